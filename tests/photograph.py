@@ -599,6 +599,11 @@ def _() -> Quantities:
     return graded(Scene(topology=chain(2), contact="set-valued"), omega=1.4)
 
 
+@scene("exponents of set-valued friction with their errors")
+def _() -> Quantities:
+    return graded(Scene(topology=chain(2), contact="set-valued"), omega=1.4, periods=64)
+
+
 @scene("exponents of Lorenz", long=True)
 def _() -> Quantities:
     return graded(Scene(oscillator="lorenz", coupling="x->x", topology=chain(2)), periods=2, transient=0)

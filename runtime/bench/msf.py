@@ -280,23 +280,23 @@ def _peer_rows(case: Case, quick: bool) -> list[Row]:
         found = []
         for scene in _starts(case, quick):
             begin = time.process_time()
-            batches, unit = _averaged(growths, case, scene, alpha, _bar(quick))
-            length = batches.blocks * batches.length / unit
-            found.append((time.process_time() - begin, length, float(batches.mean()[0, 0]), float(batches.error()[0])))
+            batches = _averaged(growths, case, scene, alpha, _bar(quick))
+            mean, error = float(batches.mean()[0, 0]), float(batches.error()[0])
+            found.append((time.process_time() - begin, batches.periods, mean, error))
         rows.append(_timed(case, f"{jitcode.NAME} {case.method}", [alpha], found))
     return rows
 
 
-def _averaged(growths: jitcode.Growths, case: Case, scene: Scene, alpha: float, bar: float) -> tuple[Batches, float]:
-    """Batches of growth up to the error bar, as `exponents` takes them, and the unit of time."""
+def _averaged(growths: jitcode.Growths, case: Case, scene: Scene, alpha: float, bar: float) -> Batches:
+    """Batches of growth up to the error bar, as `exponents` takes them."""
     unit = unit_of_time(scene)
     start = np.array([numbers[0] for numbers in scene.initial.values()])
-    batches = Batches(case.block * unit)
-    for growth in growths(alpha, start, batches.length, SETTLED // case.block):
+    batches = Batches(unit, case.block)
+    for growth in growths(alpha, start, case.block * unit, SETTLED // case.block):
         batches.add(np.array([[growth]]))
         if batches.due and np.all(batches.error() <= bar):
             break
-    return batches, unit
+    return batches
 
 
 def _bar(quick: bool) -> float:

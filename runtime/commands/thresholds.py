@@ -59,6 +59,7 @@ def configure(parser: ArgumentParser) -> None:
 def execute(arguments: Namespace) -> int:
     """Print the synchronous ranges as a table or as JSON."""
     from ..cells.kernels import kernel_source
+    from ..synchronisation.hidden_modes import hidden_modes
     from ..synchronisation.threshold import Criterion, check_probe, default_grid, thresholds
 
     with wrong_use():
@@ -70,7 +71,7 @@ def execute(arguments: Namespace) -> int:
         criterion = Criterion(**_effort(arguments))
         sigma = arguments.sigma or default_grid(scene.topology.spectrum, 0.005 if arguments.quick else 0.0025)
         scene.replace(axes={scene.strength: sigma})
-    warn(scene.warnings)
+    warn((*scene.warnings, *hidden_modes(scene)))
     result = thresholds(
         scene,
         sigma=sigma,

@@ -5,20 +5,29 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
+from scipy.special import ndtr, stdtrit
 
 from synchain.models.inputs.checks import check_integer, check_number, check_positive
 
 from ..support.execution import Execution
 from ..support.progress import Reporter
 
-__all__ = ["Averaging", "Batches"]
+__all__ = ["Averaging", "Batches", "check_whole"]
 
 BATCHES = 64
 """Most batches that are kept."""
 CHECKED = 8
 """Batches between two checks of the error."""
+FEWEST, MOST = 3, 16
+"""Fewest degrees of freedom of an error that is known, and most that are used."""
+NARROW = 0.2
+"""Degrees of freedom are NARROW n^(2/3) after n periods.
+
+Lazarus et al. take 0.4 for noise that is correlated over a few samples; chaos is over several periods.
+"""
 ALL = slice(None)
 
 
@@ -31,13 +40,18 @@ class Averaging:
     precision : float
         The average ends if every standard error is below this value.
     periods : float
-        Longest average, in periods of the drive, or in units of 2 pi if there is none.
+        Longest average, in periods of the drive, or in units of 2 pi if there is none; a whole number.
     transient : float
-        Transient before the average, in the same units.
+        Transient before the average, in the same units; a whole number.
     seed : int
         Seed of what is drawn at random before the orbit begins.
     execution : Execution
         Who does the work, and who hears how many periods are done.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a number is none, too small, or not whole.
     """
 
     precision: float
@@ -48,48 +62,60 @@ class Averaging:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "precision", check_number("precision", self.precision, 0.0))
-        object.__setattr__(self, "periods", check_positive("periods", self.periods))
-        object.__setattr__(self, "transient", check_number("transient", self.transient, 0.0))
+        object.__setattr__(self, "periods", check_whole("periods", check_positive("periods", self.periods)))
+        object.__setattr__(self, "transient", check_whole("transient", check_number("transient", self.transient, 0.0)))
         object.__setattr__(self, "seed", check_integer("seed", self.seed, 0))
 
     def reporter(self, orbits: int = 1) -> Reporter:
         """Return the reporter of the transients and the longest averages along orbits in turn; its time begins now."""
-        return self.execution.reporter(orbits * (round(self.transient) + math.ceil(self.periods)), "period")
+        return self.execution.reporter(round(orbits * (self.transient + self.periods)), "period")
 
-    def rounds(
-        self, batches: Batches, step: float, error: Callable[[], np.ndarray | float], reporter: Reporter
-    ) -> Iterator[int]:
+    def rounds(self, batches: Batches, error: Callable[[], np.ndarray | float], reporter: Reporter) -> Iterator[int]:
         """Yield how many blocks are left until the average is long or precise enough; one of them at least must be added.
 
         Parameters
         ----------
         batches : Batches
             The average.
-        step : float
-            Length of a block in periods.
         error : callable
             Returns the standard errors that must become small, or the largest.
         reporter : Reporter
             Counts the periods.
         """
-        while batches.blocks * step < self.periods:
+        while batches.periods < self.periods:
             before = batches.blocks
-            yield max(1, math.ceil(self.periods / step) - before)
-            reporter.advance(step * (batches.blocks - before))
+            yield math.ceil(self.periods / batches.block) - before
+            reporter.advance(batches.block * (batches.blocks - before))
             if batches.due and np.all(error() <= self.precision):
                 return
 
 
+def check_whole(what: str, periods: float) -> float:
+    """Return a number of periods; ValueError if it is not whole."""
+    if not periods.is_integer():
+        raise ValueError(f"{what}: found {periods:g}; expected a whole number of periods")
+    return periods
+
+
 @dataclass(slots=True)
 class Batches:
-    """Means of growth rates over batches of blocks.
+    """Means of growth rates over batches of blocks, and their standard errors.
 
     When BATCHES batches are full, they are joined in pairs, so that memory does not grow.
 
+    The error of a mean over a time T is sqrt(S/T), where S is the spectral density of the rate at frequency 0. The
+    cosine transform of the batch means has one value for each of the frequencies 1/(2T), 2/(2T) …; the mean of the
+    lowest few squares estimates S, with one degree of freedom for each. Their number grows as n^(2/3) with n periods, so
+    that the band narrows and correlations of any finite length are seen in the end. Few squares may be small together by
+    chance; Student's quantile makes up for it, so that the mean lies within two errors of the truth as often as a
+    normal variable, in 95 of 100 runs. An error of fewer than FEWEST squares is unknown: it has no variance.
+
     Parameters
     ----------
-    length : float
-        Length of one block in units of non-dimensional time.
+    unit : float
+        Length of a period in units of non-dimensional time.
+    block : float
+        Number of periods of one block.
     blocks : int
         Number of blocks so far.
     per_batch : int
@@ -105,16 +131,34 @@ class Batches:
 
     References
     ----------
-    Flyvbjerg & Petersen, J. Chem. Phys. 91, 461 (1989).
+    Batches joined in pairs: Flyvbjerg & Petersen, J. Chem. Phys. 91, 461 (1989). Cosine transform and Student's
+    distribution: Müller, J. Econometrics 141, 1331 (2007). Number of frequencies: Lazarus, Lewis, Stock & Watson, J.
+    Bus. Econ. Stat. 36, 541 (2018).
     """
 
-    length: float
+    unit: float
+    block: float = 1.0
     blocks: int = 0
     per_batch: int = 1
     sums: np.ndarray = field(default_factory=lambda: np.zeros((BATCHES, 0, 0)))
     count: int = 0
     due: bool = False
     worst: int = 0
+
+    @property
+    def periods(self) -> float:
+        """Number of periods averaged over."""
+        return self.blocks * self.block
+
+    @property
+    def time(self) -> float:
+        """Non-dimensional time averaged over."""
+        return self.blocks * (self.block * self.unit)
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom of the standard errors: NARROW n^(2/3) after n periods, within what the batches allow."""
+        return min(round(NARROW * self.periods ** (2.0 / 3.0)), MOST, self.blocks // self.per_batch - 1)
 
     def ahead(self, most: int) -> np.ndarray:
         """Return the blocks of the batches until the error is due.
@@ -160,10 +204,10 @@ class Batches:
 
     def mean(self) -> np.ndarray:
         """Return the growth per unit of time, an ndarray of shape (starts, m)."""
-        return np.asarray(np.sum(self.sums[: self.count], axis=0) / (self.blocks * self.length))
+        return np.asarray(np.sum(self.sums[: self.count], axis=0) / self.time)
 
     def error_by_start(self, strengths: slice = ALL) -> np.ndarray:
-        """Estimate the standard error of each start.
+        """Estimate the standard error of each start: half of what the mean is within in 95 of 100 runs.
 
         Parameters
         ----------
@@ -173,19 +217,16 @@ class Batches:
         Returns
         -------
         ndarray, shape (starts, strengths)
-            The largest estimate from the batches alone, joined in twos and joined in fours; inf if
-            there is a single batch.
+            The estimates; inf if the average has fewer than FEWEST degrees of freedom; 45 periods have them.
         """
-        rates = self.sums[: self.blocks // self.per_batch, :, strengths] / (self.per_batch * self.length)
-        estimates = []
-        for join in (1, 2, 4):
-            count = len(rates) // join
-            if count >= 8 or join == 1:
-                means = rates[: count * join].reshape(count, join, *rates.shape[1:]).mean(axis=1)
-                estimates.append(
-                    means.std(axis=0, ddof=1) / math.sqrt(count) if count > 1 else np.full(means[0].shape, np.inf)
-                )
-        return np.asarray(np.max(estimates, axis=0))
+        whole, freedom = self.blocks // self.per_batch, self.freedom
+        rates = self.sums[:whole, :, strengths] / (self.per_batch * self.block * self.unit)
+        if freedom < FEWEST:
+            return np.full(rates.shape[1:], np.inf)
+        parts = np.zeros((freedom, *rates.shape[1:]))
+        for wave, rate in zip(_waves(freedom, whole), rates, strict=True):
+            parts += wave[:, None, None] * rate
+        return np.asarray(stdtrit(freedom, ndtr(2.0)) / 2.0 * np.sqrt((parts**2).mean(axis=0) / whole))
 
     def error(self, strengths: slice = ALL) -> np.ndarray:
         """Return the standard errors (strengths,) of the mean over the starts, as `error_by_start`."""
@@ -204,3 +245,10 @@ class Batches:
         error = self.error()
         self.worst = int(np.argmax(error))
         return float(error[self.worst])
+
+
+@lru_cache(maxsize=8)
+def _waves(count: int, batches: int) -> np.ndarray:
+    """The lowest terms (batches, count) of the orthonormal cosine transform of some batches, but the mean."""
+    angles = [[math.pi * j * (k + 0.5) / batches for j in range(1, count + 1)] for k in range(batches)]
+    return math.sqrt(2.0 / batches) * np.array([[math.cos(angle) for angle in row] for row in angles])

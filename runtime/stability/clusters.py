@@ -179,7 +179,7 @@ def cluster_exponents(
     precision : float
         Averaging stops if every standard error is below this value.
     periods : float
-        Longest average, in periods of the drive, or in units of 2 pi if there is none.
+        Longest average, in periods of the drive, or in units of 2 pi if there is none; a whole number.
     transient : float
         Transient before the average, in the same units.
     rtol : float
@@ -219,10 +219,10 @@ def cluster_exponents(
         for _ in range(round(averaging.transient)):
             integrator.advance(unit)
             reporter.advance(1)
-        for _ in averaging.rounds(batches, 1.0, batches.error, reporter):
+        for _ in averaging.rounds(batches, batches.error, reporter):
             batches.add(integrator.advance(unit))
             apart = np.maximum(apart, _differences(integrator.state[0], partition.quotient.n, _deviating(variation)))
-    mean, error, time = batches.mean()[0], batches.error_by_start()[0], batches.blocks * unit
+    mean, error, time = batches.mean()[0], batches.error_by_start()[0], batches.time
     return ClusterExponents(partition, mean[1:], error[1:], float(mean[0]), float(error[0]), apart, time)
 
 

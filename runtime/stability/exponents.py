@@ -4,10 +4,10 @@ One orbit carries the modes of all strengths alpha + i beta = -sigma gamma at on
 (`synchain.codegen.kernels.modes`). The propagators of most modes are interpolated in the strength
 (`synchain.runtime.stability.interpolation`). On a fixed point or a periodic orbit locked to the
 drive the exponents follow from eigenvalues. Elsewhere they are the mean growth of a deviation, with
-an error from batch means.
+an error from batch means (`Batches`).
 
 Sources: Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); Benettin, Galgani, Giorgilli &
-Strelcyn, Meccanica 15, 9 (1980); batch means: Flyvbjerg & Petersen, J. Chem. Phys. 91, 461 (1989).
+Strelcyn, Meccanica 15, 9 (1980).
 """
 
 from __future__ import annotations
@@ -63,7 +63,8 @@ class Exponents(Labelled):
         Exponents per unit of non-dimensional time.
     stderr : ndarray, shape (m,)
         Standard errors. On fixed points and drive-locked periodic orbits, the difference of two
-        cycles; elsewhere from the scatter of batch means.
+        cycles; elsewhere half of what the truth lies within in 95 of 100 runs, inf below 45 periods
+        (docs/accuracy.md).
     time : float
         Time averaged over for each start.
     starts : int
@@ -211,7 +212,7 @@ def exponents(
     precision : float
         Averaging stops if the standard error of every exponent is below this value.
     periods : float
-        Longest average, in periods of the drive, or in units of 2 pi if there is none.
+        Longest average, in periods of the drive, or in units of 2 pi if there is none; a whole number.
     transient : float
         Transient before the average, in the same units.
     starts : int
@@ -448,10 +449,9 @@ def average(orbits: Orbits, averaging: Averaging, reporter: Reporter) -> tuple[n
     length : float
         Time averaged over.
     """
-    batches = Batches(orbits.unit * orbits.block)
-    for left in averaging.rounds(batches, orbits.block, lambda: batches.largest_error(averaging.precision), reporter):
+    batches = Batches(orbits.unit, orbits.block)
+    for left in averaging.rounds(batches, lambda: batches.largest_error(averaging.precision), reporter):
         parts = batches.ahead(left)
         for growth, blocks in zip(orbits.growths(parts), parts, strict=True):
             batches.add(growth, int(blocks))
-    mean, error = batches.mean(), batches.error_by_start()
-    return mean, error, batches.blocks * batches.length
+    return batches.mean(), batches.error_by_start(), batches.time

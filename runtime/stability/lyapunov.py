@@ -177,7 +177,7 @@ def lyapunov_spectrum(
     precision : float
         Averaging stops if every standard error is below this value.
     periods : float
-        Longest average, in periods of the drive, or in units of 2 pi if there is none.
+        Longest average, in periods of the drive, or in units of 2 pi if there is none; a whole number.
     transient : float
         Transient before the average, in the same units.
     rtol : float
@@ -214,8 +214,8 @@ def lyapunov_spectrum(
             frame.advance()
             reporter.advance(1)
         frame.choose_block()
-        batches, lost = Batches(frame.unit / frame.parts), np.zeros(frame.count, dtype=bool)
-        for _ in averaging.rounds(batches, 1.0 / frame.parts, lambda: batches.error()[:-1][~lost], reporter):
+        batches, lost = Batches(frame.unit, 1.0 / frame.parts), np.zeros(frame.count, dtype=bool)
+        for _ in averaging.rounds(batches, lambda: batches.error()[:-1][~lost], reporter):
             growth, share, volume = frame.advance()
             np.logical_or(lost, share < LOST * frame.rtol, out=lost)
             batches.add(np.append(np.where(np.isfinite(growth), growth, 0.0), volume)[None])
@@ -228,7 +228,7 @@ def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray) -> Lyapunov
     mean, error = batches.mean()[0], batches.error_by_start()[0]
     exponent, spread = np.where(resolved, mean[:-1], -np.inf), np.where(resolved, error[:-1], 0.0)
     order = np.argsort(-exponent, kind="stable")
-    time, volume = batches.blocks * batches.length, (float(mean[-1]), float(error[-1]))
+    time, volume = batches.time, (float(mean[-1]), float(error[-1]))
     if frame.variation.events is not None:
         known = len(exponent) == frame.variation.size
         volume = (float(exponent.sum()), float(np.hypot.reduce(spread))) if known else (math.nan, math.nan)

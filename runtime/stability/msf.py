@@ -162,18 +162,24 @@ class MSF(Labelled):
     def windows(self) -> tuple[Window, ...]:
         """Ranges of sigma in which every mode of the scene's network is stable.
 
-        Eigenvalues must be real. No mode is lost at an end that comes from an end of the grid.
+        Eigenvalues must be real. No mode is lost at an end that comes from an end of the grid. The errors of ends at
+        which one is are infinite if an average was too short to estimate them.
         """
         return tuple(self._trimmed(window) for window in windows(self.open_ranges, self.scene.topology, self.errors))
 
     def _trimmed(self, window: Window) -> Window:
-        """Remove the modes of a window whose strength at its ends is an end of the grid."""
+        """Remove the modes of a window whose strength at its ends is an end of the grid, and errors that are unknown."""
         low, high = (float(self.fine.alpha[k]) for k in (0, -1))
         modes = [
             None if mode is None or math.isclose(sigma * mode.size, end, rel_tol=1e-12) else mode
             for sigma, mode, end in ((window.low, window.low_mode, low), (window.high, window.high_mode, high))
         ]
-        return replace(window, low_mode=modes[0], high_mode=modes[1])
+        known = self.errors is not None
+        low_error, high_error = (
+            0.0 if mode is None else error if known else math.inf
+            for mode, error in zip(modes, (window.low_error, window.high_error), strict=True)
+        )
+        return replace(window, low_mode=modes[0], high_mode=modes[1], low_error=low_error, high_error=high_error)
 
     @property
     def open_ranges(self) -> tuple[Interval, ...]:

@@ -185,13 +185,15 @@ class Orbits:
         Parameters
         ----------
         periods : float
-            Length of the longest average in units. A short one keeps short blocks, whose scatter says its error.
+            Length of the longest average in units, a whole number of blocks. A short one keeps short blocks, whose
+            scatter says its error.
         """
         limit = max(0.01 * self.scene.rtol, 1e-12)  # later blocks of a chaotic orbit are up to ten times worse
         one = self.integrator_of(self.strengths[:1], LOOSENESS)
         one.advance(self.unit)
         taken = STEP * self.components * one.steps / len(self.state)
-        blocks = [b for b in BLOCKS if b <= max(4.0, periods / BATCHES)] if self.scene.forced else FREE_BLOCKS
+        most = max(4.0, periods / BATCHES)
+        blocks = [b for b in BLOCKS if b <= most and periods % b == 0.0] if self.scene.forced else FREE_BLOCKS
         lines = 1 if self.strengths.ndim == 1 else len(lines_of(self.strengths)[1])
         for block, nodes, parts in _choices(blocks, lines * taken, len(self.strengths) * self.components**2):
             chosen = strength_interpolation(self.strengths, nodes, parts)

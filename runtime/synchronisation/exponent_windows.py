@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,6 @@ import numpy as np
 from synchain.models.scenes.scene import Scene
 
 from ..prediction.intervals import Interval
-from ..prediction.synchronisability import Window
 from ..results.labelled import words_of
 from ..stability.exponents import initial_states
 from ..stability.msf import MSF, msf
@@ -53,19 +51,13 @@ class ExponentWindows:
         found = function.windows
         return cls(
             tuple((window.low, window.high) for window in found),
-            tuple(_errors(window, function.errors is not None) for window in found),
+            tuple((window.low_error, window.high_error) for window in found),
         )
 
     @property
     def words(self) -> str:
         """The windows with their errors, or why there are none."""
         return f"not computed: {self.absent}" if self.absent else words_of(self.intervals, self.errors)
-
-
-def _errors(window: Window, known: bool) -> Interval:
-    """Errors of both ends; of an end that no mode decides, 0."""
-    low, high = (error if known else math.inf for error in (window.low_error, window.high_error))
-    return 0.0 if window.low_mode is None else low, 0.0 if window.high_mode is None else high
 
 
 def exponent_windows(

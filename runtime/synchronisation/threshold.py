@@ -30,10 +30,12 @@ from ..cells.plan import Planner
 from ..cells.reduce import reduce_scene
 from ..prediction.intervals import Interval, intersect, refine, scale
 from ..results.labelled import Labelled, dataset, ends_of, words_of
+from ..stability.averages import check_whole
 from ..support.arrays import row
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .exponent_windows import ExponentWindows, exponent_windows
+from .hidden_modes import hidden_modes
 from .trials import Trials
 
 __all__ = [
@@ -69,6 +71,9 @@ class Criterion:
     synchronisation error below `tolerance`, averaged over `window` drive periods after a transient
     of `transient`.  Near the ends of a range of chaotic motion single starts synchronise or burst
     by chance; their majority does not depend on one of them.
+
+    Distances between oscillators are those of the scene's own start in all of them.  Where oscillators and links are
+    linear, a mode in which these distances have no part grows from rounding alone: `thresholds` warns of it.
     """
 
     tolerance: float = 1e-3
@@ -226,7 +231,8 @@ def thresholds(
     Returns
     -------
     Thresholds
-        A network in several parts is allowed; its warnings say so.
+        A network in several parts is allowed; its warnings say so, and name the modes of a linear network that the
+        start has no part in (`hidden_modes`).
 
     Raises
     ------
@@ -243,13 +249,14 @@ def thresholds(
     scene = scene.replace(record=("sync_error",))
     grid = default_grid(spectrum) if sigma is None else row("sigma", sigma, 2, rising=True)
     resolution = check_positive("resolution", resolution)
-    precision, periods = check_number("precision", precision, 0.0), check_positive("periods", periods)
+    precision = check_number("precision", precision, 0.0)
+    periods = check_whole("periods", check_positive("periods", periods))
     alpha = _probe_grid(grid, spectrum)
     stable = exponent_windows(scene, alpha, execution, precision, periods, criterion.seed)
     pair = probe(scene, alpha, criterion, resolution, execution)
     direct = simulate(scene, grid, criterion, resolution, execution)
     predicted = project(pair.intervals, spectrum, float(grid[-1]), float(grid[0]))
-    return Thresholds(scene, pair, tuple(predicted), direct, criterion, stable, scene.warnings)
+    return Thresholds(scene, pair, tuple(predicted), direct, criterion, stable, (*scene.warnings, *hidden_modes(scene)))
 
 
 def default_grid(spectrum: Spectrum, step: float = 0.0025) -> np.ndarray:

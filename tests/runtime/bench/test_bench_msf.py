@@ -98,7 +98,8 @@ def test_the_peers_average_ends_at_the_error_bar(bar: float) -> None:
         noise = np.random.default_rng(0)
         return (float(x) for x in iter(lambda: noise.normal(-0.3 * block, 1.0), None))
 
-    batches, unit = msf._averaged(growths, case, case.scene, 0.5, bar)
+    batches = msf._averaged(growths, case, case.scene, 0.5, bar)
+    unit = batches.unit
     assert unit == pytest.approx(2 * math.pi / 1.4)
     assert asked == [(0.5, [0.3, 0.0], 4 * unit, 75)]
     assert batches.error()[0] <= bar

@@ -1,0 +1,116 @@
+"""Averages along chaotic orbits: how far they lie from the truth in units of their errors, and how long they are."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from synchain.models import Scene, chain
+from synchain.runtime import cluster_exponents, exponents, lyapunov_spectrum, thresholds
+from synchain.runtime.stability.averages import FEWEST, MOST, Averaging, Batches
+from synchain.runtime.stability.exponents import average, initial_states
+from synchain.runtime.stability.orbits import Orbits
+from synchain.runtime.support.execution import Execution
+
+STARTS, WINDOWS = 256, 4
+"""Orbits, and averages one after another along each."""
+
+FRICTION = Scene("friction", topology=chain(2), parameters={"omega": 1.4}, rtol=1e-6)
+ROSSLER = Scene("rossler", "x->x", chain(2), rtol=1e-6)
+LORENZ = Scene("lorenz", "x->x", chain(2), rtol=1e-6)
+
+
+def distances(scene: Scene, alpha: list[float], periods: int) -> np.ndarray:
+    """Distances (averages, m) of averages from the mean of them all, in units of their errors."""
+    orbits = Orbits.make(scene, np.array(alpha), initial_states(scene, STARTS, seed=1), workers=1)
+    orbits.settle(100)
+    orbits.prepare(periods)
+    averaging = Averaging(0.0, periods, 0.0, 0, Execution(1, show_progress=False))
+    with averaging.reporter() as reporter:
+        found = [average(orbits, averaging, reporter)[:2] for _ in range(WINDOWS)]
+    mean, error = (np.concatenate(part) for part in zip(*found, strict=True))
+    return np.abs(mean - mean.mean(axis=0)) / error
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("scene", "alpha"),
+    [(FRICTION, [0.0, 0.1, 0.3, 0.5]), (ROSSLER, [0.0, 0.1, 0.5, 2.0, 5.0]), (LORENZ, [0.0, 2.0, 8.0])],
+    ids=["friction", "Rössler", "Lorenz"],
+)
+def test_averages_in_chaos_lie_within_two_errors(scene, alpha):
+    """A normal variable is beyond two standard deviations in 4.6 of 100 cases (docs/accuracy.md)."""
+    for periods in (50, 100):
+        beyond = (distances(scene, alpha, periods) > 2.0).mean(axis=0)
+        assert np.all((beyond > 0.012) & (beyond < 0.12)), (periods, beyond)
+
+
+@pytest.mark.parametrize(("blocks", "block"), [(45, 1.0), (25, 4.0), (640, 1 / 8), (1280, 1.0)])
+def test_averages_of_white_noise_lie_within_two_errors_in_95_of_100_cases(blocks, block):
+    """Few or many batches, joined or not: Student's distribution is exact. 20 000 cases tell it to 0.15 of 100."""
+    random, batches = np.random.default_rng(0), Batches(2.0, block)
+    for _ in range(blocks):
+        batches.add(random.normal(size=(20_000, 1)))
+    beyond = np.abs(batches.mean()) > 2.0 * batches.error_by_start()
+    assert 100 * beyond.mean() == pytest.approx(4.55, abs=0.45)
+
+
+def test_the_error_follows_from_what_remains_of_the_noise_after_long_times():
+    """Differences of white noise add up to almost nothing; an error from their scatter would be thirty times too large."""
+    random, batches, last = np.random.default_rng(0), Batches(1.0), np.zeros((1000, 1))
+    for _ in range(2048):
+        noise = random.normal(size=last.shape)
+        batches.add(noise - last)
+        last = noise
+    scatter = math.sqrt(2.0 / 2048)
+    assert np.median(batches.error_by_start()) < 0.15 * scatter
+    assert batches.freedom == MOST
+
+
+def test_an_average_of_few_periods_has_no_error():
+    short, enough = Batches(1.0, 1 / 8), Batches(1.0, 1 / 8)
+    for blocks, batches in ((44, short), (45, enough)):
+        for growth in np.random.default_rng(0).normal(size=8 * blocks):
+            batches.add(np.array([[growth]]))
+    assert short.freedom == FEWEST - 1
+    assert short.error().tolist() == [math.inf]
+    assert enough.freedom == FEWEST
+    assert np.isfinite(enough.error()).all()
+
+
+@pytest.mark.parametrize("periods", [1, 3, 6, 50.0])
+@pytest.mark.parametrize(
+    ("scene", "unit"), [(FRICTION, 2 * math.pi / 1.4), (ROSSLER, 2 * math.pi)], ids=["friction", "Rössler"]
+)
+def test_averages_are_as_long_as_asked(scene, unit, periods):
+    given = {"periods": periods, "transient": 10, "precision": 0.0, "show_progress": False}
+    assert exponents(scene, [0.0, 0.2], starts=1, workers=1, **given).time == pytest.approx(periods * unit, rel=1e-12)
+
+
+def test_spectra_and_clusters_are_averaged_as_long_as_asked():
+    given = {"periods": 3, "transient": 10, "precision": 0.0, "show_progress": False}
+    pair = ROSSLER.replace(initial={"x": [1.0, 1.1]}, parameters={**ROSSLER.parameters, "sigma": 0.1})
+    for found in (lyapunov_spectrum(ROSSLER, **given), cluster_exponents(pair, [0, 0], **given)):
+        assert found.time == pytest.approx(6 * math.pi, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "average_of",
+    [
+        lambda **given: exponents(ROSSLER, [0.1], **given),
+        lambda **given: lyapunov_spectrum(ROSSLER, **given),
+        lambda **given: cluster_exponents(ROSSLER, [0, 0], **given),
+        lambda **given: thresholds(FRICTION, **given),
+    ],
+    ids=["exponents", "lyapunov_spectrum", "cluster_exponents", "thresholds"],
+)
+def test_parts_of_a_period_are_refused(average_of):
+    with pytest.raises(ValueError, match=r"^periods: found 2\.5; expected a whole number of periods$"):
+        average_of(periods=2.5)
+
+
+def test_a_transient_of_parts_of_a_period_is_refused():
+    with pytest.raises(ValueError, match=r"^transient: found 0\.5; expected a whole number of periods$"):
+        exponents(ROSSLER, [0.1], transient=0.5)
