@@ -16,6 +16,7 @@ from sympy.functions.elementary.piecewise import Piecewise
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
+from synchain.models.mechanics.jumps import JUMPING, KINKED, jumps
 
 from ..program import functions
 from ..program.expressions import ONE, ZERO, Expression, Name, Negation, Number
@@ -58,11 +59,6 @@ The others follow from the derivative that SymPy knows.
 ODD = (sp.sin, sp.tan, sp.sinh, sp.tanh, sp.atan, sp.asin, sp.erf)
 EVEN = (sp.cos, sp.cosh)
 
-KINKED = (sp.Abs, sp.Max, sp.Min)
-"""Functions with a kink where an argument, or the difference of two, is zero."""
-
-JUMPING = (sp.sign, sp.floor, sp.ceiling, sp.Heaviside)
-
 STEADY = ("sin", "cos")
 """Functions of which some low coefficient is always as large as the argument makes the high ones."""
 
@@ -72,7 +68,7 @@ PLAIN = 3
 
 def jump(equations: Equations) -> sp.Expr | None:
     """Return a part of some equations that jumps in the states or in time, or is a root at a kink; None if there is none."""
-    return next((part for own, moving in _templates(equations) for part in _jumps(own, moving)), None)
+    return next((part for own, moving in _templates(equations) for part in _unserial(own, moving)), None)
 
 
 def is_analytic(equations: Equations) -> bool:
@@ -98,30 +94,12 @@ def is_linear(equations: Equations) -> bool:
     return fixed and equations.constant_mass
 
 
-def _jumps(expressions: Sequence[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:
-    parts = {part for e in expressions for part in e.atoms(*JUMPING, Piecewise) if part.free_symbols & moving}
-    found = [part for part in parts if not (isinstance(part, Piecewise) and _joins(part, moving))]
+def _unserial(expressions: Sequence[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:
+    """The parts without series: those that jump, and roots at a kink."""
     powers = {part for e in expressions for part in e.atoms(sp.Pow) if part.base.free_symbols & moving}
     roots = [p for p in powers if p.exp.is_integer is not True]
-    found += [p for p in roots if any(isinstance(f, (*KINKED, Piecewise)) for f in sp.Mul.make_args(p.base))]
-    return sorted(found, key=sp.default_sort_key)
-
-
-def _joins(choice: Piecewise, moving: Set[sp.Symbol]) -> bool:
-    """True if the pieces of a choice agree where it goes from one to the next, as far as can be seen."""
-    pieces = list(choice.args)
-    for k, (piece, condition) in enumerate(pieces[:-1]):
-        if not isinstance(condition, sp.StrictGreaterThan | sp.GreaterThan | sp.StrictLessThan | sp.LessThan):
-            return False
-        gap, rest = condition.lhs - condition.rhs, Piecewise(*pieces[k + 1 :])
-        at = next((s for s in sorted(gap.free_symbols & moving, key=str) if _steady(gap.diff(s), s)), None)
-        if at is None or sp.simplify((piece - rest).subs(at, sp.solve(gap, at)[0])) != 0:
-            return False
-    return bool(pieces[-1][1] == sp.true)
-
-
-def _steady(slope: sp.Expr, symbol: sp.Symbol) -> bool:
-    return bool(slope != 0 and not slope.has(symbol))
+    roots = [p for p in roots if any(isinstance(f, (*KINKED, Piecewise)) for f in sp.Mul.make_args(p.base))]
+    return sorted([*jumps(expressions, moving), *roots], key=sp.default_sort_key)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +113,7 @@ class Template:
     def of(cls, expressions: Sequence[sp.Expr], moving: Iterable[sp.Symbol], supply: Iterator[sp.Symbol]) -> Template:
         """Share the repeated parts under names of the supply; ValueError for functions of `moving` symbols that jump."""
         symbols = frozenset(moving)
-        for part in _jumps(expressions, symbols):
+        for part in _unserial(expressions, symbols):
             raise ValueError(
                 f"taylor: a function that jumps, or has no series at its kink; found {part}; expected continuous functions, "
                 f"analytic on either side of a kink; use integrator dop853 or rodas5p"

@@ -15,6 +15,7 @@ import sympy as sp
 from ..interactions.link import strength
 from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, Edge, Node
+from ..mechanics.jumps import discontinuity, rough_at
 from .equations import Equations
 from .mode_inertia import effective_slope
 from .reduction import collapse
@@ -72,7 +73,8 @@ class Variation:
     Raises
     ------
     ValueError
-        For an entry outside the matrix, with an unknown symbol, or not linear in `parameters`.
+        For an entry outside the matrix, with an unknown symbol, or not linear in `parameters`, and for rates of the orbit that
+        jump in its state: a deviation jumps there too (saltation), which is known for set-valued friction alone.
     """
 
     orbit: Equations
@@ -88,6 +90,7 @@ class Variation:
             raise ValueError(f"the symbol {min(taken)!r} is needed for the strength of a mode; rename it in the model")
         if (self.events is not None) != self.orbit.sticks:
             raise ValueError("variation: events belong to set-valued friction, and to nothing else")
+        _expect_continuous(self.orbit)
         for (row, column), e in self.matrix:
             if not (0 <= row < self.size and 0 <= column < self.size):
                 raise ValueError(f"variation: entry ({row}, {column}) is outside the {self.size} x {self.size} matrix")
@@ -97,6 +100,19 @@ class Variation:
             slopes = [e.diff(s) for s in self.parameters]
             if any(slope.has(*self.parameters) for slope in slopes):
                 raise ValueError(f"variation: entry ({row}, {column}) is not linear in the strengths of a mode: {e}")
+
+
+def _expect_continuous(orbit: Equations) -> None:
+    """Raise ValueError for rates that jump in the state."""
+    templates = [(node.rhs, node.continuous) for node in orbit.nodes]
+    templates += [(edge.rhs, (*edge.here, *edge.there)) for edge in orbit.edges]
+    for rates, moving in templates:
+        part = discontinuity(rates, set(moving))
+        if part is not None:
+            raise ValueError(
+                f"small deviations: found {part}, by which rates jump, and deviations too; expected continuous rates, or "
+                'friction with contact = "set-valued"'
+            )
 
 
 def mode(equations: Equations, plane: bool = False) -> Variation:
@@ -340,8 +356,8 @@ def source_slopes(equations: Equations) -> tuple[sp.Matrix, ...]:
     Raises
     ------
     ValueError
-        If nodes differ, there is no coupling, several layers have inertia, or links are not proportional to their weight and
-        to one strength.
+        If nodes differ, there is no coupling, several layers have inertia, links are not proportional to their weight and
+        to one strength, or have no derivative between equal states.
     """
     several = len(equations.layers) > 1
     equations.expect_alike("transversal modes of complete synchronisation", inertia_too=not several, layers_too=True)
@@ -355,6 +371,11 @@ def _source_slope(edge: Edge, node: Node) -> sp.Matrix:
     """H of one layer, without inertia."""
     sigma = strength(edge, node.parameters)
     equal = {**dict(zip((*edge.here, *edge.there), node.state * 2, strict=True)), **dict(edge.theirs)}
+    part = next((part for e in edge.rhs if (part := rough_at(e, equal, edge.there)) is not None), None)
+    if part is not None:
+        raise ValueError(
+            f"small deviations: found {part}, by which a link jumps or has a kink between equal states; expected a derivative there"
+        )
     weighted = sp.Matrix(edge.jacobian_there()).xreplace(equal)
     matrix = weighted.xreplace({edge.weight: sp.S.One})
     zero = sp.zeros(*matrix.shape)

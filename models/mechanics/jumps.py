@@ -1,0 +1,101 @@
+"""Where expressions jump: series end there, and so do small deviations, which jump too."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Set
+from functools import reduce
+
+import sympy as sp
+from sympy.functions.elementary.piecewise import Piecewise
+
+from .calculus import derivative
+
+__all__ = ["JUMPING", "KINKED", "discontinuity", "jumps", "rough_at"]
+
+JUMPING = (sp.sign, sp.floor, sp.ceiling, sp.Heaviside)
+"""Functions that jump."""
+
+KINKED = (sp.Abs, sp.Max, sp.Min)
+"""Functions with a kink where an argument, or the difference of two, is zero."""
+
+SIDES = {sp.sign: (sp.S.One, sp.S.NegativeOne), sp.Heaviside: (sp.S.One, sp.S.Zero)}
+"""The values of a function above and below the zero of its argument."""
+
+
+def jumps(expressions: Iterable[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:
+    """Return the parts that jump where `moving` symbols pass some value, in a fixed order.
+
+    Pieces that agree where one goes over into the next do not jump, as far as can be seen.
+    """
+    parts = {part for e in expressions for part in e.atoms(*JUMPING, Piecewise) if part.free_symbols & moving}
+    found = [part for part in parts if not (isinstance(part, Piecewise) and _joins(part, moving))]
+    return sorted(found, key=sp.default_sort_key)
+
+
+def discontinuity(expressions: Iterable[sp.Expr], moving: Set[sp.Symbol]) -> sp.Expr | None:
+    """Return a part by which one of the expressions jumps, None if all are continuous, as far as can be seen.
+
+    The parts of sign(v)*v**2 do jump, and it is continuous.
+    """
+    for e in expressions:
+        for part in jumps([e], moving):
+            argument, above, below = _sides(part)
+            if argument is None or not _agree(e.xreplace({part: above}), e.xreplace({part: below}), argument, moving):
+                return part
+    return None
+
+
+def _sides(part: sp.Expr) -> tuple[sp.Expr | None, sp.Expr, sp.Expr]:
+    """What passes zero where a part jumps, and the part above and below; None for parts of many pieces."""
+    if isinstance(part, sp.Abs):
+        return part.args[0], part.args[0], -part.args[0]
+    if type(part) in SIDES:
+        return part.args[0], *SIDES[type(part)]
+    if isinstance(part, Piecewise) and len(part.args) == 2:
+        (first, condition), (second, _) = part.args
+        if isinstance(condition, sp.StrictGreaterThan | sp.GreaterThan | sp.StrictLessThan | sp.LessThan):
+            return condition.lhs - condition.rhs, first, second
+    return None, part, part
+
+
+def _joins(choice: Piecewise, moving: Set[sp.Symbol]) -> bool:
+    """True if the pieces of a choice agree where it goes from one to the next, as far as can be seen."""
+    pieces = list(choice.args)
+    for k, (piece, condition) in enumerate(pieces[:-1]):
+        if not isinstance(condition, sp.StrictGreaterThan | sp.GreaterThan | sp.StrictLessThan | sp.LessThan):
+            return False
+        if not _agree(piece, Piecewise(*pieces[k + 1 :]), condition.lhs - condition.rhs, moving):
+            return False
+    return bool(pieces[-1][1] == sp.true)
+
+
+def _agree(one: sp.Expr, other: sp.Expr, gap: sp.Expr, moving: Set[sp.Symbol]) -> bool:
+    """True if two expressions are equal where `gap` is zero."""
+    at = next((s for s in sorted(gap.free_symbols & moving, key=str) if _steady(gap.diff(s), s)), None)
+    return at is not None and bool(sp.simplify((one - other).subs(at, sp.solve(gap, at)[0])) == 0)
+
+
+def _steady(slope: sp.Expr, symbol: sp.Symbol) -> bool:
+    return bool(slope != 0 and not slope.has(symbol))
+
+
+def rough_at(e: sp.Expr, place: Mapping[sp.Symbol, sp.Expr], symbols: Iterable[sp.Symbol]) -> sp.Expr | None:
+    """Return a part by which an expression, or a derivative of it by `symbols`, jumps at a place; None if there is none."""
+    e, symbols = e.replace(sp.Max, _larger).replace(sp.Min, _smaller), tuple(symbols)
+    for part in sorted(e.atoms(sp.Abs, *SIDES, Piecewise), key=sp.default_sort_key):
+        argument, above, below = _sides(part)
+        if argument is None or sp.expand(argument.xreplace(place)) != 0:
+            continue
+        sides = [e.xreplace({part: value}) for value in (above, below)]
+        slopes = [[side, *(derivative(side, s) for s in symbols)] for side in sides]
+        if any(sp.simplify((one - other).xreplace(place)) != 0 for one, other in zip(*slopes, strict=True)):
+            return part
+    return None
+
+
+def _larger(*values: sp.Expr) -> sp.Expr:
+    return reduce(lambda a, b: (a + b + sp.Abs(a - b)) / 2, values)
+
+
+def _smaller(*values: sp.Expr) -> sp.Expr:
+    return -_larger(*(-value for value in values))
