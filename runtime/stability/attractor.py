@@ -1,6 +1,6 @@
 """Classification of the motion that an orbit has settled on.
 
-The motion is a fixed point, a periodic orbit locked to the drive, or neither.
+The motion is a fixed point, a periodic orbit locked to the drive, a limit cycle of an undriven oscillator, or none of these.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import sympy as sp
 
 from synchain.models.dynamics.variational import Variation
 
+from .limit_cycle import limit_cycle
 from .orbits import FAR, Orbits
 
 __all__ = ["Attractor", "Motion", "cycle_propagators", "find_attractor"]
@@ -48,7 +49,7 @@ class Attractor:
         Propagators of all m modes over two successive cycles. For a fixed point and a linear
         motion, the matrix of the variational equation, twice. None for aperiodic motion.
     periods : int
-        Drive periods of one cycle.
+        Drive periods of one cycle; 1 without a drive.
     logarithms : float or ndarray, shape (2, m)
         Logarithms of the factors that the propagators of a cycle are without.
     """
@@ -111,10 +112,10 @@ def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
     if orbit.linear:
         timed = any(e.has(sp.Symbol("t", real=True)) for _, e in orbit.variation.matrix)
         return _periodic(orbit, Motion.LINEAR, 1) if timed else _steady(orbit, Motion.LINEAR)
-    if not orbit.scene.forced:
-        return _fixed_point(orbit)
-    integrator = orbit.integrator_of(orbit.strengths[:1])
     closed = max(RETURN, 0.1 * orbit.scene.rtol)
+    if not orbit.scene.forced:
+        return _free(orbit, closed)
+    integrator = orbit.integrator_of(orbit.strengths[:1])
     for _ in range(3):
         states = [integrator.state[0]]
         for _ in range(LONGEST):
@@ -131,11 +132,12 @@ def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
     return Attractor(Motion.APERIODIC, 0.0)
 
 
-def _periodic(orbit: Orbits, motion: Motion, cycle: int) -> Attractor:
-    """Return motion along which the variational equation repeats itself after some drive periods."""
-    both = [cycle_propagators(orbit, cycle) for _ in range(2)]
+def _periodic(orbit: Orbits, motion: Motion, cycle: int, unit: float | None = None) -> Attractor:
+    """Return motion along which the variational equation repeats itself after some drive periods, or other units."""
+    unit = orbit.unit if unit is None else unit
+    both = [cycle_propagators(orbit, cycle, unit / orbit.unit) for _ in range(2)]
     propagators, logarithms = (np.concatenate(parts) for parts in zip(*both, strict=True))
-    return Attractor(motion, cycle * orbit.unit, propagators, cycle, logarithms)
+    return Attractor(motion, cycle * unit, propagators, cycle, logarithms)
 
 
 def _distance(a: np.ndarray, b: np.ndarray) -> float:
@@ -143,7 +145,7 @@ def _distance(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.abs(a - b).max() / max(1e-3, np.abs(b).max()))
 
 
-def cycle_propagators(orbit: Orbits, cycle: int) -> tuple[np.ndarray, np.ndarray]:
+def cycle_propagators(orbit: Orbits, cycle: int, block: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Integrate the propagators of all modes over one cycle, from the current state.
 
     Parameters
@@ -151,7 +153,9 @@ def cycle_propagators(orbit: Orbits, cycle: int) -> tuple[np.ndarray, np.ndarray
     orbit : Orbits
         A single orbit; its state is advanced by the cycle.
     cycle : int
-        Number of drive periods.
+        Number of blocks, drive periods unless said otherwise.
+    block : float
+        Length of a block in units of the orbit.
 
     Returns
     -------
@@ -160,7 +164,7 @@ def cycle_propagators(orbit: Orbits, cycle: int) -> tuple[np.ndarray, np.ndarray
     logarithms : ndarray, shape (1, m)
         Logarithm of this factor.
     """
-    orbit.block, orbit.integrator = 1.0, orbit.integrator_of(orbit.strengths)
+    orbit.block, orbit.integrator = block, orbit.integrator_of(orbit.strengths)
     total, logarithms = orbit.propagators()
     for _ in range(cycle - 1):
         propagators, more = orbit.propagators()
@@ -172,12 +176,13 @@ def cycle_propagators(orbit: Orbits, cycle: int) -> tuple[np.ndarray, np.ndarray
     return total, logarithms
 
 
-def _fixed_point(orbit: Orbits) -> Attractor:
-    """Return a fixed point if the orbit rests, else aperiodic motion."""
+def _free(orbit: Orbits, closed: float) -> Attractor:
+    """Return the fixed point or the limit cycle of an undriven orbit, else aperiodic motion."""
     rates = sp.lambdify(_symbols(orbit.variation), list(orbit.variation.orbit.rhs()), "numpy")(*_values(orbit))
-    if not np.abs(rates).max() < RETURN * max(1.0, np.abs(orbit.state).max()):
-        return Attractor(Motion.APERIODIC, 0.0)
-    return _steady(orbit, Motion.FIXED_POINT)
+    if np.abs(rates).max() < RETURN * max(1.0, np.abs(orbit.state).max()):
+        return _steady(orbit, Motion.FIXED_POINT)
+    period = 0.0 if orbit.variation.events else limit_cycle(orbit, closed)
+    return _periodic(orbit, Motion.PERIODIC, 1, period) if period else Attractor(Motion.APERIODIC, 0.0)
 
 
 def _steady(orbit: Orbits, motion: Motion) -> Attractor:

@@ -1,0 +1,88 @@
+"""Limit cycles of undriven oscillators: their exponents are eigenvalues of a period, not averages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from synchain.models import Field, Scene, chain
+from synchain.runtime import exponents, msf
+
+VAN_DER_POL = Field({"x": "v", "v": "mu*(1 - x**2)*v - x"}, parameters={"mu": 1.0})
+
+
+def pair(mu: float, **settings: object) -> Scene:
+    return Scene(VAN_DER_POL, "v->v", chain(2), initial={"x": 1, "v": 0.1}, parameters={"mu": mu}, **settings)
+
+
+def floquet(mu: float, alphas: Sequence[float]) -> tuple[float, list[float]]:
+    """The period, and the largest exponents of modes, by SciPy."""
+
+    def both(_: float, z: np.ndarray, alpha: float) -> np.ndarray:
+        x, v = z[:2]
+        matrix = np.array([[0.0, 1.0], [-2.0 * mu * x * v - 1.0, mu * (1.0 - x * x) - alpha]])
+        return np.concatenate([[v, mu * (1.0 - x * x) * v - x], (matrix @ z[2:].reshape(2, 2)).ravel()])
+
+    def turn(_: float, z: np.ndarray, *_more: float) -> float:
+        return float(z[1])
+
+    turn.direction = -1  # type: ignore[attr-defined]
+    tight = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
+    turns = solve_ivp(both, (0.0, 400.0), [2.0, 0.0, 0, 0, 0, 0], args=(0.0,), events=turn, **tight)
+    (*_, before, last), state = turns.t_events[0], turns.y_events[0][-1][:2]
+    found = []
+    for alpha in alphas:
+        end = solve_ivp(both, (0.0, last - before), [*state, 1.0, 0.0, 0.0, 1.0], args=(alpha,), **tight).y[2:, -1]
+        found.append(float(np.log(np.abs(np.linalg.eigvals(end.reshape(2, 2))).max()) / (last - before)))
+    return float(last - before), found
+
+
+@pytest.mark.parametrize("mu", [0.1, 1.0, 10.0])
+def test_exponents_along_a_cycle_are_eigenvalues(mu: float) -> None:
+    found = exponents(pair(mu), [0.0, 0.1, 0.5], starts=3, rtol=1e-9)
+    assert [attractor.kind for attractor in found.attractors] == ["periodic"] * 3
+    period, expected = floquet(mu, [0.0, 0.1, 0.5])
+    np.testing.assert_allclose([attractor.cycle for attractor in found.attractors], period, rtol=1e-8)
+    np.testing.assert_allclose(found.exponent, expected, atol=1e-8)
+    assert found.stderr.max() < 1e-7
+
+
+@pytest.mark.parametrize("omega", [0.02, 2.0, 1e3])
+def test_any_unit_of_time(omega: float) -> None:
+    """z' = omega (1 + 2 i - |z|^2) z with both parts coupled: -alpha, beside the 0 of the motion itself."""
+    node = Field({"x": "o*(x - 2*y - (x**2 + y**2)*x)", "y": "o*(2*x + y - (x**2 + y**2)*y)"}, parameters={"o": omega})
+    scene = Scene(node, "x->x, y->y", chain(2), initial={"x": 0.5, "y": 0.1})
+    found = exponents(scene, np.array([0.0, 0.3]) * omega, transient=round(max(20.0, 10.0 / omega)), starts=2)
+    np.testing.assert_allclose(found.attractors[0].cycle, np.pi / omega, rtol=1e-6)
+    np.testing.assert_allclose(found.exponent, [0.0, -0.3 * omega], atol=2e-6 * omega)
+
+
+@pytest.mark.parametrize(("c", "turns"), [(2.5, 1), (3.5, 2), (4.0, 4)])
+def test_doubled_periods_of_rossler(c: float, turns: int) -> None:
+    scene = Scene("rossler", "x->x", chain(2), parameters={"a": 0.2, "b": 0.2, "c": c})
+    found = exponents(scene, [0.0, 0.3], transient=2000, starts=1, rtol=1e-8)
+    assert found.attractors[0].kind == "periodic"
+    assert round(found.attractors[0].cycle / 5.8) == turns
+    assert abs(found.exponent[0]) < 1e-6
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        lambda: Scene("rossler", "x->x", chain(2), parameters={"a": 0.2, "b": 0.2, "c": 9.0}),
+        lambda: Scene("lorenz", "x->x", chain(2)),
+        lambda: Scene("pendulum", topology=chain(2)),
+    ],
+)
+def test_chaos_and_conservative_orbits_are_averaged(scene: Callable[[], Scene]) -> None:
+    """Chaos comes near its unstable cycles, and every orbit of a pendulum is a cycle; neither attracts."""
+    found = exponents(scene(), [0.0, 0.2], periods=64, starts=4)
+    assert {attractor.kind for attractor in found.attractors} == {"aperiodic"}
+
+
+def test_windows_of_a_cycle_begin_at_zero() -> None:
+    function = msf(pair(1.0), np.linspace(0.0, 2.0, 21))
+    assert [low for low, _ in function.intervals] == pytest.approx([0.0], abs=1e-6)
