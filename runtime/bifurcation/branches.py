@@ -144,13 +144,17 @@ def follow(
     Raises
     ------
     ValueError
-        If the parameter is unknown, or if the values are not monotonic.
+        If the parameter is unknown, if the values are not monotonic, and for the cycle of an undriven oscillator.
     TypeError
         If `first` is no PeriodicOrbit.
     ArithmeticError
         If there is no orbit near `first` at values[0].
     """
     check_instance("first", first, PeriodicOrbit, "a PeriodicOrbit, such as periodic_orbit(scene) returns")
+    if first.free:
+        raise ValueError(
+            "first: found the limit cycle of an oscillator without a drive; expected an orbit of a driven one"
+        )
     wanted = checked_values(first.scene, name, values)
     scene = others(Given(follow, parameters, more, NEWTON), scene, name)
     with Execution(1, None, show_progress, progress).reporter(len(wanted), "value") as reporter:

@@ -1,4 +1,4 @@
-"""Periodic orbits of a driven oscillator by Newton's method on its stroboscopic map.
+"""Periodic orbits by Newton's method: of a driven oscillator on its stroboscopic map, of an undriven one with its period.
 
 The derivative of the map is the propagator of a deviation along the orbit
 (`synchain.runtime.stability.orbits`), through stick and slip if friction is set-valued. Newton's
@@ -26,8 +26,9 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.keywords import Given
 from ..results.labelled import Labelled, dataset
-from ..stability.attractor import cycle_propagators
+from ..stability.attractor import RETURN, cycle_propagators
 from ..stability.exponents import coupled_cell, single_cell
+from ..stability.limit_cycle import limit_cycle
 from ..stability.orbits import Orbits, unit_of_time
 from .phases import Phases, phases_of
 
@@ -65,22 +66,25 @@ LONGEST = 10_000
 
 @dataclass(frozen=True, slots=True, repr=False)
 class PeriodicOrbit(Labelled):
-    """A motion that repeats itself after some periods of the drive.
+    """A motion that repeats itself, after some periods of the drive or, without a drive, after a time of its own.
 
     Parameters
     ----------
     scene : Scene
         Oscillator with its parameters.
     periods : int
-        Number of drive periods.
+        Number of drive periods; 1 without a drive.
     state : ndarray, shape (components,)
-        State at the beginning of a period of the drive.
+        State at the beginning of a period of the drive, or anywhere on the orbit of an undriven oscillator.
     multipliers : ndarray, shape (components,)
-        Floquet multipliers of the oscillator alone, the largest first.
+        Floquet multipliers of the oscillator alone, the largest first; without a drive one of them is 1, that of a shift along
+        the orbit.
     residual : float
         Largest distance of the state from its image.
     steps : int
         Steps of Newton's method.
+    free : float
+        The time after which the motion of an undriven oscillator repeats itself; 0 with a drive.
     """
 
     scene: Scene = field(repr=False)
@@ -89,6 +93,12 @@ class PeriodicOrbit(Labelled):
     multipliers: np.ndarray
     residual: float
     steps: int
+    free: float = 0.0
+
+    @property
+    def period(self) -> float:
+        """The time after which the motion repeats itself, in units of non-dimensional time."""
+        return self.free or self.periods * unit_of_time(self.scene)
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -100,7 +110,7 @@ class PeriodicOrbit(Labelled):
         """State and Floquet multipliers."""
         return dataset(
             {
-                "state": (("component",), self.state, "state at the beginning of a drive period"),
+                "state": (("component",), self.state, "state at the beginning of a period"),
                 "multipliers": (("number",), self.multipliers, "Floquet multipliers, the largest first"),
             },
             {"component": list(self.components), "number": np.arange(1, len(self.multipliers) + 1)},
@@ -114,7 +124,7 @@ class PeriodicOrbit(Labelled):
         sizes = ", ".join(f"{value:.6g}" for value in self.multipliers)
         return (
             ("scene", repr(self.scene)),
-            ("drive periods", str(self.periods)),
+            ("period", f"{self.period:.12g} units of time") if self.free else ("drive periods", str(self.periods)),
             ("state", state),
             ("multipliers", f"{sizes}: {'stable' if self.stable else 'unstable'}"),
             ("residual", f"{self.residual:.1e} after {self.steps} steps"),
@@ -122,8 +132,9 @@ class PeriodicOrbit(Labelled):
 
     @property
     def stable(self) -> bool:
-        """True if every multiplier lies inside the unit circle."""
-        return bool(abs(self.multipliers[0]) < 1.0)
+        """True if every multiplier, but that of a shift along the orbit, lies inside the unit circle."""
+        shift = [int(np.abs(self.multipliers - 1.0).argmin())] if self.free else []
+        return bool(np.all(np.abs(np.delete(self.multipliers, shift)) < 1.0))
 
     @property
     def phases(self) -> Phases | None:
@@ -158,7 +169,7 @@ class PeriodicOrbit(Labelled):
         ndarray, shape (components,)
             The largest first.
         """
-        return _sorted(_strobe(self.scene, self.state, self.periods, alpha)[1])
+        return _sorted(_strobe(self.scene, self.state, self.periods, alpha, self.free)[1])
 
 
 def periodic_orbit(
@@ -174,11 +185,12 @@ def periodic_orbit(
     Parameters
     ----------
     scene : Scene
-        Source of the driven oscillator.
+        Source of the oscillator.
     periods : int
-        Number of drive periods after which the orbit repeats itself.
+        Number of drive periods after which the orbit repeats itself; 1 without a drive.
     start : array_like, shape (components,), optional
-        Start of Newton's method; by default the scene's initial state after its transient.
+        Start of Newton's method; by default the scene's initial state after its transient.  Of an undriven oscillator it is a
+        state from which the orbit is reached, and the orbit must attract.
     parameters : mapping of str to float, optional
         Parameters of the scene to set, for names that are keywords already.
     **more : float
@@ -191,14 +203,15 @@ def periodic_orbit(
     Raises
     ------
     ValueError
-        If the oscillator has no drive, `periods` is out of range, a parameter is unknown, or
-        `start` is no state.
+        If `periods` is out of range, a parameter is unknown, or `start` is no state.
     ArithmeticError
         If Newton's method does not converge.
     """
     few = {name: "a few steps of Newton's method are soon done" for name in ("show_progress", "progress")}
-    scene = _driven(Given(periodic_orbit, parameters, more, {**NEWTON, **few}), scene)
+    scene = coupled_cell(Given(periodic_orbit, parameters, more, {**NEWTON, **few}), scene, TOLERANCE)
     check_periods(periods)
+    if not scene.forced:
+        return _limit_cycle(scene, periods, start)
     state = _settled(scene) if start is None else _state(scene, start)
     best, steps, kept = np.inf, 0, state
     while steps < MOST_STEPS:
@@ -218,6 +231,27 @@ def periodic_orbit(
     if not best < 1e-9 * max(1.0, float(np.abs(kept).max())):
         raise ArithmeticError(f"no orbit of {periods} drive periods near the start: the best residual was {best:.1e}")
     return PeriodicOrbit(scene, int(periods), kept, _sorted(monodromy), best, steps)
+
+
+def _limit_cycle(scene: Scene, periods: int, start: Sequence[float] | np.ndarray | None) -> PeriodicOrbit:
+    """The cycle that attracts an undriven oscillator from its start."""
+    if periods != 1:
+        raise ValueError(f"periods = {periods}; expected 1 for an oscillator without a drive, whose period is found")
+    if scene.equations.sticks:
+        raise ValueError(
+            "periodic orbits: found set-valued friction without a drive; expected a drive, or a smoothed law"
+        )
+    state = _initial(scene) if start is None else _state(scene, start)
+    orbit = Orbits.make(scene, np.zeros(1), state[None], 1)
+    orbit.settle(scene.transient)
+    free, steps = limit_cycle(orbit, RETURN)
+    if not free:
+        raise ArithmeticError(
+            f"no attracting cycle near the motion after {scene.transient:g} units of time; start elsewhere, or settle longer"
+        )
+    state = orbit.state[0]
+    image, matrix = _strobe(scene, state, 1, 0.0, free)
+    return PeriodicOrbit(scene, 1, state, _sorted(matrix), float(np.abs(image - state).max()), steps, free)
 
 
 def _nearly_sticks(image: np.ndarray, gap: np.ndarray) -> bool:
@@ -299,11 +333,14 @@ def _driven(given: Given, scene: Scene) -> Scene:
     return coupled_cell(Given(given.function), scene, TOLERANCE)
 
 
+def _initial(scene: Scene) -> np.ndarray:
+    """The initial state of the first oscillator."""
+    return np.array([values[0] for values in scene.initial.values()], dtype=float)
+
+
 def _settled(scene: Scene) -> np.ndarray:
     """State (components,) after the scene's transient from its initial one."""
-    state = np.zeros(len(scene.initial))
-    state[:] = [values[0] for values in scene.initial.values()]
-    orbits = Orbits.make(scene, np.zeros(1), state[None], 1)
+    orbits = Orbits.make(scene, np.zeros(1), _initial(scene)[None], 1)
     orbits.settle(scene.transient)
     return np.asarray(orbits.state[0][: orbits.components])
 
@@ -361,12 +398,14 @@ def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:
     return float(brentq(growth, low, high, xtol=1e-14, rtol=1e-14))
 
 
-def _strobe(scene: Scene, state: np.ndarray, periods: int, alpha: float) -> tuple[np.ndarray, np.ndarray]:
-    """State some periods later, and the propagator of a deviation of strength alpha."""
+def _strobe(
+    scene: Scene, state: np.ndarray, periods: int, alpha: float, free: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """State some periods later, of the drive or of length `free`, and the propagator of a deviation of strength alpha."""
     start = np.zeros(len(scene.initial))
     start[: len(state)] = state
     orbits = Orbits.make(scene, np.array([alpha]), start[None], 1)
-    propagators, logarithms = cycle_propagators(orbits, periods)
+    propagators, logarithms = cycle_propagators(orbits, periods, free / orbits.unit if free else 1.0)
     if (size := float(logarithms[0, 0])) > 700.0:
         raise FloatingPointError(
             f"multipliers: found a deviation that grows by exp({size:.3g}); expected exp(700) at most"

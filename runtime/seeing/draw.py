@@ -155,15 +155,15 @@ def _(value: ClusterExponents, axes: Axes) -> Axes:
 
 @_draw.register
 def _(value: PeriodicOrbit, axes: Axes) -> Axes:
-    """The closed curve of the first two components; a dot begins each drive period."""
+    """The closed curve of the first two components; a dot begins each period."""
     start = {name: [x] for name, x in zip(value.components, value.state.tolist(), strict=True)}
     one = value.scene.replace(
         topology=Topology("one", 1, ()),
         record=("trajectory",),
         samples=SAMPLES * value.periods,
         transient=0.0,
-        window=float(value.periods),
-        time_unit="period",
+        window=value.period,
+        time_unit="time",
         initial=start,
     )
     path = run(one, show_progress=False, workers=1).trajectory.sel(node=1)

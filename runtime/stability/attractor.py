@@ -181,7 +181,7 @@ def _free(orbit: Orbits, closed: float) -> Attractor:
     rates = sp.lambdify(_symbols(orbit.variation), list(orbit.variation.orbit.rhs()), "numpy")(*_values(orbit))
     if np.abs(rates).max() < RETURN * max(1.0, np.abs(orbit.state).max()):
         return _steady(orbit, Motion.FIXED_POINT)
-    period = 0.0 if orbit.variation.events else limit_cycle(orbit, closed)
+    period = 0.0 if orbit.variation.events else limit_cycle(orbit, closed)[0]
     return _periodic(orbit, Motion.PERIODIC, 1, period) if period else Attractor(Motion.APERIODIC, 0.0)
 
 

@@ -40,7 +40,7 @@ Conservative orbits have the multiplier 1 twice, which errors of size rtol split
 """
 
 
-def limit_cycle(orbit: Orbits, closed: float) -> float:
+def limit_cycle(orbit: Orbits, closed: float) -> tuple[float, int]:
     """Find the attracting cycle that an undriven orbit has settled on.
 
     Parameters
@@ -52,8 +52,10 @@ def limit_cycle(orbit: Orbits, closed: float) -> float:
 
     Returns
     -------
-    float
-        The period in units of non-dimensional time; 0 if no such cycle is found.
+    period : float
+        In units of non-dimensional time; 0 if no such cycle is found.
+    steps : int
+        Steps of Newton's method.
     """
     alone = Orbits(
         orbit.scene,
@@ -65,21 +67,23 @@ def limit_cycle(orbit: Orbits, closed: float) -> float:
         orbit.method,
     )
     rates, start = _rates(orbit), orbit.state[0].copy()
+    if np.abs(rates(start)).max() < closed * max(1.0, float(np.abs(start).max())):
+        return 0.0, 0
     for guess, extent in islice(_returns(alone, rates, start), RETURNS):
         state, period = start, _on_plane(alone, rates, start, guess)
-        for _ in range(MOST_STEPS):
+        for steps in range(MOST_STEPS):
             image, matrix = _flow(alone, state, period)
             gap = image - state
             if not np.abs(gap).max() < NEAR * extent:
                 break
             if np.abs(gap).max() < closed * max(1e-3, float(np.abs(image).max())):
                 orbit.state = image[None]
-                return period if _attracts(matrix, orbit.scene.rtol) else 0.0
+                return period if _attracts(matrix, orbit.scene.rtol) else 0.0, steps
             change = _correction(matrix, gap, rates(state), rates(image))
             state, period = state + change[:-1], period + float(change[-1])
             if not (period > 0.0 and np.abs(state - start).max() < 10.0 * NEAR * extent):
                 break
-    return 0.0
+    return 0.0, 0
 
 
 def _returns(

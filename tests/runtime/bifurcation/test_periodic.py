@@ -11,7 +11,7 @@ import pytest
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.bifurcation.branches import follow
-from synchain.runtime.bifurcation.periodic import PeriodicOrbit, periodic_orbit, stability_end
+from synchain.runtime.bifurcation.periodic import PeriodicOrbit, periodic_orbit, stability_end, strobe
 from synchain.runtime.bifurcation.skeleton import skeleton
 
 PAIR = topology("chain", 2)
@@ -156,7 +156,7 @@ def test_the_skeleton_of_a_diagram_has_stable_and_unstable_orbits() -> None:
 
 def test_what_is_refused() -> None:
     with pytest.raises(ValueError, match="an oscillator without one"):
-        periodic_orbit(Scene(oscillator="lorenz", coupling="x->x", topology=PAIR))
+        strobe(Scene(oscillator="lorenz", coupling="x->x", topology=PAIR), np.zeros(3), 1)
     with pytest.raises(ValueError, match="periods = 0; expected a whole number, at least 1"):
         periodic_orbit(scene(), 0)
     with pytest.raises(ArithmeticError, match="no orbit of 1 drive periods near the start"):

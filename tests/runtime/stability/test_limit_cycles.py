@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from synchain.models import Field, Scene, chain
-from synchain.runtime import exponents, msf
+from synchain.runtime import exponents, follow, msf, open_result, periodic_orbit
 
 VAN_DER_POL = Field({"x": "v", "v": "mu*(1 - x**2)*v - x"}, parameters={"mu": 1.0})
 
@@ -86,3 +88,36 @@ def test_chaos_and_conservative_orbits_are_averaged(scene: Callable[[], Scene]) 
 def test_windows_of_a_cycle_begin_at_zero() -> None:
     function = msf(pair(1.0), np.linspace(0.0, 2.0, 21))
     assert [low for low, _ in function.intervals] == pytest.approx([0.0], abs=1e-6)
+
+
+def test_periodic_orbits_of_undriven_oscillators(tmp_path: Path) -> None:
+    period, (_, weak, strong) = floquet(1.0, [0.0, 0.1, 0.5])
+    orbit = periodic_orbit(pair(1.0))
+    assert orbit.period == pytest.approx(period, rel=1e-10)
+    assert orbit.stable
+    assert orbit.multipliers[0] == pytest.approx(1.0, abs=1e-10)
+    for alpha, exponent in ((0.1, weak), (0.5, strong)):
+        largest = abs(orbit.transversal_multipliers(alpha)[0])
+        assert np.log(largest) / orbit.period == pytest.approx(exponent, abs=1e-10)
+    orbit.save(tmp_path / "orbit.nc")
+    again = open_result(tmp_path / "orbit.nc")
+    assert (again.period, again.stable) == (orbit.period, True)
+    assert "period " in str(again)
+    with pytest.raises(ValueError, match="first: found the limit cycle of an oscillator without a drive"):
+        follow(pair(1.0), "mu", [1.0, 1.2], orbit)
+
+
+@pytest.mark.parametrize(
+    ("scene", "more", "error", "words"),
+    [
+        (pair(1.0), {"periods": 2}, ValueError, "periods = 2; expected 1 for an oscillator without a drive"),
+        (pair(1.0), {"start": [1.0]}, ValueError, "expected a number for each of x, v"),
+        (Scene("lorenz", "x->x", chain(2)), {}, ArithmeticError, "no attracting cycle near the motion"),
+        (Scene("pendulum", topology=chain(2)), {}, ArithmeticError, "no attracting cycle near the motion"),
+        (pair(-1.0), {}, ArithmeticError, "no attracting cycle near the motion"),
+    ],
+)
+def test_what_has_no_attracting_cycle(scene: Scene, more: dict[str, Any], error: type, words: str) -> None:
+    with pytest.raises(error, match=words) as caught:
+        periodic_orbit(scene, **more)
+    assert "\n" not in str(caught.value)
