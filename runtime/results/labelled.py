@@ -72,11 +72,13 @@ class Labelled(Shown):
         Parameters
         ----------
         path : str or path
-            Its ending chooses the form: .nc4 is netCDF-4 (needs h5netcdf), .zarr a Zarr folder
-            (needs zarr); any other ending is netCDF-3, which needs no further package.
+            Its ending chooses the form: .nc is netCDF-3, .nc4 netCDF-4 (needs h5netcdf), .zarr a Zarr
+            folder (needs zarr).
 
         Raises
         ------
+        ValueError
+            For another ending.
         ModuleNotFoundError
             If the package of the form is not installed.
         OSError

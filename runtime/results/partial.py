@@ -27,7 +27,15 @@ from .certificate import VERDICTS, Certificate
 from .labels import Variable, dimensions, labelled, scene_of, swept, variables
 from .result import Result, gather
 
-__all__ = ["certificate_of", "describe_sweep", "layout_of", "partial_path", "read_partial", "verdicts_in", "write_result"]
+__all__ = [
+    "certificate_of",
+    "describe_sweep",
+    "layout_of",
+    "partial_path",
+    "read_partial",
+    "verdicts_in",
+    "write_result",
+]
 
 
 def describe_sweep(

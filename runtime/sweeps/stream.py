@@ -27,7 +27,7 @@ from ..results.labelled import Labelled
 from ..results.labels import alike, changed, scene_of
 from ..results.partial import certificate_of, describe_sweep, layout_of, partial_path, verdicts_in, write_result
 from ..results.result import Result, read_result
-from ..results.store import CHOICES, attributes_of
+from ..results.store import NETCDF, attributes_of, ending_of
 from ..support.execution import Execution
 from ..support.files import check_replaceable, drop_leftovers, netcdf_data, understood
 from ..support.progress import Hook, Progress, Reporter
@@ -106,7 +106,7 @@ def stream(
     ----------
     scene : Scene
     path : str or path
-        File of the result; it ends in .nc by custom.
+        File of the result, whose name ends in .nc.
     resume : bool
         Go on with a run that was not finished; its result is, byte for byte, that of a run without
         interruption. Nothing is run if it was finished.
@@ -125,7 +125,7 @@ def stream(
     Raises
     ------
     ValueError
-        If a keyword is refused as by `run`, or if a file at `path` belongs to another run.
+        If a keyword is refused as by `run`, for another ending, or if a file at `path` belongs to another run.
     FileExistsError
         If the result or an unfinished run is there and neither `resume` nor `overwrite` is given.
     FileNotFoundError
@@ -188,12 +188,7 @@ def claim(
         check_flag(name, value)
     target = check_path("path", path)
     partial = partial_path(target)
-    if target.suffix.lower() in CHOICES:
-        raise ValueError(f"path: found {str(target)!r}; expected another ending: stream writes netCDF-3; end it in .nc")
-    if target.suffix.lower() == partial.suffix:
-        raise ValueError(
-            f"path: found {str(target)!r}, the name of an unfinished run; expected that of a result; end it in .nc"
-        )
+    ending_of(target, [NETCDF])
     if resume and overwrite:
         raise ValueError("found both resume and overwrite; expected one of them")
     check_replaceable(target)
