@@ -131,6 +131,6 @@ def words_of(
     found = []
     for k, ends in enumerate(intervals[:most]):
         spread = errors[k] if errors else (0.0, 0.0)
-        found.append(" … ".join(f"{x:.4f}" + (f" ± {e:.1g}" if e else "") for x, e in zip(ends, spread, strict=True)))
+        found.append(" … ".join(f"{x:z.4f}" + (f" ± {e:.1g}" if e else "") for x, e in zip(ends, spread, strict=True)))
     more = [f"{len(intervals) - most} more"] if len(intervals) > most else []
     return "; ".join([*found, *more]) or "none"

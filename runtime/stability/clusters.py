@@ -91,7 +91,7 @@ class ClusterExponents(Labelled):
         """The clusters, each block with its verdict, and what has merged."""
         members = [", ".join(str(i + 1) for i in nodes) for nodes in self.state.members]
         blocks = [
-            f"{verdict} ({exponent:.4f} ± {error:.1g}): clusters {', '.join(str(c + 1) for c in block.clusters)}"
+            f"{verdict} ({exponent:z.4f} ± {error:.1g}): clusters {', '.join(str(c + 1) for c in block.clusters)}"
             for block, exponent, error, verdict in zip(
                 self.state.blocks, self.exponent, self.stderr, self.verdicts, strict=True
             )
@@ -100,7 +100,7 @@ class ClusterExponents(Labelled):
         return (
             ("clusters", "; ".join(f"{k}: {nodes}" for k, nodes in enumerate(members, 1))),
             *((f"block {k}", words) for k, words in enumerate(blocks, 1)),
-            ("own motion", f"{self.motion:.4f} ± {self.motion_error:.1g}"),
+            ("own motion", f"{self.motion:z.4f} ± {self.motion_error:.1g}"),
             *([("merged", merged)] if merged else []),
         )
 
