@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 
-__all__ = ["TAKEN", "expect_free"]
+__all__ = ["ATTRIBUTES", "TAKEN", "expect_free"]
 
 TAKEN = frozenset(
-    {"cell", "component", "data", "drive_phase", "end", "end_time", "ended_early", "kind", "link", "message", "name", "names", "node",
-     "part", "periods_skipped", "plot", "point", "realisation", "rejected", "sample", "save", "scene", "section",
-     "section_count", "section_time", "state", "status", "steps", "success", "sync_error", "sync_error_end",
-     "sync_error_max", "time", "trajectory", "transversal_exponent", "transversal_stderr", "verdict"}
+    {"cell", "component", "drive_phase", "end", "end_time", "ended_early", "node", "part", "periods_skipped", "point",
+     "realisation", "rejected", "sample", "section", "section_count", "section_time", "status", "steps", "sync_error",
+     "sync_error_end", "sync_error_max", "time", "trajectory", "transversal_exponent", "transversal_stderr", "verdict"}
 )  # fmt: skip
-"""What results have under these names already."""
+"""What data of results have under these names already."""
+
+ATTRIBUTES = frozenset(
+    {"belongs_to", "data", "kind", "link", "message", "name", "names", "plot", "restore", "save", "scene", "state",
+     "states", "stepped", "success", "summary"}
+)  # fmt: skip
+"""Attributes of results and of their data, which would hide variables of these names."""
 
 
 def expect_free(what: str, names: Iterable[str], more: Collection[str] = ()) -> None:

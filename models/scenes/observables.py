@@ -14,7 +14,7 @@ from ..inputs.frozen import Frozen
 from ..mechanics.components import TIME
 from .energy import energy_of
 from .model import Model
-from .names import expect_free
+from .names import ATTRIBUTES, expect_free
 from .parameters import varied
 from .section import Section
 
@@ -118,7 +118,14 @@ def _named(
 ) -> Iterator[tuple[str, object]]:
     """Yield names and values of a table; no name with one of the `endings` may mean something else in results."""
     links = {name for name in varied(numbers, model.parameters) if not model.holders(name)}
-    taken = {*model.parameters, *numbers, *model.unlinked.state, *links, *(f"{name}_link" for name in links)}
+    taken = {
+        *ATTRIBUTES,
+        *model.parameters,
+        *numbers,
+        *model.unlinked.state,
+        *links,
+        *(f"{name}_link" for name in links),
+    }
     for key, value in check_table(keyword, given).items():
         name = check_text(keyword, key)
         if not name.isidentifier() or name.startswith("_"):

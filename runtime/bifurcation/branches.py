@@ -52,7 +52,18 @@ KINK = 1e-2
 """Distance from the expected state that is always allowed: changes of phases are kinks."""
 
 NAMES = frozenset(
-    {"bifurcation", "bifurcation_kind", "branch", "multipliers", "number", "orbit", "periods", "stable", "turn"}
+    {
+        "bifurcation",
+        "bifurcation_kind",
+        "branch",
+        "multipliers",
+        "number",
+        "orbit",
+        "periods",
+        "stable",
+        "state",
+        "turn",
+    }
 )
 """What branches and skeletons have under these names beside those of all results."""
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import pytest
 
 from synchain.models import Field, Rates, Scene, chain
-from synchain.models.scenes.names import TAKEN
+from synchain.models.scenes.names import ATTRIBUTES, TAKEN
 
 
 def decay(name: str, **keywords: object) -> Scene:
@@ -22,6 +22,14 @@ def test_what_is_swept_or_drawn_has_a_name_of_its_own(name: str) -> None:
         decay(name, axes={name: [1, 5]})
     with pytest.raises(ValueError, match=f"draw {name}: {words}"):
         decay(name, realisations=2, draws={name: [1, 5]})
+
+
+@pytest.mark.parametrize("name", sorted(ATTRIBUTES))
+def test_attributes_of_results_hide_variables_alone(name: str) -> None:
+    assert decay(name, axes={name: [1, 5]}).shape == (2,)
+    for table in ({"observe": {name: "mean(x_1)"}}, {"sections": {name: {"function": "x_1"}}}):
+        with pytest.raises(ValueError, match=f"found the name '{name}', which results have for something else"):
+            decay("rate_of_x", **table)
 
 
 def test_draws_of_links_have_a_dimension_of_their_own() -> None:

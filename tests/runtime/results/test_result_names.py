@@ -8,7 +8,7 @@ import xarray as xr
 
 from synchain.codegen.driver.columns import Span
 from synchain.models import Field, Rates, Scene, chain, normal
-from synchain.models.scenes.names import TAKEN
+from synchain.models.scenes.names import ATTRIBUTES, TAKEN
 from synchain.runtime import follow, plane, run, skeleton
 from synchain.runtime.bifurcation import branches
 from synchain.runtime.bifurcation.bifurcations import Bifurcation, BifurcationKind
@@ -16,7 +16,7 @@ from synchain.runtime.bifurcation.periodic import PeriodicOrbit
 from synchain.runtime.bifurcation.skeleton import Skeleton
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.results.certificate import Certificate
-from synchain.runtime.results.result import gather
+from synchain.runtime.results.result import Result, gather
 from synchain.runtime.stability import msf
 
 
@@ -39,6 +39,10 @@ def test_no_result_of_a_run_has_other_names() -> None:
         samples=4, zipped=True, axes={"a": [1, 2], "x_1": [3, 4]}, realisations=2, draws={"k": normal(1, 0.1)},
     )  # fmt: skip
     assert names_of(whole) - TAKEN == {"a", "x_1", "k", "k_link"}
+
+
+def test_no_result_has_other_attributes() -> None:
+    assert {name for name in dir(Result) if not name.startswith("_")} <= ATTRIBUTES
 
 
 def test_no_plane_and_no_branch_has_other_names() -> None:
