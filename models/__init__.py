@@ -31,6 +31,7 @@ from typing import Any
 
 _HOMES = {
     "Axis": "scenes.axis",
+    "Clusters": "graphs.clusters",
     "Field": "definitions.inline",
     "FrictionLaw": "mechanics.friction",
     "Lagrangian": "definitions.inline",
@@ -45,6 +46,7 @@ _HOMES = {
     "Topology": "graphs.topology",
     "allow_code": "inputs.plugins",
     "cartesian": "graphs.products",
+    "clusters": "graphs.clusters",
     "complement": "graphs.products",
     "end": "dynamics.observable",
     "ends": "interactions.ends",
@@ -66,6 +68,7 @@ _HOMES = {
     "minimum": "dynamics.observable",
     "nodes": "dynamics.observable",
     "normal": "scenes.draw",
+    "orbital_partitions": "graphs.clusters",
     "probability_option": "inputs.options",
     "rate": "dynamics.observable",
     "read_edges": "graphs.readers",
@@ -84,6 +87,7 @@ _HOMES = {
 
 __all__ = [
     "Axis",
+    "Clusters",
     "Field",
     "FrictionLaw",
     "Lagrangian",
@@ -98,6 +102,7 @@ __all__ = [
     "Topology",
     "allow_code",
     "cartesian",
+    "clusters",
     "complement",
     "end",
     "ends",
@@ -121,6 +126,7 @@ __all__ = [
     "minimum",
     "nodes",
     "normal",
+    "orbital_partitions",
     "probability_option",
     "rate",
     "read_edges",

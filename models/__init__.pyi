@@ -14,6 +14,9 @@ from .dynamics.observable import minimum as minimum
 from .dynamics.observable import nodes as nodes
 from .dynamics.observable import rate as rate
 from .dynamics.observable import variance as variance
+from .graphs.clusters import Clusters as Clusters
+from .graphs.clusters import clusters as clusters
+from .graphs.clusters import orbital_partitions as orbital_partitions
 from .graphs.joint import joint_spectrum as joint_spectrum
 from .graphs.products import cartesian as cartesian
 from .graphs.products import complement as complement

@@ -251,7 +251,12 @@ def _asked(function: Callable[..., Any]) -> tuple[str, ...]:
 OSCILLATOR = Kind("oscillator", "oscillators", check_oscillator, near={"roessler": "rossler", "vdp": "van_der_pol"})
 """Oscillators: the files of the folder `oscillators`."""
 
-FRICTION_LAW = Kind("friction", "frictions", check_friction)
+FRICTION_LAW = Kind(
+    "friction",
+    "frictions",
+    check_friction,
+    otherwise=", or an expression, friction_law('mu*sign(w)', {'mu': 0.3})",
+)
 """Friction laws: the files of the folder `frictions`."""
 
 COUPLING = Kind(

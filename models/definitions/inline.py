@@ -76,8 +76,9 @@ def Lagrangian(
         and in text they are called v if there is one coordinate, v_x and v_y if there are several, unless said
         otherwise.  Coordinates that are plain symbols must be given.
     friction : str, FrictionLaw or Expr, optional
-        The friction law: its name, its value, or the friction coefficient as an expression of the sliding velocity
-        ``w`` and of parameters that occur nowhere else.  A scene may name another.
+        The friction law: its name, its value, or the friction coefficient as an expression of SymPy of the sliding
+        velocity ``w`` and of parameters that occur nowhere else; `friction_law` reads one from text.  A scene may name
+        another.
     contact : str, optional
         How the jump of the law at rest is treated: "atan" (the default), "sign" or "set-valued".
     parameters : mapping, optional
@@ -476,7 +477,7 @@ def _law(what: str, given: object, defaults: Mapping[str, Parameter]) -> Frictio
         return given
     if isinstance(given, str):
         return load_friction_law(given)
-    expected = "a name, a friction law, or an expression of the sliding velocity w"
+    expected = "a name, a law that friction_law('mu*sign(w)', {'mu': 0.3}) makes, or an expression of SymPy of w"
     value = check_instance(f"{what}: friction", given, (sp.Expr, int, float), expected)
     about = f"{what}: friction"
     coefficient = _Names.of_law(about, defaults).expression("law", value)

@@ -101,6 +101,11 @@ def orbital_partitions(
     partition_limit : int, optional
         Greatest number of partitions.
 
+    Returns
+    -------
+    tuple of Clusters
+        The finest one, of single nodes, first.
+
     Raises
     ------
     ValueError
@@ -136,10 +141,16 @@ def clusters(graph: Topology, classes: Sequence[int]) -> Clusters:
     classes : sequence
         The cluster of each node.
 
+    Returns
+    -------
+    Clusters
+
     Raises
     ------
     ValueError
         If the partition is not balanced, or has not one class for each node.
+    TypeError
+        If it is no sequence.
     """
     graph = as_topology("clusters", graph)
     if not isinstance(classes, Collection) or isinstance(classes, Set | Mapping):

@@ -21,7 +21,7 @@ from ..mechanics.physics import check_masses, check_power
 from .axis import Axis
 from .draw import GRAPH, LIMIT, drawn_axes, drawn_graph, draws
 from .model import Model, NodeKind, as_contact, as_coupling, as_groups, as_law, as_layers, as_oscillator
-from .observables import observables, sections, stop
+from .observables import ENDINGS, observables, sections, stop
 from .parameters import at_nodes, drive, parameters, varied
 from .section import Section
 from .start import SEED_LIMIT, chosen_start, default_start
@@ -211,7 +211,7 @@ def _check_sections(values: Mapping[str, Any]) -> None:
     other = "sections" if values["sections"] else "stop" if values["stop"] else None
     if Record.SECTION in values["record"] and other:
         raise ValueError(f"record: found 'section' beside {other}; expected one of them; make it one of the sections")
-    made = {f"{name}{more}" for name in values["sections"] for more in ("", "_time", "_count", "_kept")}
+    made = {f"{name}{more}" for name in values["sections"] for more in ENDINGS}
     twice = sorted(made & {*values["observe"]})
     if twice:
         raise ValueError(f"observe: found the name {twice[0]!r}, which a section has; rename one of them")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import sympy as sp
@@ -14,18 +14,14 @@ from ..inputs.frozen import Frozen
 from ..mechanics.components import TIME
 from .energy import energy_of
 from .model import Model
+from .names import ATTRIBUTES, expect_free
 from .parameters import varied
 from .section import Section
 
-__all__ = ["TAKEN", "has_own_energy", "observables", "sections", "stop"]
+__all__ = ["ENDINGS", "has_own_energy", "observables", "sections", "stop"]
 
-TAKEN = frozenset(
-    {"cell", "component", "data", "drive_phase", "end", "end_time", "ended_early", "kind", "link", "message", "name", "names", "node",
-     "periods_skipped", "plot", "point", "realisation", "rejected", "sample", "save", "scene", "section",
-     "section_count", "section_time", "state", "status", "steps", "success", "sync_error", "sync_error_end",
-     "sync_error_max", "time", "trajectory", "transversal_exponent", "transversal_stderr", "verdict"}
-)  # fmt: skip
-"""What results have under these names already."""
+ENDINGS = ("", "_time", "_count", "_kept")
+"""What follows the name of a section in the names that results have of it."""
 
 
 def observables(model: Model, numbers: Mapping[str, float], given: object) -> Frozen[Observable]:
@@ -61,7 +57,7 @@ def sections(model: Model, numbers: Mapping[str, float], given: object) -> Froze
     if given is None:
         return Frozen()
     found: dict[str, Section] = {}
-    for name, value in _named("sections", model, numbers, given):
+    for name, value in _named("sections", model, numbers, given, ENDINGS):
         what = f"section {name}"
         section = Section.of_table(what, value)
         function = as_value(what, section.variable)
@@ -117,17 +113,26 @@ def _of_nodes(model: Model, numbers: Mapping[str, float]) -> tuple[str, ...]:
     return tuple(name for name in varied(numbers, model.parameters) if model.holders(name))
 
 
-def _named(keyword: str, model: Model, numbers: Mapping[str, float], given: object) -> Iterator[tuple[str, object]]:
-    """Yield names and values of a table, whose names results must not have for something else."""
+def _named(
+    keyword: str, model: Model, numbers: Mapping[str, float], given: object, endings: Sequence[str] = ("",)
+) -> Iterator[tuple[str, object]]:
+    """Yield names and values of a table; no name with one of the `endings` may mean something else in results."""
     links = {name for name in varied(numbers, model.parameters) if not model.holders(name)}
-    taken = TAKEN | set(model.parameters) | set(numbers) | set(model.unlinked.state)
-    taken |= links.union(f"{name}_link" for name in links)
+    taken = {
+        *ATTRIBUTES,
+        *model.parameters,
+        *numbers,
+        *model.unlinked.state,
+        *links,
+        *(f"{name}_link" for name in links),
+    }
     for key, value in check_table(keyword, given).items():
         name = check_text(keyword, key)
         if not name.isidentifier() or name.startswith("_"):
             raise ValueError(f"{keyword}: found the name {short_repr(name)}; expected letters, digits and _")
-        if name in taken:
-            raise ValueError(f"{keyword}: found the name {name!r}, which results have for something else; rename it")
+        made = [f"{name}{ending}" for ending in endings]
+        expect_free(keyword, made, taken)
+        taken.update(made)
         yield name, value
 
 

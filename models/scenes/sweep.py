@@ -16,6 +16,7 @@ from ..inputs.node_name import NodeName
 from ..inputs.words import Word
 from .axis import LIMIT, Axis, known_length
 from .model import WEIGHTS, Model, in_range
+from .names import expect_free
 from .parameters import drive
 
 __all__ = ["Continuation", "check_draws", "check_sweep", "read_axes", "rest_in_sweep"]
@@ -58,6 +59,7 @@ def check_sweep(model: Model, values: Mapping[str, Any]) -> Continuation:
     names = [axis.name for axis in axes]
     for i, axis in enumerate(axes):
         _axis(model, values["parameters"], axis)
+        expect_free(f"axis {axis.name}", [axis.name])
         if axis.name in names[:i]:
             raise ValueError(f"axis {axis.name!r} occurs twice; expected each axis once; merge their values")
     if zipped and len({len(axis) for axis in axes}) > 1:
@@ -78,6 +80,8 @@ def check_draws(model: Model, values: Mapping[str, Any], drawn: Sequence[Axis]) 
         if axis.name in swept:
             raise ValueError(f"draw {axis.name!r}: it is an axis as well; expected one of them")
         _axis(model, values["parameters"], axis)
+    for name in values["draws"]:
+        expect_free(f"draw {name}", [name, f"{name}_link"], swept)
     if drawn and values["continuation"] != Continuation.NONE:
         raise ValueError(
             f"continuation: found {str(values['continuation'])!r} with realisations; expected none of either"

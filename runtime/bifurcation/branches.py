@@ -18,6 +18,7 @@ import numpy as np
 import xarray as xr
 
 from synchain.models.inputs.checks import check_instance, short_repr
+from synchain.models.scenes.names import expect_free
 from synchain.models.scenes.scene import Scene
 
 from ..cells.keywords import Given
@@ -49,6 +50,22 @@ FAR = 0.3
 
 KINK = 1e-2
 """Distance from the expected state that is always allowed: changes of phases are kinks."""
+
+NAMES = frozenset(
+    {
+        "bifurcation",
+        "bifurcation_kind",
+        "branch",
+        "multipliers",
+        "number",
+        "orbit",
+        "periods",
+        "stable",
+        "state",
+        "turn",
+    }
+)
+"""What branches and skeletons have under these names beside those of all results."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -212,10 +229,12 @@ def checked_values(scene: Scene, name: str, values: Sequence[float] | np.ndarray
     Raises
     ------
     ValueError
-        If the parameter is unknown, or if the values are not finite and monotonic.
+        If the parameter is unknown, if results have its name for something else, or if the values are not
+        finite and monotonic.
     """
     if name not in scene.parameters:
         raise ValueError(f"unknown parameter {name!r}; known: {', '.join(scene.parameters)}")
+    expect_free("branch", [name], NAMES)
     if not np.iterable(values) or not all(isinstance(value, Real) and math.isfinite(value) for value in values):
         raise ValueError(f"values: found {short_repr(values)}; expected finite numbers for {name}")
     wanted = [float(value) for value in values]

@@ -116,7 +116,7 @@ class LineReport:
         rows = [
             ("class", f"{function.kind}, for alpha from {line[0]:g} to {line[-1]:g}"),
             ("negative for alpha", "; ".join(ranges) or "none"),
-            ("smallest, largest", f"{np.min(function.exponent):.4f}, {np.max(function.exponent):.4f}"),
+            ("smallest, largest", f"{np.min(function.exponent):z.4f}, {np.max(function.exponent):z.4f}"),
             *how(function.scene, function.attractors, function.fine.time, function.stderr),
         ]
         lines = [f"{headline(function.scene)}, alpha = -sigma gamma", *rows_of(rows)]

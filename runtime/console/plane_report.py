@@ -54,7 +54,7 @@ class PlaneReport:
         alpha, beta = plane.across, plane.up
         contours = [
             ", ".join(
-                f"{name} {part.min():.4f} … {part.max():.4f}"
+                f"{name} {part.min():z.4f} … {part.max():z.4f}"
                 for name, part in zip(("alpha", "beta"), line.T, strict=True)
             )
             for line in plane.contours
@@ -63,7 +63,7 @@ class PlaneReport:
             ("plane", f"alpha {alpha[0]:g} … {alpha[-1]:g}, beta {beta[0]:g} … {beta[-1]:g}"),
             *[("zero contour", words) for words in contours or ["none"]],
             ("negative", f"at {np.count_nonzero(plane.exponent < 0)} of {plane.exponent.size} strengths"),
-            ("smallest, largest", f"{np.min(plane.exponent):.4f}, {np.max(plane.exponent):.4f}"),
+            ("smallest, largest", f"{np.min(plane.exponent):z.4f}, {np.max(plane.exponent):z.4f}"),
             *how(plane.scene, plane.motion.tolist(), plane.time, plane.stderr),
         ]
         lines = [f"{headline(plane.scene)}, alpha + i beta = -sigma gamma", *rows_of(rows)]

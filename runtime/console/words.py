@@ -81,11 +81,11 @@ def rows_of(rows: Sequence[tuple[str, str]]) -> list[str]:
 def measured(value: float, error: float, at_end: bool = False) -> str:
     """Return a number with its error, to the digits that are certain; dots if a grid ends at it."""
     if at_end:
-        return f"{value:g}" + ("..." if value else "")
+        return f"{value:zg}" + ("..." if value else "")
     if not (error > 0 and math.isfinite(error)):
-        return f"{value:.4f}"
+        return f"{value:z.4f}"
     digits = min(max(1 - math.floor(math.log10(error)), 2), 5)
-    return f"{value:.{digits}f} ± {max(error, 10.0**-digits):.{digits}f}"
+    return f"{value:z.{digits}f} ± {max(error, 10.0**-digits):.{digits}f}"
 
 
 def window_text(window: Window, error: bool = True) -> str:
@@ -94,7 +94,7 @@ def window_text(window: Window, error: bool = True) -> str:
     for side in ("low", "high"):
         sigma, mode = getattr(window, side), getattr(window, f"{side}_mode")
         if mode is None:
-            ends.append("0" if sigma == 0 else "any" if math.isinf(sigma) else f"{sigma:.4f}...")
+            ends.append("0" if sigma == 0 else "any" if math.isinf(sigma) else f"{sigma:z.4f}...")
         else:
             ends.append(measured(sigma, getattr(window, f"{side}_error") if error else 0.0))
             lost.append(f"lost {'below' if side == 'low' else 'above'}: gamma = {mode.eigenvalue}")

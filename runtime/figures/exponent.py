@@ -41,6 +41,9 @@ SIZE = (COLUMN, 4.4)
 HIGHEST = 1.2
 """Largest strength: that of the paper's probe, sigma = 0.6 of two oscillators."""
 
+MARKED = 60
+"""Most strengths that are marked; more would cover the line."""
+
 _KEPT: WeakKeyDictionary[FigureRuns, dict[Scene, MSF]] = WeakKeyDictionary()
 
 
@@ -119,7 +122,7 @@ def draw(axes: list[Axes], data: tuple[MSF, ...]) -> list[Axes]:
         bracket(panel, _inside(scale(row.intervals, 2.0), panel.get_xlim()) if row else (), 0.92, ORANGE, "published")
         motion = found.attractors[0].replace("drive periods", "periods")
         panel.set_title(rf"$\omega={found.scene.parameters['omega']:.2f}$, {motion}", fontsize=7.5, pad=3, loc="left")
-        stable = ", ".join(f"{a:.3f} … {b:.3f}" for a, b in found.intervals[:2]) or "nowhere"
+        stable = ", ".join(f"{a:z.3f} … {b:z.3f}" for a, b in found.intervals[:2]) or "nowhere"
         panel.set_title(rf"$\Lambda<0$: {stable}", fontsize=7.0, pad=3, loc="right")
         panel.set_ylabel("")
         panel.label_outer()
@@ -128,7 +131,7 @@ def draw(axes: list[Axes], data: tuple[MSF, ...]) -> list[Axes]:
 
 
 def draw_exponent(axes: Axes, found: MSF) -> Axes:
-    """Draw exponents over their strengths.
+    """Draw exponents over all strengths at which they were computed; dots mark the requested ones if they are few.
 
     A band shows two standard errors on either side, grey bands the ranges with a negative exponent.
 
@@ -143,11 +146,16 @@ def draw_exponent(axes: Axes, found: MSF) -> Axes:
     -------
     Axes
     """
-    value, error = finite(found.exponent), finite(found.stderr)
+    fine = found.fine
+    value, error = finite(fine.exponent), finite(fine.stderr)
     bands(axes, found.intervals)
     axes.axhline(0.0, color="0.35", linewidth=0.6, zorder=1)
-    axes.fill_between(found.alpha, value - 2 * error, value + 2 * error, color=BLUE, alpha=0.3, linewidth=0.0, zorder=2)
-    axes.plot(found.alpha, value, color=BLUE, linewidth=0.9, zorder=3)
+    axes.fill_between(fine.alpha, value - 2 * error, value + 2 * error, color=BLUE, alpha=0.3, linewidth=0.0, zorder=2)
+    axes.plot(fine.alpha, value, color=BLUE, linewidth=0.9, zorder=3)
+    if len(found.alpha) <= MARKED:
+        axes.plot(
+            found.alpha, finite(found.exponent), color=BLUE, linestyle="none", marker="o", markersize=2.5, zorder=3
+        )
     axes.set(
         xlim=(found.alpha[0], found.alpha[-1]),
         xlabel=r"strength of a mode $\alpha=\sigma\,|\gamma|$",

@@ -215,7 +215,7 @@ def _difference(found: float | None, printed: float | None) -> float | None:
 
 
 def _listed(intervals: tuple[Interval, ...], digits: int) -> str:
-    return "; ".join(f"[{a:.{digits}f}, {b:.{digits}f}]" for a, b in intervals)
+    return "; ".join(f"[{a:z.{digits}f}, {b:z.{digits}f}]" for a, b in intervals)
 
 
 def document(data: Comparison) -> str:
@@ -232,20 +232,20 @@ def document(data: Comparison) -> str:
         cells = [str(row.n), f"{row.omega:.2f}", *map(_shown, found[:2]), _with_errors(row, found[2]), _shown(printed)]
         for ends in found:
             pairs = [_difference(a, b) for a, b in zip(ends, printed, strict=True)]
-            cells.append(", ".join(f"{d:+.4f}" for d in pairs if d is not None) or "-")
+            cells.append(", ".join(f"{d:+z.4f}" for d in pairs if d is not None) or "-")
         lines.append("| " + " | ".join([*cells, row.remark]) + " |")
     return "\n".join([*lines, "", _how(data.quality), ""])
 
 
 def _shown(ends: tuple[float | None, float | None]) -> str:
-    return "none" if None in ends else f"[{ends[0]:.4f}, {ends[1]:.4f}]"
+    return "none" if None in ends else f"[{ends[0]:z.4f}, {ends[1]:z.4f}]"
 
 
 def _with_errors(row: Row, ends: tuple[float | None, float | None]) -> str:
     if row.windows.absent:
         return "not computed"
     pairs = zip(ends, row.errors, strict=True)
-    words = [f"{end:.4f}" + (f" ± {error:.1g}" if error else "") for end, error in pairs if end is not None]
+    words = [f"{end:z.4f}" + (f" ± {error:.1g}" if error else "") for end, error in pairs if end is not None]
     return f"[{', '.join(words)}]" if words else "none"
 
 

@@ -1,6 +1,7 @@
 # What `__init__.py` loads on first use; tests/test_front.py writes it with --update.
 from synchain import models as models, runtime as runtime
 from synchain.models import Axis as Axis
+from synchain.models import Clusters as Clusters
 from synchain.models import Field as Field
 from synchain.models import FrictionLaw as FrictionLaw
 from synchain.models import Lagrangian as Lagrangian
@@ -20,6 +21,7 @@ from synchain.models import cayley_dihedral as cayley_dihedral
 from synchain.models import chain as chain
 from synchain.models import circulant as circulant
 from synchain.models import circular_ladder as circular_ladder
+from synchain.models import clusters as clusters
 from synchain.models import complement as complement
 from synchain.models import complete as complete
 from synchain.models import complete_bipartite as complete_bipartite
@@ -58,6 +60,7 @@ from synchain.models import minimum as minimum
 from synchain.models import nodes as nodes
 from synchain.models import normal as normal
 from synchain.models import one_way_ring as one_way_ring
+from synchain.models import orbital_partitions as orbital_partitions
 from synchain.models import paley as paley
 from synchain.models import path as path
 from synchain.models import petersen as petersen

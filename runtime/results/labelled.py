@@ -72,11 +72,13 @@ class Labelled(Shown):
         Parameters
         ----------
         path : str or path
-            Its ending chooses the form: .nc4 is netCDF-4 (needs h5netcdf), .zarr a Zarr folder
-            (needs zarr); any other ending is netCDF-3, which needs no further package.
+            Its ending chooses the form: .nc is netCDF-3, .nc4 netCDF-4 (needs h5netcdf), .zarr a Zarr
+            folder (needs zarr).
 
         Raises
         ------
+        ValueError
+            For another ending.
         ModuleNotFoundError
             If the package of the form is not installed.
         OSError
@@ -129,6 +131,6 @@ def words_of(
     found = []
     for k, ends in enumerate(intervals[:most]):
         spread = errors[k] if errors else (0.0, 0.0)
-        found.append(" … ".join(f"{x:.4f}" + (f" ± {e:.1g}" if e else "") for x, e in zip(ends, spread, strict=True)))
+        found.append(" … ".join(f"{x:z.4f}" + (f" ± {e:.1g}" if e else "") for x, e in zip(ends, spread, strict=True)))
     more = [f"{len(intervals) - most} more"] if len(intervals) > most else []
     return "; ".join([*found, *more]) or "none"

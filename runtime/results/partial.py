@@ -27,7 +27,15 @@ from .certificate import VERDICTS, Certificate
 from .labels import Variable, dimensions, labelled, scene_of, swept, variables
 from .result import Result, gather
 
-__all__ = ["certificate_of", "describe_sweep", "layout_of", "partial_path", "read_partial", "write_result"]
+__all__ = [
+    "certificate_of",
+    "describe_sweep",
+    "layout_of",
+    "partial_path",
+    "read_partial",
+    "verdicts_in",
+    "write_result",
+]
 
 
 def describe_sweep(
@@ -165,7 +173,12 @@ def _template(reader: _Reader) -> xr.Dataset:
     return unsealed(labelled(scene, found, (1,) * len(scene.shape), reader.log.about["attributes"]))
 
 
-def _verdicts(name: str, values: np.ndarray) -> list[tuple[str, int]]:
+def verdicts_in(data: xr.Dataset) -> dict[str, int]:
+    """Return how many cells of a result have each verdict, as `write_result` does."""
+    return {words: count for name, values in data.items() for words, count in _verdicts(str(name), values)}
+
+
+def _verdicts(name: str, values: np.ndarray | xr.DataArray) -> list[tuple[str, int]]:
     """What a variable of a block adds to the count of verdicts."""
     if name == "ended_early":
         return [("ended early", int(np.count_nonzero(values)))]

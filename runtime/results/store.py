@@ -11,28 +11,42 @@ import os
 import shutil
 import tempfile
 import warnings
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
+from synchain.models.inputs.checks import check_path
+
 from ..support.files import netcdf_data, whole_file
 from ..support.netcdf import DIGEST, seal, unsealed
 
-__all__ = ["CHOICES", "attributes_of", "read_data", "write_data"]
+__all__ = ["CHOICES", "NETCDF", "attributes_of", "ending_of", "read_data", "write_data"]
 
 PARTS = ("real", "imaginary")
 """The values of the dimension `part`, by which complex numbers are stored as pairs of real ones."""
 
+NETCDF = ".nc"
+"""The ending of netCDF-3."""
+
 CHOICES = {".nc4": "h5netcdf", ".zarr": "zarr"}
-"""The package of each ending that is not netCDF-3."""
+"""The package of each other ending."""
+
+
+def ending_of(path: str | os.PathLike[str], known: Sequence[str] = (NETCDF, *CHOICES)) -> str:
+    """Return the ending of a path, in small letters; ValueError if it is none of the `known` ones."""
+    ending = check_path("path", path).suffix.lower()
+    if ending not in known:
+        raise ValueError(f"path: found {os.fspath(path)!r}; expected a name that ends in {' or '.join(known)}")
+    return ending
 
 
 def write_data(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
     """Write a dataset; its ending chooses the form (see `Labelled.save`)."""
+    ending = ending_of(path)
     target, plain = Path(path), _without_complex(data)
-    ending = target.suffix.lower()
     if ending == ".zarr":
         _needed(ending, target)
         _write_folder(plain, target)

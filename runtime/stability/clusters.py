@@ -8,6 +8,7 @@ Source: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -30,6 +31,12 @@ from .orbits import unit_of_time
 from .variational_integrator import VariationalIntegrator
 
 __all__ = ["BlockVerdict", "ClusterExponents", "cluster_exponents"]
+
+MERGED = 1e-9
+"""Distance below which two clusters count as one."""
+
+APPROACH = 0.5
+"""Two clusters approach each other if their largest distance falls below this part of what it was earlier."""
 
 
 class BlockVerdict(StrEnum):
@@ -61,6 +68,9 @@ class ClusterExponents(Labelled):
         if the clusters have merged; then the exponents are those of a coarser state.
     time : float
         Time averaged over.
+    approaching : tuple of (int, int)
+        Pairs of clusters that have not merged and whose distance still falls; the exponents may be
+        those of a coarser state.
     """
 
     state: Clusters
@@ -70,6 +80,7 @@ class ClusterExponents(Labelled):
     motion_error: float
     separation: np.ndarray
     time: float
+    approaching: tuple[tuple[int, int], ...] = ()
 
     @property
     def data(self) -> xr.Dataset:
@@ -88,20 +99,20 @@ class ClusterExponents(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """The clusters, each block with its verdict, and what has merged."""
+        """The clusters, each block with its verdict, what has merged and what is about to."""
         members = [", ".join(str(i + 1) for i in nodes) for nodes in self.state.members]
         blocks = [
-            f"{verdict} ({exponent:.4f} ± {error:.1g}): clusters {', '.join(str(c + 1) for c in block.clusters)}"
+            f"{verdict} ({exponent:z.4f} ± {error:.1g}): clusters {', '.join(str(c + 1) for c in block.clusters)}"
             for block, exponent, error, verdict in zip(
                 self.state.blocks, self.exponent, self.stderr, self.verdicts, strict=True
             )
         ]
-        merged = "; ".join(f"{a + 1} and {b + 1}" for a, b in self.merged)
+        pairs = (("merged", self.merged), ("approaching", self.approaching))
         return (
             ("clusters", "; ".join(f"{k}: {nodes}" for k, nodes in enumerate(members, 1))),
             *((f"block {k}", words) for k, words in enumerate(blocks, 1)),
-            ("own motion", f"{self.motion:.4f} ± {self.motion_error:.1g}"),
-            *([("merged", merged)] if merged else []),
+            ("own motion", f"{self.motion:z.4f} ± {self.motion_error:.1g}"),
+            *((name, _words(found)) for name, found in pairs if found),
         )
 
     @property
@@ -121,8 +132,7 @@ class ClusterExponents(Labelled):
         """Pairs of clusters that never were more than 1e-9 apart; the motion is that of fewer
         clusters.
         """
-        first, second = np.nonzero(np.triu(self.separation < 1e-9, 1))
-        return tuple((int(a), int(b)) for a, b in zip(first, second, strict=True))
+        return _pairs(self.separation < MERGED)
 
     def as_dict(self) -> dict[str, object]:
         """Return the exponents for JSON.
@@ -131,7 +141,7 @@ class ClusterExponents(Labelled):
         -------
         dict
             classes, blocks (clusters, nodes, exponent, stderr, verdict), motion, motion_stderr,
-            merged, time.
+            merged, approaching, time.
         """
         rows = zip(self.state.blocks, self.exponent, self.stderr, self.verdicts, strict=True)
         return {
@@ -149,6 +159,7 @@ class ClusterExponents(Labelled):
             "motion": self.motion,
             "motion_stderr": self.motion_error,
             "merged": [list(pair) for pair in self.merged],
+            "approaching": [list(pair) for pair in self.approaching],
             "time": self.time,
         }
 
@@ -207,6 +218,12 @@ def cluster_exponents(
         without a known period.
     FloatingPointError
         If the integration fails.
+
+    Warns
+    -----
+    RuntimeWarning
+        If clusters approach each other: their largest distance halves from the first to the second
+        half of the motion after the first half of the transient.
     """
     averaging = Averaging(precision, periods, transient, seed, Execution(1, None, show_progress, progress))
     scene = single_cell(Given(cluster_exponents, parameters, more, ONE_ORBIT), scene, rtol)
@@ -214,16 +231,31 @@ def cluster_exponents(
     variation, unit = clustered(scene.equations, partition), unit_of_time(scene)
     reporter = averaging.reporter()
     integrator = _integrator(scene, partition, variation, averaging.seed)
-    batches, apart = Batches(unit), np.zeros((partition.quotient.n,) * 2)
+    batches, dropped = Batches(unit), round(averaging.transient)
+    gaps: list[np.ndarray] = []
+
+    def advance() -> np.ndarray:
+        growth = integrator.advance(unit)
+        gaps.append(_differences(integrator.state[0], partition.quotient.n, _deviating(variation)))
+        return growth
+
     with reporter:
-        for _ in range(round(averaging.transient)):
-            integrator.advance(unit)
+        for _ in range(dropped):
+            advance()
             reporter.advance(1)
         for _ in averaging.rounds(batches, batches.error, reporter):
-            batches.add(integrator.advance(unit))
-            apart = np.maximum(apart, _differences(integrator.state[0], partition.quotient.n, _deviating(variation)))
+            batches.add(advance())
+    apart = np.max(gaps[dropped:], axis=0)
+    approaching = _pairs(_falls(np.array(gaps[dropped // 2 :])) & (apart >= MERGED))
+    if approaching:
+        warnings.warn(
+            f"cluster_exponents: found clusters that approach each other, {_words(approaching)}; expected settled ones, "
+            f"the exponents may be those of fewer clusters; raise transient = {averaging.transient:g}",
+            RuntimeWarning,
+            stacklevel=2,
+        )
     mean, error, time = batches.mean()[0], batches.error_by_start()[0], batches.time
-    return ClusterExponents(partition, mean[1:], error[1:], float(mean[0]), float(error[0]), apart, time)
+    return ClusterExponents(partition, mean[1:], error[1:], float(mean[0]), float(error[0]), apart, time, approaching)
 
 
 def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
@@ -271,6 +303,23 @@ def _parts(partition: Clusters, components: int) -> Iterator[slice]:
     for block in partition.blocks:
         first, last = last, last + len(block.nodes) * components
         yield slice(first, last)
+
+
+def _falls(gaps: np.ndarray) -> np.ndarray:
+    """True (clusters, clusters) for distances (blocks, clusters, clusters) that are smaller in the later half of the blocks."""
+    half = len(gaps) // 2
+    early, late = (part.max(axis=0, initial=0.0) for part in (gaps[:half], gaps[half:]))
+    return np.asarray(late < APPROACH * early)
+
+
+def _pairs(found: np.ndarray) -> tuple[tuple[int, int], ...]:
+    """The pairs of clusters for which a symmetric table is true."""
+    first, second = np.nonzero(np.triu(found, 1))
+    return tuple((int(a), int(b)) for a, b in zip(first, second, strict=True))
+
+
+def _words(pairs: Sequence[tuple[int, int]]) -> str:
+    return "; ".join(f"{a + 1} and {b + 1}" for a, b in pairs)
 
 
 def _differences(state: np.ndarray, count: int, components: int) -> np.ndarray:

@@ -107,7 +107,7 @@ class Exponents(Labelled):
         return (
             ("strengths", f"{len(self.alpha)}, {ends_of(self.alpha)}"),
             *stable,
-            ("smallest, largest", f"{self.exponent.min():.4f}, {self.exponent.max():.4f}"),
+            ("smallest, largest", f"{self.exponent.min():z.4f}, {self.exponent.max():z.4f}"),
             ("motion", ", ".join(dict.fromkeys(a.kind for a in self.attractors))),
             ("average", f"{self.time:.6g} units of time for each of {self.starts} starts"),
         )

@@ -19,6 +19,7 @@ import xarray as xr
 from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.dynamics.variational import mode
 from synchain.models.inputs.checks import check_integer
+from synchain.models.scenes.names import expect_free
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import ORBITS, Given, with_numbers
@@ -36,6 +37,9 @@ __all__ = ["MSF", "Plane", "StabilityClass", "classify", "msf", "plane"]
 
 STRENGTHS = ("alpha", "beta")
 """The axes of a plane that are strengths of a mode; all others are parameters."""
+
+NAMES = frozenset({"attractor", "attractors", "contours", "exponent", "mode", "modes", "number", "start", "stderr"})
+"""What a plane has under these names beside those of all results."""
 
 FINE = 1001
 """Least number of strengths at which the function is computed; ends of ranges are interpolated."""
@@ -418,6 +422,7 @@ def plane(
             f"plane: found the axes {', '.join((*strengths, *rows)) or 'none'}; expected alpha and beta, alpha and a "
             "parameter, or two parameters, each with a row of values"
         )
+    expect_free("plane", rows, NAMES)
     axes = {name: row(name, values, 2, rising=True) for name, values in (*strengths.items(), *rows.items())}
     known = _known(given, scene)
     if len(rows) == 2 and not a_scene(scene).model.linked:

@@ -25,13 +25,13 @@ from ..cells.reduce import Reduction, as_reduction
 from ..results.block_log import BlockLog
 from ..results.labelled import Labelled
 from ..results.labels import alike, changed, scene_of
-from ..results.partial import certificate_of, describe_sweep, layout_of, partial_path, write_result
+from ..results.partial import certificate_of, describe_sweep, layout_of, partial_path, verdicts_in, write_result
 from ..results.result import Result, read_result
-from ..results.store import CHOICES, attributes_of
+from ..results.store import NETCDF, attributes_of, ending_of
 from ..support.execution import Execution
 from ..support.files import check_replaceable, drop_leftovers, netcdf_data, understood
 from ..support.progress import Hook, Progress, Reporter
-from ..support.status import Status
+from ..support.status import Status, tally
 from .errors import SweepFailed, SweepInterrupted
 from .job import Start
 from .pool import Task, worker_lost
@@ -106,10 +106,10 @@ def stream(
     ----------
     scene : Scene
     path : str or path
-        File of the result; it ends in .nc by custom.
+        File of the result, whose name ends in .nc.
     resume : bool
         Go on with a run that was not finished; its result is, byte for byte, that of a run without
-        interruption.
+        interruption. Nothing is run if it was finished.
     overwrite : bool
         Replace what is there already.
     width, reduce, certified, realisations, draws, rng, parameters, **axes
@@ -125,7 +125,7 @@ def stream(
     Raises
     ------
     ValueError
-        If a keyword is refused as by `run`, or if a file at `path` belongs to another run.
+        If a keyword is refused as by `run`, for another ending, or if a file at `path` belongs to another run.
     FileExistsError
         If the result or an unfinished run is there and neither `resume` nor `overwrite` is given.
     FileNotFoundError
@@ -140,9 +140,12 @@ def stream(
     execution = Execution(workers, executor, show_progress, progress)
     reporter = execution.reporter(scene.cells)
     if (state := claim(reduction, path, resume=resume, overwrite=overwrite, certified=certified)) == "complete":
-        raise FileExistsError(
-            f"{os.fspath(path)} holds the result of this scene already; give overwrite (--overwrite) to run it again"
-        )
+        if not resume:
+            raise FileExistsError(
+                f"{os.fspath(path)} holds the result of this scene already; give resume (--resume) to take it, or "
+                "overwrite (--overwrite) to run it again"
+            )
+        return _finished(Path(path), reporter)
     partial = partial_path(path)
     if state == "continue":
         certificate = certificate_of(BlockLog.describe(partial))
@@ -185,12 +188,7 @@ def claim(
         check_flag(name, value)
     target = check_path("path", path)
     partial = partial_path(target)
-    if target.suffix.lower() in CHOICES:
-        raise ValueError(f"path: found {str(target)!r}; expected another ending: stream writes netCDF-3; end it in .nc")
-    if target.suffix.lower() == partial.suffix:
-        raise ValueError(
-            f"path: found {str(target)!r}, the name of an unfinished run; expected that of a result; end it in .nc"
-        )
+    ending_of(target, [NETCDF])
     if resume and overwrite:
         raise ValueError("found both resume and overwrite; expected one of them")
     check_replaceable(target)
@@ -239,6 +237,15 @@ def _check_same(
     if exponents != certified:
         certificate = "with" if exponents else "without"
         raise ValueError(f"{path} was run {certificate} a certificate (certified, --certify); {again}")
+
+
+def _finished(path: Path, reporter: Reporter) -> Streamed:
+    """The run whose result is there already."""
+    with understood(path), netcdf_data(path) as file:
+        reporter.start(tally(file["status"].values.ravel()))
+        verdicts = verdicts_in(file)
+    reporter.close()
+    return Streamed(path, reporter.now, verdicts)
 
 
 @dataclass(slots=True)

@@ -204,6 +204,10 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "friction in a field": (lambda: Field({X: friction(X)}), "found friction(…) in a rate"),
     "law unused": (lambda: Lagrangian(v**2, friction="coulomb"), "found friction 'coulomb', but no force has"),
     "contact unused": (lambda: Lagrangian(v**2, contact="atan"), "found contact 'atan', but no force has"),
+    "law as text": (
+        lambda: Lagrangian(v**2, 0, RUB, friction="mu*sign(w)"),
+        "viscous, or an expression, friction_law('mu*sign(w)', {'mu': 0.3})",
+    ),
     "unknown law": (lambda: Lagrangian(v**2, 0, RUB, friction="colomb"), "unknown friction 'colomb'"),
     "unknown contact": (lambda: Lagrangian(v**2, 0, RUB, contact="sticky"), "unknown contact 'sticky'"),
     "law without w": (

@@ -22,6 +22,9 @@ from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.cli import main
 from synchain.runtime.commands.run import _nothing_to_do
 from synchain.runtime.console.arguments import spaced
+from synchain.runtime.console.words import measured, window_text
+from synchain.runtime.prediction.synchronisability import Window
+from synchain.runtime.results.labelled import words_of
 from synchain.runtime.sweeps import job
 from synchain.runtime.sweeps.certify import check_certifiable
 from synchain.runtime.sweeps.run import run
@@ -29,6 +32,15 @@ from synchain.runtime.sweeps.stream import claim
 
 PAIR = Scene(oscillator="harmonic", topology=chain(2), transient=1, window=1)
 LARGE = {"sigma": np.linspace(0, 1, 1000), "x_1": np.linspace(0, 1, 1000), "x_2": np.linspace(0, 1, 1000)}
+
+
+def test_what_rounds_to_zero_has_no_sign():
+    tiny, window = -2.7e-05, Window(-2.7e-05, 0.3, 3e-05, 0.0, None, None)
+    written = [words_of([(tiny, 0.3)], [(3e-05, 0.0)]), words_of([(-1e-9, -0.0)]), measured(tiny, 1e-3)]
+    written += [measured(-0.0, 0.0, at_end=True), measured(tiny, 0.0), window_text(window)]
+    assert written == [
+        "0.0000 ± 3e-05 … 0.3000", "0.0000 … 0.0000", "0.0000 ± 0.0010", "0", "0.0000", "0.0000... … 0.3000...",
+    ]  # fmt: skip
 
 
 def test_compiling_is_told_and_loading_is_not(tmp_path, monkeypatch, caplog):

@@ -33,8 +33,8 @@ def test_exponents_are_drawn_with_their_stable_range_and_error(simulation: Simul
     for panel, found, (low, high) in zip(panels, data, ((0.0, 0.466), (0.09, 0.6), (0.176, 0.594)), strict=True):
         band = next(patch for patch in panel.patches if patch.get_facecolor() == to_rgba(style.GREY))
         assert (band.get_x(), band.get_x() + band.get_width()) == pytest.approx((low, high), abs=1e-3)
-        (line,) = (line for line in panel.lines if len(line.get_xdata()) == len(found.alpha))
-        np.testing.assert_allclose(line.get_ydata(), (found.alpha - low) * (found.alpha - high))
+        (line,) = (line for line in panel.lines if len(line.get_xdata()) == len(found.fine.alpha))
+        np.testing.assert_allclose(line.get_ydata(), (found.fine.alpha - low) * (found.fine.alpha - high))
         cloud = panel.collections[0].get_paths()[0].vertices
         at_end = cloud[np.isclose(cloud[:, 0], 1.2), 1]
         assert at_end.max() - at_end.min() == pytest.approx(4 * 1e-3, rel=1e-3)  # two standard errors either side
@@ -50,8 +50,20 @@ def test_an_exponent_that_is_not_finite_leaves_a_gap() -> None:
     fine.exponent[2] = -math.inf
     with style.context():
         axes = exponent.draw_exponent(style.new_figure((3, 2)).add_subplot(), MSF(Scene(), alpha, fine))
-    (line,) = (line for line in axes.lines if len(line.get_xdata()) == 9)
-    assert np.isnan(line.get_ydata()).tolist() == [k == 2 for k in range(9)]
+    curve, dots = axes.lines[1:]
+    for line in (curve, dots):
+        assert np.isnan(line.get_ydata()).tolist() == [k == 2 for k in range(9)]
+
+
+@pytest.mark.parametrize(("asked", "marked"), [(4, True), (97, False)])
+def test_few_strengths_are_marked_on_the_line_of_all(asked: int, marked: bool) -> None:
+    fine = parabola(1.4, np.linspace(0.0, 1.2, 289))
+    with style.context():
+        alpha = np.linspace(0.0, 1.2, asked)
+        axes = exponent.draw_exponent(style.new_figure((3, 2)).add_subplot(), MSF(Scene(), alpha, fine))
+    _, curve, *dots = axes.lines
+    np.testing.assert_array_equal(curve.get_xdata(), fine.alpha)
+    assert [(line.get_linestyle(), len(line.get_xdata())) for line in dots] == ([("None", 4)] if marked else [])
 
 
 def test_numbers_of_the_exponents_are_written(simulation: Simulation, tmp_path: Path) -> None:

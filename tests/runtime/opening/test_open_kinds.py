@@ -131,8 +131,21 @@ def test_a_streamed_result_has_data_and_is_saved_elsewhere(result: Any, tmp_path
     made.save(tmp_path / "b.nc")
     assert open_result(tmp_path / "b.nc").data.identical(result.data)
     assert "a.nc" in repr(made)
-    with pytest.raises(ValueError, match=r"expected another ending: stream writes netCDF-3; end it in \.nc"):
-        stream(result.scene, tmp_path / "a.nc4")
+    for name in ("a.nc4", "a.csv"):
+        with pytest.raises(ValueError, match=rf"path: found '.*{name}'; expected a name that ends in \.nc$"):
+            stream(result.scene, tmp_path / name)
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.NetCDF", "a"])
+def test_an_unknown_ending_is_refused(result: Any, name: str, tmp_path: Path) -> None:
+    for value in (result, KINDS["Plane"]):
+        with pytest.raises(
+            ValueError, match=rf"path: found '.*{name}'; expected a name that ends in .nc or .nc4 or .zarr"
+        ):
+            value.save(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+    result.save(tmp_path / "A.NC")
+    assert open_result(tmp_path / "A.NC").data.identical(result.data)
 
 
 @pytest.mark.parametrize("ending", FORMS)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import mpmath
 import numpy as np
 import pytest
@@ -171,3 +173,41 @@ def test_the_table_of_a_state_is_plain() -> None:
     assert found["merged"] == []
     (block,) = found["blocks"]
     assert (block["clusters"], block["nodes"], block["verdict"]) == ([0], [0, 1], "stable")
+
+
+def neurons(sigma: float) -> Scene:
+    return Scene("fitzhugh_nagumo", "y->x", topology("ring", 6), parameters={"sigma": sigma})
+
+
+def test_clusters_that_still_approach_each_other_are_said() -> None:
+    """Coupling that repels for sigma > 0 brings all neurons together for sigma < 0, at 0.0044 per unit of time."""
+    pairs = tuple((a, b) for a in range(4) for b in range(a + 1, 4))
+    with pytest.warns(RuntimeWarning, match=r"clusters that approach each other, 1 and 2; .*; raise transient = 300$"):
+        found = cluster_exponents(neurons(-0.05), (0, 1, 0, 2, 3, 2), periods=100)
+    assert 1e-6 < found.separation.max() < 1e-4
+    assert (found.merged, found.approaching) == ((), pairs)
+    assert "approaching  1 and 2; 1 and 3" in repr(found)
+    assert found.as_dict()["approaching"] == [list(pair) for pair in pairs]
+
+
+def test_clusters_that_have_merged_or_stay_apart_do_not_approach_each_other() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        merged = cluster_exponents(neurons(-0.05), (0, 1, 0, 2, 3, 2), transient=1000, periods=100)
+        apart = cluster_exponents(neurons(0.05), (0, 1, 0, 2, 3, 2), periods=1)
+    assert (len(merged.merged), merged.approaching) == (6, ())
+    assert (apart.merged, apart.approaching) == (((0, 3), (1, 2)), ())
+    assert apart.separation.max() > 0.1
+
+
+def test_the_first_half_of_the_transient_may_bring_clusters_nearer() -> None:
+    """Two weak oscillators of van der Pol in antiphase, whose amplitude falls to 2 from 20, after 30 periods by 1 %."""
+    scene = Scene(
+        "van_der_pol", "spring", RING, parameters={"mu": 0.02, "sigma": 0.01}, initial={"x": [20, -20] * 2, "v": 0}
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = cluster_exponents(scene, (0, 1, 0, 1), transient=60, periods=30)
+    assert found.separation.max() == pytest.approx(4.0, rel=0.02)
+    with pytest.warns(RuntimeWarning, match="clusters that approach each other, 1 and 2; expected"):
+        cluster_exponents(scene, (0, 1, 0, 1), transient=0, periods=30)

@@ -442,6 +442,24 @@ def test_nothing_is_overwritten_silently(tmp_path):
         stream(other, tmp_path / "b.nc", resume=True)
 
 
+def test_a_finished_run_is_resumed_by_its_result(tmp_path, monkeypatch):
+    path, seen = tmp_path / "a.nc", []
+    small = PAIR.replace(axes={"sigma": [0.1, 0.5]})
+    done = stream(small, path, certified=True, width=8, show_progress=False)
+    before = path.stat()
+    monkeypatch.delattr("synchain.runtime.sweeps.stream.prepare")
+    again = stream(small, path, certified=True, resume=True, show_progress=False, progress=seen.append)
+    assert path.stat().st_mtime_ns == before.st_mtime_ns
+    assert (again.verdicts, again.success, again.path) == (done.verdicts, done.success, done.path)
+    assert again.progress.statuses == done.progress.statuses
+    assert (again.progress.kept, again.progress.done, again.progress.total) == (2, 2, 2)
+    assert again.data.identical(done.data)
+    assert len(seen) == 1
+    for other, words in ((PAIR, "belongs to another scene"), (small, "was run with a certificate")):
+        with pytest.raises(ValueError, match=words):
+            stream(other, path, resume=True, show_progress=False)
+
+
 def test_an_unfinished_run_is_not_begun_again_silently(tmp_path, interruptible):
     path = tmp_path / "a.nc"
     with pytest.raises(SweepInterrupted):
@@ -657,7 +675,7 @@ def test_a_file_with_a_scene_alone_is_no_result(tmp_path):
 
 @pytest.mark.parametrize("name", ["x.partial", "x.PARTIAL"])
 def test_the_name_of_an_unfinished_run_is_no_name_of_a_result(name, tmp_path):
-    with pytest.raises(ValueError, match=r"the name of an unfinished run; expected that of a result; end it in \.nc"):
+    with pytest.raises(ValueError, match=r"found '.*'; expected a name that ends in \.nc"):
         stream(PAIR, tmp_path / name, show_progress=False)
     assert not list(tmp_path.iterdir())
 
