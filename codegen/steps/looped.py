@@ -241,7 +241,31 @@ class Looped(Step):
                 at = plus(j * Name("DIMENSION"), place)
                 found.append(If(Name("DENSE"), (store("dense", at, scaled_value),)))
             self.put(rows.over(found))
+        if m.dense_error:
+            before, self.statements = self.statements, []
+            self.stiff_errors()
+            self.statements = [*before, If(Name("DENSE"), tuple(self.statements))]
         self.put(Return((Name("error") + 0.0 * Name("total"),), "NaN or infinite where any estimate is"))
+
+    def stiff_errors(self) -> None:
+        """Raise the error to that which the dense output has where the state is stiff; K1 is lost."""
+        m, last = self.method, (len(self.method.dense) - 1) * Name("DIMENSION")
+        self.note("what is stiff of the error of the dense output")
+        for rows, place in self.places.rows:
+            found: list[Statement] = [let("e", m.dense_error * Load("dense", plus(last, place)))]
+            found += [store("dense", plus(Name("K1"), place), Name("shift") * "e")]
+            if self.equations.inertial:  # what `carried` multiplies by M - 1, and by the rate where M is constant
+                kept = Name("e") * (1.0 / m.gamma) if self.mass.constant else Name("shift") * "e"
+                found += [store("dense", plus(Name("STATE"), place), kept)]
+            self.put(rows.over(found))
+        self.mass.carried("K1")
+        self.mass.solve("K1", "SLOPE")
+        for rows, place in self.places.rows:
+            found = [let("old", Load("y", place)), let("new", Load("y_new", place))]
+            found += [let("e", m.dense_error * Load("dense", plus(last, place)) - Load("dense", plus(Name("K1"), place)))]
+            found += [let("e", call("scaled", "e", "old", "new", "rtol", "atol"))]
+            found += [let("total", Name("total") + "e"), let("error", call("maximum", "error", "e"))]
+            self.put(rows.over(found))
 
 
 def vector(number: int) -> Expression:

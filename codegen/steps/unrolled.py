@@ -236,6 +236,10 @@ class Unrolled(Step):
                 value = lane(linear(row, self.stages(name, len(row))))
                 value = value if m.implicit else Product((Name("h"), value))
                 self.put(store("dense", j * len(self.state) + slot, value))
+        if m.dense_error:
+            before += [let(f"e_{name}", e) for name, e in zip(self.state, errors, strict=True)]
+            errors = [Name(f"e_{name}") for name in self.state]
+            self.stiff_errors()
         self.statements = [*before, If(Name("DENSE"), tuple(self.statements))]
         for slot, (name, e) in enumerate(zip(self.state, errors, strict=True)):
             self.put(store("y_new", slot, f"n_{name}"))
@@ -246,6 +250,21 @@ class Unrolled(Step):
         self.put(*(let("error", call("maximum", "error", term)) for term in others))
         results = (Name("error") + 0.0 * Name("total"), *([Name("bound")] * self.bounded))
         self.put(Return(results, "NaN or infinite where any estimate is"))
+
+    def stiff_errors(self) -> None:
+        """Raise the errors to those that the dense output has where the state is stiff."""
+        m = self.method
+        self.note("what is stiff of the error of the dense output")
+        for name in self.state:
+            self.let(f"g_{name}", m.dense_error * linear(m.dense[-1], self.stages(name, len(m.dense[-1]))))
+        carried = self.mass.times("g")
+        for name in self.state:
+            self.let(f"r_{name}", Name("shift") * carried.get(name, Name(f"g_{name}")))
+        rights, results = ({k: f"{v}_{name}" for k, name in enumerate(self.state)} for v in "rf")
+        self.put(*write_solve(self.steps, self.factors, rights, results))
+        for name in self.state:
+            stiff = call("absolute", Name(f"g_{name}") - Name(f"f_{name}"))
+            self.let(f"e_{name}", call("maximum", call("absolute", f"e_{name}"), stiff))
 
     def new_state(self, name: str) -> Expression:
         """Compute the new value of one state variable; returns its error, of one or two embedded methods."""
