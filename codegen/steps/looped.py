@@ -258,7 +258,7 @@ class Looped(Step):
                 kept = Name("e") * (1.0 / m.gamma) if self.mass.constant else Name("shift") * "e"
                 found += [store("dense", plus(Name("STATE"), place), kept)]
             self.put(rows.over(found))
-        self.mass.carried("K1")
+        self.mass.carried(0)
         self.mass.solve("K1", "SLOPE")
         for rows, place in self.places.rows:
             found = [let("old", Load("y", place)), let("new", Load("y_new", place))]

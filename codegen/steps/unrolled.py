@@ -256,15 +256,15 @@ class Unrolled(Step):
         m = self.method
         self.note("what is stiff of the error of the dense output")
         for name in self.state:
-            self.let(f"g_{name}", m.dense_error * linear(m.dense[-1], self.stages(name, len(m.dense[-1]))))
+            self.let(f"g_{name}", linear(m.dense[-1], self.stages(name, len(m.dense[-1]))))
         carried = self.mass.times("g")
         for name in self.state:
             self.let(f"r_{name}", Name("shift") * carried.get(name, Name(f"g_{name}")))
         rights, results = ({k: f"{v}_{name}" for k, name in enumerate(self.state)} for v in "rf")
         self.put(*write_solve(self.steps, self.factors, rights, results))
         for name in self.state:
-            stiff = call("absolute", Name(f"g_{name}") - Name(f"f_{name}"))
-            self.let(f"e_{name}", call("maximum", call("absolute", f"e_{name}"), stiff))
+            stiff = call("absolute", Name(f"g_{name}") - Name(f"f_{name}")) - call("absolute", f"f_{name}")
+            self.let(f"e_{name}", call("maximum", call("absolute", f"e_{name}"), m.dense_error * stiff))
 
     def new_state(self, name: str) -> Expression:
         """Compute the new value of one state variable; returns its error, of one or two embedded methods."""
