@@ -74,9 +74,9 @@ class Integrator:
 
     In the limit of infinite stiffness (y' = z (y - g(t)) + g'(t), z to minus infinity [2]_) the error
     estimate of a stiffly accurate method vanishes, and the dense output of Rosenbrock methods loses
-    an order: Rodas5P reproduces g of degree 3, Rodas4 of degree 2.  A step that records between its
-    ends therefore takes w = dense_error D_last as a second estimate, and of it what is stiff,
-    w - (s - J)^-1 s w: h J w in components that are not stiff, w in those that are.
+    an order: Rodas5P reproduces g of degree 3, Rodas4 of degree 2.  Where states between steps are
+    recorded, dense_error D_last therefore is a second estimate, times 1 - 2 s/p with the pivot p of
+    the component in the elimination of s - J: p = s if it is not stiff (no estimate), p >> s if it is.
 
     References
     ----------

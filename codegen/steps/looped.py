@@ -14,7 +14,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import Block
 
 from ..integrators import Integrator
-from ..program.expressions import Expression, Load, Name, Product, Value, call, linear, negative, plus, scaled
+from ..program.expressions import Expression, Load, Name, Number, Product, Value, call, linear, negative, plus, scaled
 from ..program.lowering import lower
 from ..program.passes import Body
 from ..program.statements import Assign, Do, If, Return, Statement, accumulate, let, store, whole
@@ -233,7 +233,8 @@ class Looped(Step):
         for rows, place in self.places.rows:
             found = [*self.load_stages(place, [1.0] * len(m.c)), let("old", Load("y", place))]
             found += [let("new", Name("old") + self.increment(m.b, values)), store("y_new", place, "new")]
-            found += [let("e", call("scaled", error, "old", "new", "rtol", "atol"))]
+            found += [let("e", error), *self.stiff_errors(place, values)]
+            found += [let("e", call("scaled", "e", "old", "new", "rtol", "atol"))]
             found += [let("total", Name("total") + "e"), let("error", call("maximum", "error", "e"))]
             for j, row in enumerate(m.dense):
                 value = lane(linear(row, values))
@@ -241,31 +242,17 @@ class Looped(Step):
                 at = plus(j * Name("DIMENSION"), place)
                 found.append(If(Name("DENSE"), (store("dense", at, scaled_value),)))
             self.put(rows.over(found))
-        if m.dense_error:
-            before, self.statements = self.statements, []
-            self.stiff_errors()
-            self.statements = [*before, If(Name("DENSE"), tuple(self.statements))]
         self.put(Return((Name("error") + 0.0 * Name("total"),), "NaN or infinite where any estimate is"))
 
-    def stiff_errors(self) -> None:
-        """Raise the error to that which the dense output has where the state is stiff; K1 is lost."""
-        m, last = self.method, (len(self.method.dense) - 1) * Name("DIMENSION")
-        self.note("what is stiff of the error of the dense output")
-        for rows, place in self.places.rows:
-            found: list[Statement] = [let("e", m.dense_error * Load("dense", plus(last, place)))]
-            found += [store("dense", plus(Name("K1"), place), Name("shift") * "e")]
-            if self.equations.inertial:  # what `carried` multiplies by M - 1, and by the rate where M is constant
-                kept = Name("e") * (1.0 / m.gamma) if self.mass.constant else Name("shift") * "e"
-                found += [store("dense", plus(Name("STATE"), place), kept)]
-            self.put(rows.over(found))
-        self.mass.carried(0)
-        self.mass.solve("K1", "SLOPE")
-        for rows, place in self.places.rows:
-            found = [let("old", Load("y", place)), let("new", Load("y_new", place))]
-            found += [let("e", m.dense_error * Load("dense", plus(last, place)) - Load("dense", plus(Name("K1"), place)))]
-            found += [let("e", call("scaled", "e", "old", "new", "rtol", "atol"))]
-            found += [let("total", Name("total") + "e"), let("error", call("maximum", "error", "e"))]
-            self.put(rows.over(found))
+    def stiff_errors(self, place: Expression, values: Sequence[str]) -> list[Statement]:
+        """Raise the error of a state with a large pivot to that of the dense output; with inertia each counts as large."""
+        m = self.method
+        if not m.dense_error:
+            return []
+        factors = Name("MATRIX") if self.elimination.exact else Name("MATRIX") + "ENTRIES"
+        pivot = Load("dense", plus(factors, place))
+        share = lane(Number(0.0)) if self.equations.inertial else Name("shift") * pivot
+        return [If(Name("DENSE"), (let("e", self.stiff_error("e", linear(m.dense[-1], values), share)),))]
 
 
 def vector(number: int) -> Expression:

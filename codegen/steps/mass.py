@@ -158,25 +158,20 @@ class Mass:
                     found[row, k] = found.get((row, k), sp.S.Zero) - derivative(e, s) * rate
         return {key: e for key, e in found.items() if e != 0}
 
-    def times(self, vector: str) -> dict[str, Expression]:
-        """By state, the product of M at the start of the step and a vector, for the rows that M couples."""
-        names, found = self.writer.state, {}
-        for row in self.rows:
-            terms = [e * sp.Symbol(f"{vector}_{names[c]}") for (r, c), e in self.entries.items() if r == row]
-            found[names[row]] = lower(sp.Add(*terms))
-        return found
-
     def known(self, sums: Mapping[str, Expression], i: int) -> dict[str, Expression]:
         """By state, M (F + rate sum c k) for the rows that M couples, in stage i; `sums` are the sums of c k."""
         if not self.entries or i == 0:
             return {}
         w, rate = self.writer, Name("rate")
+        names = {row: w.state[row] for row in self.rows}
         if not self.constant:
             self.solve("u", "f", "g")
-        for name in self.names:
+        found = {}
+        for name in names.values():
             change = sums[name] if self.constant else Name(f"g_{name}") + Product((rate, sums[name]))
             w.put(let(f"g_{name}", change))
-        carried = self.times("g")
-        if self.constant:
-            return {name: Name(f"f_{name}") + Product((rate, e)) for name, e in carried.items()}
-        return carried
+        for row, name in names.items():
+            terms = [e * sp.Symbol(f"g_{w.state[c]}") for (r, c), e in self.entries.items() if r == row]
+            carried = lower(sp.Add(*terms))
+            found[name] = Name(f"f_{name}") + Product((rate, carried)) if self.constant else carried
+        return found

@@ -13,7 +13,7 @@ from ..program.expressions import ZERO, Call, Expression, Load, Name, Number, Pr
 from ..program.lowering import lower
 from ..program.statements import If, Return, let, store
 from .blocks import NodeBlocks
-from .elimination import Entries, plan, write_factors, write_solve
+from .elimination import Entries, plan, times, write_factors, write_solve
 from .mass import Mass
 from .step import NOW, Step, lane, prefix, time_term
 
@@ -252,19 +252,14 @@ class Unrolled(Step):
         self.put(Return(results, "NaN or infinite where any estimate is"))
 
     def stiff_errors(self) -> None:
-        """Raise the errors to those that the dense output has where the state is stiff."""
-        m = self.method
-        self.note("what is stiff of the error of the dense output")
-        for name in self.state:
-            self.let(f"g_{name}", linear(m.dense[-1], self.stages(name, len(m.dense[-1]))))
-        carried = self.mass.times("g")
-        for name in self.state:
-            self.let(f"r_{name}", Name("shift") * carried.get(name, Name(f"g_{name}")))
-        rights, results = ({k: f"{v}_{name}" for k, name in enumerate(self.state)} for v in "rf")
-        self.put(*write_solve(self.steps, self.factors, rights, results))
-        for name in self.state:
-            stiff = call("absolute", Name(f"g_{name}") - Name(f"f_{name}")) - call("absolute", f"f_{name}")
-            self.let(f"e_{name}", call("maximum", call("absolute", f"e_{name}"), m.dense_error * stiff))
+        """Raise the errors of states with large pivots to that of the dense output."""
+        self.note("the dense output has errors of its own where the state is stiff")
+        for slot, name in enumerate(self.state):
+            pivot, mass = self.factors.inverse[slot], self.mass.entries.get((slot, slot), sp.S.One)
+            if pivot != Name("reach"):
+                self.let(f"f_{name}", times(lower(mass), Name("shift") * pivot))
+                last = linear(self.method.dense[-1], self.stages(name, len(self.method.dense[-1])))
+                self.let(f"e_{name}", self.stiff_error(f"e_{name}", last, Name(f"f_{name}")))
 
     def new_state(self, name: str) -> Expression:
         """Compute the new value of one state variable; returns its error, of one or two embedded methods."""
