@@ -152,7 +152,7 @@ def dense_errors(m, eq: Equations, h, y, p, jacobian, dense: list, looped: bool)
     order = program(eq).arrays[NAMES.index("order")].tolist() if looped else plan(size, pattern).order
     matrix, share = shift * mass - slopes, [mpf(0)] * size
     for at, k in enumerate(order):
-        share[k] = 0 if looped and eq.inertial else shift * mass[k, k] / matrix[k, k]
+        share[k] = shift * mass[k, k] / matrix[k, k]
         for r, c in itertools.product(order[at + 1 :], repeat=2):
             matrix[r, c] -= matrix[r, k] * matrix[k, c] / matrix[k, k]
     return [mpf(m.dense_error) * (1 - 2 * f) * abs(d) for f, d in zip(share, dense[-size:], strict=True)]

@@ -44,7 +44,9 @@ def test_samples_of_a_large_network_keep_to_the_tolerance():
 
 def test_transits_keep_to_the_tolerance():
     data = run(scene("rodas5p", 1e-8, record=("section",), section="x_1 falling"), a=STIFFNESS).data
-    for a, times in zip(STIFFNESS, data.section_time.transpose("a", ...).values.reshape(len(STIFFNESS), -1), strict=True):
+    for a, times in zip(
+        STIFFNESS, data.section_time.transpose("a", ...).values.reshape(len(STIFFNESS), -1), strict=True
+    ):
         found = times[np.isfinite(times)]
         assert found.size
         turns = (found - np.pi / 2 - np.arctan(1 / a)) / np.pi
