@@ -49,6 +49,9 @@ class Integrator:
         One or two rows of weights for the error estimate.
     dense
         One row of weights for each D_j below.
+    dense_error
+        Largest error of the dense output in a component of infinite stiffness, in units of its last
+        row; 0 if its order is the same there.
     gamma, d, big_c
         What a Rosenbrock method has besides: gamma, the weights of df/dt, and the matrix C.
     inexact
@@ -69,10 +72,17 @@ class Integrator:
     The dense output is y(theta) = (1-theta) y + theta (y_new + (1-theta) (D_1 + theta (D_2 + …))) with
     D_j = sum dense_ji k_i (times h).
 
+    In the limit of infinite stiffness (y' = z (y - g(t)) + g'(t), z to minus infinity [2]_) the error
+    estimate of a stiffly accurate method vanishes, and the dense output of Rosenbrock methods loses
+    an order: Rodas5P reproduces g of degree 3, Rodas4 of degree 2.  Where states between steps are
+    recorded, dense_error D_last therefore is a second estimate, times 1 - 2 s/p with the pivot p of
+    the component in the elimination of s - J: p = s if it is not stiff (no estimate), p >> s if it is.
+
     References
     ----------
     .. [1] E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed., Springer, 1996,
        eq. IV.7.25.
+    .. [2] A. Prothero, A. Robinson, Mathematics of Computation 28, 145 (1974).
     """
 
     name: str
@@ -86,6 +96,7 @@ class Integrator:
     c: Row
     e: tuple[Row, ...]
     dense: tuple[Row, ...]
+    dense_error: float = 0.0
     gamma: float = 0.0
     d: Row = ()
     big_c: tuple[Row, ...] = ()
@@ -170,6 +181,7 @@ def _read(name: str, data: ModuleType) -> Integrator:
         c=data.C,
         e=data.E,
         dense=data.DENSE,
+        dense_error=getattr(data, "DENSE_ERROR", 0.0),
         gamma=getattr(data, "GAMMA", 0.0),
         d=getattr(data, "TIME_WEIGHTS", ()),
         big_c=getattr(data, "BIG_C", ()),

@@ -230,10 +230,15 @@ class Looped(Step):
         error = self.increment(m.e[0], values)
         if len(m.e) > 1:
             error = call("pair", *(linear(row, values) for row in m.e), "h")
+        if m.dense_error and self.equations.inertial:
+            before, self.statements = self.statements, []
+            self.mass.gather("y", "MASS")
+            self.statements = [*before, If(Name("DENSE"), tuple(self.statements))]
         for rows, place in self.places.rows:
             found = [*self.load_stages(place, [1.0] * len(m.c)), let("old", Load("y", place))]
             found += [let("new", Name("old") + self.increment(m.b, values)), store("y_new", place, "new")]
-            found += [let("e", call("scaled", error, "old", "new", "rtol", "atol"))]
+            found += [let("e", error), *self.stiff_errors(place, values)]
+            found += [let("e", call("scaled", "e", "old", "new", "rtol", "atol"))]
             found += [let("total", Name("total") + "e"), let("error", call("maximum", "error", "e"))]
             for j, row in enumerate(m.dense):
                 value = lane(linear(row, values))
@@ -242,6 +247,16 @@ class Looped(Step):
                 found.append(If(Name("DENSE"), (store("dense", at, scaled_value),)))
             self.put(rows.over(found))
         self.put(Return((Name("error") + 0.0 * Name("total"),), "NaN or infinite where any estimate is"))
+
+    def stiff_errors(self, place: Expression, values: Sequence[str]) -> list[Statement]:
+        """Raise the error of a state with a large pivot to that of the dense output."""
+        m = self.method
+        if not m.dense_error:
+            return []
+        factors = Name("MATRIX") if self.elimination.exact else Name("MATRIX") + "ENTRIES"
+        share = Name("shift") * Load("dense", plus(factors, place))
+        share = share * Load("dense", plus(Name("MASS"), place)) if self.equations.inertial else share
+        return [If(Name("DENSE"), (let("e", self.stiff_error("e", linear(m.dense[-1], values), share)),))]
 
 
 def vector(number: int) -> Expression:
@@ -259,12 +274,12 @@ class LoopMass:
         self.heavy = [kind for kind in writer.places.kinds if kind.node.inertia]
 
     def bases(self, before: int) -> dict[str, Expression]:
-        """Where a Rosenbrock step keeps the rates at its start and M in a stage, behind so many vectors and the matrix."""
-        if self.constant or not self.writer.method.implicit:
+        """Where a Rosenbrock step keeps M, behind so many vectors and the matrix, and the rates at its start if M varies."""
+        if not self.inertial or not self.writer.method.implicit:
             return {}
         matrix = Name("ENTRIES") if self.writer.elimination.exact else 2 * Name("ENTRIES")
         start = Name("DENSE_ROWS") * "DIMENSION" + before * Name("DIMENSION") + matrix
-        return {"RATES": start, "MASS": start + "DIMENSION"}
+        return {"MASS": start} if self.constant else {"RATES": start, "MASS": start + "DIMENSION"}
 
     # -- linear algebra ---------------------------------------------------------------------------------------
 
@@ -285,6 +300,11 @@ class LoopMass:
 
     def assemble(self, base: str, matrix: str) -> None:
         """M at a state, factorised; STATE is lost."""
+        self.gather(base, matrix)
+        self.factorise(matrix)
+
+    def gather(self, base: str, matrix: str) -> None:
+        """M at a state."""
         w = self.writer
         w.put(*filled(matrix, 1.0 + 0.0 * Name("h")))
         for kind in self.heavy:
@@ -297,7 +317,6 @@ class LoopMass:
             for block, slot in zip(joint.edge.inertia, SLOTS, strict=True):
                 found += w.entries(block, slot, named(joint), lambda e: e, matrix)
             w.put(joint.span.over(found))
-        self.factorise(matrix)
 
     def link(self, joint: Joint, base: str) -> list[Statement]:
         """What the inertia of a link is made of."""

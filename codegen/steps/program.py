@@ -274,14 +274,14 @@ def _eliminate(k: int, rows: list[set[int]], columns: list[set[int]], near: list
 def workspace(w: Step, elimination: Program) -> int:
     """Groups of scratch memory: stages, stage state, slopes, time slopes and, for implicit methods, the matrix.
 
-    Factors of an incomplete elimination stand beside the matrix, exact ones replace it.  Where M depends on the state, an
-    implicit method keeps the rates at the start and a second matrix.  A mean field keeps what nodes are as sources.
+    Factors of an incomplete elimination stand beside the matrix, exact ones replace it.  Where M is not the
+    identity, an implicit method keeps it too, and the rates at the start if M depends on the state.  A mean field keeps what nodes are as sources.
     """
     vectors = (len(w.method.c) + 3) * w.equations.dimension
     vectors += sum(len(field.alike) for field in mean_fields(w.equations)) * w.equations.n
     if not w.method.implicit and not w.equations.inertial:
         return vectors
     matrix = elimination.entries if elimination.exact else 2 * elimination.entries
-    if not w.method.implicit or w.equations.constant_mass:
+    if not w.method.implicit or not w.equations.inertial:
         return vectors + matrix
-    return vectors + 2 * matrix + w.equations.dimension
+    return vectors + 2 * matrix + (0 if w.equations.constant_mass else w.equations.dimension)

@@ -177,6 +177,14 @@ class Step(ABC):
         total = linear(row, values)
         return total if self.method.implicit else Product((Name("h"), total))
 
+    def stiff_error(self, error: Value, last: Expression, share: Expression) -> Expression:
+        """The error of a state, at least that of its dense output times 1 - 2 share: the share that is not stiff.
+
+        `last` is the last row of the dense output, `share` the shift over the pivot: one where the state is not stiff.
+        """
+        stiff = self.method.dense_error * (Number(1.0) - 2.0 * share) * call("absolute", last)
+        return call("maximum", call("absolute", error), stiff)
+
     def first_of(self, blocks: NodeBlocks) -> Body:
         """What is evaluated of a node of some kind at the start of a step."""
         if self.method.implicit:

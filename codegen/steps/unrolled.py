@@ -13,7 +13,7 @@ from ..program.expressions import ZERO, Call, Expression, Load, Name, Number, Pr
 from ..program.lowering import lower
 from ..program.statements import If, Return, let, store
 from .blocks import NodeBlocks
-from .elimination import Entries, plan, write_factors, write_solve
+from .elimination import Entries, plan, times, write_factors, write_solve
 from .mass import Mass
 from .step import NOW, Step, lane, prefix, time_term
 
@@ -236,6 +236,10 @@ class Unrolled(Step):
                 value = lane(linear(row, self.stages(name, len(row))))
                 value = value if m.implicit else Product((Name("h"), value))
                 self.put(store("dense", j * len(self.state) + slot, value))
+        if m.dense_error:
+            before += [let(f"e_{name}", e) for name, e in zip(self.state, errors, strict=True)]
+            errors = [Name(f"e_{name}") for name in self.state]
+            self.stiff_errors()
         self.statements = [*before, If(Name("DENSE"), tuple(self.statements))]
         for slot, (name, e) in enumerate(zip(self.state, errors, strict=True)):
             self.put(store("y_new", slot, f"n_{name}"))
@@ -246,6 +250,16 @@ class Unrolled(Step):
         self.put(*(let("error", call("maximum", "error", term)) for term in others))
         results = (Name("error") + 0.0 * Name("total"), *([Name("bound")] * self.bounded))
         self.put(Return(results, "NaN or infinite where any estimate is"))
+
+    def stiff_errors(self) -> None:
+        """Raise the errors of states with large pivots to that of the dense output."""
+        self.note("the dense output has errors of its own where the state is stiff")
+        for slot, name in enumerate(self.state):
+            pivot, mass = self.factors.inverse[slot], self.mass.entries.get((slot, slot), sp.S.One)
+            if pivot != Name("reach"):
+                self.let(f"f_{name}", times(lower(mass), Name("shift") * pivot))
+                last = linear(self.method.dense[-1], self.stages(name, len(self.method.dense[-1])))
+                self.let(f"e_{name}", self.stiff_error(f"e_{name}", last, Name(f"f_{name}")))
 
     def new_state(self, name: str) -> Expression:
         """Compute the new value of one state variable; returns its error, of one or two embedded methods."""

@@ -151,6 +151,23 @@ def test_dense_output_has_its_order_and_no_more(m):
         assert max(t.defects(t.dense(theta), m.dense_order + 1, theta)) > 1e-7
 
 
+@rosenbrock
+def test_the_error_of_the_dense_output_in_the_stiff_limit(m):
+    """y' = z (y - t^q) + q t^(q-1), z to minus infinity, h = 1: what a step makes of the first power that it gets wrong."""
+    if m.dense_order < 2:  # chords; runs warn of them
+        assert m.dense_error == 0.0
+        return
+    size, theta = len(m.c), np.linspace(0.0, 1.0, 1001)
+    limit = np.linalg.inv(np.eye(size) + Tableau.square(m.a, size))
+    for power in range(1, m.dense_order + 1):
+        k = limit @ (np.array(m.c) ** power + (np.array(m.d) if power == 1 else 0.0))
+        rows = [np.dot(row, k[: len(row)]) for row in m.dense]
+        found = theta * np.dot(m.b, k) + theta * (1 - theta) * sum(theta**j * d for j, d in enumerate(rows))
+        error = np.abs(found - theta**power).max()
+        assert (error < 1e-12) == (power < m.dense_order), power
+    assert m.dense_error == pytest.approx(error / abs(rows[-1]), rel=1e-3)
+
+
 @every_method
 def test_stages_behind_the_step_serve_the_dense_output_alone(m):
     assert len(m.b) == m.stages <= len(m.c)
