@@ -37,7 +37,9 @@ def test_an_early_end_changes_nothing_but_the_time(both: tuple) -> None:
     assert np.all(np.abs(certified.sync_error.values - plain.sync_error.values) < NEAR)
     assert np.all(certified.data.sync_error_max.values[early] <= NEAR)
     assert certified.steps.values[:2].sum() < 0.9 * plain.steps.values[:2].sum()
-    assert certified.sync_error.values[2] == plain.sync_error.values[2] > 0.05  # chaos: 0.06 to 0.14 in windows of this length
+    assert (
+        certified.sync_error.values[2] == plain.sync_error.values[2] > 0.05
+    )  # chaos: 0.06 to 0.14 in windows of this length
     assert certified.success
 
 
