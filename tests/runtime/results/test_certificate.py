@@ -31,15 +31,14 @@ def both() -> tuple:
 
 
 def test_an_early_end_changes_nothing_but_the_time(both: tuple) -> None:
+    """The third cell is chaotic: in windows of this length its error lies between 0.06 and 0.14."""
     plain, certified = both
     early = certified.data.end_time.values < plain.data.end_time.values
     assert list(early) == [True, True, False]
     assert np.all(np.abs(certified.sync_error.values - plain.sync_error.values) < NEAR)
     assert np.all(certified.data.sync_error_max.values[early] <= NEAR)
     assert certified.steps.values[:2].sum() < 0.9 * plain.steps.values[:2].sum()
-    assert (
-        certified.sync_error.values[2] == plain.sync_error.values[2] > 0.05
-    )  # chaos: 0.06 to 0.14 in windows of this length
+    assert certified.sync_error.values[2] == plain.sync_error.values[2] > 0.05
     assert certified.success
 
 
