@@ -30,11 +30,13 @@ __all__ = [
     "Value",
     "as_expression",
     "call",
+    "factors_of",
     "linear",
     "negative",
     "plus",
     "product",
     "scaled",
+    "terms_of",
 ]
 
 
@@ -58,16 +60,16 @@ class Expression:
             yield from part.walk()
 
     def __add__(self, other: Value) -> Sum:
-        return Sum((*_terms(self), as_expression(other)))
+        return Sum((*terms_of(self), as_expression(other)))
 
     def __radd__(self, other: Value) -> Sum:
         return Sum((as_expression(other), self))
 
     def __sub__(self, other: Value) -> Sum:
-        return Sum((*_terms(self), Negation(as_expression(other))))
+        return Sum((*terms_of(self), Negation(as_expression(other))))
 
     def __mul__(self, other: Value) -> Product:
-        return Product((*_factors(self), as_expression(other)))
+        return Product((*factors_of(self), as_expression(other)))
 
     def __rmul__(self, other: Value) -> Product:
         return Product((as_expression(other), self))
@@ -208,7 +210,7 @@ def call(function: str, *arguments: Value) -> Call:
 
 def plus(first: Expression, *others: Expression) -> Expression:
     """Return the sum of all terms of some expressions, in their order."""
-    return Sum(tuple(term for e in (first, *others) for term in _terms(e))) if others else first
+    return Sum(tuple(term for e in (first, *others) for term in terms_of(e))) if others else first
 
 
 def product(factors: Sequence[Expression]) -> Expression:
@@ -230,7 +232,7 @@ def scaled(factor: Value, e: Expression) -> Expression:
             return Negation(scaled(factor, value))
         case Quotient(top, bottom):
             return Quotient(scaled(factor, top), bottom)
-    return Product((as_expression(factor), *_factors(e)))
+    return Product((as_expression(factor), *factors_of(e)))
 
 
 def linear(row: Iterable[float], values: Iterable[Value], start: Value | None = None) -> Expression:
@@ -244,9 +246,11 @@ def linear(row: Iterable[float], values: Iterable[Value], start: Value | None = 
     return plus(*terms) if terms else ZERO
 
 
-def _terms(e: Expression) -> tuple[Expression, ...]:
+def terms_of(e: Expression) -> tuple[Expression, ...]:
+    """Return the terms of a sum, or the expression itself."""
     return e.terms if isinstance(e, Sum) else (e,)
 
 
-def _factors(e: Expression) -> tuple[Expression, ...]:
+def factors_of(e: Expression) -> tuple[Expression, ...]:
+    """Return the factors of a product, or the expression itself."""
     return e.factors if isinstance(e, Product) else (e,)

@@ -105,12 +105,12 @@ def resolved_once() -> Iterator[None]:
     known: dict[Any, Any] = {}
 
     def remembered(function: Any, context: Any, args: Any, kws: Any) -> Any:
+        if kws:
+            return resolve(function, context, args, kws)
         key = function, tuple(args)
-        if kws or (found := known.get(key)) is None:
-            found = resolve(function, context, args, kws)
-            if not kws:
-                known[key] = found
-        return found
+        if key not in known:
+            known[key] = resolve(function, context, args, kws)
+        return known[key]
 
     types.Function.get_call_type, base._has_loc = remembered, functools.cache(has_loc)
     try:

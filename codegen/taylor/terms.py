@@ -11,12 +11,12 @@ from ..program.expressions import (
     Expression,
     Negation,
     Number,
-    Product,
     Quotient,
-    Sum,
+    factors_of,
     negative,
     plus,
     product,
+    terms_of,
 )
 from ..program.printers import LANES
 
@@ -30,7 +30,7 @@ def add(*terms: Expression) -> Expression:
     """The sum, without zeros, its numbers together at the end."""
     number = 0.0
     rest: list[Expression] = []
-    for term in (part for e in terms for part in (e.terms if isinstance(e, Sum) else (e,))):
+    for term in (part for e in terms for part in terms_of(e)):
         if isinstance(term, Number):
             number += term.value
         else:
@@ -47,7 +47,7 @@ def times(*factors: Expression) -> Expression:
     for factor in factors:
         if isinstance(factor, Negation):
             number, factor = -number, factor.value
-        for part in factor.factors if isinstance(factor, Product) else (factor,):
+        for part in factors_of(factor):
             if isinstance(part, Number):
                 number *= part.value
             else:

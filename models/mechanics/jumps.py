@@ -18,6 +18,9 @@ JUMPING = (sp.sign, sp.floor, sp.ceiling, sp.Heaviside)
 KINKED = (sp.Abs, sp.Max, sp.Min)
 """Functions with a kink where an argument, or the difference of two, is zero."""
 
+INEQUALITIES = (sp.StrictGreaterThan, sp.GreaterThan, sp.StrictLessThan, sp.LessThan)
+"""Conditions with an edge at which pieces can be compared."""
+
 SIDES = {sp.sign: (sp.S.One, sp.S.NegativeOne), sp.Heaviside: (sp.S.One, sp.S.Zero)}
 """The values of a function above and below the zero of its argument."""
 
@@ -53,7 +56,7 @@ def _sides(part: sp.Expr) -> tuple[sp.Expr | None, sp.Expr, sp.Expr]:
         return part.args[0], *SIDES[type(part)]
     if isinstance(part, Piecewise) and len(part.args) == 2:
         (first, condition), (second, _) = part.args
-        if isinstance(condition, sp.StrictGreaterThan | sp.GreaterThan | sp.StrictLessThan | sp.LessThan):
+        if isinstance(condition, INEQUALITIES):
             return condition.lhs - condition.rhs, first, second
     return None, part, part
 
@@ -62,7 +65,7 @@ def _joins(choice: Piecewise, moving: Set[sp.Symbol]) -> bool:
     """True if the pieces of a choice agree where it goes from one to the next, as far as can be seen."""
     pieces = list(choice.args)
     for k, (piece, condition) in enumerate(pieces[:-1]):
-        if not isinstance(condition, sp.StrictGreaterThan | sp.GreaterThan | sp.StrictLessThan | sp.LessThan):
+        if not isinstance(condition, INEQUALITIES):
             return False
         if not _agree(piece, Piecewise(*pieces[k + 1 :]), condition.lhs - condition.rhs, moving):
             return False

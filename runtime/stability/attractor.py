@@ -14,7 +14,7 @@ import sympy as sp
 
 from synchain.models.dynamics.variational import Variation
 
-from .limit_cycle import limit_cycle
+from .limit_cycle import limit_cycle, rates_of, rests
 from .orbits import FAR, Orbits
 
 __all__ = ["Attractor", "Motion", "cycle_propagators", "find_attractor"]
@@ -178,8 +178,7 @@ def cycle_propagators(orbit: Orbits, cycle: int, block: float = 1.0) -> tuple[np
 
 def _free(orbit: Orbits, closed: float) -> Attractor:
     """Return the fixed point or the limit cycle of an undriven orbit, else aperiodic motion."""
-    rates = sp.lambdify(_symbols(orbit.variation), list(orbit.variation.orbit.rhs()), "numpy")(*_values(orbit))
-    if np.abs(rates).max() < RETURN * max(1.0, np.abs(orbit.state).max()):
+    if rests(rates_of(orbit), orbit.state[0], RETURN):
         return _steady(orbit, Motion.FIXED_POINT)
     period = 0.0 if orbit.variation.events else limit_cycle(orbit, closed)[0]
     return _periodic(orbit, Motion.PERIODIC, 1, period) if period else Attractor(Motion.APERIODIC, 0.0)

@@ -15,7 +15,7 @@ import sympy as sp
 
 from .orbits import Orbits
 
-__all__ = ["limit_cycle"]
+__all__ = ["limit_cycle", "rates_of", "rests"]
 
 SAMPLES = 4096
 """States in which a return is looked for."""
@@ -66,8 +66,8 @@ def limit_cycle(orbit: Orbits, closed: float) -> tuple[float, int]:
         orbit.unit,
         orbit.method,
     )
-    rates, start = _rates(orbit), orbit.state[0].copy()
-    if np.abs(rates(start)).max() < closed * max(1.0, float(np.abs(start).max())):
+    rates, start = rates_of(orbit), orbit.state[0].copy()
+    if rests(rates, start, closed):
         return 0.0, 0
     for guess, extent in islice(_returns(alone, rates, start), RETURNS):
         state, period = start, _on_plane(alone, rates, start, guess)
@@ -138,8 +138,13 @@ def _attracts(matrix: np.ndarray, rtol: float) -> bool:
     return bool(np.all(np.abs(others) < 1.0 - APART * math.sqrt(rtol)))
 
 
-def _rates(orbit: Orbits) -> Callable[[np.ndarray], np.ndarray]:
-    """The rates of the orbit as a function of its state."""
+def rests(rates: Callable[[np.ndarray], np.ndarray], state: np.ndarray, closed: float) -> bool:
+    """Return whether the rates at a state are zero, within a part `closed` of the state."""
+    return bool(np.abs(rates(state)).max() < closed * max(1.0, float(np.abs(state).max())))
+
+
+def rates_of(orbit: Orbits) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the rates of an undriven orbit as a function of its state."""
     equations = orbit.variation.orbit
     names = [sp.Symbol(name, real=True) for name in (*equations.state, *equations.parameters)]
     rhs = sp.lambdify(names, list(equations.rhs()), "numpy")
