@@ -383,7 +383,7 @@ def _without_collection() -> Iterator[None]:
 
 
 @_without_collection()
-@decorator.resolved_once()
+@decorator.without_repetition()
 def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) -> Compiled:
     """Compile the functions `wanted` of a module.
 

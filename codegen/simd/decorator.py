@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import numba
 from numba import types
-from numba.core import base
+from numba.core import base, codegen, postproc, transforms
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRewrites
 from numba.core.untyped_passes import InlineClosureLikes, InlineInlinables, WithLifting
 
-__all__ = ["njit", "resolved_once"]
+__all__ = ["njit", "without_repetition"]
 
 
 class _Linked(JITCodeLibrary):
@@ -95,25 +95,66 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 @contextmanager
-def resolved_once() -> Iterator[None]:
-    """Let Numba find out once, not for each line, what an operator means for operands of given types.
+def without_repetition() -> Iterator[None]:
+    """Let Numba do once what it does over and over, and leave out what kernels do not need; only one thread may be within.
 
-    A kernel adds and multiplies lanes thousands of times; a fifth of its compilation went over the same dozen operators.
-    Only one thread may be within.
+    A kernel adds and multiplies lanes thousands of times: Numba finds out once, not for each line, what an operator means
+    for operands of given types, and how large a type is.  A function is compiled for integers, not for 3, 4 and 5 apart.
+    No function is a generator or leaves compiled code, which is all that needs the variables alive at the start of a
+    block.  LLVM does not optimise the functions that a module only names.  One look finds a locale that LLVM cannot read.
     """
-    resolve, has_loc = types.Function.get_call_type, base._has_loc
-    known: dict[Any, Any] = {}
+    with ExitStack() as stack:
+        for owner, name, instead in _instead():
+            stack.callback(setattr, owner, name, getattr(owner, name))
+            setattr(owner, name, instead)
+        yield
 
-    def remembered(function: Any, context: Any, args: Any, kws: Any) -> Any:
+
+def _instead() -> list[tuple[Any, str, Callable[..., Any]]]:
+    """What stands in the place of functions of Numba, by owner and name; each remembers its answers for itself."""
+    resolve, call, size = types.Function.get_call_type, types.Dispatcher.get_call_type, base.BaseContext.get_abi_sizeof
+    meanings: dict[Any, Any] = {}
+    sizes: dict[str, int] = {}
+    look = functools.cache(codegen.CPUCodegen._check_llvm_bugs)
+
+    def meaning(function: Any, context: Any, args: Any, kws: Any) -> Any:
         if kws:
             return resolve(function, context, args, kws)
         key = function, tuple(args)
-        if key not in known:
-            known[key] = resolve(function, context, args, kws)
-        return known[key]
+        if key not in meanings:
+            meanings[key] = resolve(function, context, args, kws)
+        return meanings[key]
 
-    types.Function.get_call_type, base._has_loc = remembered, functools.cache(has_loc)
-    try:
-        yield
-    finally:
-        types.Function.get_call_type, base._has_loc = resolve, has_loc
+    def of_any_integer(function: Any, context: Any, args: Any, kws: Any) -> Any:
+        return call(function, context, tuple(map(types.unliteral, args)), kws)
+
+    def abi_size(context: Any, kind: Any) -> int:
+        key = str(kind)
+        if key not in sizes:
+            sizes[key] = size(context, kind)
+        return sizes[key]
+
+    def optimize_functions(library: Any, module: Any) -> None:
+        module.data_layout = library._codegen._data_layout
+        for function in module.functions:
+            if not function.is_declaration:
+                manager, builder = library._codegen._function_pass_manager()
+                manager.run(function, builder)
+
+    def lifetimes(processor: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
+        source = processor.func_ir
+        source.blocks = transforms.canonicalize_cfg(source.blocks)
+        source.variable_lifetime = postproc.VariableLifetime(source.blocks)
+        source.generator_info = None
+        if emit_dels:
+            processor._insert_var_dels(extend_lifetimes=extend_lifetimes)
+
+    return [
+        (types.Function, "get_call_type", meaning),
+        (types.Dispatcher, "get_call_type", of_any_integer),
+        (base, "_has_loc", functools.cache(base._has_loc)),
+        (base.BaseContext, "get_abi_sizeof", abi_size),
+        (postproc.PostProcessor, "run", lifetimes),
+        (codegen.CPUCodeLibrary, "_optimize_functions", optimize_functions),
+        (codegen.CPUCodegen, "_check_llvm_bugs", look),
+    ]

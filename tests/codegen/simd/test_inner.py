@@ -14,7 +14,7 @@ from numba.core.registry import cpu_target
 from numba.core.target_extension import get_local_target
 
 from synchain.codegen.simd import lanes  # noqa: F401  (defines the operators)
-from synchain.codegen.simd.decorator import njit, resolved_once
+from synchain.codegen.simd.decorator import njit, without_repetition
 from synchain.codegen.simd.lane_types import Lane
 
 
@@ -94,7 +94,7 @@ def test_the_meaning_of_an_operator_is_found_once(monkeypatch: pytest.MonkeyPatc
     )
     counted = types.Function.get_call_type
     pairs = [(Lane(4), Lane(4)), (types.float64, Lane(4)), [Lane(4), Lane(4)], (Lane(4), Lane(4))]
-    with resolved_once():
+    with without_repetition():
         meanings = [add.get_call_type(context, pair, {}) for pair in pairs]
         for _ in range(2):
             with pytest.raises(errors.TypingError):
