@@ -204,7 +204,7 @@ def numbers(equations: Equations, **changed: float) -> list[float]:
 
 def source_of(text: str, looped: bool = False) -> KernelSource:
     """A kernel whose text is a test's own."""
-    return replace(emit(harmonic_chain(2), "cash_karp", (), width=1, unroll=0 if looped else 8), text=text)
+    return replace(emit(harmonic_chain(2), "cash_karp", (), width=1, unroll=0 if looped else 8), code=text)
 
 
 @functools.cache
@@ -279,6 +279,19 @@ def run_cells(compiled: Kernel, scene: Scene) -> Outcome:
 # -- kernels as plain Python ---------------------------------------------------------------------------------
 
 
+class _From:
+    """What stands in a list from some place on."""
+
+    def __init__(self, array: list, first: int) -> None:
+        self.array, self.first = array, first
+
+    def __getitem__(self, k: int) -> Any:
+        return self.array[self.first + k]
+
+    def __setitem__(self, k: int, value: Any) -> None:
+        self.array[self.first + k] = value
+
+
 def _load(array: list, slot: int, width: int) -> Any:
     return array[slot]
 
@@ -297,7 +310,7 @@ def _minimum(a: Any, b: Any) -> Any:
 
 
 PYTHON: dict[str, Any] = {
-    "njit": lambda **options: lambda function: function, "load": _load, "store": _store,
+    "njit": lambda **options: lambda function: function, "load": _load, "store": _store, "address": _From,
     "select": lambda mask, yes, no: yes if mask else no, "broadcast": lambda number, width: number,
     "any_lane": bool, "lane_bits": int, "absolute": abs, "maximum": _maximum, "minimum": _minimum, "np": np, "math": math,
     "sign": lambda x: (x > 0) - (x < 0),

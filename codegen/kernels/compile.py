@@ -1,8 +1,9 @@
 """From the text of a kernel to machine code, through a cache on disk that is named by content.
 
-The functions of a scene are one module, the driver that runs them is another, which scenes share.  A
-module file is named by the hash of everything that could change the machine code: its text, the
-sources of the lanes, the versions of Python, Numba and llvmlite, and the processor.
+The functions of a scene are one module, the driver that runs them is another, which scenes share.  Scenes of one code
+share the first module too: kernels of loops are alike for all graphs of a size.  A module file is named by the hash of
+everything that could change the machine code: its code, the sources of the lanes, the versions of Python, Numba and
+llvmlite, and the processor.
 """
 
 from __future__ import annotations
@@ -105,6 +106,9 @@ _lock = threading.Lock()
 _held: WeakValueDictionary[KernelSource, Kernel] = WeakValueDictionary()
 """The kernels of this process that somebody holds."""
 
+_modules: WeakValueDictionary[str, Compiled] = WeakValueDictionary()
+"""The functions of scenes that somebody holds, by their code."""
+
 
 class EntryPoint(Protocol):
     """The compiled entry point of a driver: `drive` of a sweep, `march` of a kernel of modes.
@@ -115,7 +119,7 @@ class EntryPoint(Protocol):
     def __call__(self, /, *arguments: Any) -> None: ...
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, weakref_slot=True)
 class Compiled:
     """The compiled functions of one module.
 
@@ -157,7 +161,7 @@ class Kernel:
 
     @property
     def path(self) -> str:
-        """The file that holds the text of the functions of the scene."""
+        """The file that holds the code of the functions of the scene."""
         return self.compiled.path
 
     @property
@@ -258,6 +262,7 @@ def forget() -> None:
         _load.cache_clear()
         _driver.cache_clear()
         _held.clear()
+        _modules.clear()
 
 
 def _check_numba() -> None:
@@ -287,7 +292,10 @@ def _driver(driver: Driver) -> Compiled:
 def _kernel(source: KernelSource) -> Kernel:
     known = signatures(source.driver)
     driver = _driver(source.driver)
-    compiled = _module(source.text, "kernel", {name: known[name] for name in source.driver.functions}, _what(source))
+    compiled = _modules.get(source.code)
+    if compiled is None:
+        wanted = {name: known[name] for name in source.driver.functions}
+        compiled = _modules[source.code] = _module(source.code, "kernel", wanted, _what(source))
     functions = [compiled.functions[name] for name in source.driver.functions]
     if source.kind is KernelKind.MODES:
         own = (*functions, source.dimensions, np.array(source.marks, np.int64))

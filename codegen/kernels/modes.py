@@ -24,7 +24,7 @@ from ..program.expressions import ZERO, Expression, Load, Name, Number, Product,
 from ..program.lowering import lower
 from ..program.passes import Names, share
 from ..program.printers import LANES
-from ..program.statements import Assign, Comment, Function, Return, Statement, let, operations, store
+from ..program.statements import Assign, Comment, Function, Return, Role, Statement, let, operations, store
 from ..simd import lanes
 from ..steps.blocks import analyse
 from ..steps.contacts import event_functions, register
@@ -98,7 +98,8 @@ def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int
     events = variation.events
     owners = (-1,) * variation.size if events is None else tuple(events.owners)
     return KernelSource(
-        "\n\n\n".join([head, imports(text), constants, text]),
+        head,
+        "\n\n\n".join([imports(text), constants, text]),
         equations,
         method,
         Driver(KernelKind.MODES, width, contacts=plain.sticks, series=method.series),
@@ -126,7 +127,7 @@ def _stages(variation: Variation, method: Integrator, names: Names) -> tuple[lis
         ("t", "h", "y", "p", "y_new", "dense", "rtol", "atol", "shared"),
         "One step of the orbit from (t, y): writes y_new and what the modes need, returns the error.",
         tuple(writer.statements),
-        inline=False,
+        role=Role.ENTRY,
     )
     modes = Function(
         "mode_step",

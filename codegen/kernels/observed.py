@@ -26,7 +26,7 @@ from synchain.models.mechanics.components import TIME
 from ..integrators import Integrator
 from ..program.expressions import Expression, Load, Name, Number, call, plus
 from ..program.lowering import lower
-from ..program.statements import Function, Loop, Statement, let, store
+from ..program.statements import Function, Loop, Role, Statement, let, store
 
 __all__ = ["UNWATCHED", "Watched", "rule_of", "with_rows"]
 
@@ -149,7 +149,7 @@ def _function(
         ("theta", "t", "h", "y", "y_new", "dense", "out", "dims"),
         about,
         tuple(writer.statements(observed)),
-        inline=False,
+        role=Role.ENTRY,
     )
 
 

@@ -20,7 +20,7 @@ from ..program.expressions import Load, Number, call
 from ..program.lowering import lower
 from ..program.passes import Names
 from ..program.printers import LANES
-from ..program.statements import Function, Return, Statement, let, operations
+from ..program.statements import Function, Return, Role, Statement, let, operations
 from ..simd import lanes
 from ..steps.blocks import NodeBlocks, analyse
 from ..steps.contacts import push_functions
@@ -61,7 +61,8 @@ class KernelSource:
     written out.  `rule` has the points and weights by which observed values are integrated over a step.
     """
 
-    text: str = field(repr=False)
+    head: str = field(repr=False)
+    code: str = field(repr=False)
     equations: Equations = field(repr=False)
     method: Integrator = field(repr=False)
     driver: Driver
@@ -69,6 +70,11 @@ class KernelSource:
     marks: tuple[int, ...] = field(repr=False)
     elimination: Program | None = field(default=None, repr=False, compare=False)
     rule: tuple[float, ...] = field(default=(), repr=False)
+
+    @property
+    def text(self) -> str:
+        """The module for readers, `head` before its code."""
+        return f"{self.head}\n\n\n{self.code}"
 
     @property
     def integrator(self) -> str:
@@ -181,16 +187,17 @@ def emit(
     text = "\n\n\n".join([*functions, *map(LANES.function, events)]) + "\n"
     head = describe(equations, plain, method, (*ordered, *watched.words(equations)), count)
     constants = {"WIDTH": width, "DENSE": bool(ordered or watched) or plain.sticks, "SERIES": method.series}
-    constants |= {} if elimination is None else _of_loops(plain, method, elimination)
+    if looped:
+        constants |= {"NODES": plain.n, "DIMENSION": plain.dimension, "DENSE_ROWS": method.dense_rows}
     named = "\n".join(f"{name} = {value}" for name, value in (*constants.items(), *watched.tables(equations).items()))
-    text = "\n\n\n".join([head, imports(f"{named}\n{text}"), named, text])
+    code = "\n\n\n".join([imports(f"{named}\n{text}"), named, text])
     sizes = _dimensions(plain, method, scratch)._replace(
         observed=watched.count(equations),
         sections=len(watched.sections) or int("section" in ordered),
         kept=watched.kept,
     )
     rule = rule_of(method) if watched.observed else ()
-    return KernelSource(text, equations, method, chosen, sizes, weights or (1,) * equations.n, elimination, rule)
+    return KernelSource(head, code, equations, method, chosen, sizes, weights or (1,) * equations.n, elimination, rule)
 
 
 def _check_records(
@@ -232,12 +239,6 @@ def _is_looped(equations: Equations, method: Integrator, unroll: int) -> bool:
     return equations.n > unroll or alone or (not method.inexact and _of_links(equations) > MOST_OF_LINKS)
 
 
-def _of_loops(plain: Equations, method: Integrator, elimination: Program) -> dict[str, int]:
-    """The constants of the text of a kernel of loops."""
-    entries = elimination.entries if method.implicit or plain.inertial else 0
-    return {"NODES": plain.n, "DIMENSION": plain.dimension, "DENSE_ROWS": method.dense_rows, "ENTRIES": entries}
-
-
 def _of_links(equations: Equations) -> int:
     """The number of operations that the right-hand sides of all links take."""
     size = {edge: sum(int(sp.count_ops(e)) for e in edge.rhs) for edge in equations.edges}
@@ -264,7 +265,9 @@ def _stages(
     functions = [f for k in range(len(blocks)) for f in node_functions(list(steps.values()), blocks[k], k)]
     functions += dict.fromkeys(f for writer in steps.values() for f in writer.functions)
     stepping = [_step(name, writer, looped) for name, writer in steps.items()]
-    made = [*map(LANES.function, functions), SCALED, *([PAIR, driver.text("sparse")] if looped else [])]
+    solves = looped and (method.implicit or plain.inertial)
+    made = [*map(LANES.function, functions), SCALED, *([PAIR] if looped and len(method.e) > 1 else [])]
+    made += [driver.text("sparse")] if solves else []
     scratch = workspace(steps["step"], elimination) if elimination is not None else 0
     return [*made, *map(LANES.function, stepping)], scratch, sum(operations(f.body) for f in stepping), False
 
@@ -368,7 +371,7 @@ def _listed(names: tuple[str, ...]) -> str:
 def _step(name: str, writer: Step, looped: bool) -> Function:
     arguments = ("t", "h", "y", "p", "y_new", "dense", "rtol", "atol", *(("graph", "weights") if looped else ()))
     about = "One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."
-    return Function(name, arguments, about, tuple(writer.statements), inline=False)
+    return Function(name, arguments, about, tuple(writer.statements), role=Role.ENTRY)
 
 
 def _section(equations: Equations, plain: Equations, section: sp.Expr | None) -> list[Function]:
@@ -397,7 +400,7 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
             ("theta", "t", "h", "y", "y_new", "dense", "dims"),
             about,
             (*body, Return((value,))),
-            inline=False,
+            role=Role.ENTRY,
         )
     ]
 

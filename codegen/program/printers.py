@@ -36,6 +36,7 @@ from .statements import (
     Index,
     Loop,
     Return,
+    Role,
     Statement,
     Store,
     Titled,
@@ -45,6 +46,9 @@ __all__ = ["C99", "LANES", "MATH", "NUMPY", "Printer"]
 
 SUM, TERM, POWER, ATOM = range(4)
 """How tightly a piece of text holds together."""
+
+OPTIONS = {Role.INLINED: ", forceinline=True", Role.CALLED: "", Role.ENTRY: ", cache=True"}
+"""What Numba is told of a function."""
 
 
 class Printer:
@@ -221,7 +225,7 @@ class Lanes(Printer):
 
     def function(self, f: Function) -> str:
         """A function with its head."""
-        options = "error_model='numpy'" + (", forceinline=True" if f.inline else ", cache=True")
+        options = "error_model='numpy'" + OPTIONS[f.role]
         head = [f"@njit({options})", f"def {f.name}({', '.join(f.arguments)}):", f'    """{f.about}"""']
         return "\n".join([*head, *(f"    {line}" for line in self.lines(f.body))])
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from typing import TypeAlias
 
 from .expressions import Call, Expression, Load, Name, Power, Product, Quotient, Sum, Value, as_expression
@@ -20,12 +21,15 @@ __all__ = [
     "Index",
     "Loop",
     "Return",
+    "Role",
     "Statement",
     "Store",
     "Titled",
     "accumulate",
+    "assigned",
     "called",
     "let",
+    "mentioned",
     "operations",
     "store",
     "used",
@@ -133,15 +137,23 @@ class Return:
 Statement: TypeAlias = Array | Identity | Assign | Store | Accumulate | Loop | If | Titled | Comment | Do | Return
 
 
+class Role(Enum):
+    """What becomes of a function: its callers take over its body, or call it, or a driver does."""
+
+    INLINED = "inlined"
+    CALLED = "called"
+    ENTRY = "entry"
+
+
 @dataclass(frozen=True, slots=True)
 class Function:
-    """A function of a kernel; `inline` if its callers take over its body, otherwise a driver calls it."""
+    """A function of a kernel."""
 
     name: str
     arguments: tuple[str, ...]
     about: str
     body: tuple[Statement, ...]
-    inline: bool = True
+    role: Role = Role.INLINED
 
 
 def let(name: str, value: Value) -> Assign:
@@ -185,6 +197,25 @@ def values(statements: Iterable[Statement]) -> Iterator[Expression]:
 def called(statements: Iterable[Statement]) -> set[str]:
     """Return the names of the functions that are called."""
     return {e.function for value in values(statements) for e in value.walk() if isinstance(e, Call)}
+
+
+def assigned(statements: Iterable[Statement]) -> list[str]:
+    """Return the names of the variables that get values, outside of loops, in the order in which they get them."""
+    return list(dict.fromkeys(name for s in statements if isinstance(s, Assign) for name in s.targets))
+
+
+def mentioned(statements: Iterable[Statement]) -> set[str]:
+    """Return the names of all variables and arrays that are read or written, in places and bounds too."""
+    found = set()
+    for s in walk(statements):
+        parts = [
+            getattr(s, name) for name in ("value", "index", "start", "stop", "condition", "call") if hasattr(s, name)
+        ]
+        parts += s.values if isinstance(s, Return) else ()
+        found |= {s.array} if isinstance(s, Store | Accumulate) else set()
+        for e in (e for part in parts if isinstance(part, Expression) for e in part.walk()):
+            found |= {e.text.partition(".")[0]} if isinstance(e, Name) else {e.array} if isinstance(e, Load) else set()
+    return found
 
 
 def used(statements: Sequence[Statement]) -> set[str]:

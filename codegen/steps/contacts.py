@@ -15,7 +15,7 @@ from synchain.models.mechanics.friction import Contact
 from ..program.expressions import ZERO, Compare, Expression, Load, Name, Number, Product, call, plus
 from ..program.lowering import lower
 from ..program.passes import Body, Hoist, Names, share
-from ..program.statements import Assign, Function, If, Statement, accumulate, let, store
+from ..program.statements import Assign, Function, If, Role, Statement, accumulate, let, store
 from .names import NAMES
 from .places import link_ends, places, span
 from .step import lane
@@ -38,7 +38,7 @@ def push_functions(equations: Equations, names: Names, looped: bool = False) -> 
         "For each contact: sliding velocity, ground's velocity, accelerations under static friction both ways, in slip."
     )
     network = ("graph", "weights") if looped else ()
-    return [Function("pushes", ("t", "y", "p", "out", *network), about, tuple(body), inline=False)]
+    return [Function("pushes", ("t", "y", "p", "out", *network), about, tuple(body), role=Role.ENTRY)]
 
 
 def _columns(contact: Contact) -> tuple[sp.Expr, ...]:
@@ -116,7 +116,7 @@ def _release(events: Events, variation: Variation, names: Names) -> list[Functio
         body.append(If(Compare("==", Name("i"), Number(i)), tuple(after)))
     about = "Where a contact begins to slip and friction drops at once, deviations that let go early have gained a velocity."
     arguments = ("i", "after", "t", "y", "strengths", "modes", "which")
-    return [Function("release", arguments, about, tuple(body), inline=False)]
+    return [Function("release", arguments, about, tuple(body), role=Role.ENTRY)]
 
 
 def register(array: str, size: int, k: int) -> Load:

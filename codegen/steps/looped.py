@@ -17,7 +17,21 @@ from ..integrators import Integrator
 from ..program.expressions import Expression, Load, Name, Product, Value, call, linear, negative, plus, scaled
 from ..program.lowering import lower
 from ..program.passes import Body
-from ..program.statements import Assign, Do, If, Return, Statement, accumulate, let, store, whole
+from ..program.statements import (
+    Assign,
+    Do,
+    Function,
+    If,
+    Return,
+    Role,
+    Statement,
+    accumulate,
+    assigned,
+    let,
+    mentioned,
+    store,
+    whole,
+)
 from .blocks import NodeBlocks
 from .fields import mean_fields
 from .mass import added_masses, momentum_slopes, turned_masses
@@ -32,8 +46,11 @@ __all__ = ["Looped"]
 SLOTS = ("here_slot", "there_slot")
 """The arrays that say where the entries of a link's blocks stand, by its target and by its source."""
 
-GROUPS = {"y": "y", "u": "STATE", "f": "SLOPE"}
-"""What the vectors of a step are called in memory; those of stages are K1, K2, …"""
+STATES, PLACE = span("i", "DIMENSION"), Name("i")
+"""A loop over all states, for what is done to each alike, and the place of a state."""
+
+GROUPS = {"f": "SLOPE"}
+"""What vectors of slopes are called in memory, besides those of stages, K1, K2, …"""
 
 
 class Looped(Step):
@@ -45,38 +62,59 @@ class Looped(Step):
         super().__init__(equations, kinds, method)
         self.places, self.elimination, self.fields = places(equations), elimination, mean_fields(equations)
         self.mass = LoopMass(self)
+        self.given: list[str] = []
 
     def opening(self) -> None:
         """Name the parts of the workspace, load the parameters that all nodes share."""
         stages = [f"K{j + 1}" for j in range(len(self.method.c))]
         vectors = [*stages, "STATE", "SLOPE", "TIME_SLOPE", "MATRIX"]
-        base = {name: vector(i) for i, name in enumerate(vectors)} | self.mass.bases(len(vectors) - 1)
+        base = {name: vector(i) for i, name in enumerate(vectors)}
+        if self.solves:
+            base["ENTRIES"] = Name("DIMENSION") + "column.size"
+            base |= self.mass.bases(base["MATRIX"] + self.matrices)
         if any(field.alike for field in self.fields):
-            matrix = Name("ENTRIES") if self.elimination.exact else 2 * Name("ENTRIES")
-            base["FIELD"] = base["MATRIX"] + matrix
-        self.put(*(whole(name, place) for name, place in base.items()))
+            base["FIELD"] = base["MATRIX"] + self.matrices if self.solves else base["MATRIX"]
         self.put(Assign(NAMES, Name("graph"), whole=True))
+        self.put(*(whole(name, place) for name, place in base.items()))
         self.parameters(but=self.equations.single)
         if not self.method.implicit:
             self.mass.opening()
 
     @property
-    def early(self) -> int:
-        """All stages: those of the dense output too."""
-        return len(self.method.c)
+    def solves(self) -> bool:
+        """True if the step solves linear equations."""
+        return self.method.implicit or self.equations.inertial
+
+    @property
+    def matrices(self) -> Expression:
+        """The length of the matrix, with its factors where these stand apart."""
+        return Name("ENTRIES") if self.elimination.exact else 2 * Name("ENTRIES")
 
     # -- right-hand side --------------------------------------------------------------------------------------
 
     def slopes(self, base: str, out: str) -> None:
-        """Compute the right-hand side at one vector of states into another."""
-        base, out = GROUPS[base], GROUPS.get(out, out.upper())
+        """Compute the right-hand side at one vector of states into another, by a function that all stages call."""
+        if not self.given:
+            self.given = self.write_slopes()
+        states = Name("y") if base == "y" else call("address", "dense", Name("STATE") * "WIDTH")
+        self.put(Do(call("slopes", states, "dense", GROUPS.get(out, out.upper()), *self.given)))
+
+    def write_slopes(self) -> list[str]:
+        """Write that function; returns what it is given besides states, workspace, and place of the slopes."""
+        outside, self.statements = self.statements, []
         for kind in self.places.kinds:
-            self.node_slopes(kind, base, out)
-        self.links(base, out)
+            self.node_slopes(kind, "y", "out")
+        self.links("y", "out")
         kept = 0
         for field in self.fields:
-            self.put(*field.statements(self.places, base, out, kept))
+            self.put(*field.statements(self.places, "y", "out", kept))
             kept += len(field.alike)
+        body, self.statements = self.statements, outside
+        needed = mentioned(body)
+        given = [name for name in ("h", "p", *assigned(outside), "weights") if name in needed]
+        about = "Write the right-hand side at the states y behind the place `out` of the workspace."
+        self.functions.append(Function("slopes", ("y", "dense", "out", *given), about, tuple(body), Role.CALLED))
+        return given
 
     def node_slopes(self, kind: Kind, base: str, out: str) -> None:
         """The right-hand side of the nodes of one kind."""
@@ -186,10 +224,9 @@ class Looped(Step):
     def advance(self, i: int) -> None:
         """Compute the state of stage i > 0: y + sum a_j k_j, the sum times h for explicit methods."""
         row = self.method.a[i]
-        for rows, place in self.places.rows:
-            found = [*self.load_stages(place, row), let("old", Load("y", place))]
-            value = Name("old") + self.increment(row, self.stages(len(row)))
-            self.put(rows.over([*found, store("dense", plus(Name("STATE"), place), value)]))
+        found = [*self.load_stages(PLACE, row), let("old", Load("y", PLACE))]
+        value = Name("old") + self.increment(row, self.stages(len(row)))
+        self.put(STATES.over([*found, store("dense", Name("STATE") + PLACE, value)]))
 
     def solve(self, i: int) -> None:
         """Turn the slopes of stage i into its rates."""
@@ -223,8 +260,14 @@ class Looped(Step):
         return [let(f"k{j}", Load("dense", plus(Name(f"K{j}"), place))) for j in used]
 
     def finish(self) -> None:
-        """Compute the new state, the error and the dense output."""
+        """Compute the new state, the error and the dense output; stages that serve this alone run if DENSE."""
         m, values = self.method, self.stages(len(self.method.c))
+        late = len(m.c) - self.early
+        if late:
+            before, self.statements = self.statements, []
+            for i in range(self.early, len(m.c)):
+                self.stage(i)
+            self.statements = [*before, If(Name("DENSE"), tuple(self.statements))]
         self.note("new state, error and dense output")
         self.put(let("error", 0.0 * Name("h")), let("total", 0.0 * Name("h")))
         error = self.increment(m.e[0], values)
@@ -234,28 +277,27 @@ class Looped(Step):
             before, self.statements = self.statements, []
             self.mass.gather("y", "MASS")
             self.statements = [*before, If(Name("DENSE"), tuple(self.statements))]
-        for rows, place in self.places.rows:
-            found = [*self.load_stages(place, [1.0] * len(m.c)), let("old", Load("y", place))]
-            found += [let("new", Name("old") + self.increment(m.b, values)), store("y_new", place, "new")]
-            found += [let("e", error), *self.stiff_errors(place, values)]
-            found += [let("e", call("scaled", "e", "old", "new", "rtol", "atol"))]
-            found += [let("total", Name("total") + "e"), let("error", call("maximum", "error", "e"))]
-            for j, row in enumerate(m.dense):
-                value = lane(linear(row, values))
-                scaled_value = value if m.implicit else Product((Name("h"), value))
-                at = plus(j * Name("DIMENSION"), place)
-                found.append(If(Name("DENSE"), (store("dense", at, scaled_value),)))
-            self.put(rows.over(found))
+        found = [*self.load_stages(PLACE, [1.0] * self.early), let("old", Load("y", PLACE))]
+        found += [let("new", Name("old") + self.increment(m.b, values)), store("y_new", PLACE, "new")]
+        found += [let("e", error), *self.stiff_errors(values)]
+        found += [let("e", call("scaled", "e", "old", "new", "rtol", "atol"))]
+        found += [let("total", Name("total") + "e"), let("error", call("maximum", "error", "e"))]
+        dense: list[Statement] = self.load_stages(PLACE, [0.0] * self.early + [1.0] * late)
+        for j, row in enumerate(m.dense):
+            value = lane(linear(row, values))
+            scaled_value = value if m.implicit else Product((Name("h"), value))
+            dense.append(store("dense", j * Name("DIMENSION") + PLACE, scaled_value))
+        self.put(STATES.over([*found, If(Name("DENSE"), tuple(dense))]))
         self.put(Return((Name("error") + 0.0 * Name("total"),), "NaN or infinite where any estimate is"))
 
-    def stiff_errors(self, place: Expression, values: Sequence[str]) -> list[Statement]:
+    def stiff_errors(self, values: Sequence[str]) -> list[Statement]:
         """Raise the error of a state with a large pivot to that of the dense output."""
         m = self.method
         if not m.dense_error:
             return []
         factors = Name("MATRIX") if self.elimination.exact else Name("MATRIX") + "ENTRIES"
-        share = Name("shift") * Load("dense", plus(factors, place))
-        share = share * Load("dense", plus(Name("MASS"), place)) if self.equations.inertial else share
+        share = Name("shift") * Load("dense", factors + PLACE)
+        share = share * Load("dense", Name("MASS") + PLACE) if self.equations.inertial else share
         return [If(Name("DENSE"), (let("e", self.stiff_error("e", linear(m.dense[-1], values), share)),))]
 
 
@@ -273,12 +315,10 @@ class LoopMass:
         self.joints = [joint for joint in writer.places.joints if joint.edge.inertia]
         self.heavy = [kind for kind in writer.places.kinds if kind.node.inertia]
 
-    def bases(self, before: int) -> dict[str, Expression]:
-        """Where a Rosenbrock step keeps M, behind so many vectors and the matrix, and the rates at its start if M varies."""
+    def bases(self, start: Expression) -> dict[str, Expression]:
+        """Where a Rosenbrock step keeps M, and the rates at its start if M varies."""
         if not self.inertial or not self.writer.method.implicit:
             return {}
-        matrix = Name("ENTRIES") if self.writer.elimination.exact else 2 * Name("ENTRIES")
-        start = Name("DENSE_ROWS") * "DIMENSION" + before * Name("DIMENSION") + matrix
         return {"MASS": start} if self.constant else {"RATES": start, "MASS": start + "DIMENSION"}
 
     # -- linear algebra ---------------------------------------------------------------------------------------

@@ -22,7 +22,7 @@ NAMES = (
 """What the arrays of a program are called, in the order in which a kernel takes them."""
 
 RESERVED = frozenset(
-    {"i", "j", "k", "e", "old", "new", "graph", "weights", "pair", "factorise", "solve", "NODES", "DIMENSION",
+    {"i", "j", "k", "e", "old", "new", "graph", "weights", "pair", "factorise", "solve", "slopes", "NODES", "DIMENSION",
      "DENSE_ROWS", "FIELD",
      "ENTRIES", "STATE", "SLOPE", "TIME_SLOPE", "MATRIX", *(f"K{i}" for i in range(1, 32)),
      "MASS", "RATES", "where", "t", "h", "y", "y_new", "dense",

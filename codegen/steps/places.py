@@ -106,7 +106,7 @@ class Places:
 
     @property
     def rows(self) -> list[tuple[Span, Expression]]:
-        """Loops over all states for what is done to each alike, and the place of a state."""
+        """Loops over all states, one for those with a time slope of one meaning, and the place of a state."""
         return [(span("i", "NODES"), self.place(c)) for c in range(self.size)]
 
     def row_of(self, c: int) -> int:

@@ -14,7 +14,7 @@ from ..integrators import Integrator
 from ..program.expressions import Expression, Load, Name, Negation, Number, Product, Value, call, linear
 from ..program.lowering import lower
 from ..program.passes import Body
-from ..program.statements import Assign, Comment, Function, Return, Statement, let, operations
+from ..program.statements import Assign, Comment, Function, Return, Role, Statement, let, operations
 from .blocks import NodeBlocks
 
 __all__ = [
@@ -64,7 +64,8 @@ def node_function(name: str, about: str, body: Body, arguments: Sequence[str], r
 
 def function_of(name: str, arguments: Sequence[str], about: str, body: Sequence[Statement]) -> Function:
     """A function of lanes that the stages of a step call; each of them takes over the body of a small one."""
-    return Function(name, tuple(arguments), about, tuple(body), inline=operations(body) <= LARGEST_INLINED)
+    role = Role.INLINED if operations(body) <= LARGEST_INLINED else Role.CALLED
+    return Function(name, tuple(arguments), about, tuple(body), role)
 
 
 def lane(e: Expression, width: str = "WIDTH") -> Expression:

@@ -509,7 +509,7 @@ class LoopWriter:
         orders = [self.waves.text("0"), *(section.text("0") for section in self.sections)]
         later = [self.waves.text("k"), *(section.text("k") for section in self.sections)]
         bases, size = self.bases()
-        lines = [*bases, f"{', '.join(NAMES)} = graph", f"LINKS = {self.links}"]
+        lines = [*bases, f"{', '.join(NAMES)} = graph", "LINKS = target.size"]
         for slot, name in enumerate(eq.parameters, start=eq.dimension):
             if name not in eq.single:
                 lines.append(f"{self.called[name]} = load(p, {slot}, WIDTH)")

@@ -205,7 +205,7 @@ def test_exact_jacobian_keeps_the_number_of_steps_low():
 def test_a_wrong_jacobian_shows_in_the_number_of_steps():
     right = friction_kernel(1)
     constant = next(line for line in right.source.splitlines() if line.endswith("*epsilon*kappa"))
-    wrong = dataclasses.replace(right.origin, text=right.source.replace(constant, constant + "*kappa"))
+    wrong = dataclasses.replace(right.origin, code=right.origin.code.replace(constant, constant + "*kappa"))
     assert wrong.text != right.source
     assert steps_of(load(wrong)) > 20 * steps_of(right)
 

@@ -84,7 +84,7 @@ class TinyDriver(Driver):
         return TINY_DRIVER.replace("end[i, c] = new[c]", f"end[i, c] = {self.scale!r} * new[c]")
 
 
-SOURCE = dataclasses.replace(REAL, text=TINY, driver=TinyDriver(KernelKind.SWEEP, 1))
+SOURCE = dataclasses.replace(REAL, code=TINY, driver=TinyDriver(KernelKind.SWEEP, 1))
 """A module and a driver with the functions of a kernel that compile ten times faster than one."""
 MODULES = ("kernel", "driver")
 """What a kernel is made of, by the beginnings of the names of its files."""
@@ -214,7 +214,7 @@ def test_of_two_processes_that_miss_a_kernel_one_compiles_it(folder):
 
 @every_module
 def test_the_lock_of_a_process_that_was_killed_keeps_nobody_waiting(folder, module):
-    text = SOURCE.text if module == "kernel" else SOURCE.driver.text
+    text = SOURCE.code if module == "kernel" else SOURCE.driver.text
     name = f"{module}_{loading._fingerprint(text)[:32]}"
     holder = subprocess.Popen([sys.executable, "-c", HOLDER, str(folder), name], stdout=subprocess.PIPE, text=True)
     assert holder.stdout is not None
@@ -231,7 +231,7 @@ def test_the_lock_of_a_process_that_was_killed_keeps_nobody_waiting(folder, modu
 def test_the_kernel_keeps_its_text(compiled_folder, folder):
     copied(compiled_folder, folder)
     compiled = fresh()
-    assert compiled.source == SOURCE.text == Path(compiled.path).read_text(encoding="utf-8")
+    assert compiled.source == f"{SOURCE.head}\n\n\n{Path(compiled.path).read_text(encoding='utf-8')}"
     assert compiled.digest == SOURCE.digest
     assert compiled.equations is SWING
     assert loading.load(SOURCE) is compiled, "the same kernel is loaded once"
@@ -254,7 +254,7 @@ def test_digests_are_stable_and_tell_kernels_apart():
 
 
 def test_the_file_name_follows_everything_that_shapes_machine_code(monkeypatch):
-    names = {loading._fingerprint(SOURCE.text)}
+    names = {loading._fingerprint(SOURCE.code)}
     import llvmlite.binding as llvm
     import numba
 
@@ -265,7 +265,7 @@ def test_the_file_name_follows_everything_that_shapes_machine_code(monkeypatch):
         with monkeypatch.context() as m:
             m.setattr(*change)
             loading._surroundings.cache_clear()
-            names.add(loading._fingerprint(SOURCE.text))
+            names.add(loading._fingerprint(SOURCE.code))
         loading._surroundings.cache_clear()
 
     changed(numba, "__version__", "9.9")
@@ -278,9 +278,9 @@ def test_the_file_name_follows_everything_that_shapes_machine_code(monkeypatch):
     changed(dimensions, "__file__", __file__)
     changed(loading.importlib.metadata, "version", lambda name: "9.9")
     changed(loading.platform, "machine", lambda: "sun dial")
-    names.add(loading._fingerprint(SOURCE.text + "\n"))
+    names.add(loading._fingerprint(SOURCE.code + "\n"))
     assert len(names) == 12
-    assert loading._fingerprint(SOURCE.text) in names
+    assert loading._fingerprint(SOURCE.code) in names
 
 
 # -- kernels that nobody holds, and drivers ahead of time ------------------------------------------------------
@@ -297,7 +297,7 @@ MANY = textwrap.dedent(
     def kernels():
         made = []
         for k in range(10, 50):
-            kernel = load(dataclasses.replace(SOURCE, text=TINY.replace("2.0", f"{k}.0")))
+            kernel = load(dataclasses.replace(SOURCE, code=TINY.replace("2.0", f"{k}.0")))
             step = kernel.compiled.functions["step"]
             made.append([weakref.ref(o) for o in (kernel, step, step.overloads[step.signatures[0]].library)])
         return made
@@ -434,7 +434,7 @@ def test_a_changed_module_file_is_written_anew(compiled_folder, folder, module):
     before = path.read_text()
     path.write_text(before.replace("0", "5") + "\nraise SystemExit('not ours')\n")
     assert works(fresh())
-    assert path.read_text() == before == (SOURCE.text if module == "kernel" else SOURCE.driver.text)
+    assert path.read_text() == before == (SOURCE.code if module == "kernel" else SOURCE.driver.text)
 
 
 def test_missing_machine_code_is_no_problem(compiled_folder, folder):
@@ -459,7 +459,7 @@ def test_one_wrong_bit_in_machine_code_is_not_run(compiled_folder, folder, modul
 
 def test_machine_code_of_another_kernel_is_not_run(compiled_folder, folder):
     copied(compiled_folder, folder)
-    other = dataclasses.replace(SOURCE, text=TINY.replace("2.0", "5.0"))
+    other = dataclasses.replace(SOURCE, code=TINY.replace("2.0", "5.0"))
     (theirs,) = machine_code(folder, "kernel")
     mine = Path(fresh(other).path).with_suffix(".code")
     shutil.copyfile(theirs, mine)
@@ -552,14 +552,14 @@ def test_a_full_disk_is_no_problem(folder, monkeypatch):
 
 
 def test_a_kernel_that_cannot_be_compiled_is_an_error(folder):
-    broken = dataclasses.replace(SOURCE, text=TINY.replace("2.0", "undefined_name"))
+    broken = dataclasses.replace(SOURCE, code=TINY.replace("2.0", "undefined_name"))
     with pytest.raises(Exception, match="undefined_name"):
         fresh(broken)
     assert gc.isenabled()  # it pauses while kernels are compiled
 
 
 def test_a_step_of_other_types_than_the_driver_calls_is_an_error(folder):
-    broken = dataclasses.replace(SOURCE, text=TINY.replace("broadcast(0.0, 1)", "0.0"))
+    broken = dataclasses.replace(SOURCE, code=TINY.replace("broadcast(0.0, 1)", "0.0"))
     with pytest.raises(Exception, match="float64"):
         fresh(broken)
 
@@ -690,3 +690,12 @@ def test_a_good_folder_gives_no_warning(compiled_folder, folder):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert from_cache(fresh()) == ALL_FROM_CACHE
+
+
+@pytest.mark.usefixtures("folder")
+def test_scenes_of_one_code_share_what_is_compiled() -> None:
+    first, second = fresh(), loading.load(dataclasses.replace(SOURCE, head='"""Another scene."""'))
+    assert first.digest != second.digest
+    assert first.source != second.source
+    assert first.compiled is second.compiled
+    assert fresh(second.origin).from_cache

@@ -48,6 +48,7 @@ from synchain.codegen.program.statements import (
     If,
     Loop,
     Return,
+    Role,
     Titled,
     accumulate,
     called,
@@ -210,7 +211,7 @@ def test_lanes_load_and_store_registers() -> None:
         accumulate("dense", Name("K1") + "i", A - B),
         Return((A,), "a remark"),
     )
-    found = LANES.function(Function("f", ("y", "shared", "dense"), "What it does.", body, inline=False))
+    found = LANES.function(Function("f", ("y", "shared", "dense"), "What it does.", body, role=Role.ENTRY))
     assert found.splitlines() == [
         "@njit(error_model='numpy', cache=True)",
         "def f(y, shared, dense):",

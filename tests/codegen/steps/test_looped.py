@@ -9,7 +9,7 @@ from samples import FLOATS, kernel, plain, run_cells
 from synchain.codegen import driver
 from synchain.codegen.steps.names import NAMES
 from synchain.codegen.steps.program import Program, order, program
-from synchain.models import chain, complete, grid, random_cubic, ring, star, tree
+from synchain.models import chain, complete, grid, random_cubic, ring, star, tree, wheel
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.scenes.scene import Scene
@@ -164,3 +164,16 @@ def test_elimination_of_sparse_families_stays_sparse(graph):
 def test_order_covers_every_unknown_once():
     steps = order(6, {(0, 1), (1, 0), (2, 2), (3, 0), (5, 4)})
     assert sorted(steps.order) == list(range(6))
+
+
+@pytest.mark.parametrize(
+    ("coupling", "integrator"),
+    [("spring", "dop853"), ("inerter", "dop853"), ("spring", "rodas5p"), ("inerter", "rodas5p"), ("spring", "taylor")],
+)
+def test_the_code_is_the_same_for_all_graphs_of_a_size(coupling: str, integrator: str) -> None:
+    """What differs is given at run time: many random graphs cost one compilation."""
+    graphs = [ring(12), star(12), wheel(12)]
+    scenes = [Scene("duffing", coupling, graph, parameters={"sigma": 0.1}, integrator=integrator) for graph in graphs]
+    sources = [kernel_source(scene, reduce=False) for scene in scenes]
+    assert len({source.text for source in sources}) == 3
+    assert len({source.code for source in sources}) == 1
