@@ -58,7 +58,7 @@ _HOMES = {
     "from_matrix": "graphs.topology",
     "from_sparse": "graphs.readers",
     "from_symbols": "graphs.symbolic",
-    "joint_spectrum": "graphs.joint",
+    "joint_spectrum": "spectra.joint",
     "kronecker": "graphs.products",
     "latex": "presentation.equations",
     "load_scene": "scenes.file",

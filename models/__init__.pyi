@@ -17,7 +17,7 @@ from .dynamics.observable import variance as variance
 from .graphs.clusters import Clusters as Clusters
 from .graphs.clusters import clusters as clusters
 from .graphs.clusters import orbital_partitions as orbital_partitions
-from .graphs.joint import joint_spectrum as joint_spectrum
+from .spectra.joint import joint_spectrum as joint_spectrum
 from .graphs.products import cartesian as cartesian
 from .graphs.products import complement as complement
 from .graphs.products import kronecker as kronecker

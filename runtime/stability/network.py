@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from synchain.models.graphs.joint import JointEigenvalue, joint_spectrum
+from synchain.models.spectra.joint import JointEigenvalue, joint_spectrum
 from synchain.models.scenes.scene import Scene
 
 __all__ = ["SharedOrbit", "shared_orbits", "still_strengths", "transversal_modes"]
