@@ -1,14 +1,14 @@
-"""The links of a graph: their type, their greatest number, and the links of all pairs, which are not listed."""
+"""The links of a graph: their type, their greatest number, their sums, and the links of all pairs, which are not listed."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import islice
 from typing import TypeAlias
 
-__all__ = ["LINK_LIMIT", "AllPairs", "Link", "Links"]
+__all__ = ["LINK_LIMIT", "AllPairs", "Link", "Links", "one_degree"]
 
 LINK_LIMIT = 4_000_000
 """Greatest number of links of a graph: more take above 600 MB."""
@@ -58,3 +58,11 @@ class AllPairs:
 
 Links: TypeAlias = tuple[Link, ...] | AllPairs
 """Links in a list, or those of all pairs."""
+
+
+def one_degree(n: int, links: Iterable[Link]) -> Fraction | None:
+    """Return the sum of weights that every one of n nodes feels; None if it is not one for all."""
+    sums = [Fraction(0)] * n
+    for target, _, weight in links:
+        sums[target] += weight
+    return sums[0] if len(set(sums)) == 1 else None

@@ -6,17 +6,17 @@ W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.1.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
 from itertools import groupby
 from operator import itemgetter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from ..inputs.rationals import total
-from .products import listed, one_degree, written
-from .topology import Topology, dense, sympy_matrix
+from ..spectra.matrix import Matrix
+from .links import Link, one_degree
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ..spectra.eigenspaces import Eigenspace
     from ..spectra.spectrum import Spectrum
 
-__all__ = ["GraphMatrix", "MatrixKind"]
+__all__ = ["GraphMatrix", "MatrixKind", "dense", "sympy_matrix"]
 
 
 class MatrixKind(StrEnum):
@@ -41,6 +41,22 @@ class MatrixKind(StrEnum):
     the normalised Laplacian 1 - D^(-1/2) W D^(-1/2), whose entries are roots: it has its
     eigenvalues, and D^(1/2) times its eigenvectors are those of the other.
     """
+
+
+class Graph(Matrix, Protocol):
+    """What its other matrices know of a graph, which is the matrix G itself; a `Topology` is one."""
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """The links (target, source, weight), sorted."""
+
+    @property
+    def undirected(self) -> bool:
+        """True if G is known to be symmetric."""
+
+    @property
+    def asymmetry(self) -> str:
+        """In words, the first links that do not act both ways with one weight; "" if all do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +78,7 @@ class GraphMatrix:
         positive.
     """
 
-    graph: Topology
+    graph: Graph
     kind: MatrixKind
 
     def __post_init__(self) -> None:
@@ -129,21 +145,22 @@ class GraphMatrix:
 
     def closed_form(self) -> Sequence[tuple[sp.Expr, int]] | None:
         """List the eigenvalues with multiplicities, each once, if they follow from those of G; else None."""
-        from ..algebra.cosine_sums import AngleSum
+        from ..algebra.cosine_sums import AngleSum, expressions
+        from ..spectra.angle_sums import angle_sums
 
         map_of_gamma = self._map
-        known = None if map_of_gamma is None or self.graph.closed_form() is None else listed(self.graph)
+        known = None if map_of_gamma is None or self.graph.closed_form() is None else angle_sums(self.graph)
         if map_of_gamma is None or known is None:
             return None
         factor, shift = (AngleSum.rational(x) for x in map_of_gamma)
-        return written([(factor * gamma + shift, times) for gamma, times in known])
+        return expressions([(factor * gamma + shift, times) for gamma, times in known])
 
     @property
     def _map(self) -> tuple[Fraction, Fraction] | None:
         """(a, b) if the matrix is a G + b; None of any other."""
         if self.kind is MatrixKind.LAPLACIAN:
             return Fraction(-1), Fraction(0)
-        d = one_degree(self.graph)
+        d = one_degree(self.n, self.graph.links)
         if d is None:
             return None
         if self.kind is MatrixKind.RANDOM_WALK:
@@ -166,3 +183,19 @@ class GraphMatrix:
 
     def __repr__(self) -> str:
         return f"GraphMatrix({self.graph!r}, {str(self.kind)!r})"
+
+
+def dense(n: int, entries: Iterable[tuple[int, int, Fraction]]) -> tuple[tuple[Fraction, ...], ...]:
+    """Return n rows of n fractions with some entries and zeros."""
+    zero = Fraction(0)
+    table = [[zero] * n for _ in range(n)]
+    for i, j, number in entries:
+        table[i][j] = number
+    return tuple(map(tuple, table))
+
+
+def sympy_matrix(rows: Iterable[Iterable[Fraction]]) -> sp.ImmutableDenseMatrix:
+    """Return rows of fractions as an immutable SymPy matrix."""
+    import sympy as sp
+
+    return sp.ImmutableDenseMatrix([[sp.Rational(x.numerator, x.denominator) for x in row] for row in rows])

@@ -20,6 +20,8 @@ from ..inputs.checks import check_instance, check_integer, check_printable, shor
 from ..inputs.options import Options
 from ..inputs.rationals import file_text, parse_rows, rational_rows, total
 from ..inputs.shown import Drawn
+from .links import Link
+from .matrices import GraphMatrix, MatrixKind, dense, sympy_matrix
 from .partitions import join
 
 if TYPE_CHECKING:
@@ -27,10 +29,8 @@ if TYPE_CHECKING:
 
     from ..spectra.eigenspaces import Eigenspace
     from ..spectra.spectrum import Spectrum
-    from .links import Link
-    from .matrices import GraphMatrix
 
-__all__ = ["Rule", "Topology", "dense", "from_matrix", "read_matrix", "sympy_matrix"]
+__all__ = ["Rule", "Topology", "from_matrix", "read_matrix"]
 
 
 class Rule(Protocol):
@@ -236,17 +236,17 @@ class Topology(Drawn):
     @property
     def adjacency(self) -> GraphMatrix:
         """The weights W, without a diagonal: row i feels column j."""
-        return self._other("ADJACENCY")
+        return GraphMatrix(self, MatrixKind.ADJACENCY)
 
     @property
     def laplacian(self) -> GraphMatrix:
         """The Laplacian D - W, which is -G, with the row sums D of W."""
-        return self._other("LAPLACIAN")
+        return GraphMatrix(self, MatrixKind.LAPLACIAN)
 
     @property
     def signless_laplacian(self) -> GraphMatrix:
         """The signless Laplacian D + W; ValueError if links are one-way."""
-        return self._other("SIGNLESS")
+        return GraphMatrix(self, MatrixKind.SIGNLESS)
 
     @property
     def random_walk_laplacian(self) -> GraphMatrix:
@@ -255,12 +255,7 @@ class Topology(Drawn):
         It has the eigenvalues of the normalised Laplacian 1 - D^(-1/2) W D^(-1/2), to which it is
         similar, and rational entries.
         """
-        return self._other("RANDOM_WALK")
-
-    def _other(self, kind: str) -> GraphMatrix:
-        from .matrices import GraphMatrix, MatrixKind
-
-        return GraphMatrix(self, MatrixKind[kind])
+        return GraphMatrix(self, MatrixKind.RANDOM_WALK)
 
     @property
     def spanning_trees(self) -> Fraction:
@@ -379,22 +374,6 @@ def read_matrix(path: str | Path) -> Topology:
     """
     text, name = file_text(path, "matrix file", "a text file of rows")
     return from_matrix(parse_rows(text, name), name)
-
-
-def dense(n: int, entries: Iterable[tuple[int, int, Fraction]]) -> tuple[tuple[Fraction, ...], ...]:
-    """Return n rows of n fractions with some entries and zeros."""
-    zero = Fraction(0)
-    table = [[zero] * n for _ in range(n)]
-    for i, j, number in entries:
-        table[i][j] = number
-    return tuple(map(tuple, table))
-
-
-def sympy_matrix(rows: Iterable[Iterable[Fraction]]) -> sp.ImmutableDenseMatrix:
-    """Return rows of fractions as an immutable SymPy matrix."""
-    import sympy as sp
-
-    return sp.ImmutableDenseMatrix([[sp.Rational(x.numerator, x.denominator) for x in row] for row in rows])
 
 
 def _check_size(name: object, n: object) -> None:
