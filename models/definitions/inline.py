@@ -28,9 +28,10 @@ from ..inputs.checks import (
     suggestion,
     typed_repr,
 )
+from ..inputs.expressions import FUNCTIONS
 from ..inputs.frozen import Frozen
 from ..mechanics.components import SLIDING, TIME
-from ..mechanics.expression import FUNCTIONS, RESERVED, exact
+from ..mechanics.expression import RESERVED, exact
 from ..mechanics.friction import ContactModel, FrictionLaw
 from ..mechanics.lagrangian import check_masses_exist, mass_matrix
 from ..mechanics.oscillator import FRICTION, Coordinate, FieldModel, LagrangianModel, Oscillator

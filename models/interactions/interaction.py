@@ -22,9 +22,10 @@ from ..inputs.checks import (
     suggestion,
     typed_repr,
 )
+from ..inputs.expressions import FUNCTIONS
 from ..inputs.frozen import Frozen
 from ..mechanics.components import TIME, Node
-from ..mechanics.expression import FRICTION_NAME, FUNCTIONS, LENGTH, exact, read, written
+from ..mechanics.expression import FRICTION_NAME, LENGTH, exact, read, written
 from ..mechanics.parameter import Parameter
 from .ends import WEIGHT, Pair, Terms
 

@@ -112,10 +112,6 @@ class Graphs:
             found = ", ".join(map(str, sizes)) or "no"
             raise ValueError(f"draw {GRAPH}: found graphs of {found} nodes; expected one number of nodes")
 
-    def realised(self, count: int, rng: int) -> Graphs:
-        """Return the graphs themselves, which are listed for each realisation already."""
-        return self
-
     @property
     def union(self) -> Topology:
         """The union of the graphs, whose links a run steps: their weights are numbers of its cells, 0 for no link."""
@@ -131,7 +127,7 @@ class RandomGraph:
 
     text: str
 
-    def realised(self, count: int, rng: int) -> Graphs:
+    def graphs(self, count: int, rng: int) -> Graphs:
         """Return the graphs of `count` realisations, whose seeds are drawn by `rng`; more of them begin with the same ones.
 
         Raises
@@ -183,7 +179,12 @@ def draws(given: object, realisations: object) -> Frozen[Draws]:
 def drawn_graph(drawn: Mapping[str, Draws], count: int, rng: int) -> Topology | None:
     """Return the union of the graphs of all realisations, None if no graphs are drawn or listed."""
     graphs = drawn.get(GRAPH)
-    return graphs.realised(count, rng).union if isinstance(graphs, Graphs | RandomGraph) else None
+    return _realised(graphs, count, rng).union if isinstance(graphs, Graphs | RandomGraph) else None
+
+
+def _realised(graphs: Graphs | RandomGraph, count: int, rng: int) -> Graphs:
+    """The graphs of all realisations, drawn now unless they are listed."""
+    return graphs.graphs(count, rng) if isinstance(graphs, RandomGraph) else graphs
 
 
 def _graphs(what: str, value: object, count: int) -> Graphs | RandomGraph:
@@ -328,7 +329,7 @@ def drawn_axes(model: Model, drawn: Frozen[Draws], count: int, rng: int) -> tupl
 def _columns(model: Model, name: str, how: Draws, count: int, rng: int) -> Iterable[tuple[str, Sequence[float]]]:
     """The names and the values of one draw."""
     if isinstance(how, Graphs | RandomGraph):
-        return _weights(model, how.realised(count, rng).graphs)
+        return _weights(model, _realised(how, count, rng).graphs)
     holders = model.unlinked.holders(name)
     links = {} if holders else model.link_names(name)
     if links:

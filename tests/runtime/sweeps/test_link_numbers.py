@@ -283,7 +283,7 @@ def test_members_of_random_families_are_drawn(text: str, edges: int | None) -> N
     assert set().union(*(links.values() for links in found)) == ({0.25} if text.startswith("weighted") else {1.0})
     assert members(drawn(text, 6, x=normal(0, 1)))[:4] == found
     assert members(drawn(text, rng=4)) != found
-    graphs = scene.draws["topology"].realised(4, 3).graphs
+    graphs = scene.draws["topology"].graphs(4, 3).graphs
     assert [{(i, j) for i, j, _ in graph.links if i < j} for graph in graphs] == [set(links) for links in found]
 
 
@@ -297,7 +297,7 @@ def test_the_number_of_edges_is_that_of_the_family() -> None:
 def test_runs_on_random_graphs_are_those_on_their_members(tmp_path: Path) -> None:
     scene = drawn("erdos_renyi(10, p=0.3)")
     found = run(scene, show_progress=False)
-    graphs = scene.draws["topology"].realised(4, 3).graphs
+    graphs = scene.draws["topology"].graphs(4, 3).graphs
     listed = run(RANDOM, realisations=4, draws={"topology": graphs}, show_progress=False)
     np.testing.assert_array_equal(found.end.values, listed.end.values)
     one = run(RANDOM.replace(topology=graphs[2]), show_progress=False)
