@@ -130,11 +130,18 @@ class _OfNodes(Expressions):
 
     def function(self, name: str) -> Callable[..., sp.Expr] | None:
         one = _ONE_NODE.fullmatch(name)
-        return nodes[int(one[1])] if one else KNOWN.get(SPELLINGS.get(name, name))
+        if one is None:
+            return KNOWN.get(SPELLINGS.get(name, name))
+        try:
+            return nodes[int(one[1])]
+        except ValueError as error:
+            raise NoMeaning(_reason(error)) from None
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[sp.Basic]]:
         if function in tuple(Window):
-            raise NoMeaning(f"found {function} inside; over the window a value is reduced once, outermost")
+            raise NoMeaning(
+                f"found {function} inside; expected values of an instant: over the window one is reduced once, outermost"
+            )
         return Expressions.arguments(self, function, count, options)
 
     def call(self, function: str, arguments: Sequence[sp.Basic], options: Mapping[str, str]) -> sp.Basic:
