@@ -20,9 +20,8 @@ from ..inputs.checks import check_instance, check_integer, check_printable, shor
 from ..inputs.options import Options
 from ..inputs.rationals import file_text, parse_rows, rational_rows, total
 from ..inputs.shown import Drawn
-from .links import Link
+from .links import Link, join
 from .matrices import GraphMatrix, MatrixKind, dense, sympy_matrix
-from .partitions import join
 
 if TYPE_CHECKING:
     import sympy as sp

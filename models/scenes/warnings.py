@@ -10,7 +10,7 @@ from ..dynamics.synchrony import NoSynchrony, synchronous_node
 from ..graphs.topology import Topology
 from ..inputs.node_name import LinkName, NodeName
 from ..interactions.coupling import MatrixCoupling
-from .model import Model
+from ..networks.model import Model
 
 __all__ = ["warnings", "zero_multiplicity"]
 

@@ -11,8 +11,8 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from synchain.models import end, maximum, mean, minimum, nodes, rate, ring, variance
 from synchain.models.dynamics.observable_text import as_observable
+from synchain.models.inputs.result_names import TAKEN
 from synchain.models.scenes.file import load_scene
-from synchain.models.scenes.names import TAKEN
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.results.labels import MEANINGS
 

@@ -7,43 +7,9 @@ from collections import deque
 from collections.abc import Hashable, Iterable, Sequence
 from fractions import Fraction
 
-from .links import Link
+from ..graphs.links import Link
 
-__all__ = ["class_links", "coarsest_balanced", "join"]
-
-
-def join(n: int, pairs: Iterable[tuple[int, int]]) -> tuple[int, ...]:
-    """Return the class of each node in the finest partition with every pair in one class.
-
-    Parameters
-    ----------
-    n : int
-        Number of nodes.
-    pairs : iterable of (int, int)
-        Nodes of one class.
-
-    Returns
-    -------
-    tuple of int
-        The class of each node, numbered by the first members.
-
-    References
-    ----------
-    R. E. Tarjan, J. Assoc. Comput. Mach. 22, 215 (1975): sets as trees, with short paths.
-    """
-    parent = list(range(n))
-
-    def root(i: int) -> int:
-        while parent[i] != i:
-            parent[i] = parent[parent[i]]
-            i = parent[i]
-        return i
-
-    for i, j in pairs:
-        a, b = root(i), root(j)
-        parent[max(a, b)] = min(a, b)
-    order: dict[int, int] = {}
-    return tuple(order.setdefault(root(i), len(order)) for i in range(n))
+__all__ = ["class_links", "coarsest_balanced"]
 
 
 def class_links(n: int, links: Iterable[Link], classes: Sequence[int]) -> tuple[Link, ...]:

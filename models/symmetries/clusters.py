@@ -20,12 +20,13 @@ from fractions import Fraction
 from flint import fmpq_mat, fmpq_poly
 
 from ..algebra.rationals import to_flint
+from ..graphs.links import join
+from ..graphs.readers import as_topology
+from ..graphs.topology import Topology
 from ..inputs.checks import typed_repr
 from ..spectra.eigenvalue import ProofError
-from .partitions import class_links, join
-from .readers import as_topology
-from .symmetry import automorphisms
-from .topology import Topology
+from .automorphisms import automorphisms
+from .partitions import class_links
 
 __all__ = ["Block", "Clusters", "check", "clusters", "orbital_partitions"]
 
