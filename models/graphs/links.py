@@ -4,13 +4,13 @@ and the links of all pairs, which are not listed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import islice
 from typing import TypeAlias
 
-__all__ = ["LINK_LIMIT", "AllPairs", "Link", "Links", "join", "one_degree"]
+__all__ = ["LINK_LIMIT", "AllPairs", "Link", "Links", "join", "numbered", "one_degree"]
 
 LINK_LIMIT = 4_000_000
 """Greatest number of links of a graph: more take above 600 MB."""
@@ -100,5 +100,10 @@ def join(n: int, pairs: Iterable[tuple[int, int]]) -> tuple[int, ...]:
     for i, j in pairs:
         a, b = root(i), root(j)
         parent[max(a, b)] = min(a, b)
-    order: dict[int, int] = {}
-    return tuple(order.setdefault(root(i), len(order)) for i in range(n))
+    return numbered(map(root, range(n)))
+
+
+def numbered(classes: Iterable[Hashable]) -> tuple[int, ...]:
+    """Return the class of each node as a number from 0, in the order of the first members."""
+    order: dict[Hashable, int] = {}
+    return tuple(order.setdefault(own, len(order)) for own in classes)

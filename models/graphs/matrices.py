@@ -6,7 +6,7 @@ W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.1.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
@@ -24,7 +24,46 @@ if TYPE_CHECKING:
     from ..spectra.eigenspaces import Eigenspace
     from ..spectra.spectrum import Spectrum
 
-__all__ = ["GraphMatrix", "MatrixKind", "dense", "sympy_matrix"]
+__all__ = ["Exact", "GraphMatrix", "MatrixKind"]
+
+
+class Exact:
+    """A matrix of a graph that says what its entries are: its rows, its exact spectrum and eigenvectors."""
+
+    __slots__ = ()
+
+    @property
+    def rows(self: Matrix) -> tuple[tuple[Fraction, ...], ...]:
+        """The matrix as n rows of n fractions."""
+        zero = Fraction(0)
+        table = [[zero] * self.n for _ in range(self.n)]
+        for i, j, number in self.entries:
+            table[i][j] = number
+        return tuple(map(tuple, table))
+
+    @property
+    def matrix(self: Matrix) -> sp.ImmutableDenseMatrix:
+        """The matrix as an immutable SymPy matrix, n x n."""
+        import sympy as sp
+
+        table = sp.zeros(self.n)
+        for i, j, number in self.entries:
+            table[i, j] = sp.Rational(number.numerator, number.denominator)
+        return table.as_immutable()
+
+    @property
+    def spectrum(self: Matrix) -> Spectrum:
+        """The exact eigenvalues with multiplicities, the largest first (see `synchain.models.spectra.solve`)."""
+        from ..spectra.solve import spectrum
+
+        return spectrum(self)
+
+    @property
+    def eigenspaces(self: Matrix) -> tuple[Eigenspace, ...]:
+        """The exact eigenvectors (see `synchain.models.spectra.eigenspaces`)."""
+        from ..spectra.eigenspaces import eigenspaces
+
+        return eigenspaces(self)
 
 
 class MatrixKind(StrEnum):
@@ -60,7 +99,7 @@ class Graph(Matrix, Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class GraphMatrix:
+class GraphMatrix(Exact):
     """A matrix of a graph beside its connectivity matrix G.
 
     Parameters
@@ -133,16 +172,6 @@ class GraphMatrix:
         sign = 1 if self.kind is MatrixKind.SIGNLESS else -1
         return (*((i, j, sign * weight) for i, j, weight in links), *((i, i, d) for i, d in degrees.items() if d))
 
-    @property
-    def rows(self) -> tuple[tuple[Fraction, ...], ...]:
-        """The matrix as n rows of n fractions."""
-        return dense(self.n, self.entries)
-
-    @property
-    def matrix(self) -> sp.ImmutableDenseMatrix:
-        """The matrix as an immutable SymPy matrix, n x n."""
-        return sympy_matrix(self.rows)
-
     def closed_form(self) -> Sequence[tuple[sp.Expr, int]] | None:
         """List the eigenvalues with multiplicities, each once, if they follow from those of G; else None."""
         from ..algebra.cosine_sums import AngleSum, expressions
@@ -167,35 +196,5 @@ class GraphMatrix:
             return (-1 / d if d else Fraction(0)), Fraction(0)
         return Fraction(1), d if self.kind is MatrixKind.ADJACENCY else 2 * d
 
-    @property
-    def spectrum(self) -> Spectrum:
-        """The exact eigenvalues with multiplicities, the largest first (see `synchain.models.spectra.solve`)."""
-        from ..spectra.solve import spectrum
-
-        return spectrum(self)
-
-    @property
-    def eigenspaces(self) -> tuple[Eigenspace, ...]:
-        """The exact eigenvectors (see `synchain.models.spectra.eigenspaces`)."""
-        from ..spectra.eigenspaces import eigenspaces
-
-        return eigenspaces(self)
-
     def __repr__(self) -> str:
         return f"GraphMatrix({self.graph!r}, {str(self.kind)!r})"
-
-
-def dense(n: int, entries: Iterable[tuple[int, int, Fraction]]) -> tuple[tuple[Fraction, ...], ...]:
-    """Return n rows of n fractions with some entries and zeros."""
-    zero = Fraction(0)
-    table = [[zero] * n for _ in range(n)]
-    for i, j, number in entries:
-        table[i][j] = number
-    return tuple(map(tuple, table))
-
-
-def sympy_matrix(rows: Iterable[Iterable[Fraction]]) -> sp.ImmutableDenseMatrix:
-    """Return rows of fractions as an immutable SymPy matrix."""
-    import sympy as sp
-
-    return sp.ImmutableDenseMatrix([[sp.Rational(x.numerator, x.denominator) for x in row] for row in rows])

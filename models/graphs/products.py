@@ -40,8 +40,7 @@ def cartesian(first: Topology, second: Topology) -> Topology:
     ValueError
         On more than LINK_LIMIT links.
     """
-    first, second = as_topology("cartesian: first", first), as_topology("cartesian: second", second)
-    return _made(f"cartesian({_named(first)}, {_named(second)})", first.n * second.n, Cartesian(first, second))
+    return _of_two("cartesian", Cartesian, first, second)
 
 
 def kronecker(first: Topology, second: Topology) -> Topology:
@@ -55,8 +54,7 @@ def kronecker(first: Topology, second: Topology) -> Topology:
     ValueError
         On more than LINK_LIMIT links.
     """
-    first, second = as_topology("kronecker: first", first), as_topology("kronecker: second", second)
-    return _made(f"kronecker({_named(first)}, {_named(second)})", first.n * second.n, Kronecker(first, second))
+    return _of_two("kronecker", Kronecker, first, second)
 
 
 def union(first: Topology, second: Topology) -> Topology:
@@ -67,8 +65,7 @@ def union(first: Topology, second: Topology) -> Topology:
     ValueError
         On more than LINK_LIMIT links.
     """
-    first, second = as_topology("union: first", first), as_topology("union: second", second)
-    return _made(f"union({_named(first)}, {_named(second)})", first.n + second.n, Union(first, second))
+    return _of_two("union", Union, first, second)
 
 
 def complement(graph: Topology) -> Topology:
@@ -126,6 +123,11 @@ class _OfTwo:
     def all_to_all(self) -> Fraction | None:
         """None: pairs of nodes are not joined alike."""
         return None
+
+    @property
+    def n(self) -> int:
+        """The number of nodes: one for each pair of nodes of the graphs."""
+        return self.first.n * self.second.n
 
     def spectra(self) -> tuple[Listed, Listed] | None:
         """The closed spectra of both graphs; None if one of them has none."""
@@ -188,6 +190,11 @@ class Kronecker(_OfTwo):
 @dataclass(frozen=True, slots=True)
 class Union(_OfTwo):
     """The rule of two graphs side by side."""
+
+    @property
+    def n(self) -> int:
+        """The number of nodes."""
+        return self.first.n + self.second.n
 
     @property
     def link_count(self) -> int:
@@ -285,6 +292,12 @@ class Weighted:
 def _named(graph: Topology) -> str:
     more = "".join(f", {key}={value}" for key, value in graph.options)
     return graph.name if "(" in graph.name else f"{graph.name}({graph.n}{more})"
+
+
+def _of_two(name: str, operation: type[Cartesian | Kronecker | Union], first: object, second: object) -> Topology:
+    """The graph that an operation makes of two."""
+    rule = operation(as_topology(f"{name}: first", first), as_topology(f"{name}: second", second))
+    return _made(f"{name}({_named(rule.first)}, {_named(rule.second)})", rule.n, rule)
 
 
 def _small(name: str, links: int) -> None:

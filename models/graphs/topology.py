@@ -21,13 +21,11 @@ from ..inputs.options import Options
 from ..inputs.rationals import file_text, parse_rows, rational_rows, total
 from ..inputs.shown import Drawn
 from .links import Link, join
-from .matrices import GraphMatrix, MatrixKind, dense, sympy_matrix
+from .matrices import Exact, GraphMatrix, MatrixKind
 
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ..spectra.eigenspaces import Eigenspace
-    from ..spectra.spectrum import Spectrum
 
 __all__ = ["Rule", "Topology", "from_matrix", "read_matrix"]
 
@@ -58,7 +56,7 @@ class Rule(Protocol):
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
-class Topology(Drawn):
+class Topology(Exact, Drawn):
     """`n` nodes and their sorted links (target, source, weight); an undirected edge is two links.
 
     Parameters
@@ -207,30 +205,6 @@ class Topology(Drawn):
         """The entries of G other than 0 as (row, column, entry): the links, then the diagonal."""
         felt = ((i, total(weight for _, _, weight in row)) for i, row in groupby(self.links, itemgetter(0)))
         return (*self.links, *((i, i, -degree) for i, degree in felt if degree))
-
-    @property
-    def rows(self) -> tuple[tuple[Fraction, ...], ...]:
-        """G as n rows of n fractions."""
-        return dense(self.n, self.entries)
-
-    @property
-    def matrix(self) -> sp.ImmutableDenseMatrix:
-        """G as an immutable SymPy matrix, n x n."""
-        return sympy_matrix(self.rows)
-
-    @property
-    def spectrum(self) -> Spectrum:
-        """The exact eigenvalues of G with multiplicities (see `synchain.models.spectra.solve`)."""
-        from ..spectra.solve import spectrum
-
-        return spectrum(self)
-
-    @property
-    def eigenspaces(self) -> tuple[Eigenspace, ...]:
-        """The exact eigenvectors of G (see `synchain.models.spectra.eigenspaces`)."""
-        from ..spectra.eigenspaces import eigenspaces
-
-        return eigenspaces(self)
 
     @property
     def adjacency(self) -> GraphMatrix:

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Hashable, Iterable, Sequence
 from fractions import Fraction
 
-from ..graphs.links import Link
+from ..graphs.links import Link, numbered
 
 __all__ = ["class_links", "coarsest_balanced"]
 
@@ -87,9 +87,8 @@ def coarsest_balanced(n: int, links: Iterable[Link], colours: Sequence[Hashable]
     if len(colours) != n:
         raise ValueError(f"colours: found {len(colours)} for {n} nodes; expected one for each node")
     columns = _columns(n, tuple(links))
-    numbers: dict[Hashable, int] = {}
-    of = [numbers.setdefault(colour, len(numbers)) for colour in colours]
-    members: list[set[int]] = [set() for _ in numbers]
+    of = list(numbered(colours))
+    members: list[set[int]] = [set() for _ in {*of}]
     for i, k in enumerate(of):
         members[k].add(i)
     queue = deque(range(len(members)))
@@ -100,8 +99,7 @@ def coarsest_balanced(n: int, links: Iterable[Link], colours: Sequence[Hashable]
                 for i in part:
                     of[i] = len(members)
                 members.append(part)
-    order: dict[int, int] = {}
-    return tuple(order.setdefault(k, len(order)) for k in of)
+    return numbered(of)
 
 
 def _columns(n: int, links: tuple[Link, ...]) -> list[list[tuple[int, int]]]:
