@@ -1,7 +1,7 @@
 """The kinds of plug-in that mechanics knows, and what their files must hold: checked when a file from outside is loaded.
 
 A definition that another one makes idle and a parameter that no function uses are refused, since the model would
-be another than the one that was meant.
+be another than the one that was meant.  Lists of plug-ins need no SymPy: only the functions that check a file load it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """The other matrices of a graph: adjacency, Laplacians; their spectra are proved as that of G is.
 
 F. R. K. Chung, Spectral Graph Theory (American Mathematical Society, 1997), chapter 1; A. E. Brouwer,
-W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.1.
+W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.1.  A matrix costs no algebra: only its
+eigenvalues, its eigenvectors and `matrix` load SymPy.
 """
 
 from __future__ import annotations

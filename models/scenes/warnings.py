@@ -31,7 +31,7 @@ def zero_multiplicity(graph: Topology) -> int:
     leading = graph.leading_groups
     if graph.n > COUNTED or not _has_negative(graph):
         return leading
-    from ..spectra.characteristic import characteristic
+    from ..spectra.characteristic import characteristic  # most scenes need no FLINT
 
     return next(k for k, c in enumerate(characteristic(graph).coeffs()) if c != 0)
 
