@@ -14,10 +14,6 @@ from .dynamics.observable import minimum as minimum
 from .dynamics.observable import nodes as nodes
 from .dynamics.observable import rate as rate
 from .dynamics.observable import variance as variance
-from .graphs.clusters import Clusters as Clusters
-from .graphs.clusters import clusters as clusters
-from .graphs.clusters import orbital_partitions as orbital_partitions
-from .graphs.joint import joint_spectrum as joint_spectrum
 from .graphs.products import cartesian as cartesian
 from .graphs.products import complement as complement
 from .graphs.products import kronecker as kronecker
@@ -45,15 +41,19 @@ from .mechanics.oscillator import friction as friction
 from .mechanics.parameter import Parameter as Parameter
 from .presentation.equations import latex as latex
 from .presentation.equations import text as text
-from .scenes.axis import Axis as Axis
-from .scenes.draw import lorentzian as lorentzian
-from .scenes.draw import normal as normal
-from .scenes.draw import uniform as uniform
 from .scenes.file import load_scene as load_scene
 from .scenes.file import scene_names as scene_names
 from .scenes.scene import Scene as Scene
 from .scenes.section import Section as Section
+from .spectra.joint import joint_spectrum as joint_spectrum
 from .spectra.spectrum import Spectrum as Spectrum
+from .sweeps.axis import Axis as Axis
+from .sweeps.distribution import lorentzian as lorentzian
+from .sweeps.distribution import normal as normal
+from .sweeps.distribution import uniform as uniform
+from .symmetries.clusters import Clusters as Clusters
+from .symmetries.clusters import clusters as clusters
+from .symmetries.clusters import orbital_partitions as orbital_partitions
 
 @overload
 def topology(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from synchain.models.graphs.clusters import clusters
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
+from synchain.models.symmetries.clusters import clusters
 from synchain.runtime.bifurcation.bifurcations import Bifurcation, BifurcationKind
 from synchain.runtime.bifurcation.branches import Branch
 from synchain.runtime.bifurcation.periodic import PeriodicOrbit

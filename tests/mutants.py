@@ -31,7 +31,7 @@ FOLDER = Path(os.environ.get("SYNCHAIN_MUTANTS", ROOT / ".mutants"))
 TESTS = {
     "models/algebra/cosines": "spectrum closed_forms angle_text graph_families",
     "models/graphs/closed_forms": "closed_forms spectrum",
-    "models/graphs/joint": "joint",
+    "models/spectra/joint": "joint",
     "models/mechanics/friction": "contact contact_theory",
     "models/interactions/coupling": "coupling_matrix parts_manual",
     "models/algebra/isolation": "isolation spectrum",

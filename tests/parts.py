@@ -12,7 +12,7 @@ from synchain.models.mechanics.components import Edge, Node
 from synchain.models.mechanics.friction import FrictionLaw
 from synchain.models.mechanics.oscillator import LagrangianModel, Oscillator
 from synchain.models.mechanics.parameter import Parameter
-from synchain.models.scenes.model import as_coupling, as_law, as_oscillator
+from synchain.models.networks.parts import as_coupling, as_law, as_oscillator
 
 __all__ = ["connectivity", "coupling_of", "edge", "is_lagrangian", "law_of", "node", "oscillator_of", "parameters"]
 

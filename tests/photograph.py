@@ -58,8 +58,8 @@ from synchain.runtime.synchronisation.threshold import thresholds
 from synchain.models.graphs.closed_forms import closed_form  # isort: skip
 from synchain.models.graphs.closed_forms import formulas
 
-from synchain.models.graphs.clusters import clusters  # isort: skip
-from synchain.models.graphs.clusters import orbital_partitions
+from synchain.models.symmetries.clusters import clusters  # isort: skip
+from synchain.models.symmetries.clusters import orbital_partitions
 
 from synchain.models.scenes.energy import energy  # isort: skip
 from synchain.codegen.export.c import to_c  # isort: skip

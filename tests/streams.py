@@ -10,8 +10,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from synchain.models import chain
-from synchain.models.scenes.axis import Axis
 from synchain.models.scenes.scene import Scene
+from synchain.models.sweeps.axis import Axis
 from synchain.runtime.cells.kernels import kernel
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.opening.open import open_result

@@ -30,10 +30,13 @@ ARROWS = {
     "models.definitions": "interactions mechanics inputs",
     "models.spectra": "algebra inputs",
     "models.graphs": "spectra algebra inputs",
-    "models.dynamics": "graphs definitions interactions mechanics inputs",
+    "models.symmetries": "graphs spectra algebra inputs",
+    "models.dynamics": "symmetries graphs definitions interactions mechanics inputs",
     "models.claims": "graphs spectra algebra inputs",
     "models.presentation": "dynamics interactions mechanics inputs",
-    "models.scenes": "dynamics graphs spectra definitions interactions mechanics inputs",
+    "models.networks": "dynamics graphs definitions interactions mechanics inputs",
+    "models.sweeps": "networks dynamics graphs inputs",
+    "models.scenes": "sweeps networks dynamics graphs spectra definitions interactions mechanics inputs",
     "models.scenes.library": "",
     "models.topologies": "graphs spectra algebra inputs",
     "models.oscillators": "mechanics",
@@ -150,6 +153,37 @@ def test_the_table_of_arrows_has_no_circle() -> None:
     while ground := {room for room in left if not reach[room] & left}:
         left -= ground
     assert left == set()
+
+
+def module_name(path: Path) -> str:
+    return ".".join(path.relative_to(PROJECT).with_suffix("").parts).removesuffix(".__init__")
+
+
+def in_circles(texts: dict[Path, str]) -> set[str]:
+    """The modules that import each other, directly or through others, at any depth and for type checks too."""
+    modules = {module_name(path) for path in texts}
+    reach: dict[str, set[str]] = {}
+    for path, text in texts.items():
+        found = reach[module_name(path)] = set()
+        for _, name in imported(path, ast.parse(text)):
+            parts = name.split(".")[1:] if name.startswith("synchain.") else []
+            while parts and ".".join(parts) not in modules:
+                parts.pop()
+            if (path.relative_to(PROJECT).as_posix(), room_of(name)) not in DOORS:
+                found.add(".".join(parts))
+        found -= {module_name(path), ""}
+    left = set(reach)
+    while ground := {module for module in left if not reach[module] & left}:
+        left -= ground
+    return {module for module in left if any(module in reach[other] for other in left)}
+
+
+def test_no_modules_import_each_other() -> None:
+    texts = {path: path.read_text("utf-8") for path in sources()}
+    assert in_circles(texts) == set()
+    planted = PROJECT / "models" / "graphs" / "links.py"
+    texts[planted] += "\n\ndef f():\n    from .products import union"
+    assert {"models.graphs.links", "models.graphs.topology", "models.graphs.products"} <= in_circles(texts)
 
 
 @pytest.mark.parametrize(

@@ -16,11 +16,11 @@ import scipy.sparse
 
 from synchain import models, runtime
 from synchain.models import chain, star
-from synchain.models.graphs.clusters import clusters, orbital_partitions
 from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
 from synchain.models.scenes.section import Section
 from synchain.models.spectra.spectrum import Spectrum
+from synchain.models.symmetries.clusters import clusters, orbital_partitions
 from synchain.runtime.cells.keywords import Given
 from synchain.runtime.results.energy import energy_function
 from synchain.runtime.support.threads import worker_count

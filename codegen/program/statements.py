@@ -26,12 +26,12 @@ __all__ = [
     "Store",
     "Titled",
     "accumulate",
-    "assigned",
     "called",
     "let",
     "mentioned",
     "operations",
     "store",
+    "targets",
     "used",
     "values",
     "walk",
@@ -199,7 +199,7 @@ def called(statements: Iterable[Statement]) -> set[str]:
     return {e.function for value in values(statements) for e in value.walk() if isinstance(e, Call)}
 
 
-def assigned(statements: Iterable[Statement]) -> list[str]:
+def targets(statements: Iterable[Statement]) -> list[str]:
     """Return the names of the variables that get values, outside of loops, in the order in which they get them."""
     return list(dict.fromkeys(name for s in statements if isinstance(s, Assign) for name in s.targets))
 

@@ -14,8 +14,9 @@ from synchain.models.mechanics.friction import Contact
 
 from ..program.expressions import ZERO, Compare, Expression, Load, Name, Number, Product, call, plus
 from ..program.lowering import lower
-from ..program.passes import Body, Hoist, Names, share
+from ..program.passes import Hoist, Names, share
 from ..program.statements import Assign, Function, If, Role, Statement, accumulate, let, store
+from .fields import assigned
 from .names import NAMES
 from .places import link_ends, places, span
 from .step import lane
@@ -50,7 +51,7 @@ def _written_out(equations: Equations, names: Names) -> list[Statement]:
     body = share([e for column in zip(*map(_columns, contacts), strict=True) for e in column], names.fresh("z"))
     states = [let(name, Load("y", Number(k))) for k, name in enumerate(equations.state) if _in(name, body.symbols)]
     stores = [store("out", k, lane(lower(e))) for k, e in enumerate(body.results)]
-    return [*states, *_parameters(equations, body.symbols), *_assigned(body), *stores]
+    return [*states, *_parameters(equations, body.symbols), *assigned(body), *stores]
 
 
 def _looped(equations: Equations, names: Names) -> list[Statement]:
@@ -64,7 +65,7 @@ def _looped(equations: Equations, names: Names) -> list[Statement]:
     used = body.symbols.union(*(e.free_symbols for e in (*fixed.table, *link)))
     before = [*_parameters(equations, used), *(let(s.name, lane(lower(e))) for e, s in fixed.table.items())]
     own: list[Statement] = [let(s.name, Load("y", _place(k, "i"))) for k, s in enumerate(node.state) if s in used]
-    own += _assigned(body)
+    own += assigned(body)
     own += [store("out", _place(k, "i"), lane(lower(e))) for k, e in enumerate(body.results)]
     if not force:
         return [*before, nodes.over(own)]
@@ -131,11 +132,7 @@ def _gained(entries: Sequence[Entry], size: int, names: Names) -> list[Statement
     for ((row, column), _), e in zip(entries, body.results, strict=True):
         rows.setdefault(row, []).append(Product((lower(e), register("modes", size, column))))
     stores = [store("modes", size * Name("which") + row, plus(*terms)) for row, terms in rows.items()]
-    return [*_assigned(body), *stores]
-
-
-def _assigned(body: Body) -> list[Statement]:
-    return [let(s.name, lower(e)) for s, e in body.statements]
+    return [*assigned(body), *stores]
 
 
 def _place(c: int, index: str) -> Expression:

@@ -26,10 +26,10 @@ from ..program.statements import (
     Role,
     Statement,
     accumulate,
-    assigned,
     let,
     mentioned,
     store,
+    targets,
     whole,
 )
 from .blocks import NodeBlocks
@@ -111,7 +111,7 @@ class Looped(Step):
             kept += len(field.alike)
         body, self.statements = self.statements, outside
         needed = mentioned(body)
-        given = [name for name in ("h", "p", *assigned(outside), "weights") if name in needed]
+        given = [name for name in ("h", "p", *targets(outside), "weights") if name in needed]
         about = "Write the right-hand side at the states y behind the place `out` of the workspace."
         self.functions.append(Function("slopes", ("y", "dense", "out", *given), about, tuple(body), Role.CALLED))
         return given

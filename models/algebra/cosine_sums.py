@@ -23,7 +23,7 @@ from .balls import Ball, precision
 from .lazy import LazyEigenvalues
 from .rationals import to_flint, to_fraction, to_sympy
 
-__all__ = ["AngleSum", "box", "expression", "folded_sum", "merged", "minimal_polynomial", "read"]
+__all__ = ["AngleSum", "box", "expression", "expressions", "folded_sum", "merged", "minimal_polynomial", "read"]
 
 _HUGE = 10**300
 """Rational numbers above it are infinite as floats."""
@@ -269,6 +269,11 @@ def expression(number: AngleSum) -> sp.Expr:
             shift += 2 * b
             long.append(cosines.minus_four_sine_squared(k, m) * to_sympy(b))
     return sp.Add(to_sympy(shift), *short, *long)
+
+
+def expressions(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[sp.Expr, int]]:
+    """Return numbers with multiplicities as `expression` writes them, equal ones once, descending."""
+    return [(expression(number), times) for number, times in merged(numbers)]
 
 
 def read(number: sp.Expr) -> AngleSum | None:

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, reduce
 from operator import eq, ge, gt, le, lt
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 import sympy as sp
 from flint import arb
@@ -47,6 +47,8 @@ LISTED = 5000
 """Closed forms with as many different eigenvalues as nodes are listed up to so many nodes."""
 
 WORDS = ("largest", "slowest", "ratio", "distinct", "multiplicity")
+T = TypeVar("T", bound=Number)
+
 Exact: TypeAlias = AngleSum | sp.Expr
 Value: TypeAlias = AngleSum | Number
 
@@ -186,7 +188,7 @@ def verify_parts(graph: Topology, parts: Sequence[Part]) -> tuple[tuple[str, ...
 
 
 def _subject(part: Part) -> str:
-    return part.word if part.of is None else f"{part.word}({sp.sstr(_expression(part.of))})"
+    return part.word if part.of is None else f"{part.word}({sp.sstr(_number(part.of))})"
 
 
 @dataclass
@@ -277,7 +279,7 @@ def _decided(part: Part, known: _Known) -> tuple[bool, str]:
     value = known.largest if part.word == "largest" else known.slowest
     shown = words(Eigenvalue(_number(value), 1))
     if _complex(value) and part.relation == "=" and part.number is not None:
-        return equal(_number(value), _expression(part.number)), shown
+        return equal(_number(value), _number(part.number)), shown
     return _holds(part, value, AngleSum.rational(1)), shown
 
 
@@ -299,24 +301,24 @@ def _quotient_order(value: Value, unit: Value, number: Exact) -> int:
         return _order(value, number)
     if isinstance(value, AngleSum) and isinstance(unit, AngleSum) and isinstance(number, AngleSum):
         return (value + -(number * unit)).sign() * unit.sign()
-    return sign((_number(value),), (_expression(number), _number(unit))) * _order(unit, AngleSum.rational(0))
+    return sign((_number(value),), (_number(number), _number(unit))) * _order(unit, AngleSum.rational(0))
 
 
 def _order(value: Value, number: Exact) -> int:
     """The sign of value - number."""
     if isinstance(value, AngleSum) and isinstance(number, AngleSum):
         return (value + -number).sign()
-    return sign((_number(value),), (_expression(number),))
+    return sign((_number(value),), (_number(number),))
 
 
 def _same(e: Eigenvalue, number: Exact) -> bool:
-    middle = complex(sp.N(_expression(number), 20))
+    middle = complex(sp.N(_number(number), 20))
     if abs(complex(e.value) - middle) > 1e-9 * max(1.0, abs(middle)):
         return False
     value = _value(e.number)
     if isinstance(value, AngleSum) and isinstance(number, AngleSum):
         return (value + -number).sign() == 0
-    return equal(e.number, _expression(number))
+    return equal(e.number, _number(number))
 
 
 def _quotient(value: Value, unit: Value) -> str:
@@ -340,12 +342,9 @@ def _sum(number: sp.Expr) -> AngleSum:
     return found
 
 
-def _number(value: Value) -> Number:
+def _number(value: AngleSum | T) -> sp.Expr | T:
+    """A sum of cosines as an expression, anything else as it is."""
     return expression(value.risen) if isinstance(value, AngleSum) else value
-
-
-def _expression(number: Exact) -> sp.Expr:
-    return expression(number.risen) if isinstance(number, AngleSum) else number
 
 
 def _complex(value: Value) -> bool:

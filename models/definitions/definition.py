@@ -1,7 +1,7 @@
 """The kinds of plug-in that mechanics knows, and what their files must hold: checked when a file from outside is loaded.
 
 A definition that another one makes idle and a parameter that no function uses are refused, since the model would
-be another than the one that was meant.
+be another than the one that was meant.  Lists of plug-ins need no SymPy: only the functions that check a file load it.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from ..inputs.plugin_file import PluginFile
 from ..inputs.plugins import Kind
@@ -41,6 +41,15 @@ _NEEDED = {
 @dataclass(frozen=True, slots=True)
 class _PartFile(PluginFile):
     """The file of a part of a model: it has parameters, and its functions return expressions."""
+
+    @classmethod
+    def checked(cls, kind: str, module: ModuleType, where: str, text: bytes) -> Self:
+        """Return the file of a part whose names, values and table of parameters are those that its kind may have."""
+        file = cls.of(kind, KNOWN[kind], module, where, text)
+        file.check_names(_NEEDED[kind])
+        file.check_values()
+        file.check_parameters()
+        return file
 
     def check_parameters(self) -> None:
         """Refuse a table of parameters that is none."""
@@ -115,10 +124,7 @@ def _symbols(names: Iterable[str], positive: Iterable[str] = ()) -> dict[str, sp
 
 def check_oscillator(module: ModuleType, where: str, text: bytes) -> None:
     """Raise ValueError if a module is neither a vector field nor a Lagrangian, or lacks what its scaling needs."""
-    file = _PartFile.of("oscillator", KNOWN["oscillator"], module, where, text)
-    file.check_names(_NEEDED["oscillator"])
-    file.check_values()
-    file.check_parameters()
+    file = _PartFile.checked("oscillator", module, where, text)
     if file.has("field"):
         file.idle(_LAGRANGIAN, "beside field, which is the whole model")
         file.need("STATE")
@@ -203,10 +209,7 @@ def _check_friction(file: _PartFile, found: Iterable[sp.Expr]) -> None:
 
 def check_friction(module: ModuleType, where: str, text: bytes) -> None:
     """Raise ValueError if a module is no friction law."""
-    file = _PartFile.of("friction", KNOWN["friction"], module, where, text)
-    file.check_names(_NEEDED["friction"])
-    file.check_values()
-    file.check_parameters()
+    file = _PartFile.checked("friction", module, where, text)
     names = file.get("PARAMETERS")
     given = _symbols(names)
     found = [file.expression("force", {**_symbols("w"), **given})]
@@ -221,10 +224,7 @@ def check_friction(module: ModuleType, where: str, text: bytes) -> None:
 
 def check_coupling(module: ModuleType, where: str, text: bytes) -> None:
     """Raise ValueError if a module is no coupling."""
-    file = _PartFile.of("coupling", KNOWN["coupling"], module, where, text)
-    file.check_names(_NEEDED["coupling"])
-    file.check_values()
-    file.check_parameters()
+    file = _PartFile.checked("coupling", module, where, text)
     names = file.get("PARAMETERS")
     functions = [name for name in ("potential", "dissipation", "kinetic") if file.has(name)]
     if not functions:

@@ -8,7 +8,7 @@ assumed; a parameter that was assumed positive or nonnegative has that range.
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from keyword import iskeyword
@@ -20,7 +20,6 @@ from sympy.core.function import AppliedUndef
 from ..inputs.checks import (
     check_flag,
     check_instance,
-    check_keys,
     check_number,
     check_table,
     check_text,
@@ -28,9 +27,10 @@ from ..inputs.checks import (
     suggestion,
     typed_repr,
 )
+from ..inputs.expressions import FUNCTIONS
 from ..inputs.frozen import Frozen
 from ..mechanics.components import SLIDING, TIME
-from ..mechanics.expression import FUNCTIONS, RESERVED, exact
+from ..mechanics.expression import RESERVED, exact
 from ..mechanics.friction import ContactModel, FrictionLaw
 from ..mechanics.lagrangian import check_masses_exist, mass_matrix
 from ..mechanics.oscillator import FRICTION, Coordinate, FieldModel, LagrangianModel, Oscillator
@@ -424,12 +424,7 @@ def _parameter(value: object) -> Parameter:
         return value
     if not isinstance(value, Mapping):
         return Parameter(_value("default", value))
-    check_keys("parameter", value, [own.name for own in fields(Parameter)])
-    if "default" not in value:
-        raise ValueError(f"found {short_repr(dict(value))}; expected a table with a default")
-    checks: dict[str, Callable[[str, object], Any]] = {own.name: check_number for own in fields(Parameter)}
-    checks |= {"unit": check_text, "meaning": check_text, "scale": check_text, "positive": check_flag}
-    return Parameter(**{str(key): checks[str(key)](str(key), entry) for key, entry in value.items()})
+    return Parameter.of_table("parameter", value, [own.name for own in fields(Parameter)])
 
 
 def _value(what: str, value: object) -> float:

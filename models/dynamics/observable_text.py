@@ -6,35 +6,32 @@ import ast
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NoReturn, TypeVar
 
 import sympy as sp
 
-from ..inputs.checks import check_text, short_repr, suggestion
-from ..inputs.reader import Algebra, Arithmetic, Expression, NoMeaning, parse
+from ..inputs.checks import check_text, short_repr
+from ..inputs.expressions import EXPONENT, FUNCTIONS, Expressions
+from ..inputs.reader import Algebra, Expression, NoMeaning, parse
 from .observable import Observable, Window, nodes, rate, real
 
-__all__ = ["FUNCTIONS", "as_observable", "as_value"]
+__all__ = ["as_observable", "as_value"]
 
-T = TypeVar("T")
+LENGTH = 4000
+"""Most characters."""
 
-LENGTH, DEPTH, EXPONENT, MAGNITUDE = 4000, 60, 16, 1e100
-"""Most characters, most nested operations, largest exponent that is a number, largest constant."""
-
-FUNCTIONS: Mapping[str, Callable[..., sp.Expr]] = {
-    "abs": sp.Abs, "atan": sp.atan, "cos": sp.cos, "exp": sp.exp, "floor": sp.floor, "log": sp.log, "max": sp.Max,
-    "min": sp.Min, "sign": sp.sign, "sin": sp.sin, "sqrt": sp.sqrt, "tanh": sp.tanh,
+KNOWN: Mapping[str, Callable[..., sp.Expr]] = {
+    **{name: FUNCTIONS[name] for name in ("abs", "atan", "cos", "exp", "floor", "log", "max", "min", "sign", "sin",
+                                          "sqrt", "tanh")},
+    "rate": rate,
+    **{f"nodes.{name}": getattr(nodes, name) for name in ("sum", "mean", "maximum", "minimum", "std")},
+    "nodes[3]": nodes[3],
 }  # fmt: skip
-"""The functions of observables, by their names in text: those that generated kernels know."""
+"""The functions of observables, by their names in text: of numbers those that lanes have."""
 
 SPELLINGS = {"Abs": "abs", "Max": "max", "Min": "min"}
 """How SymPy spells some of them."""
 
-OF_NODES: Mapping[str, Callable[[object], sp.Expr]] = {
-    f"nodes.{name}": getattr(nodes, name) for name in ("sum", "mean", "maximum", "minimum", "std")
-}
-ONE_NODE = re.compile(r"nodes\[(\d+)\]")
-KNOWN = (*FUNCTIONS, "rate", *OF_NODES, "nodes[3]")
+_ONE_NODE = re.compile(r"nodes\[(\d+)\]")
 
 
 def as_observable(what: str, value: object) -> Observable:
@@ -79,15 +76,15 @@ def as_value(what: str, value: object) -> sp.Expr:
     expression = _parsed(what, text)
     if expression is None:
         raise ValueError(f"{what}: unreadable expression {short_repr(text)}; expected such as 'x_1 - x_2'")
-    return real(_evaluated(what, text, expression, _Values(what)))
+    return _real(what, expression)
 
 
 def _read(what: str, text: str) -> Observable:
     expression = _parsed(what, text)
     if expression is not None:
         match expression.tree:
-            case ast.Call(func=ast.Name(id=name), args=[_], keywords=[]) if name in tuple(Window):
-                return _evaluated(what, text, expression, _Windows(_Values(what)))
+            case ast.Call(func=ast.Name(id=name), args=[value], keywords=[]) if name in tuple(Window):
+                return Observable(Window(name), _real(what, Expression(expression.text, value)))
     windows = ", ".join(Window)
     raise ValueError(f"{what}: found {short_repr(text)}; expected one of {windows} of an expression outermost")
 
@@ -98,107 +95,57 @@ def _parsed(what: str, text: str) -> Expression | None:
     return parse(text)
 
 
-def _evaluated(what: str, text: str, expression: Expression, algebra: Algebra[T]) -> T:
-    """The value of a text; errors of one line."""
+def _real(what: str, expression: Expression) -> sp.Expr:
+    """The value of an expression, made of real symbols."""
     try:
-        return expression.evaluate(algebra)
-    except _Refusal as refusal:
-        raise ValueError(str(refusal)) from None
+        return real(_OfNodes(what).read(expression))
     except ValueError as error:
-        raise ValueError(f"{what}: {str(error).removeprefix('observable: ')}") from None
-    except (TypeError, AttributeError, OverflowError, ArithmeticError) as error:  # of SymPy, which compares in vain
-        reason = " ".join(str(error).split())[:200]
-        raise ValueError(f"{what}: {short_repr(text)} has no value: {reason or type(error).__name__}") from None
+        raise ValueError(f"{what}: {_reason(error).removeprefix(f'{what}: ')}") from None
 
 
-class _Refusal(Exception):
-    """An error in the words of this module."""
+def _reason(error: ValueError) -> str:
+    return str(error).removeprefix("observable: ")
 
 
 @dataclass(frozen=True, slots=True)
-class _Windows(Algebra[Observable]):
-    """The outermost call, which reduces a value over the window."""
+class _OfNodes(Expressions):
+    """Expressions of states, of any names; constants may be complex, as in abs(nodes.mean(exp(sqrt(-1)*theta)))."""
 
-    values: _Values
-    deepest = DEPTH
+    deepest = 60
+    functions = KNOWN
 
-    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[Any]]:
-        return (self.values,) * count
+    def pieces(self) -> str:
+        return f"names, pi, + - * / ** and {', '.join(KNOWN)}"
 
-    def call(self, function: str, arguments: Sequence[Any], options: Mapping[str, str]) -> Observable:
-        return Observable(Window(function), arguments[0])
-
-
-@dataclass(frozen=True, slots=True)
-class _Values(Arithmetic[sp.Expr]):
-    """Expressions of states; constants are checked after every operation, so that none grows."""
-
-    what: str
-    deepest = DEPTH
-
-    def refuse(self, node: ast.expr, reason: str) -> NoReturn:
-        piece = short_repr(ast.unparse(node))
-        expected = f"numbers, names, pi, + - * / ** and {', '.join(KNOWN)}"
-        raise _Refusal(f"{self.what}: {reason or f'found {piece}; expected {expected}'}")
-
-    def refuse_depth(self) -> NoReturn:
-        raise _Refusal(f"{self.what}: more than {DEPTH} nested operations; expected fewer")
-
-    def number(self, value: int | float) -> sp.Expr:
-        if not abs(value) <= MAGNITUDE:
-            raise NoMeaning(f"found {short_repr(value)}; expected numbers up to {MAGNITUDE:g}")
-        return sp.Integer(value) if isinstance(value, int) else sp.Rational(repr(value))
-
-    def name(self, name: str) -> sp.Expr:
+    def name(self, name: str) -> sp.Basic:
         return sp.pi if name == "pi" else sp.Symbol(name, real=True)
 
-    def divide(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
-        if b == 0:
-            raise NoMeaning("found a division by zero; expected finite values")
-        return self.checked(a / b)
-
-    def power(self, base: sp.Expr, exponent: sp.Expr) -> sp.Expr:
-        if not (exponent.is_Rational and abs(exponent) <= EXPONENT and exponent.q <= 2):
+    def power(self, base: sp.Basic, exponent: sp.Basic) -> sp.Basic:
+        if not (exponent.is_Rational and exponent.q <= 2):
             raise NoMeaning(f"found the exponent {short_repr(exponent)}; expected halves up to {EXPONENT}")
-        made = self.checked(base**exponent)
-        if made.is_Pow and made.exp.is_Rational and abs(made.exp) > EXPONENT:
-            raise NoMeaning(f"found the exponent {made.exp}; expected at most {EXPONENT}")
-        return made
+        return Expressions.power(self, base, exponent)
 
-    def compare(self, sign: str, a: sp.Expr, b: sp.Expr) -> sp.Expr:
+    def compare(self, sign: str, a: sp.Basic, b: sp.Basic) -> sp.Basic:
         raise NoMeaning(f"found the condition {a} {sign} {b}; expected a value, such as the difference {a} - ({b})")
 
-    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[sp.Expr]]:
-        name = SPELLINGS.get(function, function)
-        if name not in KNOWN and not ONE_NODE.fullmatch(name):
-            hint = suggestion(name, KNOWN)
-            if name in tuple(Window):
-                hint = "; over the window a value is reduced once, outermost"
-            raise NoMeaning(f"unknown function {short_repr(function)}; known: {', '.join(KNOWN)}{hint}")
-        if options or (count < 2 if name in ("max", "min") else count != 1):
-            wanted = "at least 2" if name in ("max", "min") else "1"
-            raise NoMeaning(f"{function} has {count + len(options)} arguments; expected {wanted}")
-        return (self,) * count
+    def function(self, name: str) -> Callable[..., sp.Expr] | None:
+        one = _ONE_NODE.fullmatch(name)
+        if one is None:
+            return KNOWN.get(SPELLINGS.get(name, name))
+        try:
+            return nodes[int(one[1])]
+        except ValueError as error:
+            raise NoMeaning(_reason(error)) from None
 
-    def call(self, function: str, arguments: Sequence[sp.Expr], options: Mapping[str, str]) -> sp.Expr:
-        name = SPELLINGS.get(function, function)
-        if name == "rate":
-            return rate(arguments[0])
-        if name in OF_NODES:
-            return OF_NODES[name](arguments[0])
-        if one := ONE_NODE.fullmatch(name):
-            return nodes[int(one[1])](arguments[0])
-        return self.checked(FUNCTIONS[name](*arguments))
+    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[sp.Basic]]:
+        if function in tuple(Window):
+            raise NoMeaning(
+                f"found {function} inside; expected values of an instant: over the window one is reduced once, outermost"
+            )
+        return Expressions.arguments(self, function, count, options)
 
-    def checked(self, e: sp.Expr) -> sp.Expr:
-        """The expression, if the constants at its top are finite and not too large."""
-        parts = (e,) if e.is_number else e.args if isinstance(e, sp.Add | sp.Mul | sp.Pow) else ()
-        for number in (part for part in parts if part.is_number):
-            if number.is_Rational:
-                large = max(abs(number.p), number.q) > MAGNITUDE
-            else:
-                size = sp.Abs(sp.N(number))
-                large = not (size.is_finite and size <= MAGNITUDE)
-            if large:
-                raise NoMeaning(f"found {short_repr(number)}; expected finite numbers up to {MAGNITUDE:g}")
-        return e
+    def call(self, function: str, arguments: Sequence[sp.Basic], options: Mapping[str, str]) -> sp.Basic:
+        try:
+            return Expressions.call(self, function, arguments, options)
+        except ValueError as error:
+            raise NoMeaning(_reason(error)) from None

@@ -22,9 +22,9 @@ from functools import lru_cache, partial
 import sympy as sp
 
 from ..graphs.links import LINK_LIMIT
-from ..graphs.partitions import class_links, coarsest_balanced
 from ..inputs.node_name import LinkName
 from ..mechanics.components import Edge
+from ..symmetries.partitions import class_links, coarsest_balanced
 from .equations import Equations
 
 __all__ = ["NoQuotient", "collapse", "quotient", "substitute_constants"]

@@ -27,7 +27,7 @@ from ..mechanics.friction import SLIP
 from .equations import Equations
 
 if TYPE_CHECKING:
-    from ..graphs.clusters import Block
+    from ..symmetries.clusters import Block
 
 __all__ = ["Entry", "Events", "of_blocks", "of_mode", "of_network"]
 

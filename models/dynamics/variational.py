@@ -23,7 +23,7 @@ from .saltation import Entry, Events, of_blocks, of_mode, of_network
 from .synchrony import synchronous_node
 
 if TYPE_CHECKING:
-    from ..graphs.clusters import Block, Clusters
+    from ..symmetries.clusters import Block, Clusters
 
 __all__ = [
     "LOG_VOLUME",

@@ -1,5 +1,5 @@
-"""Graphs: families, products, readers, symmetries, partitions, closed forms. Knows no oscillator.
+"""Graphs: families, products, readers, other matrices, closed forms. Knows no oscillator.
 
 A topology is a graph with exact weights, a family makes topologies of any size, a rule says how a
-topology came about, a partition puts nodes into classes.
+topology came about.
 """

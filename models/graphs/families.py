@@ -16,13 +16,11 @@ from ..inputs import plugins
 from ..inputs.options import Options, as_options
 from ..inputs.plugin_file import PluginFile
 from ..inputs.plugins import Kind
-from .links import LINK_LIMIT
+from .links import LINK_LIMIT, Link
 from .topology import Topology
 
 if TYPE_CHECKING:
     import sympy as sp
-
-    from .links import Link
 
 __all__ = ["KNOWN", "TOPOLOGY", "Family", "FamilyRule", "check_topology", "family", "names", "topology"]
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, ClassVar, NoReturn, TypeVar
 
 from ..inputs.checks import short_repr
-from ..inputs.reader import Algebra, Expression, NoMeaning, parse
+from ..inputs.reader import Algebra, NoMeaning, parse
 from . import products
 from .families import family, topology
 from .topology import Topology
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from .closed_forms import ClosedForm
 
 __all__ = ["is_composed", "read_form", "read_graph"]
+
+V = TypeVar("V")
 
 LENGTH, DEPTH = 300, 8
 PAIRS, SIZED = ("cartesian", "kronecker", "union"), ("complement", "weighted")
@@ -53,10 +55,7 @@ def read_graph(text: str, largest: int | None = None, seeds: Iterator[int] | Non
     ValueError
         On anything else, on a graph of more than `largest` nodes, and on a seed beside `seeds`.
     """
-    expression, graphs = _parsed(text), _Graphs(text, largest, seeds)
-    if expression is None:
-        raise graphs.unreadable
-    return expression.evaluate(graphs)
+    return _value(_Graphs(text, largest, seeds))
 
 
 def read_form(text: str) -> ClosedForm:
@@ -67,24 +66,22 @@ def read_form(text: str) -> ClosedForm:
     ValueError
         On anything else, and if no closed form with symbols is known.
     """
-    expression, forms = _parsed(text), _Forms(text)
-    if expression is None:
-        raise forms.unreadable
-    return expression.evaluate(forms)
-
-
-def _parsed(text: str) -> Expression | None:
-    return parse(text) if len(text) <= LENGTH else None
+    return _value(_Forms(text))
 
 
 @dataclass(frozen=True, slots=True)
-class _Graphs(Algebra[Topology]):
-    """Graphs: families with their sizes, and the operations on them."""
+class _Composed(Algebra[V]):
+    """What texts of operations stand for; a text that stands for nothing is refused as a whole."""
 
     text: str
-    largest: int | None
-    seeds: Iterator[int] | None = None
     deepest = DEPTH
+    what: ClassVar[str]
+    expected: ClassVar[str]
+
+    @property
+    def unreadable(self) -> ValueError:
+        """The error for any other text."""
+        return ValueError(f"unreadable {self.what} {short_repr(self.text)}; expected {self.expected}")
 
     def refuse(self, node: ast.expr, reason: str) -> NoReturn:
         raise self.unreadable
@@ -92,13 +89,23 @@ class _Graphs(Algebra[Topology]):
     def refuse_depth(self) -> NoReturn:
         raise self.unreadable
 
-    @property
-    def unreadable(self) -> ValueError:
-        """The error for any text that names no graph."""
-        known = ", ".join((*PAIRS, *SIZED))
-        return ValueError(
-            f"unreadable graph {short_repr(self.text)}; expected {known}, e.g. cartesian(chain(4), ring(5))"
-        )
+
+def _value(composed: _Composed[V]) -> V:
+    """What the text stands for; ValueError if it is too long, or stands for nothing."""
+    expression = parse(composed.text) if len(composed.text) <= LENGTH else None
+    if expression is None:
+        raise composed.unreadable
+    return expression.evaluate(composed)
+
+
+@dataclass(frozen=True, slots=True)
+class _Graphs(_Composed[Topology]):
+    """Graphs: families with their sizes, and the operations on them."""
+
+    largest: int | None
+    seeds: Iterator[int] | None = None
+    what = "graph"
+    expected = f"{', '.join((*PAIRS, *SIZED))}, e.g. cartesian(chain(4), ring(5))"
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[Topology] | None]:
         if function in PAIRS and count == 2 and not options:
@@ -148,25 +155,11 @@ class _Graphs(Algebra[Topology]):
 
 
 @dataclass(frozen=True, slots=True)
-class _Forms(Algebra["ClosedForm"]):
+class _Forms(_Composed["ClosedForm"]):
     """Closed forms: families without sizes, and the operations that keep them closed forms."""
 
-    text: str
-    deepest = DEPTH
-
-    def refuse(self, node: ast.expr, reason: str) -> NoReturn:
-        raise self.unreadable
-
-    def refuse_depth(self) -> NoReturn:
-        raise self.unreadable
-
-    @property
-    def unreadable(self) -> ValueError:
-        """The error for any text that names no closed form."""
-        return ValueError(
-            f"unreadable closed form {short_repr(self.text)}; expected {', '.join(PAIRS)} of families without sizes, "
-            "e.g. cartesian(chain, torus(shape=(p, q)))"
-        )
+    what = "closed form"
+    expected = f"{', '.join(PAIRS)} of families without sizes, e.g. cartesian(chain, torus(shape=(p, q)))"
 
     def name(self, name: str) -> ClosedForm:
         from .closed_forms import closed_form

@@ -1,7 +1,8 @@
 """The other matrices of a graph: adjacency, Laplacians; their spectra are proved as that of G is.
 
 F. R. K. Chung, Spectral Graph Theory (American Mathematical Society, 1997), chapter 1; A. E. Brouwer,
-W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.1.
+W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.1.  A matrix costs no algebra: only its
+eigenvalues, its eigenvectors and `matrix` load SymPy.
 """
 
 from __future__ import annotations
@@ -12,11 +13,11 @@ from enum import StrEnum
 from fractions import Fraction
 from itertools import groupby
 from operator import itemgetter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from ..inputs.rationals import total
-from .products import listed, one_degree, written
-from .topology import Topology, dense, sympy_matrix
+from ..spectra.matrix import Matrix
+from .links import Link, one_degree
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -24,7 +25,46 @@ if TYPE_CHECKING:
     from ..spectra.eigenspaces import Eigenspace
     from ..spectra.spectrum import Spectrum
 
-__all__ = ["GraphMatrix", "MatrixKind"]
+__all__ = ["Exact", "GraphMatrix", "MatrixKind"]
+
+
+class Exact:
+    """A matrix of a graph that says what its entries are: its rows, its exact spectrum and eigenvectors."""
+
+    __slots__ = ()
+
+    @property
+    def rows(self: Matrix) -> tuple[tuple[Fraction, ...], ...]:
+        """The matrix as n rows of n fractions."""
+        zero = Fraction(0)
+        table = [[zero] * self.n for _ in range(self.n)]
+        for i, j, number in self.entries:
+            table[i][j] = number
+        return tuple(map(tuple, table))
+
+    @property
+    def matrix(self: Matrix) -> sp.ImmutableDenseMatrix:
+        """The matrix as an immutable SymPy matrix, n x n."""
+        import sympy as sp
+
+        table = sp.zeros(self.n)
+        for i, j, number in self.entries:
+            table[i, j] = sp.Rational(number.numerator, number.denominator)
+        return table.as_immutable()
+
+    @property
+    def spectrum(self: Matrix) -> Spectrum:
+        """The exact eigenvalues with multiplicities, the largest first (see `synchain.models.spectra.solve`)."""
+        from ..spectra.solve import spectrum
+
+        return spectrum(self)
+
+    @property
+    def eigenspaces(self: Matrix) -> tuple[Eigenspace, ...]:
+        """The exact eigenvectors (see `synchain.models.spectra.eigenspaces`)."""
+        from ..spectra.eigenspaces import eigenspaces
+
+        return eigenspaces(self)
 
 
 class MatrixKind(StrEnum):
@@ -43,8 +83,24 @@ class MatrixKind(StrEnum):
     """
 
 
+class Graph(Matrix, Protocol):
+    """What its other matrices know of a graph, which is the matrix G itself; a `Topology` is one."""
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """The links (target, source, weight), sorted."""
+
+    @property
+    def undirected(self) -> bool:
+        """True if G is known to be symmetric."""
+
+    @property
+    def asymmetry(self) -> str:
+        """In words, the first links that do not act both ways with one weight; "" if all do."""
+
+
 @dataclass(frozen=True, slots=True)
-class GraphMatrix:
+class GraphMatrix(Exact):
     """A matrix of a graph beside its connectivity matrix G.
 
     Parameters
@@ -62,7 +118,7 @@ class GraphMatrix:
         positive.
     """
 
-    graph: Topology
+    graph: Graph
     kind: MatrixKind
 
     def __post_init__(self) -> None:
@@ -117,52 +173,29 @@ class GraphMatrix:
         sign = 1 if self.kind is MatrixKind.SIGNLESS else -1
         return (*((i, j, sign * weight) for i, j, weight in links), *((i, i, d) for i, d in degrees.items() if d))
 
-    @property
-    def rows(self) -> tuple[tuple[Fraction, ...], ...]:
-        """The matrix as n rows of n fractions."""
-        return dense(self.n, self.entries)
-
-    @property
-    def matrix(self) -> sp.ImmutableDenseMatrix:
-        """The matrix as an immutable SymPy matrix, n x n."""
-        return sympy_matrix(self.rows)
-
     def closed_form(self) -> Sequence[tuple[sp.Expr, int]] | None:
         """List the eigenvalues with multiplicities, each once, if they follow from those of G; else None."""
-        from ..algebra.cosine_sums import AngleSum
+        from ..algebra.cosine_sums import AngleSum, expressions
+        from ..spectra.angle_sums import angle_sums
 
         map_of_gamma = self._map
-        known = None if map_of_gamma is None or self.graph.closed_form() is None else listed(self.graph)
+        known = None if map_of_gamma is None or self.graph.closed_form() is None else angle_sums(self.graph)
         if map_of_gamma is None or known is None:
             return None
         factor, shift = (AngleSum.rational(x) for x in map_of_gamma)
-        return written([(factor * gamma + shift, times) for gamma, times in known])
+        return expressions([(factor * gamma + shift, times) for gamma, times in known])
 
     @property
     def _map(self) -> tuple[Fraction, Fraction] | None:
         """(a, b) if the matrix is a G + b; None of any other."""
         if self.kind is MatrixKind.LAPLACIAN:
             return Fraction(-1), Fraction(0)
-        d = one_degree(self.graph)
+        d = one_degree(self.n, self.graph.links)
         if d is None:
             return None
         if self.kind is MatrixKind.RANDOM_WALK:
             return (-1 / d if d else Fraction(0)), Fraction(0)
         return Fraction(1), d if self.kind is MatrixKind.ADJACENCY else 2 * d
-
-    @property
-    def spectrum(self) -> Spectrum:
-        """The exact eigenvalues with multiplicities, the largest first (see `synchain.models.spectra.solve`)."""
-        from ..spectra.solve import spectrum
-
-        return spectrum(self)
-
-    @property
-    def eigenspaces(self) -> tuple[Eigenspace, ...]:
-        """The exact eigenvectors (see `synchain.models.spectra.eigenspaces`)."""
-        from ..spectra.eigenspaces import eigenspaces
-
-        return eigenspaces(self)
 
     def __repr__(self) -> str:
         return f"GraphMatrix({self.graph!r}, {str(self.kind)!r})"

@@ -3,7 +3,7 @@
 The rules: A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), sections 1.3.6 (union),
 1.3.8 (complement), 1.4.6 (Cartesian product) and 1.4.7 (Kronecker product).  Sums and products of
 eigenvalues are merged exactly if all of them are rational, cosines or their short radicals; other
-spectra come from the matrix itself.
+spectra come from the matrix itself.  A product costs no algebra: only `eigenvalues` loads SymPy.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from itertools import product
 from typing import TYPE_CHECKING, TypeAlias
 
 from ..inputs.rationals import rational
-from .links import LINK_LIMIT
+from .links import LINK_LIMIT, Link, one_degree
 from .readers import as_topology
 from .topology import Rule, Topology
 
@@ -22,9 +22,8 @@ if TYPE_CHECKING:
     import sympy as sp
 
     from ..algebra.cosine_sums import AngleSum
-    from .links import Link
 
-__all__ = ["cartesian", "complement", "factors", "kronecker", "listed", "one_degree", "union", "weighted", "written"]
+__all__ = ["cartesian", "complement", "factors", "kronecker", "union", "weighted"]
 
 Listed: TypeAlias = "list[tuple[AngleSum, int]]"
 Closed: TypeAlias = "list[tuple[sp.Expr, int]] | None"
@@ -41,8 +40,7 @@ def cartesian(first: Topology, second: Topology) -> Topology:
     ValueError
         On more than LINK_LIMIT links.
     """
-    first, second = as_topology("cartesian: first", first), as_topology("cartesian: second", second)
-    return _made(f"cartesian({_named(first)}, {_named(second)})", first.n * second.n, Cartesian(first, second))
+    return _of_two("cartesian", Cartesian, first, second)
 
 
 def kronecker(first: Topology, second: Topology) -> Topology:
@@ -56,8 +54,7 @@ def kronecker(first: Topology, second: Topology) -> Topology:
     ValueError
         On more than LINK_LIMIT links.
     """
-    first, second = as_topology("kronecker: first", first), as_topology("kronecker: second", second)
-    return _made(f"kronecker({_named(first)}, {_named(second)})", first.n * second.n, Kronecker(first, second))
+    return _of_two("kronecker", Kronecker, first, second)
 
 
 def union(first: Topology, second: Topology) -> Topology:
@@ -68,8 +65,7 @@ def union(first: Topology, second: Topology) -> Topology:
     ValueError
         On more than LINK_LIMIT links.
     """
-    first, second = as_topology("union: first", first), as_topology("union: second", second)
-    return _made(f"union({_named(first)}, {_named(second)})", first.n + second.n, Union(first, second))
+    return _of_two("union", Union, first, second)
 
 
 def complement(graph: Topology) -> Topology:
@@ -128,9 +124,16 @@ class _OfTwo:
         """None: pairs of nodes are not joined alike."""
         return None
 
+    @property
+    def n(self) -> int:
+        """The number of nodes: one for each pair of nodes of the graphs."""
+        return self.first.n * self.second.n
+
     def spectra(self) -> tuple[Listed, Listed] | None:
         """The closed spectra of both graphs; None if one of them has none."""
-        a, b = listed(self.first), listed(self.second)
+        from ..spectra.angle_sums import angle_sums
+
+        a, b = angle_sums(self.first), angle_sums(self.second)
         return None if a is None or b is None else (a, b)
 
 
@@ -152,8 +155,10 @@ class Cartesian(_OfTwo):
 
     def eigenvalues(self) -> Closed:
         """List the sums of the eigenvalues."""
+        from ..algebra.cosine_sums import expressions
+
         known = self.spectra()
-        return None if known is None else written([(x + y, m * k) for (x, m), (y, k) in product(*known)])
+        return None if known is None else expressions([(x + y, m * k) for (x, m), (y, k) in product(*known)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,18 +178,23 @@ class Kronecker(_OfTwo):
 
     def eigenvalues(self) -> Closed:
         """List (a + d)(b + e) - d e, d and e the in-degrees."""
-        from ..algebra.cosine_sums import AngleSum
+        from ..algebra.cosine_sums import AngleSum, expressions
 
-        first, second = one_degree(self.first), one_degree(self.second)
+        first, second = (one_degree(graph.n, graph.links) for graph in (self.first, self.second))
         if first is None or second is None or (known := self.spectra()) is None:
             return None
         d, e = AngleSum.rational(first), AngleSum.rational(second)
-        return written([((x + d) * (y + e) + -(d * e), m * k) for (x, m), (y, k) in product(*known)])
+        return expressions([((x + d) * (y + e) + -(d * e), m * k) for (x, m), (y, k) in product(*known)])
 
 
 @dataclass(frozen=True, slots=True)
 class Union(_OfTwo):
     """The rule of two graphs side by side."""
+
+    @property
+    def n(self) -> int:
+        """The number of nodes."""
+        return self.first.n + self.second.n
 
     @property
     def link_count(self) -> int:
@@ -198,8 +208,10 @@ class Union(_OfTwo):
 
     def eigenvalues(self) -> Closed:
         """List the eigenvalues of both."""
+        from ..algebra.cosine_sums import expressions
+
         known = self.spectra()
-        return None if known is None else written([*known[0], *known[1]])
+        return None if known is None else expressions([*known[0], *known[1]])
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,14 +242,15 @@ class Complement:
 
     def eigenvalues(self) -> Closed:
         """List 0 and the numbers -(n + γ)."""
-        from ..algebra.cosine_sums import AngleSum
+        from ..algebra.cosine_sums import AngleSum, expressions
+        from ..spectra.angle_sums import angle_sums
 
-        known = listed(self.graph)
+        known = angle_sums(self.graph)
         if known is None:
             return None
         whole = AngleSum.rational(-self.graph.n)
         others = [(whole + -a, times - a.vanishes()) for a, times in known]
-        return written([(AngleSum.rational(0), 1), *((a, times) for a, times in others if times)])
+        return expressions([(AngleSum.rational(0), 1), *((a, times) for a, times in others if times)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,15 +282,22 @@ class Weighted:
 
     def eigenvalues(self) -> Closed:
         """List the eigenvalues times the factor."""
-        from ..algebra.cosine_sums import AngleSum
+        from ..algebra.cosine_sums import AngleSum, expressions
+        from ..spectra.angle_sums import angle_sums
 
-        known = listed(self.graph)
-        return None if known is None else written([(AngleSum.rational(self.factor) * a, times) for a, times in known])
+        known, by = angle_sums(self.graph), AngleSum.rational(self.factor)
+        return None if known is None else expressions([(by * a, times) for a, times in known])
 
 
 def _named(graph: Topology) -> str:
     more = "".join(f", {key}={value}" for key, value in graph.options)
     return graph.name if "(" in graph.name else f"{graph.name}({graph.n}{more})"
+
+
+def _of_two(name: str, operation: type[Cartesian | Kronecker | Union], first: object, second: object) -> Topology:
+    """The graph that an operation makes of two."""
+    rule = operation(as_topology(f"{name}: first", first), as_topology(f"{name}: second", second))
+    return _made(f"{name}({_named(rule.first)}, {_named(rule.second)})", rule.n, rule)
 
 
 def _small(name: str, links: int) -> None:
@@ -289,31 +309,3 @@ def _made(name: str, n: int, rule: Rule) -> Topology:
     if rule.all_to_all is None:
         _small(name, rule.link_count or 0)
     return Topology(name, n, rule=rule)
-
-
-def one_degree(graph: Topology) -> Fraction | None:
-    """Return the sum of weights that every node feels; None if it is not one for all."""
-    sums = [Fraction(0)] * graph.n
-    for target, _, weight in graph.links:
-        sums[target] += weight
-    return sums[0] if len(set(sums)) == 1 else None
-
-
-def listed(graph: Topology) -> Listed | None:
-    """Return the closed spectrum of a graph, or that of a small matrix, as sums of cosines; else None."""
-    from ..algebra.cosine_sums import read
-
-    rule = graph.closed_form()
-    if rule is None:
-        rule = [(e.exact, e.multiplicity) for e in graph.spectrum.eigenvalues] if graph.n <= 100 else None
-    if rule is None:
-        return None
-    found = [(read(number), times) for number, times in rule]
-    return None if any(a is None for a, _ in found) else [(a, times) for a, times in found if a is not None]
-
-
-def written(numbers: Listed) -> Closed:
-    """Return the numbers as SymPy expressions, equal ones merged."""
-    from ..algebra.cosine_sums import expression, merged
-
-    return [(expression(a), times) for a, times in merged(numbers)]

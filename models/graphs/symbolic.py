@@ -1,7 +1,7 @@
-"""Graphs whose weights are rational functions of symbols: characteristic polynomial, factors, and roots where it factors.
+"""Graphs whose weights are rational functions of symbols; nothing in a text is run.
 
-What is said holds for symbols as such: for particular numbers eigenvalues may coincide, and `SymbolicTopology.at` gives the
-graph for them, with its own proved spectrum.
+Their spectrum holds for symbols as such (`synchain.models.spectra.symbolic`); `SymbolicTopology.at` gives the graph for
+particular numbers, with its own proved spectrum.
 """
 
 from __future__ import annotations
@@ -17,59 +17,20 @@ from pathlib import Path
 from typing import NoReturn
 
 import sympy as sp
-from sympy.polys.matrices import DomainMatrix
 
 from ..inputs.rationals import file_text, parse_rows, rational, square
 from ..inputs.reader import Algebra, NoMeaning, parse
-from ..spectra.eigenvalue import ProofError
+from ..spectra.symbolic import SymbolicSpectrum, Z, symbolic_spectrum
 from .topology import Topology, from_matrix
 
-__all__ = ["SymbolicSpectrum", "SymbolicTopology", "from_symbols", "read_symbols", "weight"]
+__all__ = ["SymbolicTopology", "from_symbols", "read_symbols", "weight"]
 
 LARGEST, LENGTH, DEPTH, EXPONENT = 30, 200, 20, 12
 DEGREE, TERMS, BITS = 60, 2000, 10_000
 """Largest degree, number of terms and bits of a number that a weight may have once it is multiplied out."""
 
-Z = sp.Symbol("z")
-"""The variable of characteristic polynomials; no weight may be called so."""
-
 _LETTERS = re.compile(r"[A-Za-z0-9_+\-*/(). ]*", re.ASCII)
 _EXPECTED = "expected whole numbers, fractions, letters, + - * / **, e.g. a/2 or 1/(1+b)"
-
-
-@dataclass(frozen=True, slots=True)
-class SymbolicSpectrum:
-    """The monic characteristic polynomial in z and its irreducible factors with multiplicities, for generic symbols."""
-
-    polynomial: sp.Poly
-    factors: tuple[tuple[sp.Poly, int], ...]
-
-    @property
-    def eigenvalues(self) -> tuple[tuple[sp.Expr, int], ...]:
-        """(root, multiplicity) of every factor of degree 1 or 2."""
-        return tuple((root, count) for factor, count in self.factors for root in _roots(factor))
-
-    @property
-    def unsolved(self) -> tuple[tuple[sp.Poly, int], ...]:
-        """The factors of higher degree."""
-        return tuple((factor, count) for factor, count in self.factors if factor.degree() > 2)
-
-    @property
-    def text(self) -> str:
-        """The spectrum as lines."""
-        rows = [f"characteristic polynomial: {sp.sstr(_product(self.factors))}"]
-        rows += [f"  {sp.sstr(root)}{_often(count)}" for root, count in self.eigenvalues]
-        rows += [f"  the roots of {sp.sstr(f.as_expr())}{_often(count)}" for f, count in self.unsolved]
-        return "\n".join(rows)
-
-    def as_dict(self) -> dict[str, object]:
-        """What `synchain spectrum --symbolic --matrix FILE --json` prints."""
-        return {
-            "n": self.polynomial.degree(),
-            "polynomial": sp.sstr(self.polynomial.as_expr()),
-            "factors": [{"factor": sp.sstr(f.as_expr()), "multiplicity": count} for f, count in self.factors],
-            "eigenvalues": [{"exact": sp.sstr(root), "multiplicity": count} for root, count in self.eigenvalues],
-        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,16 +57,8 @@ class SymbolicTopology:
 
     @property
     def spectrum(self) -> SymbolicSpectrum:
-        """The characteristic polynomial, factored; ProofError where the factors do not multiply to it."""
-        given = DomainMatrix.from_Matrix(self.matrix)
-        coefficients = [given.domain.to_sympy(c) for c in given.charpoly()]
-        polynomial = sp.Poly(coefficients, Z)
-        whole = sp.numer(sp.together(polynomial.as_expr()))
-        factors = [(sp.Poly(f, Z), count) for f, count in sp.factor_list(whole)[1] if f.has(Z)]
-        monic = tuple((_monic(f), count) for f, count in sorted(factors, key=lambda f: (f[0].degree(), str(f[0]))))
-        if sp.cancel(sp.expand(_product(monic)) - polynomial.as_expr()) != 0:
-            raise ProofError(f"spectrum of {self.name}: the factors do not multiply to the characteristic polynomial")
-        return SymbolicSpectrum(polynomial, monic)
+        """The characteristic polynomial, factored (see `synchain.models.spectra.symbolic`)."""
+        return symbolic_spectrum(self.matrix, self.name)
 
     def at(self, **values: object) -> Topology:
         """The graph with rational numbers for all symbols; weights that become 0 are left out.
@@ -273,26 +226,3 @@ class _Weights(Algebra[sp.Expr]):
                 f"{self.where} is {self.text!r}, a number of more than {BITS} bits; expected a smaller one"
             )
         return base**exponent
-
-
-def _monic(f: sp.Poly) -> sp.Poly:
-    return sp.Poly([sp.cancel(c / f.LC()) for c in f.all_coeffs()], Z)
-
-
-def _roots(factor: sp.Poly) -> list[sp.Expr]:
-    """The roots of a monic factor of degree 1 or 2; none of a higher one."""
-    c = factor.all_coeffs()
-    if len(c) == 2:
-        return [-c[1]]
-    if len(c) == 3:
-        middle, root = -c[1] / 2, sp.sqrt(sp.factor(c[1] ** 2 / 4 - c[2]))
-        return [middle + root, middle - root]
-    return []
-
-
-def _product(factors: Iterable[tuple[sp.Poly, int]]) -> sp.Expr:
-    return sp.Mul(*(f.as_expr() ** count for f, count in factors))
-
-
-def _often(count: int) -> str:
-    return "" if count == 1 else f", {count} times"

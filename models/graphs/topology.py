@@ -20,17 +20,14 @@ from ..inputs.checks import check_instance, check_integer, check_printable, shor
 from ..inputs.options import Options
 from ..inputs.rationals import file_text, parse_rows, rational_rows, total
 from ..inputs.shown import Drawn
-from .partitions import join
+from .links import Link, join
+from .matrices import Exact, GraphMatrix, MatrixKind
 
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ..spectra.eigenspaces import Eigenspace
-    from ..spectra.spectrum import Spectrum
-    from .links import Link
-    from .matrices import GraphMatrix
 
-__all__ = ["Rule", "Topology", "dense", "from_matrix", "read_matrix", "sympy_matrix"]
+__all__ = ["Rule", "Topology", "from_matrix", "read_matrix"]
 
 
 class Rule(Protocol):
@@ -59,7 +56,7 @@ class Rule(Protocol):
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
-class Topology(Drawn):
+class Topology(Exact, Drawn):
     """`n` nodes and their sorted links (target, source, weight); an undirected edge is two links.
 
     Parameters
@@ -210,43 +207,19 @@ class Topology(Drawn):
         return (*self.links, *((i, i, -degree) for i, degree in felt if degree))
 
     @property
-    def rows(self) -> tuple[tuple[Fraction, ...], ...]:
-        """G as n rows of n fractions."""
-        return dense(self.n, self.entries)
-
-    @property
-    def matrix(self) -> sp.ImmutableDenseMatrix:
-        """G as an immutable SymPy matrix, n x n."""
-        return sympy_matrix(self.rows)
-
-    @property
-    def spectrum(self) -> Spectrum:
-        """The exact eigenvalues of G with multiplicities (see `synchain.models.spectra.solve`)."""
-        from ..spectra.solve import spectrum
-
-        return spectrum(self)
-
-    @property
-    def eigenspaces(self) -> tuple[Eigenspace, ...]:
-        """The exact eigenvectors of G (see `synchain.models.spectra.eigenspaces`)."""
-        from ..spectra.eigenspaces import eigenspaces
-
-        return eigenspaces(self)
-
-    @property
     def adjacency(self) -> GraphMatrix:
         """The weights W, without a diagonal: row i feels column j."""
-        return self._other("ADJACENCY")
+        return GraphMatrix(self, MatrixKind.ADJACENCY)
 
     @property
     def laplacian(self) -> GraphMatrix:
         """The Laplacian D - W, which is -G, with the row sums D of W."""
-        return self._other("LAPLACIAN")
+        return GraphMatrix(self, MatrixKind.LAPLACIAN)
 
     @property
     def signless_laplacian(self) -> GraphMatrix:
         """The signless Laplacian D + W; ValueError if links are one-way."""
-        return self._other("SIGNLESS")
+        return GraphMatrix(self, MatrixKind.SIGNLESS)
 
     @property
     def random_walk_laplacian(self) -> GraphMatrix:
@@ -255,12 +228,7 @@ class Topology(Drawn):
         It has the eigenvalues of the normalised Laplacian 1 - D^(-1/2) W D^(-1/2), to which it is
         similar, and rational entries.
         """
-        return self._other("RANDOM_WALK")
-
-    def _other(self, kind: str) -> GraphMatrix:
-        from .matrices import GraphMatrix, MatrixKind
-
-        return GraphMatrix(self, MatrixKind[kind])
+        return GraphMatrix(self, MatrixKind.RANDOM_WALK)
 
     @property
     def spanning_trees(self) -> Fraction:
@@ -379,22 +347,6 @@ def read_matrix(path: str | Path) -> Topology:
     """
     text, name = file_text(path, "matrix file", "a text file of rows")
     return from_matrix(parse_rows(text, name), name)
-
-
-def dense(n: int, entries: Iterable[tuple[int, int, Fraction]]) -> tuple[tuple[Fraction, ...], ...]:
-    """Return n rows of n fractions with some entries and zeros."""
-    zero = Fraction(0)
-    table = [[zero] * n for _ in range(n)]
-    for i, j, number in entries:
-        table[i][j] = number
-    return tuple(map(tuple, table))
-
-
-def sympy_matrix(rows: Iterable[Iterable[Fraction]]) -> sp.ImmutableDenseMatrix:
-    """Return rows of fractions as an immutable SymPy matrix."""
-    import sympy as sp
-
-    return sp.ImmutableDenseMatrix([[sp.Rational(x.numerator, x.denominator) for x in row] for row in rows])
 
 
 def _check_size(name: object, n: object) -> None:

@@ -11,7 +11,7 @@ the column of y.  H is the matrix of the master stability function (Pecora & Car
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
@@ -130,12 +130,8 @@ class MatrixCoupling:
 
     def check(self, state: tuple[str, ...]) -> None:
         """Raise ValueError for components outside `state`, the names of a node's states."""
-        for name in (name for source, target, _ in self.entries for name in (source, target)):
-            if name not in state:
-                raise ValueError(
-                    f"coupling {short_repr(str(self))}: unknown component {short_repr(name)}; known: {', '.join(state)}"
-                    f"{suggestion(name, state) or '; name states of the oscillator'}"
-                )
+        names = (name for source, target, _ in self.entries for name in (source, target))
+        _expect_known(self, "component", "states", names, state)
 
     def canonical(self, state: tuple[str, ...], coordinates: tuple[str, ...] = ()) -> MatrixCoupling:
         """Return the same coupling with its entries ordered by target and source as in `state`.
@@ -202,12 +198,7 @@ class LagrangianCoupling:
                 f"coupling {short_repr(str(self))}: found oscillators without coordinates, which are vector fields; expected "
                 "a coupling by components, e.g. 'x->x'"
             )
-        for name in self.coordinates:
-            if name not in known:
-                raise ValueError(
-                    f"coupling {short_repr(str(self))}: unknown coordinate {short_repr(name)}; known: {', '.join(known)}"
-                    f"{suggestion(name, known) or '; name coordinates of the oscillator'}"
-                )
+        _expect_known(self, "coordinate", "coordinates", self.coordinates, known)
         if len(set(self.coordinates)) < len(self.coordinates):
             raise ValueError(
                 f"coupling {short_repr(str(self))}: found a coordinate twice; expected each once; leave one out"
@@ -292,6 +283,16 @@ Coupling = MatrixCoupling | LagrangianCoupling | Rates | Potential
 
 COUPLINGS = (MatrixCoupling, LagrangianCoupling, Rates, Potential)
 """The types of couplings."""
+
+
+def _expect_known(coupling: Coupling, kind: str, all_of: str, names: Iterable[str], known: tuple[str, ...]) -> None:
+    """Raise ValueError for a component or coordinate that a coupling names and a node does not have."""
+    for name in names:
+        if name not in known:
+            raise ValueError(
+                f"coupling {short_repr(str(coupling))}: unknown {kind} {short_repr(name)}; known: {', '.join(known)}"
+                f"{suggestion(name, known) or f'; name {all_of} of the oscillator'}"
+            )
 
 
 def _turned(energy: sp.Expr, at: Mapping[sp.Symbol, sp.Symbol]) -> tuple[sp.Expr, sp.Expr]:

@@ -13,8 +13,6 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from ..inputs.checks import (
-    check_flag,
-    check_keys,
     check_number,
     check_table,
     check_text,
@@ -22,9 +20,10 @@ from ..inputs.checks import (
     suggestion,
     typed_repr,
 )
+from ..inputs.expressions import FUNCTIONS
 from ..inputs.frozen import Frozen
 from ..mechanics.components import TIME, Node
-from ..mechanics.expression import FRICTION_NAME, FUNCTIONS, LENGTH, exact, read, written
+from ..mechanics.expression import FRICTION_NAME, LENGTH, exact, read, written
 from ..mechanics.parameter import Parameter
 from .ends import WEIGHT, Pair, Terms
 
@@ -304,16 +303,7 @@ def _parameter(what: str, value: object) -> Parameter:
     if not isinstance(value, Mapping):
         return _plain(check_number(what, value))
     names = [f.name for f in fields(Parameter) if f.name != "scale"]
-    check_keys(what, value, names)
-    if "default" not in value:
-        raise ValueError(f"{what}: 'default' is missing; expected a number")
-    given = {"unit": "1", "meaning": "parameter of a link", **value}
-    for name in {"default", "minimum", "maximum"} & set(given):
-        given[name] = check_number(f"{what}: {name}", given[name])
-    for name in ("unit", "meaning"):
-        given[name] = check_text(f"{what}: {name}", given[name])
-    given["positive"] = check_flag(f"{what}: positive", given.get("positive", False))
-    return Parameter(**given)
+    return Parameter.of_table(what, value, names, meaning=_plain(0.0).meaning)
 
 
 def _placed(coupling: Rates | Potential, e: sp.Expr, pair: Pair) -> sp.Expr:

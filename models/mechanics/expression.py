@@ -7,35 +7,26 @@ a model keeps, wherever it comes from.
 
 from __future__ import annotations
 
-import ast
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, NoReturn
 
 import sympy as sp
 from sympy.logic.boolalg import Boolean
 
 from ..inputs.checks import short_repr, suggestion
-from ..inputs.reader import Algebra, NoMeaning, parse
+from ..inputs.expressions import FUNCTIONS, Expressions
+from ..inputs.reader import NoMeaning, parse
 from .components import TIME
 from .oscillator import FRICTION
 
-__all__ = ["FRICTION_NAME", "FUNCTIONS", "LENGTH", "exact", "read", "written"]
+__all__ = ["FRICTION_NAME", "LENGTH", "exact", "read", "written"]
 
-LENGTH, DEPTH, EXPONENT, MAGNITUDE = 20_000, 100, 16, 1e100
-"""Most characters, most nested operations, largest exponent of a power that is a number, largest constant."""
+LENGTH = 20_000
+"""Most characters."""
 
 DIGITS = 10**1000
 """Largest whole number, above and below a line."""
-
-FUNCTIONS: Mapping[str, Any] = {
-    "abs": sp.Abs, "acos": sp.acos, "acosh": sp.acosh, "asin": sp.asin, "asinh": sp.asinh, "atan": sp.atan,
-    "atan2": sp.atan2, "atanh": sp.atanh, "ceiling": sp.ceiling, "cos": sp.cos, "cosh": sp.cosh, "exp": sp.exp,
-    "floor": sp.floor, "log": sp.log, "max": sp.Max, "min": sp.Min, "sign": sp.sign, "sin": sp.sin, "sinh": sp.sinh,
-    "sqrt": sp.sqrt, "tan": sp.tan, "tanh": sp.tanh,
-}  # fmt: skip
-"""The functions that a model may call, by their names in text; generated code knows the same ones."""
 
 FRICTION_NAME = "friction"
 """The friction coefficient of a velocity, in text."""
@@ -43,6 +34,7 @@ FRICTION_NAME = "friction"
 RESERVED = frozenset({"pi", TIME.name, FRICTION_NAME})
 """Names that text has for other things than states and parameters."""
 
+_CALLED = dict(sorted({**FUNCTIONS, FRICTION_NAME: FRICTION}.items()))
 _NAMES = {function: name for name, function in FUNCTIONS.items()}
 _SIGNS: Mapping[type, str] = {
     sp.StrictLessThan: "<",
@@ -51,8 +43,6 @@ _SIGNS: Mapping[type, str] = {
     sp.GreaterThan: ">=",
 }
 _RELATIONS = {sign: relation for relation, sign in _SIGNS.items()}
-_COUNTS = {"atan2": 2, "max": None, "min": None}
-"""Numbers of arguments other than one; None is any number from two."""
 
 
 def exact(what: str, value: object, names: Mapping[str, sp.Symbol]) -> sp.Expr:
@@ -272,104 +262,38 @@ def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
     Raises
     ------
     ValueError
-        For unknown names and functions, more than LENGTH characters or DEPTH nested operations, exponents beyond
-        EXPONENT, and constants that are not real or beyond MAGNITUDE.
+        For unknown names and functions, more than LENGTH characters, constants that are not real, and whatever
+        `Expressions` refuses.
     """
     if len(text) > LENGTH:
         raise ValueError(f"{what}: found {len(text)} characters; expected at most {LENGTH}")
     expression = parse(text)
     if expression is None:
         raise ValueError(f"{what}: unreadable expression {short_repr(text)}; expected such as '-k*x + u*cos(omega*t)'")
-    algebra = _Expressions(what, names)
-    try:
-        found = algebra.value(expression.evaluate(algebra))
-    except _Refusal as refusal:
-        raise ValueError(str(refusal)) from None
-    except NoMeaning as error:
-        raise ValueError(f"{what}: {error.reason}; expected a value") from None
-    except Exception as error:  # of SymPy, which compares in vain
-        reason = " ".join(str(error).split())[:200]
-        raise ValueError(f"{what}: {short_repr(text)} has no value: {reason or type(error).__name__}") from None
+    found = _OfModels(what, names).read(expression)
     if found.has(sp.I):
         raise ValueError(f"{what}: found the complex {short_repr(found)}; expected a real value")
-    steep = [e for e in found.atoms(sp.Pow) if e.exp.is_number and not abs(e.exp) <= EXPONENT]
-    if steep:
-        raise ValueError(f"{what}: found the power {short_repr(steep[0])}; expected exponents up to {EXPONENT}")
     return found
 
 
-class _Refusal(Exception):
-    """An error in the words of this module."""
-
-
 @dataclass(frozen=True, slots=True)
-class _Expressions(Algebra[sp.Basic]):
-    """Expressions of some symbols as SymPy makes them; operands are checked, so that no constant grows."""
+class _OfModels(Expressions):
+    """Expressions of some symbols, with friction and conditions."""
 
-    what: str
     names: Mapping[str, sp.Symbol]
-    deepest = DEPTH
+    whole = DIGITS
+    numbers = "finite real numbers"
+    functions = _CALLED
 
-    def refuse(self, node: ast.expr, reason: str) -> NoReturn:
-        piece = short_repr(ast.unparse(node))
-        raise _Refusal(f"{self.what}: {reason or f'found {piece}; expected numbers, {self._known()}'}")
-
-    def refuse_depth(self) -> NoReturn:
-        raise _Refusal(f"{self.what}: more than {DEPTH} nested operations; expected fewer; add parentheses")
-
-    def _known(self) -> str:
+    def pieces(self) -> str:
         return f"pi, + - * / **, {' '.join(FUNCTIONS)} friction, a if x > 0 else b, and {', '.join(self.names)}"
-
-    def number(self, value: int | float) -> sp.Basic:
-        if not abs(value) <= (DIGITS if isinstance(value, int) else MAGNITUDE):
-            raise _Refusal(f"{self.what}: found {short_repr(value)}; expected numbers up to {MAGNITUDE:g}")
-        return sp.Integer(value) if isinstance(value, int) else sp.Rational(repr(value))
 
     def name(self, name: str) -> sp.Basic:
         if name in self.names:
             return self.names[name]
         if name == "pi":
             return sp.pi
-        raise _Refusal(f"{self.what}: {_undeclared(name, self.names)}")
-
-    def positive(self, value: sp.Basic) -> sp.Basic:
-        return value
-
-    def negative(self, value: sp.Basic) -> sp.Basic:
-        return -self.value(value)
-
-    def add(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
-        return self.value(a) + self.value(b)
-
-    def subtract(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
-        return self.value(a) - self.value(b)
-
-    def multiply(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
-        return self.value(a) * self.value(b)
-
-    def divide(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
-        if b == 0:
-            raise _Refusal(f"{self.what}: found a division by zero; expected finite real numbers")
-        return self.value(a) / self.value(b)
-
-    def power(self, base: sp.Basic, exponent: sp.Basic) -> sp.Basic:
-        lower, upper = self.value(base), self.value(exponent)
-        if upper.is_number and not abs(upper) <= EXPONENT:
-            raise _Refusal(f"{self.what}: found the exponent {short_repr(upper)}; expected at most {EXPONENT}")
-        return lower**upper
-
-    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[sp.Basic]]:
-        known = {*FUNCTIONS, FRICTION_NAME}
-        if function not in known:
-            close = suggestion(function, known)
-            raise NoMeaning(f"unknown function {short_repr(function)}; known: {', '.join(sorted(known))}{close}")
-        wanted = _COUNTS.get(function, 1)
-        if options or (count < 2 if wanted is None else count != wanted):
-            raise NoMeaning(f"{function} has {count} arguments; expected {wanted or 'at least 2'}")
-        return (self,) * count
-
-    def call(self, function: str, arguments: Sequence[sp.Basic], options: Mapping[str, str]) -> sp.Basic:
-        return (FRICTION if function == FRICTION_NAME else FUNCTIONS[function])(*map(self.value, arguments))
+        raise NoMeaning(_undeclared(name, self.names))
 
     def compare(self, sign: str, a: sp.Basic, b: sp.Basic) -> sp.Basic:
         return _RELATIONS[sign](self.value(a), self.value(b))
@@ -384,31 +308,11 @@ class _Expressions(Algebra[sp.Basic]):
         last = otherwise.args if isinstance(otherwise, sp.Piecewise) else ((self.value(otherwise), sp.true),)
         return sp.Piecewise((self.value(value), self.condition(condition)), *last)
 
-    def value(self, e: sp.Basic) -> sp.Expr:
-        """The expression, if it is no condition and its constants are finite, real and not too large."""
-        if not isinstance(e, sp.Expr):
-            raise NoMeaning(f"found the condition {short_repr(e)}, which is no value")
-        for number in _constants(e):
-            if number.is_Rational:
-                large = max(abs(number.p), number.q) > DIGITS
-            else:
-                size = sp.N(number)
-                large = not (size.is_real and size.is_finite and abs(size) <= MAGNITUDE)
-            if large:
-                shown = short_repr(number)
-                raise _Refusal(f"{self.what}: found {shown}; expected finite real numbers up to {MAGNITUDE:g}")
-        return e
+    def fits(self, number: sp.Expr) -> bool:
+        return Expressions.fits(self, number) and bool(number.is_Rational or sp.N(number).is_real)
 
     def condition(self, e: sp.Basic) -> Boolean:
         """The condition, if it is one."""
         if not isinstance(e, Boolean) or isinstance(e, sp.Expr):
-            raise NoMeaning(f"found {short_repr(e)}, which is no condition")
+            raise NoMeaning(f"found {short_repr(e)}, which is no condition; expected one such as x > 0")
         return e
-
-
-def _constants(e: sp.Expr) -> Iterator[sp.Expr]:
-    """The constants at the top of an expression: itself, or its terms, factors, base and exponent that are constant."""
-    if e.is_number:
-        yield e
-    elif isinstance(e, sp.Mul | sp.Add | sp.Pow):
-        yield from (part for part in e.args if part.is_number)

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
+
+from ..inputs.checks import check_flag, check_keys, check_number, check_text, short_repr
 
 __all__ = ["Dimension", "Parameter", "dimension"]
 
@@ -48,6 +52,34 @@ class Parameter:
             raise ValueError(f"parameter range is empty: minimum {self.minimum} above maximum {self.maximum}")
         self.check(f"default of {self.meaning!r}" if self.meaning else "default", self.default)
 
+    @classmethod
+    def of_table(cls, what: str, table: Mapping[Any, object], keys: Sequence[str], **usual: object) -> Parameter:
+        """Return the parameter of a table.
+
+        Parameters
+        ----------
+        what : str
+            The subject of errors.
+        table : mapping
+            Arguments by their names.
+        keys : sequence of str
+            The names that it may have.
+        **usual
+            Arguments that it may leave out.
+
+        Raises
+        ------
+        ValueError, TypeError
+            For other names, values of a wrong type, and a table without a default.
+        """
+        check_keys(what, table, keys)
+        if "default" not in table:
+            raise ValueError(
+                f"{what}: 'default' is missing in {short_repr(dict(table))}; expected a table with a default"
+            )
+        given = {**usual, **table}
+        return cls(**{key: _CHECKS.get(key, check_text)(f"{what}: {key}", value) for key, value in given.items()})
+
     def check(self, name: str, value: float) -> float:
         """Return `value` as a float, or raise ValueError (TypeError: no number) that names it and the range."""
         if isinstance(value, bool) or not hasattr(value, "__float__"):
@@ -71,6 +103,14 @@ class Parameter:
             words.append(f"at most {self.maximum:g}")
         return "a finite number" + (" " + " and ".join(words) if words else "")
 
+
+_CHECKS: Mapping[str, Callable[[str, object], Any]] = {
+    "default": check_number,
+    "minimum": check_number,
+    "maximum": check_number,
+    "positive": check_flag,
+}
+"""What checks the arguments that are no text."""
 
 Dimension = tuple[int, int, int]
 """Powers of (kg, m, s)."""

@@ -1,1 +1,1 @@
-"""What is simulated: a model with its numbers, start, records and axes, and the files that hold it."""
+"""What is simulated: a model with its numbers and what is recorded of it, and the files that hold it."""

@@ -18,14 +18,15 @@ from ..mechanics.components import WEIGHT_NUMBER
 from ..mechanics.friction import ContactModel, FrictionLaw
 from ..mechanics.oscillator import FieldModel
 from ..mechanics.physics import check_masses, check_power
-from .axis import Axis
-from .draw import GRAPH, LIMIT, drawn_axes, drawn_graph, draws
-from .model import Model, NodeKind, as_contact, as_coupling, as_groups, as_law, as_layers, as_oscillator
+from ..networks.model import Model, NodeKind
+from ..networks.parts import as_contact, as_coupling, as_groups, as_law, as_layers, as_oscillator
+from ..sweeps.axis import Axis
+from ..sweeps.draw import GRAPH, LIMIT, drawn_axes, drawn_graph, draws
+from ..sweeps.parameters import at_nodes, drive, parameters, varied
+from ..sweeps.start import SEED_LIMIT, chosen_start, default_start
+from ..sweeps.sweep import check_draws, check_sweep, read_axes
 from .observables import ENDINGS, observables, sections, stop
-from .parameters import at_nodes, drive, parameters, varied
 from .section import Section
-from .start import SEED_LIMIT, chosen_start, default_start
-from .sweep import check_draws, check_sweep, read_axes
 
 __all__ = ["LIMITS", "TimeUnit", "complete", "integrators"]
 

@@ -13,8 +13,9 @@ from ..graphs.topology import Topology, from_matrix, read_matrix
 from ..inputs.checks import check_integer, check_keys, check_table, check_text, short_repr
 from ..inputs.plugins import part
 from ..interactions.coupling import Coupling, Potential, Rates, split
-from .draw import GRAPH, Draw, Draws, Graphs, RandomGraph
-from .parameters import collected
+from ..sweeps.distribution import Draw
+from ..sweeps.draw import GRAPH, Draws, Graphs, RandomGraph
+from ..sweeps.parameters import collected
 
 __all__ = ["arguments", "as_dict", "graph_of", "graph_table"]
 

@@ -11,11 +11,11 @@ from ..dynamics.observable import ENERGY, AtNode, Observable, Rate, Reduction, n
 from ..dynamics.observable_text import as_observable, as_value
 from ..inputs.checks import check_table, check_text, short_repr, suggestion
 from ..inputs.frozen import Frozen
+from ..inputs.result_names import ATTRIBUTES, expect_free
 from ..mechanics.components import TIME
-from .energy import energy_of
-from .model import Model
-from .names import ATTRIBUTES, expect_free
-from .parameters import varied
+from ..networks.energy import energy_of
+from ..networks.model import Model
+from ..sweeps.parameters import varied
 from .section import Section
 
 __all__ = ["ENDINGS", "has_own_energy", "observables", "sections", "stop"]

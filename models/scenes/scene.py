@@ -23,14 +23,15 @@ from ..interactions.coupling import Coupling
 from ..interactions.link import strength
 from ..mechanics.friction import SLIP, ContactModel, FrictionLaw
 from ..mechanics.oscillator import Oscillator
-from .axis import Axis
+from ..networks.model import Group, Model
+from ..networks.parts import as_oscillator, as_topology
+from ..sweeps.axis import Axis
+from ..sweeps.draw import GRAPH, Draws, drawn_axes
+from ..sweeps.parameters import drive, varied, without
+from ..sweeps.sweep import Continuation
 from .complete import TimeUnit, complete
 from .dictionary import arguments, as_dict
-from .draw import GRAPH, Draws, drawn_axes
-from .model import Group, Model, as_oscillator, as_topology
-from .parameters import drive, varied, without
 from .section import Section
-from .sweep import Continuation
 from .toml import write
 from .warnings import warnings
 

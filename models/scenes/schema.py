@@ -17,10 +17,10 @@ from ..inputs.plugins import Kind
 from ..inputs.words import Word
 from ..mechanics.friction import ContactModel
 from ..mechanics.parameter import Parameter
-from .axis import LIMIT as AXIS_LIMIT
+from ..sweeps.axis import LIMIT as AXIS_LIMIT
+from ..sweeps.draw import GRAPH
 from .complete import LIMITS, integrators
 from .dictionary import NODES
-from .draw import GRAPH
 from .scene import KEYWORDS, Scene
 from .section import Direction
 

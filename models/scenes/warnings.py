@@ -10,7 +10,7 @@ from ..dynamics.synchrony import NoSynchrony, synchronous_node
 from ..graphs.topology import Topology
 from ..inputs.node_name import LinkName, NodeName
 from ..interactions.coupling import MatrixCoupling
-from .model import Model
+from ..networks.model import Model
 
 __all__ = ["warnings", "zero_multiplicity"]
 
@@ -31,7 +31,7 @@ def zero_multiplicity(graph: Topology) -> int:
     leading = graph.leading_groups
     if graph.n > COUNTED or not _has_negative(graph):
         return leading
-    from ..spectra.characteristic import characteristic
+    from ..spectra.characteristic import characteristic  # most scenes need no FLINT
 
     return next(k for k, c in enumerate(characteristic(graph).coeffs()) if c != 0)
 

@@ -95,7 +95,7 @@ def spectrum(
     n: int, *, shape: tuple[int, ...] | None = None, generators: tuple[int, ...] | None = None
 ) -> list[tuple[sp.Expr, int]]:
     """Sums over the generators g of -4 sin²(π Σ k g/m) over the orders m, half of it for g = -g."""
-    from ..algebra.cosine_sums import AngleSum, expression, merged
+    from ..algebra.cosine_sums import AngleSum, expressions
 
     orders, chosen = _group(n, shape, generators)
     whole = lcm(*orders)
@@ -107,4 +107,4 @@ def spectrum(
             turn = sum(k * a * (whole // m) for k, a, m in zip(character, g, orders, strict=True))
             total += AngleSum.cosine(-2 * weight, weight, turn % whole, whole)
         numbers.append((total, 1))
-    return [(expression(number), times) for number, times in merged(numbers)]
+    return expressions(numbers)

@@ -68,7 +68,7 @@ def spectrum(
 
     The modulus is a cosine for two reflections; for more the characteristic polynomial is factored.
     """
-    from ..algebra.cosine_sums import AngleSum, expression, merged
+    from ..algebra.cosine_sums import AngleSum, expressions
 
     if len(reflections) > 2:
         return None
@@ -81,4 +81,4 @@ def spectrum(
             weight = Fraction(1, 2) if 2 * a == m else Fraction(1)
             value += AngleSum.cosine(-2 * weight, weight, k * a % m, m)
         numbers += [(value + AngleSum.cosine(0, sign * half, k * gap, 2 * m), 1) for sign in (1, -1)]
-    return [(expression(number), times) for number, times in merged(numbers)]
+    return expressions(numbers)

@@ -44,14 +44,14 @@ def count(n: int, *, offsets: tuple[int, ...] = (1, 2)) -> int:
 
 def spectrum(n: int, *, offsets: tuple[int, ...] = (1, 2)) -> list[tuple[sp.Expr, int]]:
     """Sums of -4 sin²(ksπ/n) over the offsets s (half of it for s = n/2), k = 0 … n - 1."""
-    from ..algebra.cosine_sums import AngleSum, expression, merged
+    from ..algebra.cosine_sums import AngleSum, expressions
 
     weights = [(s, Fraction(1, 2) if 2 * s == n else Fraction(1)) for s in offsets]
     numbers = []
     for k in range(n // 2 + 1):
         parts = [AngleSum.cosine(-2 * weight, weight, k * s, n) for s, weight in weights]
         numbers.append((sum(parts, AngleSum.rational(0)), 1 if k in (0, n - k) else 2))
-    return [(expression(number), times) for number, times in merged(numbers)]
+    return expressions(numbers)
 
 
 def formula(offsets: str | Iterable[object] = (1, 2)) -> ClosedForm:

@@ -9,14 +9,13 @@ figure of the rows, called within the style of `synchain.runtime.figures.style`.
 from __future__ import annotations
 
 import csv
-import importlib
 import io
-import pkgutil
 import platform
 from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
+from ..support import folder
 from .kit.tables import markdown
 
 __all__ = ["csv_text", "load", "machine", "names", "text", "write"]
@@ -24,14 +23,12 @@ __all__ = ["csv_text", "load", "machine", "names", "text", "write"]
 
 def names() -> tuple[str, ...]:
     """Names of all benchmarks: the files of this folder."""
-    return tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.ispkg and not m.name.startswith("_")))
+    return folder.names(__path__)
 
 
 def load(name: str) -> ModuleType:
     """Return the benchmark of that name; ValueError for an unknown one."""
-    if name not in names():
-        raise ValueError(f"unknown benchmark {name!r}; known: {', '.join(names())}")
-    return importlib.import_module(f".{name}", __name__)
+    return folder.load("benchmark", name, __name__, __path__)
 
 
 def machine() -> str:

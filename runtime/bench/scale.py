@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from synchain.models.graphs.families import topology
-from synchain.models.scenes.axis import Axis
 from synchain.models.scenes.scene import Scene
+from synchain.models.sweeps.axis import Axis
 
 from ..sweeps.stream import stream
 from .scaling import apart, peak_memory

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from synchain.models.graphs.families import topology
-from synchain.models.scenes.axis import Axis
 from synchain.models.scenes.scene import Scene
+from synchain.models.sweeps.axis import Axis
 
 from ..cells.kernels import kernel_source
 from ..cells.reduce import Reduction, reduce_scene

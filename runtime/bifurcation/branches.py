@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 
 from synchain.models.inputs.checks import check_instance, short_repr
-from synchain.models.scenes.names import expect_free
+from synchain.models.inputs.result_names import expect_free
 from synchain.models.scenes.scene import Scene
 
 from ..cells.keywords import Given

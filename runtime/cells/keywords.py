@@ -11,8 +11,8 @@ from typing import Any
 
 from synchain.models.inputs.checks import check_number, check_table, check_text, suggestion
 from synchain.models.inputs.node_name import NodeName
-from synchain.models.scenes.parameters import without
 from synchain.models.scenes.scene import KEYWORDS, Scene, a_scene
+from synchain.models.sweeps.parameters import without
 
 __all__ = ["ONE_CELL", "ONE_ORBIT", "ORBITS", "Given", "with_numbers"]
 

@@ -7,23 +7,18 @@ is fast.
 
 from __future__ import annotations
 
-from importlib import import_module
-from pkgutil import iter_modules
 from types import ModuleType
+
+from ..support import folder
 
 __all__ = ["command", "names"]
 
 
 def names() -> tuple[str, ...]:
     """All commands: the files of this folder, sorted."""
-    return tuple(sorted(module.name for module in iter_modules(__path__) if not module.name.startswith("_")))
+    return folder.names(__path__)
 
 
 def command(name: str) -> ModuleType:
     """The module of a command; ValueError on an unknown name."""
-    known = names()
-    if name not in known:
-        from synchain.models.inputs.checks import short_repr, suggestion
-
-        raise ValueError(f"unknown command {short_repr(name)}; known: {', '.join(known)}{suggestion(name, known)}")
-    return import_module(f".{name}", __name__)
+    return folder.load("command", name, __name__, __path__)

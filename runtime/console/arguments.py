@@ -7,8 +7,8 @@ from argparse import ArgumentParser, ArgumentTypeError
 from synchain.models.inputs.arithmetic import constant
 from synchain.models.inputs.checks import short_repr
 from synchain.models.inputs.options import integer_option
-from synchain.models.scenes.axis import LIMIT as AXIS_LIMIT
-from synchain.models.scenes.axis import Axis
+from synchain.models.sweeps.axis import LIMIT as AXIS_LIMIT
+from synchain.models.sweeps.axis import Axis
 
 __all__ = [
     "add_allow_code",

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from synchain.models.graphs.families import topology
-from synchain.models.scenes.axis import Axis
 from synchain.models.scenes.scene import Scene
+from synchain.models.sweeps.axis import Axis
 
 from ..prediction.intervals import Interval, scale
 from ..results.result import Result

@@ -16,9 +16,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from synchain.models.scenes.axis import Axis
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
+from synchain.models.sweeps.axis import Axis
 
 from ..bifurcation.bifurcations import BifurcationKind
 from ..bifurcation.branches import Branch

@@ -27,7 +27,7 @@ __all__ = ["open_result"]
 @cache
 def _classes() -> dict[str, type]:
     """All classes that a file may name: those of values that are kept, and of their parts."""
-    from synchain.models.graphs.clusters import Block, Clusters
+    from synchain.models.symmetries.clusters import Block, Clusters
 
     from ..bifurcation.bifurcations import Bifurcation, BifurcationKind
     from ..bifurcation.branches import Branch

@@ -34,7 +34,17 @@ from .intervals import find
 from .modes import NetworkMode, has_loose_parts, transversal_modes
 from .stable_ranges import StableRange, exact_ranges, widen
 
-__all__ = ["Answer", "OneWay", "Verdict", "Window", "possible", "verdict", "windows", "windows_complex"]
+__all__ = [
+    "Answer",
+    "OneWay",
+    "Verdict",
+    "Window",
+    "expect_no_repulsion",
+    "possible",
+    "verdict",
+    "windows",
+    "windows_complex",
+]
 
 
 class Answer(StrEnum):
@@ -367,12 +377,17 @@ def _real_modes(graph: Topology) -> tuple[NetworkMode, ...]:
                 f"{graph.name}({graph.n}) has the complex eigenvalue {gamma:.6g}; expected real ones: stable ranges of real "
                 "alpha say nothing about it. Use synchain.runtime.prediction.synchronisability.windows_complex"
             )
-        if gamma > 0:
-            raise ValueError(
-                f"{graph.name}({graph.n}) has the positive eigenvalue {gamma:g}, which drives oscillators apart; expected "
-                "none. If the matrix is a Laplacian D - A, negate it: the connectivity matrix is A - D"
-            )
+        expect_no_repulsion(graph, gamma)
     return modes
+
+
+def expect_no_repulsion(graph: Topology, gamma: float) -> None:
+    """Raise ValueError if an eigenvalue of a graph is positive."""
+    if gamma > 0:
+        raise ValueError(
+            f"{graph.name}({graph.n}) has the positive eigenvalue {gamma:g}, which drives oscillators apart; expected none. "
+            "If the matrix is a Laplacian D - A, negate it: the connectivity matrix is A - D"
+        )
 
 
 def _exact_ratio(slowest: NetworkMode | None, fastest: NetworkMode | None) -> sp.Expr | None:

@@ -12,7 +12,8 @@ from scipy.integrate import cumulative_simpson
 from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.checks import check_keys, check_number, check_table
 from synchain.models.mechanics.components import TIME
-from synchain.models.scenes.energy import Energy, Share, energy
+from synchain.models.networks.energy import Energy, Share
+from synchain.models.scenes.energy import energy
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..support.arrays import numbers

@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from synchain.models.graphs.families import FamilyRule
-from synchain.models.graphs.partitions import join
+from synchain.models.graphs.links import join
 from synchain.models.graphs.topology import Topology
 
 __all__ = ["positions"]

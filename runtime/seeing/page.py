@@ -21,10 +21,11 @@ from synchain.models.presentation.equations import latex as latex_of
 from synchain.models.presentation.equations import lines
 from synchain.models.presentation.mathml import formula
 from synchain.models.presentation.writer import Latex, Text, Writer
-from synchain.models.scenes.draw import Draw, RandomGraph
 from synchain.models.scenes.scene import Scene
 from synchain.models.spectra.eigenvalue import Eigenvalue, decimal
 from synchain.models.spectra.spectrum import Spectrum
+from synchain.models.sweeps.distribution import Draw
+from synchain.models.sweeps.draw import RandomGraph
 
 from ..results.labelled import Labelled
 from .graph import svg

@@ -12,8 +12,8 @@ from html import escape
 import numpy as np
 
 from synchain.models.presentation.equations import latex
-from synchain.models.scenes.axis import Axis
 from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.sweeps.axis import Axis
 
 from ..cells.kernels import kernel_source
 from ..stability.msf import MSF, msf

@@ -17,8 +17,8 @@ import numpy as np
 import xarray as xr
 
 from synchain.models.dynamics.variational import Variation, clustered
-from synchain.models.graphs.clusters import Clusters, clusters
 from synchain.models.scenes.scene import Scene
+from synchain.models.symmetries.clusters import Clusters, clusters
 
 from ..cells.initial_modes import with_modes
 from ..cells.keywords import ONE_ORBIT, Given
@@ -185,7 +185,7 @@ def cluster_exponents(
     scene : Scene
         Network of at most eight clusters with its coupling strength.
     state : Clusters or sequence of int
-        Partition of the nodes, from `synchain.models.graphs.clusters` or as the cluster of each
+        Partition of the nodes, from `synchain.models.symmetries.clusters` or as the cluster of each
         node. Each cluster starts from the state of its first node.
     precision : float
         Averaging stops if every standard error is below this value.

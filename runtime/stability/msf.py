@@ -19,7 +19,7 @@ import xarray as xr
 from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.dynamics.variational import mode
 from synchain.models.inputs.checks import check_integer
-from synchain.models.scenes.names import expect_free
+from synchain.models.inputs.result_names import expect_free
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import ORBITS, Given, with_numbers

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from synchain.models.graphs.joint import JointEigenvalue, joint_spectrum
 from synchain.models.scenes.scene import Scene
+from synchain.models.spectra.joint import JointEigenvalue, joint_spectrum
 
 __all__ = ["SharedOrbit", "shared_orbits", "still_strengths", "transversal_modes"]
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from synchain.models.dynamics.variational import mode
 from synchain.models.scenes.scene import Scene
-from synchain.models.scenes.sweep import rest_in_sweep
+from synchain.models.sweeps.sweep import rest_in_sweep
 
 from ..cells.keywords import with_numbers
 from ..cells.plan import Planner

@@ -29,6 +29,7 @@ from ..cells.keywords import Given
 from ..cells.plan import Planner
 from ..cells.reduce import reduce_scene
 from ..prediction.intervals import Interval, intersect, refine, scale
+from ..prediction.synchronisability import expect_no_repulsion
 from ..results.labelled import Labelled, dataset, ends_of, words_of
 from ..stability.averages import check_whole
 from ..support.arrays import row
@@ -286,12 +287,7 @@ def check_probe(graph: Topology, spectrum: Spectrum) -> None:
             f"{graph.name}({graph.n}) has complex eigenvalues; the two-oscillator probe covers real ones only. "
             "Use a network with symmetric coupling"
         )
-    worst = max(float(value.real) for value in spectrum.values)
-    if worst > 0.0:
-        raise ValueError(
-            f"{graph.name}({graph.n}) has the positive eigenvalue {worst:g}, which drives oscillators apart; expected none. "
-            "If the matrix is a Laplacian D - A, negate it: the connectivity matrix is A - D"
-        )
+    expect_no_repulsion(graph, max(float(value.real) for value in spectrum.values))
 
 
 def probe(

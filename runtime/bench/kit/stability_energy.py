@@ -14,7 +14,7 @@ from synchain.codegen.kernels.sweep import emit
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.mechanics.lagrangian import total_derivative
-from synchain.models.scenes.energy import Energy
+from synchain.models.networks.energy import Energy
 from synchain.models.scenes.scene import Scene
 
 from ...cells.buffers import Buffers

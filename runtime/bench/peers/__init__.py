@@ -12,24 +12,23 @@ first; and `prepare(problem) -> solve`, which may compile and is timed apart.
 from __future__ import annotations
 
 import importlib
-import pkgutil
 import shutil
 from collections.abc import Iterable
 from types import ModuleType
+
+from ...support import folder
 
 __all__ = ["absent", "load", "names", "present", "skipped"]
 
 
 def names() -> tuple[str, ...]:
     """Names of all peers: the files of this folder."""
-    return tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))
+    return folder.names(__path__)
 
 
 def load(name: str) -> ModuleType:
     """Return the peer of that name; ValueError for an unknown one."""
-    if name not in names():
-        raise ValueError(f"unknown peer {name!r}; known: {', '.join(names())}")
-    return importlib.import_module(f".{name}", __name__)
+    return folder.load("peer", name, __name__, __path__)
 
 
 def absent(peer: ModuleType) -> str:

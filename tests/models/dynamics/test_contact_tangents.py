@@ -10,10 +10,10 @@ from mpmath import mp, mpf
 
 from synchain.models.dynamics.saltation import of_network
 from synchain.models.dynamics.variational import MODE, clustered, mode, network_variation
-from synchain.models.graphs.clusters import clusters
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
+from synchain.models.symmetries.clusters import clusters
 from synchain.runtime.bifurcation.periodic import periodic_orbit
 from synchain.runtime.stability.clusters import cluster_exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum

@@ -15,10 +15,10 @@ from synchain.models import chain
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.network import network
 from synchain.models.dynamics.variational import MODE, clustered, mode
-from synchain.models.graphs.clusters import orbital_partitions
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.scenes.scene import Scene
+from synchain.models.symmetries.clusters import orbital_partitions
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.certify import certify
 

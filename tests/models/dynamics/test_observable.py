@@ -11,8 +11,8 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from synchain.models import end, maximum, mean, minimum, nodes, rate, ring, variance
 from synchain.models.dynamics.observable_text import as_observable
+from synchain.models.inputs.result_names import TAKEN
 from synchain.models.scenes.file import load_scene
-from synchain.models.scenes.names import TAKEN
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.results.labels import MEANINGS
 
@@ -50,10 +50,11 @@ def test_observables_and_their_texts(observable: object, text: str) -> None:
         ("mean(x, y)", "expected one of mean"),
         ("mean(maximum(x))", "reduced once, outermost"),
         ("mean(nodes.avg(x))", "unknown function 'nodes.avg'"),
-        ("mean(nodes[0](x))", "expected a whole number from 1"),
+        ("mean(nodes[0](x))", "observe r: nodes: found the number 0; expected a whole number from 1"),
         ("mean(asin(x))", "did you mean 'sin'"),
         ("mean(rate(2*x))", "expected one state"),
         ("mean(9**9**9)", "found the exponent"),
+        ("mean(x**16*x)", "found the power x**17; expected exponents up to 16"),
         ("mean(floor(exp(10**16)))", "expected finite numbers"),
         ("mean(x/0)", "division by zero"),
         ("mean(log(-1)*x)", "expected a real value"),

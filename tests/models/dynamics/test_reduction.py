@@ -17,8 +17,8 @@ from synchain.models import chain, complete, ring, star
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.network import network
 from synchain.models.dynamics.reduction import collapse, quotient, substitute_constants
-from synchain.models.graphs.partitions import coarsest_balanced
 from synchain.models.mechanics.components import TIME, Edge, Node
+from synchain.models.symmetries.partitions import coarsest_balanced
 
 HALF = Fraction(1, 2)
 

@@ -12,7 +12,7 @@ from synchain.models import Rates, Scene, Topology, chain, complete, ends, from_
 from synchain.models.definitions.loader import load_oscillator
 from synchain.models.dynamics.synchrony import NoSynchrony, expect_vanishing, synchronous_node
 from synchain.models.dynamics.variational import clustered, mode
-from synchain.models.graphs.clusters import clusters
+from synchain.models.symmetries.clusters import clusters
 
 G, LAM = sp.symbols("g lam")
 

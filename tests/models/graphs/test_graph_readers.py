@@ -13,13 +13,13 @@ import pytest
 import scipy.sparse
 import sympy as sp
 
-from synchain.models.graphs.clusters import orbital_partitions
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.products import cartesian, complement, weighted
 from synchain.models.graphs.readers import as_topology, from_edges, from_graph, from_sparse, read_edges, read_graphml
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.inputs.rationals import FILE_LIMIT
 from synchain.models.scenes.scene import Scene
+from synchain.models.symmetries.clusters import orbital_partitions
 
 ONE = Fraction(1)
 

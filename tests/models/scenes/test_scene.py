@@ -21,10 +21,10 @@ from hypothesis import strategies as st
 from synchain.models import Scene, chain, ring, star
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.frozen import Frozen
-from synchain.models.scenes.axis import Axis
 from synchain.models.scenes.file import load_scene, scene_names
 from synchain.models.scenes.scene import KEYWORDS
 from synchain.models.scenes.section import Section
+from synchain.models.sweeps.axis import Axis
 
 TABLE_1 = {
     "theta_b": 0.1,
@@ -328,7 +328,7 @@ def test_no_oscillator() -> None:
 
 
 def test_too_many_values_are_refused_without_building_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("synchain.models.scenes.axis.LIMIT", 10)
+    monkeypatch.setattr("synchain.models.sweeps.axis.LIMIT", 10)
     with pytest.raises(ValueError, match="more than 10 values"):
         Axis("sigma", count())
 

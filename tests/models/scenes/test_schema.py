@@ -15,10 +15,10 @@ from jsonschema import Draft4Validator, Draft7Validator
 
 from synchain.models import Scene, Topology, load_scene, scene_names
 from synchain.models.graphs.families import family, names
-from synchain.models.scenes.axis import Axis
-from synchain.models.scenes.model import Group
+from synchain.models.networks.model import Group
 from synchain.models.scenes.scene import KEYWORDS
 from synchain.models.scenes.schema import _of_type, schema
+from synchain.models.sweeps.axis import Axis
 
 SCHEMA = schema()
 DRAFTS = [Draft4Validator(SCHEMA), Draft7Validator(SCHEMA)]

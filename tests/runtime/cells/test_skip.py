@@ -12,8 +12,8 @@ from samples import source_of
 from synchain.models import chain, ring, star
 from synchain.models.dynamics import reduction as reduction_module
 from synchain.models.graphs.topology import from_matrix
-from synchain.models.scenes.axis import Axis
 from synchain.models.scenes.scene import Scene
+from synchain.models.sweeps.axis import Axis
 from synchain.runtime.bench import skip as bench
 from synchain.runtime.cells import reduce as skip_module
 from synchain.runtime.cells.buffers import Buffers

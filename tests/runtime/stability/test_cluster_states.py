@@ -11,11 +11,11 @@ import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import STRENGTH, clustered
-from synchain.models.graphs.clusters import clusters, orbital_partitions
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.mechanics.components import Edge
 from synchain.models.scenes.scene import Scene
+from synchain.models.symmetries.clusters import clusters, orbital_partitions
 from synchain.runtime.stability.clusters import ClusterExponents, cluster_exponents
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.run import run

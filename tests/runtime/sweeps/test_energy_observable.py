@@ -26,7 +26,7 @@ from synchain.models import (
     uniform,
 )
 from synchain.models.definitions.loader import load_oscillator
-from synchain.models.scenes.energy import Energy
+from synchain.models.networks.energy import Energy
 from synchain.runtime.cells.kernels import kernel_source
 from synchain.runtime.results.energy import energy_function
 from synchain.runtime.sweeps.run import run

@@ -13,10 +13,10 @@ import sympy as sp
 from ..dynamics.periodicity import as_function, names_in
 from ..inputs.checks import short_repr
 from ..inputs.node_name import NodeName
+from ..inputs.result_names import expect_free
 from ..inputs.words import Word
+from ..networks.model import WEIGHTS, Model, in_range
 from .axis import LIMIT, Axis, known_length
-from .model import WEIGHTS, Model, in_range
-from .names import expect_free
 from .parameters import drive
 
 __all__ = ["Continuation", "check_draws", "check_sweep", "read_axes", "rest_in_sweep"]

@@ -7,43 +7,9 @@ from collections import deque
 from collections.abc import Hashable, Iterable, Sequence
 from fractions import Fraction
 
-from .links import Link
+from ..graphs.links import Link, numbered
 
-__all__ = ["class_links", "coarsest_balanced", "join"]
-
-
-def join(n: int, pairs: Iterable[tuple[int, int]]) -> tuple[int, ...]:
-    """Return the class of each node in the finest partition with every pair in one class.
-
-    Parameters
-    ----------
-    n : int
-        Number of nodes.
-    pairs : iterable of (int, int)
-        Nodes of one class.
-
-    Returns
-    -------
-    tuple of int
-        The class of each node, numbered by the first members.
-
-    References
-    ----------
-    R. E. Tarjan, J. Assoc. Comput. Mach. 22, 215 (1975): sets as trees, with short paths.
-    """
-    parent = list(range(n))
-
-    def root(i: int) -> int:
-        while parent[i] != i:
-            parent[i] = parent[parent[i]]
-            i = parent[i]
-        return i
-
-    for i, j in pairs:
-        a, b = root(i), root(j)
-        parent[max(a, b)] = min(a, b)
-    order: dict[int, int] = {}
-    return tuple(order.setdefault(root(i), len(order)) for i in range(n))
+__all__ = ["class_links", "coarsest_balanced"]
 
 
 def class_links(n: int, links: Iterable[Link], classes: Sequence[int]) -> tuple[Link, ...]:
@@ -121,9 +87,8 @@ def coarsest_balanced(n: int, links: Iterable[Link], colours: Sequence[Hashable]
     if len(colours) != n:
         raise ValueError(f"colours: found {len(colours)} for {n} nodes; expected one for each node")
     columns = _columns(n, tuple(links))
-    numbers: dict[Hashable, int] = {}
-    of = [numbers.setdefault(colour, len(numbers)) for colour in colours]
-    members: list[set[int]] = [set() for _ in numbers]
+    of = list(numbered(colours))
+    members: list[set[int]] = [set() for _ in {*of}]
     for i, k in enumerate(of):
         members[k].add(i)
     queue = deque(range(len(members)))
@@ -134,8 +99,7 @@ def coarsest_balanced(n: int, links: Iterable[Link], colours: Sequence[Hashable]
                 for i in part:
                     of[i] = len(members)
                 members.append(part)
-    order: dict[int, int] = {}
-    return tuple(order.setdefault(k, len(order)) for k in of)
+    return numbered(of)
 
 
 def _columns(n: int, links: tuple[Link, ...]) -> list[list[tuple[int, int]]]:

@@ -14,7 +14,8 @@ from synchain.models.inputs.node_name import NodeName
 from synchain.models.interactions.coupling import WEIGHT, LagrangianCoupling, MatrixCoupling
 from synchain.models.mechanics.friction import ContactModel, FrictionLaw
 from synchain.models.mechanics.oscillator import FRICTION, Coordinate, FieldModel, LagrangianModel, Oscillator
-from synchain.models.scenes.model import Model, NodeKind, as_law, as_oscillator
+from synchain.models.networks.model import Model, NodeKind
+from synchain.models.networks.parts import as_law, as_oscillator
 from synchain.models.scenes.scene import Scene
 
 x, v, w, mu, k, sigma, q_i, q_j = sp.symbols("x v w mu k sigma q_i q_j", real=True)

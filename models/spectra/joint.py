@@ -1,4 +1,4 @@
-"""Joint eigenvalues of several graphs on the same nodes, whose matrices commute.
+"""Joint eigenvalues of several matrices that commute, such as those of graphs on the same nodes.
 
 Matrices that commute are triangular in one basis, so that A + t B has the eigenvalues a + t b of the pairs (a, b) of
 their common modes (R. A. Horn, C. R. Johnson, Matrix Analysis, Cambridge University Press, 2013, theorem 2.3.3).  With a t
@@ -18,10 +18,10 @@ from typing import TypeAlias
 from flint import acb, fmpq, fmpq_poly
 
 from ..algebra.balls import disjoint, precision
-from ..spectra.eigenvalue import Eigenvalue, ProofError
-from ..spectra.jordan import value_at
-from ..spectra.solve import DENSE_LIMIT, spectrum
-from .topology import Topology
+from .eigenvalue import Eigenvalue, ProofError
+from .jordan import value_at
+from .matrix import Matrix
+from .solve import DENSE_LIMIT, spectrum
 
 __all__ = ["JointEigenvalue", "joint_spectrum"]
 
@@ -59,14 +59,54 @@ class JointEigenvalue:
         return f"({', '.join(map(str, self.parts))})"
 
 
+@dataclass(frozen=True, slots=True)
+class _Combination:
+    """The matrix A + t B of two matrices that commute."""
+
+    first: Matrix
+    second: Matrix
+    factor: Fraction
+
+    @property
+    def name(self) -> str:
+        return f"{self.first.name} and {self.second.name}"
+
+    @property
+    def n(self) -> int:
+        return self.first.n
+
+    @property
+    def options(self) -> tuple[tuple[str, object], ...]:
+        return ()
+
+    @property
+    def entries(self) -> tuple[tuple[int, int, Fraction], ...]:
+        found = {(i, j): number for i, j, number in self.first.entries}
+        for i, j, number in self.second.entries:
+            found[i, j] = found.get((i, j), Fraction(0)) + self.factor * number
+        return tuple((i, j, number) for (i, j), number in found.items() if number)
+
+    @property
+    def link_count(self) -> int:
+        return sum(i != j for i, j, _ in self.entries)
+
+    @property
+    def diagonalisable(self) -> bool:
+        """True if both are: matrices that commute have a basis of common eigenvectors then."""
+        return self.first.diagonalisable and self.second.diagonalisable
+
+    def closed_form(self) -> None:
+        return None
+
+
 @lru_cache(maxsize=32)
-def joint_spectrum(graphs: tuple[Topology, ...]) -> tuple[JointEigenvalue, ...]:
+def joint_spectrum(graphs: tuple[Matrix, ...]) -> tuple[JointEigenvalue, ...]:
     """Return the distinct joint eigenvalues of the connectivity matrices of graphs, exactly.
 
     Parameters
     ----------
-    graphs : tuple of Topology
-        Graphs on the same nodes; of a single one this is its spectrum.
+    graphs : tuple of Matrix
+        Graphs on the same nodes, or other rational matrices of one size; of a single one this is its spectrum.
 
     Returns
     -------
@@ -95,7 +135,7 @@ def joint_spectrum(graphs: tuple[Topology, ...]) -> tuple[JointEigenvalue, ...]:
     return tuple(JointEigenvalue(parts, number.multiplicity) for parts, number in modes)
 
 
-def _check(graphs: Sequence[Topology]) -> None:
+def _check(graphs: Sequence[Matrix]) -> None:
     """Raise ValueError unless the graphs have the same nodes and their matrices commute."""
     sizes = sorted({graph.n for graph in graphs})
     if len(sizes) != 1:
@@ -116,7 +156,7 @@ def _check(graphs: Sequence[Topology]) -> None:
                 )
 
 
-def _joined(modes: Modes, combined: Topology, graph: Topology) -> tuple[Modes, Topology]:
+def _joined(modes: Modes, combined: Matrix, graph: Matrix) -> tuple[Modes, Matrix]:
     """The modes with their eigenvalues on one more graph, and the combination whose eigenvalues are theirs."""
     own = tuple(spectrum(graph))
     pairs = [(parts, e) for parts, _ in modes for e in own]
@@ -130,7 +170,7 @@ def _joined(modes: Modes, combined: Topology, graph: Topology) -> tuple[Modes, T
         raise ProofError(
             f"joint spectrum of {graph.name}({graph.n}): found equal sums for {TRIED} factors; expected one"
         )
-    combined = _combined(combined, graph, factor)
+    combined = _Combination(combined, graph, factor)
     found = []
     for number in spectrum(combined):
         with precision(2 * bits):
@@ -150,12 +190,3 @@ def _sums(first: Sequence[Eigenvalue], second: Sequence[Eigenvalue], factor: Fra
         share = fmpq(factor.numerator, factor.denominator)
         pairs = product((a.enclosure(bits) for a in first), [b.enclosure(bits) for b in second])
         return [acb(a + share * b) for a, b in pairs]
-
-
-def _combined(first: Topology, second: Topology, factor: Fraction) -> Topology:
-    """The graph of the matrix A + t B."""
-    weights = {link[:2]: link[2] for link in first.links}
-    for target, source, weight in second.links:
-        weights[target, source] = weights.get((target, source), Fraction(0)) + factor * weight
-    links = tuple((*at, weight) for at, weight in sorted(weights.items()) if weight)
-    return Topology(f"{first.name} and {second.name}", first.n, links)

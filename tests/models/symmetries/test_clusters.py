@@ -10,12 +10,12 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from synchain.models.graphs.clusters import check, clusters, orbital_partitions
 from synchain.models.graphs.families import topology
-from synchain.models.graphs.symmetry import automorphisms
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.spectra.characteristic import characteristic
 from synchain.models.spectra.eigenvalue import ProofError
+from synchain.models.symmetries.automorphisms import automorphisms
+from synchain.models.symmetries.clusters import check, clusters, orbital_partitions
 
 ONE = Fraction(1)
 

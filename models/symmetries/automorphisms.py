@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 
+from ..graphs.topology import Topology
 from .partitions import coarsest_balanced
-from .topology import Topology
 
 __all__ = ["Permutation", "automorphisms"]
 

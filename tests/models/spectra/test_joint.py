@@ -55,6 +55,11 @@ def test_eigenvalues_are_exact_and_told_apart_where_one_combination_is_not() -> 
     assert sorted(swapped) == ["(-291, -1)", "(-291, -3)", "(0, -4)", "(0, 0)"]
 
 
+def test_matrices_beside_those_of_graphs_have_joint_eigenvalues_too() -> None:
+    found = joint_spectrum((ring(4).adjacency, complete(4).laplacian))
+    assert {str(mode): mode.multiplicity for mode in found} == {"(2, 0)": 1, "(0, 4)": 2, "(-2, 4)": 1}
+
+
 def test_matrices_that_do_not_commute_are_refused() -> None:
     with pytest.raises(ValueError, match=r"ring\(4\) and star\(4\): found matrices that do not commute"):
         joint_spectrum((ring(4), star(4)))

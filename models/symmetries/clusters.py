@@ -20,12 +20,13 @@ from fractions import Fraction
 from flint import fmpq_mat, fmpq_poly
 
 from ..algebra.rationals import to_flint
+from ..graphs.links import join, numbered
+from ..graphs.readers import as_topology
+from ..graphs.topology import Topology
 from ..inputs.checks import typed_repr
 from ..spectra.eigenvalue import ProofError
-from .partitions import class_links, join
-from .readers import as_topology
-from .symmetry import automorphisms
-from .topology import Topology
+from .automorphisms import automorphisms
+from .partitions import class_links
 
 __all__ = ["Block", "Clusters", "check", "clusters", "orbital_partitions"]
 
@@ -157,9 +158,7 @@ def clusters(graph: Topology, classes: Sequence[int]) -> Clusters:
         raise TypeError(f"partition: found {typed_repr(classes)}; expected the cluster of each node, e.g. [0, 0, 1]")
     if len(classes) != graph.n:
         raise ValueError(f"partition: found {len(classes)} classes for {graph.n} nodes; expected one for each node")
-    order: dict[int, int] = {}
-    numbered = tuple(order.setdefault(k, len(order)) for k in classes)
-    return _described(graph, numbered, _polynomial(graph.rows))
+    return _described(graph, numbered(classes), _polynomial(graph.rows))
 
 
 def _described(graph: Topology, classes: tuple[int, ...], characteristic: fmpq_poly) -> Clusters:

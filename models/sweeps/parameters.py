@@ -11,8 +11,8 @@ from ..graphs.readers import as_topology, is_graph
 from ..inputs.checks import check_number, check_table, first_of, short_repr
 from ..inputs.frozen import Frozen
 from ..inputs.node_name import LinkName, NodeName
+from ..networks.model import WEIGHTS, Model, NodeKind, in_range
 from .axis import Axis
-from .model import WEIGHTS, Model, NodeKind, in_range
 
 __all__ = ["at_nodes", "by_name", "collected", "drive", "in_order", "parameters", "varied", "without"]
 

@@ -2,102 +2,30 @@
 
 from __future__ import annotations
 
-import ast
-import math
 import random
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from statistics import NormalDist
-from typing import NoReturn, TypeGuard
+from typing import TypeGuard
 
 from ..graphs.graph_text import read_graph
 from ..graphs.readers import as_topology, is_graph
 from ..graphs.topology import Topology
-from ..inputs.arithmetic import constant
-from ..inputs.checks import check_integer, check_number, check_positive, check_table, check_text, first_of, short_repr
+from ..inputs.checks import check_integer, check_number, check_table, check_text, first_of, short_repr
 from ..inputs.frozen import Frozen
 from ..inputs.node_name import LinkName, NodeName
-from ..inputs.reader import Algebra, NoMeaning, parse
-from ..inputs.words import Word
+from ..networks.model import MOST_NUMBERED, WEIGHTS, Model, union_of
 from .axis import LIMIT, Axis
-from .model import MOST_NUMBERED, WEIGHTS, Model, union_of
+from .distribution import KNOWN, Draw, read_draw
 from .parameters import by_name, in_order
 
 __all__ = [
     "GRAPH",
-    "Distribution",
-    "Draw",
     "Draws",
     "drawn_axes",
     "drawn_graph",
     "draws",
-    "lorentzian",
-    "normal",
-    "uniform",
 ]
-
-
-KNOWN = "normal(mean, deviation), uniform(low, high), lorentzian(centre, half width)"
-"""What may be drawn from, in messages."""
-
-
-class Distribution(Word):
-    """What numbers are drawn from."""
-
-    NORMAL = "normal"
-    UNIFORM = "uniform"
-    LORENTZIAN = "lorentzian"
-
-
-@dataclass(frozen=True, slots=True)
-class Draw:
-    """A distribution: normal with mean and standard deviation, uniform between two ends, or Lorentzian with its half width.
-
-    Raises ValueError or TypeError on anything but finite numbers, a deviation or a half width that is not positive, and
-    ends that do not rise.
-    """
-
-    distribution: Distribution
-    first: float
-    second: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "distribution", Distribution.parse("draw", self.distribution))
-        object.__setattr__(self, "first", check_number(f"{self.distribution}: first", self.first))
-        object.__setattr__(self, "second", check_number(f"{self.distribution}: second", self.second))
-        if self.distribution is Distribution.NORMAL:
-            check_positive("normal: standard deviation", self.second)
-        elif self.distribution is Distribution.LORENTZIAN:
-            check_positive("lorentzian: half width", self.second)
-        elif not self.first < self.second:
-            raise ValueError(f"uniform: found the ends {self.first!r} and {self.second!r}; expected rising ends")
-
-    def value(self, chance: float) -> float:
-        """Return the value below which a share `chance` of the distribution lies."""
-        if self.distribution is Distribution.NORMAL:
-            return NormalDist(self.first, self.second).inv_cdf(chance)
-        if self.distribution is Distribution.LORENTZIAN:
-            return self.first + self.second * math.tan(math.pi * (chance - 0.5))
-        return self.first + (self.second - self.first) * chance
-
-    def __str__(self) -> str:
-        return f"{self.distribution}({self.first!r}, {self.second!r})"
-
-
-def normal(mean: float, deviation: float) -> Draw:
-    """Return the normal distribution of a mean and a standard deviation."""
-    return Draw(Distribution.NORMAL, mean, deviation)
-
-
-def uniform(low: float, high: float) -> Draw:
-    """Return the uniform distribution between two numbers."""
-    return Draw(Distribution.UNIFORM, low, high)
-
-
-def lorentzian(centre: float, half_width: float) -> Draw:
-    """Return the distribution of Lorentz, or Cauchy, of a centre and a half width at half maximum."""
-    return Draw(Distribution.LORENTZIAN, centre, half_width)
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,8 +107,12 @@ def draws(given: object, realisations: object) -> Frozen[Draws]:
 def drawn_graph(drawn: Mapping[str, Draws], count: int, rng: int) -> Topology | None:
     """Return the union of the graphs of all realisations, None if no graphs are drawn or listed."""
     graphs = drawn.get(GRAPH)
-    graphs = graphs.graphs(count, rng) if isinstance(graphs, RandomGraph) else graphs
-    return graphs.union if isinstance(graphs, Graphs) else None
+    return _realised(graphs, count, rng).union if isinstance(graphs, Graphs | RandomGraph) else None
+
+
+def _realised(graphs: Graphs | RandomGraph, count: int, rng: int) -> Graphs:
+    """The graphs of all realisations, drawn now unless they are listed."""
+    return graphs.graphs(count, rng) if isinstance(graphs, RandomGraph) else graphs
 
 
 def _graphs(what: str, value: object, count: int) -> Graphs | RandomGraph:
@@ -242,7 +174,7 @@ def _drawn(what: str, value: object, count: int) -> Draws:
     if isinstance(value, Draw):
         return value
     if isinstance(value, str):
-        return _read(what, value)
+        return read_draw(what, value)
     listed = _plain(value)
     if not isinstance(listed, Sequence) or len(listed) != count:
         entries = f"{len(listed)} entries" if isinstance(listed, Sequence) else short_repr(listed)
@@ -267,37 +199,6 @@ def _plain(value: object) -> object:
 
 def _is_row(value: object) -> TypeGuard[Sequence[object]]:
     return isinstance(value, Sequence) and not isinstance(value, str)
-
-
-@dataclass(frozen=True, slots=True)
-class _Distributions(Algebra[Draw]):
-    """The call of a distribution with two constants."""
-
-    what: str
-    deepest = 2
-
-    def refuse(self, node: ast.expr, reason: str) -> NoReturn:
-        raise ValueError(f"{self.what}: found {short_repr(ast.unparse(node))}; expected {KNOWN}")
-
-    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[None]:
-        if function not in tuple(Distribution) or count != 2 or options:
-            raise NoMeaning
-        return (None, None)
-
-    def call(self, function: str, arguments: Sequence[str], options: Mapping[str, str]) -> Draw:
-        first, second = map(constant, arguments)
-        return Draw(Distribution(function), first, second)
-
-
-def _read(what: str, text: str) -> Draw:
-    expression = parse(check_text(what, text))
-    if expression is None:
-        raise ValueError(f"{what}: found {short_repr(text)}; expected {KNOWN}")
-    try:
-        return expression.evaluate(_Distributions(what))
-    except ValueError as error:
-        words = str(error)
-        raise ValueError(words if words.startswith(what) else f"{what}: {words}") from None
 
 
 @lru_cache(maxsize=64)
@@ -325,7 +226,7 @@ def drawn_axes(model: Model, drawn: Frozen[Draws], count: int, rng: int) -> tupl
 def _columns(model: Model, name: str, how: Draws, count: int, rng: int) -> Iterable[tuple[str, Sequence[float]]]:
     """The names and the values of one draw."""
     if isinstance(how, Graphs | RandomGraph):
-        return _weights(model, (how.graphs(count, rng) if isinstance(how, RandomGraph) else how).graphs)
+        return _weights(model, _realised(how, count, rng).graphs)
     holders = model.unlinked.holders(name)
     links = {} if holders else model.link_names(name)
     if links:

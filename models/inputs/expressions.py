@@ -1,0 +1,172 @@
+"""Expressions of symbols as text: what the numbers, operations and functions in it make, whatever its names mean."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, NoReturn
+
+import sympy as sp
+
+from .checks import short_repr, suggestion
+from .reader import Algebra, Expression, NoMeaning
+
+__all__ = ["EXPONENT", "FUNCTIONS", "MAGNITUDE", "Expressions"]
+
+EXPONENT, MAGNITUDE = 16, 1e100
+"""Largest exponent of a power that is a number, largest constant."""
+
+FUNCTIONS: Mapping[str, Any] = {
+    "abs": sp.Abs, "acos": sp.acos, "acosh": sp.acosh, "asin": sp.asin, "asinh": sp.asinh, "atan": sp.atan,
+    "atan2": sp.atan2, "atanh": sp.atanh, "ceiling": sp.ceiling, "cos": sp.cos, "cosh": sp.cosh, "exp": sp.exp,
+    "floor": sp.floor, "log": sp.log, "max": sp.Max, "min": sp.Min, "sign": sp.sign, "sin": sp.sin, "sinh": sp.sinh,
+    "sqrt": sp.sqrt, "tan": sp.tan, "tanh": sp.tanh,
+}  # fmt: skip
+"""The functions that a model may call, by their names in text; generated code knows the same ones."""
+
+_COUNTS: Mapping[Any, int | None] = {sp.atan2: 2, sp.Max: None, sp.Min: None}
+"""Numbers of arguments other than one; None is any number from two."""
+
+
+class _Refusal(Exception):
+    """An error in words of its own."""
+
+
+@dataclass(frozen=True, slots=True)
+class Expressions(Algebra[sp.Basic]):
+    """Expressions as SymPy makes them; operands are checked, so that no constant grows.
+
+    A subclass says what names and functions there are.
+
+    Parameters
+    ----------
+    what : str
+        The subject of errors.
+
+    Attributes
+    ----------
+    whole : number
+        Largest whole number, above and below a line.
+    numbers : str
+        What constants must be, in words.
+    functions : mapping of str to callable
+        The functions by their names, as messages list them.
+    """
+
+    what: str
+    deepest = 100
+    whole: ClassVar[float] = MAGNITUDE
+    numbers: ClassVar[str] = "finite numbers"
+    functions: ClassVar[Mapping[str, Callable[..., sp.Expr]]]
+
+    def read(self, expression: Expression) -> sp.Expr:
+        """Return the value of an expression.
+
+        Raises
+        ------
+        ValueError
+            In one line, for what has no meaning or no finite value, and for powers beyond EXPONENT.
+        """
+        try:
+            found = self.value(expression.evaluate(self))
+        except _Refusal as refusal:
+            raise ValueError(str(refusal)) from None
+        except NoMeaning as error:
+            raise ValueError(f"{self.what}: {error.reason}") from None
+        except Exception as error:  # of SymPy, which compares in vain
+            text, reason = short_repr(expression.text), " ".join(str(error).split())[:200]
+            raise ValueError(f"{self.what}: {text} has no value: {reason or type(error).__name__}") from None
+        steep = [e for e in found.atoms(sp.Pow) if e.exp.is_number and not abs(e.exp) <= EXPONENT]
+        if steep:
+            raise ValueError(
+                f"{self.what}: found the power {short_repr(steep[0])}; expected exponents up to {EXPONENT}"
+            )
+        return found
+
+    def pieces(self) -> str:
+        """What expressions consist of beside numbers, in words."""
+        raise NotImplementedError
+
+    def function(self, name: str) -> Callable[..., sp.Expr] | None:
+        """The function of a name, None of an unknown one."""
+        return self.functions.get(name)
+
+    def _known(self, name: str) -> Callable[..., sp.Expr]:
+        found = self.function(name)
+        if found is None:
+            close = suggestion(name, self.functions)
+            raise NoMeaning(f"unknown function {short_repr(name)}; known: {', '.join(self.functions)}{close}")
+        return found
+
+    def refuse(self, node: ast.expr, reason: str) -> NoReturn:
+        piece = short_repr(ast.unparse(node))
+        raise _Refusal(f"{self.what}: {reason or f'found {piece}; expected numbers, {self.pieces()}'}")
+
+    def refuse_depth(self) -> NoReturn:
+        raise _Refusal(f"{self.what}: more than {self.deepest} nested operations; expected fewer; add parentheses")
+
+    def number(self, value: int | float) -> sp.Basic:
+        if not abs(value) <= (self.whole if isinstance(value, int) else MAGNITUDE):
+            raise NoMeaning(f"found {short_repr(value)}; expected numbers up to {MAGNITUDE:g}")
+        return sp.Integer(value) if isinstance(value, int) else sp.Rational(repr(value))
+
+    def positive(self, value: sp.Basic) -> sp.Basic:
+        return value
+
+    def negative(self, value: sp.Basic) -> sp.Basic:
+        return -self.value(value)
+
+    def add(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
+        return self.value(a) + self.value(b)
+
+    def subtract(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
+        return self.value(a) - self.value(b)
+
+    def multiply(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
+        return self.value(a) * self.value(b)
+
+    def divide(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
+        if b == 0:
+            raise NoMeaning(f"found a division by zero; expected {self.numbers}")
+        return self.value(a) / self.value(b)
+
+    def power(self, base: sp.Basic, exponent: sp.Basic) -> sp.Basic:
+        lower, upper = self.value(base), self.value(exponent)
+        if upper.is_number and not abs(upper) <= EXPONENT:
+            raise NoMeaning(f"found the exponent {short_repr(upper)}; expected at most {EXPONENT}")
+        return lower**upper
+
+    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[sp.Basic]]:
+        found = self._known(function)
+        wanted = _COUNTS.get(found, 1)
+        if options or (count < 2 if wanted is None else count != wanted):
+            raise NoMeaning(f"{function} has {count + len(options)} arguments; expected {wanted or 'at least 2'}")
+        return (self,) * count
+
+    def call(self, function: str, arguments: Sequence[sp.Basic], options: Mapping[str, str]) -> sp.Basic:
+        return self._known(function)(*map(self.value, arguments))
+
+    def value(self, e: sp.Basic) -> sp.Expr:
+        """The expression, if it is no condition and its constants are finite and not too large."""
+        if not isinstance(e, sp.Expr):
+            raise NoMeaning(f"found the condition {short_repr(e)}, which is no value; expected a value")
+        large = next((number for number in _constants(e) if not self.fits(number)), None)
+        if large is not None:
+            raise NoMeaning(f"found {short_repr(large)}; expected {self.numbers} up to {MAGNITUDE:g}")
+        return e
+
+    def fits(self, number: sp.Expr) -> bool:
+        """True for a constant that is finite and not too large."""
+        if number.is_Rational:
+            return bool(max(abs(number.p), number.q) <= self.whole)
+        size = sp.N(number)
+        return bool(size.is_finite and abs(size) <= MAGNITUDE)
+
+
+def _constants(e: sp.Expr) -> Iterator[sp.Expr]:
+    """The constants at the top of an expression: itself, or its terms, factors, base and exponent that are constant."""
+    if e.is_number:
+        yield e
+    elif isinstance(e, sp.Mul | sp.Add | sp.Pow):
+        yield from (part for part in e.args if part.is_number)

@@ -1,0 +1,33 @@
+"""Spectra as sums of cosines of rational angles, which the rules of products and of other matrices of a graph add exactly."""
+
+from __future__ import annotations
+
+from ..algebra.cosine_sums import AngleSum, read
+from .matrix import Matrix
+from .solve import spectrum
+
+__all__ = ["angle_sums"]
+
+SMALL = 100
+"""Most rows of a matrix without a closed form whose eigenvalues are computed for it."""
+
+
+def angle_sums(matrix: Matrix) -> list[tuple[AngleSum, int]] | None:
+    """Return the eigenvalues of a matrix and their multiplicities as sums of cosines.
+
+    Parameters
+    ----------
+    matrix : Matrix
+        A matrix with a closed form, or one of at most SMALL rows.
+
+    Returns
+    -------
+    list of (AngleSum, int) or None
+        None of a larger matrix without a closed form, and if an eigenvalue is no such sum.
+    """
+    pairs = matrix.closed_form()
+    if pairs is None and matrix.n > SMALL:
+        return None
+    known = [(e.exact, e.multiplicity) for e in spectrum(matrix)] if pairs is None else pairs
+    found = [(read(number), times) for number, times in known]
+    return None if any(a is None for a, _ in found) else [(a, times) for a, times in found if a is not None]

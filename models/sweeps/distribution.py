@@ -1,0 +1,110 @@
+"""What numbers are drawn from: normal, uniform and Lorentzian distributions, as values and as text."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from statistics import NormalDist
+from typing import NoReturn
+
+from ..inputs.arithmetic import constant
+from ..inputs.checks import check_number, check_positive, check_text, short_repr
+from ..inputs.reader import Algebra, NoMeaning, parse
+from ..inputs.words import Word
+
+__all__ = ["KNOWN", "Distribution", "Draw", "lorentzian", "normal", "read_draw", "uniform"]
+
+KNOWN = "normal(mean, deviation), uniform(low, high), lorentzian(centre, half width)"
+"""What may be drawn from, in messages."""
+
+
+class Distribution(Word):
+    """What numbers are drawn from."""
+
+    NORMAL = "normal"
+    UNIFORM = "uniform"
+    LORENTZIAN = "lorentzian"
+
+
+@dataclass(frozen=True, slots=True)
+class Draw:
+    """A distribution: normal with mean and standard deviation, uniform between two ends, or Lorentzian with its half width.
+
+    Raises ValueError or TypeError on anything but finite numbers, a deviation or a half width that is not positive, and
+    ends that do not rise.
+    """
+
+    distribution: Distribution
+    first: float
+    second: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "distribution", Distribution.parse("draw", self.distribution))
+        object.__setattr__(self, "first", check_number(f"{self.distribution}: first", self.first))
+        object.__setattr__(self, "second", check_number(f"{self.distribution}: second", self.second))
+        if self.distribution is Distribution.NORMAL:
+            check_positive("normal: standard deviation", self.second)
+        elif self.distribution is Distribution.LORENTZIAN:
+            check_positive("lorentzian: half width", self.second)
+        elif not self.first < self.second:
+            raise ValueError(f"uniform: found the ends {self.first!r} and {self.second!r}; expected rising ends")
+
+    def value(self, chance: float) -> float:
+        """Return the value below which a share `chance` of the distribution lies."""
+        if self.distribution is Distribution.NORMAL:
+            return NormalDist(self.first, self.second).inv_cdf(chance)
+        if self.distribution is Distribution.LORENTZIAN:
+            return self.first + self.second * math.tan(math.pi * (chance - 0.5))
+        return self.first + (self.second - self.first) * chance
+
+    def __str__(self) -> str:
+        return f"{self.distribution}({self.first!r}, {self.second!r})"
+
+
+def normal(mean: float, deviation: float) -> Draw:
+    """Return the normal distribution of a mean and a standard deviation."""
+    return Draw(Distribution.NORMAL, mean, deviation)
+
+
+def uniform(low: float, high: float) -> Draw:
+    """Return the uniform distribution between two numbers."""
+    return Draw(Distribution.UNIFORM, low, high)
+
+
+def lorentzian(centre: float, half_width: float) -> Draw:
+    """Return the distribution of Lorentz, or Cauchy, of a centre and a half width at half maximum."""
+    return Draw(Distribution.LORENTZIAN, centre, half_width)
+
+
+@dataclass(frozen=True, slots=True)
+class _Distributions(Algebra[Draw]):
+    """The call of a distribution with two constants."""
+
+    what: str
+    deepest = 2
+
+    def refuse(self, node: ast.expr, reason: str) -> NoReturn:
+        raise ValueError(f"{self.what}: found {short_repr(ast.unparse(node))}; expected {KNOWN}")
+
+    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[None]:
+        if function not in tuple(Distribution) or count != 2 or options:
+            raise NoMeaning
+        return (None, None)
+
+    def call(self, function: str, arguments: Sequence[str], options: Mapping[str, str]) -> Draw:
+        first, second = map(constant, arguments)
+        return Draw(Distribution(function), first, second)
+
+
+def read_draw(what: str, text: str) -> Draw:
+    """Return the distribution of a text such as "normal(0, 1)"; ValueError, with `what` in front, for any other."""
+    expression = parse(check_text(what, text))
+    if expression is None:
+        raise ValueError(f"{what}: found {short_repr(text)}; expected {KNOWN}")
+    try:
+        return expression.evaluate(_Distributions(what))
+    except ValueError as error:
+        words = str(error)
+        raise ValueError(words if words.startswith(what) else f"{what}: {words}") from None

@@ -1,0 +1,42 @@
+"""The modules of a folder, one for each thing that a user can name: commands, benchmarks, peers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib import import_module
+from pkgutil import iter_modules
+from types import ModuleType
+
+from synchain.models.inputs.checks import short_repr, suggestion
+
+__all__ = ["load", "names"]
+
+
+def names(path: Iterable[str]) -> tuple[str, ...]:
+    """Return the names of the modules in the folders of a package, sorted, without those that begin with "_"."""
+    return tuple(sorted(m.name for m in iter_modules(path) if not m.ispkg and not m.name.startswith("_")))
+
+
+def load(what: str, name: str, package: str, path: Iterable[str]) -> ModuleType:
+    """Return a module of a package.
+
+    Parameters
+    ----------
+    what : str
+        What the modules are called in errors.
+    name : str
+        The name of the module.
+    package : str
+        The dotted name of the package.
+    path : iterable of str
+        Its folders.
+
+    Raises
+    ------
+    ValueError
+        If there is no such module.
+    """
+    known = names(path)
+    if name not in known:
+        raise ValueError(f"unknown {what} {short_repr(name)}; known: {', '.join(known)}{suggestion(name, known)}")
+    return import_module(f".{name}", package)
