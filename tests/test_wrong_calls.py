@@ -108,8 +108,8 @@ CALLS = [
     (lambda: runtime.kernel("figure_4a"), A_SCENE),
     (lambda: runtime.kernel(PAIR, width=0), "width = 0; expected at least 1"),
     (lambda: runtime.open_result(3), "result: found 3"),
-    (lambda: runtime.open_result("no/such/file.nc"), "does not exist; expected a netCDF result: check the path"),
-    (lambda: runtime.open_result(Path(__file__).parent), "is a folder; expected a netCDF result"),
+    (lambda: runtime.open_result("no/such/file.nc"), "does not exist; expected a result: check the path"),
+    (lambda: runtime.open_result(Path(__file__).parent), "is a folder; expected a file: name the file in it"),
     (lambda: runtime.open_result(__file__), "is no netCDF file; expected a netCDF 3 result"),
     (lambda: runtime.Result(None, None), r"data: found None; expected an xarray\.Dataset"),
     # starts, thresholds, probe
