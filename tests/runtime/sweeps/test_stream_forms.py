@@ -206,7 +206,9 @@ def test_the_command_writes_every_form_and_its_figure(ending: str, tmp_path: Pat
     assert main(words) == 0
     assert main(words) == 0
     assert "nothing was run (--overwrite runs it again)" in capsys.readouterr().out
-    assert sorted(part.name for part in tmp_path.iterdir()) == sorted([f"two_oscillators{ending}", "two_oscillators.png"])
+    assert sorted(part.name for part in tmp_path.iterdir()) == sorted(
+        [f"two_oscillators{ending}", "two_oscillators.png"]
+    )
     assert open_result(tmp_path / f"two_oscillators{ending}").success
 
 
