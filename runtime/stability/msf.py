@@ -430,6 +430,8 @@ def plane(
             "plane: found two parameters and a scene without links; expected a network, or alpha and a parameter"
         )
     if rows:
+        if "alpha" not in axes:  # exponents depend on all strengths
+            whole.expect_one_cell(scene)
         cell = coupled_cell(
             replace(given, table={**given.values, **{name: axes[name][0] for name in rows}}), scene, rtol
         )
