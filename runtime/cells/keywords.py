@@ -70,7 +70,7 @@ class Given:
             )
         return {check_text("parameters", name): value for name, value in (*table.items(), *self.keywords.items())}
 
-    def scene(self, scene: Scene, free: Collection[str] = (), **settings: object) -> Scene:
+    def scene(self, scene: Scene, free: Collection[str] = (), /, **settings: object) -> Scene:
         """Return the single cell of a scene that has these parameters, with settings that the function needs.
 
         The function does not depend on parameters that are `free`.

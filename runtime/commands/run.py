@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..console.arguments import add_scene, add_workers, folder, setting, tolerance
+from ..console.arguments import add_scene, add_set, add_workers, folder, settings, tolerance
 from ..console.outcome import FAILED, FINE, Failed, WrongUse, sentence, warn, wrong_use
 from ..support.files import output_folder, whole_file
 
@@ -58,16 +58,10 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--rtol", metavar="X", type=tolerance, help="relative tolerance of one step, above 0, at most 0.1"
     )
-    parser.add_argument(
-        "--set",
-        metavar="NAME=VALUE",
-        nargs="+",
-        action="extend",
-        type=setting,
-        default=[],
-        help="set a parameter, an initial state (x_1) or one of "
-        + ", ".join(SETTINGS)
-        + "; a,b,c or LO:HI:N sweeps a parameter or an initial state",
+    add_set(
+        parser,
+        f"set a parameter, an initial state (x_1) or one of {', '.join(SETTINGS)}; a,b,c or LO:HI:N sweeps a parameter "
+        "or an initial state",
     )
     parser.add_argument(
         "--format",
@@ -148,14 +142,10 @@ def changed_scene(arguments: Namespace) -> Scene:
     from ..sweeps.run import run
 
     scene = load_scene(arguments.scene)
-    changes: dict[str, object] = {}
-    for name, value in arguments.set:
-        if name in changes:
-            raise WrongUse(f"--set gives {name} twice; expected it once")
-        changes[name] = _fitting(scene, name, value)
-    settings = {name: changes[name] for name in SETTINGS if name in changes and not scene.takes(name)}
-    own = {name: value for name, value in changes.items() if name not in settings}
-    scene = Given(run, own).sweep(scene.replace(**settings))
+    changes = {name: _fitting(scene, name, value) for name, value in settings(arguments).items()}
+    fields = {name: changes[name] for name in SETTINGS if name in changes and not scene.takes(name)}
+    own = {name: value for name, value in changes.items() if name not in fields}
+    scene = Given(run, own).sweep(scene.replace(**fields))
     if changes:
         scene = scene.replace(title=f"{scene.title or arguments.scene}, changed: {', '.join(changes)}")
     return scene if arguments.rtol is None else scene.replace(rtol=arguments.rtol)
