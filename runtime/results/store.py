@@ -246,7 +246,7 @@ def _write_netcdf4(data: xr.Dataset, path: Path, long: Collection[str] = ()) -> 
         return
     import h5netcdf
 
-    with TemporaryDirectory() as folder:
+    with TemporaryDirectory(dir=path.parent, prefix=path.stem, suffix=path.suffix) as folder:
         first = Path(folder, "first.nc4")
         _write_netcdf4(_first(data, long), first)
         with h5netcdf.File(first, "r") as made, h5netcdf.File(path, "w") as file:
