@@ -41,6 +41,12 @@ EVERY = [form(ending) for ending in FORMS]
 FURTHER = [form(ending) for ending in FORMS if FORMS[ending].package]
 
 
+CHUNKS = PAIR.replace(
+    samples=500, axes={"sigma": [0.01 * k for k in range(3)], "omega": [1.1 + 0.03 * k for k in range(15)]}
+)
+"""A trajectory of 90 000 numbers, three chunks of which the last is not full."""
+
+
 @pytest.fixture(autouse=True, scope="module")
 def _kernel() -> None:
     warm()
@@ -59,7 +65,7 @@ def ctrl_c(progress: Any) -> None:
 
 
 @pytest.mark.parametrize("ending", EVERY)
-@pytest.mark.parametrize("scene", [MAP, UP, PAIR], ids=["map", "up", "one cell"])
+@pytest.mark.parametrize("scene", [MAP, UP, PAIR, CHUNKS], ids=["map", "up", "one cell", "chunks"])
 def test_a_file_that_is_filled_holds_what_one_that_is_saved_holds(scene: Scene, ending: str, tmp_path: Path) -> None:
     whole = run(scene, workers=1, show_progress=False)
     whole.save(tmp_path / f"saved{ending}")
@@ -181,11 +187,19 @@ def test_an_unfinished_run_can_take_another_form(ending: str, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("ending", FURTHER)
-def test_a_pipe_is_no_result(ending: str, tmp_path: Path) -> None:
+def test_what_is_no_result_is_refused_before_anything_runs(ending: str, tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.delattr("synchain.runtime.sweeps.stream.prepare")
+    words = "is no Zarr folder" if ending == ".zarr" else "is a pipe or device"
     os.mkfifo(tmp_path / f"a{ending}")
-    for call in (lambda path: stream(PAIR, path, show_progress=False), open_result):
-        with pytest.raises(OSError, match=r"is a pipe or device|is no Zarr folder|the file is damaged"):
-            call(tmp_path / f"a{ending}")
+    for options in ({}, {"resume": True}, {"overwrite": True}):
+        with pytest.raises(OSError, match=words):
+            stream(PAIR, tmp_path / f"a{ending}", show_progress=False, **options)
+    with pytest.raises(OSError, match=r"is a pipe or device|the file is damaged"):
+        open_result(tmp_path / f"a{ending}")
+    (tmp_path / f"b{ending}").mkdir()
+    with pytest.raises(OSError, match=r"is no Zarr folder|is a folder; expected a file"):
+        stream(PAIR, tmp_path / f"b{ending}", overwrite=True, show_progress=False)
+    assert sorted(part.name for part in tmp_path.iterdir()) == [f"a{ending}", f"b{ending}"]
 
 
 @pytest.mark.parametrize(
