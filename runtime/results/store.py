@@ -18,7 +18,7 @@ from importlib import import_module
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -45,16 +45,11 @@ __all__ = [
 PARTS = ("real", "imaginary")
 """The values of the dimension `part`, by which complex numbers are stored as pairs of real ones."""
 
-
 CHUNK = 2**15
 """Numbers of a chunk, 256 kB of doubles, which are in memory together."""
 
-
-class Write(Protocol):
-    """Writes a dataset to a path, without its digest."""
-
-    def __call__(self, data: xr.Dataset, path: Path, long: Collection[str] = ()) -> object:
-        """Variables with a `long` dimension are read and written chunk by chunk, all others at once."""
+Copy: TypeAlias = "Callable[[xr.Dataset, Path, Collection[str]], None]"
+"""Writes a dataset to a path: variables with one of these dimensions chunk by chunk, others at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +65,7 @@ class Form:
     whole : callable
         Yields a temporary path that takes the place of the one that is given.
     write : callable
-        Writes a dataset to a path.
+        Writes a dataset to a path, without its digest.
     rows : callable
         Yields the sheet of a file at a path, which is like a template but for the lengths of some
         dimensions.
@@ -83,7 +78,7 @@ class Form:
     package: str | None
     check: Callable[[Path], None]
     whole: Callable[[Path], AbstractContextManager[Path]]
-    write: Write
+    write: Callable[[xr.Dataset, Path], None]
     rows: Callable[[xr.Dataset, Mapping[str, int], Path], AbstractContextManager[Sheet]]
     seal: Callable[[Path], None]
     open: Callable[[Path], xr.Dataset]
@@ -205,7 +200,7 @@ def _damaged(path: Path, what: str) -> OSError:
 # -- netCDF-3 ------------------------------------------------------------------------------------------------
 
 
-def _write_netcdf3(data: xr.Dataset, path: Path, long: Collection[str] = ()) -> None:
+def _write_netcdf3(data: xr.Dataset, path: Path) -> None:
     unsealed(data).to_netcdf(path, engine="scipy", format="NETCDF3_64BIT")
 
 
@@ -240,10 +235,11 @@ def _open_netcdf3(path: Path) -> xr.Dataset:
 # -- netCDF-4 ------------------------------------------------------------------------------------------------
 
 
-def _write_netcdf4(data: xr.Dataset, path: Path, long: Collection[str] = ()) -> None:
-    if not long:
-        data.to_netcdf(path, engine="h5netcdf")
-        return
+def _write_netcdf4(data: xr.Dataset, path: Path) -> None:
+    data.to_netcdf(path, engine="h5netcdf")
+
+
+def _copy_to_netcdf4(data: xr.Dataset, path: Path, long: Collection[str]) -> None:
     import h5netcdf
 
     with TemporaryDirectory(dir=path.parent, prefix=path.stem, suffix=path.suffix) as folder:
@@ -283,15 +279,14 @@ def _check_zarr(target: Path) -> None:
         raise FileExistsError(f"{target} is no Zarr folder; expected one or nothing there; choose another path")
 
 
-def _write_zarr(data: xr.Dataset, path: Path, long: Collection[str] = ()) -> None:
-    how: dict[str, Any] = {"mode": "w", "zarr_format": 2, "consolidated": False}
-    if not long:
-        data.to_zarr(path, **how)
-        return
+def _write_zarr(data: xr.Dataset, path: Path, encoding: Mapping[str, Any] | None = None) -> None:
+    data.to_zarr(path, mode="w", zarr_format=2, consolidated=False, encoding=encoding)
+
+
+def _copy_to_zarr(data: xr.Dataset, path: Path, long: Collection[str]) -> None:
     import zarr
 
-    chunks = {str(name): {"chunks": chunk(data[name].shape)} for name in _with(data, long)}
-    _first(data, long).to_zarr(path, encoding=chunks, **how)
+    _write_zarr(_first(data, long), path, {name: {"chunks": chunk(data[name].shape)} for name in _with(data, long)})
     arrays = dict(zarr.open_group(path, mode="r+").arrays())
     for name in _with(data, long):
         arrays[name].resize(data[name].shape)
@@ -307,8 +302,8 @@ def _seal_zarr(path: Path) -> None:
 # -- pieces --------------------------------------------------------------------------------------------------
 
 
-def _by_rows(write: Write) -> Callable[..., AbstractContextManager[Sheet]]:
-    """How the rows of a form are filled whose files are written by `write`: in netCDF-3, beside it."""
+def _by_way_of_netcdf3(copy: Copy) -> Callable[..., AbstractContextManager[Sheet]]:
+    """How files are filled whose rows have no fixed places: in netCDF-3 beside them, of which they are copies."""
 
     @contextmanager
     def rows(template: xr.Dataset, lengths: Mapping[str, int], path: Path) -> Iterator[Sheet]:
@@ -317,7 +312,8 @@ def _by_rows(write: Write) -> Callable[..., AbstractContextManager[Sheet]]:
             with _rows_of_netcdf3(template, lengths, beside) as sheet:
                 yield sheet
             with xr.open_dataset(beside, engine="scipy", cache=False) as data:
-                write(data.assign_attrs({DIGEST: ""}).drop_encoding(), path, tuple(lengths))
+                data.attrs.pop(DIGEST)
+                copy(data.drop_encoding(), path, lengths)
         finally:
             beside.unlink(missing_ok=True)
 
@@ -428,7 +424,7 @@ FORMS: dict[str, Form] = {
         check_replaceable,
         whole_file,
         _write_netcdf4,
-        _by_rows(_write_netcdf4),
+        _by_way_of_netcdf3(_copy_to_netcdf4),
         _seal_netcdf4,
         _open_netcdf4,
     ),
@@ -437,7 +433,7 @@ FORMS: dict[str, Form] = {
         _check_zarr,
         whole_folder,
         _write_zarr,
-        _by_rows(_write_zarr),
+        _by_way_of_netcdf3(_copy_to_zarr),
         _seal_zarr,
         lambda path: _intact(path, "zarr"),
     ),
