@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import random
+import shutil
 import time
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -33,6 +34,11 @@ def partial(path: Path) -> Path:
     return path.with_suffix(".partial")
 
 
+def contents(path: Path) -> dict[str, bytes]:
+    """The bytes of a file, or of all files of a folder."""
+    return {str(part.relative_to(path)): part.read_bytes() for part in (path, *path.rglob("*")) if part.is_file()}
+
+
 def sit(scene: Scene, path: Path, said: Connection) -> None:
     """One sitting, which says how many cells are done; made to be killed."""
 
@@ -52,18 +58,18 @@ def last(said: Connection) -> int:
         return found
 
 
-def kill_again_and_again(scene: Scene, folder: Path, times: int, seed: int) -> tuple[int, int]:
+def kill_again_and_again(scene: Scene, folder: Path, times: int, seed: int, ending: str = ".nc") -> tuple[int, int]:
     """Kill sittings at random moments so many times; returns how often blocks were kept and how often the sweep got done.
 
     What a sitting has said to be done must be on the disk, and every finished file must be that of a run without kills.
     """
     warm()
-    stream(scene, folder / "whole.nc", workers=2, show_progress=False)
-    expected = (folder / "whole.nc").read_bytes()
+    stream(scene, folder / f"whole{ending}", workers=2, show_progress=False)
+    expected = contents(folder / f"whole{ending}")
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["streams_warm"])
     os.environ["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
-    dice, path = random.Random(seed), folder / "cut.nc"
+    dice, path = random.Random(seed), folder / f"cut{ending}"
     span, killed, kept, done = float("inf"), -2, 0, 0  # the first two are left alone, to see how long it takes
     while killed < times:
         hears, says = context.Pipe(duplex=False)
@@ -83,11 +89,11 @@ def kill_again_and_again(scene: Scene, folder: Path, times: int, seed: int) -> t
             assert stored >= said, f"{said} cells were done, {stored} are on the disk"
             kept += stored > 0
         if path.exists():
-            assert path.read_bytes() == expected
-            path.unlink()
+            assert contents(path) == expected
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
             partial(path).unlink(missing_ok=True)
             done += 1
     stream(scene, path, resume=partial(path).exists(), workers=1, show_progress=False)
-    assert path.read_bytes() == expected
-    assert sorted(p.name for p in folder.iterdir()) == ["cut.nc", "whole.nc"]
+    assert contents(path) == expected
+    assert sorted(p.name for p in folder.iterdir()) == [f"cut{ending}", f"whole{ending}"]
     return kept, done

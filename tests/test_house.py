@@ -237,7 +237,7 @@ def test_values_of_the_models_cannot_be_changed() -> None:
 
 
 def test_every_package_that_is_imported_is_declared() -> None:
-    """Peers of the benchmark and the extras `dask` and `completion` aside, which may be missing."""
+    """Peers of the benchmark and the extras `dask`, `completion` and `files` aside, which may be missing."""
     found = {
         name.partition(".")[0]
         for path in sources()
@@ -246,7 +246,7 @@ def test_every_package_that_is_imported_is_declared() -> None:
     }
     project = tomllib.loads((PROJECT / "pyproject.toml").read_text("utf-8"))["project"]
     declared = {re.match("[a-z-]+", line).group().removeprefix("python-") for line in project["dependencies"]}
-    assert found - sys.stdlib_module_names - {"synchain", "distributed", "shtab"} == declared
+    assert found - sys.stdlib_module_names - {"synchain", "distributed", "shtab", "h5netcdf", "zarr"} == declared
 
 
 def loaded_by(statement: str) -> set[str]:

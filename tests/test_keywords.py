@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from synchain import runtime
-from synchain.models import Field, Scene, chain
+from synchain.models import Field, Rates, Scene, chain
 from synchain.runtime.bifurcation import skeleton as skeletons
 from synchain.runtime.cells.keywords import Given
 from synchain.runtime.support.progress import Progress
+from synchain.runtime.synchronisation.agreement import agreement
 from synchain.runtime.synchronisation.threshold import Criterion
 
 SHARED = {
@@ -175,6 +176,55 @@ def test_a_parameter_fixes_an_axis() -> None:
     expected = runtime.msf(DRIVEN, [0.1, 0.2], omega=1.4, delta=0.7, **words)
     assert found.scene == expected.scene
     np.testing.assert_array_equal(found.exponent, expected.exponent)
+
+
+SHORT_ORBITS: dict[str, Any] = {"starts": 1, "transient": 5, "periods": 5, "show_progress": False}
+SAME = {
+    "exponents": lambda scene: runtime.exponents(scene, [0.1, 0.2], **SHORT_ORBITS).exponent,
+    "msf": lambda scene: runtime.msf(scene, [0.1, 0.2], **SHORT_ORBITS).exponent,
+    "a plane of alpha and beta": lambda scene: runtime.plane(scene, [0.1, 0.2], [0.0, 0.1], **SHORT_ORBITS).exponent,
+    "a plane of alpha and omega": lambda scene: (
+        runtime.plane(scene, [0.1, 0.2], omega=[1.3, 1.4], **SHORT_ORBITS).exponent
+    ),
+    "universal_probe": lambda scene: (
+        runtime.universal_probe(scene, [0.1, 2.0], 0.0, criterion=SHORT, show_progress=False).error
+    ),
+    "thresholds": lambda scene: [
+        edge
+        for found in [runtime.thresholds(scene, criterion=SHORT, resolution=0.1, periods=5, show_progress=False)]
+        for ranges in (found.direct.intervals, found.probe.intervals, found.exponents.intervals)
+        for interval in ranges
+        for edge in interval
+    ],
+    "agreement": lambda scene: [
+        (cell.sigma, cell.exponent, cell.error)
+        for cell in agreement(scene, [0.1, 0.2], criterion=SHORT, show_progress=False).cells
+    ],
+}
+
+
+@pytest.mark.parametrize("name", SAME)
+def test_an_axis_of_the_strength_is_no_choice_where_nothing_depends_on_it(name: str) -> None:
+    swept = DRIVEN.replace(axes={"sigma": [0.1, 0.3]}, zipped=True)
+    expected = SAME[name](DRIVEN)
+    assert np.size(expected) >= 2
+    np.testing.assert_array_equal(SAME[name](swept), expected)
+    with pytest.raises(ValueError, match="found axes of x_1; "):
+        SAME[name](DRIVEN.replace(axes={"sigma": [0.1, 0.3], "x_1": [0.1, 0.2]}))
+
+
+def test_an_axis_of_the_strength_is_refused_where_something_depends_on_it(tmp_path: Any) -> None:
+    swept = DRIVEN.replace(axes={"sigma": [0.1, 0.3]})
+    for name in ("basin", "cluster_exponents", "lyapunov_spectrum"):
+        with pytest.raises(ValueError, match=f"^{name}: found axes of sigma; "):
+            calls(swept, tmp_path / "a.nc")[name]()
+    with pytest.raises(ValueError, match=r"^plane: found axes of sigma; "):
+        runtime.plane(swept, omega=[1.2, 1.3], delta=[0.2, 0.3])
+    theta = Field({"theta": "1 - theta"})
+    pull = Rates({"theta": "g*W*(theta_j - 2*theta_i)"}, {"g": 0.1})
+    between_equal_states = Scene(theta, pull, chain(2), axes={"g": [0.1, 0.2]})
+    with pytest.raises(ValueError, match=r"^exponents: found axes of g; "):
+        runtime.exponents(between_equal_states, [0.1, 0.2])
 
 
 def made(name: str) -> Scene:

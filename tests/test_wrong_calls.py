@@ -23,6 +23,7 @@ from synchain.models.spectra.spectrum import Spectrum
 from synchain.models.symmetries.clusters import clusters, orbital_partitions
 from synchain.runtime.cells.keywords import Given
 from synchain.runtime.results.energy import energy_function
+from synchain.runtime.results.labelled import Labelled
 from synchain.runtime.support.threads import worker_count
 from synchain.runtime.synchronisation.agreement import agreement
 from synchain.runtime.synchronisation.threshold import Criterion
@@ -108,8 +109,8 @@ CALLS = [
     (lambda: runtime.kernel("figure_4a"), A_SCENE),
     (lambda: runtime.kernel(PAIR, width=0), "width = 0; expected at least 1"),
     (lambda: runtime.open_result(3), "result: found 3"),
-    (lambda: runtime.open_result("no/such/file.nc"), "does not exist; expected a netCDF result: check the path"),
-    (lambda: runtime.open_result(Path(__file__).parent), "is a folder; expected a netCDF result"),
+    (lambda: runtime.open_result("no/such/file.nc"), "does not exist; expected a result: check the path"),
+    (lambda: runtime.open_result(Path(__file__).parent), "is a folder; expected a file: name the file in it"),
     (lambda: runtime.open_result(__file__), "is no netCDF file; expected a netCDF 3 result"),
     (lambda: runtime.Result(None, None), r"data: found None; expected an xarray\.Dataset"),
     # starts, thresholds, probe
@@ -234,14 +235,56 @@ def test_unknown_keywords_are_refused_with_those_that_are_known(value: Any) -> N
 
 
 @pytest.mark.parametrize("value", OFFERED, ids=lambda value: value.__name__)
+def test_arguments_at_no_place_and_missing_ones_are_refused_in_words_of_ours(value: Any) -> None:
+    given = inspect.signature(value).parameters.values()
+    further = {each.kind for each in given} & {inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD}
+    own = [each for each in given if each.kind not in further]
+    if inspect.Parameter.VAR_POSITIONAL not in further:
+        places = [each.name for each in own if each.kind is not inspect.Parameter.KEYWORD_ONLY]
+        with pytest.raises(
+            TypeError, match=f"^{value.__name__}: found 99 arguments without a name; expected "
+        ) as caught:
+            value(*[None] * 99)
+        words = f"at most {len(places)}, {', '.join(places)}" if places else "none"
+        assert f"expected {words}" in str(caught.value)
+        for name in places[:1]:
+            with pytest.raises(TypeError, match=f"^{value.__name__}: found '{name}' without a name and by name"):
+                value(None, **{name: None})
+    needed = [each.name for each in own if each.default is inspect.Parameter.empty]
+    if needed:
+        with pytest.raises(
+            TypeError, match=f"^{value.__name__}: found no '{needed[0]}'; expected {', '.join(needed)}$"
+        ):
+            value()
+
+
+KEPT = [kind for kind in OFFERED if inspect.isclass(kind) and issubclass(kind, Labelled)]
+"""The classes of results."""
+
+
+def test_plots_refuse_unknown_keywords() -> None:
+    assert len(KEPT) > 10
+    for kind in KEPT:
+        known = ", ".join(name for name in inspect.signature(kind.plot).parameters if name != "self")
+        with pytest.raises(TypeError, match=f"^unknown keyword 'axes' of plot; known: {known}"):
+            kind.plot(object.__new__(kind), axes=1)
+        with pytest.raises(TypeError, match=r"^save: found no 'path'; expected path$"):
+            kind.save(object.__new__(kind))
+    with pytest.raises(TypeError, match=r"^unknown keyword 'axes' of draw; known: ax"):
+        models.chain(3).draw(axes=1)
+    with pytest.raises(TypeError, match=r"^replace: found 1 argument without a name; expected none$"):
+        PAIR.replace(3)
+
+
+@pytest.mark.parametrize("value", OFFERED, ids=lambda value: value.__name__)
 def test_public_names_can_be_sent_to_other_processes(value: Any) -> None:
     assert pickle.loads(pickle.dumps(value)) is value
 
 
 def test_a_class_is_changed_once() -> None:
     for _ in range(3):
-        made = runtime.Criterion.__init__
-    assert not hasattr(made.__wrapped__, "__wrapped__")
+        made = (runtime.Criterion.__init__, runtime.Result.plot, runtime.Plane.as_dict, models.Topology.to_networkx)
+    assert [hasattr(each.__wrapped__, "__wrapped__") for each in made] == [False] * 4
 
 
 def test_a_parameter_among_the_keywords_is_said_to_be_one() -> None:

@@ -1,19 +1,20 @@
-"""Unknown keywords of public functions and classes: they are refused with those that are known."""
+"""Arguments of public functions, classes and methods: what does not fit is refused with what would."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
 from functools import cache, wraps
 from inspect import Parameter, isfunction, signature
 from typing import Any
 
 from .checks import suggestion
 
-__all__ = ["public"]
+__all__ = ["check_methods", "public"]
 
 
 def public(value: Any, package: str) -> Any:
-    """Return what a package offers by a name: its call refuses unknown keywords, with a suggestion.
+    """Return what a package offers by a name: its call refuses what does not fit, unknown keywords with a suggestion.
 
     Parameters
     ----------
@@ -30,23 +31,96 @@ def public(value: Any, package: str) -> Any:
     return _checked(value, package) if isfunction(value) else value
 
 
+def check_methods(kind: type) -> None:
+    """Make the public methods that a class defines refuse what does not fit."""
+    for name, method in list(vars(kind).items()):
+        if isfunction(method) and not name.startswith("_") and not hasattr(method, "__wrapped__"):
+            setattr(kind, name, _checked(method, kind.__module__))
+
+
+@dataclass(frozen=True, slots=True)
+class _Taken:
+    """What a function takes.
+
+    Attributes
+    ----------
+    name : str
+        What it is called; a class in place of its `__init__`.
+    places : tuple of str
+        Arguments that may be given without their names, `self` among them.
+    names : tuple of str
+        Arguments that have a name, but for `self`.
+    needed : tuple of str
+        Those without a default.
+    enough : range
+        How many arguments without a name do without any that has one.
+    any_place, any_name : bool
+        Whether it takes further arguments, as the function itself decides.
+    """
+
+    name: str
+    places: tuple[str, ...]
+    names: tuple[str, ...]
+    needed: tuple[str, ...]
+    enough: range
+    any_place: bool
+    any_name: bool
+
+    @classmethod
+    def by(cls, function: Callable[..., Any]) -> _Taken:
+        """Return what a function takes."""
+        own = signature(function).parameters.values()
+        further = {each.kind for each in own} & {Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD}
+        named = [each for each in own if each.kind not in further]
+        places = tuple(each.name for each in named if each.kind is not Parameter.KEYWORD_ONLY)
+        needed = tuple(each.name for each in named if each.default is Parameter.empty)
+        return cls(
+            function.__qualname__.removesuffix(".__init__").rpartition(".")[2],
+            places,
+            tuple(each.name for each in named if each.name != "self"),
+            needed,
+            range(len(needed), len(places) + 1) if set(needed) <= set(places) else range(0),
+            Parameter.VAR_POSITIONAL in further,
+            Parameter.VAR_KEYWORD in further,
+        )
+
+    def refusal(self, given: int, keywords: Collection[str]) -> str | None:
+        """Why so many arguments without a name and these keywords do not fit; None if they do."""
+        if not keywords and given in self.enough:
+            return None
+        strange = next((name for name in keywords if name not in self.names and not self.any_name), None)
+        if strange is not None:
+            other = f"; a parameter is given as parameters={{{strange!r}: …}}" if "parameters" in self.names else ""
+            return (
+                f"unknown keyword {strange!r} of {self.name}; known: {', '.join(self.names) or 'none'}"
+                f"{suggestion(strange, self.names) or other}"
+            )
+        if given > len(self.places) and not self.any_place:
+            shown = [name for name in self.places if name in self.names]
+            by_name = [name for name in self.names if name not in self.places]
+            most = f"at most {len(shown)}, {', '.join(shown)}" if shown else "none"
+            others = f"; give the others by name: {', '.join(by_name)}" if by_name else ""
+            without = given - len(self.places) + len(shown)
+            return f"{self.name}: found {without} argument{'s' * (without > 1)} without a name; expected {most}{others}"
+        placed = self.places[:given]
+        twice = next((name for name in placed if name in keywords), None)
+        if twice is not None:
+            return f"{self.name}: found {twice!r} without a name and by name; expected it once"
+        missing = next((name for name in self.needed if name not in keywords and name not in placed), None)
+        if missing is not None:
+            return f"{self.name}: found no {missing!r}; expected {', '.join(n for n in self.needed if n != 'self')}"
+        return None
+
+
 @cache
 def _checked(function: Callable[..., Any], package: str) -> Callable[..., Any]:
-    """The function with its keywords checked; one that takes any keywords checks them itself."""
-    own = signature(function).parameters.values()
-    if any(each.kind is Parameter.VAR_KEYWORD for each in own):
-        return function
-    known = [each.name for each in own if each.kind is not Parameter.VAR_POSITIONAL and each.name != "self"]
+    """The function with its arguments checked; one that takes any keywords checks these itself."""
+    taken = _Taken.by(function)
 
     @wraps(function)
     def checked(*arguments: Any, **keywords: Any) -> Any:
-        strange = next((name for name in keywords if name not in known), None)
-        if strange is not None:
-            other = f"; a parameter is given as parameters={{{strange!r}: …}}" if "parameters" in known else ""
-            raise TypeError(
-                f"unknown keyword {strange!r} of {function.__qualname__.removesuffix('.__init__')}; "
-                f"known: {', '.join(known) or 'none'}{suggestion(strange, known) or other}"
-            )
+        if (refusal := taken.refusal(len(arguments), keywords)) is not None:
+            raise TypeError(refusal)
         return function(*arguments, **keywords)
 
     checked.__module__ = package

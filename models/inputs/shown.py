@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from .keywords import check_methods
+
 if TYPE_CHECKING:
     from typing import TypeAlias
 
@@ -13,9 +15,16 @@ __all__ = ["Drawn", "Shown", "Written"]
 
 
 class Shown:
-    """A value with HTML for notebooks; `synchain.runtime.seeing` knows what stands in it."""
+    """A value with HTML for notebooks; `synchain.runtime.seeing` knows what stands in it.
+
+    Its public methods refuse arguments that do not fit as public functions do.
+    """
 
     __slots__ = ()
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        check_methods(cls)
 
     def _repr_html_(self) -> str:
         from synchain.runtime.seeing.page import fragment

@@ -5,7 +5,7 @@ run(scene, workers=2, omega=1.2), or as a mapping, run(scene, parameters={"omega
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -70,8 +70,10 @@ class Given:
             )
         return {check_text("parameters", name): value for name, value in (*table.items(), *self.keywords.items())}
 
-    def scene(self, scene: Scene, **settings: object) -> Scene:
+    def scene(self, scene: Scene, free: Collection[str] = (), /, **settings: object) -> Scene:
         """Return the single cell of a scene that has these parameters, with settings that the function needs.
+
+        The function does not depend on parameters that are `free`.
 
         Raises
         ------
@@ -80,12 +82,15 @@ class Given:
         ValueError
             If a name is no parameter of the scene, or is given twice; as `expect_one_cell`.
         """
-        self.expect_one_cell(scene)
+        self.expect_one_cell(scene, free)
         return with_numbers(scene, self.checked(scene), **{**ONE_CELL, **settings})
 
-    def expect_one_cell(self, scene: Scene) -> None:
-        """Raise ValueError for a scene with draws, or with axes that no parameter fixes: one cell would stand for all."""
-        swept = [axis.name for axis in a_scene(scene).axes if axis.name not in self.values]
+    def expect_one_cell(self, scene: Scene, free: Collection[str] = ()) -> None:
+        """Raise ValueError for a scene with draws, or with axes that no parameter fixes: one cell would stand for all.
+
+        Axes of what is `free`, on which the function does not depend, are no choice between answers.
+        """
+        swept = [axis.name for axis in a_scene(scene).axes if axis.name not in {*self.values, *free}]
         for what, names, remedy in (("axes", swept, "axes=()"), ("draws", scene.draws, "realisations=0, draws=None")):
             if names:
                 raise ValueError(

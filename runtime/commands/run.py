@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..console.arguments import add_scene, add_workers, folder, setting, tolerance
+from ..console.arguments import add_scene, add_set, add_workers, folder, settings, tolerance
 from ..console.outcome import FAILED, FINE, Failed, WrongUse, sentence, warn, wrong_use
 from ..support.files import output_folder, whole_file
 
@@ -25,17 +25,21 @@ if TYPE_CHECKING:
     from ..sweeps.errors import SweepFailed, SweepInterrupted
     from ..sweeps.stream import Streamed
 
-SUMMARY = "run a scene; write its results (netCDF) and a figure"
+SUMMARY = "run a scene; write its results (netCDF or Zarr) and a figure"
 EXAMPLES = (
     "synchain run figure_4a --out results",
     "synchain run two_oscillators --out results --set sigma=0:0.6:61 omega=1.4 --rtol 1e-9",
     "synchain run figure_4a --out results --resume",
+    "synchain run figure_4a --out results --format zarr",
     "synchain run figure_4a --out results --dask tcp://192.168.0.1:8786",
     "synchain run figure_4a --explain",
 )
 
 SETTINGS = ("transient", "window", "samples", "atol", "max_steps")
 """Numbers of a scene besides parameters and initial states that --set can change."""
+
+FORMATS = ("nc", "nc4", "zarr")
+"""Endings of results (`synchain.runtime.results.store.FORMS`, which is not loaded for a help)."""
 
 PATIENCE = 10
 """Seconds that a Dask scheduler has to answer."""
@@ -45,7 +49,8 @@ def configure(parser: ArgumentParser) -> None:
     """Add scene, folder and changes to the scene."""
     parser.usage = (
         "synchain run SCENE --out DIR [--rtol X] [--workers N] [--set NAME=VALUE ...]\n"
-        "                    [--resume | --overwrite] [--dask ADDRESS] [--certify] [--no-skip] [--explain]\n"
+        "                    [--format FORMAT] [--resume | --overwrite] [--dask ADDRESS] [--certify]\n"
+        "                    [--no-skip] [--explain]\n"
         "       synchain run SCENE --explain [--rtol X] [--set NAME=VALUE ...] [--no-skip]"
     )
     add_scene(parser)
@@ -53,16 +58,17 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--rtol", metavar="X", type=tolerance, help="relative tolerance of one step, above 0, at most 0.1"
     )
+    add_set(
+        parser,
+        f"set a parameter, an initial state (x_1) or one of {', '.join(SETTINGS)}; a,b,c or LO:HI:N sweeps a parameter "
+        "or an initial state",
+    )
     parser.add_argument(
-        "--set",
-        metavar="NAME=VALUE",
-        nargs="+",
-        action="extend",
-        type=setting,
-        default=[],
-        help="set a parameter, an initial state (x_1) or one of "
-        + ", ".join(SETTINGS)
-        + "; a,b,c or LO:HI:N sweeps a parameter or an initial state",
+        "--format",
+        metavar="FORMAT",
+        choices=FORMATS,
+        default=FORMATS[0],
+        help="ending of the result: nc, netCDF-3 (default), nc4, netCDF-4 (needs h5netcdf), or zarr (needs zarr)",
     )
     parser.add_argument("--resume", action="store_true", help="continue an interrupted run; finished cells are kept")
     parser.add_argument("--overwrite", action="store_true", help="replace a result that is there already")
@@ -96,7 +102,7 @@ def execute(arguments: Namespace) -> int:
         name = Path(arguments.scene).stem if arguments.scene.endswith(".toml") else arguments.scene
         if arguments.explain:
             print(f"{name}: {_count(scene.cells, 'cell')} of {_count(scene.n, 'oscillator')}\n{explain(skip)}")
-        target = None if arguments.out is None else Path(arguments.out, f"{name}.nc")
+        target = None if arguments.out is None else _target(Path(arguments.out, f"{name}.{arguments.format}"))
         _check(skip, arguments)
         if target is None:
             return FINE
@@ -117,6 +123,17 @@ def execute(arguments: Namespace) -> int:
     return FINE if done.success else FAILED
 
 
+def _target(path: Path) -> Path:
+    """The file of the result; Failed if the package of its form is not installed."""
+    from ..results.store import form_of
+
+    try:
+        form_of(path)
+    except ModuleNotFoundError as problem:
+        raise Failed(sentence(problem)) from problem
+    return path
+
+
 def changed_scene(arguments: Namespace) -> Scene:
     """The scene with the changes of --set and --rtol; ValueError where they do not fit."""
     from synchain.models.scenes.file import load_scene
@@ -125,14 +142,10 @@ def changed_scene(arguments: Namespace) -> Scene:
     from ..sweeps.run import run
 
     scene = load_scene(arguments.scene)
-    changes: dict[str, object] = {}
-    for name, value in arguments.set:
-        if name in changes:
-            raise WrongUse(f"--set gives {name} twice; expected it once")
-        changes[name] = _fitting(scene, name, value)
-    settings = {name: changes[name] for name in SETTINGS if name in changes and not scene.takes(name)}
-    own = {name: value for name, value in changes.items() if name not in settings}
-    scene = Given(run, own).sweep(scene.replace(**settings))
+    changes = {name: _fitting(scene, name, value) for name, value in settings(arguments).items()}
+    fields = {name: changes[name] for name in SETTINGS if name in changes and not scene.takes(name)}
+    own = {name: value for name, value in changes.items() if name not in fields}
+    scene = Given(run, own).sweep(scene.replace(**fields))
     if changes:
         scene = scene.replace(title=f"{scene.title or arguments.scene}, changed: {', '.join(changes)}")
     return scene if arguments.rtol is None else scene.replace(rtol=arguments.rtol)
@@ -258,15 +271,15 @@ def _drawn(target: Path) -> Path:
 def _draw(target: Path) -> Path:
     """Write the figure of a result, which is read from its file as far as it is drawn."""
     import matplotlib
-    import xarray as xr
 
     matplotlib.use("Agg")
     from ..figures.result_plot import draw_result
     from ..results.labels import scene_of
     from ..results.result import Result
+    from ..results.store import opened
 
     path = target.with_suffix(".png")
-    with xr.open_dataset(target, engine="scipy") as data:
+    with opened(target) as data:
         axes = draw_result(Result(data, scene_of(data.attrs)))
         with whole_file(path) as temporary:
             axes.figure.figure.savefig(temporary, dpi=150)

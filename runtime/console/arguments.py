@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, ArgumentTypeError
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 
 from synchain.models.inputs.arithmetic import constant
 from synchain.models.inputs.checks import short_repr
@@ -10,14 +10,18 @@ from synchain.models.inputs.options import integer_option
 from synchain.models.sweeps.axis import LIMIT as AXIS_LIMIT
 from synchain.models.sweeps.axis import Axis
 
+from .outcome import WrongUse
+
 __all__ = [
     "add_allow_code",
     "add_scene",
+    "add_set",
     "add_workers",
     "folder",
     "number",
     "positive",
     "setting",
+    "settings",
     "tolerance",
     "whole",
 ]
@@ -104,6 +108,21 @@ def setting(text: str) -> tuple[str, float | tuple[float, ...] | dict[str, objec
     if "," in value:
         return name, tuple(number(part) for part in value.split(","))
     return name, number(value)
+
+
+def settings(arguments: Namespace) -> dict[str, float | tuple[float, ...] | dict[str, object]]:
+    """The names and values of --set; WrongUse if one is given twice."""
+    found: dict[str, float | tuple[float, ...] | dict[str, object]] = {}
+    for name, value in arguments.set:
+        if name in found:
+            raise WrongUse(f"--set gives {name} twice; expected it once")
+        found[name] = value
+    return found
+
+
+def add_set(parser: ArgumentParser, words: str) -> None:
+    """Add the option --set, whose help says what it sets."""
+    parser.add_argument("--set", metavar="NAME=VALUE", nargs="+", action="extend", type=setting, default=[], help=words)
 
 
 def add_scene(parser: ArgumentParser, default: str = "") -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from .outcome import WrongUse
@@ -9,10 +10,10 @@ from .outcome import WrongUse
 if TYPE_CHECKING:
     from synchain.models.scenes.scene import Scene
 
-__all__ = ["at_frequency", "drive_words"]
+__all__ = ["at_frequency", "drive_period", "drive_words"]
 
 
-def at_frequency(scene: Scene, omega: float | None, where: str | None) -> dict[str, float]:
+def at_frequency(scene: Scene, omega: float | None, where: str | None, given: Collection[str] = ()) -> dict[str, float]:
     """Return the parameter that sets the frequency of a scene's drive.
 
     Parameters
@@ -23,6 +24,8 @@ def at_frequency(scene: Scene, omega: float | None, where: str | None) -> dict[s
         The frequency that --omega asks for, in radians per unit of time.
     where : str or None
         The user's word for the scene, for messages; None if no scene is named.
+    given : collection of str
+        The parameters that --set gives.
 
     Returns
     -------
@@ -32,10 +35,16 @@ def at_frequency(scene: Scene, omega: float | None, where: str | None) -> dict[s
     Raises
     ------
     WrongUse
-        If `omega` is asked for and the drive has no frequency that is a parameter. Without
-        `omega`: if an axis of the scene moves the frequency, or if no scene is named.
+        If `omega` is asked for and the drive has no frequency that is a parameter, or --set gives
+        it. Without `omega` or --set: if an axis of the scene moves the frequency, or if no scene is
+        named.
     """
     frequency = scene.drive.frequency
+    names = set() if frequency is None else {s.name for s in frequency.free_symbols}
+    if names & set(given):
+        if omega is not None:
+            raise WrongUse(f"found --omega beside --set {' '.join(sorted(names & set(given)))}; expected one of them")
+        return {}
     if omega is not None:
         if frequency is None:
             raise WrongUse(f"--omega: the oscillator of {where} {scene.drive.problem}; leave it out")
@@ -47,16 +56,22 @@ def at_frequency(scene: Scene, omega: float | None, where: str | None) -> dict[s
         return {frequency.name: omega}
     if where is None:
         raise WrongUse("expected a frequency of the drive, e.g. --omega 1.4, or a SCENE")
-    names = set() if frequency is None else {s.name for s in frequency.free_symbols}
     swept = next((axis.name for axis in scene.axes if axis.name in names), None)
     if swept is not None:
         raise WrongUse(f"{where} sweeps {swept}; expected one frequency of the drive, e.g. --omega 1.4")
     return {}
 
 
-def drive_words(scene: Scene) -> str:
-    """The frequency of the drive in a headline, such as ", omega = 1.4"; nothing without one."""
+def drive_words(scene: Scene, axes: Collection[str] = ()) -> str:
+    """The frequency of the drive in a headline, such as ", omega = 1.4"; nothing without one, or if
+    it is among `axes`.
+    """
     frequency, value = scene.drive.frequency, scene.angular_frequency
-    if frequency is None or value is None:
+    if frequency is None or value is None or {s.name for s in frequency.free_symbols} & set(axes):
         return ""
     return f", {frequency} = {value:g}" if frequency.free_symbols else f", drive frequency {value:g}"
+
+
+def drive_period(scene: Scene, axes: Collection[str] = ()) -> float:
+    """The period of the drive; 0 without one, or if its frequency is among `axes`."""
+    return (scene.period or 0.0) if drive_words(scene, axes) else 0.0

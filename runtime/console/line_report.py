@@ -13,6 +13,7 @@ from synchain.models.graphs.topology import Topology
 from ..prediction.modes import transversal_modes
 from ..prediction.synchronisability import Verdict, verdict
 from ..stability.msf import MSF
+from .drive import drive_period
 from .words import (
     defective_rows,
     exact,
@@ -117,7 +118,7 @@ class LineReport:
             ("class", f"{function.kind}, for alpha from {line[0]:g} to {line[-1]:g}"),
             ("negative for alpha", "; ".join(ranges) or "none"),
             ("smallest, largest", f"{np.min(function.exponent):z.4f}, {np.max(function.exponent):z.4f}"),
-            *how(function.scene, function.attractors, function.fine.time, function.stderr),
+            *how(drive_period(function.scene), function.attractors, function.fine.time, function.stderr),
         ]
         lines = [f"{headline(function.scene)}, alpha = -sigma gamma", *rows_of(rows)]
         if self.judged:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from .arguments import above_zero, whole
@@ -76,17 +76,19 @@ def named_network(arguments: Namespace, scene: Scene | None) -> Topology | None:
     return topology(name or "chain", n)
 
 
-def scene_on(network: Topology, scene: Scene | None, arguments: Namespace) -> Scene:
+def scene_on(network: Topology | None, scene: Scene | None, arguments: Namespace, given: Collection[str] = ()) -> Scene:
     """Return one cell of a scene on a network, without records, at the frequency of --omega.
 
     Parameters
     ----------
-    network : Topology
-        The network of the returned scene.
+    network : Topology or None
+        The network of the returned scene; None for that of a scene with several layers of links.
     scene : Scene or None
         The oscillators and their parameters; the default scene if None.
     arguments : Namespace
         Holds `omega`, a frequency or None, and `scene`, the user's word for the scene or None.
+    given : collection of str
+        The parameters that --set gives.
 
     Returns
     -------
@@ -105,17 +107,18 @@ def scene_on(network: Topology, scene: Scene | None, arguments: Namespace) -> Sc
         scene = Scene(topology=network)
     if scene.draws:
         raise WrongUse(f"found draws of {', '.join(scene.draws)} in the scene; expected none; only run takes them")
-    if scene.links is not None:
+    if scene.links is not None and network is not None:
         raise WrongUse(
-            f"found {len(scene.links)} layers of links in the scene; expected one; in Python, `plane` takes the "
-            "strengths of several"
+            f"found {len(scene.links)} layers of links in the scene; expected one; their strengths can be the axes "
+            "of a map: synchain msf SCENE --set NAME=LO:HI:N NAME=LO:HI:N"
         )
-    frequency = at_frequency(scene, arguments.omega, arguments.scene)
-    chosen = {*frequency, *scene.strengths}
+    frequency = at_frequency(scene, arguments.omega, arguments.scene, given)
+    chosen = {*frequency, *scene.strengths, *given} if network is not None else {*frequency, *given}
     moved = [axis.name for axis in scene.axes if axis.name not in chosen]
     if moved:
         raise WrongUse(f"{arguments.scene} sweeps {', '.join(moved)}; expected a scene without these axes")
-    return scene.replace(topology=network, axes=(), zipped=False, continuation="none", record=None, **frequency)
+    settings: dict[str, object] = {} if network is None else {"topology": network}
+    return scene.replace(**settings, axes=(), zipped=False, continuation="none", record=None, **frequency)
 
 
 def named_graph(arguments: Namespace) -> Topology:

@@ -1,4 +1,4 @@
-"""Report on a master stability function over complex strengths: text, JSON, files."""
+"""Report on exponents over two axes: text, JSON, files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import numpy as np
 
 from ..prediction.modes import transversal_modes
 from ..prediction.synchronisability import Window, windows_complex
-from ..stability.msf import Plane
+from ..stability.msf import STRENGTHS, Plane
+from .drive import drive_period
 from .words import defective_rows, finite, headline, how, rows_of, window_dict, window_text, write_files
 
 if TYPE_CHECKING:
@@ -19,20 +20,23 @@ if TYPE_CHECKING:
 
 __all__ = ["PlaneReport", "plane_windows"]
 
+MOST_MODES = 6
+"""Modes that a report lists."""
+
 STEPS = 2001
 """Values of sigma at which a network is looked up in the plane."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlaneReport:
-    """A master stability function over complex strengths and what it says about a network.
+    """Exponents over two axes, and what a function of complex strengths says about a network.
 
     Attributes
     ----------
     plane : Plane
-        The exponents over alpha + i beta.
+        The exponents.
     network : bool
-        Whether the scene has a network to be judged.
+        Whether the scene has a network to be judged: by alpha + i beta alone.
     """
 
     plane: Plane
@@ -51,22 +55,22 @@ class PlaneReport:
     def text(self) -> str:
         """Return the report as lines of text."""
         plane = self.plane
-        alpha, beta = plane.across, plane.up
         contours = [
             ", ".join(
-                f"{name} {part.min():z.4f} … {part.max():z.4f}"
-                for name, part in zip(("alpha", "beta"), line.T, strict=True)
+                f"{name} {part.min():z.4f} … {part.max():z.4f}" for name, part in zip(plane.names, line.T, strict=True)
             )
             for line in plane.contours
         ]
+        axes = zip(plane.names, (plane.across, plane.up), strict=True)
         rows = [
-            ("plane", f"alpha {alpha[0]:g} … {alpha[-1]:g}, beta {beta[0]:g} … {beta[-1]:g}"),
+            ("plane", ", ".join(f"{name} {values[0]:g} … {values[-1]:g}" for name, values in axes)),
             *[("zero contour", words) for words in contours or ["none"]],
-            ("negative", f"at {np.count_nonzero(plane.exponent < 0)} of {plane.exponent.size} strengths"),
+            ("negative", f"at {np.count_nonzero(plane.exponent < 0)} of {plane.exponent.size} points"),
             ("smallest, largest", f"{np.min(plane.exponent):z.4f}, {np.max(plane.exponent):z.4f}"),
-            *how(plane.scene, plane.motion.tolist(), plane.time, plane.stderr),
+            *_mode_rows(plane),
+            *how(drive_period(plane.scene, plane.names), plane.motion.reshape(-1).tolist(), plane.time, plane.stderr),
         ]
-        lines = [f"{headline(plane.scene)}, alpha + i beta = -sigma gamma", *rows_of(rows)]
+        lines = [f"{headline(plane.scene, plane.names)}, {_meaning(plane)}", *rows_of(rows)]
         if self.network:
             graph = plane.scene.topology
             ranges = [window_text(window, error=False) for window in plane_windows(plane)] or ["none in this plane"]
@@ -89,6 +93,25 @@ class PlaneReport:
                 draw_rays(axes, self.plane, (scene.parameters[scene.strength] if scene.model.linked else 0.0) or None)
 
         return write_files(folder, "plane", table(self.plane), draw)
+
+
+def _meaning(plane: Plane) -> str:
+    """What the exponents are those of."""
+    if plane.names == STRENGTHS:
+        return "alpha + i beta = -sigma gamma"
+    if "alpha" in plane.names:
+        return "alpha = -sigma gamma"
+    return f"the largest of {len(plane.modes)} transversal modes of {plane.scene.n} nodes"
+
+
+def _mode_rows(plane: Plane) -> list[tuple[str, str]]:
+    """At how many points which mode has the largest exponent, the most frequent ones first."""
+    if plane.mode is None:
+        return []
+    counts = np.bincount(plane.mode.reshape(-1), minlength=len(plane.modes))
+    order = [k for k in np.argsort(-counts, kind="stable")[:MOST_MODES] if counts[k]]
+    gammas = [words if ", " in words else words[1:-1] for words in plane.modes]  # of one layer without brackets
+    return [("largest for", f"gamma = {gammas[k]}, at {counts[k]} of {plane.mode.size} points") for k in order]
 
 
 def plane_windows(plane: Plane) -> tuple[Window, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,20 +36,22 @@ __all__ = [
 ]
 
 
-def headline(scene: Scene) -> str:
-    """Return the first line of a report: oscillators, coupling, drive, unit of the exponents."""
+def headline(scene: Scene, axes: Collection[str] = ()) -> str:
+    """Return the first line of a report: oscillators, coupling, the drive if it is none of the
+    `axes`, and the unit of exponents.
+    """
     coupling = f", {scene.coupling} coupling" if scene.coupling else ""
     oscillators = " and ".join(dict.fromkeys(kind.oscillator.name for kind in scene.model.kinds))
-    return f"{oscillators} oscillator{coupling}{drive_words(scene)}: exponents per unit of time"
+    return f"{oscillators} oscillator{coupling}{drive_words(scene, axes)}: exponents per unit of time"
 
 
-def how(scene: Scene, attractors: Sequence[str], time: float, stderr: np.ndarray) -> list[tuple[str, str]]:
+def how(period: float, attractors: Sequence[str], time: float, stderr: np.ndarray) -> list[tuple[str, str]]:
     """Return the rows on the orbits and on the length of the average.
 
     Parameters
     ----------
-    scene : Scene
-        The scene with its drive.
+    period : float
+        Period of the drive; 0 without one, or if an axis changes it.
     attractors : sequence of str
         The kind of attractor that each start settled on.
     time : float
@@ -67,7 +69,7 @@ def how(scene: Scene, attractors: Sequence[str], time: float, stderr: np.ndarray
     )
     worst = float(np.max(stderr))
     sure = f"largest standard error {worst:.1g}" if math.isfinite(worst) else "too short for an error: raise --periods"
-    drive = f" ({time / scene.period:.0f} drive periods)" if scene.period else ""
+    drive = f" ({time / period:.0f} drive periods)" if period else ""
     length = f"{time:.6g} units of time{drive} for each start" if time else "not needed"
     return [("attractor", kinds), ("average", f"{length}, {sure}")]
 

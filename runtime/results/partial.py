@@ -1,5 +1,5 @@
 """Results out of the blocks of a sweep on disk: of the cells so far in memory, or of all cells in a
-netCDF file.
+file.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from ..cells.layout import Layout
 from ..cells.observed import Sections
 from ..cells.plan import Planner
 from ..cells.reduce import NodeMerge, Reduction
-from ..support.files import understood, whole_file
-from ..support.netcdf import Sheet, seal, unsealed
+from ..support.files import understood
 from .block_log import BlockLog, Description
 from .certificate import VERDICTS, Certificate
 from .labels import Variable, dimensions, labelled, scene_of, swept, variables
 from .result import Result, gather
+from .store import filled
 
 __all__ = [
     "certificate_of",
@@ -137,8 +137,8 @@ def _so_far(reader: _Reader) -> Result:
 
 
 def write_result(log: BlockLog, path: str | os.PathLike[str], scene: Scene) -> dict[str, int]:
-    """Write the netCDF file of a scene's log that has all blocks, with one block in memory at a
-    time.
+    """Write the file of a scene's log that has all blocks, with one block in memory at a time; the
+    ending of `path` chooses its form.
 
     Returns
     -------
@@ -149,19 +149,15 @@ def write_result(log: BlockLog, path: str | os.PathLike[str], scene: Scene) -> d
     reader = _Reader(log, scene)
     verdicts: dict[str, int] = {}
     lengths = dict(zip(dimensions(scene), scene.shape, strict=True))
-    with whole_file(path) as temporary, open(temporary, "w+b") as file:
-        sheet = Sheet(file, _template(reader), lengths)
+    with filled(path, _template(reader), lengths) as file:
         for name, _, values in swept(scene):
-            sheet.put(name, np.arange(len(values)), values)
+            file.put(name, np.arange(len(values)), values)
         for block in range(reader.layout.blocks):
             rows = reader.layout.rows(block)
             for name, _, values in reader.variables(rows, reader.buffers(block)):
-                sheet.put(name, rows, values)
+                file.put(name, rows, values)
                 for verdict, count in _verdicts(name, values):
                     verdicts[verdict] = verdicts.get(verdict, 0) + count
-        seal(file)
-        file.flush()
-        os.fsync(file.fileno())
     return verdicts
 
 
@@ -170,7 +166,7 @@ def _template(reader: _Reader) -> xr.Dataset:
     scene = reader.scene
     first = Buffers(*(array[:1] for array in reader.buffers(0).arrays()))
     found = reader.variables(np.arange(1), first)
-    return unsealed(labelled(scene, found, (1,) * len(scene.shape), reader.log.about["attributes"]))
+    return labelled(scene, found, (1,) * len(scene.shape), reader.log.about["attributes"])
 
 
 def verdicts_in(data: xr.Dataset) -> dict[str, int]:

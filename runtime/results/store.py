@@ -1,68 +1,151 @@
 """Files of labelled data: netCDF-3 without further packages, netCDF-4 and Zarr if their packages are installed.
 
 A file appears whole or not at all, and carries a digest by which damage is seen: netCDF-3 that of its
-bytes, the other forms that of their contents.
+bytes, the other forms that of their contents.  It is written at once, or filled row by row with few
+rows in memory.  Rows have fixed places in netCDF-3 alone: the other forms, whose chunks are
+compressed whole, are copied from such a file beside them, chunk by chunk.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-import shutil
-import tempfile
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
 from importlib import import_module
+from itertools import product
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, TypeAlias
 
 import numpy as np
 import xarray as xr
 
 from synchain.models.inputs.checks import check_path
+from synchain.models.inputs.regular_file import open_regular
 
-from ..support.files import netcdf_data, whole_file
-from ..support.netcdf import DIGEST, seal, unsealed
+from ..support.files import check_replaceable, synced, whole_file, whole_folder
+from ..support.netcdf import DIGEST, Sheet, is_sealed, seal, unsealed
 
-__all__ = ["CHOICES", "NETCDF", "attributes_of", "ending_of", "read_data", "write_data"]
+__all__ = [
+    "FORMS",
+    "Form",
+    "attributes_of",
+    "chunk",
+    "filled",
+    "form_of",
+    "opened",
+    "pieces",
+    "read_data",
+    "write_data",
+]
 
 PARTS = ("real", "imaginary")
 """The values of the dimension `part`, by which complex numbers are stored as pairs of real ones."""
 
-NETCDF = ".nc"
-"""The ending of netCDF-3."""
+CHUNK = 2**15
+"""Numbers of a chunk, 256 kB of doubles, which are in memory together."""
 
-CHOICES = {".nc4": "h5netcdf", ".zarr": "zarr"}
-"""The package of each other ending."""
+Copy: TypeAlias = "Callable[[xr.Dataset, Path, Collection[str]], None]"
+"""Writes a dataset to a path: variables with one of these dimensions chunk by chunk, others at once."""
 
 
-def ending_of(path: str | os.PathLike[str], known: Sequence[str] = (NETCDF, *CHOICES)) -> str:
-    """Return the ending of a path, in small letters; ValueError if it is none of the `known` ones."""
+@dataclass(frozen=True, slots=True)
+class Form:
+    """A form of files.
+
+    Attributes
+    ----------
+    package : str or None
+        What it needs besides the dependencies of this package.
+    check : callable
+        Raises OSError if what stands at a path is no file of this form.
+    whole : callable
+        Yields a temporary path that takes the place of the one that is given.
+    write : callable
+        Writes a dataset to a path, without its digest.
+    rows : callable
+        Yields the sheet of a file at a path, which is like a template but for the lengths of some
+        dimensions.
+    seal : callable
+        Writes the digest of a file into it.
+    open : callable
+        Returns the data of a file whose digest fits, to be read as they are asked for.
+    """
+
+    package: str | None
+    check: Callable[[Path], None]
+    whole: Callable[[Path], AbstractContextManager[Path]]
+    write: Callable[[xr.Dataset, Path], None]
+    rows: Callable[[xr.Dataset, Mapping[str, int], Path], AbstractContextManager[Sheet]]
+    seal: Callable[[Path], None]
+    open: Callable[[Path], xr.Dataset]
+
+
+def form_of(path: str | os.PathLike[str]) -> Form:
+    """Return the form that the ending of a path chooses.
+
+    Raises
+    ------
+    ValueError
+        If no form has this ending.
+    ModuleNotFoundError
+        If the package of the form is not installed.
+    """
     ending = check_path("path", path).suffix.lower()
-    if ending not in known:
-        raise ValueError(f"path: found {os.fspath(path)!r}; expected a name that ends in {' or '.join(known)}")
-    return ending
+    if ending not in FORMS:
+        raise ValueError(f"path: found {os.fspath(path)!r}; expected a name that ends in {' or '.join(FORMS)}")
+    if (package := FORMS[ending].package) is not None:
+        try:
+            import_module(package)
+        except ModuleNotFoundError:
+            raise ModuleNotFoundError(
+                f"{os.fspath(path)}: the ending {ending} needs the package {package}; install it: python -m pip "
+                'install "synchain[files]", or end the name in .nc',
+                name=package,
+            ) from None
+    return FORMS[ending]
 
 
 def write_data(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
     """Write a dataset; its ending chooses the form (see `Labelled.save`)."""
-    ending = ending_of(path)
-    target, plain = Path(path), _without_complex(data)
-    if ending == ".zarr":
-        _needed(ending, target)
-        _write_folder(plain, target)
-        return
-    with whole_file(target) as temporary:
-        if ending == ".nc4":
-            _needed(ending, target)
-            _digested(plain).to_netcdf(temporary, engine="h5netcdf")
-            return
-        unsealed(plain).to_netcdf(temporary, engine="scipy", format="NETCDF3_64BIT")
-        with open(temporary, "r+b") as file:
-            seal(file)
+    with _new(path) as (form, temporary):
+        form.write(_without_complex(data), temporary)
 
 
-def read_data(path: Path) -> xr.Dataset:
-    """Return the dataset of a file or Zarr folder, in memory, without its digest.
+@contextmanager
+def filled(path: str | os.PathLike[str], template: xr.Dataset, lengths: Mapping[str, int]) -> Iterator[Sheet]:
+    """Yield the variables of a new file, to be filled; it appears at the end of the with block.
+
+    Parameters
+    ----------
+    path : str or path
+        Its ending chooses the form.
+    template : Dataset
+        Holds variables, dimensions and attributes.
+    lengths : mapping of str to int
+        Of the dimensions that are longer in the file; their variables are what is to be filled.
+    """
+    with _new(path) as (form, temporary), form.rows(_without_complex(template), lengths, temporary) as rows:
+        yield rows
+
+
+@contextmanager
+def _new(path: str | os.PathLike[str]) -> Iterator[tuple[Form, Path]]:
+    """The form of a path, and where to write what takes its place, sealed and on the disk itself."""
+    form, target = form_of(path), Path(path)
+    form.check(target)
+    with form.whole(target) as temporary:
+        yield form, temporary
+        form.seal(temporary)
+        synced(temporary)
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[xr.Dataset]:
+    """Yield the open data of a file, which are read as they are asked for.
 
     Raises
     ------
@@ -71,11 +154,17 @@ def read_data(path: Path) -> xr.Dataset:
     OSError
         If there is no such file or if it is damaged.
     """
-    if path.suffix.lower() == ".zarr" or path.suffix.lower() == ".nc4":
-        data = _read_digested(path)
-    else:
-        with netcdf_data(path) as file:
-            data = file.load()
+    if not path.exists():
+        raise FileNotFoundError(f"{path} does not exist; expected a result: check the path")
+    form = form_of(path) if path.suffix.lower() in FORMS else FORMS[".nc"]
+    with form.open(path) as data:
+        yield data
+
+
+def read_data(path: Path) -> xr.Dataset:
+    """Return the dataset of a file in memory, without its digest; raises as `opened`."""
+    with opened(path) as file, _readable(path):
+        data = file.load().drop_encoding()  # how it was stored does not say how to store it again
     data.attrs = attributes_of(data.attrs, path)
     return _with_complex(data)
 
@@ -91,75 +180,221 @@ def attributes_of(attributes: dict[str, object], path: Path) -> dict[str, object
     return {str(name): value for name, value in attributes.items() if name != DIGEST}
 
 
-def _needed(ending: str, path: Path) -> None:
-    """Raise ModuleNotFoundError if the package of an ending is not installed."""
-    package = CHOICES[ending]
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    """Turn any error of a package that reads what is no file of its own into an OSError in one line."""
     try:
-        import_module(package)
-    except ModuleNotFoundError:
-        raise ModuleNotFoundError(
-            f"{path}: the ending {ending} needs the package {package}; install it: python -m pip install {package}, "
-            "or end the name in .nc",
-            name=package,
-        ) from None
-
-
-def _write_folder(data: xr.Dataset, target: Path) -> None:
-    """Write a Zarr folder beside the target, then put it in the target's place."""
-    if target.exists() and not (target / ".zgroup").is_file():
-        raise FileExistsError(f"{target} is no Zarr folder; expected one or nothing there; choose another path")
-    folder = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.stem}-", suffix=".zarr"))
-    try:
-        _digested(data).to_zarr(folder, mode="w", zarr_format=2, consolidated=False)
-        if target.exists():
-            shutil.rmtree(target)
-        os.chmod(folder, 0o755)
-        os.replace(folder, target)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-def _read_digested(path: Path) -> xr.Dataset:
-    """The data of a netCDF-4 file or Zarr folder whose digest fits."""
-    if not path.exists():
-        raise FileNotFoundError(f"{path} does not exist; expected a result: check the path")
-    ending = path.suffix.lower()
-    _needed(ending, path)
-    try:
-        more = {} if ending == ".nc4" else {"consolidated": False}
-        with xr.open_dataset(path, engine=CHOICES[ending], **more) as file:  # type: ignore[arg-type]
-            data = file.load()
-    except Exception as problem:  # the packages raise anything on what is no file of theirs
+        yield
+    except Exception as problem:
         words = " ".join(str(problem).split()) or type(problem).__name__
         raise OSError(f"cannot read {path}, the file is damaged: {words}") from problem
-    if data.attrs.get(DIGEST, "") not in ("", _digest(data)):
-        raise OSError(f"{path} is damaged, its contents do not fit their digest; restore it from a copy")
+
+
+def _damaged(path: Path, what: str) -> OSError:
+    return OSError(
+        f"{path} is damaged, its {what} do not fit their digest; restore it from a copy, or run again with overwrite "
+        "(--overwrite)"
+    )
+
+
+# -- netCDF-3 ------------------------------------------------------------------------------------------------
+
+
+def _write_netcdf3(data: xr.Dataset, path: Path) -> None:
+    unsealed(data).to_netcdf(path, engine="scipy", format="NETCDF3_64BIT")
+
+
+@contextmanager
+def _rows_of_netcdf3(template: xr.Dataset, lengths: Mapping[str, int], path: Path) -> Iterator[Sheet]:
+    with open(path, "wb") as file:
+        yield Sheet(file, unsealed(template), lengths)
+
+
+def _seal_netcdf3(path: Path) -> None:
+    with open(path, "r+b") as file:
+        seal(file)
+
+
+def _open_netcdf3(path: Path) -> xr.Dataset:
+    with open_regular(path) as file:
+        start = file.read(4)
+        if start[:3] != b"CDF":
+            kind = "an HDF5 or netCDF4 file" if start == b"\x89HDF" else "no netCDF file"
+            raise OSError(f"{path} is {kind}; expected a netCDF 3 result, as Result.save and stream write it")
+        sealed = is_sealed(file)
+    if sealed is False:  # before its header is believed
+        raise _damaged(path, "bytes")
+    with _readable(path):
+        data = xr.open_dataset(path, engine="scipy")
+    if sealed is None and DIGEST in data.attrs:
+        data.close()
+        raise _damaged(path, "bytes")
     return data
 
 
-def _digested(data: xr.Dataset) -> xr.Dataset:
-    copy = data.copy(deep=False)
-    copy.attrs = {**data.attrs, DIGEST: _digest(data)}
-    return copy
+# -- netCDF-4 ------------------------------------------------------------------------------------------------
+
+
+def _write_netcdf4(data: xr.Dataset, path: Path) -> None:
+    data.to_netcdf(path, engine="h5netcdf")
+
+
+def _copy_to_netcdf4(data: xr.Dataset, path: Path, long: Collection[str]) -> None:
+    import h5netcdf
+
+    with TemporaryDirectory(dir=path.parent, prefix=path.stem, suffix=path.suffix) as folder:
+        first = Path(folder, "first.nc4")
+        _write_netcdf4(_first(data, long), first)
+        with h5netcdf.File(first, "r") as made, h5netcdf.File(path, "w") as file:
+            file.dimensions = {name: data.sizes.get(name, part.size) for name, part in made.dimensions.items()}
+            file.attrs.update(made.attrs)
+            for name, variable in made.variables.items():
+                about = dict(variable.attrs)
+                fill = about.pop("_FillValue", None)
+                copy = file.create_variable(name, variable.dimensions, variable.dtype, fillvalue=fill)
+                copy.attrs.update(about)
+                if not set(variable.dimensions) & set(long):
+                    copy[...] = variable[...]
+            _copy(data, long, file.variables)
+
+
+def _seal_netcdf4(path: Path) -> None:
+    import h5netcdf
+
+    digest = _digest_of(path, "h5netcdf")
+    with h5netcdf.File(path, "r+") as file:
+        file.attrs[DIGEST] = digest
+
+
+def _open_netcdf4(path: Path) -> xr.Dataset:
+    open_regular(path).close()
+    return _intact(path, "h5netcdf")
+
+
+# -- Zarr ----------------------------------------------------------------------------------------------------
+
+
+def _check_zarr(target: Path) -> None:
+    if target.exists() and not (target / ".zgroup").is_file():
+        raise FileExistsError(f"{target} is no Zarr folder; expected one or nothing there; choose another path")
+
+
+def _write_zarr(data: xr.Dataset, path: Path, encoding: Mapping[str, Any] | None = None) -> None:
+    data.to_zarr(path, mode="w", zarr_format=2, consolidated=False, encoding=encoding)
+
+
+def _copy_to_zarr(data: xr.Dataset, path: Path, long: Collection[str]) -> None:
+    import zarr
+
+    _write_zarr(_first(data, long), path, {name: {"chunks": chunk(data[name].shape)} for name in _with(data, long)})
+    arrays = dict(zarr.open_group(path, mode="r+").arrays())
+    for name in _with(data, long):
+        arrays[name].resize(data[name].shape)
+    _copy(data, long, arrays)
+
+
+def _seal_zarr(path: Path) -> None:
+    import zarr
+
+    zarr.open_group(path, mode="r+").attrs[DIGEST] = _digest_of(path, "zarr")
+
+
+# -- pieces --------------------------------------------------------------------------------------------------
+
+
+def _by_way_of_netcdf3(copy: Copy) -> Callable[..., AbstractContextManager[Sheet]]:
+    """How files are filled whose rows have no fixed places: in netCDF-3 beside them, of which they are copies."""
+
+    @contextmanager
+    def rows(template: xr.Dataset, lengths: Mapping[str, int], path: Path) -> Iterator[Sheet]:
+        beside = path.with_name(f"{path.stem}-rows{path.suffix}")
+        try:
+            with _rows_of_netcdf3(template, lengths, beside) as sheet:
+                yield sheet
+            with xr.open_dataset(beside, engine="scipy", cache=False) as data:
+                data.attrs.pop(DIGEST)
+                copy(data.drop_encoding(), path, lengths)
+        finally:
+            beside.unlink(missing_ok=True)
+
+    return rows
+
+
+def _with(data: xr.Dataset, long: Collection[str]) -> list[str]:
+    """The variables that have a long dimension."""
+    return [str(name) for name, variable in data.variables.items() if set(variable.dims) & set(long)]
+
+
+def _first(data: xr.Dataset, long: Collection[str]) -> xr.Dataset:
+    """The data at the first place of the long dimensions, in memory."""
+    return data.isel({name: slice(1) for name in long}).load()
+
+
+def _copy(data: xr.Dataset, long: Collection[str], arrays: Mapping[str, Any]) -> None:
+    """Copy the variables that have a long dimension into arrays of their shapes."""
+    for name in _with(data, long):
+        variable, array = data.variables[name], arrays[name]
+        for piece in pieces(variable.shape):
+            array[piece] = variable[piece].values.astype(array.dtype)
+
+
+def chunk(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the shape of a chunk of at most CHUNK elements that follow each other in C order."""
+    left, found = CHUNK, []
+    for size in reversed(shape):
+        found.append(max(1, min(size, left)))
+        left //= size or 1
+    return tuple(reversed(found))
+
+
+def pieces(shape: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
+    """Yield the chunks of an array in C order."""
+    steps = [range(0, size, step) for size, step in zip(shape, chunk(shape), strict=True)]
+    for corner in product(*steps):
+        yield tuple(slice(first, first + run.step) for first, run in zip(corner, steps, strict=True))
+
+
+# -- digests of contents -------------------------------------------------------------------------------------
+
+
+def _lazy(path: Path, engine: str) -> xr.Dataset:
+    more: dict[str, Any] = {"consolidated": False} if engine == "zarr" else {}
+    return xr.open_dataset(path, engine=engine, cache=False, **more)
+
+
+def _intact(path: Path, engine: str) -> xr.Dataset:
+    """The data of a file whose contents fit their digest."""
+    with _readable(path):
+        data = _lazy(path, engine)
+        fits = data.attrs.get(DIGEST, "") in ("", _digest(data))
+    if not fits:
+        data.close()
+        raise _damaged(path, "contents")
+    return data
+
+
+def _digest_of(path: Path, engine: str) -> str:
+    with _lazy(path, engine) as data:
+        return _digest(data)
 
 
 def _digest(data: xr.Dataset) -> str:
     """The SHA-256 of names, dimensions, values and attributes, whatever the form of the file."""
     total = hashlib.sha256()
     for name in sorted(map(str, data.variables)):
-        variable = data[name]
-        values = variable.values
-        words = [name, *map(str, variable.dims), *map(str, values.shape)]
-        total.update("\n".join(words).encode())
-        text = values.dtype.kind in "OUST"
-        total.update("\n".join(map(str, values.reshape(-1))).encode() if text else _as_double(values).tobytes())
+        variable = data.variables[name]
+        total.update("\n".join([name, *map(str, variable.dims), *map(str, variable.shape)]).encode())
+        if variable.dtype.kind in "OUST":
+            total.update("\n".join(map(str, variable.values.reshape(-1))).encode())
+            continue
+        for piece in pieces(variable.shape):
+            total.update(np.ascontiguousarray(variable[piece].values, dtype="<f8").tobytes())
     for name, value in sorted((str(key), value) for key, value in data.attrs.items() if key != DIGEST):
         total.update(f"{name}={value}".encode())
     return total.hexdigest()
 
 
-def _as_double(values: np.ndarray) -> np.ndarray:
-    return np.ascontiguousarray(values, dtype="<f8")
+# -- complex numbers -----------------------------------------------------------------------------------------
 
 
 def _without_complex(data: xr.Dataset) -> xr.Dataset:
@@ -180,3 +415,27 @@ def _with_complex(data: xr.Dataset) -> xr.Dataset:
         if "part" in values.dims
     }
     return data.assign(whole).drop_vars("part") if whole else data
+
+
+FORMS: dict[str, Form] = {
+    ".nc": Form(None, check_replaceable, whole_file, _write_netcdf3, _rows_of_netcdf3, _seal_netcdf3, _open_netcdf3),
+    ".nc4": Form(
+        "h5netcdf",
+        check_replaceable,
+        whole_file,
+        _write_netcdf4,
+        _by_way_of_netcdf3(_copy_to_netcdf4),
+        _seal_netcdf4,
+        _open_netcdf4,
+    ),
+    ".zarr": Form(
+        "zarr",
+        _check_zarr,
+        whole_folder,
+        _write_zarr,
+        _by_way_of_netcdf3(_copy_to_zarr),
+        _seal_zarr,
+        lambda path: _intact(path, "zarr"),
+    ),
+}
+"""The forms by the endings that choose them."""

@@ -32,6 +32,7 @@ from ..support.execution import Execution
 from ..support.progress import Hook, Reporter
 from .attractor import Attractor, find_attractor
 from .averages import Averaging, Batches
+from .network import unused_axes
 from .orbits import Orbits
 
 __all__ = [
@@ -241,8 +242,9 @@ def exponents(
     ------
     ValueError
         If the network has no coupling, if the coupling has no synchronous state, if time enters
-        without a known period, and for a scene with axes or draws, for whose cells there is no one
-        answer.
+        without a known period, and for a scene with draws, or with axes on which the orbit depends: for
+        their cells there is no one answer.  An axis of the strength of links that vanish between equal
+        states is no such axis.
     FloatingPointError
         If an integration fails.
     """
@@ -332,6 +334,8 @@ def _by_start(
 def coupled_cell(given: Given, scene: Scene, rtol: float) -> Scene:
     """Return a single cell whose network has a coupling: a lone oscillator gets a partner.
 
+    The scene may sweep strengths that do not move the synchronous orbit.
+
     Parameters
     ----------
     given : Given
@@ -341,7 +345,7 @@ def coupled_cell(given: Given, scene: Scene, rtol: float) -> Scene:
     rtol : float
         Relative tolerance.
     """
-    given.expect_one_cell(scene)
+    given.expect_one_cell(scene, unused_axes(scene))
     return single_cell(given, with_partner(scene), rtol)
 
 

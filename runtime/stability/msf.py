@@ -294,8 +294,10 @@ class Plane(Labelled):
         Returns
         -------
         dict
-            Both axes by their names, exponent and stderr (rows of the first), contours, attractors and time.
+            Both axes by their names, exponent and stderr (rows of the first), contours, attractors and time; over two
+            parameters "modes" and "mode" too.
         """
+        of_modes = {} if self.mode is None else {"modes": list(self.modes), "mode": self.mode.tolist()}
         return {
             self.names[0]: self.across.tolist(),
             self.names[1]: self.up.tolist(),
@@ -304,6 +306,7 @@ class Plane(Labelled):
             "contours": [line.tolist() for line in self.contours],
             "attractors": self.motion.tolist(),
             "time": self.time,
+            **of_modes,
         }
 
 
@@ -430,6 +433,8 @@ def plane(
             "plane: found two parameters and a scene without links; expected a network, or alpha and a parameter"
         )
     if rows:
+        if "alpha" not in axes:  # exponents depend on all strengths
+            whole.expect_one_cell(scene)
         cell = coupled_cell(
             replace(given, table={**given.values, **{name: axes[name][0] for name in rows}}), scene, rtol
         )

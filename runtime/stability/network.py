@@ -11,7 +11,7 @@ import numpy as np
 from synchain.models.scenes.scene import Scene
 from synchain.models.spectra.joint import JointEigenvalue, joint_spectrum
 
-__all__ = ["SharedOrbit", "shared_orbits", "still_strengths", "transversal_modes"]
+__all__ = ["SharedOrbit", "shared_orbits", "still_strengths", "transversal_modes", "unused_axes"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +52,11 @@ def still_strengths(scene: Scene) -> set[str]:
     """Return the strengths that do not move the synchronous orbit: those of layers whose links vanish between equal states."""
     pairs = zip(scene.strengths, scene.equations.layers, strict=True)
     return {name for name, layer in pairs if all(edge.diffusive for _, edge in layer.edge_of)}
+
+
+def unused_axes(scene: Scene) -> set[str]:
+    """Return the axes on which nothing depends that is computed for given strengths of modes or of links."""
+    return {axis.name for axis in scene.axes} & still_strengths(scene) if scene.axes else set()
 
 
 def shared_orbits(scene: Scene, columns: Mapping[str, np.ndarray]) -> Iterator[SharedOrbit]:

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from glob import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-from synchain.models.inputs.regular_file import open_regular
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 __all__ = [
     "check_replaceable",
     "drop_leftovers",
-    "netcdf_data",
     "output_folder",
+    "synced",
     "understood",
     "whole_file",
+    "whole_folder",
     "write_text",
 ]
 
@@ -33,10 +29,8 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     target = Path(path)
     check_replaceable(target)
-    try:
+    with _cannot_write(target):
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix)
-    except OSError as problem:
-        raise OSError(f"cannot write {target}: {problem.strerror}; choose a folder you can write to") from problem
     os.close(handle)
     temporary = Path(name)
     try:
@@ -49,12 +43,51 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 @contextmanager
+def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Yield a temporary folder beside `path`, which takes its place as that of `whole_file` does;
+    a former folder is deleted after that.
+    """
+    target = Path(path)
+    with _cannot_write(target):
+        name = tempfile.mkdtemp(dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix)
+    folder = Path(name)
+    former = folder.with_name(f"{folder.stem}-former{folder.suffix}")
+    try:
+        with _named(target, name):
+            yield folder
+        os.chmod(folder, 0o777 & ~_umask())
+        if target.exists():
+            os.replace(target, former)
+        os.replace(folder, target)
+    finally:
+        for leftover in (folder, former):
+            shutil.rmtree(leftover, ignore_errors=True)
+
+
+def synced(path: Path) -> None:
+    """Ask the system to put a file, or all files of a folder, on the disk itself."""
+    for part in (path, *path.rglob("*")):
+        if part.is_file():
+            with open(part, "rb+") as file:
+                os.fsync(file.fileno())
+
+
+@contextmanager
+def _cannot_write(target: Path) -> Iterator[None]:
+    """Name the target in an error of the system, with a remedy."""
+    try:
+        yield
+    except OSError as problem:
+        raise OSError(f"cannot write {target}: {problem.strerror}; choose a folder you can write to") from problem
+
+
+@contextmanager
 def _named(target: Path, temporary: str) -> Iterator[None]:
     """Make an error of the system name the file of the user instead of none or a temporary one."""
     try:
         yield
     except OSError as problem:
-        if problem.errno is not None and problem.filename in (None, temporary):
+        if problem.errno is not None and str(problem.filename or temporary).startswith(temporary):
             problem.filename = str(target)
         raise
 
@@ -68,48 +101,15 @@ def check_replaceable(target: Path) -> None:
 
 
 def drop_leftovers(path: str | os.PathLike[str]) -> None:
-    """Delete temporary files of processes that were killed while they wrote `path`; no other
-    process may be writing it.
+    """Delete temporary files and folders of processes that were killed while they wrote `path`; no
+    other process may be writing it.
     """
     target = Path(path)
     for leftover in target.parent.glob(f".{escape(target.stem)}-*{escape(target.suffix)}"):
-        leftover.unlink(missing_ok=True)
-
-
-@contextmanager
-def netcdf_data(path: Path) -> Iterator[xr.Dataset]:
-    """Yield the open data of a netCDF file; OSError in one line if there is none or if it is
-    damaged.
-    """
-    import xarray as xr
-
-    from .netcdf import DIGEST, is_sealed
-
-    if not path.exists():
-        raise FileNotFoundError(f"{path} does not exist; expected a netCDF result: check the path")
-    if path.is_dir():
-        raise IsADirectoryError(f"{path} is a folder; expected a netCDF result: name the file in it")
-    with open_regular(path) as file:
-        start = file.read(4)
-        if start[:3] != b"CDF":
-            kind = "an HDF5 or netCDF4 file" if start == b"\x89HDF" else "no netCDF file"
-            raise OSError(f"{path} is {kind}; expected a netCDF 3 result, as Result.save and stream write it")
-        sealed = is_sealed(file)
-    try:
-        if sealed is not False:
-            with xr.open_dataset(path, engine="scipy") as data:
-                if sealed or DIGEST not in data.attrs:
-                    yield data
-                    return
-    except OSError:
-        raise
-    except Exception as problem:  # SciPy and xarray raise anything on what is no file of theirs
-        words = " ".join(str(problem).split()) or type(problem).__name__
-        raise OSError(f"cannot read {path} as a netCDF result, the file is damaged: {words}") from problem
-    raise OSError(
-        f"{path} is damaged, its bytes do not fit their digest; restore it from a copy, or run again with overwrite "
-        "(--overwrite)"
-    )
+        if leftover.is_dir():
+            shutil.rmtree(leftover, ignore_errors=True)
+        else:
+            leftover.unlink(missing_ok=True)
 
 
 @contextmanager

@@ -27,9 +27,9 @@ from ..results.labelled import Labelled
 from ..results.labels import alike, changed, scene_of
 from ..results.partial import certificate_of, describe_sweep, layout_of, partial_path, verdicts_in, write_result
 from ..results.result import Result, read_result
-from ..results.store import NETCDF, attributes_of, ending_of
+from ..results.store import attributes_of, form_of, opened
 from ..support.execution import Execution
-from ..support.files import check_replaceable, drop_leftovers, netcdf_data, understood
+from ..support.files import drop_leftovers, understood
 from ..support.progress import Hook, Progress, Reporter
 from ..support.status import Status, tally
 from .errors import SweepFailed, SweepInterrupted
@@ -97,18 +97,18 @@ def stream(
     parameters: Mapping[str, object] | None = None,
     **axes: object,
 ) -> Streamed:
-    """Run every cell of a scene and write its result to a netCDF file, block by block.
+    """Run every cell of a scene and write its result to a file, block by block.
 
     Memory does not grow with the sweep.  Until all cells have ended, their blocks are kept beside
-    `path` in a file ".partial", which `open_result` opens too.
+    `path` in a file ".partial", whatever the form of the result; `open_result` opens it too.
 
     Parameters
     ----------
     scene : Scene
     path : str or path
-        File of the result, whose name ends in .nc.
+        File of the result, whose ending chooses its form: .nc, .nc4 or .zarr (see `Result.save`).
     resume : bool
-        Go on with a run that was not finished; its result is, byte for byte, that of a run without
+        Go on with a run that was not finished; its result is, bit for bit, that of a run without
         interruption. Nothing is run if it was finished.
     overwrite : bool
         Replace what is there already.
@@ -130,6 +130,8 @@ def stream(
         If the result or an unfinished run is there and neither `resume` nor `overwrite` is given.
     FileNotFoundError
         If there is nothing to resume.
+    ModuleNotFoundError
+        If the package of the form is not installed.
     SweepInterrupted
         On Ctrl-C.
     SweepFailed
@@ -188,10 +190,10 @@ def claim(
         check_flag(name, value)
     target = check_path("path", path)
     partial = partial_path(target)
-    ending_of(target, [NETCDF])
+    form = form_of(target)
     if resume and overwrite:
         raise ValueError("found both resume and overwrite; expected one of them")
-    check_replaceable(target)
+    form.check(target)
     if overwrite:
         return "begin"
     if partial.exists() and (resume or not target.exists()):
@@ -206,7 +208,7 @@ def claim(
         return "continue"
     if target.exists():
         with understood(target):
-            with netcdf_data(target) as file:
+            with opened(target) as file:
                 attributes, exponents = dict(file.attrs), "transversal_exponent" in file
             _check_same(reduction, certified, target, attributes_of(attributes, target), exponents)
         return "complete"
@@ -241,7 +243,7 @@ def _check_same(
 
 def _finished(path: Path, reporter: Reporter) -> Streamed:
     """The run whose result is there already."""
-    with understood(path), netcdf_data(path) as file:
+    with understood(path), opened(path) as file:
         reporter.start(tally(file["status"].values.ravel()))
         verdicts = verdicts_in(file)
     reporter.close()

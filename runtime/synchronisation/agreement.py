@@ -21,10 +21,11 @@ import numpy as np
 
 from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.graphs.topology import Topology
-from synchain.models.scenes.scene import Scene
+from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import Given
 from ..stability.exponents import Exponents, exponents
+from ..stability.network import unused_axes
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .threshold import IN_CRITERION, Criterion, check_probe, checked, simulate
@@ -144,9 +145,9 @@ def agreement(
     ------
     ValueError
         If the line lacks a strength, or if sigma is negative, not finite or does not increase, and for
-        a scene with axes or draws; as `strengths` does.
+        a scene with draws or axes, but for one of sigma; as `strengths` does.
     """
-    scene = Given(agreement, parameters, more, IN_CRITERION).scene(scene)
+    scene = Given(agreement, parameters, more, IN_CRITERION).scene(scene, unused_axes(a_scene(scene)))
     expect_vanishing("agreement", scene.equations)
     check_probe(scene.topology, scene.spectrum)
     scene = scene.replace(record=("sync_error",))

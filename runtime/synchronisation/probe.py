@@ -25,12 +25,13 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.families import topology
 from synchain.models.interactions.link import strength
 from synchain.models.mechanics.components import Edge
-from synchain.models.scenes.scene import Scene
+from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.choice import chosen_for_rows
 from ..cells.keywords import Given
 from ..cells.plan import Plan, Planner, control_of
 from ..results.labelled import Labelled, dataset, ends_of
+from ..stability.network import unused_axes
 from ..support.arrays import numbers
 from ..support.execution import Execution
 from ..support.progress import Hook
@@ -130,12 +131,12 @@ def universal_probe(
     Raises
     ------
     ValueError
-        If strengths are missing or not finite, if the scene has no coupling, axes or draws, or if its
-        coupling is not proportional to sigma and to the weight of a link.
+        If strengths are missing or not finite, if the scene has no coupling, draws, or axes but that of
+        sigma, or if its coupling is not proportional to sigma and to the weight of a link.
     """
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     real, imaginary = _broadcast(alpha, beta)
-    scene = Given(universal_probe, parameters, more, IN_CRITERION).scene(scene)
+    scene = Given(universal_probe, parameters, more, IN_CRITERION).scene(scene, unused_axes(a_scene(scene)))
     if scene.varied:
         scene.equations.expect_alike("the three-oscillator probe")
     ring = scene.replace(

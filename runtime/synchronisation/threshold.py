@@ -32,6 +32,7 @@ from ..prediction.intervals import Interval, intersect, refine, scale
 from ..prediction.synchronisability import expect_no_repulsion
 from ..results.labelled import Labelled, dataset, ends_of, words_of
 from ..stability.averages import check_whole
+from ..stability.network import unused_axes
 from ..support.arrays import row
 from ..support.execution import Execution
 from ..support.progress import Hook
@@ -239,11 +240,12 @@ def thresholds(
     ------
     ValueError
         For a network without links, for one-way links whose eigenvalues are complex, for unequal
-        nodes, for links with inertia, and for a scene with axes or draws.
+        nodes, for links with inertia, and for a scene with draws or axes, but for one of sigma, which
+        is not used.
     """
     a_scene(scene).equations.expect_alike("thresholds")
     expect_vanishing("thresholds", scene.equations)
-    scene = Given(thresholds, parameters, more, IN_CRITERION).scene(scene)
+    scene = Given(thresholds, parameters, more, IN_CRITERION).scene(scene, unused_axes(a_scene(scene)))
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     spectrum = scene.topology.spectrum
     check_probe(scene.topology, spectrum)

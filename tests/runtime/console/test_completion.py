@@ -69,6 +69,8 @@ CASES = [
     ("synchain msf --topology r", {"ring"}, {"star"}),
     ("synchain thresholds two", {"two_oscillators"}, set()),
     ("synchain run --c", {"--certify"}, {"--rtol"}),
+    ("synchain run --format ", {"nc", "nc4", "zarr"}, {"figure_4a"}),
+    ("synchain msf --s", {"--set", "--starts"}, {"--alpha"}),
     ("synchain cache ", {"info", "clear", "warm"}, {"figure_4a"}),
     ("synchain new ", {"friction", "topology", "oscillator", "coupling"}, set()),
     ("synchain check mi", {"mine.toml", "mine.txt"}, {"figure_4a"}),

@@ -51,6 +51,16 @@ def disc(scene: Scene, alpha: np.ndarray, beta: np.ndarray) -> Plane:
     return Plane(scene, alpha, beta, value, np.full(value.shape, 1e-3), np.array([[["aperiodic"]]]), 500.0)
 
 
+def mapped(scene: Scene, alpha: Any, parameters: dict[str, tuple[float, ...]]) -> Plane:
+    """Negative where the first axis is below the second; between two modes over two parameters."""
+    axes = {**({} if alpha is None else {"alpha": alpha}), **parameters}
+    across, up = (np.array(values) for values in axes.values())
+    value = np.subtract.outer(across, up)
+    modes = {} if alpha is not None else {"modes": ("(-1)", "(-3)"), "mode": np.where(value < 0, 0, 1)}
+    kinds = np.array([[["aperiodic"], ["aperiodic"], ["periodic"]]])
+    return Plane(scene, across, up, value, np.full(value.shape, 1e-3), kinds, 500.0, tuple(axes), **modes)
+
+
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
     """What the stand-ins for msf and plane were asked for."""
@@ -61,9 +71,12 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
         found.append({"scene": scene, "alpha": alpha, **options})
         return MSF(scene, alpha, line(alpha))
 
-    def plane(scene: Scene, alpha: np.ndarray, beta: np.ndarray, **options: Any) -> Plane:
-        found.append({"scene": scene, "alpha": alpha, "beta": beta, **options})
-        return disc(scene, alpha, beta)
+    def plane(scene: Scene, alpha: Any = None, beta: Any = None, parameters: Any = None, **options: Any) -> Plane:
+        given = {"alpha": alpha, "beta": beta, "parameters": parameters, **options}
+        found.append({"scene": scene, **{name: value for name, value in given.items() if value is not None}})
+        return (
+            disc(scene, np.asarray(alpha), np.asarray(beta)) if parameters is None else mapped(scene, alpha, parameters)
+        )
 
     monkeypatch.setattr(module, "msf", msf)
     monkeypatch.setattr(module, "plane", plane)
@@ -340,6 +353,88 @@ def test_a_mode_that_leaves_the_plane_ends_the_search_and_not_the_window(tmp_pat
     assert (mirrored[0].low, mirrored[0].high) == pytest.approx((whole.low, whole.high), abs=1e-6)
 
 
+# -- maps over parameters
+# ----------------------------------------------------------------------------------------
+
+
+def test_report_of_a_map_over_alpha_and_a_parameter(
+    asked: list[dict[str, Any]], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    words = f"msf figure_8 --alpha 0:2:5 --set omega=0.5:1.5:3 kappa=1e4 --starts 1 --out {tmp_path}"
+    assert main(words.split()) == 0
+    text = capsys.readouterr().out
+    assert text.startswith(
+        "friction oscillator, spring coupling: exponents per unit of time, alpha = -sigma gamma\n"
+    )  # without a frequency
+    assert value(text, "plane") == "alpha 0 … 2, omega 0.5 … 1.5"
+    assert value(text, "zero contour") == "alpha 0.5000 … 1.5000, omega 0.5000 … 1.5000"
+    assert value(text, "negative") == "at 6 of 15 points"
+    assert value(text, "attractor") == "aperiodic (2 of 3 starts); periodic (1 of 3 starts)"
+    assert "drive periods" not in text  # omega is an axis
+    assert "sigma  " not in text
+    (given,) = asked
+    assert given["parameters"] == {"omega": (0.5, 1.0, 1.5)}
+    assert given["alpha"].tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
+    assert given["starts"] == 1
+    assert given["scene"].parameters["kappa"] == 1e4
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["plane.csv", "plane.png"]
+    assert list(rows(tmp_path / "plane.csv")[0]) == ["alpha", "omega", "exponent", "stderr"]
+    assert main(["msf", "figure_8", "--set", "omega=1,1.5"]) == 0
+    assert (len(asked[1]["alpha"]), asked[1]["alpha"][0], asked[1]["alpha"][-1]) == (241, 0.0, 1.2)
+
+
+def test_report_of_a_map_over_two_parameters(asked: list[dict[str, Any]], capsys: pytest.CaptureFixture[str]) -> None:
+    words = "msf figure_8 --set sigma=0:2:5 kappa=0.5,1,1.5 --set a=2 --topology star --n 5"
+    assert main(words.split()) == 0
+    text = capsys.readouterr().out
+    assert "omega = 1.4: exponents per unit of time, the largest of 2 transversal modes of 5 nodes\n" in text
+    assert [row.split("  ")[-1] for row in text.splitlines() if "largest for" in row] == [
+        "gamma = -3, at 9 of 15 points",
+        "gamma = -1, at 6 of 15 points",
+    ]
+    assert "500 units of time (111 drive periods)" in text
+    (given,) = asked
+    assert "alpha" not in given
+    assert given["parameters"] == {"sigma": (0.0, 0.5, 1.0, 1.5, 2.0), "kappa": (0.5, 1.0, 1.5)}
+    assert given["scene"].parameters["a"] == 2.0
+    assert given["scene"].topology.name == "star"
+    assert main([*words.split(), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["modes"] == ["(-1)", "(-3)"]
+    assert np.shape(found["mode"]) == np.shape(found["exponent"]) == (5, 3)
+    assert found["windows"] is None
+
+
+def test_a_number_is_set_and_an_axis_of_the_scene_with_it(
+    asked: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = tmp_path / "swept.toml"
+    scene.write_text(
+        "topology.name = 'chain'\ntopology.n = 2\nsweep = {kappa = [1e4, 1e5], omega = [1.1, 1.2], sigma = [0, 1]}\n"
+    )
+    assert main(f"msf {scene} --set kappa=2e4 omega=1.5".split()) == 0
+    assert "omega = 1.5" in capsys.readouterr().out
+    assert (asked[0]["scene"].parameters["kappa"], asked[0]["scene"].axes) == (2e4, ())
+    assert main(f"msf {scene} --set omega=1,2 kappa=1e4,1e5".split()) == 0
+    assert asked[1]["scene"].axes == ()
+    assert main(["msf", "--set", "omega=1.4"]) == 0
+
+
+def test_the_real_map_over_the_strengths_of_two_layers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """x' = -x with links k on a ring of 4, gamma = -2 and -4, and g between all, gamma = -4: the exponent is -1 - 2k - 4g."""
+    scene = tmp_path / "layers.toml"
+    scene.write_text(
+        'oscillator = {rates = {x = "-x"}}\ntime_unit = "time"\n'
+        'links = [{coupling = {rates = {x = "k*W*(x_j - x_i)"}, parameters = {k = 1}}, topology = {name = "ring", n = 4}}, '
+        '{coupling = {rates = {x = "g*W*(x_j - x_i)"}, parameters = {g = 1}}, topology = {name = "complete", n = 4}}]\n'
+    )
+    assert main(f"msf {scene} --set k=0,1 g=0,0.5,1 --starts 1 --json".split()) == 0
+    found = json.loads(capsys.readouterr().out)
+    k, g = np.meshgrid(found["k"], found["g"], indexing="ij")
+    np.testing.assert_allclose(found["exponent"], -1 - 2 * k - 4 * g, atol=1e-6)
+    assert found["modes"] == ["(-2, -4)", "(-4, -4)"]
+
+
 # -- files, errors, names
 # ----------------------------------------------------------------------------------------
 
@@ -385,7 +480,19 @@ WRONG = [
     ("figure_8 --out {own}", "the name of a file; expected a folder"),
     ("{alone}", "the scene has no coupling, by which modes differ"),
     ("{swept}", "sweeps kappa, x_1; expected a scene without these axes"),
-    ("{layers}", "found 2 layers of links in the scene; expected one"),
+    ("{layers}", "found 2 layers of links in the scene; expected one; their strengths can be the axes of a map"),
+    ("{layers} --set g=1,2", "found 2 layers of links in the scene; expected one"),
+    ("{layers} --set g=1,2 sigma=1,2 --n 3", "found 2 layers of links in the scene; expected one"),
+    ("{alone} --set omega=1,2", "the scene has no coupling"),
+    ("figure_8 --set sgima=0:1:3", "--set: unknown parameter 'sgima'; known: theta_b, epsilon, "),
+    ("figure_8 --set a=1 a=2", "--set gives a twice"),
+    ("figure_8 --set a=1,2 u=1,2 kappa=1,2", "--set: found the axes a, u, kappa; expected at most two"),
+    ("figure_8 --set a=1,2 --beta 0:1:3", "found --beta beside the axes a of --set"),
+    ("figure_8 --set a=1,2 u=1,2 --alpha 0:1:3", "found --alpha beside the axes a, u of --set"),
+    ("figure_8 --omega 1.2 --set omega=1,2", "found --omega beside --set omega; expected one of them"),
+    ("figure_8 --set a=0:1:2000 u=0:1:2000", "coarser grids"),
+    ("figure_8 --set a=0:1:20000", "coarser grids"),
+    ("figure_8 --set x_1=0", "--set: unknown parameter 'x_1'"),
 ]
 
 
