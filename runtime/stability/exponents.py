@@ -62,9 +62,9 @@ class Exponents(Labelled):
     exponent : ndarray, shape (m,)
         Exponents per unit of non-dimensional time.
     stderr : ndarray, shape (m,)
-        Standard errors. On fixed points and drive-locked periodic orbits, the difference of two
-        cycles; elsewhere half of what the truth lies within in 95 of 100 runs, inf below 45 periods
-        (docs/accuracy.md).
+        Standard errors. On fixed points and periodic orbits, the difference of two cycles, or of two tolerances;
+        elsewhere half of what the truth lies within in 95 of 100 runs, inf below 45 periods, with the error of the
+        steps (docs/accuracy.md).
     time : float
         Time averaged over for each start.
     starts : int
@@ -454,4 +454,4 @@ def average(orbits: Orbits, averaging: Averaging, reporter: Reporter) -> tuple[n
         parts = batches.ahead(left)
         for growth, blocks in zip(orbits.growths(parts), parts, strict=True):
             batches.add(growth, int(blocks))
-    return batches.mean(), batches.error_by_start(), batches.time
+    return batches.mean(), np.hypot(batches.error_by_start(), orbits.error_of_steps()), batches.time

@@ -18,7 +18,7 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import with_modes
-from .averages import BATCHES
+from .averages import BATCHES, SLACK, TRIED, error_of_steps
 from .interpolation import Interpolation, exact_interpolation, lines_of, strength_interpolation
 from .variational_integrator import Travellers, VariationalIntegrator
 
@@ -144,7 +144,9 @@ class Orbits:
             self.scene, self.variation, self.strengths, self.state[rows], self.workers, self.unit, self.method
         )
 
-    def integrator_of(self, strengths: np.ndarray, looseness: float = 1.0) -> VariationalIntegrator:
+    def integrator_of(
+        self, strengths: np.ndarray, looseness: float = 1.0, tolerance: float = 1.0
+    ) -> VariationalIntegrator:
         """Return an integrator along the orbits from their current states.
 
         Parameters
@@ -153,14 +155,18 @@ class Orbits:
             Strengths; each has one deviation for each component.
         looseness : float
             Ratio of the tolerance of the deviations to that of the orbit.
+        tolerance : float
+            Ratio of the tolerance of both to the usual one.
         """
         repeated = np.repeat(strengths, self.components, axis=0)
         rows = _rows(repeated.astype(self.strengths.dtype))
         names = self.variation.orbit.parameters
         numbers = np.tile([self.scene.parameters[name] for name in names], (len(self.state), 1))
-        return VariationalIntegrator.make(
+        integrator = VariationalIntegrator.make(
             self.scene, self.variation, self.state, numbers, rows, self.workers, looseness, self.method
         )
+        integrator.loosen(tolerance)
+        return integrator
 
     def settle(self, periods: float, advanced: Callable[[float], object] | None = None) -> None:
         """Advance all orbits over a transient of a number of units.
@@ -292,6 +298,30 @@ class Orbits:
         if self.integrator is None or self.travellers is None:
             raise RuntimeError("orbits are not prepared")
         return self.integrator.follow(self.block * self.unit, batches, self.travellers)
+
+    def error_of_steps(self) -> np.ndarray:
+        """Advance by TRIED blocks.
+
+        Returns
+        -------
+        ndarray, shape (starts, m)
+            The error of growth rates that is due to the steps (`averages.error_of_steps`).
+
+        Raises
+        ------
+        RuntimeError
+            If the orbits are not prepared.
+        """
+        if self.integrator is None or self.travellers is None:
+            raise RuntimeError("orbits are not prepared")
+        usual, looser, one = [], [], np.ones(1, dtype=np.int64)
+        for _ in range(TRIED):
+            vectors = self.travellers.vectors.copy()
+            with self.integrator.loosened(SLACK):
+                looser.append(self.growths(one)[0])
+            self.travellers.vectors[:] = vectors
+            usual.append(self.growths(one)[0])
+        return error_of_steps(usual, looser, self.block * self.unit)
 
 
 def _rows(strengths: np.ndarray) -> np.ndarray:
