@@ -330,7 +330,7 @@ def _by_start(
 
 
 def coupled_cell(given: Given, scene: Scene, rtol: float) -> Scene:
-    """Return a single cell whose network has a coupling: a lone oscillator gets a partner.
+    """Return a single cell whose network has a coupling: a lone oscillator gets a partner, if there is a link for it.
 
     Parameters
     ----------
@@ -346,10 +346,16 @@ def coupled_cell(given: Given, scene: Scene, rtol: float) -> Scene:
 
 
 def with_partner(scene: Scene) -> Scene:
-    """Return a network that sweeps nothing: a lone oscillator gets a partner; ValueError if the link moves them both."""
+    """Return a network that sweeps nothing: a lone oscillator gets a partner; ValueError if the link moves them both.
+
+    One that its coupling cannot join stays alone: it has the mode of strength 0 (`Orbits.make`).
+    """
     if a_scene(scene).model.linked:
         return scene.replace(**ONE_CELL)
-    coupled = scene.replace(topology=topology("chain", 2), **ONE_CELL)
+    try:
+        coupled = scene.replace(topology=topology("chain", 2), **ONE_CELL)
+    except ValueError:
+        return scene.replace(**ONE_CELL)
     expect_vanishing("a lone oscillator gets a partner", coupled.equations)
     return coupled
 

@@ -4,7 +4,8 @@ Deviations are integrated over short blocks of time and made orthogonal after ea
 enough if every direction stands out of the error of the integration. Under a smoothed friction law,
 oscillators that stick lose their velocity deviations so fast that no block is short enough;
 exponents lost in this error are not reported as numbers. Their sum is known all the same: the sum
-of all exponents is the mean divergence of the equations, which is integrated along the orbit.
+of all exponents is the mean divergence of the equations, which is integrated along the orbit. If one
+alone is lost, this tells it.
 
 Under set-valued friction, stick makes the velocity of a deviation zero, so that directions vanish
 within finite time. Their exponent is -inf by definition, and so is the sum. Such a direction comes
@@ -78,7 +79,7 @@ class Lyapunov(Labelled):
     stderr : ndarray, shape (count,)
         Standard errors.
     resolved : ndarray of bool, shape (count,)
-        False if a direction decays faster than can be followed; its exponent is -inf, its error 0.
+        False if several directions decay faster than can be followed; their exponents are -inf, their errors 0.
     divergence : float
         Mean divergence along the orbit: the sum of all exponents of the network. With set-valued
         friction it is that sum itself, -inf if an oscillator has stuck, nan if not all exponents
@@ -197,7 +198,7 @@ def lyapunov_spectrum(
     transient : float
         Transient before the average, in the same units.
     rtol : float
-        Relative tolerance of the integration. The friction law may require a smaller one.
+        Relative tolerance of the integration, at most 1e-5. The friction law may require a smaller one.
     seed : int
         Seed of the initial directions.
     show_progress : bool, optional
@@ -216,8 +217,8 @@ def lyapunov_spectrum(
     Raises
     ------
     ValueError
-        If there are more than eight oscillators, if `count` exceeds the number of exponents, or if
-        time enters without a known period.
+        If there are more than eight oscillators, if `count` exceeds the number of exponents, if `rtol` is
+        too large, or if time enters without a known period.
     FloatingPointError
         If the integration fails.
     """

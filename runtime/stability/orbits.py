@@ -14,6 +14,7 @@ from synchain.codegen.integrators import Integrator
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.mode_inertia import inertia_of_modes
 from synchain.models.dynamics.variational import Variation, mode
+from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 
 from ..cells.choice import chosen_for_modes
@@ -99,7 +100,7 @@ class Orbits:
         Parameters
         ----------
         scene : Scene
-            Scene with coupling.
+            Scene with coupling; one without has the mode of strength 0 alone.
         strengths : ndarray, shape (m,) or (m, layers)
             Strengths alpha + i beta of the modes.
         state : ndarray, shape (starts, components)
@@ -110,9 +111,10 @@ class Orbits:
         Raises
         ------
         ValueError
-            If time enters without a known period, if a mode has no positive mass at its strength, or if modes have another
+            If time enters without a known period, if a strength other than 0 has no link, if a mode has no positive mass at its strength, or if modes have another
             number of strengths than there are layers of links.
         """
+        scene = scene if scene.model.linked else _joined(scene, strengths)
         variation = _variation(scene.equations, bool(np.iscomplexobj(strengths)))
         layers = len(scene.equations.layers)
         if strengths.size != len(strengths) * layers:
@@ -322,6 +324,18 @@ class Orbits:
             self.travellers.vectors[:] = vectors
             usual.append(self.growths(one)[0])
         return error_of_steps(usual, looser, self.block * self.unit)
+
+
+def _joined(scene: Scene, strengths: np.ndarray) -> Scene:
+    """A lone oscillator and a partner, joined by any link: its strength is 0; ValueError if it is not."""
+    pair, first = topology("chain", 2), next(iter(scene.initial))
+    if not np.any(strengths):
+        return scene.replace(coupling=f"{first}->{first}", topology=pair)
+    try:
+        scene.replace(topology=pair)
+    except ValueError as error:
+        raise ValueError(f"transversal modes need a link to a partner: {error}; strength 0 needs none") from None
+    raise ValueError(f"transversal modes: found no links in {scene!r}; expected a coupling and a topology")
 
 
 def _rows(strengths: np.ndarray) -> np.ndarray:
