@@ -159,7 +159,7 @@ class Equilibrium(Labelled):
     def verdict(self) -> str:
         """The stability in words."""
         if self.growing:
-            return f"unstable, {self.growing} growing"
+            return f"unstable, {'' if self.complete else 'at least '}{self.growing} growing"
         if not self.complete:
             return f"not decided: none of the {len(self.eigenvalues)} eigenvalues nearest to zero grows"
         return f"neutral, {self.neutral} on the imaginary axis" if self.neutral else "stable"

@@ -246,9 +246,7 @@ def _limit_cycle(scene: Scene, periods: int, start: Sequence[float] | np.ndarray
     orbit.settle(scene.transient)
     if rests(rates_of(orbit), orbit.state[0], RETURN):
         at = ", ".join(f"{name} = {x:.6g}" for name, x in zip(scene.components, orbit.state[0], strict=False))
-        raise ArithmeticError(
-            f"no cycle: the motion comes to rest at {at} within {scene.transient:g} units of time; `equilibrium` finds such states"
-        )
+        raise ArithmeticError(f"no cycle: the motion comes to rest at {at}; `equilibrium` finds such states")
     free, steps = limit_cycle(orbit, RETURN)
     if not free:
         raise ArithmeticError(
