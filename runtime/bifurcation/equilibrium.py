@@ -56,6 +56,9 @@ ZERO = 1e-7
 """Size of an eigenvalue that counts as zero, relative to the largest: at a fold two solutions merge, and rounding of
 1e-16 moves the eigenvalue by its root."""
 
+LEAST = 1e-12
+"""Size of an eigenvalue that counts as zero even if there is no larger one."""
+
 SHIFT = 0.7
 """Distance of a shift that must not change the rates."""
 
@@ -172,7 +175,7 @@ class Equilibrium(Labelled):
     @property
     def _zero(self) -> float:
         """Largest real part that counts as zero."""
-        return ZERO * float(np.abs(self.eigenvalues).max(initial=0.0))
+        return max(LEAST, ZERO * float(np.abs(self.eigenvalues).max(initial=0.0)))
 
 
 def equilibrium(

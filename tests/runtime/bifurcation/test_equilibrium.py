@@ -86,6 +86,25 @@ def test_masses_that_depend_on_angles() -> None:
     np.testing.assert_allclose(frequencies**2, [2 - np.sqrt(2), 2 + np.sqrt(2)], rtol=1e-12)
 
 
+def test_links_with_inertia() -> None:
+    """Modes of a chain of three, whose Laplacian has the eigenvalues 0, 1, 3: squares of frequencies 1/(1 + sigma gamma)."""
+    found = sc.equilibrium(sc.Scene("harmonic", "inerter", sc.chain(3), parameters={"sigma": 0.5}))
+    frequencies = np.sort(found.eigenvalues.imag)[3:]
+    np.testing.assert_allclose(frequencies**2, [0.4, 1 / 1.5, 1.0], rtol=1e-12)
+
+
+def test_newton_steps_are_shortened_where_they_would_diverge() -> None:
+    found = sc.equilibrium(sc.Scene(sc.Field({"x": "-atan(x)"}, initial={"x": 3})))
+    assert found.state == pytest.approx([0.0], abs=1e-11)
+
+
+@pytest.mark.parametrize("start", [0, 0.3])
+def test_a_flat_place_is_no_shift(start: float) -> None:
+    found = sc.equilibrium(sc.Scene(sc.Field({"x": "-x**3"}, initial={"x": start})))
+    assert found.shifts == ()
+    assert found.verdict == "neutral, 1 on the imaginary axis"
+
+
 @pytest.mark.parametrize(
     "scene",
     [
