@@ -25,7 +25,7 @@ from synchain.models.dynamics.variational import expect_continuous
 from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
-from ..cells.keywords import ONE_CELL, Given
+from ..cells.keywords import Given
 from ..results.labelled import Labelled, dataset
 from ..results.labels import STATE, States
 from ..results.result import Result
@@ -227,7 +227,7 @@ def equilibrium(
     (True, ('delta',))
     """
     given = Given(equilibrium, parameters, more, REFUSED)
-    scene = given.scene(scene, **ONE_CELL)
+    scene = given.scene(scene)
     scene = scene if start is None else started(scene, start)[0]
     _expect_rest(scene)
     network, state = Linearised.of(scene), np.array(scene.y0)
@@ -255,7 +255,7 @@ def _expect_rest(scene: Scene) -> None:
 
 
 def _shifts(scene: Scene, network: Linearised, state: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
-    """Components whose shift at all nodes changes no rate, and the unit vectors (states, shifts) along them."""
+    """Components whose shift at all nodes changes no rate, and the vectors of ones (states, shifts) along them."""
     equations, jacobian = scene.equations, network.jacobian(state)
     scale = max(1.0, float(abs(jacobian).max()))
     names, rows = [], []

@@ -51,7 +51,8 @@ class Part:
     def __call__(self, state: np.ndarray) -> np.ndarray:
         """The values (count, all) of rates and entries at a state of the network."""
         states = [column for places in self.others for column in state[places].T]
-        found = self.function(*states, *self.numbers)
+        with np.errstate(all="ignore"):  # far from the start there may be no numbers
+            found = self.function(*states, *self.numbers)
         return np.stack([np.broadcast_to(np.asarray(x, dtype=float), len(self.own)) for x in found], axis=1)
 
 
