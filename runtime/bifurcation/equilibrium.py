@@ -21,6 +21,8 @@ import xarray as xr
 from scipy import linalg, sparse
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, splu
 
+from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.reduction import substitute_constants
 from synchain.models.dynamics.variational import expect_continuous
 from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
@@ -210,7 +212,7 @@ def equilibrium(
     Raises
     ------
     ValueError
-        If time enters the equations, for set-valued friction and rates that jump, if a parameter is
+        If time enters the equations, but for a drive of strength 0, for set-valued friction and rates that jump, if a parameter is
         unknown, or if `start` holds no states of this network.
     ArithmeticError
         If Newton's method does not converge, or the eigenvalues of a large network do not.
@@ -229,8 +231,7 @@ def equilibrium(
     given = Given(equilibrium, parameters, more, REFUSED)
     scene = given.scene(scene)
     scene = scene if start is None else started(scene, start)[0]
-    _expect_rest(scene)
-    network, state = Linearised.of(scene), np.array(scene.y0)
+    network, state = Linearised.of(_at_rest(scene), scene.parameters), np.array(scene.y0)
     size = len(state)
     wanted = None if count is None else check_integer("count", count, 1)
     if wanted is not None and wanted > size:
@@ -240,18 +241,23 @@ def equilibrium(
     return Equilibrium(scene, state, _eigenvalues(network, state, wanted), names, speeds, residual, steps)
 
 
-def _expect_rest(scene: Scene) -> None:
-    """Raise ValueError for equations that have no equilibria which are isolated or smooth."""
-    if scene.forced:
+def _at_rest(scene: Scene) -> Equations:
+    """The equations without a drive whose strength is zero; ValueError if they have no equilibria, or none of Newton's."""
+    equations = scene.equations
+    if equations.forced and not equations.mixed:
+        common = set(equations.parameters) - equations.single
+        equations = substitute_constants(equations, {name: 0 for name in sorted(common) if scene.parameters[name] == 0})
+    if equations.forced:
         raise ValueError(
             f"equilibrium: found a drive, time enters the equations of {scene!r}; expected none; `periodic_orbit` finds "
             "motions that repeat themselves with the drive"
         )
-    if scene.equations.sticks:
+    if equations.sticks:
         raise ValueError(
             "equilibrium: found set-valued friction, under which whole ranges of states rest; expected a smoothed law"
         )
-    expect_continuous(scene.equations)
+    expect_continuous(equations)
+    return equations
 
 
 def _shifts(scene: Scene, network: Linearised, state: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:

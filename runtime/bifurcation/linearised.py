@@ -13,7 +13,6 @@ from synchain.models.dynamics.equations import Equations, Layer
 from synchain.models.graphs.links import Link
 from synchain.models.inputs.node_name import NodeName
 from synchain.models.mechanics.components import Block, Edge, Node
-from synchain.models.scenes.scene import Scene
 
 __all__ = ["Linearised"]
 
@@ -75,9 +74,8 @@ class Linearised:
     masses: tuple[Part, ...]
 
     @classmethod
-    def of(cls, scene: Scene) -> Linearised:
-        """Compile the equations of a scene."""
-        equations, values = scene.equations, scene.parameters
+    def of(cls, equations: Equations, values: Mapping[str, float]) -> Linearised:
+        """Compile equations with the values of their parameters."""
         sources = [*_nodes(equations, values), *_links(equations, values)]
         parts = tuple(
             Part.of(symbols, rates, blocks, places, numbers) for symbols, rates, blocks, _, places, numbers in sources

@@ -86,6 +86,16 @@ def test_masses_that_depend_on_angles() -> None:
     np.testing.assert_allclose(frequencies**2, [2 - np.sqrt(2), 2 + np.sqrt(2)], rtol=1e-12)
 
 
+def test_a_drive_of_strength_zero_is_none() -> None:
+    """Duffing's oscillator with a soft spring, x + beta x^3 = 0: a saddle at 1/2 if beta = -4."""
+    scene = sc.Scene("duffing", topology=sc.chain(2), parameters={"beta": -4.0}, initial={"x": 0.45, "v": 0.0})
+    found = sc.equilibrium(scene, u=0)
+    np.testing.assert_allclose(found.state, [0.5, 0.5, 0.0, 0.0], atol=1e-12)
+    assert found.growing == 2
+    with pytest.raises(ValueError, match="found a drive"):
+        sc.equilibrium(scene, u=0.1)
+
+
 def test_links_with_inertia() -> None:
     """Modes of a chain of three, whose Laplacian has the eigenvalues 0, 1, 3: squares of frequencies 1/(1 + sigma gamma)."""
     found = sc.equilibrium(sc.Scene("harmonic", "inerter", sc.chain(3), parameters={"sigma": 0.5}))
@@ -116,7 +126,7 @@ def test_a_flat_place_is_no_shift(start: float) -> None:
     ids=["field", "masses", "inerters", "numbers of nodes"],
 )
 def test_rates_jacobian_and_masses_are_those_of_the_equations(scene: sc.Scene) -> None:
-    equations, network = scene.equations, Linearised.of(scene)
+    equations, network = scene.equations, Linearised.of(scene.equations, scene.parameters)
     state = np.random.default_rng(0).normal(size=equations.dimension)
     known = dict(zip(equations.state, state, strict=True)) | dict(scene.parameters)
 
