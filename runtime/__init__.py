@@ -28,6 +28,7 @@ from synchain.models.inputs.keywords import public
 
 if TYPE_CHECKING:
     from .bifurcation.branches import Branch, follow
+    from .bifurcation.equilibrium import Equilibrium, equilibrium
     from .bifurcation.periodic import PeriodicOrbit, periodic_orbit
     from .bifurcation.skeleton import Skeleton, skeleton
     from .cells.kernels import kernel
@@ -53,6 +54,7 @@ __all__ = [
     "Branch",
     "ClusterExponents",
     "Criterion",
+    "Equilibrium",
     "ExponentWindows",
     "Exponents",
     "Lyapunov",
@@ -69,6 +71,7 @@ __all__ = [
     "Thresholds",
     "basin",
     "cluster_exponents",
+    "equilibrium",
     "exponents",
     "follow",
     "kernel",
@@ -89,6 +92,7 @@ _HOME = {
     "Branch": "bifurcation.branches",
     "ClusterExponents": "stability.clusters",
     "Criterion": "synchronisation.threshold",
+    "Equilibrium": "bifurcation.equilibrium",
     "ExponentWindows": "synchronisation.exponent_windows",
     "Exponents": "stability.exponents",
     "Lyapunov": "stability.lyapunov",
@@ -106,6 +110,7 @@ _HOME = {
     "Thresholds": "synchronisation.threshold",
     "basin": "synchronisation.basin",
     "cluster_exponents": "stability.clusters",
+    "equilibrium": "bifurcation.equilibrium",
     "exponents": "stability.exponents",
     "follow": "bifurcation.branches",
     "kernel": "cells.kernels",

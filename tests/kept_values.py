@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from synchain.models.definitions.inline import Field
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.models.symmetries.clusters import clusters
 from synchain.runtime.bifurcation.bifurcations import Bifurcation, BifurcationKind
 from synchain.runtime.bifurcation.branches import Branch
+from synchain.runtime.bifurcation.equilibrium import Equilibrium
 from synchain.runtime.bifurcation.periodic import PeriodicOrbit
 from synchain.runtime.bifurcation.phases import Phases
 from synchain.runtime.bifurcation.skeleton import Skeleton
@@ -24,13 +26,14 @@ from synchain.runtime.synchronisation.probe import Probe
 from synchain.runtime.synchronisation.threshold import Criterion, Sweep, Thresholds
 
 PAIR = Scene(topology=topology("chain", 2), parameters={"omega": 1.15})
+ROTORS = Scene(Field({"theta": "w"}, parameters={"w": 0.25}), "theta->theta", topology("chain", 2))
 
 
 def exponents_on(alpha: np.ndarray) -> Exponents:
     """Exponents that are negative below |alpha| = 0.3, of two starts on two kinds of motion."""
     value = np.abs(alpha) - 0.3
     spread = np.full(len(alpha), 1e-3)
-    cycle = Attractor(Motion.PERIODIC, 5.46, np.arange(8.0 * len(alpha)).reshape(2, len(alpha), 2, 2), 2)
+    cycle = Attractor(Motion.PERIODIC, 5.46, np.arange(12.0 * len(alpha)).reshape(3, len(alpha), 2, 2), 2)
     both = np.stack([value, value + 1.0])
     return Exponents(alpha, value, spread, 100.0, 2, both, (cycle, Attractor(Motion.APERIODIC, 0.0)))
 
@@ -91,6 +94,9 @@ def every_kind() -> dict[str, Labelled]:
             state, np.array([-0.1]), np.array([0.01]), 0.0, 0.01, np.array([[0.0, 0.5], [0.5, 0.0]]), 20.0
         ),
         orbit_at(1.2),
+        Equilibrium(
+            ROTORS, np.array([0.1, -0.1]), np.array([0.0, -1.5 + 0.5j]), ("theta",), np.array([0.25]), 1e-16, 4
+        ),
         branch(),
         Skeleton((branch(), branch())),
         Basin(PAIR, 1e-3, 0.95, np.arange(12.0).reshape(3, 4), np.array([0.0, 0.5, np.inf]), np.array([1, 1, 2])),

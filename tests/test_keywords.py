@@ -44,6 +44,7 @@ TAKEN = {
     "plane": ORBITS,
     "cluster_exponents": ORBITS - {"workers"},
     "lyapunov_spectrum": ORBITS - {"workers"},
+    "equilibrium": {"parameters"},
     "periodic_orbit": {"parameters", "periods"},
     "follow": {"show_progress", "progress", "parameters"},
     "skeleton": {"show_progress", "progress", "parameters", "seed", "transient", "periods"},
@@ -96,6 +97,7 @@ def calls(scene: Scene, path: Any) -> dict[str, Callable[..., object]]:
         "plane": lambda **words: runtime.plane(scene, [0.1, 0.2], [0.0, 0.1], **words),
         "cluster_exponents": lambda **words: runtime.cluster_exponents(scene, [0, 0], **words),
         "lyapunov_spectrum": lambda **words: runtime.lyapunov_spectrum(scene, **words),
+        "equilibrium": lambda **words: runtime.equilibrium(scene, **words),
         "periodic_orbit": lambda **words: runtime.periodic_orbit(scene, **words),
         "follow": lambda **words: runtime.follow(scene, "omega", [1.3], first, **words),
         "skeleton": lambda **words: runtime.skeleton(scene, "omega", [1.3], **words),
@@ -130,7 +132,7 @@ def test_every_function_refuses_in_one_line_what_is_no_parameter(name: str, tmp_
         *((n, w, "one orbit") for n in ("cluster_exponents", "lyapunov_spectrum") for w in ("workers", "executor")),
         *(
             (n, w, "needs the one before")
-            for n in ("periodic_orbit", "follow", "skeleton")
+            for n in ("equilibrium", "periodic_orbit", "follow", "skeleton")
             for w in ("workers", "executor")
         ),
         *((name, "rtol", "rtol = 1e-12") for name in ("periodic_orbit", "follow", "skeleton")),

@@ -141,7 +141,7 @@ CALLS = [
     (lambda: runtime.cluster_exponents(PAIR, [0, 0], perods=5), "of cluster_exponents.*did you mean 'periods'"),
     (lambda: agreement(PAIR, [0.1], criterium=3), "'criterium' of agreement.*did you mean 'criterion'"),
     (lambda: runtime.periodic_orbit(Scene(), perods=2), "'perods' of periodic_orbit.*did you mean 'periods'"),
-    (lambda: runtime.periodic_orbit(Scene(oscillator="lorenz")), "name the components that a link joins"),
+    (lambda: runtime.exponents(Scene(oscillator="lorenz"), [0.1]), "name the components that a link joins"),
     (lambda: runtime.thresholds(None), A_SCENE),
     (lambda: runtime.thresholds(ONE), "has no links"),
     (lambda: runtime.thresholds(PAIR, sigma="a"), "sigma: found 'a'; expected real numbers"),

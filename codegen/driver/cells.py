@@ -31,19 +31,25 @@ from .recording import BUDGET
 from .recording import CANCEL
 from .recording import CHANGE
 from .recording import CHATTERING
+from .recording import CLIMB
 from .recording import CLOCK
 from .recording import CYCLE
 from .recording import DIVERGED
 from .recording import END
 from .recording import FAR
 from .recording import FINISHED
+from .recording import FIRST_MARK
 from .recording import FIRST_STEP
 from .recording import HALTED
+from .recording import HIGH
 from .recording import INTERRUPTED
 from .recording import LAG
+from .recording import LAPSE
 from .recording import LAST
 from .recording import LEFT
 from .recording import LONGEST_RUSH
+from .recording import MARK
+from .recording import MARKED_AT
 from .recording import MAX_STEPS
 from .recording import MEAN
 from .recording import MEMORY
@@ -54,10 +60,13 @@ from .recording import N_SKIPPED
 from .recording import N_SMOOTH
 from .recording import NEXT_SAMPLE
 from .recording import NO_JUMPS
+from .recording import ORIGIN
+from .recording import PACE
 from .recording import PEAK
 from .recording import PERIOD
 from .recording import PERIODS
 from .recording import POWER
+from .recording import RECORD
 from .recording import REJECTED
 from .recording import RUSH
 from .recording import SAMPLE_GAP
@@ -74,6 +83,7 @@ from .recording import SYNC
 from .recording import SYNC_PEAK
 from .recording import SYNC_SUM
 from .recording import TIME
+from .recording import TOWER
 from .recording import UNDERFLOW
 from .recording import spread
 
@@ -119,6 +129,7 @@ def fill(which, cell, start, numbers, spans, control, clock, y, samples, multipl
     put(clock, NEXT_SAMPLE, which, spans[cell, 0])
     if TRAJECTORY and samples.shape[1] > 1:
         put(clock, SAMPLE_GAP, which, (spans[cell, 1] - spans[cell, 0]) / (samples.shape[1] - 1))
+    watch(which, control, clock)
     begin(which, cell, spans, clock)
     if SYNC_ERROR:
         now = np.empty(WIDTH)
@@ -126,6 +137,14 @@ def fill(which, cell, start, numbers, spans, control, clock, y, samples, multipl
         put(clock, SYNC, which, now[which])
     if idle:
         vacate(which, clock)
+
+
+@njit(error_model="numpy")
+def watch(which, control, clock):
+    """Begin to watch the growth of a cell."""
+    for group in (MARKED_AT, LAPSE, HIGH, RECORD, ORIGIN):
+        put(clock, group, which, 0.0)
+    put(clock, MARK, which, min(FIRST_MARK, control[MAX_STEPS]))
 
 
 @njit(error_model="numpy")
@@ -241,6 +260,33 @@ def leap(which, periods, clock):
 
 
 @njit(error_model="numpy")
+def unbounded(which, clock, control):
+    """Whether the state grows while the steps shrink with it, so that their number will not reach the end.
+
+    Looks when the number of steps has doubled.  If doublings take equal times, the work grows exponentially; bounded
+    motions have work in proportion to time, and an angle that turns ever faster has a power of it: their doublings take
+    longer and longer.  Even if growth ended here, the steps that are left would not do.
+    """
+    steps = clock[ACCEPTED * WIDTH + which] + clock[REJECTED * WIDTH + which]
+    if HALTS or steps < clock[MARK * WIDTH + which]:
+        return False
+    t, size, before = clock[TIME * WIDTH + which], clock[HIGH * WIDTH + which], clock[LAPSE * WIDTH + which]
+    now = clock[BASE * WIDTH + which] + t
+    lapse = now - clock[MARKED_AT * WIDTH + which]
+    if size < CLIMB * clock[RECORD * WIDTH + which] or lapse > PACE * before:
+        put(clock, ORIGIN, which, size)
+    put(clock, MARK, which, min(2.0 * steps, control[MAX_STEPS]))
+    put(clock, MARKED_AT, which, now)
+    put(clock, LAPSE, which, lapse)
+    put(clock, RECORD, which, size)
+    put(clock, HIGH, which, 0.0)
+    if size < TOWER * clock[ORIGIN * WIDTH + which]:
+        return False
+    left = clock[END * WIDTH + which] - t
+    return steps + 0.5 * steps * left / lapse >= control[MAX_STEPS]
+
+
+@njit(error_model="numpy")
 def outcome(which, clock, y, control, dims):
     """Status of the cell in a lane, 0 while it runs."""
     t = clock[TIME * WIDTH + which]
@@ -258,6 +304,8 @@ def outcome(which, clock, y, control, dims):
         return INTERRUPTED
     if clock[ACCEPTED * WIDTH + which] + clock[REJECTED * WIDTH + which] >= control[MAX_STEPS]:
         return BUDGET
+    if unbounded(which, clock, control):
+        return DIVERGED
     if CONTACTS and clock[RUSH * WIDTH + which] >= LONGEST_RUSH:
         return CHATTERING
     if clock[STEP * WIDTH + which] <= 4e-16 * max(1.0, t):

@@ -26,9 +26,10 @@ from .recording import CHANGE
 from .recording import END
 from .recording import FAR
 from .recording import HALTED
+from .recording import HIGH
 from .recording import LONGEST_RUSH
+from .recording import MARK
 from .recording import MAX_STEP
-from .recording import MAX_STEPS
 from .recording import MEMORY
 from .recording import PERIOD
 from .recording import REJECTED
@@ -113,16 +114,17 @@ def advance(clock, y, t, t_new, accept, y_new, dims):
         value = select(accept, load(y_new, c, WIDTH), load(y, c, WIDTH))
         store(y, c, value)
         largest = maximum(largest, absolute(value))
+    store(clock, HIGH, maximum(load(clock, HIGH, WIDTH), largest))
     return largest
 
 
 @njit(error_model="numpy", forceinline=True)
-def pause(clock, largest, control):
-    """Mask of lanes that need a look: at a stop, out of budget, with a vanishing step, or out of bounds."""
+def pause(clock, largest):
+    """Mask of lanes that need a look: at a stop, at a mark of their steps, with a vanishing step, or out of bounds."""
     t, h = load(clock, TIME, WIDTH), load(clock, STEP, WIDTH)
-    spent = load(clock, ACCEPTED, WIDTH) + load(clock, REJECTED, WIDTH) >= control[MAX_STEPS]
+    marked = load(clock, ACCEPTED, WIDTH) + load(clock, REJECTED, WIDTH) >= load(clock, MARK, WIDTH)
     stopped = (t >= load(clock, END, WIDTH)) | (t >= load(clock, PERIOD, WIDTH))
-    found = stopped | spent | (h <= 4e-16 * maximum(t, 1.0)) | (largest >= FAR)
+    found = stopped | marked | (h <= 4e-16 * maximum(t, 1.0)) | (largest >= FAR)
     found = found | (load(clock, RUSH, WIDTH) >= LONGEST_RUSH) if CONTACTS else found
     return found | (load(clock, HALTED, WIDTH) > 0.0) if HALTS else found
 

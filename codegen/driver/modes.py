@@ -34,6 +34,7 @@ from .cells import outcome
 from .cells import put
 from .cells import restart
 from .cells import turn_over
+from .cells import watch
 from .contacts import change_modes
 from .contacts import stop_at_event
 from .contacts import take_back
@@ -203,11 +204,12 @@ def attempt(
 
 
 @njit(error_model="numpy")
-def renew(cell, spans, clock):
+def renew(cell, spans, control, clock):
     """Let the next block begin at time 0 of the clock, with nothing in mind but a power of two as the step."""
     restart(0, clock)
     for group in (ACCEPTED, REJECTED, PERIODS):
         put(clock, group, 0, 0.0)
+    watch(0, control, clock)
     begin(0, cell, spans, clock)
 
 
@@ -272,7 +274,7 @@ def march(
                 if status != FINISHED:
                     break
                 if begun:
-                    renew(cell, spans, clock)
+                    renew(cell, spans, control, clock)
                 begun = True
                 take_in(vectors[cell], old, registers, parts)
                 for k in range(registers * LANES):
@@ -312,7 +314,7 @@ def march(
                             if y[2 * dims.nodes + i] != slips[i]:
                                 saltate(i, slips[i], clock[TIME], y, out, carried, old, active, owners, dims, release)
                                 landed = landed or y[2 * dims.nodes + i] == 0.0
-                    if lane_bits(pause(clock, largest, steering)) != 0:
+                    if lane_bits(pause(clock, largest)) != 0:
                         status = outcome(0, clock, y, control, dims)
                         if status == 0 and clock[TIME] >= clock[PERIOD]:
                             turn_over(0, cell, spans, control, clock, y, dims)

@@ -18,8 +18,8 @@ from .one_section import keep, surface
 TIME, STEP, STOP, START, END, MEMORY, CHANGE, ACCEPTED, REJECTED = 0, 1, 2, 3, 4, 5, 6, 7, 8
 SYNC, SYNC_SUM, SYNC_PEAK, NEXT_SAMPLE, SAMPLE_GAP, BASE, PERIOD, PERIODS = 9, 10, 11, 12, 13, 14, 15, 16
 MODE, SMOOTH_STEPS, POWER, LAG, CYCLE, LEFT, SUM_BEFORE, SKIPPED, RUSH = 17, 18, 19, 20, 21, 22, 23, 24, 25
-HALTED = 26
-CLOCK = 27
+HALTED, MARK, MARKED_AT, LAPSE, HIGH, RECORD, ORIGIN = 26, 27, 28, 29, 30, 31, 32
+CLOCK = 33
 # How a cell ended.
 FINISHED, BUDGET, UNDERFLOW, DIVERGED, INTERRUPTED, CHATTERING, STOPPED = 1, 2, 3, 4, 5, 6, 7
 # Columns of `control`, of `sums` and of `counts`.
@@ -30,6 +30,9 @@ STATUS, N_ACCEPTED, N_REJECTED, N_POINTS, N_SKIPPED, N_SMOOTH = 0, 1, 2, 3, 4, 5
 LONGEST_RUSH = 200.0
 # A state of this size, 2^53, has diverged: its neighbours are further apart than anything that happens at size one.
 FAR = 9007199254740992.0
+# Growth is looked at after so many steps, and each time that their number has doubled.  A doubling counts if it takes no
+# more than PACE times the time of the last one while the state grows by CLIMB; together they must have raised it by TOWER.
+FIRST_MARK, PACE, CLIMB, TOWER = 256.0, 1.1, 1.4142135623730951, 256.0
 # The two ways to step.
 STIFF, SMOOTH = 0, 1
 ALL = (1 << WIDTH) - 1

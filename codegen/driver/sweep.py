@@ -212,7 +212,7 @@ def conclude(mode, t, h, accept, rate, clock, y, y_new, out, control, dims, push
     flips = 0
     if SWITCHING:
         flips = lane_bits(turned(clock, accept, rate, mode))
-    return ALL if control[CANCEL] != 0.0 else lane_bits(pause(clock, largest, control)) | flips, flips
+    return ALL if control[CANCEL] != 0.0 else lane_bits(pause(clock, largest)) | flips, flips
 
 
 @njit(error_model="numpy", nogil=True, cache=True)

@@ -32,6 +32,7 @@ __all__ = [
     "STRENGTH",
     "Variation",
     "clustered",
+    "expect_continuous",
     "mode",
     "network_variation",
     "phase_shifted",
@@ -90,7 +91,7 @@ class Variation:
             raise ValueError(f"the symbol {min(taken)!r} is needed for the strength of a mode; rename it in the model")
         if (self.events is not None) != self.orbit.sticks:
             raise ValueError("variation: events belong to set-valued friction, and to nothing else")
-        _expect_continuous(self.orbit)
+        expect_continuous(self.orbit)
         for (row, column), e in self.matrix:
             if not (0 <= row < self.size and 0 <= column < self.size):
                 raise ValueError(f"variation: entry ({row}, {column}) is outside the {self.size} x {self.size} matrix")
@@ -102,7 +103,7 @@ class Variation:
                 raise ValueError(f"variation: entry ({row}, {column}) is not linear in the strengths of a mode: {e}")
 
 
-def _expect_continuous(orbit: Equations) -> None:
+def expect_continuous(orbit: Equations) -> None:
     """Raise ValueError for rates that jump in the state."""
     templates = [(node.rhs, node.continuous) for node in orbit.nodes]
     templates += [(edge.rhs, (*edge.here, *edge.there)) for edge in orbit.edges]

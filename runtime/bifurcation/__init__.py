@@ -1,1 +1,1 @@
-"""Periodic orbits, their branches and bifurcations: may know stability and runs, no networks."""
+"""Equilibria of networks, periodic orbits, their branches and bifurcations: may know stability and runs."""

@@ -28,7 +28,7 @@ from ..cells.keywords import Given
 from ..results.labelled import Labelled, dataset
 from ..stability.attractor import RETURN, cycle_propagators
 from ..stability.exponents import coupled_cell, single_cell
-from ..stability.limit_cycle import limit_cycle
+from ..stability.limit_cycle import limit_cycle, rates_of, rests
 from ..stability.orbits import Orbits, unit_of_time
 from .phases import Phases, phases_of
 
@@ -244,6 +244,9 @@ def _limit_cycle(scene: Scene, periods: int, start: Sequence[float] | np.ndarray
     state = _initial(scene) if start is None else _state(scene, start)
     orbit = Orbits.make(scene, np.zeros(1), state[None], 1)
     orbit.settle(scene.transient)
+    if rests(rates_of(orbit), orbit.state[0], RETURN):
+        at = ", ".join(f"{name} = {x:.6g}" for name, x in zip(scene.components, orbit.state[0], strict=False))
+        raise ArithmeticError(f"no cycle: the motion comes to rest at {at}; `equilibrium` finds such states")
     free, steps = limit_cycle(orbit, RETURN)
     if not free:
         raise ArithmeticError(

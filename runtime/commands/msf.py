@@ -118,7 +118,7 @@ def _alpha(arguments: Namespace) -> np.ndarray:
 
 def _parted(arguments: Namespace) -> tuple[dict[str, float], Rows]:
     """The numbers and the rows of --set; WrongUse if these are no axes of a map."""
-    from synchain.models.scenes.axis import Axis
+    from synchain.models.sweeps.axis import Axis
 
     found = settings(arguments)
     numbers = {name: value for name, value in found.items() if isinstance(value, float)}

@@ -90,6 +90,7 @@ from synchain.runtime import Basin as Basin
 from synchain.runtime import Branch as Branch
 from synchain.runtime import ClusterExponents as ClusterExponents
 from synchain.runtime import Criterion as Criterion
+from synchain.runtime import Equilibrium as Equilibrium
 from synchain.runtime import ExponentWindows as ExponentWindows
 from synchain.runtime import Exponents as Exponents
 from synchain.runtime import Lyapunov as Lyapunov
@@ -107,6 +108,7 @@ from synchain.runtime import SweepInterrupted as SweepInterrupted
 from synchain.runtime import Thresholds as Thresholds
 from synchain.runtime import basin as basin
 from synchain.runtime import cluster_exponents as cluster_exponents
+from synchain.runtime import equilibrium as equilibrium
 from synchain.runtime import exponents as exponents
 from synchain.runtime import follow as follow
 from synchain.runtime import kernel as kernel

@@ -31,6 +31,7 @@ def _classes() -> dict[str, type]:
 
     from ..bifurcation.bifurcations import Bifurcation, BifurcationKind
     from ..bifurcation.branches import Branch
+    from ..bifurcation.equilibrium import Equilibrium
     from ..bifurcation.periodic import PeriodicOrbit
     from ..bifurcation.phases import Phases
     from ..bifurcation.skeleton import Skeleton
@@ -45,7 +46,7 @@ def _classes() -> dict[str, type]:
     from ..synchronisation.threshold import Criterion, Sweep, Thresholds
 
     exponents = (ClusterExponents, Exponents, Lyapunov, MSF, Plane)
-    kept = (Basin, Branch, PeriodicOrbit, Probe, Skeleton, Thresholds, *exponents)
+    kept = (Basin, Branch, Equilibrium, PeriodicOrbit, Probe, Skeleton, Thresholds, *exponents)
     motions = (Attractor, Bifurcation, BifurcationKind, Block, Clusters, Motion, Phases)
     parts = (*motions, Criterion, ExponentWindows, Sweep)
     return {kind.__name__: kind for kind in (*kept, *parts)}

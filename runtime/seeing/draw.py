@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from synchain.models.graphs.topology import Topology
 
 from ..bifurcation.branches import Branch
+from ..bifurcation.equilibrium import Equilibrium
 from ..bifurcation.periodic import PeriodicOrbit
 from ..bifurcation.skeleton import Skeleton
 from ..figures.exponent import draw_exponent, finite
@@ -150,6 +151,18 @@ def _(value: ClusterExponents, axes: Axes) -> Axes:
     axes.set_xticks(range(1, len(names) + 1), names)
     axes.set_ylabel("exponent per unit of time")
     axes.margins(x=0.2)
+    return axes
+
+
+@_draw.register
+def _(value: Equilibrium, axes: Axes) -> Axes:
+    """The eigenvalues in the complex plane; those that grow stand out."""
+    grows = value.eigenvalues.real > 0.0 if value.growing else np.zeros(len(value.eigenvalues), dtype=bool)
+    axes.axvline(0.0, color=BLACK, linewidth=0.6)
+    for chosen, colour in ((~grows, BLUE), (grows, ORANGE)):
+        axes.plot(value.eigenvalues.real[chosen], value.eigenvalues.imag[chosen], **DOTS, color=colour)
+    axes.set(xlabel="real part of eigenvalues", ylabel="imaginary part")
+    note(axes, value.verdict)
     return axes
 
 

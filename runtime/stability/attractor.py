@@ -25,6 +25,9 @@ LONGEST = 32
 RETURN = 1e-9
 """Largest distance of a closed cycle, relative to the size of the state; at least 0.1 rtol."""
 
+SLACK = 10.0
+"""How many times the tolerance a cycle is compared with."""
+
 
 class Motion(StrEnum):
     """Kind of motion on an attractor; of linear equations every motion, bounded or not, has the same exponents."""
@@ -45,12 +48,13 @@ class Attractor:
         Kind of the motion.
     cycle : float
         Length of one cycle in units of non-dimensional time; 0 if the motion is not a cycle.
-    propagators : ndarray, shape (2, m, p, p), optional
-        Propagators of all m modes over two successive cycles. For a fixed point and a linear
-        motion, the matrix of the variational equation, twice. None for aperiodic motion.
+    propagators : ndarray, shape (3, m, p, p), optional
+        Propagators of all m modes over two successive cycles, and over the second one once more with SLACK
+        times the tolerance. For a fixed point and a constant linear motion, the matrix of the variational
+        equation as often. None for aperiodic motion.
     periods : int
         Drive periods of one cycle; 1 without a drive.
-    logarithms : float or ndarray, shape (2, m)
+    logarithms : float or ndarray, shape (3, m)
         Logarithms of the factors that the propagators of a cycle are without.
     """
 
@@ -73,7 +77,7 @@ class Attractor:
         values : ndarray, shape (m,)
             Largest exponent of each mode, per unit of non-dimensional time.
         error : ndarray, shape (m,)
-            Difference between the two cycles.
+            Difference between the two cycles, or from the looser tolerance if that is larger.
 
         Raises
         ------
@@ -88,7 +92,9 @@ class Attractor:
         else:
             with np.errstate(divide="ignore"):
                 exponents = (np.log(np.abs(values).max(axis=-1)) + self.logarithms) / self.cycle
-        return exponents[1], np.abs(exponents[1] - exponents[0])
+        with np.errstate(invalid="ignore"):
+            apart = np.where(exponents == exponents[1], 0.0, np.abs(exponents - exponents[1]))
+        return exponents[1], apart.max(axis=0)
 
 
 def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
@@ -135,8 +141,11 @@ def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
 def _periodic(orbit: Orbits, motion: Motion, cycle: int, unit: float | None = None) -> Attractor:
     """Return motion along which the variational equation repeats itself after some drive periods, or other units."""
     unit = orbit.unit if unit is None else unit
-    both = [cycle_propagators(orbit, cycle, unit / orbit.unit) for _ in range(2)]
-    propagators, logarithms = (np.concatenate(parts) for parts in zip(*both, strict=True))
+    block = unit / orbit.unit
+    found = [cycle_propagators(orbit, cycle, block)]
+    settled = orbit.state
+    found += [cycle_propagators(orbit, cycle, block), cycle_propagators(orbit, cycle, block, settled, SLACK)]
+    propagators, logarithms = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return Attractor(motion, cycle * unit, propagators, cycle, logarithms)
 
 
@@ -145,8 +154,10 @@ def _distance(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.abs(a - b).max() / max(1e-3, np.abs(b).max()))
 
 
-def cycle_propagators(orbit: Orbits, cycle: int, block: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """Integrate the propagators of all modes over one cycle, from the current state.
+def cycle_propagators(
+    orbit: Orbits, cycle: int, block: float = 1.0, state: np.ndarray | None = None, slack: float = 1.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Integrate the propagators of all modes over one cycle.
 
     Parameters
     ----------
@@ -156,6 +167,10 @@ def cycle_propagators(orbit: Orbits, cycle: int, block: float = 1.0) -> tuple[np
         Number of blocks, drive periods unless said otherwise.
     block : float
         Length of a block in units of the orbit.
+    state : ndarray, shape (1, components), optional
+        Where the cycle begins, the current state by default.
+    slack : float
+        How many times the tolerance of the orbit the steps are allowed.
 
     Returns
     -------
@@ -164,7 +179,8 @@ def cycle_propagators(orbit: Orbits, cycle: int, block: float = 1.0) -> tuple[np
     logarithms : ndarray, shape (1, m)
         Logarithm of this factor.
     """
-    orbit.block, orbit.integrator = block, orbit.integrator_of(orbit.strengths)
+    orbit.state = orbit.state if state is None else state
+    orbit.block, orbit.integrator = block, orbit.integrator_of(orbit.strengths, tolerance=slack)
     total, logarithms = orbit.propagators()
     for _ in range(cycle - 1):
         propagators, more = orbit.propagators()
@@ -187,7 +203,7 @@ def _free(orbit: Orbits, closed: float) -> Attractor:
 def _steady(orbit: Orbits, motion: Motion) -> Attractor:
     """Return motion along which the variational equation is constant."""
     matrix = _matrix(orbit.variation, _symbols(orbit.variation), _values(orbit), orbit.strengths)
-    return Attractor(motion, 0.0, np.stack([matrix, matrix]))
+    return Attractor(motion, 0.0, np.stack([matrix] * 3))
 
 
 def _symbols(variation: Variation) -> list[sp.Symbol]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -15,7 +15,7 @@ from synchain.models.inputs.checks import check_integer, check_number, check_pos
 from ..support.execution import Execution
 from ..support.progress import Reporter
 
-__all__ = ["Averaging", "Batches", "check_whole"]
+__all__ = ["SLACK", "TRIED", "Averaging", "Batches", "check_whole", "error_of_steps"]
 
 BATCHES = 64
 """Most batches that are kept."""
@@ -29,6 +29,8 @@ NARROW = 0.2
 Lazarus et al. take 0.4 for noise that is correlated over a few samples; chaos is over several periods.
 """
 ALL = slice(None)
+SLACK, TRIED = 4.0, 8
+"""How many times the tolerance the growth over a block is compared with, and over how many blocks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +97,25 @@ def check_whole(what: str, periods: float) -> float:
     if not periods.is_integer():
         raise ValueError(f"{what}: found {periods:g}; expected a whole number of periods")
     return periods
+
+
+def error_of_steps(usual: Sequence[np.ndarray], looser: Sequence[np.ndarray], length: float) -> np.ndarray:
+    """Return the error of growth rates that is due to the steps: their change at SLACK times the tolerance.
+
+    It is the mean change over single blocks, each from the same state and deviations as the other, with its own standard
+    error: chaos makes much of a small difference within a block, at random.
+
+    Parameters
+    ----------
+    usual, looser : sequence of ndarray
+        Growth over each block, with the usual and with the looser tolerance; blocks without growth do not count.
+    length : float
+        Length of a block in units of non-dimensional time.
+    """
+    found, other = np.array(usual), np.array(looser)
+    known = np.isfinite(found) & np.isfinite(other)
+    change = np.where(known, found, 0.0) - np.where(known, other, 0.0)
+    return np.asarray(np.sqrt(change.mean(axis=0) ** 2 + change.var(axis=0) / len(change)) / length)
 
 
 @dataclass(slots=True)

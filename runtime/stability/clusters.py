@@ -245,6 +245,7 @@ def cluster_exponents(
             reporter.advance(1)
         for _ in averaging.rounds(batches, batches.error, reporter):
             batches.add(advance())
+        steps = integrator.error_of_steps(unit)
     apart = np.max(gaps[dropped:], axis=0)
     approaching = _pairs(_falls(np.array(gaps[dropped // 2 :])) & (apart >= MERGED))
     if approaching:
@@ -254,7 +255,7 @@ def cluster_exponents(
             RuntimeWarning,
             stacklevel=2,
         )
-    mean, error, time = batches.mean()[0], batches.error_by_start()[0], batches.time
+    mean, error, time = batches.mean()[0], np.hypot(batches.error_by_start(), steps)[0], batches.time
     return ClusterExponents(partition, mean[1:], error[1:], float(mean[0]), float(error[0]), apart, time, approaching)
 
 

@@ -4,7 +4,8 @@ Deviations are integrated over short blocks of time and made orthogonal after ea
 enough if every direction stands out of the error of the integration. Under a smoothed friction law,
 oscillators that stick lose their velocity deviations so fast that no block is short enough;
 exponents lost in this error are not reported as numbers. Their sum is known all the same: the sum
-of all exponents is the mean divergence of the equations, which is integrated along the orbit.
+of all exponents is the mean divergence of the equations, which is integrated along the orbit. If one
+alone is lost, this tells it.
 
 Under set-valued friction, stick makes the velocity of a deviation zero, so that directions vanish
 within finite time. Their exponent is -inf by definition, and so is the sum. Such a direction comes
@@ -16,10 +17,11 @@ Source: Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15, 9 (1980).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
+import sympy as sp
 import xarray as xr
 
 from synchain.models.dynamics.variational import PHASE, Variation, network_variation, phase_shifted, with_volume
@@ -31,15 +33,18 @@ from ..cells.keywords import ONE_ORBIT, Given
 from ..results.labelled import Labelled, dataset
 from ..support.execution import Execution
 from ..support.progress import Hook
-from .averages import Averaging, Batches
+from .averages import SLACK, TRIED, Averaging, Batches, error_of_steps
 from .exponents import single_cell
 from .orbits import unit_of_time
 from .variational_integrator import VariationalIntegrator
 
 __all__ = ["Lyapunov", "lyapunov_spectrum"]
 
-PARTS = (1, 2, 4, 8, 16, 32, 64)
+PARTS = (1, 2, 4, 8, 16, 32, 64, 128, 256)
 """Numbers of blocks in a period that are tried, in ascending order."""
+
+ENOUGH = 64
+"""Blocks in a period beyond which more are tried only if the next direction stood out of rounding."""
 
 TRIAL = 4
 """Periods of each trial, and periods that are dropped after the choice."""
@@ -49,6 +54,15 @@ CLEAR, LOST = 1e4, 10.0
 
 From the first on it is clear of the error, below the second it is lost.
 """
+
+LARGEST_RTOL = 1e-5
+"""Beyond, no direction is ever clear of the error."""
+
+ROUNDING = 1e-13
+"""Length of a direction that rounding leaves: shorter blocks may find one that is longer."""
+
+GONE = 700.0
+"""Logarithm by which a direction shrinks over a block that is not followed at all; numbers end at 745."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -65,7 +79,7 @@ class Lyapunov(Labelled):
     stderr : ndarray, shape (count,)
         Standard errors.
     resolved : ndarray of bool, shape (count,)
-        False if a direction decays faster than can be followed; its exponent is -inf, its error 0.
+        False if several directions decay faster than can be followed; their exponents are -inf, their errors 0.
     divergence : float
         Mean divergence along the orbit: the sum of all exponents of the network. With set-valued
         friction it is that sum itself, -inf if an oscillator has stuck, nan if not all exponents
@@ -107,8 +121,11 @@ class Lyapunov(Labelled):
         """The exponents with errors, their sum, the dimension and the length of the average."""
         shown = [f"{x:.5g} ± {e:.1g}" for x, e in zip(self.exponent[:8], self.stderr[:8], strict=True)]
         low, high = self.dimension_range
+        lost = int((~self.resolved).sum())
+        fast = f"{lost} direction{'s' * (lost > 1)}, which decay too fast; their exponents sum to {self.rest:.8g}"
         return (
             ("exponents", ", ".join([*shown, *(["…"] if len(self.exponent) > len(shown) else [])])),
+            *((("not followed", fast),) if lost and len(self.exponent) == self.components else ()),
             ("divergence", f"{self.divergence:.5g} ± {self.divergence_error:.1g}"),
             ("Kaplan-Yorke dimension", f"{self.dimension:.4g}, from {low:.4g} to {high:.4g} within two errors"),
             ("average", f"{self.time:.6g} units of time"),
@@ -181,7 +198,7 @@ def lyapunov_spectrum(
     transient : float
         Transient before the average, in the same units.
     rtol : float
-        Relative tolerance of the integration. The friction law may require a smaller one.
+        Relative tolerance of the integration, at most 1e-5. The friction law may require a smaller one.
     seed : int
         Seed of the initial directions.
     show_progress : bool, optional
@@ -200,8 +217,8 @@ def lyapunov_spectrum(
     Raises
     ------
     ValueError
-        If there are more than eight oscillators, if `count` exceeds the number of exponents, or if
-        time enters without a known period.
+        If there are more than eight oscillators, if `count` exceeds the number of exponents, if `rtol` is
+        too large, or if time enters without a known period.
     FloatingPointError
         If the integration fails.
     """
@@ -209,6 +226,11 @@ def lyapunov_spectrum(
     scene = single_cell(Given(lyapunov_spectrum, parameters, more, ONE_ORBIT), scene, rtol)
     reporter = averaging.reporter()
     frame = TangentFrame.make(scene, _counted(scene, count), averaging.seed)
+    if frame.rtol > LARGEST_RTOL:
+        raise ValueError(
+            f"rtol: found {frame.rtol:g}; expected at most {LARGEST_RTOL:g} for a whole spectrum, whose directions must "
+            "stand out of the error of a block"
+        )
     with reporter:
         for _ in range(round(averaging.transient)):
             frame.advance()
@@ -216,16 +238,17 @@ def lyapunov_spectrum(
         frame.choose_block()
         batches, lost = Batches(frame.unit, 1.0 / frame.parts), np.zeros(frame.count, dtype=bool)
         for _ in averaging.rounds(batches, lambda: batches.error()[:-1][~lost], reporter):
-            growth, share, volume = frame.advance()
-            np.logical_or(lost, share < LOST * frame.rtol, out=lost)
-            batches.add(np.append(np.where(np.isfinite(growth), growth, 0.0), volume)[None])
-    return _report(frame, batches, lost)
+            growth, gone = frame.measure()
+            np.logical_or(lost, gone, out=lost)
+            batches.add(growth[None])
+        steps = frame.error_of_steps()
+    return _report(frame, batches, lost, steps)
 
 
-def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray) -> Lyapunov:
+def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray, steps: np.ndarray) -> Lyapunov:
     """Means and errors; exponents after a lost direction are lost as well."""
     resolved = ~np.logical_or.accumulate(lost)
-    mean, error = batches.mean()[0], batches.error_by_start()[0]
+    mean, error = batches.mean()[0], np.hypot(batches.error_by_start()[0], steps)
     exponent, spread = np.where(resolved, mean[:-1], -np.inf), np.where(resolved, error[:-1], 0.0)
     order = np.argsort(-exponent, kind="stable")
     time, volume = batches.time, (float(mean[-1]), float(error[-1]))
@@ -273,6 +296,8 @@ class TangentFrame:
         Blocks in a period.
     phase : int
         Block within the period.
+    rates : callable
+        The matrix (size, size) of the variational equation as a function of states and parameters.
     """
 
     scene: Scene
@@ -282,6 +307,7 @@ class TangentFrame:
     unit: float
     parts: int = 1
     phase: int = 0
+    rates: Callable[..., np.ndarray] = field(kw_only=True)
 
     @classmethod
     def make(cls, scene: Scene, count: int, seed: int) -> TangentFrame:
@@ -312,7 +338,7 @@ class TangentFrame:
         state = with_modes(variation.orbit, state, numbers)
         integrator = VariationalIntegrator.make(scene, variation, state, numbers, np.zeros((0, count)), 1)
         basis = np.linalg.qr(np.random.default_rng(seed).normal(size=(network.size, count)))[0]
-        return cls(scene, variation, integrator, basis, unit)
+        return cls(scene, variation, integrator, basis, unit, rates=_rates(variation))
 
     @property
     def count(self) -> int:
@@ -340,9 +366,12 @@ class TangentFrame:
         if PHASE.name in names:
             self.integrator.numbers[:, names.index(PHASE.name)] = self.phase * (self.unit / self.parts)
         self.phase = (self.phase + 1) % self.parts
-        self.integrator.set_deviations(self.basis[None])
+        followed = self.followed()
+        self.integrator.set_deviations(np.where(np.arange(self.count) < followed, self.basis, 0.0)[None])
         whole_growth = self.integrator.advance(self.unit / self.parts)[0]
-        self.basis, triangle = np.linalg.qr(self.integrator.deviations[0])
+        ends = self.integrator.deviations[0]
+        ends[:, followed:] = self.basis[:, followed:]
+        self.basis, triangle = np.linalg.qr(ends)
         lengths = np.abs(np.diagonal(triangle))
         volume = np.nan
         if self.variation.events is None:
@@ -352,6 +381,46 @@ class TangentFrame:
         with np.errstate(divide="ignore"):
             return whole_growth + np.log(lengths), lengths * np.exp(np.minimum(whole_growth, 0.0)), volume
 
+    def followed(self) -> int:
+        """Number of directions that are integrated over the next block: not those that would be gone long before its end.
+
+        An integration with a relative error follows them through every decade.
+        """
+        matrix = self.rates(*self.integrator.state[0], *self.integrator.numbers[0])
+        length = self.unit / self.parts
+        if not GONE < np.abs(matrix).sum(axis=1).max() * length < math.inf:
+            return self.count
+        decay = np.sort(np.linalg.eigvals(matrix).real)[::-1][: self.count]
+        return int((decay * length > -GONE).sum())
+
+    def measure(self) -> tuple[np.ndarray, np.ndarray]:
+        """Advance by one block.
+
+        Returns
+        -------
+        growth : ndarray, shape (count + 1,)
+            Logarithm of the growth in each direction, 0 for those that are lost, and of the growth of volumes.
+        lost : ndarray of bool, shape (count,)
+            Directions whose growth is unknown. One alone is known: its growth is what the others leave of that of
+            volumes.
+        """
+        growth, share, volume = self.advance()
+        lost = share < LOST * self.rtol
+        if lost.sum() == 1 and self.count == self.variation.size and self.variation.events is None:
+            growth[lost], lost = volume - growth[~lost].sum(), np.zeros_like(lost)
+        return np.append(np.where(np.isfinite(growth), growth, 0.0), volume), lost
+
+    def error_of_steps(self) -> np.ndarray:
+        """Advance by TRIED periods, and return the error of all growth rates (count + 1,) that is due to the steps."""
+        usual, looser = [], []
+        for _ in range(TRIED * self.parts):
+            basis, phase = self.basis, self.phase
+            with self.integrator.loosened(SLACK):
+                looser.append(self.measure()[0])
+            self.basis, self.phase = basis, phase
+            usual.append(self.measure()[0])
+        return error_of_steps(usual, looser, self.unit / self.parts)
+
     def choose_block(self) -> None:
         """Choose the fewest blocks in a period that keep most directions clear of the error."""
         best = -1
@@ -359,11 +428,21 @@ class TangentFrame:
         for parts in PARTS:
             self.parts, self.phase = parts, 0
             shares = np.array([self.advance()[1] for _ in range(TRIAL * parts)])
-            clear = np.logical_and.accumulate(shares.min(axis=0) > CLEAR * self.rtol)
+            least = shares.min(axis=0)
+            clear = np.logical_and.accumulate(least > CLEAR * self.rtol)
             if clear.sum() > best:
                 best, fewest = int(clear.sum()), parts
-            if best == self.count:
+            if best == self.count or (parts >= ENOUGH and least[best] < ROUNDING):
                 break
         self.parts, self.phase = fewest, 0
         for _ in range(TRIAL * fewest):
             self.advance()
+
+
+def _rates(variation: Variation) -> Callable[..., np.ndarray]:
+    """The matrix of a variational equation at time 0, as a function of states and parameters."""
+    names = [sp.Symbol(name, real=True) for name in (*variation.orbit.state, *variation.orbit.parameters)]
+    table = sp.zeros(variation.size, variation.size)
+    for (row, column), e in variation.matrix:
+        table[row, column] = e.xreplace({sp.Symbol("t", real=True): sp.S.Zero})
+    return sp.lambdify(names, table, "numpy")

@@ -14,11 +14,12 @@ from synchain.codegen.integrators import Integrator
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.mode_inertia import inertia_of_modes
 from synchain.models.dynamics.variational import Variation, mode
+from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 
 from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import with_modes
-from .averages import BATCHES
+from .averages import BATCHES, SLACK, TRIED, error_of_steps
 from .interpolation import Interpolation, exact_interpolation, lines_of, strength_interpolation
 from .variational_integrator import Travellers, VariationalIntegrator
 
@@ -99,7 +100,7 @@ class Orbits:
         Parameters
         ----------
         scene : Scene
-            Scene with coupling.
+            Scene with coupling; one without has the mode of strength 0 alone.
         strengths : ndarray, shape (m,) or (m, layers)
             Strengths alpha + i beta of the modes.
         state : ndarray, shape (starts, components)
@@ -110,9 +111,10 @@ class Orbits:
         Raises
         ------
         ValueError
-            If time enters without a known period, if a mode has no positive mass at its strength, or if modes have another
+            If time enters without a known period, if a strength other than 0 has no link, if a mode has no positive mass at its strength, or if modes have another
             number of strengths than there are layers of links.
         """
+        scene = scene if scene.model.linked else _joined(scene, strengths)
         variation = _variation(scene.equations, bool(np.iscomplexobj(strengths)))
         layers = len(scene.equations.layers)
         if strengths.size != len(strengths) * layers:
@@ -144,7 +146,9 @@ class Orbits:
             self.scene, self.variation, self.strengths, self.state[rows], self.workers, self.unit, self.method
         )
 
-    def integrator_of(self, strengths: np.ndarray, looseness: float = 1.0) -> VariationalIntegrator:
+    def integrator_of(
+        self, strengths: np.ndarray, looseness: float = 1.0, tolerance: float = 1.0
+    ) -> VariationalIntegrator:
         """Return an integrator along the orbits from their current states.
 
         Parameters
@@ -153,14 +157,18 @@ class Orbits:
             Strengths; each has one deviation for each component.
         looseness : float
             Ratio of the tolerance of the deviations to that of the orbit.
+        tolerance : float
+            Ratio of the tolerance of both to the usual one.
         """
         repeated = np.repeat(strengths, self.components, axis=0)
         rows = _rows(repeated.astype(self.strengths.dtype))
         names = self.variation.orbit.parameters
         numbers = np.tile([self.scene.parameters[name] for name in names], (len(self.state), 1))
-        return VariationalIntegrator.make(
+        integrator = VariationalIntegrator.make(
             self.scene, self.variation, self.state, numbers, rows, self.workers, looseness, self.method
         )
+        integrator.loosen(tolerance)
+        return integrator
 
     def settle(self, periods: float, advanced: Callable[[float], object] | None = None) -> None:
         """Advance all orbits over a transient of a number of units.
@@ -292,6 +300,42 @@ class Orbits:
         if self.integrator is None or self.travellers is None:
             raise RuntimeError("orbits are not prepared")
         return self.integrator.follow(self.block * self.unit, batches, self.travellers)
+
+    def error_of_steps(self) -> np.ndarray:
+        """Advance by TRIED blocks.
+
+        Returns
+        -------
+        ndarray, shape (starts, m)
+            The error of growth rates that is due to the steps (`averages.error_of_steps`).
+
+        Raises
+        ------
+        RuntimeError
+            If the orbits are not prepared.
+        """
+        if self.integrator is None or self.travellers is None:
+            raise RuntimeError("orbits are not prepared")
+        usual, looser, one = [], [], np.ones(1, dtype=np.int64)
+        for _ in range(TRIED):
+            vectors = self.travellers.vectors.copy()
+            with self.integrator.loosened(SLACK):
+                looser.append(self.growths(one)[0])
+            self.travellers.vectors[:] = vectors
+            usual.append(self.growths(one)[0])
+        return error_of_steps(usual, looser, self.block * self.unit)
+
+
+def _joined(scene: Scene, strengths: np.ndarray) -> Scene:
+    """A lone oscillator and a partner, joined by any link: its strength is 0; ValueError if it is not."""
+    pair, first = topology("chain", 2), next(iter(scene.initial))
+    if not np.any(strengths):
+        return scene.replace(coupling=f"{first}->{first}", topology=pair)
+    try:
+        scene.replace(topology=pair)
+    except ValueError as error:
+        raise ValueError(f"transversal modes need a link to a partner: {error}; strength 0 needs none") from None
+    raise ValueError(f"transversal modes: found no links in {scene!r}; expected a coupling and a topology")
 
 
 def _rows(strengths: np.ndarray) -> np.ndarray:

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -25,6 +27,7 @@ from ..cells.initial_modes import local_clock
 from ..cells.plan import control_array, half_swing, periods, tolerances
 from ..support.status import Status
 from ..support.threads import worker_count
+from .averages import SLACK, TRIED, error_of_steps
 from .interpolation import Registers, on_a_cache_line
 
 __all__ = ["Travellers", "VariationalIntegrator"]
@@ -263,6 +266,47 @@ class VariationalIntegrator:
         self._run(length, panels, self.vectors, np.empty((len(self.state), self.strengths.shape[1])))
         travellers.error = float(np.maximum(travellers.error, misfits.max()))  # NaN too
         return gains.transpose(1, 0, 2).take(registers.where, axis=2)
+
+    def loosen(self, ratio: float) -> None:
+        """Multiply the tolerances.
+
+        Parameters
+        ----------
+        ratio : float
+            Looser over usual tolerance.
+        """
+        self.control[[Control.RTOL, Control.ATOL]] *= ratio
+
+    @contextmanager
+    def loosened(self, ratio: float) -> Iterator[None]:
+        """Multiply the tolerances of what is integrated inside; states, deviations and tolerances are as before after it.
+
+        Parameters
+        ----------
+        ratio : float
+            Looser over usual tolerance.
+        """
+        state, vectors, control = self.state, self.vectors.copy(), self.control.copy()
+        self.loosen(ratio)
+        yield
+        self.state, self.vectors[:], self.control[:] = state, vectors, control
+
+    def error_of_steps(self, length: float) -> np.ndarray:
+        """Advance by TRIED blocks, and return the error of growth rates (cells, modes) that is due to the steps.
+
+        See `averages.error_of_steps`.
+
+        Parameters
+        ----------
+        length : float
+            Length of a block, as for `advance`.
+        """
+        usual, looser = [], []
+        for _ in range(TRIED):
+            with self.loosened(SLACK):
+                looser.append(self.advance(length))
+            usual.append(self.advance(length))
+        return error_of_steps(usual, looser, length)
 
     def _run(
         self, length: float | np.ndarray, panels: tuple[np.ndarray, ...], vectors: np.ndarray, growth: np.ndarray

@@ -38,8 +38,8 @@ _MESSAGES = {
     Status.STEP_BUDGET: "used up max_steps before the end; raise max_steps or loosen rtol and atol",
     Status.STEP_UNDERFLOW: "the step size fell below rounding; the equations may be singular here, or the tolerance "
     "tighter than double precision allows",
-    Status.DIVERGED: "the state grew without bound, beyond 2^53, or became undefined; begin on a bounded motion, such as "
-    "an equilibrium, or shorten the time",
+    Status.DIVERGED: "the state grew without bound, beyond 2^53 or with steps that shrink so that max_steps will not do, or "
+    "became undefined; begin on a bounded motion, such as an equilibrium, or shorten the time",
     Status.CHATTERING: "a contact changed between stick and slip hundreds of times while no time passed; "
     "check the friction law",
     Status.STOPPED: "met the stop condition of the scene before the end of the window",

@@ -1,0 +1,204 @@
+"""Equilibria against closed forms, their eigenvalues, shifts, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import synchain as sc
+from synchain.runtime.bifurcation import equilibrium as module
+from synchain.runtime.bifurcation.linearised import Linearised
+
+MACHINE = sc.Field({"delta": "w", "w": "P - w/2"}, parameters={"P": 0})
+LINE = sc.Rates({"w": "K*W*sin(delta_j - delta_i)"}, {"K": 1})
+PHASE = sc.Field({"theta": "w"}, parameters={"w": 0})
+PULL = sc.Rates({"theta": "K*W*sin(theta_j - theta_i)"}, {"K": 1})
+
+
+def grid(*powers: float, graph: sc.Topology | None = None) -> sc.Scene:
+    return sc.Scene(MACHINE, LINE, graph or sc.chain(len(powers)), parameters={"P": list(powers)})
+
+
+@pytest.mark.parametrize("power", [0.0, 0.3, 0.9, 0.9999])
+def test_two_machines_are_apart_by_the_arc_sine_of_power_over_strength(power: float) -> None:
+    found = sc.equilibrium(grid(power, -power))
+    apart = np.arcsin(power)
+    assert found.state[0] - found.state[1] == pytest.approx(apart, abs=1e-9)
+    assert found.shifts == ("delta",)
+    assert found.speeds.tolist() == [0.0]
+    swings = np.roots([1.0, 0.5, 2.0 * np.cos(apart)])  # of the difference
+    expected = np.sort_complex(np.array([0.0, -0.5, *swings], dtype=complex))
+    np.testing.assert_allclose(np.sort_complex(found.eigenvalues), expected, atol=1e-7)
+    assert found.stable
+
+
+def test_the_other_equilibrium_of_two_machines_is_unstable() -> None:
+    scene = grid(0.3, -0.3).replace(initial={"delta": [3.0, 0.0], "w": 0.0})
+    found = sc.equilibrium(scene)
+    assert found.state[0] - found.state[1] == pytest.approx(np.pi - np.arcsin(0.3), abs=1e-12)
+    assert (found.growing, found.verdict) == (1, "unstable, 1 growing")
+
+
+def test_at_the_fold_nothing_is_called_stable_and_beyond_it_nothing_is_found() -> None:
+    fold = sc.equilibrium(grid(1.0, -1.0))
+    assert (fold.growing, fold.neutral, fold.stable) == (0, 1, False)
+    with pytest.raises(ArithmeticError, match="no equilibrium near the start: Newton's method left rates of"):
+        sc.equilibrium(grid(1.001, -1.001))
+
+
+def test_machines_whose_powers_do_not_add_up_to_zero_turn_together() -> None:
+    """The sum of the powers balances the damping: w = 2 mean(P)."""
+    found = sc.equilibrium(grid(0.7, -0.3))
+    assert found.speeds == pytest.approx([0.4], abs=1e-14)
+    np.testing.assert_allclose(found.state[2:], 0.4, atol=1e-14)
+    assert found.state[0] - found.state[1] == pytest.approx(np.arcsin(0.5), abs=1e-13)
+    assert found.stable
+
+
+def test_phases_of_kuramoto_lock_at_the_mean_frequency() -> None:
+    """On a complete graph K r sin(theta_i - psi) = w_i - mean(w), r exp(i psi) the sum of exp(i theta)."""
+    w = np.linspace(-1.0, 2.0, 7)
+    found = sc.equilibrium(sc.Scene(PHASE, PULL, sc.complete(7), parameters={"w": w.tolist(), "K": 0.5}))
+    field = np.exp(1j * found.state).sum()
+    np.testing.assert_allclose(np.sin(found.state - np.angle(field)) * 0.5 * abs(field), w - w.mean(), atol=1e-12)
+    assert found.speeds == pytest.approx([w.mean()], abs=1e-13)
+    assert found.stable
+
+
+def test_a_pendulum_has_two_equilibria() -> None:
+    down = sc.equilibrium(sc.Scene("pendulum"))
+    up = sc.equilibrium(sc.Scene("pendulum", initial={"x": 3.0, "v": 0.0}))
+    np.testing.assert_allclose(down.state, 0.0, atol=1e-12)
+    np.testing.assert_allclose(down.eigenvalues, [1j, -1j], atol=1e-12)
+    assert down.verdict == "neutral, 2 on the imaginary axis"
+    assert not down.stable
+    np.testing.assert_allclose(up.state, [np.pi, 0.0], atol=1e-12)
+    np.testing.assert_allclose(up.eigenvalues, [1.0, -1.0], atol=1e-12)
+    assert (down.shifts, up.shifts) == ((), ())
+
+
+def test_masses_that_depend_on_angles() -> None:
+    """A double pendulum of equal masses and lengths: squares of the frequencies 2 -+ sqrt(2)."""
+    found = sc.equilibrium(sc.Scene("double_pendulum"))
+    frequencies = np.sort(np.abs(found.eigenvalues.imag))[::2]
+    np.testing.assert_allclose(frequencies**2, [2 - np.sqrt(2), 2 + np.sqrt(2)], rtol=1e-12)
+
+
+def test_a_drive_of_strength_zero_is_none() -> None:
+    """Duffing's oscillator with a soft spring, x + beta x^3 = 0: a saddle at 1/2 if beta = -4."""
+    scene = sc.Scene("duffing", topology=sc.chain(2), parameters={"beta": -4.0}, initial={"x": 0.45, "v": 0.0})
+    found = sc.equilibrium(scene, u=0)
+    np.testing.assert_allclose(found.state, [0.5, 0.5, 0.0, 0.0], atol=1e-12)
+    assert found.growing == 2
+    with pytest.raises(ValueError, match="found a drive"):
+        sc.equilibrium(scene, u=0.1)
+
+
+def test_links_with_inertia() -> None:
+    """Modes of a chain of three, whose Laplacian has the eigenvalues 0, 1, 3: squares of frequencies 1/(1 + sigma gamma)."""
+    found = sc.equilibrium(sc.Scene("harmonic", "inerter", sc.chain(3), parameters={"sigma": 0.5}))
+    frequencies = np.sort(found.eigenvalues.imag)[3:]
+    np.testing.assert_allclose(frequencies**2, [0.4, 1 / 1.5, 1.0], rtol=1e-12)
+
+
+def test_newton_steps_are_shortened_where_they_would_diverge() -> None:
+    found = sc.equilibrium(sc.Scene(sc.Field({"x": "-atan(x)"}, initial={"x": 3})))
+    assert found.state == pytest.approx([0.0], abs=1e-11)
+
+
+@pytest.mark.parametrize("start", [0, 0.3])
+def test_a_flat_place_is_no_shift(start: float) -> None:
+    found = sc.equilibrium(sc.Scene(sc.Field({"x": "-x**3"}, initial={"x": start})))
+    assert found.shifts == ()
+    assert found.verdict == "neutral, 1 on the imaginary axis"
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        sc.Scene("fitzhugh_nagumo", "x->x, y->x", sc.star(4)),
+        sc.Scene("double_pendulum", topology=sc.chain(3)),
+        sc.Scene("harmonic", "inerter", sc.chain(3)),
+        grid(0.1, 0.2, -0.3, graph=sc.ring(3)),
+    ],
+    ids=["field", "masses", "inerters", "numbers of nodes"],
+)
+def test_rates_jacobian_and_masses_are_those_of_the_equations(scene: sc.Scene) -> None:
+    equations, network = scene.equations, Linearised.of(scene.equations, scene.parameters)
+    state = np.random.default_rng(0).normal(size=equations.dimension)
+    known = dict(zip(equations.state, state, strict=True)) | dict(scene.parameters)
+
+    def value(e) -> float:
+        return float(e.xreplace({s: known[s.name] for s in e.free_symbols}))
+
+    np.testing.assert_allclose(network.rates(state), [value(e) for e in equations.rhs()], atol=1e-13)
+    for found, entries in ((network.jacobian(state), equations.jacobian()), (network.mass(state), equations.mass())):
+        expected = np.zeros((len(state), len(state)))
+        for place, e in entries.items():
+            expected[place] = value(e)
+        np.testing.assert_allclose(0.0 * expected if found is None else found.toarray(), expected, atol=1e-13)
+
+
+def test_links_and_nodes_with_numbers_of_their_own() -> None:
+    strengths = {"K": [[0, 2.0, 0], [2.0, 0, 3.0], [0, 3.0, 0]]}
+    scene = sc.Scene(MACHINE, LINE, sc.chain(3), parameters={"P": [0.5, 0.0, -0.5], **strengths})
+    found = sc.equilibrium(scene)
+    np.testing.assert_allclose(-np.diff(found.state[:3]), np.arcsin([0.25, 0.5 / 3.0]), atol=1e-12)
+
+
+def test_a_large_network_is_not_called_stable_by_a_few_eigenvalues(monkeypatch: pytest.MonkeyPatch) -> None:
+    n = 60
+    scene = grid(*(0.01 * np.cos(2.0 * np.pi * np.arange(n) / n)), graph=sc.ring(n))
+    whole = sc.equilibrium(scene)
+    monkeypatch.setattr(module, "DENSE", 2 * n - 1)
+    few = sc.equilibrium(scene)
+    assert whole.stable
+    assert few.verdict == "not decided: none of the 12 eigenvalues nearest to zero grows"
+    assert not few.stable
+    nearest = np.sort(np.abs(whole.eigenvalues))[:12]
+    np.testing.assert_allclose(np.sort(np.abs(few.eigenvalues)), nearest, atol=1e-9)
+    apart = scene.replace(initial={"delta": [np.pi * (i % 2) for i in range(n)], "w": 0.0})
+    assert sc.equilibrium(apart).verdict == "unstable, at least 11 growing"
+
+
+def test_starts_are_those_of_runs(tmp_path: Path) -> None:
+    """A run settles; its end is where the search begins, and what is found stays where it is."""
+    scene = grid(0.5, -0.5).replace(time_unit="time", transient=0, window=40)
+    found = sc.equilibrium(scene, sc.run(scene))
+    again = sc.equilibrium(scene, found.data.state, P=[0.6, -0.6])
+    assert again.state[0] - again.state[1] == pytest.approx(np.arcsin(0.6), abs=1e-12)
+    stays = sc.run(scene, start=found.data.state)
+    np.testing.assert_allclose(stays.end.values.ravel(), found.state, atol=1e-9)
+    found.save(tmp_path / "rest.nc")
+    kept = sc.open_result(tmp_path / "rest.nc")
+    assert isinstance(kept, sc.Equilibrium)
+    assert kept.shifts == found.shifts
+    np.testing.assert_array_equal(kept.eigenvalues, found.eigenvalues)
+
+
+@pytest.mark.parametrize(
+    ("scene", "options", "message"),
+    [
+        (sc.Scene("duffing"), {}, "found a drive.*`periodic_orbit` finds"),
+        (sc.Scene(sc.Field({"x": "-x + sign(x - 1)"})), {}, "by which rates jump"),
+        (grid(0.0, 0.0), {"count": 5}, "count = 5; expected at most 4"),
+        (grid(0.0, 0.0), {"count": 0}, "count"),
+    ],
+)
+def test_what_is_refused(scene: sc.Scene, options: dict[str, int], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        sc.equilibrium(scene, **options)
+
+
+def test_set_valued_friction_rests_in_whole_ranges() -> None:
+    with pytest.raises(ValueError, match="set-valued friction, under which whole ranges of states rest"):
+        sc.equilibrium(sc.Scene("froude", contact="set-valued"))
+
+
+def test_a_motion_that_comes_to_rest_is_no_periodic_orbit() -> None:
+    scene = sc.Scene(sc.Field({"x": "v", "v": "-v - x + 1"}), "x->x")
+    with pytest.raises(ArithmeticError, match=r"comes to rest at x = 1, v = .*`equilibrium` finds such states"):
+        sc.periodic_orbit(scene)
+    np.testing.assert_allclose(sc.equilibrium(scene).state, [1.0, 0.0], atol=1e-14)
