@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from synchain.models.scenes.scene import Scene
+from synchain.models.scenes.scene import Scene, a_scene
 from synchain.models.spectra.joint import JointEigenvalue, joint_spectrum
 
 __all__ = ["SharedOrbit", "shared_orbits", "still_strengths", "transversal_modes", "unused_axes"]
@@ -56,7 +56,8 @@ def still_strengths(scene: Scene) -> set[str]:
 
 def unused_axes(scene: Scene) -> set[str]:
     """Return the axes on which nothing depends that is computed for given strengths of modes or of links."""
-    return {axis.name for axis in scene.axes} & still_strengths(scene) if scene.axes else set()
+    axes = {axis.name for axis in a_scene(scene).axes}
+    return axes & still_strengths(scene) if axes else set()
 
 
 def shared_orbits(scene: Scene, columns: Mapping[str, np.ndarray]) -> Iterator[SharedOrbit]:

@@ -21,7 +21,7 @@ import numpy as np
 
 from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.graphs.topology import Topology
-from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.scenes.scene import Scene
 
 from ..cells.keywords import Given
 from ..stability.exponents import Exponents, exponents
@@ -147,7 +147,7 @@ def agreement(
         If the line lacks a strength, or if sigma is negative, not finite or does not increase, and for
         a scene with draws or axes, but for one of sigma; as `strengths` does.
     """
-    scene = Given(agreement, parameters, more, IN_CRITERION).scene(scene, unused_axes(a_scene(scene)))
+    scene = Given(agreement, parameters, more, IN_CRITERION).scene(scene, unused_axes(scene))
     expect_vanishing("agreement", scene.equations)
     check_probe(scene.topology, scene.spectrum)
     scene = scene.replace(record=("sync_error",))

@@ -25,7 +25,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.families import topology
 from synchain.models.interactions.link import strength
 from synchain.models.mechanics.components import Edge
-from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.scenes.scene import Scene
 
 from ..cells.choice import chosen_for_rows
 from ..cells.keywords import Given
@@ -136,7 +136,7 @@ def universal_probe(
     """
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     real, imaginary = _broadcast(alpha, beta)
-    scene = Given(universal_probe, parameters, more, IN_CRITERION).scene(scene, unused_axes(a_scene(scene)))
+    scene = Given(universal_probe, parameters, more, IN_CRITERION).scene(scene, unused_axes(scene))
     if scene.varied:
         scene.equations.expect_alike("the three-oscillator probe")
     ring = scene.replace(

@@ -245,7 +245,7 @@ def thresholds(
     """
     a_scene(scene).equations.expect_alike("thresholds")
     expect_vanishing("thresholds", scene.equations)
-    scene = Given(thresholds, parameters, more, IN_CRITERION).scene(scene, unused_axes(a_scene(scene)))
+    scene = Given(thresholds, parameters, more, IN_CRITERION).scene(scene, unused_axes(scene))
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     spectrum = scene.topology.spectrum
     check_probe(scene.topology, spectrum)
