@@ -114,14 +114,17 @@ class _Taken:
 
 @cache
 def _checked(function: Callable[..., Any], package: str) -> Callable[..., Any]:
-    """The function with its arguments checked; one that takes any keywords checks these itself."""
+    """The function, whose arguments are looked at if it refuses them; one that takes any keywords checks these itself."""
     taken = _Taken.by(function)
 
     @wraps(function)
     def checked(*arguments: Any, **keywords: Any) -> Any:
-        if (refusal := taken.refusal(len(arguments), keywords)) is not None:
-            raise TypeError(refusal)
-        return function(*arguments, **keywords)
+        try:
+            return function(*arguments, **keywords)
+        except TypeError:
+            if (refusal := taken.refusal(len(arguments), keywords)) is not None:
+                raise TypeError(refusal) from None
+            raise
 
     checked.__module__ = package
     return checked
