@@ -149,6 +149,8 @@ class Exponents(Labelled):
         if not self.on_a_line:
             kind = "complex" if np.iscomplexobj(x) else f"those of {x.shape[1]} layers"
             raise ValueError(f"strengths are {kind}; ranges need real ones of a single layer")
+        if abs(y[0]) <= 2.0 * error[0] < np.inf:
+            y = np.append(0.0, y[1:])  # zero to its error, such as that of a limit cycle at strength 0
         ends: list[Interval] = [(float(x[0]), 0.0)] if y[0] < 0 else []
         for i in map(int, np.flatnonzero((y[1:] < 0) != (y[:-1] < 0))):
             a, b = max(i - 2, 0), min(i + 3, len(x) - 1)

@@ -12,7 +12,7 @@ from variational_reference import transversal_equations
 
 from synchain.codegen.export.python import to_python
 from synchain.codegen.kernels.sweep import emit
-from synchain.models import chain, ring, star
+from synchain.models import Field, chain, ring, star
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Node
@@ -102,6 +102,13 @@ def test_equal_numbers_are_equal_nodes() -> None:
 def test_lists_that_fit_no_network(given: dict, message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=re.escape(message)):
         scene(parameters=given)
+
+
+def test_states_that_numbers_make_alike_are_refused() -> None:
+    node = Field({"x": "-x + x_1", "x_1": "-x_1"})
+    with pytest.raises(ValueError, match="'x_1' has the name of one at a single node"):
+        text(Scene(node, "x->x", chain(2)).equations)
+    assert Scene(Field({"x_1": "-x_1", "x_2": "-x_2"}), "x_1->x_1", chain(2)).equations.dimension == 4
 
 
 def test_a_name_that_two_parameters_would_have() -> None:

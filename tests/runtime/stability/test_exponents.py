@@ -171,6 +171,16 @@ def test_a_zero_without_neighbours_lies_anywhere_between_two_strengths() -> None
     assert Exponents(alpha, exponent, np.zeros(2), 1.0, 1, exponent[None]).ranges == (((0.0, 0.0), (1.0, 0.0)),)
 
 
+@pytest.mark.parametrize(("error", "begins"), [(1e-7, []), (1e-9, [0.0])])
+def test_an_exponent_that_is_zero_to_its_error_begins_no_interval(error: float, begins: list[float]) -> None:
+    """That of a limit cycle at strength 0."""
+    alpha, exponent = np.linspace(0, 3, 4), np.array([-6e-9, 0.2, -0.1, -0.3])
+    found = Exponents(alpha, exponent, np.full(4, error), 1.0, 1, exponent[None]).intervals
+    assert [low for low, _ in found] == [*begins, pytest.approx(1 + 2 / 3)]
+    stable = np.array([-6e-9, -0.2, -0.1, -0.3])
+    assert Exponents(alpha, stable, np.full(4, error), 1.0, 1, stable[None]).intervals == ((0.0, 3.0),)
+
+
 @pytest.mark.long
 def test_published_zeros_of_the_rossler_function() -> None:
     """a = b = 0.2, c = 9, x -> x: 0.186 and 4.614 (Huang, Chen, Lai & Pecora, Phys. Rev. E 80, 036204 (2009))."""
