@@ -149,8 +149,8 @@ class Planner:
         ends = [_ends(values) for values in self.values.values()]
         cells = [(place,) for place in np.unique(ends)] if self.scene.zipped else [*zip(*ends, strict=True)]
         cells = cells or [()]
-        if self.drawn:
-            places = np.unique([_ends(values) for values in self.drawn.values()])
+        if self.scene.realisations:
+            places = np.unique([_ends(values) for values in self.drawn.values()] or [0])  # of graphs: perhaps no numbers
             cells = [(*cell, place) for cell in cells for place in places]
         if not self.scene.shape:
             return self.rows(np.arange(1))

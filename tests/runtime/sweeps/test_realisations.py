@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import end, lorentzian, mean, nodes, normal, rate, ring, uniform
+from synchain.models import chain, end, lorentzian, mean, nodes, normal, rate, ring, uniform
 from synchain.models.scenes.scene import Scene
 from synchain.models.sweeps.distribution import Draw
 from synchain.runtime.opening.open import open_result
@@ -145,3 +145,11 @@ def test_distributions_refuse_what_they_are_not() -> None:
 def test_certified_runs_take_no_realisations() -> None:
     with pytest.raises(ValueError, match="realisations"):
         run(SCENE, certified=True, realisations=2, draws={"sigma": [0.1, 0.2]}, show_progress=False)
+
+
+def test_graphs_without_any_link_are_realisations_too() -> None:
+    scene = Scene("harmonic", "spring", ring(3), transient=0, window=1)
+    found = run(scene, realisations=2, draws={"topology": "erdos_renyi(3, p=0)"}, show_progress=False)
+    alone = run(Scene("harmonic", topology=chain(1), transient=0, window=1), show_progress=False)
+    assert found.end.shape[0] == 2
+    np.testing.assert_allclose(found.end.values[:, 0, 0], alone.end.values[0, 0], rtol=0, atol=1e-8)
