@@ -150,7 +150,8 @@ class Planner:
         cells = [(place,) for place in np.unique(ends)] if self.scene.zipped else [*zip(*ends, strict=True)]
         cells = cells or [()]
         if self.scene.realisations:
-            places = np.unique([_ends(values) for values in self.drawn.values()] or [0])  # of graphs: perhaps no numbers
+            drawn = [_ends(values) for values in self.drawn.values()]  # none of graphs without links
+            places = np.unique(drawn) if drawn else np.zeros(1, int)
             cells = [(*cell, place) for cell in cells for place in places]
         if not self.scene.shape:
             return self.rows(np.arange(1))
