@@ -265,9 +265,8 @@ def _stages(
     functions = [f for k in range(len(blocks)) for f in node_functions(list(steps.values()), blocks[k], k)]
     functions += dict.fromkeys(f for writer in steps.values() for f in writer.functions)
     stepping = [_step(name, writer, looped) for name, writer in steps.items()]
-    solves = looped and (method.implicit or plain.inertial)
     made = [*map(LANES.function, functions), SCALED, *([PAIR] if looped and len(method.e) > 1 else [])]
-    made += [driver.text("sparse")] if solves else []
+    made += [driver.text("sparse")] if looped and steps["step"].solves else []
     scratch = workspace(steps["step"], elimination) if elimination is not None else 0
     return [*made, *map(LANES.function, stepping)], scratch, sum(operations(f.body) for f in stepping), False
 

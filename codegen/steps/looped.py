@@ -7,6 +7,7 @@ Nodes of several kinds have a loop for each kind, and their links one for each p
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 
 import sympy as sp
 
@@ -62,7 +63,6 @@ class Looped(Step):
         super().__init__(equations, kinds, method)
         self.places, self.elimination, self.fields = places(equations), elimination, mean_fields(equations)
         self.mass = LoopMass(self)
-        self.given: list[str] = []
 
     def opening(self) -> None:
         """Name the parts of the workspace, load the parameters that all nodes share."""
@@ -81,11 +81,6 @@ class Looped(Step):
             self.mass.opening()
 
     @property
-    def solves(self) -> bool:
-        """True if the step solves linear equations."""
-        return self.method.implicit or self.equations.inertial
-
-    @property
     def matrices(self) -> Expression:
         """The length of the matrix, with its factors where these stand apart."""
         return Name("ENTRIES") if self.elimination.exact else 2 * Name("ENTRIES")
@@ -94,24 +89,23 @@ class Looped(Step):
 
     def slopes(self, base: str, out: str) -> None:
         """Compute the right-hand side at one vector of states into another, by a function that all stages call."""
-        if not self.given:
-            self.given = self.write_slopes()
+        given = self.given
         states = Name("y") if base == "y" else call("address", "dense", Name("STATE") * "WIDTH")
-        self.put(Do(call("slopes", states, "dense", GROUPS.get(out, out.upper()), *self.given)))
+        self.put(Do(call("slopes", states, "dense", GROUPS.get(out, out.upper()), *given)))
 
-    def write_slopes(self) -> list[str]:
-        """Write that function; returns what it is given besides states, workspace, and place of the slopes."""
-        outside, self.statements = self.statements, []
-        for kind in self.places.kinds:
-            self.node_slopes(kind, "y", "out")
-        self.links("y", "out")
-        kept = 0
-        for field in self.fields:
-            self.put(*field.statements(self.places, "y", "out", kept))
-            kept += len(field.alike)
-        body, self.statements = self.statements, outside
+    @cached_property
+    def given(self) -> list[str]:
+        """What that function, which is written here, is given besides states, workspace, and place of the slopes."""
+        with self.apart() as body:
+            for kind in self.places.kinds:
+                self.node_slopes(kind, "y", "out")
+            self.links("y", "out")
+            kept = 0
+            for field in self.fields:
+                self.put(*field.statements(self.places, "y", "out", kept))
+                kept += len(field.alike)
         needed = mentioned(body)
-        given = [name for name in ("h", "p", *targets(outside), "weights") if name in needed]
+        given = [name for name in ("h", "p", *targets(self.statements), "weights") if name in needed]
         about = "Write the right-hand side at the states y behind the place `out` of the workspace."
         self.functions.append(Function("slopes", ("y", "dense", "out", *given), about, tuple(body), Role.CALLED))
         return given
@@ -264,19 +258,19 @@ class Looped(Step):
         m, values = self.method, self.stages(len(self.method.c))
         late = len(m.c) - self.early
         if late:
-            before, self.statements = self.statements, []
-            for i in range(self.early, len(m.c)):
-                self.stage(i)
-            self.statements = [*before, If(Name("DENSE"), tuple(self.statements))]
+            with self.apart() as stages:
+                for i in range(self.early, len(m.c)):
+                    self.stage(i)
+            self.put(If(Name("DENSE"), tuple(stages)))
         self.note("new state, error and dense output")
         self.put(let("error", 0.0 * Name("h")), let("total", 0.0 * Name("h")))
         error = self.increment(m.e[0], values)
         if len(m.e) > 1:
             error = call("pair", *(linear(row, values) for row in m.e), "h")
         if m.dense_error and self.equations.inertial:
-            before, self.statements = self.statements, []
-            self.mass.gather("y", "MASS")
-            self.statements = [*before, If(Name("DENSE"), tuple(self.statements))]
+            with self.apart() as masses:
+                self.mass.gather("y", "MASS")
+            self.put(If(Name("DENSE"), tuple(masses)))
         found = [*self.load_stages(PLACE, [1.0] * self.early), let("old", Load("y", PLACE))]
         found += [let("new", Name("old") + self.increment(m.b, values)), store("y_new", PLACE, "new")]
         found += [let("e", error), *self.stiff_errors(values)]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 
 import sympy as sp
 
@@ -113,6 +114,20 @@ class Step(ABC):
     def note(self, text: str) -> None:
         """Append a comment."""
         self.statements.append(Comment(text))
+
+    @contextmanager
+    def apart(self) -> Iterator[list[Statement]]:
+        """Collect what is appended meanwhile, for a block or a function of its own."""
+        outside, self.statements = self.statements, []
+        try:
+            yield self.statements
+        finally:
+            self.statements = outside
+
+    @property
+    def solves(self) -> bool:
+        """True if the step solves linear equations."""
+        return self.method.implicit or self.equations.inertial
 
     # -- the method -------------------------------------------------------------------------------------------
 

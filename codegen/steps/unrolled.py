@@ -228,19 +228,20 @@ class Unrolled(Step):
         m = self.method
         self.note("new state and error")
         errors = [self.new_state(name) for name in self.state]
-        before, self.statements = self.statements, []
-        for i in range(m.stages, len(m.c)):
-            self.stage(i)
-        for j, row in enumerate(m.dense):
-            for slot, name in enumerate(self.state):
-                value = lane(linear(row, self.stages(name, len(row))))
-                value = value if m.implicit else Product((Name("h"), value))
-                self.put(store("dense", j * len(self.state) + slot, value))
         if m.dense_error:
-            before += [let(f"e_{name}", e) for name, e in zip(self.state, errors, strict=True)]
+            self.put(*(let(f"e_{name}", e) for name, e in zip(self.state, errors, strict=True)))
             errors = [Name(f"e_{name}") for name in self.state]
-            self.stiff_errors()
-        self.statements = [*before, If(Name("DENSE"), tuple(self.statements))]
+        with self.apart() as dense:
+            for i in range(m.stages, len(m.c)):
+                self.stage(i)
+            for j, row in enumerate(m.dense):
+                for slot, name in enumerate(self.state):
+                    value = lane(linear(row, self.stages(name, len(row))))
+                    value = value if m.implicit else Product((Name("h"), value))
+                    self.put(store("dense", j * len(self.state) + slot, value))
+            if m.dense_error:
+                self.stiff_errors()
+        self.put(If(Name("DENSE"), tuple(dense)))
         for slot, (name, e) in enumerate(zip(self.state, errors, strict=True)):
             self.put(store("y_new", slot, f"n_{name}"))
             self.let(f"e_{name}", call("scaled", e, name, f"n_{name}", "rtol", "atol"))
