@@ -596,11 +596,7 @@ def _check_names(eq: Equations) -> None:
     twice = _repeated(eq.parameters)
     if twice is not None:
         raise ValueError(f"the name {twice!r} stands for two parameters; rename one")
-    components = {s.name for node in eq.nodes for s in node.state}
-    numbered = sorted(components.intersection(eq.state))
-    if numbered:
-        raise ValueError(f"the state variable {numbered[0]!r} has the name of one at a single node; rename it")
-    states = {*eq.state, *components}
+    states = {*eq.state, *(s.name for node in eq.nodes for s in node.state)}
     taken = sorted(states.intersection(eq.parameters))
     if taken:
         raise ValueError(f"the parameter {taken[0]!r} has the name of a state variable; rename it")

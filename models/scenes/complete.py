@@ -170,6 +170,10 @@ def _check_physics(model: Model, numbers: Mapping[str, float], axes: Sequence[Ax
 
 def _start(model: Model, given: object, seed: int) -> Frozen[tuple[float, ...]]:
     """The initial states, component by component, those of each kind of node around its own centre."""
+    for name in model.components:
+        base, _, number = name.rpartition("_")
+        if base in model.components and number.isdecimal() and 1 <= int(number) <= model.n:
+            raise ValueError(f"the state variable {name!r} has the name of {base!r} at node {number}; rename it")
     apart = model.unlinked
     own = [
         default_start(tuple(s.name for s in node.state), model.n, kind.oscillator.initial)
