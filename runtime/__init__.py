@@ -44,9 +44,10 @@ if TYPE_CHECKING:
     from .sweeps.run import run
     from .sweeps.stream import Streamed, stream
     from .synchronisation.basin import Basin, basin
+    from .synchronisation.criterion import Criterion
     from .synchronisation.exponent_windows import ExponentWindows
     from .synchronisation.probe import Probe, universal_probe
-    from .synchronisation.threshold import Criterion, Thresholds, thresholds
+    from .synchronisation.threshold import Thresholds, thresholds
 
 __all__ = [
     "MSF",
@@ -91,7 +92,7 @@ _HOME = {
     "Basin": "synchronisation.basin",
     "Branch": "bifurcation.branches",
     "ClusterExponents": "stability.clusters",
-    "Criterion": "synchronisation.threshold",
+    "Criterion": "synchronisation.criterion",
     "Equilibrium": "bifurcation.equilibrium",
     "ExponentWindows": "synchronisation.exponent_windows",
     "Exponents": "stability.exponents",

@@ -21,9 +21,10 @@ from synchain.runtime.stability.exponents import Exponents
 from synchain.runtime.stability.lyapunov import Lyapunov
 from synchain.runtime.stability.msf import MSF, Plane
 from synchain.runtime.synchronisation.basin import Basin
+from synchain.runtime.synchronisation.criterion import Criterion
 from synchain.runtime.synchronisation.exponent_windows import ExponentWindows
 from synchain.runtime.synchronisation.probe import Probe
-from synchain.runtime.synchronisation.threshold import Criterion, Sweep, Thresholds
+from synchain.runtime.synchronisation.threshold import Sweep, Thresholds
 
 PAIR = Scene(topology=topology("chain", 2), parameters={"omega": 1.15})
 ROTORS = Scene(Field({"theta": "w"}, parameters={"w": 0.25}), "theta->theta", topology("chain", 2))

@@ -26,7 +26,7 @@ from synchain.runtime.results.energy import energy_function
 from synchain.runtime.results.labelled import Labelled
 from synchain.runtime.support.threads import worker_count
 from synchain.runtime.synchronisation.agreement import agreement
-from synchain.runtime.synchronisation.threshold import Criterion
+from synchain.runtime.synchronisation.criterion import Criterion
 
 ONE = Scene(oscillator="harmonic", transient=1, window=1)
 PAIR = Scene(oscillator="harmonic", topology=chain(2), transient=1, window=1)

@@ -19,7 +19,7 @@ from synchain.models.scenes.scene import Scene
 
 from ..stability.exponents import Exponents, exponents
 from ..synchronisation.agreement import OUTCOMES, Agreement, agreement, strengths
-from ..synchronisation.threshold import Criterion
+from ..synchronisation.criterion import Criterion
 
 __all__ = ["COLUMNS", "GRAPHS", "OMEGAS", "measure", "summary"]
 

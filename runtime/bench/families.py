@@ -28,7 +28,8 @@ from ..prediction.families import CLOSED, LargestNetwork, largest_network
 from ..prediction.synchronisability import Verdict, verdict
 from ..stability.msf import MSF, msf
 from ..support.execution import Execution
-from ..synchronisation.threshold import Criterion, simulate
+from ..synchronisation.criterion import Criterion
+from ..synchronisation.threshold import simulate
 from .kit.tables import markdown
 
 __all__ = ["CASES", "COLUMNS", "GRAPHS", "function_of", "measure", "sigma_of", "summary"]

@@ -17,7 +17,8 @@ from synchain.models.scenes.scene import Scene
 
 from ..prediction.intervals import Interval
 from ..stability.exponents import exponents
-from ..synchronisation.threshold import Criterion, project, simulate
+from ..synchronisation.criterion import Criterion
+from ..synchronisation.threshold import project, simulate
 
 __all__ = ["CASES", "CHANGES", "COLUMNS", "PROJECTED", "measure"]
 

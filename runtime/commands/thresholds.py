@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from ..console.arguments import above_zero, add_scene, add_workers, positive, spaced
 from ..console.drive import drive_words
@@ -16,7 +17,8 @@ if TYPE_CHECKING:
     from synchain.models.scenes.scene import Scene
 
     from ..prediction.intervals import Interval
-    from ..synchronisation.threshold import Criterion, Thresholds
+    from ..synchronisation.criterion import Criterion
+    from ..synchronisation.threshold import Thresholds
 
 SUMMARY = (
     "measure for which coupling a network synchronises, beside the exponents of its modes and the two-oscillator probe"
@@ -27,8 +29,6 @@ EXAMPLES = (
     "synchain thresholds --matrix G.txt --omega 1.55 --quick",
 )
 
-FULL = {"starts": 8, "transient": 1000.0, "window": 100.0}
-QUICK = {"starts": 5, "transient": 400.0, "window": 50.0}
 RESOLUTION, COARSE = 5e-4, 2e-3
 """How closely the ends of the ranges are located in sigma."""
 
@@ -50,7 +50,7 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--quick",
         action="store_true",
-        help=f"defaults of {QUICK['starts']} starts, {QUICK['transient']:g} periods, half the grid; ends to {COARSE:g}",
+        help=f"a first look: 5 starts, 400 periods, rtol 1e-6, half the grid; ends to {COARSE:g}",
     )
     parser.add_argument("--json", action="store_true", help="print JSON: intervals, probe, predicted, exponents ...")
     add_workers(parser)
@@ -60,7 +60,7 @@ def execute(arguments: Namespace) -> int:
     """Print the synchronous ranges as a table or as JSON."""
     from ..cells.kernels import kernel_source
     from ..synchronisation.hidden_modes import hidden_modes
-    from ..synchronisation.threshold import Criterion, check_probe, default_grid, thresholds
+    from ..synchronisation.threshold import check_probe, default_grid, thresholds
 
     with wrong_use():
         scene = _scene(arguments)
@@ -68,7 +68,7 @@ def execute(arguments: Namespace) -> int:
         if not scene.model.linked:
             raise WrongUse("the scene has no coupling; expected a coupled network; choose another SCENE")
         kernel_source(scene)
-        criterion = Criterion(**_effort(arguments))
+        criterion = _criterion(arguments)
         sigma = arguments.sigma or default_grid(scene.topology.spectrum, 0.005 if arguments.quick else 0.0025)
         scene.replace(axes={scene.strength: sigma})
     warn((*scene.warnings, *hidden_modes(scene)))
@@ -86,11 +86,12 @@ def execute(arguments: Namespace) -> int:
     return FINE
 
 
-def _effort(arguments: Namespace) -> dict[str, Any]:
-    """The criterion's numbers: those of --quick or the full ones, unless given."""
-    effort: dict[str, Any] = dict(QUICK if arguments.quick else FULL)
-    effort.update({name: getattr(arguments, name) for name in ("starts", "transient") if getattr(arguments, name)})
-    return effort
+def _criterion(arguments: Namespace) -> Criterion:
+    """The full criterion, or that of --quick, with what is given."""
+    from ..synchronisation.criterion import QUICK, Criterion
+
+    given = {name: getattr(arguments, name) for name in ("starts", "transient") if getattr(arguments, name)}
+    return replace(QUICK if arguments.quick else Criterion(), **given)
 
 
 def _scene(arguments: Namespace) -> Scene:

@@ -16,7 +16,9 @@ from ..prediction.intervals import Interval, scale
 from ..results.result import Result
 from ..support.execution import Execution
 from ..sweeps.run import run
-from ..synchronisation.threshold import Criterion, Sweep, probe, project, simulate
+from ..synchronisation import criterion as criteria
+from ..synchronisation.criterion import Criterion
+from ..synchronisation.threshold import Sweep, probe, project, simulate
 
 __all__ = ["FULL", "QUICK", "FigureRuns", "Quality", "thin"]
 
@@ -55,7 +57,7 @@ class Quality:
 
 
 FULL = Quality()
-QUICK = Quality(241, 121, Criterion(starts=5, transient=400.0, window=50.0), 2e-3, (5,))
+QUICK = Quality(241, 121, criteria.QUICK, 2e-3, (5,))
 
 
 class FigureRuns:

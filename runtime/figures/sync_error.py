@@ -12,7 +12,7 @@ from synchain.models.scenes.file import load_scene
 from ..prediction.intervals import Interval, grid_intervals
 from ..results.result import Result
 from ..support.status import Status
-from ..synchronisation.threshold import Criterion
+from ..synchronisation.criterion import Criterion
 from .figure_runs import FigureRuns
 from .published import published
 from .style import BLUE, COLUMN, ORANGE, bands, bracket, failures, note

@@ -41,9 +41,10 @@ def _classes() -> dict[str, type]:
     from ..stability.lyapunov import Lyapunov
     from ..stability.msf import MSF, Plane
     from ..synchronisation.basin import Basin
+    from ..synchronisation.criterion import Criterion
     from ..synchronisation.exponent_windows import ExponentWindows
     from ..synchronisation.probe import Probe
-    from ..synchronisation.threshold import Criterion, Sweep, Thresholds
+    from ..synchronisation.threshold import Sweep, Thresholds
 
     exponents = (ClusterExponents, Exponents, Lyapunov, MSF, Plane)
     kept = (Basin, Branch, Equilibrium, PeriodicOrbit, Probe, Skeleton, Thresholds, *exponents)

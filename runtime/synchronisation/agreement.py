@@ -28,7 +28,8 @@ from ..stability.exponents import Exponents, exponents
 from ..stability.network import unused_axes
 from ..support.execution import Execution
 from ..support.progress import Hook
-from .threshold import IN_CRITERION, Criterion, check_probe, checked, simulate
+from .criterion import IN_CRITERION, Criterion, checked
+from .threshold import check_probe, simulate
 
 __all__ = ["CAUSES", "OUTCOMES", "Agreement", "Cell", "agreement", "strengths"]
 

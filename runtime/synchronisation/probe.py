@@ -36,7 +36,7 @@ from ..support.arrays import numbers
 from ..support.execution import Execution
 from ..support.progress import Hook
 from ..sweeps.job import RowsSpec
-from .threshold import IN_CRITERION, Criterion, checked, offsets
+from .criterion import IN_CRITERION, Criterion, checked, offsets
 from .trials import Trials
 
 __all__ = ["MODE_ALPHA", "MODE_BETA", "Probe", "ring_of_three", "universal_probe"]

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 import numpy as np
 import xarray as xr
@@ -21,7 +21,7 @@ import xarray as xr
 from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
-from synchain.models.inputs.checks import check_instance, check_integer, check_number, check_positive
+from synchain.models.inputs.checks import check_number, check_positive
 from synchain.models.scenes.scene import Scene, a_scene
 from synchain.models.spectra.spectrum import Spectrum
 
@@ -36,19 +36,17 @@ from ..stability.network import unused_axes
 from ..support.arrays import row
 from ..support.execution import Execution
 from ..support.progress import Hook
+from .criterion import IN_CRITERION, Criterion, checked, offsets
 from .exponent_windows import ExponentWindows, exponent_windows
 from .hidden_modes import hidden_modes
 from .trials import Trials
 
 __all__ = [
-    "IN_CRITERION",
-    "Criterion",
     "Sweep",
     "Thresholds",
     "cells_of",
     "critical_ratio",
     "judge",
-    "offsets",
     "probe",
     "project",
     "simulate",
@@ -62,49 +60,6 @@ RESOLUTION = 5e-4
 
 Measure = Callable[[np.ndarray], np.ndarray]
 """Mean synchronisation errors (m, starts) at points (m,)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Criterion:
-    """When a value of sigma counts as synchronous.
-
-    From `starts` different initial states (the scene's own, and copies of it moved as a whole by a
-    random amount of up to `reach` in the position), at least half must end with a mean
-    synchronisation error below `tolerance`, averaged over `window` drive periods after a transient
-    of `transient`.  Near the ends of a range of chaotic motion single starts synchronise or burst
-    by chance; their majority does not depend on one of them.
-
-    Distances between oscillators are those of the scene's own start in all of them.  Where oscillators and links are
-    linear, a mode in which these distances have no part grows from rounding alone: `thresholds` warns of it.
-    """
-
-    tolerance: float = 1e-3
-    starts: int = 8
-    reach: float = 0.4
-    transient: float = 1000.0
-    window: float = 100.0
-    rtol: float = 1e-8
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for name in ("tolerance", "transient", "window", "rtol"):
-            object.__setattr__(self, name, check_positive(f"criterion: {name}", getattr(self, name)))
-        object.__setattr__(self, "reach", check_number("criterion: reach", self.reach, 0.0))
-        check_integer("criterion: starts", self.starts, 1)
-        check_integer("criterion: seed", self.seed, 0)
-
-
-IN_CRITERION = {
-    own.name: f"it is one of the criterion; write criterion=Criterion({own.name}=…)" for own in fields(Criterion)
-}
-"""What functions with a criterion do not take themselves, and why."""
-
-
-def checked(criterion: Criterion | None) -> Criterion:
-    """Return the criterion, or the default one for None; TypeError for anything else."""
-    if criterion is None:
-        return Criterion()
-    return check_instance("criterion", criterion, Criterion, "a Criterion, e.g. Criterion(starts=4)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -375,12 +330,6 @@ def judge(measure: Measure, x: np.ndarray, resolution: float, criterion: Criteri
     on_grid = share(errors)
     ranges = refine(lambda points: share(measure(points)) >= 0.5, x, on_grid >= 0.5, resolution)
     return Sweep(x, np.asarray(np.median(errors, axis=1)), on_grid, tuple(ranges))
-
-
-def offsets(criterion: Criterion) -> np.ndarray:
-    """Return how far the starts are moved: not at all, then at random."""
-    random = np.random.default_rng(criterion.seed)
-    return np.concatenate([[0.0], random.uniform(-criterion.reach, criterion.reach, criterion.starts - 1)])
 
 
 def cells_of(scene: Scene, sigma: np.ndarray, criterion: Criterion) -> Scene:

@@ -15,7 +15,8 @@ from synchain.runtime.figures.result_plot import draw_result
 from synchain.runtime.opening.open import open_result
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.run import run
-from synchain.runtime.synchronisation.threshold import Criterion, thresholds
+from synchain.runtime.synchronisation.criterion import Criterion
+from synchain.runtime.synchronisation.threshold import thresholds
 
 pytestmark = pytest.mark.long
 

@@ -18,7 +18,7 @@ from synchain.runtime.figures import exponent, load, plane, style, synchronisabi
 from synchain.runtime.figures.figure_runs import QUICK, FigureRuns, Quality
 from synchain.runtime.figures.make import make
 from synchain.runtime.stability.msf import MSF, Plane
-from synchain.runtime.synchronisation.threshold import Criterion
+from synchain.runtime.synchronisation.criterion import Criterion
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from synchain.runtime.synchronisation.agreement import (
     agreement,
     strengths,
 )
-from synchain.runtime.synchronisation.threshold import Criterion
+from synchain.runtime.synchronisation.criterion import Criterion
 
 pytestmark = pytest.mark.long
 

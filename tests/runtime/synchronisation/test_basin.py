@@ -13,8 +13,8 @@ from synchain.models import chain
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.support.status import Status
 from synchain.runtime.synchronisation.basin import Basin, basin, random_starts
+from synchain.runtime.synchronisation.criterion import Criterion
 from synchain.runtime.synchronisation.probe import Probe, universal_probe
-from synchain.runtime.synchronisation.threshold import Criterion
 
 FREE = Scene(oscillator="harmonic", topology=chain(2), parameters={"sigma": 0.0})
 DAMPED = Scene(oscillator="harmonic", topology=chain(3), coupling="damper", parameters={"sigma": 0.5})

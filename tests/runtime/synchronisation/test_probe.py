@@ -16,8 +16,9 @@ from synchain.models.mechanics.components import Edge, Node
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.run import run
+from synchain.runtime.synchronisation.criterion import Criterion
 from synchain.runtime.synchronisation.probe import MODE_ALPHA, MODE_BETA, ring_of_three, universal_probe
-from synchain.runtime.synchronisation.threshold import Criterion, probe
+from synchain.runtime.synchronisation.threshold import probe
 
 FRICTION = Scene(topology=chain(2), parameters={"omega": 1.15})
 SPRINGS = Scene(

@@ -18,16 +18,15 @@ from synchain.runtime.stability.msf import MSF
 from synchain.runtime.support.execution import Execution
 from synchain.runtime.support.status import Status
 from synchain.runtime.synchronisation import threshold
+from synchain.runtime.synchronisation.criterion import Criterion, offsets
 from synchain.runtime.synchronisation.exponent_windows import ExponentWindows
 from synchain.runtime.synchronisation.threshold import (
-    Criterion,
     Sweep,
     cells_of,
     check_probe,
     critical_ratio,
     default_grid,
     judge,
-    offsets,
     probe,
     project,
     simulate,
