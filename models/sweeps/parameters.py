@@ -93,10 +93,11 @@ class _Given:
             self.lists.pop(name, None)
 
     def own(self, name: str, shared: float, swept: bool) -> dict[Place, float]:
-        """The values of a parameter at each node, or at each link if links have numbers or are swept; else none."""
+        """The values of a parameter at each node or link if some have numbers of their own or it is swept; else none."""
+        if not (swept or name in self.lists or name in self.single):
+            return {}
         nodes: Iterable[Place] = [NodeName(name, i) for i in self.model.holders(name)]
-        links = swept or name in self.lists or name in self.single
-        places = nodes or (self.model.link_names(name).values() if links else ())
+        places = nodes or self.model.link_names(name).values()
         return dict.fromkeys(places, shared) | self.lists.get(name, {}) | self.single.get(name, {})
 
 

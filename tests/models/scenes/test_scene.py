@@ -18,7 +18,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synchain.models import Scene, chain, ring, star
+from synchain.models import Scene, chain, complete, ring, star
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.frozen import Frozen
 from synchain.models.scenes.file import load_scene, scene_names
@@ -221,6 +221,8 @@ REFUSED = [
     ({"parameters": {"kappa": 0}}, "above 0"),
     ({"parameters": {1: 1}}, "expected text"),
     ({"parameters": [1]}, "expected a table"),
+    ({"topology": ring(10**8)}, "topology ring: n = 100000000; expected at most 4000000 nodes"),
+    ({"coupling": "spring", "topology": complete(10**9)}, "expected at most 4000000 nodes in a model: reduce n"),
     ({"initial": {"y": 1}}, "unknown key 'y'; known: x, v"),
     ({"initial": {"x": [1, 2, 3]}}, "found 3 values for 2 oscillators"),
     ({"initial": {"x": [1]}}, "found 1 values for 2 oscillators"),
