@@ -60,6 +60,12 @@ CALLS = [
     (lambda: models.complement([(0, 1)]), "complement: found .*make one of a list with from_edges"),
     (lambda: models.weighted("chain", 2), f"weighted: found 'chain'.*{A_GRAPH}"),
     (lambda: models.from_edges(3), "expected a list of edges"),
+    (lambda: models.ring(), r"^topology ring: found 0 arguments for n; expected ring\(n: int\)$"),
+    (
+        lambda: models.small_world(10, 4),
+        r"^topology small_world: found 2 arguments for n; expected .*\*, neighbours=4,",
+    ),
+    (lambda: models.ring(3, n=4), "topology ring: found 2 arguments for n"),
     (lambda: models.from_edges([{0, 1}]), r"edge 1 is \{0, 1\}; expected \(i, j\)"),
     (lambda: models.from_edges([{"a": 1, "b": 2}]), "edge 1 is"),
     (lambda: models.from_edges([(0, 1)], directed="no"), "directed: found 'no'"),
