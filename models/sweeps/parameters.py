@@ -53,7 +53,13 @@ def parameters(model: Model, given: object, axes: Sequence[Axis]) -> Frozen[floa
     for name, value in read.shared.items():
         own = read.own(name, value, name in swept)
         if own and (name in swept or len(set(own.values())) > 1):
-            values |= {str(place): number for place, number in own.items()}
+            named = {str(place): number for place, number in own.items()}
+            if taken := named.keys() & model.parameters.keys():
+                raise ValueError(
+                    f"parameter {name!r}: found a number for each node or link, but {min(taken)!r} stands for two parameters; "
+                    "rename one"
+                )
+            values |= named
         else:
             values[name] = next(iter(own.values()), value)
     if WEIGHTS in swept - set(values):
