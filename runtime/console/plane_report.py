@@ -68,7 +68,9 @@ class PlaneReport:
             ("negative", f"at {np.count_nonzero(plane.exponent < 0)} of {plane.exponent.size} points"),
             ("smallest, largest", f"{np.min(plane.exponent):z.4f}, {np.max(plane.exponent):z.4f}"),
             *_mode_rows(plane),
-            *how(drive_period(plane.scene, plane.parameters), plane.motion.reshape(-1).tolist(), plane.time, plane.stderr),
+            *how(
+                drive_period(plane.scene, plane.parameters), plane.motion.reshape(-1).tolist(), plane.time, plane.stderr
+            ),
         ]
         lines = [f"{headline(plane.scene, plane.parameters)}, {_meaning(plane)}", *rows_of(rows)]
         if self.network:
