@@ -172,6 +172,8 @@ CALLS = [
     (lambda: runtime.exponents(PAIR, {1, 2}), "alpha: found {1, 2}"),
     (lambda: runtime.exponents(PAIR, 0.1, starts=1.5), r"starts = 1\.5"),
     (lambda: runtime.exponents(PAIR, 0.1, periods=0), "periods: found 0; expected a number above 0"),
+    (lambda: runtime.exponents(PAIR, 0.1, periods=-1), "periods: found -1; expected a number above 0"),
+    (lambda: runtime.msf(PAIR, [math.nan]), "alpha: found nan; expected finite numbers"),
     (lambda: runtime.exponents(PAIR, 0.1, periods=math.inf), "periods: found inf"),
     (lambda: runtime.exponents(PAIR, 0.1, transient=-1), "transient: found -1"),
     (lambda: runtime.exponents(PAIR, 0.1, precision="a"), "precision: 'a'"),

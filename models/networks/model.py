@@ -143,9 +143,9 @@ class Model:
             )
         known = [kind, *(NodeKind(group.oscillator, group.friction) for group in groups)]
         nodes = [0] * graph.n
-        for group, own in zip(groups, known[1:], strict=True):
+        for group, node in zip(groups, known[1:], strict=True):
             for i in group.at:
-                nodes[i - 1] = known.index(own)
+                nodes[i - 1] = known.index(node)
         kinds = tuple(known[k] for k in dict.fromkeys(nodes))
         model = cls(kinds, numbered(nodes), contact, tuple((None, graph) for _, graph in layers))
         spelt = []

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias, TypeVar
 
 from ..dynamics.periodicity import Drive, drive_of
 from ..graphs.readers import as_topology, is_graph
-from ..inputs.checks import check_number, check_table, first_of, short_repr
+from ..inputs.checks import check_number, check_table, first_of, is_row, short_repr
 from ..inputs.frozen import Frozen
 from ..inputs.node_name import LinkName, NodeName
 from ..networks.model import WEIGHTS, Model, NodeKind, in_range
@@ -113,8 +113,7 @@ def _at_nodes(model: Model, name: str, values: Iterable[float]) -> dict[Place, f
 
 
 def _listed(value: object) -> bool:
-    plain = isinstance(value, str | bytes | Mapping) or is_graph(value)
-    return not plain and isinstance(value, Iterable) and getattr(value, "ndim", 1) > 0
+    return is_row(value) and not isinstance(value, Mapping) and not is_graph(value)
 
 
 def _for_each_link(model: Model, name: str, value: Any) -> dict[Place, float]:

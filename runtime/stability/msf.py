@@ -99,11 +99,17 @@ class MSF(Labelled):
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Scene, class, stable ranges of alpha and of sigma, motion."""
+        known = self._known_windows
+        lost = [pair for w in known for pair in ((w.low, w.low_mode), (w.high, w.high_mode))]
+        beyond = [x for x, mode in lost if mode is None and x]
+        alpha = words_of(self.intervals, self.errors, beyond=self.fine.ends)
+        sigma = self._without_windows or words_of([(w.low, w.high) for w in known], beyond=beyond)
         return (
             ("scene", repr(self.scene)),
             ("class", f"{self.kind}, for alpha {ends_of(self.fine.alpha)}"),
-            ("negative for alpha", words_of(self.intervals, self.errors)),
-            ("sigma", self._without_windows or words_of([(w.low, w.high) for w in self._known_windows])),
+            ("negative for alpha", alpha),
+            ("sigma", sigma),
+            *((("...", "the grid of alpha ends here, the range may go on"),) if "..." in alpha + sigma else ()),
             ("motion", ", ".join(dict.fromkeys(self.attractors))),
             ("average", f"{self.fine.time:.6g} units of time for each of {self.fine.starts} starts"),
         )
@@ -502,7 +508,9 @@ def _over_parameters(
     still = still_strengths(cell) if modes else strengths
     attractors = kinds[tuple(slice(1) if name in still else slice(None) for name in axes)].astype(str)
     of_modes = (modes, worst if modes else None)
-    return Plane(known, *axes.values(), exponent, stderr, attractors, longest, (first, second), *of_modes, strengths)
+    return Plane(
+        known, axes[first], axes[second], exponent, stderr, attractors, longest, (first, second), *of_modes, strengths
+    )
 
 
 def _columns(axes: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

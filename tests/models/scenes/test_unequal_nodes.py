@@ -124,7 +124,7 @@ def test_numbers_of_nodes_named_as_another_parameter_are_refused_by_the_scene() 
     assert Scene(node, "x->x", chain(2)).parameters["k_2"] == 2
     for wrong in ({"parameters": {"k": [1, 3]}}, {"axes": {"k_1": [1, 3]}}):
         with pytest.raises(
-            ValueError, match="^parameter 'k': found a number for each .* 'k_2' stands for two parameters"
+            ValueError, match=r"^parameter 'k': found a number for each .* 'k_2' stands for two parameters"
         ):
             Scene(node, "x->x", chain(2), **wrong)
 

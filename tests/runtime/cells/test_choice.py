@@ -160,8 +160,8 @@ def test_modes_that_become_stiff_are_said():
     """Van der Pol from the middle of a jump, where it is not stiff yet, onto the slow branch."""
     scene = Scene(oscillator="van_der_pol", topology=chain(2), parameters={"mu": 200.0}, integrator="taylor")
     orbits = Orbits.make(scene, np.array([0.0]), np.array([[0.0, 1.0]]), 1)
+    integrator = orbits.integrator_of(orbits.strengths)
     with pytest.warns(RuntimeWarning, match=r"stiff modes: found a rate of .*integrator = 'rodas5p'"):
-        integrator = orbits.integrator_of(orbits.strengths)
         integrator.advance(2.0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
