@@ -10,6 +10,7 @@ import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain, compress, count
 
 import sympy as sp
 
@@ -339,7 +340,7 @@ class Equations(_Cached, Written):
     def holders(self, name: str) -> tuple[int, ...]:
         """The nodes (0-based) that have a parameter or a state of that name."""
         has = [any(s.name == name for s in (*node.state, *node.parameters)) for node in self.nodes]
-        return tuple(i for i, kind in enumerate(self.kind_of) if has[kind])
+        return tuple(compress(count(), map(has.__getitem__, self.kind_of)))
 
     @cached_property
     def components(self) -> tuple[str, ...]:
@@ -596,8 +597,8 @@ def _check_names(eq: Equations) -> None:
     twice = _repeated(eq.parameters)
     if twice is not None:
         raise ValueError(f"the name {twice!r} stands for two parameters; rename one")
-    states = {*eq.state, *(s.name for node in eq.nodes for s in node.state)}
-    taken = sorted(states.intersection(eq.parameters))
+    states = chain(eq.state, (s.name for node in eq.nodes for s in node.state))
+    taken = sorted(set(eq.parameters).intersection(states))
     if taken:
         raise ValueError(f"the parameter {taken[0]!r} has the name of a state variable; rename it")
 

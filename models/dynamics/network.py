@@ -238,7 +238,7 @@ def layered_network(
             made.append(_mixed_layer(apart, oscillators, coupling, graph, own, mutual))
         else:
             made.append(_layer(apart, edge(coupling, singles[0], oscillators[0]), graph, own, mutual))
-    return replace(apart, layers=tuple(made))
+    return replace(apart, layers=tuple(made)) if made else apart
 
 
 def _mixed_layer(

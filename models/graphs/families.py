@@ -183,9 +183,14 @@ class Family:
     link_limit: int = LINK_LIMIT
     __signature__ = _Signature()
 
-    def __call__(self, n: int, **options: object) -> Topology:
+    def __call__(self, *n: object, **options: object) -> Topology:
         """Return the graph of `n` nodes; see `topology`."""
-        size = self._size(n)
+        sizes = (*n, *([options.pop("n")] if "n" in options else ()))
+        if len(sizes) != 1:
+            raise TypeError(
+                f"topology {self.name}: found {len(sizes)} arguments for n; expected {self.name}{inspect.signature(self)}"
+            )
+        size = self._size(sizes[0])
         settled = self._settled(size, options)
         if self.expected is not None:
             self.limit_links(size, self.links_of_edge * self.expected(size, **dict(settled)))

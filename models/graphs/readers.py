@@ -62,7 +62,7 @@ def from_edges(
     Parameters
     ----------
     edges : iterable of (i, j) or (i, j, weight)
-        Nodes are 0 … n - 1; the weight is 1 without.
+        Nodes count from 0, so that the first state is that of node 0; the weight is 1 without.
     n : int, optional
         Number of nodes; without, the largest node is the last.
     directed : bool, optional
@@ -80,8 +80,9 @@ def from_edges(
     if isinstance(edges, str | bytes | Mapping) or not isinstance(edges, Iterable):
         raise TypeError(f"{name}: found {typed_repr(edges)}; expected a list of edges, e.g. [(0, 1), (1, 2, 0.5)]")
     check_flag("directed", directed)
-    found = [_edge(edge, f"{name}: edge {k + 1}") for k, edge in enumerate(edges)]
-    size = 1 + max((max(i, j) for i, j, _ in found), default=-1) if n is None else check_integer(f"{name}: n", n, 1)
+    last = None if n is None else check_integer(f"{name}: n", n, 1) - 1
+    found = [_edge(edge, f"{name}: edge {k + 1}", last) for k, edge in enumerate(edges)]
+    size = 1 + (max((max(i, j) for i, j, _ in found), default=-1) if last is None else last)
     weights: Weights = {}
     called = _Names(name, range(size))
     for i, j, weight in found:
@@ -283,11 +284,11 @@ def _put(
             )
 
 
-def _edge(edge: Sequence[object], where: str) -> tuple[int, int, Fraction]:
+def _edge(edge: Sequence[object], where: str, last: int | None) -> tuple[int, int, Fraction]:
     unordered = isinstance(edge, str | bytes | Set | Mapping)
     if unordered or not hasattr(edge, "__len__") or len(edge) not in (2, 3):
         raise ValueError(f"{where} is {short_repr(edge)}; expected (i, j) or (i, j, weight)")
-    i, j = (check_integer(f"{where}: node", node, 0) for node in edge[:2])
+    i, j = (check_integer(f"{where}: node (counted from 0)", node, 0, last) for node in edge[:2])
     return i, j, rational(edge[2], where) if len(edge) == 3 else Fraction(1)
 
 

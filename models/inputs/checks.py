@@ -16,7 +16,7 @@ import reprlib
 from collections.abc import Callable, Iterable, Mapping, Sized
 from itertools import islice
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeGuard, TypeVar
 
 from .arithmetic import constant
 
@@ -34,6 +34,7 @@ __all__ = [
     "check_table",
     "check_text",
     "first_of",
+    "is_row",
     "short_repr",
     "suggestion",
     "typed_repr",
@@ -93,6 +94,11 @@ def first_of(values: Iterable[T], n: int) -> tuple[tuple[T, ...], str]:
     first = tuple(islice(values, n + 1))
     endless = len(first) > n and not isinstance(values, Sized)
     return first, f"more than {n}" if endless else str(len(values) if isinstance(values, Sized) else len(first))
+
+
+def is_row(value: object) -> TypeGuard[Iterable[Any]]:
+    """True for a sequence of values in place of one."""
+    return isinstance(value, Iterable) and not isinstance(value, str | bytes) and getattr(value, "ndim", 1) > 0
 
 
 def check_keys(what: str, given: Mapping[object, object], known: Iterable[str]) -> None:
@@ -203,7 +209,8 @@ def check_number(what: str, value: object, low: float | None = None, high: float
     what : str
         The subject of the error.
     value : object
-        A real number, or the text of a constant expression such as ``"2*pi/1.15"``.
+        A real number, an array of one without dimensions, a SymPy number, or the text of a constant expression such as
+        ``"2*pi/1.15"``.
     low, high : float, optional
         The range, both ends in it.
 
@@ -214,16 +221,18 @@ def check_number(what: str, value: object, low: float | None = None, high: float
     ValueError
         If it is not finite, out of range, or a text that is no constant.
     """
+    if getattr(value, "ndim", None) == 0:
+        value = value.item()  # type: ignore[attr-defined]
     if isinstance(value, str):
         try:
             result = constant(value)
         except ValueError as error:
             raise ValueError(f"{what}: {error}") from None
-    elif isinstance(value, bool) or not isinstance(value, numbers.Real):
+    elif isinstance(value, bool) or not (isinstance(value, numbers.Real) or _is_exact(value)):
         raise TypeError(f'{what}: found {typed_repr(value)}; expected a number, e.g. 0.1 or "2*pi/1.15"')
     else:
         try:
-            result = float(value)
+            result = float(value)  # type: ignore[arg-type]
         except OverflowError:
             result = math.inf
     if not math.isfinite(result):
@@ -231,6 +240,11 @@ def check_number(what: str, value: object, low: float | None = None, high: float
     if (low is not None and result < low) or (high is not None and result > high):
         raise ValueError(f"{what}: found {result!r}; expected {_span(low, high)}; correct the value")
     return result
+
+
+def _is_exact(value: object) -> bool:
+    """True for a real number of SymPy, which is not loaded for it."""
+    return bool(getattr(value, "is_number", False) and getattr(value, "is_real", False))
 
 
 def _span(low: float | None, high: float | None) -> str:
@@ -319,9 +333,9 @@ def check_integer(what: str, value: object, low: int, high: int | None = None) -
 
 def check_positive(what: str, value: object) -> float:
     """Return a finite number above 0; raises TypeError and ValueError as `number`."""
-    result = check_number(what, value, 0.0)
-    if result == 0.0:
-        raise ValueError(f"{what}: found 0; expected a number above 0")
+    result = check_number(what, value)
+    if result <= 0.0:
+        raise ValueError(f"{what}: found {result:g}; expected a number above 0")
     return result
 
 

@@ -14,7 +14,7 @@ from ..definitions.table import as_name_or_table
 from ..dynamics import network
 from ..dynamics.equations import Equations
 from ..graphs.families import topology
-from ..graphs.links import LINK_LIMIT
+from ..graphs.links import LINK_LIMIT, numbered
 from ..graphs.topology import Topology
 from ..inputs.checks import check_number, short_repr, suggestion
 from ..inputs.frozen import Frozen
@@ -26,12 +26,16 @@ from ..mechanics.oscillator import Oscillator
 from ..mechanics.parameter import Parameter
 
 __all__ = [
+    "MOST_NODES",
     "Group",
     "Model",
     "NodeKind",
     "in_range",
     "union_of",
 ]
+
+MOST_NODES = 1_000_000
+"""Most nodes of a model: they take 2 s and 700 MB."""
 
 MOST_NUMBERED = 1_000_000
 """Most links that have numbers of their own, a name and a parameter each: more take gigabytes."""
@@ -132,13 +136,18 @@ class Model:
         ValueError
             As `Model` does, and if a coupling is missing or cannot join the nodes.
         """
-        nodes = [kind] * layers[0][1].n
-        for group in groups:
+        graph = layers[0][1]
+        if graph.n > MOST_NODES:
+            raise ValueError(
+                f"topology {graph.name}: n = {graph.n}; expected at most {MOST_NODES} nodes in a model: reduce n"
+            )
+        known = [kind, *(NodeKind(group.oscillator, group.friction) for group in groups)]
+        nodes = [0] * graph.n
+        for group, node in zip(groups, known[1:], strict=True):
             for i in group.at:
-                nodes[i - 1] = NodeKind(group.oscillator, group.friction)
-        kinds = tuple(dict.fromkeys(nodes))
-        numbers = {own: k for k, own in enumerate(kinds)}
-        model = cls(kinds, tuple(numbers[own] for own in nodes), contact, tuple((None, graph) for _, graph in layers))
+                nodes[i - 1] = known.index(node)
+        kinds = tuple(known[k] for k in dict.fromkeys(nodes))
+        model = cls(kinds, numbered(nodes), contact, tuple((None, graph) for _, graph in layers))
         spelt = []
         for coupling, graph in layers:
             if coupling is None and graph.link_count:

@@ -13,14 +13,12 @@ from ..graphs.topology import Topology, from_matrix, read_matrix
 from ..inputs.checks import check_integer, check_keys, check_table, check_text, short_repr
 from ..inputs.plugins import part
 from ..interactions.coupling import Coupling, Potential, Rates, split
+from ..networks.model import MOST_NODES
 from ..sweeps.distribution import Draw
 from ..sweeps.draw import GRAPH, Draws, Graphs, RandomGraph
 from ..sweeps.parameters import collected
 
 __all__ = ["arguments", "as_dict", "graph_of", "graph_table"]
-
-NODES = 1_000_000
-"""Largest number of oscillators that a scene file may ask for."""
 
 
 def arguments(values: object, keywords: Iterable[str], folder: Path | None = None) -> dict[str, Any]:
@@ -108,7 +106,7 @@ def graph_of(given: Mapping[object, Any], folder: Path | None = None) -> Topolog
         if key not in given:
             found = short_repr(dict(given))
             raise ValueError(f"topology: {key!r} is missing in {found}; expected name and n, or matrix, or file")
-    n = check_integer("topology n", given["n"], 0, NODES)
+    n = check_integer("topology n", given["n"], 0, MOST_NODES)
     if not known and is_composed(part("topology name", name)):
         return _composed(str(name), n)
     chosen = {key: given[key] for key in options if key in given}
@@ -117,7 +115,7 @@ def graph_of(given: Mapping[object, Any], folder: Path | None = None) -> Topolog
 
 def _composed(name: str, n: int) -> Topology:
     """The graph of a text such as "weighted(complete(100), 1/100)"."""
-    graph = read_graph(name, NODES)
+    graph = read_graph(name, MOST_NODES)
     if graph.n != n:
         raise ValueError(f"topology: n = {n} but {short_repr(name)} has {graph.n} nodes; expected n = {graph.n}")
     return graph
@@ -135,7 +133,7 @@ def _of_file(given: Mapping[object, Any], folder: Path | None) -> Topology:
 
 def _of_matrix(given: Mapping[object, Any]) -> Topology:
     graph = from_matrix(given["matrix"], name=check_text("topology name", given.get("name", "matrix")))
-    if "n" in given and check_integer("topology n", given["n"], 1, NODES) != graph.n:
+    if "n" in given and check_integer("topology n", given["n"], 1, MOST_NODES) != graph.n:
         raise ValueError(f"topology: n = {given['n']} but the matrix has {graph.n} rows; remove n")
     return graph
 

@@ -17,10 +17,10 @@ from ..inputs.plugins import Kind
 from ..inputs.words import Word
 from ..mechanics.friction import ContactModel
 from ..mechanics.parameter import Parameter
+from ..networks.model import MOST_NODES
 from ..sweeps.axis import LIMIT as AXIS_LIMIT
 from ..sweeps.draw import GRAPH
 from .complete import LIMITS, integrators
-from .dictionary import NODES
 from .scene import KEYWORDS, Scene
 from .section import Direction
 
@@ -38,7 +38,7 @@ NUMBER: Table = {"type": ["number", "string"]}
 EXPRESSIONS: Table = {"type": "object", "additionalProperties": NUMBER}
 """Expressions as text, or numbers, by names."""
 
-WHOLE = {"type": "integer", "minimum": 1, "maximum": NODES}
+WHOLE = {"type": "integer", "minimum": 1, "maximum": MOST_NODES}
 OPTIONS = {int: ["integer", "string"], str: ["number", "string"]}
 """The types of an option of a family by the type of its default; other options are lists."""
 

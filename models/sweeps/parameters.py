@@ -8,7 +8,7 @@ from typing import Any, TypeAlias, TypeVar
 
 from ..dynamics.periodicity import Drive, drive_of
 from ..graphs.readers import as_topology, is_graph
-from ..inputs.checks import check_number, check_table, first_of, short_repr
+from ..inputs.checks import check_number, check_table, first_of, is_row, short_repr
 from ..inputs.frozen import Frozen
 from ..inputs.node_name import LinkName, NodeName
 from ..networks.model import WEIGHTS, Model, NodeKind, in_range
@@ -53,7 +53,13 @@ def parameters(model: Model, given: object, axes: Sequence[Axis]) -> Frozen[floa
     for name, value in read.shared.items():
         own = read.own(name, value, name in swept)
         if own and (name in swept or len(set(own.values())) > 1):
-            values |= {str(place): number for place, number in own.items()}
+            named = {str(place): number for place, number in own.items()}
+            if taken := named.keys() & model.parameters.keys():
+                raise ValueError(
+                    f"parameter {name!r}: found a number for each node or link, but {min(taken)!r} stands for two parameters; "
+                    "rename one"
+                )
+            values |= named
         else:
             values[name] = next(iter(own.values()), value)
     if WEIGHTS in swept - set(values):
@@ -93,10 +99,11 @@ class _Given:
             self.lists.pop(name, None)
 
     def own(self, name: str, shared: float, swept: bool) -> dict[Place, float]:
-        """The values of a parameter at each node, or at each link if links have numbers or are swept; else none."""
+        """The values of a parameter at each node or link if some have numbers of their own or it is swept; else none."""
+        if not (swept or name in self.lists or name in self.single):
+            return {}
         nodes: Iterable[Place] = [NodeName(name, i) for i in self.model.holders(name)]
-        links = swept or name in self.lists or name in self.single
-        places = nodes or (self.model.link_names(name).values() if links else ())
+        places = nodes or self.model.link_names(name).values()
         return dict.fromkeys(places, shared) | self.lists.get(name, {}) | self.single.get(name, {})
 
 
@@ -106,8 +113,7 @@ def _at_nodes(model: Model, name: str, values: Iterable[float]) -> dict[Place, f
 
 
 def _listed(value: object) -> bool:
-    plain = isinstance(value, str | bytes | Mapping) or is_graph(value)
-    return not plain and isinstance(value, Iterable) and getattr(value, "ndim", 1) > 0
+    return is_row(value) and not isinstance(value, Mapping) and not is_graph(value)
 
 
 def _for_each_link(model: Model, name: str, value: Any) -> dict[Place, float]:

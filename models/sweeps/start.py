@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
-from ..inputs.checks import check_integer, check_keys, check_number, check_table, first_of, short_repr
+from ..inputs.checks import check_integer, check_keys, check_number, check_table, first_of, is_row, short_repr
 from ..inputs.frozen import Frozen
 
 __all__ = ["chosen_start", "default_start"]
@@ -60,9 +60,9 @@ def _component(what: str, value: object, name: str, n: int, seed: int) -> tuple[
     if isinstance(value, Mapping):
         return _uniform(what, value, name, n, seed)
     listed = value.tolist() if hasattr(value, "tolist") else value
-    if isinstance(listed, str) or not isinstance(listed, Iterable):
+    if not is_row(listed):
         return (check_number(what, listed),) * n
-    if isinstance(listed, (bytes, set, frozenset)):
+    if isinstance(listed, (set, frozenset)):
         raise TypeError(f"{what}: found {short_repr(listed)}; expected a number, {n} numbers or {{low, high, seed}}")
     listed, count = first_of(listed, n)
     if len(listed) != n:

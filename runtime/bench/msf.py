@@ -204,8 +204,6 @@ def _settled(contact: str, omega: float, values: np.ndarray, periods: int) -> Or
 def _along(orbits: Orbits, periods: int) -> int:
     """Average from the settled state with all strengths; returns the steps of the orbit."""
     carrier = orbits.integrator
-    if carrier is None:
-        raise RuntimeError("orbits are not prepared")
     carrier.state, before = orbits.state.copy(), carrier.steps
     averaging = Averaging(0.0, periods, 0.0, 0, Execution(1, show_progress=False))
     with averaging.reporter() as reporter:

@@ -30,8 +30,7 @@ from synchain.models.scenes.scene import Scene
 from ..cells.keywords import Given
 from ..results.labelled import Labelled, dataset
 from ..results.labels import STATE, States
-from ..results.result import Result
-from ..sweeps.start import started
+from ..sweeps.start import Start, started
 from .linearised import Linearised
 
 __all__ = ["Equilibrium", "equilibrium"]
@@ -182,7 +181,7 @@ class Equilibrium(Labelled):
 
 def equilibrium(
     scene: Scene,
-    start: Result | xr.DataArray | None = None,
+    start: Start | None = None,
     *,
     count: int | None = None,
     parameters: Mapping[str, float] | None = None,
@@ -194,9 +193,10 @@ def equilibrium(
     ----------
     scene : Scene
         Network, of any size.
-    start : Result or DataArray, optional
+    start : Result, DataArray, mapping, or sequence of numbers, optional
         A result of one cell, whose end is where the search begins, or states with the dimensions
-        component and node, as ``result.end`` and ``found.data.state``; the scene's start by default.
+        component and node, as ``result.end`` and ``found.data.state``; a table as `initial` of `Scene` takes; or
+        all states in the order of the equations.  The scene's start by default.
     count : int, optional
         Number of eigenvalues nearest to zero, where stability is lost without oscillation; by default all up to
         2000 states, 12 of more.

@@ -250,7 +250,7 @@ def _limit_cycle(scene: Scene, periods: int, start: Sequence[float] | np.ndarray
     free, steps = limit_cycle(orbit, RETURN)
     if not free:
         raise ArithmeticError(
-            f"no attracting cycle near the motion after {scene.transient:g} units of time; start elsewhere, or settle longer"
+            f"no attracting cycle near the motion after {scene.transient:g} units of 2 pi; start elsewhere, or settle longer"
         )
     state = orbit.state[0]
     image, matrix = _strobe(scene, state, 1, 0.0, free)

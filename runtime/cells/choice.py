@@ -156,13 +156,13 @@ def mode_stiffness(variation: Variation, state: np.ndarray, numbers: np.ndarray,
 
 def warn_of_stiff_modes(
     variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray, step: float
-) -> None:
+) -> bool:
     """Warn if Taylor steps with deviations were short, `step` in the mean, because they are stiff where they ended.
 
-    The other parameters are those of `chosen_for_modes`.
+    The other parameters are those of `chosen_for_modes`.  Return whether they were.
     """
     if step * STIFF >= 1.0:
-        return
+        return False
     for fastest, turning in _mode_rates(variation, state, numbers, strengths):
         if fastest * step > 1.0 and fastest > STIFF * max(1.0, turning):
             warnings.warn(
@@ -171,7 +171,8 @@ def warn_of_stiff_modes(
                 RuntimeWarning,
                 stacklevel=4,
             )
-            return
+            return True
+    return False
 
 
 def _mode_rates(

@@ -5,11 +5,11 @@ run(scene, workers=2, omega=1.2), or as a mapping, run(scene, parameters={"omega
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from synchain.models.inputs.checks import check_number, check_table, check_text, suggestion
+from synchain.models.inputs.checks import check_number, check_table, check_text, is_row, suggestion
 from synchain.models.inputs.node_name import NodeName
 from synchain.models.scenes.scene import KEYWORDS, Scene, a_scene
 from synchain.models.sweeps.parameters import without
@@ -115,7 +115,7 @@ class Given:
         start = {name: list(values) for name, values in scene.initial.items()}
         given = self.checked(scene, states=True)
         for name, value in given.items():
-            if _is_row(value):
+            if is_row(value):
                 swept[name] = value
                 continue
             if state := _state(scene, name):
@@ -130,7 +130,7 @@ class Given:
 
     def parted(self) -> tuple[dict[str, Any], Given]:
         """Return the rows of values by name, and the same call with the numbers alone."""
-        rows = {name: value for name, value in self.values.items() if _is_row(value)}
+        rows = {name: value for name, value in self.values.items() if is_row(value)}
         numbers = {name: value for name, value in self.values.items() if name not in rows}
         return rows, replace(self, table=numbers, keywords={})
 
@@ -169,11 +169,6 @@ def with_numbers(scene: Scene, values: Mapping[str, object], **settings: object)
         numbers.update(values.items())
         settings["parameters"] = numbers
     return scene.replace(**settings) if settings else scene
-
-
-def _is_row(value: object) -> bool:
-    """True for a sequence of values in place of one."""
-    return isinstance(value, Iterable) and not isinstance(value, str | bytes) and getattr(value, "ndim", 1) > 0
 
 
 def _state(scene: Scene, name: str) -> NodeName | None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..prediction.modes import transversal_modes
 from ..prediction.synchronisability import Window, windows_complex
-from ..stability.msf import STRENGTHS, Plane
+from ..stability.msf import Plane
 from .drive import drive_period
 from .words import defective_rows, finite, headline, how, rows_of, window_dict, window_text, write_files
 
@@ -68,9 +68,11 @@ class PlaneReport:
             ("negative", f"at {np.count_nonzero(plane.exponent < 0)} of {plane.exponent.size} points"),
             ("smallest, largest", f"{np.min(plane.exponent):z.4f}, {np.max(plane.exponent):z.4f}"),
             *_mode_rows(plane),
-            *how(drive_period(plane.scene, plane.names), plane.motion.reshape(-1).tolist(), plane.time, plane.stderr),
+            *how(
+                drive_period(plane.scene, plane.parameters), plane.motion.reshape(-1).tolist(), plane.time, plane.stderr
+            ),
         ]
-        lines = [f"{headline(plane.scene, plane.names)}, {_meaning(plane)}", *rows_of(rows)]
+        lines = [f"{headline(plane.scene, plane.parameters)}, {_meaning(plane)}", *rows_of(rows)]
         if self.network:
             graph = plane.scene.topology
             ranges = [window_text(window, error=False) for window in plane_windows(plane)] or ["none in this plane"]
@@ -97,11 +99,9 @@ class PlaneReport:
 
 def _meaning(plane: Plane) -> str:
     """What the exponents are those of."""
-    if plane.names == STRENGTHS:
-        return "alpha + i beta = -sigma gamma"
-    if "alpha" in plane.names:
-        return "alpha = -sigma gamma"
-    return f"the largest of {len(plane.modes)} transversal modes of {plane.scene.n} nodes"
+    if plane.modes:
+        return f"the largest of {len(plane.modes)} transversal modes of {plane.scene.n} nodes"
+    return "alpha = -sigma gamma" if plane.parameters else "alpha + i beta = -sigma gamma"
 
 
 def _mode_rows(plane: Plane) -> list[tuple[str, str]]:

@@ -131,17 +131,15 @@ def draw_plane(axes: Axes, found: Plane) -> Axes:
     Axes
     """
     value = finite(found.exponent)
-    norm = TwoSlopeNorm(0.0, *_reach(value))
-    painted = axes.pcolormesh(
-        found.across, found.up, value.T, norm=norm, cmap="RdBu_r", shading="nearest", rasterized=True
-    )
+    cmap, norm = _colours(value)
+    painted = axes.pcolormesh(found.across, found.up, value.T, norm=norm, cmap=cmap, shading="nearest", rasterized=True)
     for k, line in enumerate(found.contours):
         axes.plot(line[:, 0], line[:, 1], color=BLACK, linewidth=1.1, label="" if k else r"$\Lambda=0$")
     axes.set(
         xlim=(found.across[0], found.across[-1]),
         ylim=(found.up[0], found.up[-1]),
-        xlabel=AXES.get(found.names[0]) or symbol(found.names[0]),
-        ylabel=AXES.get(found.names[1]) or symbol(found.names[1]),
+        xlabel=_label(found, found.names[0]),
+        ylabel=_label(found, found.names[1]),
     )
     bar = axes.figure.colorbar(painted, ax=axes, aspect=30, pad=0.02)
     bar.set_label(r"exponent $\Lambda$ per unit of $\tau$")
@@ -149,10 +147,19 @@ def draw_plane(axes: Axes, found: Plane) -> Axes:
     return axes
 
 
-def _reach(value: np.ndarray) -> tuple[float, float]:
-    """Ends of the colours, symmetric about zero."""
-    size = float(np.nanmax(np.abs(value), initial=0.0)) or 1.0
-    return -size, size
+def _label(found: Plane, name: str) -> str:
+    """An axis as a formula."""
+    return AXES[name] if name in found.strengths else symbol(name)
+
+
+def _colours(value: np.ndarray) -> tuple[str, TwoSlopeNorm]:
+    """Colours that are white at zero and symmetric about it; the darker half alone for values of one sign that differ."""
+    known = value[np.isfinite(value)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
+    if low * high > 0 and not np.isclose(low, high):
+        return ("Blues_r", TwoSlopeNorm(high, low, 0.0)) if high < 0 else ("Reds", TwoSlopeNorm(low, 0.0, high))
+    size = max(-low, high) or 1.0
+    return "RdBu_r", TwoSlopeNorm(0.0, -size, size)
 
 
 def draw_rays(axes: Axes, found: Plane, sigma: float | None = None) -> Axes:

@@ -123,12 +123,17 @@ def _along(data: xr.Dataset, result: Result) -> tuple[np.ndarray, str]:
     return data[name].values, name
 
 
+def _joined(x: np.ndarray, name: str) -> dict[str, Any]:
+    """The style of values over an axis: a line, with dots if they are few; dots alone of realisations, which have no order."""
+    apart = name == REALISATION
+    return {"linestyle": "none" if apart else "-", "marker": "." if apart or len(x) <= MARKED else None}
+
+
 def _error(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
     """Synchronisation error over the axis."""
     x, name = _along(data, result)
     order = np.argsort(x, kind="stable")
-    marker = "." if len(x) <= MARKED else None
-    axes.plot(x[order], data.sync_error.values[order], color=BLUE, marker=marker)
+    axes.plot(x[order], data.sync_error.values[order], color=BLUE, **_joined(x, name))
     axes.set(xlabel=symbol(name), ylabel="average synchronisation error")
     if np.nanmax(data.sync_error.values, initial=0.0) < ROUNDING:  # nothing but rounding: no landscape of it
         axes.set_ylim(-0.05 * ROUNDING, ROUNDING)
@@ -140,14 +145,14 @@ def _observed(axes: Axes, data: xr.Dataset, result: Result, name: str) -> Axes:
     x, along = _along(data, result)
     order = np.argsort(x, kind="stable")
     values = data[name].values[order].reshape(len(x), -1)
-    marker = "." if len(x) <= MARKED else None
+    style = _joined(x, along)
     if REALISATION in data.status.dims[1:]:
         axes.plot(x[order], values, color=SKY, linewidth=0.5)
-        axes.plot(x[order], values.mean(axis=1), color=BLUE, marker=marker, label="mean of the realisations")
+        axes.plot(x[order], values.mean(axis=1), color=BLUE, **style, label="mean of the realisations")
         axes.legend()
     else:
         for i, line in enumerate(values.T):
-            axes.plot(x[order], line, color=CYCLE[i % len(CYCLE)], marker=marker)
+            axes.plot(x[order], line, color=CYCLE[i % len(CYCLE)], **style)
     axes.set(xlabel=symbol(along), ylabel=name.replace("_", " "))
     return axes
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -125,12 +125,19 @@ def ends_of(values: np.ndarray) -> str:
 
 
 def words_of(
-    intervals: Sequence[tuple[float, float]], errors: Sequence[tuple[float, float]] | None = None, most: int = 8
+    intervals: Sequence[tuple[float, float]],
+    errors: Sequence[tuple[float, float]] | None = None,
+    most: int = 8,
+    beyond: Collection[float] = (),
 ) -> str:
-    """Return intervals in words, with the errors of their ends if they are known."""
+    """Return intervals in words, with the errors of their ends if they are known; dots at ends `beyond` which they may go on."""
+
+    def end(x: float, error: float) -> str:
+        return f"{x:z.4f}" + ("..." if x in beyond else f" ± {error:.1g}" if error else "")
+
     found = []
     for k, ends in enumerate(intervals[:most]):
         spread = errors[k] if errors else (0.0, 0.0)
-        found.append(" … ".join(f"{x:z.4f}" + (f" ± {e:.1g}" if e else "") for x, e in zip(ends, spread, strict=True)))
+        found.append(" … ".join(map(end, ends, spread)))
     more = [f"{len(intervals) - most} more"] if len(intervals) > most else []
     return "; ".join([*found, *more]) or "none"

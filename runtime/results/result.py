@@ -12,7 +12,7 @@ import xarray as xr
 
 from synchain.codegen.driver.columns import Count, Point
 from synchain.codegen.kernels.processor import processor, told_apart
-from synchain.models.inputs.checks import check_instance
+from synchain.models.inputs.checks import check_choice, check_instance
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.buffers import Buffers
@@ -124,8 +124,12 @@ class Result(Labelled):
         write_data(self.data, path)
 
     def states(self, name: str = "end") -> np.ndarray:
-        """Return the states (…, states) of a variable in the order of the equations: x_1 … x_n, v_1 …"""
-        return States.of(self.scene).flat(self.data[name].values)
+        """Return the states (…, states) of a variable in the order of the equations: x_1 … x_n, v_1 …
+
+        Raises ValueError for a variable that holds no states.
+        """
+        known = tuple(str(each) for each, values in self.data.items() if values.dims[-2:] == STATE)
+        return States.of(self.scene).flat(self.data[check_choice("variable of states", name, known)].values)
 
     def belongs_to(self, scene: Scene) -> bool:
         """True if the scene is this result's but for its title."""

@@ -297,6 +297,7 @@ def _seal_zarr(path: Path) -> None:
     import zarr
 
     zarr.open_group(path, mode="r+").attrs[DIGEST] = _digest_of(path, "zarr")
+    zarr.consolidate_metadata(path)
 
 
 # -- pieces --------------------------------------------------------------------------------------------------

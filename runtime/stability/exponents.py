@@ -104,7 +104,9 @@ class Exponents(Labelled):
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Strengths, stable ranges, motion and the length of the average."""
-        stable = (("negative for alpha", words_of(self.intervals)),) if self.on_a_line else ()
+        stable: tuple[tuple[str, str], ...] = ()
+        if self.on_a_line:
+            stable = (("negative for alpha", words_of(self.intervals, beyond=self.ends)),)
         return (
             ("strengths", f"{len(self.alpha)}, {ends_of(self.alpha)}"),
             *stable,
@@ -117,6 +119,11 @@ class Exponents(Labelled):
     def on_a_line(self) -> bool:
         """True if the strengths are real, one for each mode."""
         return self.alpha.ndim == 1 and not np.iscomplexobj(self.alpha)
+
+    @property
+    def ends(self) -> frozenset[float]:
+        """The ends of the grid but 0, beyond which a range may go on."""
+        return frozenset({float(self.alpha.min()), float(self.alpha.max())} - {0.0})
 
     @property
     def averaged(self) -> int:

@@ -36,7 +36,7 @@ from .network import SharedOrbit, shared_orbits, still_strengths, transversal_mo
 __all__ = ["MSF", "Plane", "StabilityClass", "classify", "msf", "plane"]
 
 STRENGTHS = ("alpha", "beta")
-"""The axes of a plane that are strengths of a mode; all others are parameters."""
+"""What the axes of a plane are called that are strengths of a mode; a parameter may have such a name too."""
 
 NAMES = frozenset({"attractor", "attractors", "contours", "exponent", "mode", "modes", "number", "start", "stderr"})
 """What a plane has under these names beside those of all results."""
@@ -99,11 +99,17 @@ class MSF(Labelled):
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Scene, class, stable ranges of alpha and of sigma, motion."""
+        known = self._known_windows
+        lost = [pair for w in known for pair in ((w.low, w.low_mode), (w.high, w.high_mode))]
+        beyond = [x for x, mode in lost if mode is None and x]
+        alpha = words_of(self.intervals, self.errors, beyond=self.fine.ends)
+        sigma = self._without_windows or words_of([(w.low, w.high) for w in known], beyond=beyond)
         return (
             ("scene", repr(self.scene)),
             ("class", f"{self.kind}, for alpha {ends_of(self.fine.alpha)}"),
-            ("negative for alpha", words_of(self.intervals, self.errors)),
-            ("sigma", self._without_windows or words_of([(w.low, w.high) for w in self._known_windows])),
+            ("negative for alpha", alpha),
+            ("sigma", sigma),
+            *((("...", "the grid of alpha ends here, the range may go on"),) if "..." in alpha + sigma else ()),
             ("motion", ", ".join(dict.fromkeys(self.attractors))),
             ("average", f"{self.fine.time:.6g} units of time for each of {self.fine.starts} starts"),
         )
@@ -235,6 +241,8 @@ class Plane(Labelled):
         Over two parameters, the exact eigenvalues of each transversal mode, those of all layers together.
     mode : ndarray of int, shape (a, b), optional
         The mode with the largest exponent, by its place in `modes`.
+    strengths : tuple of str
+        The axes of these names are strengths of a mode; all others are parameters.
     """
 
     scene: Scene
@@ -247,6 +255,12 @@ class Plane(Labelled):
     names: tuple[str, str] = STRENGTHS
     modes: tuple[str, ...] = ()
     mode: np.ndarray | None = None
+    strengths: tuple[str, ...] = STRENGTHS
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """The axes that are parameters."""
+        return tuple(name for name in self.names if name not in self.strengths)
 
     @property
     def data(self) -> xr.Dataset:
@@ -420,7 +434,12 @@ def plane(
     whole.checked(with_partner(scene))
     rows, given = whole.parted()
     strengths = {name: values for name, values in zip(STRENGTHS, (alpha, beta), strict=True) if values is not None}
-    if len(strengths) + len(rows) != 2 or list(strengths) == ["beta"] or rows.keys() & set(STRENGTHS):
+    if both := strengths.keys() & rows.keys():
+        raise ValueError(
+            f"plane: found an axis of strengths and one of a parameter, both named {min(both)!r}; expected two names; "
+            "rename the parameter"
+        )
+    if len(strengths) + len(rows) != 2 or list(strengths) == ["beta"]:
         raise ValueError(
             f"plane: found the axes {', '.join((*strengths, *rows)) or 'none'}; expected alpha and beta, alpha and a "
             "parameter, or two parameters, each with a row of values"
@@ -433,13 +452,13 @@ def plane(
             "plane: found two parameters and a scene without links; expected a network, or alpha and a parameter"
         )
     if rows:
-        if "alpha" not in axes:  # exponents depend on all strengths
+        if not strengths:  # exponents depend on all those of the scene
             whole.expect_one_cell(scene)
         cell = coupled_cell(
             replace(given, table={**given.values, **{name: axes[name][0] for name in rows}}), scene, rtol
         )
-        _check_parameters(cell, axes)
-        return _over_parameters(known, cell, axes, starts, averaging)
+        _check_parameters(cell, {name: axes[name] for name in rows}, bool(strengths))
+        return _over_parameters(known, cell, axes, tuple(strengths), starts, averaging)
     expect_vanishing("plane", a_scene(scene).equations)
     across, up = axes.values()
     heights, place = np.unique(np.abs(up), return_inverse=True)
@@ -448,12 +467,12 @@ def plane(
     return Plane(known, across, up, table, error, _kinds(half_plane)[None, None], half_plane.time)
 
 
-def _check_parameters(cell: Scene, axes: Mapping[str, np.ndarray]) -> None:
+def _check_parameters(cell: Scene, rows: Mapping[str, np.ndarray], beside_alpha: bool) -> None:
     """Raise ValueError for values out of range, and for parameters that exponents do not depend on."""
     orbit, still = mode(cell.equations).orbit, still_strengths(cell)
-    for name in (name for name in axes if name not in STRENGTHS):
-        with_numbers(cell, {name: axes[name][-1]})
-        if "alpha" in axes and name in still and len(cell.strengths) == 1:
+    for name, values in rows.items():
+        with_numbers(cell, {name: values[-1]})
+        if beside_alpha and name in still and len(cell.strengths) == 1:
             raise ValueError(
                 f"plane: found the axes alpha and {name}; expected another parameter: alpha = -{name} gamma"
             )
@@ -463,12 +482,17 @@ def _check_parameters(cell: Scene, axes: Mapping[str, np.ndarray]) -> None:
 
 
 def _over_parameters(
-    known: Scene, cell: Scene, axes: Mapping[str, np.ndarray], starts: int, averaging: Averaging
+    known: Scene,
+    cell: Scene,
+    axes: Mapping[str, np.ndarray],
+    strengths: tuple[str, ...],
+    starts: int,
+    averaging: Averaging,
 ) -> Plane:
     """Exponents over two axes, one synchronous orbit after the other."""
     first, second = axes
     shape = (len(axes[first]), len(axes[second]))
-    modes = () if first == "alpha" else tuple(map(str, transversal_modes(cell)))
+    modes = () if strengths else tuple(map(str, transversal_modes(cell)))
     orbits = list(shared_orbits(cell, _columns(axes)) if modes else _orbits_of_line(axes[first], second, axes[second]))
     exponent, stderr, worst = np.empty(shape), np.empty(shape), np.empty(shape, dtype=int)
     kinds, longest = np.empty((*shape, check_integer("starts", starts, 1)), dtype=object), 0.0
@@ -481,10 +505,12 @@ def _over_parameters(
             exponent[at], stderr[at] = table[rows, largest], found.stderr[orbit.place][rows, largest]
             kinds[at], longest = _kinds(found), max(longest, found.time)
             reporter.advance(reporter.total * done / len(orbits) - reporter.done)
-    still = still_strengths(cell) if modes else {"alpha"}
+    still = still_strengths(cell) if modes else strengths
     attractors = kinds[tuple(slice(1) if name in still else slice(None) for name in axes)].astype(str)
-    of_modes = (modes, worst) if modes else ()
-    return Plane(known, axes[first], axes[second], exponent, stderr, attractors, longest, (first, second), *of_modes)
+    of_modes = (modes, worst if modes else None)
+    return Plane(
+        known, axes[first], axes[second], exponent, stderr, attractors, longest, (first, second), *of_modes, strengths
+    )
 
 
 def _columns(axes: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -73,11 +73,14 @@ class Orbits:
         Method of all steps, the one that suits all strengths.
     block : float
         Number of units of a block.
-    interpolation : Interpolation, optional
-        Interpolation in the strength, set by `prepare`.
-    integrator : VariationalIntegrator, optional
-        Integrator of the nodes of the interpolation, set by `prepare`.
-    travellers : Travellers, optional
+
+    Attributes
+    ----------
+    interpolation : Interpolation
+        Interpolation in the strength, set by `prepare`, as what follows is.
+    integrator : VariationalIntegrator
+        Integrator of the nodes of the interpolation.
+    travellers : Travellers
         Deviations of all strengths, and the largest error of the interpolation so far.
     """
 
@@ -89,9 +92,9 @@ class Orbits:
     unit: float
     method: Integrator
     block: float = 1.0
-    interpolation: Interpolation | None = None
-    integrator: VariationalIntegrator | None = None
-    travellers: Travellers | None = None
+    interpolation: Interpolation = field(init=False, repr=False)
+    integrator: VariationalIntegrator = field(init=False, repr=False)
+    travellers: Travellers = field(init=False, repr=False)
 
     @classmethod
     def make(cls, scene: Scene, strengths: np.ndarray, state: np.ndarray, workers: int | None) -> Orbits:
@@ -261,14 +264,7 @@ class Orbits:
             Propagators of the nodes over the block, without a factor.
         logarithms : ndarray, shape (starts, nodes)
             Logarithm of this factor: 0 unless a propagator is larger than exp(FAR) or smaller than exp(-FAR).
-
-        Raises
-        ------
-        RuntimeError
-            If the orbits are not prepared.
         """
-        if self.integrator is None:
-            raise RuntimeError("orbits are not prepared")
         integrator, p, size = self.integrator, self.components, self.variation.size
         integrator.set_deviations(self._basis(integrator))
         growth = integrator.advance(self.block * self.unit)
@@ -291,14 +287,7 @@ class Orbits:
         -------
         ndarray, shape (b, starts, m)
             Logarithm of the growth of each deviation over each batch.
-
-        Raises
-        ------
-        RuntimeError
-            If the orbits are not prepared.
         """
-        if self.integrator is None or self.travellers is None:
-            raise RuntimeError("orbits are not prepared")
         return self.integrator.follow(self.block * self.unit, batches, self.travellers)
 
     def error_of_steps(self) -> np.ndarray:
@@ -308,14 +297,7 @@ class Orbits:
         -------
         ndarray, shape (starts, m)
             The error of growth rates that is due to the steps (`averages.error_of_steps`).
-
-        Raises
-        ------
-        RuntimeError
-            If the orbits are not prepared.
         """
-        if self.integrator is None or self.travellers is None:
-            raise RuntimeError("orbits are not prepared")
         usual, looser, one = [], [], np.ones(1, dtype=np.int64)
         for _ in range(TRIED):
             vectors = self.travellers.vectors.copy()

@@ -113,6 +113,8 @@ class VariationalIntegrator:
         Number of threads.
     steps : int
         Steps taken so far.
+    warned : bool
+        Whether it was said that the steps are short because the modes are stiff.
     """
 
     variation: Variation
@@ -126,6 +128,7 @@ class VariationalIntegrator:
     vectors: np.ndarray
     workers: int
     steps: int = 0
+    warned: bool = False
 
     @classmethod
     def make(
@@ -333,7 +336,7 @@ class VariationalIntegrator:
         if self.kernel.origin.method.series and taken:
             step = blocks * float(np.broadcast_to(length, cells).sum()) / taken
             self.control[Control.FIRST_STEP] = step  # any scale finds its length, only the first few steps gain
-            warn_of_stiff_modes(self.variation, end, self.numbers, self.strengths, step)
+            self.warned = self.warned or warn_of_stiff_modes(self.variation, end, self.numbers, self.strengths, step)
         self.state = end
         self.steps += taken
 

@@ -51,13 +51,13 @@ def row(what: str, values: ArrayLike, least: int = 1, *, rising: bool = False, c
         If the values are anything else.
     """
     found = np.atleast_1d(numbers(what, values, complex_too=complex_too))
+    if not np.all(np.isfinite(found)):
+        raise ValueError(f"{what}: found {found[~np.isfinite(found)][0]}; expected finite numbers")
     if found.ndim != 1 or len(found) < least:
         wanted = f"a row of at least {least} number{'s' * (least > 1)}"
         raise ValueError(
             f"{what}: found an array of shape {np.shape(found) if np.ndim(values) else ()}; expected {wanted}"
         )
-    if not np.all(np.isfinite(found)):
-        raise ValueError(f"{what}: found {found[~np.isfinite(found)][0]}; expected finite numbers")
     if rising and not np.all(np.diff(found) > 0.0):
         raise ValueError(f"{what}: found numbers that do not increase; expected them from low to high")
     return found

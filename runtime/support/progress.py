@@ -70,7 +70,9 @@ class Progress:
 
     @property
     def left(self) -> float:
-        """Seconds left at this rate; infinite before the first one has ended."""
+        """Seconds left at this rate; infinite before the first one has ended, unless none is left."""
+        if self.done >= self.total:
+            return 0.0
         return (self.total - self.done) / self.rate if self.rate > 0.0 else float("inf")
 
     @property

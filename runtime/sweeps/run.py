@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import Executor
 
-import xarray as xr
-
 from synchain.models.inputs.checks import check_instance
 from synchain.models.scenes.scene import Scene, a_scene
 
@@ -17,7 +15,7 @@ from ..support.execution import Execution
 from ..support.progress import Hook
 from .memory import Memory
 from .prepare import prepare
-from .start import started
+from .start import Start, started
 
 __all__ = ["run"]
 
@@ -26,7 +24,7 @@ def run(
     scene: Scene,
     *,
     resume: Result | None = None,
-    start: Result | xr.DataArray | None = None,
+    start: Start | None = None,
     width: int | None = None,
     reduce: bool | Reduction = True,
     certified: bool = False,
@@ -47,9 +45,10 @@ def run(
     scene : Scene
     resume : Result, optional
         An earlier, unfinished result of the same scene, whose finished cells are kept.
-    start : Result or DataArray, optional
+    start : Result, DataArray, mapping, or sequence of numbers, optional
         Start from the states at the end of one cell: a result of one cell, or
-        `result.end.isel(sigma=-1)`.  Components and nodes must be those of the scene.  Time counts
+        `result.end.isel(sigma=-1)`; or from a table as `initial` of `Scene` takes, or all states in
+        the order of the equations.  Components and nodes must be those of the scene.  Time counts
         from 0 again, so the drive must have been at the beginning of a period; the attribute
         `start_time` of the data says which time of the earlier run that was.
     width : int, optional

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -11,37 +13,49 @@ from synchain.models.inputs.checks import typed_repr
 from synchain.models.mechanics.friction import SLIP
 from synchain.models.scenes.scene import Scene
 
-from ..results.labels import DRIVE_PHASE, END_TIME, STATE
+from ..results.labels import DRIVE_PHASE, END_TIME, STATE, States
 from ..results.result import Result
+from ..support.arrays import row
 
-__all__ = ["started"]
+__all__ = ["Start", "started"]
+
+Start: TypeAlias = Result | xr.DataArray | Mapping[str, object] | Sequence[float] | np.ndarray
+"""What a run may start from."""
 
 WHOLE = 1e-9
 """Largest distance of a time from a whole number of drive periods, in periods."""
 
 
-def started(scene: Scene, start: Result | xr.DataArray) -> tuple[Scene, float]:
+def started(scene: Scene, start: Start) -> tuple[Scene, float]:
     """Return the scene with the states of one cell as its start, and when they were reached.
 
     Parameters
     ----------
     scene : Scene
-    start : Result or DataArray
-        A result of one cell, or the states `end` of one, with dimensions component and node.
+    start : Result, DataArray, mapping, or sequence of numbers
+        A result of one cell, or the states `end` of one, with dimensions component and node; a table as `initial` of
+        `Scene` takes; or all states in the order of the equations.
 
     Raises
     ------
     TypeError
-        If `start` is neither.
+        If `start` is none of these.
     ValueError
         If the states are those of several cells or of other components or nodes, if one is not
         finite, or if the drive was not at the beginning of a period.
     """
     if isinstance(start, Result) and not start.success:
         raise ValueError(f"start: found a result with {start.message}; expected a cell that finished")
+    if isinstance(start, Mapping):
+        return scene.replace(initial=start), 0.0
+    if isinstance(start, list | tuple | np.ndarray):
+        start = _in_order(scene, start)
     end = start.end if isinstance(start, Result) else start
     if not isinstance(end, xr.DataArray):
-        raise TypeError(f"start: found {typed_repr(start)}; expected a Result of one cell, or result.end of one")
+        raise TypeError(
+            f"start: found {typed_repr(start)}; expected a Result of one cell, result.end of one, a table of initial states, "
+            "or all states in a row"
+        )
     _check_labels(scene, end)
     time = float(end.coords[END_TIME]) if END_TIME in end.coords else 0.0
     _check_phase(scene, end, time)
@@ -53,6 +67,16 @@ def started(scene: Scene, start: Result | xr.DataArray) -> tuple[Scene, float]:
     if not all(math.isfinite(x) for values in initial.values() for x in values):
         raise ValueError("start: found a state that is not finite; expected those of a cell that finished")
     return scene.replace(initial=initial), time
+
+
+def _in_order(scene: Scene, start: Sequence[float] | np.ndarray) -> xr.DataArray:
+    """States in the order of the equations with their labels."""
+    values, names = row("start", start), scene.equations.state
+    if len(values) != len(names):
+        raise ValueError(f"start: found {len(values)} numbers; expected {len(names)}, of {_listed(names)}")
+    states = States.of(scene)
+    labels = {"component": list(states.components), "node": range(1, states.nodes + 1)}
+    return xr.DataArray(states.table(values), labels, STATE)
 
 
 def _check_labels(scene: Scene, end: xr.DataArray) -> None:

@@ -48,9 +48,10 @@ def test_edges_by_hand() -> None:
         ([(0, 1, float("nan"))], None, ValueError, "not finite"),
         ([(0,)], None, ValueError, "edge 1 is (0,); expected (i, j) or (i, j, weight)"),
         (["01"], None, ValueError, "edge 1 is '01'"),
-        ([(0, -1)], None, ValueError, "edge 1: node = -1; expected at least 0"),
-        ([(0, 1.0)], None, TypeError, "node = 1.0; expected a whole number"),
-        ([(0, 5)], 3, ValueError, "expected two different nodes of 0 … 2"),
+        ([(0, -1)], None, ValueError, "edge 1: node (counted from 0) = -1; expected at least 0"),
+        ([(0, 1.0)], None, TypeError, "node (counted from 0) = 1.0; expected a whole number"),
+        ([(1, 2), (2, 3)], 3, ValueError, "edge 2: node (counted from 0) = 3; expected at most 2"),
+        ([(0, 5), (0, 5)], 3, ValueError, "edge 1: node (counted from 0) = 5; expected at most 2"),
         ([], None, ValueError, "n = 0; expected at least one node"),
     ],
 )

@@ -15,10 +15,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sympy as sp
+import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synchain.models import Scene, chain, ring, star
+from synchain.models import Scene, chain, complete, ring, star
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.frozen import Frozen
 from synchain.models.scenes.file import load_scene, scene_names
@@ -143,6 +145,21 @@ def test_the_givers_list_can_change_later() -> None:
 # ---------------------------------------------------------------- start
 
 
+@pytest.mark.parametrize(
+    ("value", "same"),
+    [
+        (np.array(0.2), 0.2),
+        (xr.DataArray(0.2), 0.2),
+        (sp.pi / 7, "pi/7"),
+        (sp.sqrt(2), "sqrt(2)"),
+        (sp.Rational(1, 7), 1 / 7),
+    ],
+)
+def test_one_number_of_any_kind(value: object, same: object) -> None:
+    assert Scene(parameters={"omega": value}) == Scene(parameters={"omega": same})
+    assert Scene(initial={"x": value}) == Scene(initial={"x": same})
+
+
 def test_random_starts_are_reproducible_and_independent() -> None:
     def drawn(**box: object) -> Scene:
         return Scene(topology=chain(6), initial={"x": box, "v": box})
@@ -216,11 +233,17 @@ REFUSED = [
     ({"parameters": {"omega": 10**5000}}, "finite"),
     ({"parameters": {"omega": True}}, "found True (bool)"),
     ({"parameters": {"omega": 1j}}, "expected a number"),
+    ({"parameters": {"omega": sp.I}}, "found I (ImaginaryUnit); expected a number"),
+    ({"parameters": {"omega": sp.Symbol("a", real=True)}}, "found a (Symbol); expected a number"),
+    ({"parameters": {"omega": sp.oo}}, "expected a number"),
+    ({"parameters": {"omega": np.array([0.2])}}, "found 1 values for 2 oscillators"),
     ({"parameters": {"omega": "exit()"}}, "not a constant"),
     ({"parameters": {"sigma": -0.1}}, "sigma = -0.1"),
     ({"parameters": {"kappa": 0}}, "above 0"),
     ({"parameters": {1: 1}}, "expected text"),
     ({"parameters": [1]}, "expected a table"),
+    ({"topology": ring(10**8)}, "topology ring: n = 100000000; expected at most 1000000 nodes"),
+    ({"coupling": "spring", "topology": complete(10**9)}, "expected at most 1000000 nodes in a model: reduce n"),
     ({"initial": {"y": 1}}, "unknown key 'y'; known: x, v"),
     ({"initial": {"x": [1, 2, 3]}}, "found 3 values for 2 oscillators"),
     ({"initial": {"x": [1]}}, "found 1 values for 2 oscillators"),

@@ -119,6 +119,16 @@ def test_a_name_that_two_parameters_would_have() -> None:
         Equations.of_equal_nodes(node, None, 2, varied=("a",))
 
 
+def test_numbers_of_nodes_named_as_another_parameter_are_refused_by_the_scene() -> None:
+    node = Field({"x": "-k*x - k_2"}, parameters={"k": 1, "k_2": 2})
+    assert Scene(node, "x->x", chain(2)).parameters["k_2"] == 2
+    for wrong in ({"parameters": {"k": [1, 3]}}, {"axes": {"k_1": [1, 3]}}):
+        with pytest.raises(
+            ValueError, match=r"^parameter 'k': found a number for each .* 'k_2' stands for two parameters"
+        ):
+            Scene(node, "x->x", chain(2), **wrong)
+
+
 def test_a_swept_parameter_of_one_node() -> None:
     made = scene(parameters={"sigma": 0.1}, axes={"delta_2": [0.1, 0.2]}, time_unit="time")
     assert made.varied == ("delta",)

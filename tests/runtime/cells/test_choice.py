@@ -160,8 +160,12 @@ def test_modes_that_become_stiff_are_said():
     """Van der Pol from the middle of a jump, where it is not stiff yet, onto the slow branch."""
     scene = Scene(oscillator="van_der_pol", topology=chain(2), parameters={"mu": 200.0}, integrator="taylor")
     orbits = Orbits.make(scene, np.array([0.0]), np.array([[0.0, 1.0]]), 1)
+    integrator = orbits.integrator_of(orbits.strengths)
     with pytest.warns(RuntimeWarning, match=r"stiff modes: found a rate of .*integrator = 'rodas5p'"):
-        orbits.integrator_of(orbits.strengths).advance(2.0)
+        integrator.advance(2.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        integrator.advance(0.1)  # it has been said
     easy = Orbits.make(scene.replace(parameters={"mu": 1.0}), np.array([0.0]), np.array([[0.0, 1.0]]), 1)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -142,6 +142,16 @@ def test_colours_of_the_plane_meet_at_zero() -> None:
     assert (mesh.norm.vmin, mesh.norm.vcenter, mesh.norm.vmax) == (-1.5, 0.0, 1.5)
 
 
+@pytest.mark.parametrize(("sign", "least", "most"), [(-1, 0.0, 0.5), (1, 0.5, 1.0)])
+def test_colours_of_one_sign_differ_and_leave_white_to_zero(sign: int, least: float, most: float) -> None:
+    value = sign * np.array([[0.100, 0.101], [0.102, 0.103]])
+    axes = Plane(Scene(), np.arange(2.0), np.arange(2.0), value, value, np.array([[["periodic"]]]), 1.0).plot()
+    (mesh,) = axes.collections
+    shades = mesh.norm(mesh.get_array())
+    assert (shades.min(), shades.max()) == (least, most)
+    assert min(mesh.cmap(mesh.norm(0.0))) > 0.9
+
+
 def test_an_uneven_ring_has_the_weights_asked_for() -> None:
     ring = plane.uneven_ring(4, Fraction(1, 3))
     assert ring.links[0] == (0, 1, Fraction(1))

@@ -112,6 +112,9 @@ def test_states_have_the_dimensions_component_and_node(result: Any) -> None:
     for k, name in enumerate(names):
         component, node = name.split("_")
         np.testing.assert_array_equal(result.end.sel(component=component, node=int(node)), result.states("end")[:, k])
+    for wrong in ("nd", "status"):
+        with pytest.raises(ValueError, match=f"^unknown variable of states '{wrong}'; known: .*end"):
+            result.states(wrong)
 
 
 @pytest.mark.parametrize("ending", FORMS)

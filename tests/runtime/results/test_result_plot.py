@@ -128,5 +128,10 @@ def test_observables_are_drawn_by_name_and_where_nothing_else_is_recorded() -> N
     lines = result_plot.draw_result(several).lines
     assert len(lines) == 5
     np.testing.assert_allclose(lines[-1].get_ydata(), several.data["error"].values[[1, 2, 0]].mean(axis=1))
+    assert {line.get_linestyle() for line in lines} == {"-"}
+    alone = {"realisations": 4, "draws": {"x": "uniform(-1, 1)"}, "show_progress": False}
+    for drawn in (scene.replace(axes=()), scene.replace(axes=(), record=("sync_error",), observe=None)):
+        (dots,) = result_plot.draw_result(run(drawn, **alone)).lines
+        assert (dots.get_linestyle(), dots.get_marker()) == ("None", "."), drawn
     with_error = run(scene.replace(record=("sync_error",), observe={"own": "end(x)"}), show_progress=False)
     assert result_plot.draw_result(with_error).get_ylabel() == "average synchronisation error"

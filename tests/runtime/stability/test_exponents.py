@@ -6,6 +6,7 @@ import inspect
 import math
 import re
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -356,4 +357,14 @@ def test_windows_of_complex_eigenvalues_are_said_to_be_unknown() -> None:
     found = msf(scene("harmonic", "damper").replace(topology=topology("one_way_ring", 3)), [0.0, 1.0])
     assert dict(found.summary)["sigma"] == "not known: one_way_ring(3) has complex eigenvalues, which need `plane`"
     assert found.data.sizes["window_number"] == 0
-    assert dict(msf(scene("harmonic", "damper"), [0.0, 1.0]).summary)["sigma"] == "0.0000 … 0.5000"
+
+
+def test_ranges_that_end_with_the_grid_are_marked() -> None:
+    found = msf(scene("harmonic", "damper"), [0.0, 1.0])
+    said = dict(found.summary)
+    assert (said["negative for alpha"], said["sigma"]) == ("0.0000 … 1.0000...", "0.0000 … 0.5000...")
+    assert said["..."] == "the grid of alpha ends here, the range may go on"
+    assert dict(found.fine.summary)["negative for alpha"] == "0.0000 … 1.0000..."
+    alpha = np.linspace(0.0, 1.0, 5)
+    inside = replace(found, alpha=alpha, fine=replace(found.fine, alpha=alpha, exponent=alpha - 0.6, stderr=0 * alpha))
+    assert "..." not in "".join(dict(inside.summary).values())

@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from synchain.models import Rates, Scene, Topology, chain, circulant, complete, ends, from_matrix, ring, star, topology
 from synchain.models.definitions.loader import load_oscillator
 from synchain.runtime import exponents, msf, open_result, plane, run
+from synchain.runtime.console.plane_report import PlaneReport
 from synchain.runtime.stability.interpolation import exact_interpolation, strength_interpolation
 from synchain.runtime.stability.orbits import Orbits
 
@@ -205,6 +206,26 @@ def test_strengths_of_layers_are_interpolated_along_lines(turn: complex, moving:
             np.testing.assert_allclose(weights @ next(values), next(values), rtol=1e-9)
 
 
+def test_a_parameter_may_be_named_as_a_strength(tmp_path: Path) -> None:
+    """Duffing's cubic spring is called `beta`, as the imaginary part of a strength is."""
+    few = {"starts": 1, "transient": 5, "periods": 50}
+    found = plane(ALONE, [0, 0.5], parameters={"beta": [0.5, 2]}, **few)
+    for j, value in enumerate(found.up):
+        own = exponents(ALONE, [0, 0.5], parameters={"beta": value}, **few)
+        np.testing.assert_array_equal(found.exponent[:, j], own.exponent)
+    assert found.attractors.shape == (1, 2, 1)
+    assert found.plot().get_ylabel() == r"$\beta$"
+    assert ", alpha = -sigma gamma" in PlaneReport(found, False).text()
+    found.save(tmp_path / "map.nc")
+    assert open_result(tmp_path / "map.nc").parameters == ("beta",)
+    both = plane(ALONE, parameters={"beta": [0.5, 2], "delta": [0.1, 0.2]}, **few)
+    assert both.parameters == ("beta", "delta")
+    assert len(both.modes) == 2
+    fixed = plane(ALONE, [0, 0.5], [0, 0.1], parameters={"beta": 2}, **few)
+    np.testing.assert_allclose(fixed.exponent[:, 0], found.exponent[:, 1], atol=1e-6)
+    assert fixed.plot().get_ylabel() == r"$\beta=-\sigma\,\mathrm{Im}\,\gamma$"
+
+
 def test_files_figures_and_threads(tmp_path: Path) -> None:
     told: list[float] = []
     scene = layered(ring(4), complete(4), PULL, omega=1.3)
@@ -236,6 +257,7 @@ ALONE = Scene("duffing", SPRING, ring(4))
         (lambda: plane(SCENE, k=[0, 1]), "found the axes k; expected alpha and beta"),
         (lambda: plane(SCENE, k=[0, 1], c=[0, 1], omega=[1, 2]), "found the axes k, c, omega"),
         (lambda: plane(ALONE, beta=[0, 1], parameters={"delta": [0.1, 0.2]}), "found the axes beta, delta"),
+        (lambda: plane(ALONE, [0, 1], [0, 1], parameters={"beta": [0, 1]}), "found an axis of strengths and one of a par"),
         (lambda: plane(SCENE, k=[0, 1], c=[0, 1], starts=-1), "starts = -1"),
         (lambda: plane(SCENE, k=[0, 1], c=[1, 0]), "c: found numbers that do not increase"),
         (lambda: plane(SCENE, k=[0, 1], c=[1]), "expected a row of at least 2 numbers"),

@@ -43,6 +43,7 @@ def test_rate_and_time_left_count_this_sitting_alone():
     assert now.failures == "10 diverged"
     assert str(now) == "400 of 1000 cells (40 %), 2 cells/s, 5 min left; 10 diverged"
     assert Progress(10, 3, 3, {}, 1.0, 1.0).left == float("inf")
+    assert str(Progress(3, 3, 3, {}, 0.0, 1.0)) == "3 of 3 cells (100 %), 0 cells/s, 0 s left"
 
 
 @pytest.mark.parametrize(

@@ -72,6 +72,14 @@ def test_kinds_of_nodes_have_their_own_components() -> None:
     np.testing.assert_allclose(second.states("end"), ran(scene.replace(window=7.4)).states("end"), rtol=0, atol=1e-7)
 
 
+def test_states_in_a_row_and_tables_are_starts(first: Result) -> None:
+    whole = ran(DRIVEN, start=first)
+    for start in (first.states(), first.states().tolist(), whole.scene.initial):
+        again = ran(DRIVEN, start=start)
+        np.testing.assert_array_equal(again.end, whole.end)
+        assert again.data.attrs["start_time"] == 0.0
+
+
 @pytest.mark.parametrize(
     ("start", "error", "words"),
     [
@@ -86,7 +94,10 @@ def test_kinds_of_nodes_have_their_own_components() -> None:
         (lambda: ran(DRIVEN.replace(window=4.3)), ValueError, "is 0.300000 into a period at t = 39.88"),
         (lambda: ran(DRIVEN.replace(max_steps=3)), ValueError, "a result with 1 cell: used up max_steps"),
         (lambda: ran(DRIVEN).end * np.nan, ValueError, "a state that is not finite"),
-        (lambda: [0.1, 0.2], TypeError, r"found \[0.1, 0.2\] \(list\); expected a Result of one cell"),
+        (lambda: "end", TypeError, r"found 'end' \(str\); expected a Result of one cell"),
+        (lambda: [0.1, 0.2], ValueError, "start: found 2 numbers; expected 6, of x_1, x_2, x_3, v_1, v_2, v_3"),
+        (lambda: np.ones((2, 3)), ValueError, r"start: found an array of shape \(2, 3\)"),
+        (lambda: {"y": 1.0}, ValueError, "initial: unknown key 'y'; known: x, v"),
         (lambda: xr.DataArray([1.0, 2.0]), ValueError, r"along dim_0 \(2\)"),
     ],
 )

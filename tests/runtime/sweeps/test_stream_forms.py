@@ -8,11 +8,13 @@ import signal
 import subprocess
 import sys
 import tracemalloc
+import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from streams import MAP, PAIR, UP, contents, kill_again_and_again, partial, warm
 
 from synchain.models.scenes.scene import Scene
@@ -73,6 +75,10 @@ def test_a_file_that_is_filled_holds_what_one_that_is_saved_holds(scene: Scene, 
     assert done.success
     assert done.data.identical(whole.data)
     assert digest(tmp_path / f"a{ending}") == digest(tmp_path / f"saved{ending}")
+    if ending == ".zarr":
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # xarray's of metadata in many files
+            assert xr.open_zarr(tmp_path / "a.zarr").attrs == xr.open_zarr(tmp_path / "saved.zarr").attrs
     assert sorted(part.name for part in tmp_path.iterdir()) == [f"a{ending}", f"saved{ending}"]
 
 
