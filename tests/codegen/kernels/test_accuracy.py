@@ -26,7 +26,7 @@ TOLERANCES = [10.0**-k for k in range(5, 12)]
 
 
 def friction_kernel(n: int):
-    return kernel(friction_scene(n), "rodas5p", ALL, V_1)
+    return kernel(friction_scene(n), "rodas5p", ALL, V_1, 8)
 
 
 def friction_run(n: int, rtol: float, spans: list[tuple[float, float]], **options) -> Outcome:
@@ -141,7 +141,7 @@ def distances(states: np.ndarray) -> np.ndarray:
 
 
 def harmonic_run(method: str, rtol: float, **options) -> Outcome:
-    compiled = kernel(harmonic_chain(3), method, ALL, V_1)
+    compiled = kernel(harmonic_chain(3), method, ALL, V_1, 8)  # the driver of the others
     return drive(compiled, [[*X0, *V0]], [[SIGMA]], [(5.0, 45.0)], rtol, direction=0.0, **options)
 
 

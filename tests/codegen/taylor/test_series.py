@@ -63,7 +63,7 @@ def close(found: list, expected: list, digits: int = 40) -> bool:
     )
 
 
-POINTS = ["0.3", "-0.45", "0.7"]
+POINTS = ["-0.45", "0.7"]
 UNARY = {
     "exp": sp.exp, "log": lambda a: sp.log(2 + a), "sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "sinh": sp.sinh,
     "cosh": sp.cosh, "tanh": sp.tanh, "atan": sp.atan, "asin": sp.asin, "acos": sp.acos, "erf": sp.erf,
