@@ -17,7 +17,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME as T
 
 X, V, A, B = sp.symbols("x v a b", real=True)
-ORDER = 24
+ORDER = 16
 DIGITS = 60
 
 FUNCTIONS: dict[str, Any] = {

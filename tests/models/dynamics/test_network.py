@@ -98,8 +98,9 @@ def assemble(oscillator: str, friction: str | None, coupling: str, graph: Topolo
 
 
 @pytest.mark.parametrize("graph", unlike(), ids=identity)
-@pytest.mark.parametrize("coupling", ["damper", "spring"])  # all couplings on small graphs: test_mechanics_proof.py
-@pytest.mark.parametrize(("oscillator", "friction"), [("friction", "exponential"), ("duffing", None)])
+@pytest.mark.parametrize(
+    ("oscillator", "friction", "coupling"), [("friction", "exponential", "spring"), ("duffing", None, "damper")]
+)  # all couplings of all oscillators: test_mechanics_proof.py
 def test_template_equals_the_lagrangian_in_one_piece(
     oscillator: str, friction: str | None, coupling: str, graph: Topology
 ) -> None:
@@ -262,8 +263,11 @@ def models() -> list[tuple[str, str | None]]:
     return found
 
 
-@pytest.mark.parametrize(("oscillator", "friction"), models())
-@pytest.mark.parametrize("contact", ContactModel)
+@pytest.mark.parametrize(
+    ("oscillator", "friction", "contact"),
+    [(oscillator, friction, contact) for oscillator, friction in models()
+     for contact in (ContactModel if friction else ["atan"])],
+)  # fmt: skip
 def test_parameters_are_those_of_the_equations(oscillator: str, friction: str | None, contact: str) -> None:
     if contact == "set-valued" and friction and len(getattr(load(OSCILLATOR, oscillator), "COORDINATES", "x")) > 1:
         with pytest.raises(ValueError, match=r"set-valued contact: .* coordinates; expected one"):

@@ -86,8 +86,7 @@ def test_every_oscillator_in_a_weighted_triple(oscillator: str) -> None:
     check(by_lagrange, oscillator, "spring", WEIGHTED)
 
 
-@pytest.mark.parametrize("coupling", ["spring", "torsion", "damper"])
-@pytest.mark.parametrize("n", [2, 3])
+@pytest.mark.parametrize(("n", "coupling"), [(2, "torsion"), (2, "damper"), (3, "spring")])
 def test_double_pendulums(coupling: str, n: int) -> None:
     """The coupling meets a mass matrix that depends on the state of its target."""
     check(by_lagrange, "double_pendulum", coupling, topology("chain", n))
