@@ -18,7 +18,7 @@ import sys
 import textwrap
 import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 
 import numba
@@ -93,24 +93,15 @@ MODULES = ("kernel", "driver")
 
 HERE = Path(__file__).parent
 
-BEGIN = """
-import json, os, sys, warnings
+OTHER = """
+import json, os, sys
 sys.path[:0] = sys.argv[1].split(os.pathsep)
-from test_load import KernelKind, REAL, SOURCE, TinyDriver, reported
-from synchain.codegen.kernels import driver
-from synchain.runtime.cli import main
+from test_load import REAL, SOURCE, filled, reported
+tasks = {"small": lambda: reported(SOURCE), "real": lambda: reported(REAL), "fill": filled}
 print("ready", flush=True)
-input()
-"""
-PROGRAM = f"""{BEGIN}
-print(json.dumps(reported(SOURCE)))
-if sys.argv[2:]:
-    os.environ["SYNCHAIN_CACHE"] = sys.argv[2]
-    print(json.dumps(reported(REAL)))
-"""
-WARMING = f"""{BEGIN}
-driver.common_drivers = lambda: [TinyDriver(KernelKind.SWEEP, 1, scale=float(k)) for k in range(1, 5)]
-sys.exit(main(["cache", "warm"]))
+for line in sys.stdin:
+    task, os.environ["SYNCHAIN_CACHE"] = json.loads(line)
+    print(json.dumps(tasks[task]()), flush=True)
 """
 HOLDER = """
 import sys, time
@@ -138,28 +129,44 @@ def reported(source) -> dict:
     }  # fmt: skip
 
 
-def start(program: str, folder: Path, *arguments: str) -> subprocess.Popen:
-    """A process with a cache folder that has loaded all modules and waits for a word."""
-    job = subprocess.Popen(
-        [sys.executable, "-c", program, os.pathsep.join(map(str, (HERE, HERE.parents[1]))), *arguments],
-        env={**os.environ, "SYNCHAIN_CACHE": str(folder)}, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    assert job.stdout is not None
-    assert job.stdout.readline() == "ready\n"
-    return job
+def filled() -> int:
+    """Fill a cache with four small drivers, whose lines are printed."""
+    loading.forget()
+    with pytest.MonkeyPatch.context() as m:
+        drivers = [TinyDriver(KernelKind.SWEEP, 1, scale=float(k)) for k in range(1, 5)]
+        m.setattr(driver, "common_drivers", lambda: drivers)
+        return main(["cache", "warm"])
 
 
-def go(job: subprocess.Popen) -> None:
-    assert job.stdin is not None
-    job.stdin.write("\n")
-    job.stdin.flush()
+class Other:
+    """Another process, which has loaded all modules and waits for tasks."""
+
+    def __init__(self) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", OTHER, os.pathsep.join(map(str, (HERE, HERE.parents[1])))],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        assert self.line() == "ready"
+
+    def begin(self, task: str, folder: Path) -> None:
+        assert self.process.stdin is not None
+        print(json.dumps((task, str(folder))), file=self.process.stdin, flush=True)
+
+    def line(self) -> str:
+        assert self.process.stdout is not None
+        return self.process.stdout.readline().rstrip("\n")
+
+    def end(self) -> None:
+        self.process.kill()
+        self.process.communicate()
 
 
-def finish(job: subprocess.Popen) -> list[str]:
-    """The lines of a process."""
-    text, _ = job.communicate(timeout=120)
-    assert job.returncode == 0
-    return text.splitlines()
+@pytest.fixture(scope="module")
+def other() -> Iterator[Other]:
+    """The process that the tests share; each gives it a folder of its own."""
+    made = Other()
+    yield made
+    made.end()
 
 
 @pytest.fixture
@@ -194,12 +201,13 @@ every_module = pytest.mark.parametrize("module", MODULES)
 
 
 @pytest.fixture(scope="module")
-def reports(tmp_path_factory) -> dict[str, dict]:
+def reports(other, tmp_path_factory) -> dict[str, dict]:
     """What another process has told that loaded the small kernel and the real one into empty folders."""
-    place = tmp_path_factory.mktemp("shared")
-    job = start(PROGRAM, place / "kernels", str(place / "real"))
-    go(job)
-    return dict(zip(("small", "real"), map(json.loads, finish(job)), strict=True))
+    found = {}
+    for name in ("small", "real"):
+        other.begin(name, tmp_path_factory.mktemp("shared") / "kernels")
+        found[name] = json.loads(other.line())
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -231,10 +239,9 @@ def test_a_second_process_loads_without_compiling(reports, folder, name, source)
     assert first["end"] == second["end"] == pytest.approx(EXACT[name], abs=1e-8)
 
 
-def test_of_two_processes_that_miss_a_kernel_one_compiles_it(folder):
-    job = start(PROGRAM, folder)
-    go(job)
-    both = [reported(SOURCE), *map(json.loads, finish(job))]
+def test_of_two_processes_that_miss_a_kernel_one_compiles_it(other, folder):
+    other.begin("small", folder)
+    both = [reported(SOURCE), json.loads(other.line())]
     for report in both:
         assert report["warnings"] == []
         assert report["end"] == [2.0, 6.0]
@@ -375,40 +382,27 @@ def told(lines: list[str]) -> list[str]:
     return [line.partition("  ")[0] for line in lines]
 
 
-@pytest.fixture
-def warm(folder, monkeypatch, capsys) -> Callable[[], list[str]]:
-    """A function that fills the cache with four small drivers, as a process of `WARMING` does."""
-    drivers = [TinyDriver(KernelKind.SWEEP, 1, scale=float(k)) for k in range(1, 5)]
-    monkeypatch.setattr(driver, "common_drivers", lambda: drivers)
-
-    def fill() -> list[str]:
-        loading.forget()
-        assert main(["cache", "warm"]) == 0
-        return told(capsys.readouterr().out.splitlines())
-
-    return fill
-
-
-def test_of_two_processes_that_fill_a_cache_one_compiles_each_driver(folder, warm):
-    job = start(WARMING, folder)
-    go(job)
-    lines = [warm(), told(finish(job))]
+def test_of_two_processes_that_fill_a_cache_one_compiles_each_driver(other, folder, capsys):
+    other.begin("fill", folder)
+    assert filled() == 0
+    lines = [told(capsys.readouterr().out.splitlines()), told([other.line() for _ in range(4)])]
+    assert other.line() == "0"
     assert [sorted(pair) for pair in zip(*lines, strict=True)] == [["compiled", "was there"]] * 4
     assert not [*folder.glob("*.tmp"), *folder.glob("*.lock")]
     assert len(machine_code(folder, "driver")) == 4
 
 
-def test_a_process_that_is_killed_while_it_fills_a_cache_leaves_whole_drivers(folder, warm):
-    job = start(WARMING, folder)
-    go(job)
-    assert job.stdout is not None
-    assert job.stdout.readline().startswith("compiled")
-    job.kill()
-    job.communicate()
-    lines = warm()
+def test_a_process_that_is_killed_while_it_fills_a_cache_leaves_whole_drivers(folder, capsys):
+    other = Other()
+    other.begin("fill", folder)
+    assert other.line().startswith("compiled")
+    other.end()
+    assert filled() == 0
+    lines = told(capsys.readouterr().out.splitlines())
     assert lines[0] == "was there"
     assert lines[-1] == "compiled", "the process was killed too late"
-    assert warm() == ["was there"] * 4
+    assert filled() == 0
+    assert told(capsys.readouterr().out.splitlines()) == ["was there"] * 4
 
 
 @pytest.mark.usefixtures("folder")
