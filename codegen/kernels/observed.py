@@ -121,6 +121,8 @@ class Watched:
 
     def tables(self, equations: Equations) -> dict[str, str]:
         """Return the text of the tables that the sums read, by their names: slots of a bank, or numbers."""
+        if not self.sums:
+            return {}
         slots = {name: k for k, name in enumerate((*equations.state, *equations.parameters))}
         found = {}
         for k, rows in enumerate(self.sums):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 from pathlib import Path
 
@@ -26,7 +27,7 @@ TOLERANCES = [10.0**-k for k in range(5, 12)]
 
 
 def friction_kernel(n: int):
-    return kernel(friction_scene(n), "rodas5p", ALL, V_1)
+    return kernel(friction_scene(n), "rodas5p", ALL, V_1, 8)
 
 
 def friction_run(n: int, rtol: float, spans: list[tuple[float, float]], **options) -> Outcome:
@@ -141,7 +142,7 @@ def distances(states: np.ndarray) -> np.ndarray:
 
 
 def harmonic_run(method: str, rtol: float, **options) -> Outcome:
-    compiled = kernel(harmonic_chain(3), method, ALL, V_1)
+    compiled = kernel(harmonic_chain(3), method, ALL, V_1, 8)  # the driver of the others
     return drive(compiled, [[*X0, *V0]], [[SIGMA]], [(5.0, 45.0)], rtol, direction=0.0, **options)
 
 
@@ -224,6 +225,24 @@ def stopped(n: int) -> Equations:
     return Equations.of_equal_nodes(node, edge, n, path(n))
 
 
+CELLS = [[0.2, 5.0, drag, 0.3] for drag in (0.1, 0.4, 0.6, 0.9, 1.2)]
+
+
+def started(n: int) -> list[float]:
+    return [*np.linspace(-0.4, 0.5, n), *np.linspace(0.7, -0.2, n)]
+
+
+@functools.cache
+def ends_by_scipy(n: int) -> np.ndarray:
+    """What all methods are compared with."""
+    space: dict = {}
+    exec(to_python(stopped(n)), space)
+    return np.array([
+        solve_ivp(space["rhs"], (0, 6), started(n), "DOP853", args=tuple(cell), rtol=1e-12, atol=1e-13, max_step=0.01).y[:, -1]
+        for cell in CELLS
+    ])  # fmt: skip
+
+
 OTHERS = [
     *((method, None, 2) for method in integrators.names() if method not in ("rodas5p", "taylor")),
     ("rodas5p", 1, 2),
@@ -240,16 +259,8 @@ Taylor steps refuse these choices, which jump.
     [("rodas5p", None, 2), ("dop853", 1, 2), *(pytest.param(*other, marks=pytest.mark.long) for other in OTHERS)],
 )
 def test_choices_by_states_and_parameters_end_where_scipy_says(method, width, n):
-    equations = stopped(n)
-    drags, start = [0.1, 0.4, 0.6, 0.9, 1.2], [*np.linspace(-0.4, 0.5, n), *np.linspace(0.7, -0.2, n)]
-    cells = [[0.2, 5.0, drag, 0.3] for drag in drags]
+    equations, start = stopped(n), started(n)
     assert equations.parameters == ("gap", "stiff", "drag", "sigma")
-    found = drive(kernel(equations, method, width=width), [start] * 5, cells, [(0.0, 6.0)] * 5, 1e-8)
+    found = drive(kernel(equations, method, width=width), [start] * 5, CELLS, [(0.0, 6.0)] * 5, 1e-8)
     assert (found.counts[:, 0] == 1).all()
-    space: dict = {}
-    exec(to_python(equations), space)
-    for cell, end in zip(cells, found.end, strict=True):
-        known = solve_ivp(
-            space["rhs"], (0, 6), start, "DOP853", args=tuple(cell), rtol=1e-12, atol=1e-13, max_step=0.01
-        )
-        np.testing.assert_allclose(end, known.y[:, -1], rtol=0, atol=3e-6)
+    np.testing.assert_allclose(found.end, ends_by_scipy(n), rtol=0, atol=3e-6)

@@ -19,6 +19,8 @@ from synchain.codegen.kernels.driver import Driver, KernelKind, imports
 from synchain.codegen.kernels.modes import emit_modes
 from synchain.codegen.kernels.sweep import emit
 from synchain.codegen.program.lowering import UnprintableError
+from synchain.codegen.steps.names import tidy
+from synchain.codegen.taylor import write_looped, write_step
 from synchain.models import chain
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.record import Record
@@ -81,27 +83,28 @@ def test_scenes_of_the_same_kind_share_a_driver():
     assert len({driver.text for driver in ways}) == 5
 
 
+def written() -> str:
+    """Texts of kernels, drivers and Taylor steps."""
+    texts = []
+    for eq in (CASES["looped"], CASES["friction 3"]):
+        section = sp.Symbol(eq.state[-1], real=True) - sp.Rational(1, 3)
+        for method in ("cash_karp", "rodas5p"):
+            source = emit(eq, method, ("section", "trajectory"), section, width=2)
+            texts += [source.text, source.driver.text]
+    smooth = tidy(CASES["looped"])
+    return "\n".join([*texts, write_step(smooth, 8).text, write_looped(smooth, 8).text])
+
+
 def test_text_does_not_depend_on_the_hash_seed():
-    program = (
-        "import sys; sys.path.insert(0, sys.argv[1]); from samples import *\n"
-        "from synchain.codegen.kernels.sweep import emit\n"
-        "for eq in (CASES['looped'], CASES['friction 3']):\n"
-        "    for m in ('cash_karp', 'rodas5p'):\n"
-        "        source = emit(eq, m, ('section', 'trajectory'), "
-        "sp.Symbol(eq.state[-1], real=True) - sp.Rational(1, 3), width=2)\n"
-        "        print(source.text, source.driver.text)\n"
-    )
-    here = str(Path(__file__).parents[2])
-    jobs = [
-        subprocess.Popen(
-            [sys.executable, "-c", program, here], env={**os.environ, "PYTHONHASHSEED": seed}, stdout=subprocess.PIPE
-        )
-        for seed in ("0", "4711")
-    ]
-    texts = [job.communicate(timeout=120)[0] for job in jobs]
-    assert all(job.returncode == 0 for job in jobs)
-    assert len(texts[0]) > 100_000
-    assert texts[0] == texts[1]
+    program = "import sys; sys.path[:0] = sys.argv[1:]; from test_kernel_text import written; print(written())"
+    here = Path(__file__).parent
+    texts = subprocess.run(
+        [sys.executable, "-c", program, str(here), str(here.parents[1])], env={**os.environ, "PYTHONHASHSEED": "4711"},
+        capture_output=True, text=True, check=True, timeout=120,
+    ).stdout  # fmt: skip
+    assert len(texts) > 100_000
+    assert "# order 8" in texts
+    assert texts == written() + "\n"
 
 
 def test_the_header_says_what_runs():

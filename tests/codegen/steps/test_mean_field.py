@@ -94,22 +94,20 @@ def test_two_fields_have_sums_of_their_own(method: str) -> None:
 
 
 def test_the_text_does_not_grow_and_lists_no_link() -> None:
-    few, many = (emit(network("sine with a lag", n, False), "dop853", (), width=1, unroll=0) for n in (20, 10**6))
+    few, many = (emit(network("sine with a lag", n, False), "dop853", (), width=1, unroll=0) for n in (20, 10**5))
     assert len(many.text) - len(few.text) < 100
     assert many.elimination is not None
     assert many.elimination.weights.size == 0
     assert "in range(target.size)" not in many.text
 
 
-def test_equations_of_a_million_nodes_list_no_link() -> None:
-    field = network("springs", 10**6, False)
-    assert field.link_count == 10**6 * (10**6 - 1)
-    assert "999999000000 links" in repr(field)
-    assert field.digest != network("springs", 10**6 - 1, False).digest
+def test_equations_of_many_nodes_list_no_link() -> None:
+    field = network("springs", 10**5, False)
+    assert field.link_count == 10**5 * (10**5 - 1)
+    assert "9999900000 links" in repr(field)
+    assert field.digest != network("springs", 10**5 - 1, False).digest
     assert network("springs", 20, False).digest == network("springs", 20, True).digest
-    with pytest.raises(
-        ValueError, match=f"found 999999000000 links between 1000000 nodes; expected at most {LINK_LIMIT}"
-    ):
+    with pytest.raises(ValueError, match=f"found 9999900000 links between 100000 nodes; expected at most {LINK_LIMIT}"):
         field.without_fields()
 
 

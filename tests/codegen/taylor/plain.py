@@ -13,7 +13,8 @@ import numpy as np
 from scipy import special
 
 from synchain.codegen.steps.names import tidy
-from synchain.codegen.taylor import write_step
+from synchain.codegen.steps.program import program
+from synchain.codegen.taylor import write_looped, write_step
 from synchain.models.dynamics.equations import Equations
 
 BUDGET = 20_000
@@ -38,6 +39,30 @@ WORDS: dict[str, Any] = {
 }  # fmt: skip
 
 
+class Text:
+    """A step whose text is run; the states and the rows of dense output, (order, dimension), are those of the last one."""
+
+    def __init__(self, equations: Equations, order: int, looped: bool = False, dense: bool = False) -> None:
+        equations = tidy(equations)
+        plan, written = program(equations), (write_looped if looped else write_step)(equations, order)
+        self.size, self.kinks = equations.dimension, written.kinks
+        space = {
+            **WORDS, "DIMENSION": self.size, "NODES": equations.n, "DENSE_ROWS": order, "DENSE": dense,
+        }  # fmt: skip
+        exec(written.text, space)
+        self.function, self.graph = space["step"], (plan.arrays, plan.weights) if looped else ()
+        self.state, self.work = np.zeros(self.size), np.zeros(order * self.size + written.workspace)
+        self.rows = self.work[: order * self.size].reshape(order, self.size)
+
+    def step(
+        self, y: np.ndarray, t: float, limit: float, scale: float, rtol: float, atol: float
+    ) -> tuple[float, float]:
+        """The length of a step from a state and parameters, and how far its series reach."""
+        with np.errstate(all="ignore"):
+            found = self.function(t, limit, scale, y, y, self.state, self.work, rtol, atol, *self.graph)
+        return found if self.kinks else (found, found)
+
+
 def march(
     equations: Equations,
     order: int,
@@ -46,31 +71,26 @@ def march(
     rtol: float,
     longest: float = math.inf,
     numbers: Sequence[float] = (),
+    looped: bool = False,
 ) -> tuple[np.ndarray, int]:
     """The state at the end, NaN where steps vanish or are too many, and the number of steps; atol is a tenth of rtol.
 
     `numbers` are the values of the parameters.
     """
-    written = write_step(tidy(equations), order)
-    space = {**WORDS, "DIMENSION": equations.dimension}
-    exec(written.text, space)
-    work = np.zeros(order * equations.dimension + written.workspace)
-    size = equations.dimension
-    y, new = np.array([*start, *numbers], dtype=float), np.zeros(size)
+    text, size = Text(equations, order, looped), equations.dimension
+    y = np.array([*start, *numbers], dtype=float)
     t, scale, power_of_two = np.float64(0.0), np.float64(1e-4), _kept(0x7FF << 52)
-    with np.errstate(all="ignore"):
-        for steps in range(BUDGET):
-            if t >= end:
-                return y[:size], steps
-            limit = np.float64(min(end - t, longest))
-            found = space["step"](t, limit, scale, y, y, new, work, rtol, rtol / 10)
-            h, reach = found if written.kinks else (found, found)
-            if not reach > 0.0:
-                scale = 0.0625 * scale
-            else:
-                t = np.float64(end) if h >= end - t else t + h
-                y[:size] = new
-                scale = power_of_two(reach) if reach < limit else np.maximum(scale, power_of_two(reach))
-            if not (scale > 4e-16 * max(1.0, t) and np.abs(y[:size]).max() < 2.0**53):
-                break
+    for steps in range(BUDGET):
+        if t >= end:
+            return y[:size], steps
+        limit = np.float64(min(end - t, longest))
+        h, reach = text.step(y, t, limit, scale, rtol, rtol / 10)
+        if not reach > 0.0:
+            scale = 0.0625 * scale
+        else:
+            t = np.float64(end) if h >= end - t else t + h
+            y[:size] = text.state
+            scale = power_of_two(reach) if reach < limit else np.maximum(scale, power_of_two(reach))
+        if not (scale > 4e-16 * max(1.0, t) and np.abs(y[:size]).max() < 2.0**53):
+            break
     return np.full(size, math.nan), steps

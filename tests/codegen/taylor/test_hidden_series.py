@@ -1,6 +1,6 @@
 """Series that are small to all orders now and large soon after, that have their terms far apart, or that pass where they end.
 
-The steps run as plain Python (`plain.march`), some in compiled loops.
+The steps run as plain Python.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
-from march import alone, compiled, step_of
-from plain import march
+from march import alone, step_of
+from plain import Text, march
 from scipy import special
 
 from synchain.codegen.taylor import order_for
@@ -36,8 +36,8 @@ def test_a_pulse_of_a_phase_is_not_stepped_over(rtol):
 
 
 def test_a_pulse_of_a_phase_is_not_stepped_over_in_loops():
-    end, _ = compiled(PULSE, 16, looped=True).run([1.0, 0.0], [], 10 * math.pi + 1.0, 1e-8)
-    assert end[0, 1] == pytest.approx(math.pi * special.i0e(200.0) / 10.0, abs=1e-7)
+    end, _ = march(PULSE, 16, [1.0, 0.0], 10 * math.pi + 1.0, 1e-8, looped=True)
+    assert end[1] == pytest.approx(math.pi * special.i0e(200.0) / 10.0, abs=1e-7)
 
 
 @pytest.mark.parametrize(("power", "rtol"), [(10, 1e-3), (10, 1e-8), (7, 1e-2), (30, 1e-4)])
@@ -81,11 +81,7 @@ def test_a_spring_without_a_linear_term_keeps_its_energy(power, rtol):
 def test_a_kink_of_a_function_that_hides(looped):
     """x' = -1, y' = |exp(-30 x**2) - 1/2| from x = 3 to -3."""
     equations = alone([X, V], [-sp.S.One, sp.Abs(sp.exp(-30 * X**2) - sp.Rational(1, 2))])
-    end = (
-        compiled(equations, 16, looped=True).run([3.0, 0.0], [], 6.0, 1e-9)[0][0]
-        if looped
-        else run(equations, [3.0, 0.0], 6.0, 1e-9)
-    )
+    end, _ = march(equations, order_for(1e-9, 1e-10), [3.0, 0.0], 6.0, 1e-9, looped=looped)
     edge = math.sqrt(math.log(2.0) / 30.0)
     inner = 2.0 * float(mpmath.quad(lambda x: mpmath.exp(-30 * x**2) - 0.5, [0, edge]))
     outer = 2.0 * float(mpmath.quad(lambda x: 0.5 - mpmath.exp(-30 * x**2), [edge, 2 * edge, 3]))
@@ -103,13 +99,11 @@ def test_a_kink_of_a_wave_is_found_where_the_state_rests():
 def test_the_root_of_what_has_run_out_is_no_number(looped):
     """x' = -sqrt(x) is (1 - t/2)**2 up to t = 2, and its series go on: a tank cannot run empty and fill again."""
     tank = alone([X], [-sp.sqrt(X)])
-    if looped:
-        kernel = compiled(tank, 12, looped=True)
-        assert np.isnan(kernel.step([1.0], [], scale=2.0)[0][0])
-        assert kernel.run([1.0], [], 1.5, 1e-9)[0][0, 0] == pytest.approx(0.0625, abs=1e-9)
-    else:
-        assert run(tank, [1.0], 1.5, 1e-9)[0] == pytest.approx(0.0625, abs=1e-9)
-        assert np.isnan(run(tank, [1.0], 3.0, 1e-9)[0])
+    _, reach = Text(tank, 12, looped).step(np.ones(1), np.float64(0.0), math.inf, 2.0, 1e-10, 1e-11)
+    assert np.isnan(reach)
+    order = order_for(1e-9, 1e-10)
+    assert march(tank, order, [1.0], 1.5, 1e-9, looped=looped)[0][0] == pytest.approx(0.0625, abs=1e-9)
+    assert np.isnan(march(tank, order, [1.0], 3.0, 1e-9, looped=looped)[0][0])
 
 
 @pytest.mark.parametrize("rate", [-3 * X ** sp.Rational(2, 3), -4 * X ** sp.Rational(3, 4), -sp.S.One, -1 / X])

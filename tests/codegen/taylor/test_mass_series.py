@@ -39,23 +39,40 @@ def rates_of(equations: Equations, numbers: list[float]):
     return lambda t, y: np.linalg.solve(mass(*y, *numbers), np.array(forces(t, *y, *numbers), float))
 
 
-@pytest.mark.parametrize(
-    "looped", [pytest.param(False, marks=pytest.mark.long, id="written out"), pytest.param(True, id="looped")]
-)
-def test_a_pendulum_of_many_links_moves_as_its_matrices_say(looped):
-    lanes = compiled(alone(LINKS), 8, looped=looped)
-    found, _ = lanes.run(START, [1.3, 0.2], 0.5, 1e-13)
+WAYS = pytest.mark.parametrize(
+    ("looped", "python"),
+    [pytest.param(looped, python, id=f"{'loops' if looped else 'lines'}{' by Python' * python}",
+                  marks=[pytest.mark.long] * (not python))
+     for looped in (False, True) for python in (False, True)],
+)  # fmt: skip
+
+
+def end_of(
+    equations: Equations, order: int, start: np.ndarray, numbers: list[float], looped: bool, python: bool
+) -> np.ndarray:
+    """The state at 0.5, by machine code or by Python, which runs the same text."""
+    if python:
+        return march(equations, order, start, 0.5, 1e-13, numbers=numbers, looped=looped)[0]
+    return compiled(equations, order, looped=looped).run(start, numbers, 0.5, 1e-13)[0][0]
+
+
+@WAYS
+def test_a_pendulum_of_many_links_moves_as_its_matrices_say(looped, python):
+    found = end_of(alone(LINKS), 8, START, [1.3, 0.2], looped, python)
     expected = solve_ivp(ByHand(LINKS, 1.3, 0.2).rates, (0, 0.5), START, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
-    assert np.abs(found[0] - expected).max() < 2e-13
+    assert np.abs(found - expected).max() < 2e-13
 
 
+@pytest.mark.parametrize(
+    "python", [pytest.param(False, marks=pytest.mark.long, id="compiled"), pytest.param(True, id="by Python")]
+)
 @pytest.mark.parametrize("equations", [clocks(), inertial()], ids=["masses of the state", "constant masses"])
-def test_links_with_inertia_take_series_too(equations):
+def test_links_with_inertia_take_series_too(equations, python):
     start = np.linspace(-0.4, 0.6, equations.dimension)
     numbers = list(np.linspace(0.3, 0.9, len(equations.parameters)))
-    found, _ = compiled(equations, 12).run(start, numbers, 0.5, 1e-13)
+    found = end_of(equations, 12, start, numbers, False, python)
     expected = solve_ivp(rates_of(equations, numbers), (0, 0.5), start, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
-    assert np.abs(found[0] - expected).max() < 2e-13
+    assert np.abs(found - expected).max() < 2e-13
 
 
 def tubes(*forces: sp.Expr) -> Oscillator:
@@ -75,16 +92,12 @@ APART: dict[str, Equations] = {
 }
 
 
-@pytest.mark.parametrize("way", ["text", "loops", pytest.param("lines", marks=pytest.mark.long)])
+@WAYS
 @pytest.mark.parametrize("equations", APART.values(), ids=APART)
-def test_nodes_move_as_their_masses_and_forces_say(equations, way):
-    """As loops, and as lines: Python runs their text."""
+def test_nodes_move_as_their_masses_and_forces_say(equations, looped, python):
     start = np.linspace(-0.4, 0.6, equations.dimension)
     numbers = list(np.linspace(0.3, 0.9, len(equations.parameters)))
-    if way == "text":
-        found = march(equations, 12, start, 0.5, 1e-13, numbers=numbers)[0]
-    else:
-        found = compiled(equations, 12, looped=way == "loops").run(start, numbers, 0.5, 1e-13)[0][0]
+    found = end_of(equations, 12, start, numbers, looped, python)
     expected = solve_ivp(rates_of(equations, numbers), (0, 0.5), start, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
     assert np.abs(found - expected).max() < 2e-13
 

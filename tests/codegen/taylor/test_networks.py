@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from march import compiled
-from plain import march
+from plain import Text, march
 from samples import TABLE, harmonic_chain, looped, parametric, tanh_pair, two_kinds, varied, waving
 from scipy.integrate import solve_ivp
 from test_step import friction_pair, pendula
@@ -44,20 +44,28 @@ def reference(eq: Equations) -> np.ndarray:
     return found.y[:, -1]
 
 
-LENGTHY = ("one-way", "functions", "pendula", "lorenz ring", "own parameters")
-"""Networks whose written-out steps take seconds to compile: Python runs them, by default."""
-
-
 def follows(eq: Equations, end: np.ndarray, steps: int) -> None:
     assert np.abs(end - reference(eq)).max() < 3e-12 * (1 + np.abs(end).max())
     assert steps < 60
+
+
+@pytest.mark.parametrize("looped", [False, True], ids=["written out", "looped"])
+@pytest.mark.parametrize("name", CASES)
+def test_text_of_networks_follows_their_equations(name, looped):
+    eq = CASES[name]
+    start, numbers = values(eq)
+    follows(eq, *march(eq, 14, start, END, 1e-12, numbers=numbers, looped=looped))
+
+
+SHORT = (("driven pendulum", False), ("lorenz ring", True))
+"""What compiles in a second; others take several."""
 
 
 @pytest.mark.parametrize(
     ("name", "looped"),
     [
         pytest.param(name, looped, id=f"{name}-{'looped' if looped else 'written out'}",
-                     marks=[pytest.mark.long] * (name in LENGTHY and not looped))
+                     marks=[pytest.mark.long] * ((name, looped) not in SHORT))
         for name in CASES for looped in (False, True)
     ],
 )  # fmt: skip
@@ -67,19 +75,13 @@ def test_networks_follow_their_equations(name, looped):
     follows(eq, end[0], steps)
 
 
-@pytest.mark.parametrize("name", LENGTHY)
-def test_text_of_networks_follows_their_equations(name):
-    eq = CASES[name]
-    start, numbers = values(eq)
-    follows(eq, *march(eq, 14, start, END, 1e-12, numbers=numbers))
-
-
-@pytest.mark.parametrize("name", [pytest.param("own parameters", marks=pytest.mark.long), "two kinds", "set-valued"])
+@pytest.mark.parametrize("name", ["own parameters", "two kinds", "set-valued"])
 def test_dense_output_of_loops_is_that_of_lines(name):
     eq = CASES[name]
-    rows = [
-        compiled(eq, 8, 2, True, looped).step(*values(eq), 0.125, scale=0.25, rtol=1.0)[2] for looped in (False, True)
-    ]
+    texts = [Text(eq, 8, looped, dense=True) for looped in (False, True)]
+    for text in texts:
+        text.step(np.hstack(values(eq)), 0.0, 0.125, 0.25, 1.0, 1e-11)
+    rows = [text.rows for text in texts]
     assert np.abs(rows[0] - rows[1]).max() < 1e-15 * 8
     assert np.abs(rows[0][0]).max() > 0.0
 
@@ -97,7 +99,7 @@ def test_the_length_of_a_looped_step_is_that_of_the_largest_node_at_every_width(
 
 
 def test_a_looped_step_without_numbers_has_no_length():
-    eq = CASES["pendula"]
+    eq = CASES["lorenz ring"]
     start, numbers = values(eq)
     assert np.isnan(compiled(eq, 14, looped=True).step([np.nan, *start[1:]], numbers)[0][0])
 

@@ -17,7 +17,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME as T
 
 X, V, A, B = sp.symbols("x v a b", real=True)
-ORDER = 24
+ORDER = 16
 DIGITS = 60
 
 FUNCTIONS: dict[str, Any] = {
@@ -63,7 +63,7 @@ def close(found: list, expected: list, digits: int = 40) -> bool:
     )
 
 
-POINTS = ["0.3", "-0.45", "0.7"]
+POINTS = ["-0.45", "0.7"]
 UNARY = {
     "exp": sp.exp, "log": lambda a: sp.log(2 + a), "sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "sinh": sp.sinh,
     "cosh": sp.cosh, "tanh": sp.tanh, "atan": sp.atan, "asin": sp.asin, "acos": sp.acos, "erf": sp.erf,

@@ -18,7 +18,7 @@ PERIOD = 2 * np.pi / 1.15
 def integrate(n: int, records: tuple[str, ...], start, spans, jumps: bool, **values: float) -> Outcome:
     eq = friction_scene(n)
     section = sp.Symbol("v_1", real=True)
-    compiled = kernel(eq, "rodas5p", records, section if "section" in records else None, 4)
+    compiled = kernel(eq, "rodas5p", records, section if "section" in records else None, 8)
     start, spans = np.array(start, float), np.array(spans, float)
     spans = np.pad(spans, ((0, 0), (0, 4 - spans.shape[1])))
     outcome = blank(len(start), 2 * n, 2000 if "section" in records else 0, 0)

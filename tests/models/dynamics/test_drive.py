@@ -199,7 +199,7 @@ def test_any_drive_runs_over_plain_times(files: Path) -> None:
     np.testing.assert_allclose(end, expected, atol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["own", "half"])
+@pytest.mark.parametrize("name", ["own", pytest.param("half", marks=pytest.mark.long)])  # exponents have the half
 def test_orbits_repeat_themselves_after_the_period_of_the_drive(files: Path, name: str) -> None:
     orbit = periodic_orbit(scene(files, name), F=0.05)
     image, matrix = monodromy(orbit.state, 0.05)
@@ -225,7 +225,7 @@ def _meets(one: object, other: object) -> bool:
     return bool(np.abs(one.state - other.state).max() < 1e-7)  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("name", ["own", "half"])
+@pytest.mark.parametrize("name", [pytest.param("own", marks=pytest.mark.long), "half"])  # orbits have their own
 def test_exponents_count_the_periods_of_the_drive(files: Path, name: str) -> None:
     """Means of 300 motions over 450 periods by the classical Runge-Kutta method, their errors below 0.0007; with the
     period of the natural frequency they are 0.145, 0.109 and 0.021."""

