@@ -7,7 +7,6 @@ other than those of the rows it serves; independent integrators in 50 digits con
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from ...stability.orbits import unit_of_time
 from .cases import Case, read_case
 from .own_program import prepare
 
-__all__ = ["EXACT", "SMOOTH", "computed_case"]
+__all__ = ["EXACT", "SMOOTH", "computed_case", "reading_times"]
 
 REFERENCE = (1e-14, 1e-15)
 
@@ -61,8 +60,12 @@ def computed_case(name: str) -> Case:
         raise ValueError(f"unknown case {name!r}; known: {'; '.join((*SMOOTH, *EXACT))}")
     family, n, arguments, length = SMOOTH[name]
     scene = Scene(topology=topology(family, n), record=(), **arguments)
-    times = unit_of_time(scene) * np.array([math.ceil(length / 2), length], dtype=float)
-    return solved(Case(name, scene, times, np.empty((0, 0))))
+    return solved(Case(name, scene, unit_of_time(scene) * reading_times(length), np.empty((0, 0))))
+
+
+def reading_times(length: int) -> np.ndarray:
+    """Return the middle and the end (2,) of a case, in units of time; peers take times that increase."""
+    return length * np.array([0.5, 1.0])
 
 
 def exact_law(case: Case) -> Case:

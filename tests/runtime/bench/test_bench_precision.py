@@ -100,6 +100,12 @@ def test_methods_are_left_out_where_they_are_not_to_the_point():
     assert (taylor.suits(pendulum), rodas5p.suits(pendulum)) == (True, False)
 
 
+def test_peers_read_at_times_that_increase():
+    lengths = [length for *_, length in computed.SMOOTH.values()]
+    assert min(lengths) == 1
+    assert all(0.0 < middle < end == length for length in lengths for middle, end in [computed.reading_times(length)])
+
+
 def test_timed_runs_are_long_enough_that_a_call_does_not_count():
     assert timed_periods(cost=1e-3, periods=20, quick=False) == round(SHORTEST / 1e-3)
     assert timed_periods(cost=1e-9, periods=20, quick=False) == MOST
