@@ -64,7 +64,7 @@ def computed_case(name: str) -> Case:
 
 
 def reading_times(length: int) -> np.ndarray:
-    """Return the middle and the end (2,) of a case in units of time; peers need times that increase."""
+    """Return the middle and the end (2,) of a case in units of time: peers need rising times."""
     return length * np.array([0.5, 1.0])
 
 
