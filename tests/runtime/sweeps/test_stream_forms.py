@@ -167,7 +167,7 @@ def test_memory_does_not_grow_with_the_file(ending: str, tmp_path: Path) -> None
     peaks = []
     for cells in (20, 1030, 1500):  # the first one imports; blocks have 128 cells from 1024 on
         axes = {"sigma": [5e-5 * k for k in range(cells)]}
-        scene = PAIR.replace(samples=250, window=0.5, transient=0, axes=axes)
+        scene = PAIR.replace(samples=250, window=0.5, transient=0, axes=axes, record=("trajectory",))
         path = tmp_path / f"a{cells}{ending}"
         tracemalloc.start()
         stream(scene, path, width=8, workers=1, show_progress=False)
