@@ -17,8 +17,9 @@ from synchain.models import chain, latex, text
 from synchain.models.dynamics.network import node
 from synchain.models.dynamics.variational import mode, network_variation
 from synchain.models.scenes.scene import Scene
-from synchain.runtime import kernel, run
+from synchain.runtime import run
 from synchain.runtime.cells.choice import _blocks
+from synchain.runtime.cells.kernels import kernel_source
 
 
 def hanging(links: int, **more: Any) -> Scene:
@@ -48,7 +49,7 @@ def by_hand(links: int, end: float, delta: float = 0.1) -> np.ndarray:
     return found.y[:, -1]
 
 
-@pytest.mark.parametrize(("links", "integrator"), [(6, "auto"), (4, "cash_karp"), (4, "taylor")])
+@pytest.mark.parametrize(("links", "integrator"), [(5, "auto"), (4, "cash_karp"), (4, "taylor")])
 def test_a_pendulum_of_many_links_moves_as_its_matrices_say(links, integrator):
     found = end_of(hanging(links, integrator=integrator))
     assert np.abs(found - by_hand(links, 2.0)).max() < 1e-12
@@ -59,9 +60,9 @@ def test_implicit_steps_of_a_mass_matrix_are_right_to_their_tolerance():
     assert np.abs(found - by_hand(4, 2.0)).max() < 1e-9
 
 
-def test_the_energy_of_a_pendulum_of_six_links_stays():
-    scene = hanging(6, parameters={"delta": 0.0}, window=20.0)
-    energy = ByHand(6, 1.0).energy
+def test_the_energy_of_a_pendulum_of_five_links_stays():
+    scene = hanging(5, parameters={"delta": 0.0}, window=20.0)
+    energy = ByHand(5, 1.0).energy
     assert abs(energy(end_of(scene)) - energy(np.array(scene.y0))) < 1e-11
 
 
@@ -103,7 +104,7 @@ def test_the_stiffness_of_a_node_is_that_of_its_rates():
     rates, steps = ByHand(4, 1.0, 0.4).rates, 1e-6 * np.eye(8)
     expected = np.array([(rates(0, y + e) - rates(0, y - e)) / 2e-6 for e in steps]).T
     assert np.abs(_blocks(equations, values)[0] - expected).max() < 1e-8
-    assert ", 0 links, dop853." in kernel(hanging(4)).source
+    assert ", 0 links, dop853." in kernel_source(hanging(4)).text
 
 
 def test_an_entry_of_a_matrix_coupling_is_a_rate_and_not_a_force():

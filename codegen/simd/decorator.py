@@ -8,6 +8,7 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import numba
+from llvmlite.binding.newpassmanagers import ModulePassManager
 from numba import types
 from numba.core import base, codegen, postproc, transforms
 from numba.core.codegen import JITCodeLibrary
@@ -101,7 +102,9 @@ def without_repetition() -> Iterator[None]:
     A kernel adds and multiplies lanes thousands of times: Numba finds out once, not for each line, what an operator means
     for operands of given types, and how large a type is.  A function is compiled for integers, not for 3, 4 and 5 apart.
     No function is a generator or leaves compiled code, which is all that needs the variables alive at the start of a
-    block.  LLVM does not optimise the functions that a module only names.  One look finds a locale that LLVM cannot read.
+    block.  LLVM does not optimise the functions that a module only names, and does not thread jumps before it has merged
+    the blocks of inlined functions, thousands in a kernel: its own passes do it later and come to the same machine code.
+    One look finds a locale that LLVM cannot read.
     """
     with ExitStack() as stack:
         for owner, name, instead in _instead():
@@ -157,4 +160,5 @@ def _instead() -> list[tuple[Any, str, Callable[..., Any]]]:
         (postproc.PostProcessor, "run", lifetimes),
         (codegen.CPUCodeLibrary, "_optimize_functions", optimize_functions),
         (codegen.CPUCodegen, "_check_llvm_bugs", look),
+        (ModulePassManager, "add_jump_threading_pass", lambda passes, threshold=-1: None),
     ]

@@ -24,7 +24,7 @@ from ..sweeps.axis import Axis
 from ..sweeps.draw import GRAPH, LIMIT, drawn_axes, drawn_graph, draws
 from ..sweeps.parameters import at_nodes, drive, parameters, varied
 from ..sweeps.start import SEED_LIMIT, chosen_start, default_start
-from ..sweeps.sweep import check_draws, check_sweep, read_axes
+from ..sweeps.sweep import check_cells, check_draws, check_sweep, read_axes
 from .observables import ENDINGS, observables, sections, stop
 from .section import Section
 
@@ -86,6 +86,7 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     values |= _model(given, drawn_graph(values["draws"], given["realisations"], values["rng"]))
     model: Model = values["model"]
     values["axes"] = axes = read_axes(given["axes"], given["zipped"])
+    check_cells(axes, given["zipped"], given["realisations"])
     drawn = drawn_axes(model, values["draws"], given["realisations"], values["rng"])
     values["parameters"] = numbers = parameters(model, given["parameters"], (*axes, *drawn))
     own = varied(numbers, model.parameters)

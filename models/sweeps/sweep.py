@@ -19,7 +19,7 @@ from ..networks.model import WEIGHTS, Model, in_range
 from .axis import LIMIT, Axis, known_length
 from .parameters import drive
 
-__all__ = ["Continuation", "check_draws", "check_sweep", "read_axes", "rest_in_sweep"]
+__all__ = ["Continuation", "check_cells", "check_draws", "check_sweep", "read_axes", "rest_in_sweep"]
 
 
 class Continuation(Word):
@@ -74,7 +74,7 @@ def check_sweep(model: Model, values: Mapping[str, Any]) -> Continuation:
 
 
 def check_draws(model: Model, values: Mapping[str, Any], drawn: Sequence[Axis]) -> None:
-    """Refuse draws that are unknown, out of range or swept as well, too many cells, and continued realisations."""
+    """Refuse draws that are unknown, out of range or swept as well, and continued realisations."""
     swept = {axis.name for axis in values["axes"]}
     for axis in drawn:
         if axis.name in swept:
@@ -86,8 +86,12 @@ def check_draws(model: Model, values: Mapping[str, Any], drawn: Sequence[Axis]) 
         raise ValueError(
             f"continuation: found {str(values['continuation'])!r} with realisations; expected none of either"
         )
-    lengths = [len(axis) for axis in values["axes"]]
-    _cells([*(lengths[:1] if values["zipped"] else lengths), values["realisations"] or 1], False)
+
+
+def check_cells(axes: Sequence[Axis], zipped: object, realisations: int) -> None:
+    """Refuse too many cells, before a number is drawn for each realisation."""
+    lengths = [len(axis) for axis in axes]
+    _cells([*(lengths[:1] if zipped is True else lengths), realisations or 1], False)
 
 
 def _cells(lengths: Sequence[int], zipped: object) -> int:

@@ -283,10 +283,10 @@ def tolerances(scene: Scene, numbers: np.ndarray) -> tuple[float, float]:
     1/kappa and atol at most 0.1/kappa (not below 1e-13), for the largest kappa of the sweep.
     """
     rtol, atol = scene.rtol, scene.atol
-    columns = [k for k, name in enumerate(scene.equations.parameters) if name in parameter_names(scene, "kappa")]
+    names = parameter_names(scene, "kappa")
+    columns = [k for k, name in enumerate(scene.equations.parameters) if name in names]
     if scene.contact == "atan" and columns:
-        fixed = (scene.parameters[name] for name in parameter_names(scene, "kappa"))
-        steepest = numbers[:, columns].max() if numbers.size else max(fixed)
+        steepest = numbers[:, columns].max() if numbers.size else max(scene.parameters[name] for name in names)
         width = 1.0 / max(float(steepest), 1e-300)
         rtol, atol = min(rtol, max(width, 1e-13)), min(atol, max(0.1 * width, 1e-13))
     return rtol, atol

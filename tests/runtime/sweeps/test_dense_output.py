@@ -9,6 +9,7 @@ from synchain.models import Field, Rates, Scene, chain
 from synchain.runtime import run
 
 STIFFNESS = np.array([1e2, 1e3, 1e4, 1e6, 1e9, 1e12])
+RECORDS = {"record": ("section", "trajectory"), "section": "x_1 falling", "samples": 200}
 FORCED = Field({"x": "-a*(x - cos(t))"}, parameters={"a": 1.0})
 
 
@@ -26,7 +27,7 @@ def scene(integrator: str, rtol: float, **more) -> Scene:
     ("integrator", "rtol"), [("rodas5p", 1e-5), ("rodas5p", 1e-8), ("rodas4", 1e-6), ("switching", 1e-8)]
 )
 def test_samples_keep_to_the_tolerance_however_stiff_the_scene_is(integrator, rtol):
-    data = run(scene(integrator, rtol, record=("trajectory",), samples=200), a=STIFFNESS).data
+    data = run(scene(integrator, rtol, **RECORDS), width=1, a=STIFFNESS).data
     errors = np.abs(data.trajectory.squeeze() - exact(data.a, data.time)).max("sample")
     assert (errors < rtol).all(), errors / rtol
 
@@ -37,13 +38,13 @@ def test_samples_of_a_large_network_keep_to_the_tolerance():
         "rodas5p", 1e-8, coupling=Rates({"x": "K*W*(x_j - x_i)"}, {"K": 1.0}), topology=chain(9), record=("trajectory",),
         samples=200,
     )  # fmt: skip
-    data = run(network, a=STIFFNESS, reduce=False).data
+    data = run(network, width=1, a=STIFFNESS, reduce=False).data
     assert data.sizes["node"] == 9
     assert np.abs(data.trajectory - exact(data.a, data.time)).max() < 1e-8
 
 
 def test_transits_keep_to_the_tolerance():
-    data = run(scene("rodas5p", 1e-8, record=("section",), section="x_1 falling"), a=STIFFNESS).data
+    data = run(scene("rodas5p", 1e-8, **RECORDS), width=1, a=STIFFNESS).data
     for a, times in zip(
         STIFFNESS, data.section_time.transpose("a", ...).values.reshape(len(STIFFNESS), -1), strict=True
     ):
@@ -56,4 +57,4 @@ def test_transits_keep_to_the_tolerance():
 def test_steps_that_record_nothing_between_them_stay_as_they_are():
     """At z = 1e9 they are far longer: nothing is asked between their ends, which are exact."""
     bare = run(scene("rodas5p", 1e-8), a=1e9).data
-    assert int(bare.steps) < int(run(scene("rodas5p", 1e-8, record=("trajectory",), samples=5), a=1e9).data.steps) / 2
+    assert int(bare.steps) < int(run(scene("rodas5p", 1e-8, **{**RECORDS, "samples": 5}), a=1e9).data.steps) / 2

@@ -29,7 +29,8 @@ def test_records_are_those_of_another_method():
 
 
 def test_a_cell_does_not_depend_on_its_neighbours():
-    scene = pair(record=(), integrator="taylor")
+    given = {"topology": chain(1), "parameters": {"kappa": 10.0}, "initial": {"x": 0.3, "v": 0.0}, "record": ()}
+    scene = pair(**given, integrator="taylor")
     speeds = np.linspace(0.005, 0.08, 11)
     together = run(scene, theta_b=speeds, show_progress=False).data.end.values
     alone = [run(scene, theta_b=[speed], show_progress=False).data.end.values[0] for speed in speeds[[0, 5, 10]]]

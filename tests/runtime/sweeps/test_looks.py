@@ -44,11 +44,11 @@ def test_a_stop_near_an_extremum_ends_its_cell_the_first_time(integrator: str) -
 def test_a_layer_that_is_saturated_now_is_not_stepped_over(steepness: int) -> None:
     """In double precision tanh is 1 and its slope 0 when |v| > 19/steepness: a mass with steep friction crosses v = 0."""
     node = sc.Lagrangian(
-        "v**2/2", "x**2/2", {"x": f"-3*tanh({steepness}*v)/10 - v/10 + cos(t)"}, coordinates=["x"]
+        "v**2/2", "x**2/2", {"x": "-3*tanh(s*v)/10 - v/10 + cos(t)"}, coordinates=["x"], parameters={"s": 1}
     )  # fmt: skip
     scene = sc.Scene(
         node, initial={"x": 0.5, "v": 0.0}, transient=0, window=20, time_unit="time", record=(), rtol=1e-9,
-        integrator="taylor",
+        integrator="taylor", parameters={"s": steepness},
     )  # fmt: skip
     found = sc.run(scene, show_progress=False).states()
 

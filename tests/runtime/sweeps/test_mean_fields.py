@@ -19,7 +19,7 @@ PHASE = sc.Field({THETA: OMEGA}, parameters={OMEGA: 0})
 HERE, THERE, W = sc.ends(PHASE)
 SINE = sc.Rates({HERE.theta: K * W * sp.sin(THERE.theta - HERE.theta - LAG)}, {K: 1, LAG: 0})
 ORDER = sc.end(abs(sc.nodes.mean(sp.exp(sp.I * THETA))))
-LARGE = 3000
+LARGE = 2001
 """Nodes whose links are more than can be listed."""
 
 
@@ -68,19 +68,17 @@ def test_a_scene_of_many_phases_lists_no_link(tmp_path, monkeypatch: pytest.Monk
         raise AssertionError("the links were run through")
 
     monkeypatch.setattr(AllPairs, "__iter__", refuse)
-    large = scene(
-        LARGE, window=0.1, integrator="taylor", record=("sync_error",), observe={"r": "end(nodes.mean(cos(theta)))"}
-    )
+    large = scene(LARGE, window=0.1, integrator="taylor", observe={"r": "end(nodes.mean(cos(theta)))"})
     result = sc.run(large)
     assert float(result.r) == pytest.approx(np.cos(result.states("end")).mean(), abs=1e-12)
     result.save(tmp_path / "large.nc")
     again = sc.open_result(tmp_path / "large.nc")
     assert again.scene == large
     np.testing.assert_array_equal(again.states("end"), result.states("end"))
-    assert "8997000 links" in repr(large.equations)
-    assert "8997000" in large._repr_html_()
+    assert f"{LARGE * (LARGE - 1)} links" in repr(large.equations)
+    assert str(LARGE * (LARGE - 1)) in large._repr_html_()
     assert large.spectrum.multiplicities == (1, LARGE - 1)
-    assert large.warnings == scene(100, record=("sync_error",)).warnings
+    assert large.replace(record=("sync_error",)).warnings == scene(100, record=("sync_error",)).warnings
 
 
 def test_a_link_that_does_not_separate_is_refused_where_it_cannot_be_listed() -> None:
@@ -102,7 +100,7 @@ def test_auto_takes_explicit_steps_where_the_jacobian_cannot_be_listed() -> None
     assert chosen_integrator(reduce_scene(small)).name == "rodas5p"
     assert chosen_integrator(reduce_scene(large)).name == "dop853"
     assert chosen_integrator(reduce_scene(large.replace(parameters={"K": 0.1}))).name == "taylor"
-    with pytest.raises(ValueError, match=r"rodas5p: found a mean field of 3000 nodes"):
+    with pytest.raises(ValueError, match=f"rodas5p: found a mean field of {LARGE} nodes"):
         kernel_source(large.replace(integrator="rodas5p"))
 
 

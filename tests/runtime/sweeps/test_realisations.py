@@ -52,7 +52,7 @@ def test_cells_are_those_of_the_drawn_numbers() -> None:
 def test_what_is_drawn_depends_on_the_seed_and_the_name_alone() -> None:
     """Neither workers, lanes and blocks nor other draws change it; another seed does."""
     axes = {"realisations": 40, "rng": 3, "show_progress": False}
-    found = run(SCENE, draws={"power": normal(0, 1), "x_2": uniform(0, 1)}, **axes)
+    found = run(SCENE, draws={"power": normal(0, 1), "x_2": uniform(0, 1)}, width=8, **axes)
     assert found.data.power_1.dims == ("realisation",)
     other = run(SCENE, draws={"x_2": uniform(0, 1), "power": normal(0, 1)}, width=1, workers=1, **axes)
     for name in ("end", "frequency", "sync_error", "power_1", "x_2"):
@@ -99,9 +99,9 @@ def test_files_keep_what_was_drawn(tmp_path: Path) -> None:
 def test_one_realisation_of_a_zipped_sweep() -> None:
     """Zipped axes are one dimension, realisations another."""
     scene = SCENE.replace(axes={"sigma": [0.1, 0.2], "x_1": [0.5, 0.6]}, zipped=True)
-    found = run(scene, show_progress=False, width=8, realisations=3, draws={"x_2": [0.1, 0.2, 0.3]})
+    found = run(scene, show_progress=False, width=1, realisations=3, draws={"x_2": [0.1, 0.2, 0.3]})
     assert found.middle.dims == ("cell", "realisation")
-    one = run(SCENE.replace(parameters={"sigma": 0.2}), show_progress=False, width=8, x_1=0.6, x_2=0.3)
+    one = run(SCENE.replace(parameters={"sigma": 0.2}), show_progress=False, width=1, x_1=0.6, x_2=0.3)
     assert float(found.middle[1, 2]) == float(one.middle)
 
 
@@ -148,8 +148,9 @@ def test_certified_runs_take_no_realisations() -> None:
 
 
 def test_graphs_without_any_link_are_realisations_too() -> None:
-    scene = Scene("harmonic", "spring", ring(3), transient=0, window=1)
-    found = run(scene, realisations=2, draws={"topology": "erdos_renyi(3, p=0)"}, show_progress=False)
-    alone = run(Scene("harmonic", topology=chain(1), transient=0, window=1), show_progress=False)
+    given = {"transient": 0, "window": 1, "record": (), "integrator": "dop853"}
+    scene = Scene("harmonic", "spring", ring(3), **given)
+    found = run(scene, realisations=2, draws={"topology": "erdos_renyi(3, p=0)"}, show_progress=False, width=1)
+    alone = run(Scene("harmonic", topology=chain(1), **given), show_progress=False)
     assert found.end.shape[0] == 2
     np.testing.assert_allclose(found.end.values[:, 0, 0], alone.end.values[0, 0], rtol=0, atol=1e-8)
