@@ -222,6 +222,12 @@ def test_steepest_jump_of_a_sweep_sets_the_tolerance():
     assert tolerances(scene, plan(scene).numbers)[0] == pytest.approx(1e-6)
 
 
+@pytest.mark.parametrize("kappas", [[10.0, 1e6], [1e6, 10.0]])
+def test_steepest_jump_of_unequal_nodes_sets_the_tolerance(kappas):
+    scene = PAIR.replace(rtol=1e-3, parameters={"kappa": kappas})
+    assert tolerances(scene, plan(scene).numbers)[0] == pytest.approx(1e-6)
+
+
 def test_loose_tolerance_is_not_silently_wrong():
     """With rtol = 1e-3 taken literally the oscillator slips through its stick phase and the error is of order 0.1."""
     loose, tight = (run(PAIR.replace(rtol=rtol, window=40)) for rtol in (1e-3, 1e-9))
