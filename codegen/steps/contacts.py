@@ -14,11 +14,11 @@ from synchain.models.mechanics.friction import Contact
 
 from ..program.expressions import ZERO, Compare, Expression, Load, Name, Number, Product, call, plus
 from ..program.lowering import lower
-from ..program.passes import Hoist, Names, share
+from ..program.passes import Body, Hoist, Names, share
 from ..program.statements import Assign, Function, If, Role, Statement, accumulate, let, store
 from .fields import assigned
 from .names import NAMES
-from .places import link_ends, places, span
+from .places import link_ends, named, places, span
 from .step import lane
 
 __all__ = ["event_functions", "push_functions", "register"]
@@ -59,12 +59,14 @@ def _looped(equations: Equations, names: Names) -> list[Statement]:
     node, nodes = equations.node, span("i", "NODES")
     if node.contact is None:
         return []
-    fixed = Hoist(frozenset(node.state), names.fresh("fixed"), frozenset({TIME}))
+    varied = (sp.Symbol(name, real=True) for name in equations.varied)
+    fixed = Hoist(frozenset((*node.state, *varied)), names.fresh("fixed"), frozenset({TIME}))
     body = share([fixed.apply(e) for e in _columns(node.contact)], names.fresh("z"))
     force, link = _force(equations, node.contact)
     used = body.symbols.union(*(e.free_symbols for e in (*fixed.table, *link)))
     before = [*_parameters(equations, used), *(let(s.name, lane(lower(e))) for e, s in fixed.table.items())]
     own: list[Statement] = [let(s.name, Load("y", _place(k, "i"))) for k, s in enumerate(node.state) if s in used]
+    own += places(equations).own(body)
     own += assigned(body)
     own += [store("out", _place(k, "i"), lane(lower(e))) for k, e in enumerate(body.results)]
     if not force:
@@ -77,17 +79,16 @@ def _force(equations: Equations, contact: Contact) -> tuple[list[Statement], tup
     """Statements that add the force of one link on a body that sticks, and the expressions they hold."""
     if not equations.edges:
         return [], ()
-    (edge,) = equations.edges
+    at = places(equations)
+    (joint,) = at.joints
+    edge, swap = joint.edge, named(joint)
     velocity, mode = edge.here[1], edge.here[2]
     force = edge.rhs[1].xreplace({mode: sp.S.One, velocity: contact.speed})
-    found = link_ends(edge)
-    found += [let(name, load) for name, load in places(equations).of_link(force.free_symbols)]
-    swap = {}
-    for place, suffix, states in (("i", "here", edge.here), ("j", "there", edge.there)):
-        for k, s in enumerate(states):
-            swap[s] = sp.Symbol(f"{s.name}_{suffix}", real=True)
-            if force.has(s):
-                found.append(let(swap[s].name, Load("y", _place(k, place))))
+    found = link_ends(edge) + at.own(Body((), (force,)))
+    found += [let(name, load) for name, load in at.of_source(edge, force.free_symbols)]
+    found += [let(name, load) for name, load in at.of_link(force.free_symbols)]
+    for place, states in (("i", edge.here), ("j", edge.there)):
+        found += [let(swap[s].name, Load("y", _place(k, place))) for k, s in enumerate(states) if force.has(s)]
     found.append(let("f_link", lower(force.xreplace(swap))))
     return [*found, *(accumulate("out", _place(k, "i"), "f_link") for k in FORCES)], (force,)
 

@@ -25,7 +25,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from .checks import check_text, short_repr, suggestion
+from .checks import check_path, check_text, short_repr, suggestion
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -137,7 +137,7 @@ def allow_code(*paths: str | Path) -> None:
         If one is no file that ends in .py.
     """
     for path in paths:
-        place = Path(path)
+        place = check_path("plug-in", path)
         if place.suffix != ".py" or not place.is_file():
             raise ValueError(f"plug-in {str(path)!r} is no file that ends in .py; check the path")
         _allowed.add(place.resolve())

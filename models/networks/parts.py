@@ -64,7 +64,12 @@ def as_contact(value: object, oscillators: Iterable[Oscillator]) -> ContactModel
     Raises ValueError if these differ.
     """
     if value is not None:
-        return ContactModel.parse("contact", value)
+        contact = ContactModel.parse("contact", value)
+        if contact is not ContactModel.ATAN and not any(oscillator.takes_friction for oscillator in oscillators):
+            raise ValueError(
+                f"contact: found {str(contact)!r} and no node with friction; expected a node with friction"
+            )
+        return contact
     found = dict.fromkeys(oscillator.contact for oscillator in oscillators if oscillator.takes_friction)
     if len(found) > 1:
         raise ValueError(f"contact: the nodes have {' and '.join(map(repr, found))}; expected one; give contact")

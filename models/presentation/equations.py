@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ..dynamics.equations import Equations
+from ..inputs.checks import check_instance
 from ..mechanics.components import SLIDING, TIME, WEIGHT_NUMBER, Edge, Node
 from ..mechanics.nondimensional import FRICTION
 from .writer import Latex, Style, Text, Writer
@@ -42,7 +43,7 @@ def latex(equations: Equations) -> str:
     str
         An align* environment; more than LARGEST nodes give one equation for node i.
     """
-    body = " \\\\\n".join(f"  & {line}" for line in lines(equations, Latex()))
+    body = " \\\\\n".join(f"  & {line}" for line in lines(_those("latex", equations), Latex()))
     return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"
 
 
@@ -59,7 +60,12 @@ def text(equations: Equations) -> str:
     str
         One equation a line; more than LARGEST nodes give one for node i.
     """
-    return "\n".join(lines(equations, Text()))
+    return "\n".join(lines(_those("text", equations), Text()))
+
+
+def _those(what: str, equations: object) -> Equations:
+    """The equations; TypeError for anything else."""
+    return check_instance(what, equations, Equations, "equations, such as scene.equations")
 
 
 def as_dict(equations: Equations) -> dict[str, object]:

@@ -53,6 +53,8 @@ def write(table: Mapping[str, object], path: str | os.PathLike[str]) -> None:
 def _lines(table: Mapping[str, object], path: tuple[str, ...]) -> Iterator[str]:
     """The lines of a table: its values, then the tables in it, each below its title."""
     tables = {key: value for key, value in table.items() if isinstance(value, Mapping)}
+    if path[-1:] == ("parameters",):
+        tables = {}  # in one line each: their order among numbers is that of the parameters
     if path and (len(tables) < len(table) or not table):
         yield f"\n[{'.'.join(map(_key, path))}]"
     for key, value in table.items():

@@ -18,6 +18,7 @@ from typing import TypeAlias
 from flint import acb, fmpq, fmpq_poly
 
 from ..algebra.balls import disjoint, precision
+from ..inputs.checks import typed_repr
 from .eigenvalue import Eigenvalue, ProofError
 from .jordan import value_at
 from .matrix import Matrix
@@ -99,13 +100,12 @@ class _Combination:
         return None
 
 
-@lru_cache(maxsize=32)
-def joint_spectrum(graphs: tuple[Matrix, ...]) -> tuple[JointEigenvalue, ...]:
+def joint_spectrum(graphs: Sequence[Matrix]) -> tuple[JointEigenvalue, ...]:
     """Return the distinct joint eigenvalues of the connectivity matrices of graphs, exactly.
 
     Parameters
     ----------
-    graphs : tuple of Matrix
+    graphs : sequence of Matrix
         Graphs on the same nodes, or other rational matrices of one size; of a single one this is its spectrum.
 
     Returns
@@ -115,6 +115,8 @@ def joint_spectrum(graphs: tuple[Matrix, ...]) -> tuple[JointEigenvalue, ...]:
 
     Raises
     ------
+    TypeError
+        If they are no sequence.
     ValueError
         If the graphs have different numbers of nodes, or several of them more than DENSE_LIMIT, and if two of their matrices
         do not commute.
@@ -127,6 +129,14 @@ def joint_spectrum(graphs: tuple[Matrix, ...]) -> tuple[JointEigenvalue, ...]:
     >>> [str(mode) for mode in joint_spectrum((ring(4), complete(4)))]
     ['(0, 0)', '(-2, -4)', '(-4, -4)']
     """
+    if not isinstance(graphs, Sequence):
+        raise TypeError(f"joint_spectrum: found {typed_repr(graphs)}; expected several graphs, (first, second)")
+    return _joint(tuple(graphs))
+
+
+@lru_cache(maxsize=32)
+def _joint(graphs: tuple[Matrix, ...]) -> tuple[JointEigenvalue, ...]:
+    """The same of graphs that are known to be a sequence."""
     _check(graphs)
     modes: Modes = tuple(((e,), e) for e in spectrum(graphs[0]))
     combined = graphs[0]

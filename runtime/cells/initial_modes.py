@@ -36,16 +36,31 @@ def with_modes(equations: Equations, start: np.ndarray, numbers: np.ndarray) -> 
     states = np.array(start, dtype=float)
     values = {sp.Symbol(p, real=True): c[:, None] for p, c in zip(equations.parameters, numbers.T, strict=True)}
     values[TIME] = np.zeros((len(states), 1))
-    node_values = values | {s: states[:, k * n : (k + 1) * n] for k, s in enumerate(equations.node.state)}
+    own = _own(equations, values)
+    node_values = values | own | {s: states[:, k * n : (k + 1) * n] for k, s in enumerate(equations.node.state)}
     sliding, up, down = (_at(e, node_values, (len(states), n)) for e in (contact.sliding, contact.up, contact.down))
-    push = _link_forces(equations, contact.speed, states, values)
+    push = _link_forces(equations, contact.speed, states, values, own)
     stuck = np.where(up + push < 0.0, 1.0, np.where(down + push > 0.0, -1.0, 0.0))
     states[:, 2 * n :] = np.where(sliding == 0.0, stuck, np.sign(sliding))
     return states
 
 
+def _own(equations: Equations, values: dict[sp.Symbol, np.ndarray]) -> dict[sp.Symbol, np.ndarray]:
+    """Values (cells, n) of the parameters that each node has for itself."""
+    return {
+        sp.Symbol(name, real=True): np.concatenate(
+            [values[sp.Symbol(f"{name}_{i + 1}", real=True)] for i in range(equations.n)], axis=1
+        )
+        for name in equations.varied
+    }
+
+
 def _link_forces(
-    equations: Equations, speed: sp.Expr, state: np.ndarray, given: dict[sp.Symbol, np.ndarray]
+    equations: Equations,
+    speed: sp.Expr,
+    state: np.ndarray,
+    given: dict[sp.Symbol, np.ndarray],
+    own: dict[sp.Symbol, np.ndarray],
 ) -> np.ndarray:
     """Forces (cells, n) of the links on each oscillator if it moves with the ground."""
     n = equations.n
@@ -55,6 +70,8 @@ def _link_forces(
     (edge,) = equations.edges
     target, source = (np.array([link[side] for link in equations.links]) for side in (0, 1))
     given = {**given, edge.weight: np.array([float(link[2]) for link in equations.links])}
+    given |= {s: column[:, target] for s, column in own.items()}
+    given |= {s: own[of][:, source] for s, of in edge.theirs}
     for name, layer in equations.numbered.items():
         columns = [given[sp.Symbol(layer.name(name, link), real=True)] for link in equations.links]
         given[sp.Symbol(name, real=True)] = np.concatenate(columns, axis=1)

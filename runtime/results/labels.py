@@ -159,8 +159,10 @@ def variables(
     yield END_TIME, (), buffers.sums[:, Sum.STOPPED_AT]
     yield DRIVE_PHASE, (), _drive_phase(scene, spans, buffers.sums[:, Sum.STOPPED_AT])
     if "sync_error" in scene.record:
-        for name in ("sync_error", "sync_error_max", "sync_error_end"):
-            yield name, (), buffers.sums[:, SUMS[name]]
+        unseen = (buffers.status != Status.FINISHED) & (buffers.sums[:, Sum.STOPPED_AT] <= spans[:, Span.START])
+        for name in ("sync_error", "sync_error_max"):
+            yield name, (), np.where(unseen, np.nan, buffers.sums[:, SUMS[name]])
+        yield "sync_error_end", (), buffers.sums[:, Sum.LAST]
     for name, rows, columns in Observed(scene).columns():
         values = buffers.sums[:, columns]
         yield name, ("node",) if rows else (), values if rows else values[:, 0]

@@ -50,6 +50,10 @@ __all__ = [
 ]
 
 
+ROUNDING = 1e-9
+"""Share of the largest exponent that is no sign of the first one."""
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Exponents(Labelled):
     """Largest transversal exponent at each strength.
@@ -156,7 +160,8 @@ class Exponents(Labelled):
         if not self.on_a_line:
             kind = "complex" if np.iscomplexobj(x) else f"those of {x.shape[1]} layers"
             raise ValueError(f"strengths are {kind}; ranges need real ones of a single layer")
-        if abs(y[0]) <= 2.0 * error[0] < np.inf:
+        rounding = ROUNDING * np.max(np.abs(y[np.isfinite(y)]), initial=0.0)
+        if abs(y[0]) <= max(2.0 * error[0], rounding) < np.inf:
             y = np.append(0.0, y[1:])  # zero to its error, such as that of a limit cycle at strength 0
         ends: list[Interval] = [(float(x[0]), 0.0)] if y[0] < 0 else []
         for i in map(int, np.flatnonzero((y[1:] < 0) != (y[:-1] < 0))):

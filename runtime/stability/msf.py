@@ -8,6 +8,7 @@ Sources: classes by the zeros of the function on alpha > 0, Huang, Chen, Lai & P
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -282,11 +283,15 @@ class Plane(Labelled):
         axes = zip(self.names, (self.across, self.up), strict=True)
         return (
             ("scene", repr(self.scene)),
-            ("grid", ", ".join(f"{len(values)} {name} {ends_of(values)}" for name, values in axes)),
+            ("grid", ", ".join(f"{len(values)} {self._called(name)} {ends_of(values)}" for name, values in axes)),
             ("negative", f"{float((self.exponent < 0).mean()):.1%} of the grid"),
             ("motion", ", ".join(dict.fromkeys(map(str, self.attractors.flat)))),
             ("average", f"{self.time:.6g} units of time for each start"),
         )
+
+    def _called(self, name: str) -> str:
+        """What an axis is."""
+        return f"{name} (imaginary part)" if name == STRENGTHS[1] and name in self.strengths else name
 
     @property
     def motion(self) -> np.ndarray:
@@ -434,6 +439,12 @@ def plane(
     whole.checked(with_partner(scene))
     rows, given = whole.parted()
     strengths = {name: values for name, values in zip(STRENGTHS, (alpha, beta), strict=True) if values is not None}
+    if beta is not None and "beta" not in whole.values and a_scene(scene).takes("beta"):
+        warnings.warn(
+            "plane: found beta, the imaginary part of strengths, and a parameter of that name; "
+            "write parameters={'beta': …} for the parameter",
+            stacklevel=2,
+        )
     if both := strengths.keys() & rows.keys():
         raise ValueError(
             f"plane: found an axis of strengths and one of a parameter, both named {min(both)!r}; expected two names; "

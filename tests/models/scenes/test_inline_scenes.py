@@ -114,6 +114,19 @@ def test_a_shipped_scene_is_saved_by_the_names_of_its_parts(name: str, tmp_path:
     assert 'oscillator = "' in (tmp_path / "a.toml").read_text("utf-8")
 
 
+def test_parameters_keep_their_order_in_a_file(tmp_path: Path) -> None:
+    """Their order is that of the equations, which the digest of results holds."""
+    node = Field({"x": "-c*x + m - z*x**3"}, parameters={"c": 1, "m": Parameter(0.5, minimum=0), "z": 2})
+    scene = Scene(node, "x->x", chain(2), transient=0, window=1, time_unit="time")
+    scene.save(tmp_path / "scene.toml")
+    assert list(load_scene(tmp_path / "scene.toml").oscillator.parameters) == ["c", "m", "z"]
+
+
+def test_a_contact_without_friction_is_refused() -> None:
+    with pytest.raises(ValueError, match="contact: found 'set-valued' and no node with friction"):
+        Scene("duffing", contact="set-valued")
+
+
 def test_a_scene_is_saved_under_a_name_of_toml(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"expected a name that ends in \.toml"):
         Scene().save(tmp_path / "a.json")

@@ -178,6 +178,8 @@ def test_an_exponent_that_is_zero_to_its_error_begins_no_interval(error: float, 
     alpha, exponent = np.linspace(0, 3, 4), np.array([-6e-9, 0.2, -0.1, -0.3])
     found = Exponents(alpha, exponent, np.full(4, error), 1.0, 1, exponent[None]).intervals
     assert [low for low, _ in found] == [*begins, pytest.approx(1 + 2 / 3)]
+    rounded = np.array([-2e-12, 0.2, -0.1, -0.3])
+    assert len(Exponents(alpha, rounded, np.full(4, 1e-13), 1.0, 1, rounded[None]).intervals) == 1
     stable = np.array([-6e-9, -0.2, -0.1, -0.3])
     assert Exponents(alpha, stable, np.full(4, error), 1.0, 1, stable[None]).intervals == ((0.0, 3.0),)
 

@@ -226,6 +226,13 @@ def test_a_parameter_may_be_named_as_a_strength(tmp_path: Path) -> None:
     assert fixed.plot().get_ylabel() == r"$\beta=-\sigma\,\mathrm{Im}\,\gamma$"
 
 
+def test_the_imaginary_part_is_not_the_parameter_of_that_name() -> None:
+    scene = Scene("duffing", "spring", topology=chain(2))
+    with pytest.warns(UserWarning, match="imaginary part of strengths, and a parameter of that name"):
+        found = plane(scene, [0.0, 1.0], beta=[0.0, 1.0], periods=4, transient=2, starts=1, rtol=1e-4)
+    assert "2 beta (imaginary part) from 0 to 1" in dict(found.summary)["grid"]
+
+
 def test_files_figures_and_threads(tmp_path: Path) -> None:
     told: list[float] = []
     scene = layered(ring(4), complete(4), PULL, omega=1.3)

@@ -48,6 +48,20 @@ def test_looped_events_are_those_of_the_kernel_that_is_written_out(coupling: str
     assert abs(looped.steps[0] - plain.steps[0]) <= 0.1 * plain.steps[0]
 
 
+def test_nodes_with_contacts_of_their_own_move_as_each_alone() -> None:
+    """Each begins to stick or slip by its own ground and its own static friction."""
+    own = {"epsilon": [0.3, 0.4], "theta_b": [0.2, 0.25], "mu_s": [0.3, 0.35]}
+    given: dict[str, Any] = {"contact": "set-valued", "transient": 0, "window": 2, "record": (), "rtol": 1e-10}
+    start = {"x": [0.3, 0.1], "v": [0.2, 0.25]}
+    both = run(Scene(topology=topology("chain", 2), parameters={"sigma": 0.0, **own}, initial=start, **given))
+    for k in range(2):
+        alone = {name: values[k] for name, values in own.items()}
+        begin = {name: values[k : k + 1] for name, values in start.items()}
+        one = run(Scene(topology=topology("chain", 1), coupling="none", parameters=alone, initial=begin, **given))
+        np.testing.assert_allclose(both.data.end.values[:, k], one.data.end.values[:, 0], atol=1e-8)
+    assert both.success
+
+
 def test_equal_starts_stay_equal_bit_for_bit_and_fire_at_once() -> None:
     """Coupled where synchrony is unstable, and free: three of nine that start equal stay so, whatever the others do."""
     end = ran(nine([0.3] * 9, [0.0] * 9, 100.0, sigma=0.01))

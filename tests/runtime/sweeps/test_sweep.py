@@ -69,6 +69,7 @@ def test_step_budget_ends_a_cell_with_its_sentence():
     result = run(PAIR.replace(max_steps=100))
     assert result.status == Status.STEP_BUDGET
     assert "max_steps" in result.message
+    assert np.isnan([result.data.sync_error, result.data.sync_error_max]).all(), "nothing was seen of the window"
     assert not result.success
     assert result.steps + result.rejected == 100
     assert np.isfinite(result.end).all()
