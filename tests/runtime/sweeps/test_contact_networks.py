@@ -11,6 +11,7 @@ from samples import kernel, run_cells
 
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
+from synchain.runtime.cells.initial_modes import with_modes
 from synchain.runtime.cli import main
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.run import run
@@ -60,6 +61,14 @@ def test_nodes_with_contacts_of_their_own_move_as_each_alone() -> None:
         one = run(Scene(topology=topology("chain", 1), coupling="none", parameters=alone, initial=begin, **given))
         np.testing.assert_allclose(both.data.end.values[:, k], one.data.end.values[:, 0], atol=1e-8)
     assert both.success
+
+
+def test_each_node_begins_on_its_own_ground() -> None:
+    scene = Scene(topology=topology("chain", 2), contact="set-valued", parameters={"theta_b": [0.2, 0.25]})
+    numbers = np.array([[scene.parameters[name] for name in scene.equations.parameters]])
+    for v, modes in (([0.2, 0.25], [0.0, 0.0]), ([0.25, 0.2], [-1.0, 1.0])):
+        state = with_modes(scene.equations, np.array([[0.0, 0.0, *v, 0.5, 0.5]]), numbers)
+        assert state[0, 4:].tolist() == modes
 
 
 def test_equal_starts_stay_equal_bit_for_bit_and_fire_at_once() -> None:
