@@ -16,7 +16,7 @@ from ..prediction.intervals import Interval, scale
 from ..results.result import Result
 from ..support.execution import Execution
 from ..sweeps.run import run
-from ..synchronisation import criterion as criteria
+from ..synchronisation.criterion import QUICK as FIRST_LOOK
 from ..synchronisation.criterion import Criterion
 from ..synchronisation.threshold import Sweep, probe, project, simulate
 
@@ -57,7 +57,7 @@ class Quality:
 
 
 FULL = Quality()
-QUICK = Quality(241, 121, criteria.QUICK, 2e-3, (5,))
+QUICK = Quality(241, 121, FIRST_LOOK, 2e-3, (5,))
 
 
 class FigureRuns:
