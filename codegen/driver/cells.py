@@ -22,11 +22,13 @@ from .names import CONTACTS
 from .names import HALTS
 from .names import OBSERVED
 from .names import SECTION
+from .names import SERIES
 from .names import SYNC_ERROR
 from .names import TRAJECTORY
 from .names import WIDTH
 from .recording import ACCEPTED
 from .recording import BASE
+from .recording import BOUND
 from .recording import BUDGET
 from .recording import CANCEL
 from .recording import CHANGE
@@ -35,15 +37,16 @@ from .recording import CLIMB
 from .recording import CLOCK
 from .recording import CYCLE
 from .recording import DIVERGED
+from .recording import DUE
 from .recording import END
 from .recording import FAR
 from .recording import FINISHED
 from .recording import FIRST_MARK
 from .recording import FIRST_STEP
+from .recording import FROM
 from .recording import HALTED
 from .recording import HIGH
 from .recording import INTERRUPTED
-from .recording import LAG
 from .recording import LAPSE
 from .recording import LAST
 from .recording import LEFT
@@ -68,8 +71,10 @@ from .recording import PERIODS
 from .recording import POWER
 from .recording import RECORD
 from .recording import REJECTED
+from .recording import RTOL
 from .recording import RUSH
 from .recording import SAMPLE_GAP
+from .recording import SAVED_AT
 from .recording import SKIPPED
 from .recording import SMOOTH_STEPS
 from .recording import START
@@ -85,12 +90,16 @@ from .recording import SYNC_SUM
 from .recording import TIME
 from .recording import TOWER
 from .recording import UNDERFLOW
+from .recording import UNTIL
 from .recording import spread
 
 # --- kernel text below ---
 # What must repeat for the future to repeat, saved behind state and parameters: the state and these of the clock.
 REPEATING = (STEP, MODE, SYNC)
 LONGEST_CYCLE = 32.0
+# Taylor steps go on beyond the ends of periods, but for one in PROBE, a multiple of many lengths of cycles.  Once a state
+# there is as near as NEAR, or so many rtol, to that at the last one, the steps stop at the ends of all periods.
+PROBE, NEAR, JITTER = 60.0, 1e-6, 100.0
 # True if every step of the window counts: nothing in it can be left out.
 WHOLE = SECTION or TRAJECTORY or OBSERVED
 
@@ -122,6 +131,10 @@ def fill(which, cell, start, numbers, spans, control, clock, y, samples, multipl
     for c in range(dims.parameters):
         put(y, dims.dimension + c, which, numbers[cell, c])
     put(clock, PERIOD, which, spans[cell, 2] if spans[cell, 2] > 0.0 else math.inf)
+    put(clock, FROM, which, spans[cell, 0])
+    put(clock, UNTIL, which, spans[cell, 1])
+    if SERIES and not spans[cell, 3] > 0.0:
+        put(clock, DUE, which, PROBE if dims.repeats else math.inf)
     put(clock, STEP, which, control[FIRST_STEP])
     put(clock, CHANGE, which, math.inf)
     put(clock, POWER, which, 1.0)
@@ -150,7 +163,7 @@ def watch(which, control, clock):
 @njit(error_model="numpy")
 def vacate(which, clock):
     """Let a lane run idly on what it holds: it never stops, and nobody asks for it."""
-    for group in (STOP, START, END, PERIOD, NEXT_SAMPLE):
+    for group in (STOP, START, END, PERIOD, BOUND, NEXT_SAMPLE):
         put(clock, group, which, math.inf)
     put(clock, ACCEPTED, which, -math.inf)
 
@@ -165,7 +178,9 @@ def begin(which, cell, spans, clock):
     put(clock, TIME, which, 0.0)
     put(clock, START, which, start)
     put(clock, END, which, end)
-    put(clock, STOP, which, min(start if start > 0.0 else end, period))
+    bound = period if periods + 1.0 >= clock[DUE * WIDTH + which] else math.inf
+    put(clock, BOUND, which, bound)
+    put(clock, STOP, which, min(start if start > 0.0 else end, bound))
 
 
 @njit(error_model="numpy")
@@ -173,10 +188,10 @@ def turn_over(which, cell, spans, control, clock, y, dims):
     """Begin the next period of the drive; jump where the computation is known to repeat itself."""
     put(clock, PERIODS, which, clock[PERIODS * WIDTH + which] + 1.0)
     restart(which, clock)
-    if dims.repeats and control[NO_JUMPS] == 0.0:
+    if dims.repeats:
         if clock[CYCLE * WIDTH + which] == 0.0:
-            compare(which, clock, y, dims)
-        if clock[CYCLE * WIDTH + which] > 0.0:
+            compare(which, clock, y, control, dims)
+        if clock[CYCLE * WIDTH + which] > 0.0 and control[NO_JUMPS] == 0.0:
             jump(which, cell, spans, clock)
     begin(which, cell, spans, clock)
     if SYNC_ERROR and not WHOLE and clock[SYNC * WIDTH + which] < spans[cell, 3]:
@@ -207,27 +222,34 @@ def restart(which, clock):
 
 
 @njit(error_model="numpy")
-def compare(which, clock, y, dims):
+def compare(which, clock, y, control, dims):
     """Look for a cycle of periods: compare with a saved period, and save the present one after 1, 2, 4 … 32, 32 … periods.
 
     Source: Brent, BIT Numerical Mathematics 20, 176 (1980), with a bound that finds short cycles soon.
     """
-    lag, saved = clock[LAG * WIDTH + which] + 1.0, dims.dimension + dims.parameters
-    same = True
+    periods, saved = clock[PERIODS * WIDTH + which], dims.dimension + dims.parameters
+    lag, gap, size = periods - clock[SAVED_AT * WIDTH + which], 0.0, 0.0
     for c in range(dims.dimension):
-        same = same and y[c * WIDTH + which] == y[(saved + c) * WIDTH + which]
+        gap += abs(y[c * WIDTH + which] - y[(saved + c) * WIDTH + which])
+        size += abs(y[c * WIDTH + which])
+    same = gap == 0.0
     for k, group in enumerate(REPEATING):
         same = same and clock[group * WIDTH + which] == y[(saved + dims.dimension + k) * WIDTH + which]
-    if same:
+    if clock[DUE * WIDTH + which] > 0.0:
+        near = gap <= max(NEAR, JITTER * control[RTOL]) * size
+        put(clock, DUE, which, 0.0 if near else periods + PROBE)
+    elif same:
         put(clock, CYCLE, which, lag)
-    elif lag == clock[POWER * WIDTH + which]:
+        return
+    elif lag < clock[POWER * WIDTH + which]:
+        return
+    else:
         put(clock, POWER, which, min(LONGEST_CYCLE, clock[POWER * WIDTH + which] * 2.0))
-        lag = 0.0
-        for c in range(dims.dimension):
-            put(y, saved + c, which, y[c * WIDTH + which])
-        for k, group in enumerate(REPEATING):
-            put(y, saved + dims.dimension + k, which, clock[group * WIDTH + which])
-    put(clock, LAG, which, lag)
+    put(clock, SAVED_AT, which, periods)
+    for c in range(dims.dimension):
+        put(y, saved + c, which, y[c * WIDTH + which])
+    for k, group in enumerate(REPEATING):
+        put(y, saved + dims.dimension + k, which, clock[group * WIDTH + which])
 
 
 @njit(error_model="numpy")

@@ -10,7 +10,10 @@ from numba import njit
 from ..simd.elementary import exp
 from ..simd.elementary import log
 from ..simd.lanes import absolute
+from ..simd.lanes import any_lane
 from ..simd.lanes import broadcast
+from ..simd.lanes import floor
+from ..simd.lanes import fma
 from ..simd.lanes import load
 from ..simd.lanes import maximum
 from ..simd.lanes import minimum
@@ -22,9 +25,13 @@ from .names import CONTACTS
 from .names import HALTS
 from .names import WIDTH
 from .recording import ACCEPTED
+from .recording import BASE
+from .recording import BOUND
 from .recording import CHANGE
+from .recording import DUE
 from .recording import END
 from .recording import FAR
+from .recording import FROM
 from .recording import HALTED
 from .recording import HIGH
 from .recording import LONGEST_RUSH
@@ -32,6 +39,7 @@ from .recording import MARK
 from .recording import MAX_STEP
 from .recording import MEMORY
 from .recording import PERIOD
+from .recording import PERIODS
 from .recording import REJECTED
 from .recording import RUSH
 from .recording import SMOOTH
@@ -39,6 +47,7 @@ from .recording import START
 from .recording import STEP
 from .recording import STOP
 from .recording import TIME
+from .recording import UNTIL
 
 
 # --- kernel text below ---
@@ -98,8 +107,8 @@ def arrive(clock, t, h):
 
 @njit(error_model="numpy", forceinline=True)
 def next_stop(clock, t):
-    """The next stop after this one: the start of the window, the end of the period or of the run."""
-    last, start = minimum(load(clock, END, WIDTH), load(clock, PERIOD, WIDTH)), load(clock, START, WIDTH)
+    """The next stop after this one: the start of the window, the end of the period if it is due, or of the run."""
+    last, start = minimum(load(clock, END, WIDTH), load(clock, BOUND, WIDTH)), load(clock, START, WIDTH)
     return select(t < start, minimum(start, last), last)
 
 
@@ -119,11 +128,31 @@ def advance(clock, y, t, t_new, accept, y_new, dims):
 
 
 @njit(error_model="numpy", forceinline=True)
+def wrap(clock):
+    """Let the clocks that have gone on beyond the end of a period count from there."""
+    t, period, end = load(clock, TIME, WIDTH), load(clock, PERIOD, WIDTH), load(clock, END, WIDTH)
+    turned = (t >= period) & (t < minimum(load(clock, BOUND, WIDTH), end))
+    if any_lane(turned):
+        whole = floor(t / period)
+        passed, now = load(clock, PERIODS, WIDTH) + whole, fma(-whole, period, t)
+        base, bound, before = passed * period, load(clock, BOUND, WIDTH), load(clock, START, WIDTH)
+        start = load(clock, FROM, WIDTH) - base
+        start = select(t >= before, minimum(start, now), start)  # a window that has begun stays so
+        store(clock, START, select(turned, start, before))
+        store(clock, END, select(turned, load(clock, UNTIL, WIDTH) - base, end))
+        store(clock, BOUND, select(turned & (passed + 1.0 >= load(clock, DUE, WIDTH)), period, bound))
+        store(clock, STOP, select(turned, next_stop(clock, now), load(clock, STOP, WIDTH)))
+        store(clock, BASE, select(turned, base, load(clock, BASE, WIDTH)))
+        store(clock, PERIODS, select(turned, passed, load(clock, PERIODS, WIDTH)))
+        store(clock, TIME, select(turned, now, t))
+
+
+@njit(error_model="numpy", forceinline=True)
 def pause(clock, largest):
     """Mask of lanes that need a look: at a stop, at a mark of their steps, with a vanishing step, or out of bounds."""
     t, h = load(clock, TIME, WIDTH), load(clock, STEP, WIDTH)
     marked = load(clock, ACCEPTED, WIDTH) + load(clock, REJECTED, WIDTH) >= load(clock, MARK, WIDTH)
-    stopped = (t >= load(clock, END, WIDTH)) | (t >= load(clock, PERIOD, WIDTH))
+    stopped = (t >= load(clock, END, WIDTH)) | (t >= load(clock, BOUND, WIDTH))
     found = stopped | marked | (h <= 4e-16 * maximum(t, 1.0)) | (largest >= FAR)
     found = found | (load(clock, RUSH, WIDTH) >= LONGEST_RUSH) if CONTACTS else found
     return found | (load(clock, HALTED, WIDTH) > 0.0) if HALTS else found

@@ -44,6 +44,7 @@ from .control import aim
 from .control import arrive
 from .control import judge
 from .control import pause
+from .control import wrap
 from .dense import inside
 from .names import CONTACTS
 from .names import LANES
@@ -65,12 +66,12 @@ from .propagators import transport
 from .recording import ACCEPTED
 from .recording import ATOL
 from .recording import BASE
+from .recording import BOUND
 from .recording import CLOCK
 from .recording import FINISHED
 from .recording import MAX_STEP
 from .recording import N_ACCEPTED
 from .recording import N_REJECTED
-from .recording import PERIOD
 from .recording import PERIODS
 from .recording import REJECTED
 from .recording import RTOL
@@ -314,9 +315,11 @@ def march(
                             if y[2 * dims.nodes + i] != slips[i]:
                                 saltate(i, slips[i], clock[TIME], y, out, carried, old, active, owners, dims, release)
                                 landed = landed or y[2 * dims.nodes + i] == 0.0
+                    if SERIES:
+                        wrap(clock)
                     if lane_bits(pause(clock, largest)) != 0:
                         status = outcome(0, clock, y, control, dims)
-                        if status == 0 and clock[TIME] >= clock[PERIOD]:
+                        if status == 0 and clock[TIME] >= clock[BOUND]:
                             turn_over(0, cell, spans, control, clock, y, dims)
                             status = outcome(0, clock, y, control, dims)
                 counts[cell, N_ACCEPTED] += int(clock[ACCEPTED])

@@ -17,9 +17,11 @@ from .one_section import keep, surface
 # Times count from BASE, the beginning of the current period of the drive, so that they keep their digits in long runs.
 TIME, STEP, STOP, START, END, MEMORY, CHANGE, ACCEPTED, REJECTED = 0, 1, 2, 3, 4, 5, 6, 7, 8
 SYNC, SYNC_SUM, SYNC_PEAK, NEXT_SAMPLE, SAMPLE_GAP, BASE, PERIOD, PERIODS = 9, 10, 11, 12, 13, 14, 15, 16
-MODE, SMOOTH_STEPS, POWER, LAG, CYCLE, LEFT, SUM_BEFORE, SKIPPED, RUSH = 17, 18, 19, 20, 21, 22, 23, 24, 25
+MODE, SMOOTH_STEPS, POWER, SAVED_AT, CYCLE, LEFT, SUM_BEFORE, SKIPPED, RUSH = 17, 18, 19, 20, 21, 22, 23, 24, 25
 HALTED, MARK, MARKED_AT, LAPSE, HIGH, RECORD, ORIGIN = 26, 27, 28, 29, 30, 31, 32
-CLOCK = 33
+# Start and end of the window counted from t = 0; the period at whose end a step must stop; that end, if it is this period.
+FROM, UNTIL, DUE, BOUND = 33, 34, 35, 36
+CLOCK = 37
 # How a cell ended.
 FINISHED, BUDGET, UNDERFLOW, DIVERGED, INTERRUPTED, CHATTERING, STOPPED = 1, 2, 3, 4, 5, 6, 7
 # Columns of `control`, of `sums` and of `counts`.

@@ -46,6 +46,7 @@ from .control import arrive
 from .control import judge
 from .control import pause
 from .control import turned
+from .control import wrap
 from .halting import halt
 from .names import CONTACTS
 from .names import KINKS
@@ -64,6 +65,7 @@ from .observing import tally
 from .recording import ALL
 from .recording import ATOL
 from .recording import BASE
+from .recording import BOUND
 from .recording import CANCEL
 from .recording import CHANGE
 from .recording import CLOCK
@@ -72,7 +74,6 @@ from .recording import FURTHER
 from .recording import MAX_STEP
 from .recording import MEMORY
 from .recording import MODE
-from .recording import PERIOD
 from .recording import RTOL
 from .recording import SMOOTH
 from .recording import SMOOTH_STEPS
@@ -109,7 +110,7 @@ def settle(
                     vacate(which, clock)
                     break
             status = outcome(which, clock, y, control, dims)
-            if status == 0 and clock[TIME * WIDTH + which] >= clock[PERIOD * WIDTH + which]:
+            if status == 0 and clock[TIME * WIDTH + which] >= clock[BOUND * WIDTH + which]:
                 turn_over(which, cell[which], spans, control, clock, y, dims)
                 status = outcome(which, clock, y, control, dims)
             if status != 0:
@@ -209,6 +210,8 @@ def conclude(mode, t, h, accept, rate, clock, y, y_new, out, control, dims, push
     largest = advance(clock, y, t, t_new, accept, y_new, dims)
     if CONTACTS:
         change_modes(accept, t_new, y, out, network, dims, pushes)
+    if SERIES:
+        wrap(clock)
     flips = 0
     if SWITCHING:
         flips = lane_bits(turned(clock, accept, rate, mode))
