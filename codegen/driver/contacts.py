@@ -13,16 +13,15 @@ from numba import njit
 
 from ..simd.lanes import absolute, any_lane, broadcast, load, maximum, minimum, select, store
 from .dense import inside
-from .names import LOOPED, SERIES, WIDTH
+from .names import LOOPED, WIDTH
 from .recording import ACCEPTED, REJECTED, RUSH, STEP, STOP
 
 # --- kernel text below ---
 # A gap this little below zero counts as zero; a passage is never sought closer than the shortest step to it.
 PASSED, SHORTEST = 1e-13, 1e-13
 # Steps in which an event is looked for, equally spaced; a dip is followed to its bottom where a parabola through three
-# looks comes down to this part of the third, or of the first: looks of a Taylor step lie so far apart, up to a sixth of
-# half a swing, that a parabola is off by a hundredth of what the gap has lost.
-LOOKS, SHALLOW, SHARE = 6 if SERIES else 4, 0.2, 0.05 if SERIES else 0.0
+# looks comes down to this part of the third.
+LOOKS, SHALLOW = 4, 0.2
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -99,8 +98,7 @@ def first_dip(k, open_lanes, t, h, y, y_new, dense, middle, out, network, dims, 
         before = load(out, (6 + (k - 1) % 3) * dims.nodes + i, WIDTH)
         gap = load(out, (6 + k % 3) * dims.nodes + i, WIDTH)
         bend, slope = earlier - 2.0 * before + gap, 0.5 * (gap - earlier)
-        shallow = maximum(SHALLOW * gap, SHARE * earlier)
-        dips = open_lanes & (absolute(slope) < 0.999 * bend) & (before - 0.5 * slope * slope / bend < shallow)
+        dips = open_lanes & (absolute(slope) < 0.999 * bend) & (before - 0.5 * slope * slope / bend < SHALLOW * gap)
         if any_lane(dips):
             turn = minimum(maximum(span * (k - 1.0 - slope / bend), 0.0), 1.0)
             place, least = bottom(i, turn, span, t, h, y, y_new, dense, middle, out, network, dims, pushes)
@@ -171,6 +169,13 @@ def narrowed(low, high, f_low, f_high, t, h, y, y_new, dense, middle, out, netwo
 
 
 @njit(error_model="numpy", forceinline=True)
+def note_rush(accept, t, h, clock):
+    """Count the steps in a row that take no time."""
+    short, rush = h <= 100.0 * SHORTEST * maximum(t, 1.0), load(clock, RUSH, WIDTH)
+    store(clock, RUSH, select(accept, select(short, rush + 1.0, 0.0), rush))
+
+
+@njit(error_model="numpy", forceinline=True)
 def take_back(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, pushes):
     """Take back the steps that pass an event before their end, and aim at it; returns the lanes that go on."""
     theta = first_passage(accept, t, h, y, y_new, dense, middle, out, network, dims, pushes)
@@ -183,36 +188,8 @@ def take_back(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, 
     store(clock, STOP, select(early & ~doubtful, t + wanted, load(clock, STOP, WIDTH)))
     store(clock, ACCEPTED, load(clock, ACCEPTED, WIDTH) - select(early, 1.0, 0.0 * h))
     store(clock, REJECTED, load(clock, REJECTED, WIDTH) + select(early, 1.0, 0.0 * h))
-    rush = load(clock, RUSH, WIDTH)
-    short = h <= 100.0 * least
-    store(clock, RUSH, select(accept & ~early, select(short, rush + 1.0, 0.0), rush))
+    note_rush(accept & ~early, t, h, clock)
     return accept & ~early
-
-
-@njit(error_model="numpy", forceinline=True)
-def stop_at_event(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, pushes):
-    """End the steps that pass an event there: the series says what the state is; returns the lengths of the steps.
-
-    The rows of the dense output are scaled to the shorter step.
-    """
-    theta = first_passage(accept, t, h, y, y_new, dense, middle, out, network, dims, pushes)
-    least = SHORTEST * maximum(t, 1.0)
-    wanted = maximum(theta * h, least)
-    early = accept & (theta < 1.5) & (wanted < h)
-    if any_lane(early):
-        part = select(early, wanted / h, 1.0)
-        for c in range(2 * dims.nodes):
-            store(y_new, c, select(early, inside(part, c, y, y_new, dense, dims), load(y_new, c, WIDTH)))
-        power = part
-        for j in range(dims.dense_rows):
-            for c in range(dims.dimension):
-                row = j * dims.dimension + c
-                store(dense, row, power * load(dense, row, WIDTH))
-            power = power * part
-    rush = load(clock, RUSH, WIDTH)
-    taken = select(early, wanted, h)
-    store(clock, RUSH, select(accept, select(taken <= 100.0 * least, rush + 1.0, 0.0), rush))
-    return taken
 
 
 @njit(error_model="numpy")

@@ -41,6 +41,7 @@ class ModeDimensions(NamedTuple):
     dimension: int
     parameters: int
     dense_rows: int
+    workspace: int
     error_order: int
     repeats: int
     strengths: int

@@ -36,7 +36,7 @@ from .cells import restart
 from .cells import turn_over
 from .cells import watch
 from .contacts import change_modes
-from .contacts import stop_at_event
+from .contacts import note_rush
 from .contacts import take_back
 from .control import accept_series
 from .control import advance
@@ -177,12 +177,14 @@ def attempt(
     """
     if SERIES:
         limit = minimum(load(clock, STOP, WIDTH) - t, steering[MAX_STEP])
-        own = step(t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, steering[RTOL], steering[ATOL], shared)
+        own, reach = step(
+            t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, steering[RTOL], steering[ATOL], shared
+        )
         h, good = own, own > 0.0
         if any_lane(good):
             if CONTACTS:
-                own = stop_at_event(good, t, own, clock, y, y_new, dense, middle, out, (), dims, pushes)
-                limit = minimum(limit, own)
+                note_rush(good, t, own, clock)
+                limit = select(own < reach, own, limit)
             store(shared, LENGTH, own)
             h = broadcast(carry(shared, strengths, old, new, registers, tolerance), WIDTH)
             if any_lane(h < own):
@@ -238,10 +240,11 @@ def march(
     registers, parts, kinds = growth.shape[1] // LANES, owners.size, dims.strengths
     size, steering, slips = dims.dimension, address(control, 0), np.zeros(dims.nodes)
     orbit = CLOCK + 2 * size + dims.parameters + len(REPEATING)
-    block = aligned(orbit + 2 * size + dims.dense_rows * size + 9 * dims.nodes + dims.shared)
+    rows = dims.dense_rows * size + dims.workspace
+    block = aligned(orbit + 2 * size + rows + 9 * dims.nodes + dims.shared)
     clock, y, y_new = address(block, 0), address(block, CLOCK), address(block, orbit)
     middle, dense = address(y_new, size), address(y_new, 2 * size)
-    out = address(dense, dims.dense_rows * size)
+    out = address(dense, rows)
     shared = address(out, 9 * dims.nodes)
     columns, stride, groups = places.shape[1], registers * LANES, gains.shape[2] // LANES
     room = registers * (2 * parts + 2 + max(1, kinds) + columns * parts) + groups + parts * (1 + TILE * columns)

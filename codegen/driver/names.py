@@ -14,9 +14,7 @@ LOOPED = False
 CONTACTS = False
 """True if oscillators stick and slip: their third state is the mode, which events change."""
 SERIES = False
-"""True if the step is a Taylor step: it chooses its length, and its dense output is its series."""
-KINKS = False
-"""True if the step ends at kinks: it tells how long it is, and how far its series reach."""
+"""True if the step is a Taylor step: it tells how long it is and how far its series reach, which are its dense output."""
 SYNC_ERROR = False
 SECTION = False
 TRAJECTORY = False

@@ -37,7 +37,7 @@ from .cells import vacant
 from .cells import vacate
 from .cells import waiting
 from .contacts import change_modes
-from .contacts import stop_at_event
+from .contacts import note_rush
 from .contacts import take_back
 from .control import accept_series
 from .control import advance
@@ -49,7 +49,6 @@ from .control import turned
 from .control import wrap
 from .halting import halt
 from .names import CONTACTS
-from .names import KINKS
 from .names import HALTS
 from .names import LOOPED
 from .names import OBSERVED
@@ -172,18 +171,14 @@ def attempt(mode, clock, y, dense, y_new, middle, out, control, dims, step, step
         limit = minimum(load(clock, STOP, WIDTH) - t, control[MAX_STEP])
         if LOOPED:
             graph, weights = network
-            found = step(
+            h, reach = step(
                 t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL], graph, weights
             )
         else:
-            found = step(t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL])
-        if KINKS:
-            h, reach = found
-        else:
-            h, reach = found, found
+            h, reach = step(t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL])
         accept = accept_series(clock, reach, limit)
         if CONTACTS:
-            h = stop_at_event(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, pushes)
+            note_rush(accept, t, h, clock)
         return t, h, accept, rate
     if SWITCHING:
         if mode == SMOOTH:

@@ -69,9 +69,10 @@ def signatures(driver: Driver) -> dict[str, Any]:
     if driver.kind is KernelKind.MODES:
         one, lane = Lane(1), Lane(driver.width)
         times = (one, one, one) if driver.series else (one, one)
+        orbit = types.UniTuple(one, 2) if driver.series else one
         stages = types.UniTuple(lane, 2)(*[ADDRESS] * 4, types.int64, types.int64)
         known = {
-            "step": one(*times, *[ADDRESS] * 4, types.float64, types.float64, ADDRESS),
+            "step": orbit(*times, *[ADDRESS] * 4, types.float64, types.float64, ADDRESS),
             "carry": types.float64(*[ADDRESS] * 4, types.int64, types.float64) if driver.series else stages,
             "pushes": types.void(one, *[ADDRESS] * 3),
             "release": types.void(types.int64, *[types.float64] * 2, *[ADDRESS] * 3, types.int64),
@@ -83,7 +84,7 @@ def signatures(driver: Driver) -> dict[str, Any]:
         lane, sizes = Lane(driver.width), _sizes(Dimensions)
         times = (lane, lane, lane) if driver.series else (lane, lane)
         step = (*times, *[ADDRESS] * 4, types.float64, types.float64, *more)
-        result = types.UniTuple(lane, 2) if driver.switching or driver.kinks else lane
+        result = types.UniTuple(lane, 2) if driver.switching or driver.series else lane
         values = types.void(lane, lane, lane, *[ADDRESS] * 4, sizes)
         known = {
             "step": result(*step),

@@ -27,8 +27,8 @@ class Driver:
     """What the text of a driver depends on; scenes that agree in it share its machine code.
 
     `width` is the number of cells in a register, or of modes in one; `series` is True for Taylor steps, which choose
-    their length, and `kinks` for those among them that end at kinks; `observes` is True if values of the scene are
-    observed, `sections` if it has sections on functions, `halts` if a function of the state, the last of these, ends a cell.
+    their length; `observes` is True if values of the scene are observed, `sections` if it has sections on functions,
+    `halts` if a function of the state, the last of these, ends a cell.
     """
 
     kind: KernelKind
@@ -38,13 +38,12 @@ class Driver:
     switching: bool = False
     contacts: bool = False
     series: bool = False
-    kinks: bool = False
     observes: bool = False
     sections: bool = False
     halts: bool = False
 
     def __str__(self) -> str:
-        names = ("looped", "switching", "contacts", "kinks", "observes", "sections", "halts")
+        names = ("looped", "switching", "contacts", "observes", "sections", "halts")
         traits = [name for name in names if getattr(self, name)]
         subject = "orbits and their modes" if self.kind is KernelKind.MODES else "sweeps"
         records = ", ".join(("final state", *self.records))
@@ -92,7 +91,6 @@ class Driver:
             "SWITCHING": self.switching,
             "LOOPED": self.looped,
             "SERIES": self.series,
-            "KINKS": self.kinks,
         }
 
     @property

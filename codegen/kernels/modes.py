@@ -90,7 +90,7 @@ def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int
     plain = tidy(equations)
     names = Names([*plain.state, *plain.parameters, *(s.name for s in plain.node.state)])
     variation = _renamed(variation, plain)
-    functions, shared, count = (_series if method.series else _stages)(variation, method, names)
+    functions, sizes, count = (_series if method.series else _stages)(variation, method, names)
     text = "\n\n\n".join([*functions, *map(LANES.function, event_functions(variation, names))]) + "\n"
     deviations = f"{variation.size} deviations, {width} modes a register"
     head = describe(equations, plain, method, (), count, deviations)
@@ -103,19 +103,19 @@ def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int
         equations,
         method,
         Driver(KernelKind.MODES, width, contacts=plain.sticks, series=method.series),
-        _dimensions(variation, method, shared),
+        _dimensions(variation, method, *sizes),
         owners,
     )
 
 
-def _series(variation: Variation, method: Integrator, names: Names) -> tuple[list[str], int, int]:
-    """The functions of Taylor steps, the length of the shared array, and the operations of the orbit's step."""
+def _series(variation: Variation, method: Integrator, names: Names) -> tuple[list[str], tuple[int, int], int]:
+    """The functions of Taylor steps, the lengths of the shared array and of the workspace, the operations of the orbit's step."""
     made = write_tangent(variation, method.order)
-    return [made.orbit.text, *made.modes], made.shared, made.orbit.operations
+    return [made.orbit.text, *made.modes], (made.shared, made.orbit.workspace), made.orbit.operations
 
 
-def _stages(variation: Variation, method: Integrator, names: Names) -> tuple[list[str], int, int]:
-    """The functions of steps in stages, the length of the shared array, and the operations of the orbit's step."""
+def _stages(variation: Variation, method: Integrator, names: Names) -> tuple[list[str], tuple[int, int], int]:
+    """The functions of steps in stages, the lengths of the shared array and of the workspace, the operations of the orbit's."""
     plain = variation.orbit
     blocks = analyse(plain.node, names, plain.varied)
     parts = Parts.of(variation, method.stages)
@@ -136,7 +136,7 @@ def _stages(variation: Variation, method: Integrator, names: Names) -> tuple[lis
         tuple(_mode_step(variation, parts, method)),
     )
     made = map(LANES.function, [*node_functions([writer], blocks), *functions.values()])
-    return [*made, SCALED, LANES.function(orbit), LANES.function(modes), CARRY], parts.size, operations(orbit.body)
+    return [*made, SCALED, LANES.function(orbit), LANES.function(modes), CARRY], (parts.size, 0), operations(orbit.body)
 
 
 def _renamed(variation: Variation, plain: Equations) -> Variation:
@@ -322,7 +322,7 @@ def _largest(values: Sequence[Expression]) -> Expression:
     return first
 
 
-def _dimensions(variation: Variation, method: Integrator, shared: int) -> ModeDimensions:
+def _dimensions(variation: Variation, method: Integrator, shared: int, workspace: int) -> ModeDimensions:
     plain = variation.orbit
     return ModeDimensions(
         nodes=plain.n,
@@ -330,6 +330,7 @@ def _dimensions(variation: Variation, method: Integrator, shared: int) -> ModeDi
         dimension=plain.dimension,
         parameters=len(plain.parameters),
         dense_rows=method.dense_rows,
+        workspace=workspace,
         error_order=method.error_order,
         repeats=0,
         strengths=len(variation.parameters),

@@ -171,9 +171,9 @@ def emit(
     weight = [edge.weight.name for edge in plain.edges]
     states = [s.name for node in plain.nodes for s in node.state]
     names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
-    functions, scratch, count, kinks = (_series if method.series else _stages)(plain, method, names, elimination)
+    functions, scratch, count = (_series if method.series else _stages)(plain, method, names, elimination)
     seen = bool(watched.observed), bool(watched.sections), watched.stop is not None
-    traits = looped, method.smooth is not None, plain.sticks, method.series, kinks, *seen
+    traits = looped, method.smooth is not None, plain.sticks, method.series, *seen
     chosen = Driver(KernelKind.SWEEP, width, ordered, *traits)
     events = [
         *push_functions(plain, names, looped),
@@ -186,7 +186,11 @@ def emit(
         functions.append(driver.text("slope"))
     text = "\n\n\n".join([*functions, *map(LANES.function, events)]) + "\n"
     head = describe(equations, plain, method, (*ordered, *watched.words(equations)), count)
-    constants = {"WIDTH": width, "DENSE": bool(ordered or watched) or plain.sticks, "SERIES": method.series}
+    constants = {
+        "WIDTH": width,
+        "DENSE": bool(ordered or watched) or (plain.sticks and not method.series),
+        "SERIES": method.series,
+    }
     if looped:
         constants |= {"NODES": plain.n, "DIMENSION": plain.dimension, "DENSE_ROWS": method.dense_rows}
     named = "\n".join(f"{name} = {value}" for name, value in (*constants.items(), *watched.tables(equations).items()))
@@ -247,18 +251,16 @@ def _of_links(equations: Equations) -> int:
 
 def _series(
     plain: Equations, method: Integrator, names: Names, elimination: Program | None
-) -> tuple[list[str], int, int, bool]:
-    """The function of a Taylor step, the groups of scratch memory that it needs, its operations, and whether it has kinks."""
+) -> tuple[list[str], int, int]:
+    """The function of a Taylor step, the groups of scratch memory that it needs, and its operations."""
     step = (write_step if elimination is None else write_looped)(plain, method.order)
-    return [step.text], step.workspace, step.operations, step.kinks
+    return [step.text], step.workspace, step.operations
 
 
 def _stages(
     plain: Equations, method: Integrator, names: Names, elimination: Program | None
-) -> tuple[list[str], int, int, bool]:
-    """The functions of a step in stages, the groups of scratch memory that they need, and the operations of the steps; it
-    steps over kinks.
-    """
+) -> tuple[list[str], int, int]:
+    """The functions of a step in stages, the groups of scratch memory that they need, and the operations of the steps."""
     blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
     steps = _steps(plain, blocks, method, elimination)
     looped = elimination is not None
@@ -268,7 +270,7 @@ def _stages(
     made = [*map(LANES.function, functions), SCALED, *([PAIR] if looped and len(method.e) > 1 else [])]
     made += [driver.text("sparse")] if looped and steps["step"].solves else []
     scratch = workspace(steps["step"], elimination) if elimination is not None else 0
-    return [*made, *map(LANES.function, stepping)], scratch, sum(operations(f.body) for f in stepping), False
+    return [*made, *map(LANES.function, stepping)], scratch, sum(operations(f.body) for f in stepping)
 
 
 def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimensions:

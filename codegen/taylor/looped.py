@@ -23,18 +23,22 @@ from ..steps.names import NAMES
 from ..steps.places import Joint, Kind, Span, places
 from .graph import Graph, Template
 from .masses import moved, solved
-from .series import Constant, Series, State, Time
+from .series import Constant, Series, State, Time, magnitude
 from .step import (
     FARTHEST,
     NEXT,
+    SOONEST,
     TaylorStep,
     broken,
     called,
+    closed,
     ended,
+    ending,
     falling,
     finished,
     lane,
     largest,
+    loose,
     returned,
     unseen,
 )
@@ -53,6 +57,9 @@ def convolution(dense, left, left_step, right, right_step, k, first, end):
 '''.strip()
 """Loops of its own in each sum would take most of the time of a compilation."""
 
+GAPS = ("i", "NODES + i")
+"""Where the two gaps of the contact of a node stand among those of one order."""
+
 Hoisted = tuple[list[sp.Expr], dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]]
 """Rates, the series of their names for what depends on time, and the constants behind their other names."""
 
@@ -63,7 +70,8 @@ class Section:
 
     head, index, count: the loop, its variable and the number of its turns in the whole numbering; `setting` loads what the
     turn needs at any order, `places` are the states that it reads, and where they stand, `lent` are series that other
-    sections need too.
+    sections need too, `gaps` those of contacts, or what links add to them, `mode` says whether these slip and
+    `jumps` whether they begin to with a jump.
     """
 
     graph: Graph
@@ -74,6 +82,9 @@ class Section:
     places: dict[Series, str] = field(default_factory=dict)
     rates: list[tuple[str, Series]] = field(default_factory=list)
     lent: set[Series] = field(default_factory=set)
+    gaps: list[Series] = field(default_factory=list)
+    mode: str = ""
+    jumps: bool = False
     adds: bool = False
     waves: dict[Series, Section] = field(default_factory=dict)
     kept: list[str] = field(default_factory=list)
@@ -190,8 +201,19 @@ class Section:
                 text = f"{show(value)} + 0.0*scale" if isinstance(rate, Constant) else show(value)
                 self.lines.append(f"store(dense, at_rates + {place}, {text})")
             elif value != ZERO:
-                self.lines += statement("rate", add(Name(f"load(dense, at_rates + {place}, WIDTH)"), value))
-                self.lines.append(f"store(dense, at_rates + {place}, rate)")
+                self.put(f"at_rates + {place}", value)
+        for place, gap in zip(GAPS, self.gaps, strict=False):
+            self.put(
+                f"at_gaps + {place if first else f'k*2*NODES + {place}'}", self.start(gap) if first else self.of(gap)
+            )
+            if first:
+                self.put(f"at_sizes + {place}", magnitude(self, gap))
+
+    def put(self, place: str, value: Expression) -> None:
+        """Store a value, or add it to what other sections have stored."""
+        if self.adds:
+            self.lines += statement("value", add(Name(f"load(dense, {place}, WIDTH)"), value))
+        self.lines.append(f"store(dense, {place}, {'value' if self.adds else lane(value)})")
 
     def ends(self, order: int) -> list[str]:
         """The statements that make the step NaN where a series of this section has passed a zero that it cannot pass."""
@@ -204,10 +226,15 @@ class Section:
     def passages(self, degree: int) -> list[str]:
         """The statements that end the step at the kinks of this section."""
         found = [
-            f"passed = passage({self.load(kink, str(degree))}, load(dense, {self.slot(kink.size, '0')}, WIDTH), dense, "
+            f"passed = passage({self.load(kink, str(degree))}, load(dense, {self.slot(kink.size, '0')}, WIDTH), PASSED, NEAREST*passed, dense, "
             f"{self.where(kink.base, '0')}, {self.stride(kink.base)}, {degree}, passed)"
             for kink in self.graph.kinks
         ]
+        if self.mode:
+            sizes = [f"load(dense, at_sizes + {place}, WIDTH)" for place in GAPS]
+            places = [f"at_gaps + {place}" for place in GAPS]
+            found.append(f"stuck = 1.0 - {self.mode}*{self.mode}")
+            found += closed("stuck", self.jumps, sizes, places, "2*NODES", "at_closing", degree)
         return self.turns([*self.setting, *found]) if found else []
 
     def lengths(self, order: int, orders: Sequence[int]) -> list[str]:
@@ -218,6 +245,11 @@ class Section:
             found += statement("largest", largest(sizes[k] for k in range(3)))
             found.append("weight = 1.0/(atol + rtol*largest)")
             found += [f"size_{k} = maximum(size_{k}, {show(sizes[k])}*weight)" for k in orders]
+        for place in GAPS if self.mode else ():
+            found.append(f"weight = 1.0/(atol + loose*load(dense, at_sizes + {place}, WIDTH))")
+            for k in orders:
+                size = f"absolute(load(dense, at_gaps + {k}*2*NODES + {place}, WIDTH))*weight"
+                found.append(f"size_{k} = maximum(size_{k}, {size})")
         for s in self.graph.watched:
             found += unseen([Name(self.load(s, str(k))) for k in range(order)])
         return self.turns([*self.setting, *found]) if found else []
@@ -249,6 +281,23 @@ class Totals(Section):
                 ]
 
 
+def with_gaps(node: Node) -> list[sp.Expr]:
+    """The rates of a node, and the two gaps of its contact if it has one."""
+    if node.contact is None:
+        return list(node.rhs)
+    return [*node.rhs, *node.contact.gaps(node.state[2])]
+
+
+def with_pushes(joint: Joint) -> list[sp.Expr]:
+    """What a link adds to the rates of a node, and to the gaps of its contact if it has one: forces on a body that sticks."""
+    edge = joint.edge
+    if joint.target.contact is None:
+        return list(edge.rhs)
+    mode = edge.here[2]
+    push = (1 - mode**2) * edge.rhs[1].xreplace({mode: sp.S.One})
+    return [*edge.rhs, push, -push]
+
+
 def head_of(span: Span) -> str:
     """The head of the loop over a part of a numbering."""
     return LANES.loop(span.index, span.start, span.stop) + ":"
@@ -274,8 +323,8 @@ class LoopWriter:
         self.time = Time(name="t")
         self.waves = Section(Graph(self.names), "", "", 1)
         kinds, joints = self.places.kinds, self.places.joints
-        nodes = [self.hoisted(kind.node.rhs, [*kind.node.state, *self.varied()]) for kind in kinds]
-        links = [self.of_links(joint.edge, joint.edge.rhs) for joint in joints]
+        nodes = [self.hoisted(with_gaps(kind.node), [*kind.node.state, *self.varied()]) for kind in kinds]
+        links = [self.of_links(joint.edge, with_pushes(joint)) for joint in joints]
         fields = [self.of_field(field) for field in self.fields]
         self.waves.graph.settle([s for _, s in self.waves.rates])
         if self.waves.rates:
@@ -284,7 +333,7 @@ class LoopWriter:
         self.sections += [self.link(joint, *found) for joint, found in zip(joints, links, strict=True)]
         for mean, parts in zip(self.fields, fields, strict=True):
             self.sections += self.field(mean, *parts)
-        self.kinks = any(section.graph.kinks for section in (self.waves, *self.sections))
+        self.kinks = eq.sticks or any(section.graph.kinks for section in (self.waves, *self.sections))
         self.orders = order + 1 if self.kinks else order
 
     # -- sections ---------------------------------------------------------------------------------------------
@@ -305,14 +354,16 @@ class LoopWriter:
         states = [s for s, moving in zip(kind.node.state, moves, strict=True) if moving]
         fixed = [s for s in kind.node.state if s not in states]
         section = Section(Graph(self.names), head_of(kind.span), "i", self.equations.n)
-        used = (*kind.node.rhs, *(e for row in kind.node.inertia for e in row))
+        used = (*with_gaps(kind.node), *(e for row in kind.node.inertia for e in row))
         section.setting += self.own(used, fixed, kind.node, "i", "")
         moving = {s: State(name=self.swap[s].name) for s in states}
         component = {s: c for c, s in enumerate(kind.node.state)}
         section.places = {state: self.place(component[s]) for s, state in moving.items()}
         seen = self.seen(section, self.waves, waves)
         found = self.read(section, rates, {**moving, **seen}, constants, kind.node.inertia)
-        section.rates = [(self.place(c), rate) for c, rate in enumerate(found)]
+        section.rates, section.gaps = self.parted(kind.node, found)
+        if kind.node.contact is not None:
+            section.mode, section.jumps = self.swap[kind.node.state[2]].name, kind.node.contact.jumps
         return section
 
     def of_links(self, edge: Edge, rates: Sequence[sp.Expr], more: Iterable[sp.Symbol] = ()) -> Hoisted:
@@ -341,12 +392,13 @@ class LoopWriter:
         section = Section(Graph(self.names), head_of(joint.span), "e", self.links, adds=True)
         weight = self.called[edge.weight.name]
         section.setting += ["i, j_there = target[e], source[e]", f"{weight} = weights[e]"]
-        used = {s for e in edge.rhs for s in e.free_symbols}
+        given = with_pushes(joint)
+        used = {s for e in given for s in e.free_symbols}
         moving, fixed = self.end(section, edge.here, joint.target, ("_here", "i"), used)
         others, more = self.end(section, edge.there, joint.source, ("_there", "j_there"), used)
         moving |= others
         swap: dict[sp.Symbol, sp.Expr] = {**constants, **fixed, **more}
-        section.setting += self.own(edge.rhs, [], joint.target, "i", "_here")
+        section.setting += self.own(given, [], joint.target, "i", "_here")
         for name, load in self.places.of_source(edge, used, "j_there"):
             section.setting.append(f"{name} = {LANES.text(load)}")
         for name, load in self.places.of_link(used):
@@ -354,8 +406,13 @@ class LoopWriter:
         swap |= {s: sp.Symbol(f"{own.name}_there", real=True) for s, own in edge.theirs}
         seen = self.seen(section, self.waves, waves)
         found = self.read(section, rates, {**moving, **seen}, swap)
-        section.rates = [(self.place(c), rate) for c, rate in enumerate(found)]
+        section.rates, section.gaps = self.parted(joint.target, found)
         return section
+
+    def parted(self, node: Node, found: Sequence[Series]) -> tuple[list[tuple[str, Series]], list[Series]]:
+        """The rates of a node, with their places, and its gaps."""
+        size = len(node.state)
+        return [(self.place(c), rate) for c, rate in enumerate(found[:size])], list(found[size:])
 
     def end(
         self,
@@ -535,6 +592,8 @@ class LoopWriter:
         sizes = {"states": (p + 1) * eq.dimension, "rates": eq.dimension}
         if self.waves.rates:
             sizes["t"] = p + 1
+        if eq.sticks:
+            sizes |= {"gaps": (p + 1) * 2 * eq.n, "sizes": 2 * eq.n, "closing": p + 1}
         for section in (self.waves, *self.sections):
             kept = {
                 s.name for s in section.remembered | ({s for _, s in section.rates} if not section.index else set())
@@ -583,6 +642,7 @@ class LoopWriter:
             *(f"size_{k} = maximum(size_{k}, absolute({at.format(k=k)})*weight)" for k in orders),
         )
         lines += ["unseen = 0.0*scale"] if watching else []
+        lines += [loose(any(section.jumps for section in sections))] if self.equations.sticks else []
         lines += [line for section in sections for line in section.lengths(p, orders)]
         reaches = [f"{-1.0 / k!r}*log(size_{k})" for k in orders]
         lines.append(f"reach = minimum({reaches[0]}, minimum({reaches[1]}, {reaches[2]}))")
@@ -590,7 +650,13 @@ class LoopWriter:
         lines += finished(p, NEXT if watching and not self.equations.sticks else FARTHEST)
         if self.kinks:
             found = [line for section in sections for line in section.passages(p)]
-            lines += ["# first passage of a kink", "passed = ratio", *found, *ended()]
+            lines += [
+                "# first passage",
+                "passed = ratio",
+                *([SOONEST] if self.equations.sticks else []),
+                *found,
+                *ended(),
+            ]
         lines += ["# new state", "total = 0.0*scale"]
         lines += self.states(
             f"new = {at.format(k=p)}",
@@ -619,4 +685,4 @@ def write_looped(equations: Equations, order: int) -> TaylorStep:
         raise ValueError(f"taylor: found {found} in a network that is stepped in loops; use dop853 or rodas5p")
     writer = LoopWriter(equations, order)
     lines, size = writer.write()
-    return TaylorStep.of(lines, order, size, ", graph, weights", writer.kinks, CONVOLUTION)
+    return TaylorStep.of(lines, order, size, ", graph, weights", [*ending(writer.kinks, equations.sticks), CONVOLUTION])

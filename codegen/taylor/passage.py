@@ -1,16 +1,16 @@
-"""Where a series leaves its side of zero: the functions that a step with kinks is written with.
+"""Where a series leaves its side of zero: the functions that a step with kinks or contacts is written with.
 
 Between kinks the solution is analytic. A step that would pass a kink ends just behind it, and the next one finds itself on
-the other side: nothing has to be remembered.
+the other side: nothing has to be remembered. A contact keeps its mode until its gap closes: the sliding velocity while it
+slips, and while it sticks the distances of its load from the limits of static friction.
 """
 
 from __future__ import annotations
 
-__all__ = ["PASSAGE"]
+__all__ = ["CLOSING", "PASSAGE"]
 
 PASSAGE = '''
-PASSED, ROUNDING = 1e-10, 1e-15
-NEAREST = 1e-8
+PASSED, ROUNDING, NEAREST = 1e-10, 1e-15, 1e-8
 
 
 @njit(error_model='numpy', forceinline=True)
@@ -20,36 +20,55 @@ def side_of(value, least):
 
 
 @njit(error_model='numpy')
-def passage(side, size, dense, first, stride, degree, ratio):
-    """How far, at most to `ratio`, until a series has just left its side of zero.
+def passage(side, size, part, nearest, dense, first, stride, degree, ratio):
+    """How far, from `nearest` at most to `ratio`, until a series has just left its side of zero; 0 is no side.
 
     Its coefficients stand from group `first` on, each `stride` behind the last. What bounds the bend of the series bounds it
     from below by a parabola, whose zero lies before its own, so that the first passage is found whatever comes later; the
-    zeros converge like those of Newton's method. A passage counts once it has gone a small part of the way that the series
+    zeros converge like those of Newton's method. A passage counts once it has gone a small `part` of the way that the series
     goes in the step, and more than rounding of `size`; the step ends there. What is neglected is of the order of that part
     squared.  Products are added by `fma`, so that every width has the same bits.
     """
     bend, spread = 0.0*ratio, 0.0*ratio
     for k in range(degree, 1, -1):
-        part = absolute(load(dense, first + k*stride, WIDTH))
-        bend, spread = fma(bend, ratio, k*(k - 1.0)*part), fma(spread, ratio, part)
+        term = absolute(load(dense, first + k*stride, WIDTH))
+        bend, spread = fma(bend, ratio, k*(k - 1.0)*term), fma(spread, ratio, term)
     spread = fma(spread, ratio, absolute(load(dense, first + stride, WIDTH)))*ratio
     unit = side/maximum(fma(0.0*ratio + 1e-4, size, spread), 1e-300)
     bend = absolute(unit)*bend
-    value, slope = fma(unit, load(dense, first, WIDTH), 0.75*PASSED), unit*load(dense, first + stride, WIDTH)
-    active, place = absolute(side) > 0.5, select(absolute(side) > 0.5, 0.0, ratio)
+    value, slope = fma(unit, load(dense, first, WIDTH), 0.75*part), unit*load(dense, first + stride, WIDTH)
+    active = (absolute(side) > 0.5) & (value <= 1.0)  # the way that a series goes in the step is less than 1
+    place, active = select(active, 0.0, ratio), active & (value > 0.25*part)
     for _ in range(60):
-        root = sqrt(fma(slope, slope, 2.0*bend*value))
-        reach = select(slope > 0.0, (slope + root)/bend, 2.0*value/(root - slope))
-        place = select(active, minimum(place + reach, ratio), place)
-        active = active & (place < ratio)
         if not any_lane(active):
             break
+        root, rises = sqrt(fma(slope, slope, 2.0*bend*value)), slope > 0.0
+        reach = select(rises, slope + root, 2.0*value)/select(rises, bend, root - slope)
+        place = select(active, minimum(place + reach, ratio), place)
+        active = active & (place < ratio)
         value, slope = 0.0*ratio, 0.0*ratio
         for k in range(degree, 0, -1):
-            part = load(dense, first + k*stride, WIDTH)
-            value, slope = fma(value, place, part), fma(slope, place, 1.0*k*part)
-        value, slope = fma(unit, fma(value, place, load(dense, first, WIDTH)), 0.75*PASSED), unit*slope
-        active = active & (value > 0.25*PASSED)
-    return minimum(maximum(place, NEAREST*ratio), ratio)
+            term = load(dense, first + k*stride, WIDTH)
+            value, slope = fma(value, place, term), fma(slope, place, 1.0*k*term)
+        value, slope = fma(unit, fma(value, place, load(dense, first, WIDTH)), 0.75*part), unit*slope
+        active = active & (value > 0.25*part)
+    return minimum(maximum(place, nearest), ratio)
+'''.strip()
+
+CLOSING = '''
+@njit(error_model='numpy')
+def closing(side, late, size, nearest, dense, first, stride, room, degree, ratio):
+    """`passage` of the gap of a contact, from above; a gap that begins at zero is divided by the time.
+
+    The rate of a velocity jumps where slip ends, so the passage is as exact as rounding lets it be, or to a part `late`.
+    """
+    start = load(dense, first, WIDTH)
+    begins, side = absolute(start) <= ROUNDING*size, select(start >= -ROUNDING*size, side, 0.0*side)
+    if not any_lane(side > 0.5):
+        return ratio
+    for k in range(degree):
+        term = load(dense, first + k*stride, WIDTH)
+        store(dense, room + k, select(begins, load(dense, first + (k + 1)*stride, WIDTH), term))
+    store(dense, room + degree, select(begins, 0.0, load(dense, first + degree*stride, WIDTH)))
+    return passage(side, 1e4*size, 1e-14 + late, nearest, dense, room, 1, degree, ratio)
 '''.strip()

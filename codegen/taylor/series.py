@@ -352,11 +352,7 @@ class Kink(Series):
         return self.base, self
 
     def begin(self, at: Start) -> Expression:
-        parts = [at.start(self.base)]
-        if isinstance(self.base, Linear):
-            parts = [times(factor, at.start(series)) for factor, series in self.base.terms]
-            parts += [] if self.base.constant == ZERO else [self.base.constant]
-        self.size = at.keep(f"size_{self.name}", add(*map(_absolute, parts)))
+        self.size = at.keep(f"size_{self.name}", magnitude(at, self.base))
         return Call("side_of", (at.start(self.base), Name(f"ROUNDING*{self.size}")))
 
     def coefficient(self, at: Order) -> Expression:
@@ -383,6 +379,15 @@ class Choice(Series):
 
     def coefficient(self, at: Order) -> Expression:
         return _chosen(at.of(self.kink), at.of(self.above), at.of(self.below))
+
+
+def magnitude(at: Start, series: Series) -> Expression:
+    """The sum of the sizes of the terms that a series begins with: rounding is a small part of it."""
+    parts = [at.start(series)]
+    if isinstance(series, Linear):
+        parts = [times(factor, at.start(inner)) for factor, inner in series.terms]
+        parts += [] if series.constant == ZERO else [series.constant]
+    return add(*map(_absolute, parts))
 
 
 def _absolute(e: Expression) -> Expression:

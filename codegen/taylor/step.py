@@ -19,25 +19,29 @@ from ..program.expressions import ONE, ZERO, Call, Expression, Name, Number
 from ..program.passes import Names
 from .graph import STARTS, Graph, Template
 from .masses import moved, solved
-from .passage import PASSAGE
-from .series import Constant, Series, State, Time
+from .passage import CLOSING, PASSAGE
+from .series import Constant, Series, State, Time, magnitude
 from .terms import add, show, statement, times
 
 __all__ = [
     "FARTHEST",
     "NEXT",
+    "SOONEST",
     "StepWriter",
     "TaylorStep",
     "Written",
     "broken",
     "called",
     "check_order",
+    "closed",
     "ended",
+    "ending",
     "extreme",
     "falling",
     "finished",
     "lane",
     "largest",
+    "loose",
     "polynomial",
     "returned",
     "unseen",
@@ -67,9 +71,9 @@ The first is for zeros of the low ones alone, the second for zeros of high order
 
 WORDS = frozenset(
     {"unseen", "high", "low", "largest", "scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "j_there",
-     "slope_scale", "convolution", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", *STARTS.values()}
+     "slope_scale", "convolution", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", "nearest", "loose", "closing", *STARTS.values()}
 )  # fmt: skip
-PREFIXES = ("positive_", "i_", "e_", "half_", "w_", "n_", "size_", "odd_")
+PREFIXES = ("positive_", "i_", "e_", "half_", "w_", "n_", "size_", "odd_", "stuck_")
 """Names of the step; a user's symbol of that name is called otherwise within the step."""
 
 COUNTED = re.compile(r"[rs]\d+$")
@@ -80,13 +84,12 @@ class TaylorStep:
     """The text of the function `step` and what a kernel must know of it.
 
     order: that of the series, and the number of rows of the dense output; workspace: the groups of memory that it needs
-    behind the dense output; kinks: True if it ends at kinks, and so returns how far its series reach too.
+    behind the dense output.
     """
 
     text: str
     order: int
     workspace: int = 0
-    kinks: bool = False
 
     @property
     def operations(self) -> int:
@@ -101,19 +104,44 @@ class TaylorStep:
         order: int,
         workspace: int = 0,
         more: str = "",
-        kinks: bool = False,
-        before: str = "",
+        before: Sequence[str] = (),
     ) -> TaylorStep:
-        """The step of some statements, behind a function that they call."""
-        returned = "its length and that of its series" if kinks else "the length of the step"
+        """The step of some statements, behind functions that they call."""
         head = [
-            *([PASSAGE, "", ""] if kinks else []),
-            *([before, "", ""] if before else []),
+            *(line for text in before for line in (text, "", "")),
             "@njit(error_model='numpy', cache=True)",
             f"def step(t, h, scale, y, p, y_new, dense, rtol, atol{more}):",
-            f'    """One step from (t, y): writes y_new and the dense output, returns {returned}."""',
+            '    """One step from (t, y): writes y_new and the dense output, returns its length and how far its series reach."""',
         ]
-        return cls("\n".join([*head, *(f"    {line}" for line in lines)]), order, workspace, kinks)
+        return cls("\n".join([*head, *(f"    {line}" for line in lines)]), order, workspace)
+
+
+@dataclass(slots=True)
+class Gap:
+    """How far a contact is from changing its mode: while it slips the sliding velocity, twice, while it sticks the distances
+    of its load from the limits of static friction.
+    """
+
+    mode: str
+    jumps: bool
+    series: tuple[Series, Series]
+    sizes: tuple[str, ...] = ()
+
+    def begin(self, at: Written) -> None:
+        """Compute the sizes of the terms that they begin with."""
+        names = [f"size_{self.mode}_{word}" for word in ("rise", "fall")]
+        self.sizes = tuple(at.keep(name, magnitude(at, s)) for name, s in zip(names, self.series, strict=True))
+
+    def closings(self, at: Written, order: int, first: int) -> list[str]:
+        """End the step where one of them closes."""
+        stuck, rows, size = f"stuck_{self.mode}", range(order + 1), order + 1
+        stored = [lane(at.at(series, k)) for series in self.series for k in rows]
+        places = [str(first), str(first + size)]
+        return [
+            f"{stuck} = 1.0 - {self.mode}*{self.mode}",
+            *(f"store(dense, {first + k}, {value})" for k, value in enumerate(stored)),
+            *closed(stuck, self.jumps, self.sizes, places, "1", str(first + 2 * size), order),
+        ]
 
 
 @dataclass(slots=True)
@@ -212,7 +240,8 @@ class StepWriter:
         self.graph = Graph(self.supply)
         self.noted: list[Series] = []
         self.rates = self.read()
-        self.graph.settle([*self.rates, *self.noted])
+        self.gaps = self.contacts()
+        self.graph.settle([*self.rates, *self.noted, *(s for gap in self.gaps for s in gap.series)])
         self.at = Written({}, {}, [])
 
     def read(self) -> list[Series]:
@@ -230,6 +259,19 @@ class StepWriter:
                 terms[slot].append((ONE, rate))
         right = {slot: self.graph.sum(terms[slot]) for slot in self.states}
         return list((solved(self.graph, self.masses(), right) if eq.inertial else right).values())
+
+    def contacts(self) -> list[Gap]:
+        """What closes when a contact sticks, lets go or turns."""
+        eq, found = self.equations, list[Gap]()
+        moving, swap = self.parted({TIME: self.time}, {s: s for s in (sp.Symbol(x, real=True) for x in eq.state)})
+        shared = self.supply.fresh("shared_")
+        for i in range(eq.n):
+            contact = eq.contact_at(i)
+            if contact is not None:
+                mode = eq.symbols(i)[2]
+                rise, fall = self.graph.read(Template.of(contact.gaps(mode), moving, shared), moving, swap)
+                found.append(Gap(self.called[mode.name], contact.jumps, (rise, fall)))
+        return found
 
     def masses(self) -> dict[tuple[int, int], Series]:
         """The entries of M."""
@@ -286,6 +328,12 @@ class StepWriter:
         self.closing()
         return self.lines
 
+    def step(self, more: str = "") -> TaylorStep:
+        """The step, which takes `more` arguments."""
+        lines = self.write()
+        room = 3 * (self.order + 1) if self.gaps else self.order + 1 if self.ends else 0
+        return TaylorStep.of(lines, self.order, room, more, ending(self.ends, bool(self.gaps)))
+
     def opening(self) -> None:
         """Load states and parameters, compute constants and first coefficients."""
         eq, at = self.equations, self.at
@@ -299,6 +347,8 @@ class StepWriter:
         self.put("# order 0")
         for s in self.graph.series:
             at.put(s, s.begin(at), s in self.graph.inline_start)
+        for gap in self.gaps:
+            gap.begin(at)
         self.flush()
 
     def coefficients(self, k: int) -> None:
@@ -310,7 +360,8 @@ class StepWriter:
         for state, slope in zip(self.states.values(), slopes, strict=True):
             at.put(state, times(Name(f"r{k}"), slope))
         at.values[self.time, k] = Name("scale") if k == 1 else ZERO
-        for s in self.graph.series if k < self.order else self.graph.behind(self.graph.kinks):
+        ends = [*self.graph.kinks, *(s for gap in self.gaps for s in gap.series)]
+        for s in self.graph.series if k < self.order else self.graph.behind(ends):
             at.put(s, s.coefficient(at), s in self.graph.inline)
         self.flush()
 
@@ -334,6 +385,7 @@ class StepWriter:
             for k, e in last.items():
                 sizes[k].append(times(Call("absolute", (e,)), Name(f"w_{series.name}")))
         reaches: list[Expression] = []
+        self.loads(sizes)
         for k, found in sizes.items():
             if found:
                 self.put(*statement(f"size_{k}", largest(found)))
@@ -348,19 +400,35 @@ class StepWriter:
             self.put(falling(p))
         self.put(*finished(p, NEXT if self.graph.watched and not self.equations.sticks else FARTHEST))
 
+    def loads(self, sizes: Mapping[int, list[Expression]]) -> None:
+        """Append how large the last coefficients of the gaps of contacts are."""
+        self.put(*([loose(any(gap.jumps for gap in self.gaps))] if self.gaps else []))
+        for series, size in (pair for gap in self.gaps for pair in zip(gap.series, gap.sizes, strict=True)):
+            self.put(f"w_{size} = 1.0/(atol + loose*{size})")
+            for k, found in sizes.items():
+                if (e := self.at.at(series, k)) != ZERO:
+                    found.append(times(Call("absolute", (e,)), Name(f"w_{size}")))
+
     def passages(self) -> None:
         """End the step where a series passes a kink."""
-        kinks = self.graph.kinks
-        if not kinks:
+        if not self.ends:
             return
         first = self.order * self.equations.dimension
-        self.put("# first passage of a kink", "passed = ratio")
-        for kink in kinks:
-            for k in range(self.order + 1):
-                self.put(f"store(dense, {first + k}, {lane(self.at.at(kink.base, k))})")
-            side = show(self.at.at(kink, self.order))
-            self.put(f"passed = passage({side}, {kink.size}, dense, {first}, 1, {self.order}, passed)")
+        self.put("# first passage", "passed = ratio")
+        self.put(*([SOONEST] if self.gaps else []))
+        p, at = self.order, self.at
+        for kink in self.graph.kinks:
+            self.put(*(f"store(dense, {first + k}, {lane(at.at(kink.base, k))})" for k in range(p + 1)))
+            side = show(at.at(kink, p))
+            self.put(f"passed = passage({side}, {kink.size}, PASSED, NEAREST*passed, dense, {first}, 1, {p}, passed)")
+        for gap in self.gaps:
+            self.put(*gap.closings(at, p, first))
         self.put(*ended())
+
+    @property
+    def ends(self) -> bool:
+        """True if steps end where a series passes zero."""
+        return bool(self.graph.kinks or self.gaps)
 
     def closing(self) -> None:
         """The new state, the dense output, and the length of the step."""
@@ -381,7 +449,7 @@ class StepWriter:
                 e = self.state_at(slot, k)
                 value = "0.0*raised" if e == ZERO else show(times(e, Name("raised")))
                 self.put(f"    store(dense, {(k - 1) * eq.dimension + slot}, {value})")
-        self.put(returned(bool(self.graph.kinks)))
+        self.put(returned(self.ends))
 
 
 def broken(end: str, start: str) -> str:
@@ -433,8 +501,7 @@ def write_step(equations: Equations, order: int) -> TaylorStep:
     """
     check_order(order)
     writer = StepWriter(equations, order)
-    lines, kinks = writer.write(), bool(writer.graph.kinks)
-    return TaylorStep.of(lines, order, order + 1 if kinks else 0, kinks=kinks)
+    return writer.step()
 
 
 def check_order(order: int) -> None:
@@ -481,10 +548,41 @@ def ended() -> list[str]:
     return ["until = select(passed < ratio, passed*scale, length)", "ratio = passed"]
 
 
-def returned(kinks: bool) -> str:
-    """What a step returns."""
-    length = "length + 0.0*total"
-    return f"return {'until, ' if kinks else ''}{length}  # NaN where any coefficient is infinite or NaN"
+LATE = 1e-10
+"""How late a body may be set free, as a part of the way that its load goes in a step, if slip begins without a jump."""
+
+SOONEST = "nearest = 1e-13*maximum(t, 1.0)/scale"
+"""How soon a step may end at a contact."""
+
+
+def loose(jumps: bool) -> str:
+    """The tolerance of loads.
+
+    One that is wrong by some part sets a body free too early or late, with less than the power 3/2 of it as velocity, unless
+    friction falls at once.
+    """
+    return "loose = rtol" if jumps else "loose = math.sqrt(rtol*math.sqrt(rtol))"
+
+
+def closed(
+    stuck: str, jumps: bool, sizes: Sequence[str], places: Sequence[str], stride: str, room: str, order: int
+) -> list[str]:
+    """The statements that end a step where one of the two gaps of a contact closes, whose coefficients stand in memory."""
+    late = "0.0*t" if jumps else f"{LATE!r}*{stuck}"
+    return [
+        f"passed = closing({side}, {late}, {size}, nearest, dense, {first}, {stride}, {room}, {order}, passed)"
+        for side, size, first in zip(("1.0 + 0.0*t", stuck), sizes, places, strict=True)
+    ]
+
+
+def ending(ends: bool, contacts: bool) -> list[str]:
+    """The functions that find the ends of steps."""
+    return [text for text, needed in ((PASSAGE, ends), (CLOSING, contacts)) if needed]
+
+
+def returned(ends: bool) -> str:
+    """What a step returns; one that ends where a series passes zero goes `until` there."""
+    return f"return {'until' if ends else 'length'}, length + 0.0*total  # NaN where any coefficient is infinite or NaN"
 
 
 def lane(value: Expression) -> str:

@@ -251,7 +251,7 @@ def write_tangent(variation: Variation, order: int) -> TangentStep:
     wanted = dict.fromkeys(c for _, e in variation.matrix for c, _ in _parted(variation, e))
     check_order(order)
     orbit = OrbitWriter(variation.orbit, order, list(wanted))
-    step = TaylorStep.of(orbit.write(), order, more=", shared")
+    step = orbit.step(", shared")
     return TangentStep(step, (COMMON, ModeWriter(variation, orbit).write(), CARRY), HEAD + len(orbit.places))
 
 

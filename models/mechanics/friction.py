@@ -119,6 +119,13 @@ class Contact:
         pushes = (e + force for e in (self.up, self.down, self.pushed, self.pulled, self.shown))
         return Contact(self.speed, self.sliding, *pushes)
 
+    def gaps(self, mode: sp.Symbol) -> tuple[sp.Expr, sp.Expr]:
+        """What is positive while the contact keeps its mode: in slip the sliding velocity along it, twice, in stick the
+        distances of the load from the limits of static friction.
+        """
+        sliding, stuck = mode * self.sliding, 1 - mode**2
+        return sliding + stuck * self.up, sliding - stuck * self.down
+
     @property
     def expressions(self) -> tuple[sp.Expr, ...]:
         """All of them, in the order of the fields."""

@@ -25,7 +25,7 @@ def plain(**options: Any) -> Callable[..., Any]:
     return simd.njit(**{**options, "cache": False})
 
 
-SPACE = {name: getattr(simd, name) for name in simd.__all__} | {"njit": plain}
+SPACE = {name: getattr(simd, name) for name in simd.__all__} | {"njit": plain, "math": math}
 
 
 def alone(state: Sequence[Any], rhs: Sequence[Any], parameters: Sequence[Any] = ()) -> Equations:
@@ -98,7 +98,7 @@ def compiled(equations: Equations, order: int, width: int = 1, dense: bool = Fal
         )
     step, load, store, select, broadcast = (space[n] for n in ("step", "load", "store", "select", "broadcast"))
     size, lane_bits, power_of_two = equations.dimension, simd.lane_bits, simd.power_of_two
-    groups, kinks = order * size + written.workspace, written.kinks
+    groups = order * size + written.workspace
 
     @numba_njit(error_model="numpy")
     def march(t, y, ends, rtol, atol, first):
@@ -106,11 +106,7 @@ def compiled(equations: Equations, order: int, width: int = 1, dense: bool = Fal
         steps = 0
         while True:
             now, end = load(t, 0, width), load(ends, 0, width)
-            found = step(now, end - now, load(scales, 0, width), y, y, y_new, work, rtol, atol)
-            if kinks:
-                h, reach = found
-            else:
-                h, reach = found, found
+            h, reach = step(now, end - now, load(scales, 0, width), y, y, y_new, work, rtol, atol)
             running = reach > 0.0
             if lane_bits(running) == 0:
                 return steps
@@ -124,11 +120,10 @@ def compiled(equations: Equations, order: int, width: int = 1, dense: bool = Fal
     @numba_njit(error_model="numpy")
     def once(t, h, scale, y, y_new, work, rtol, atol):
         length = np.zeros(width)
-        found = step(broadcast(t, width), broadcast(h, width), broadcast(scale, width), y, y, y_new, work, rtol, atol)
-        if kinks:
-            store(length, 0, select(found[1] > 0.0, found[0], found[1]))
-        else:
-            store(length, 0, found)
+        h, reach = step(
+            broadcast(t, width), broadcast(h, width), broadcast(scale, width), y, y, y_new, work, rtol, atol
+        )
+        store(length, 0, select(reach > 0.0, h, reach))
         return length
 
     return Lanes(march, once, equations, width, order, groups)

@@ -45,7 +45,7 @@ class Text:
     def __init__(self, equations: Equations, order: int, looped: bool = False, dense: bool = False) -> None:
         equations = tidy(equations)
         plan, written = program(equations), (write_looped if looped else write_step)(equations, order)
-        self.size, self.kinks = equations.dimension, written.kinks
+        self.size = equations.dimension
         space = {
             **WORDS, "DIMENSION": self.size, "NODES": equations.n, "DENSE_ROWS": order, "DENSE": dense,
         }  # fmt: skip
@@ -59,8 +59,8 @@ class Text:
     ) -> tuple[float, float]:
         """The length of a step from a state and parameters, and how far its series reach."""
         with np.errstate(all="ignore"):
-            found = self.function(t, limit, scale, y, y, self.state, self.work, rtol, atol, *self.graph)
-        return found if self.kinks else (found, found)
+            length, reach = self.function(t, limit, scale, y, y, self.state, self.work, rtol, atol, *self.graph)
+        return length, reach
 
 
 def march(

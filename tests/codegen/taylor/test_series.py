@@ -49,7 +49,7 @@ def series(
     exec(exact(step_of(equations, order).text), space)
     size = equations.dimension
     y, y_new, dense = [*start, *numbers], [None] * size, [None] * size * order
-    length = space["step"](
+    length, _ = space["step"](
         t, mpmath.inf, mpmath.mpf(scale), y, y, y_new, dense, mpmath.mpf("1e-10"), mpmath.mpf("1e-11")
     )
     rows = [dense[k * size : (k + 1) * size] for k in range(order)]

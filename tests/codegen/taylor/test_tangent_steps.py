@@ -46,7 +46,7 @@ def in_digits(variation: Variation, order: int, start: list[Any], numbers: list[
     size = len(start)
     y, shared, new = [*start, *numbers], [None] * made.shared, [None] * len(d)
     huge = mpmath.mpf("1e40")
-    shared[1] = space["step"](0, 1, mpmath.mpf(1), y, y, [None] * size, [None] * size * order, huge, huge, shared)
+    shared[1], _ = space["step"](0, 1, mpmath.mpf(1), y, y, [None] * size, [None] * size * order, huge, huge, shared)
     assert shared[1] == 1
     assert space["carry"](shared, [alpha], d, new, 1, huge) == 1
     return new
