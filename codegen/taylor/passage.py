@@ -66,9 +66,11 @@ def closing(side, late, size, nearest, dense, first, stride, room, degree, ratio
     begins, side = absolute(start) <= ROUNDING*size, select(start >= -ROUNDING*size, side, 0.0*side)
     if not any_lane(side > 0.5):
         return ratio
-    for k in range(degree):
-        term = load(dense, first + k*stride, WIDTH)
-        store(dense, room + k, select(begins, load(dense, first + (k + 1)*stride, WIDTH), term))
-    store(dense, room + degree, select(begins, 0.0, load(dense, first + degree*stride, WIDTH)))
-    return passage(side, 1e4*size, 1e-14 + late, nearest, dense, room, 1, degree, ratio)
+    if any_lane(begins):
+        for k in range(degree):
+            term = load(dense, first + k*stride, WIDTH)
+            store(dense, room + k, select(begins, load(dense, first + (k + 1)*stride, WIDTH), term))
+        store(dense, room + degree, select(begins, 0.0, load(dense, first + degree*stride, WIDTH)))
+        first, stride = room, 1
+    return passage(side, 1e4*size, 1e-14 + late, nearest, dense, first, stride, degree, ratio)
 '''.strip()
