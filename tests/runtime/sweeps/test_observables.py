@@ -222,7 +222,7 @@ def test_a_resumed_run_keeps_what_was_observed(rotors: Result) -> None:
     [
         *(pytest.param("atan", method, marks=pytest.mark.long) for method in ("rodas5p", "switching")),
         ("set-valued", "rodas5p"),
-        ("set-valued", "taylor"),
+        pytest.param("set-valued", "taylor", marks=pytest.mark.long),
     ],
 )
 def test_the_mean_speed_is_the_distance_over_the_time(contact: str, integrator: str) -> None:

@@ -501,7 +501,7 @@ def own(tmp_path) -> Path:
 
 def falling(path: Path) -> Scene:
     axes = {"rate": [0.01 * k for k in range(400)]}
-    return Scene(oscillator=str(path), axes=axes, transient=0, window=2, record=("trajectory",), samples=3)
+    return Scene(oscillator=str(path), axes=axes, transient=0, window=2, record=())
 
 
 def test_a_result_says_that_its_model_has_changed(own, tmp_path):
@@ -511,13 +511,13 @@ def test_a_result_says_that_its_model_has_changed(own, tmp_path):
     own.write_text("# another comment\n" + FALLING)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert open_result(path).data.trajectory.identical(result.data.trajectory)
+        assert open_result(path).data.end.identical(result.data.end)
         with pytest.raises(FileExistsError, match="holds the result of this scene already"):
             stream(falling(own), path, show_progress=False)
     own.write_text(FALLING.replace("-rate * x", "-rate * x**3"))
     with pytest.warns(UserWarning, match=r"a\.nc: the code of its model has changed since it was written"):
         opened = open_result(path)
-    assert opened.data.trajectory.identical(result.data.trajectory)
+    assert opened.data.end.identical(result.data.end)
     for options in ({}, {"resume": True}):
         with pytest.raises(ValueError, match=r"a\.nc comes of another model: the code of its scene has changed since"):
             stream(falling(own), path, show_progress=False, **options)

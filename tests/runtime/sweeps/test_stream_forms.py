@@ -223,15 +223,14 @@ def test_pieces_cover_an_array_once_and_in_order(shape: tuple[int, ...]) -> None
 
 @pytest.mark.parametrize("ending", EVERY)
 def test_the_command_writes_every_form_and_its_figure(ending: str, tmp_path: Path, capsys: Any) -> None:
-    words = ["run", "two_oscillators", "--out", str(tmp_path), "--format", ending[1:]]
+    PAIR.save(tmp_path / "pair.toml")
+    words = ["run", str(tmp_path / "pair.toml"), "--out", str(tmp_path), "--format", ending[1:]]
     words += ["--set", "sigma=0.1,0.2", "transient=1", "window=2"]
     assert main(words) == 0
     assert main(words) == 0
     assert "nothing was run (--overwrite runs it again)" in capsys.readouterr().out
-    assert sorted(part.name for part in tmp_path.iterdir()) == sorted(
-        [f"two_oscillators{ending}", "two_oscillators.png"]
-    )
-    assert open_result(tmp_path / f"two_oscillators{ending}").success
+    assert sorted(part.name for part in tmp_path.iterdir()) == sorted([f"pair{ending}", "pair.png", "pair.toml"])
+    assert open_result(tmp_path / f"pair{ending}").success
 
 
 def test_the_command_knows_the_forms() -> None:
