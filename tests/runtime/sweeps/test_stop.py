@@ -77,7 +77,12 @@ def test_cells_stop_each_for_itself_in_any_lanes() -> None:
 )
 def test_a_function_must_pass_zero_even_if_it_begins_there(stop: str, end_time: float) -> None:
     """x = cos t: as terminal events of SciPy do, one that touches zero or lies past it at the start ends nothing."""
-    observed = {"record": ("trajectory",), "samples": 2, "observe": {"speed": mean(v)}, "sections": TURN}  # a shared driver
+    observed = {
+        "record": ("trajectory",),
+        "samples": 2,
+        "observe": {"speed": mean(v)},
+        "sections": TURN,
+    }  # a shared driver
     scene = Scene(oscillator="harmonic", rtol=1e-10, initial=START, stop=stop, **observed, **TIMES)
     assert float(run(scene, show_progress=False).end_time) == pytest.approx(end_time, abs=1e-8)
 

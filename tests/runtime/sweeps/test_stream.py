@@ -12,6 +12,7 @@ import threading
 import time
 import warnings
 from concurrent.futures import Executor, Future
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from synchain.models.inputs.plugins import allow_code
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.cells.reduce import reduce_scene
+from synchain.runtime.commands.run import stopped_by_signals
 from synchain.runtime.figures.result_plot import draw_result
 from synchain.runtime.opening.open import open_result
 from synchain.runtime.results.block_log import HEAD, BlockLog
@@ -359,8 +361,27 @@ sigma = { from = 0.0, to = 0.3, count = 300 }
 """
 
 
+@pytest.mark.parametrize("sign", [signal.SIGTERM, signal.SIGHUP])
+def test_signals_stop_like_ctrl_c_unless_they_are_ignored(sign):
+    before = signal.getsignal(sign)
+    try:
+        for handler, error in ((signal.SIG_DFL, pytest.raises(KeyboardInterrupt)), (signal.SIG_IGN, nullcontext())):
+            signal.signal(sign, handler)
+            with error, stopped_by_signals():
+                signal.raise_signal(sign)
+            assert signal.getsignal(sign) is handler
+    finally:
+        signal.signal(sign, before)
+
+
 @pytest.mark.parametrize(
-    "sign", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL], ids=lambda sign: sign.name
+    "sign",
+    [
+        signal.SIGINT,
+        signal.SIGTERM,
+        *(pytest.param(sign, marks=pytest.mark.long) for sign in (signal.SIGHUP, signal.SIGKILL)),
+    ],
+    ids=lambda sign: sign.name,
 )
 def test_the_real_program_is_stopped_and_goes_on(sign, tmp_path):
     scene = tmp_path / "slow.toml"
