@@ -143,12 +143,12 @@ def test_axes_are_single_layers() -> None:
 def test_certified_runs_of_two_layers_have_the_same_exponents() -> None:
     scene = layered(ring(4), complete(4), omega=1.3).replace(transient=5, window=5)
     axes = {"k": [0.1, 0.5], "c": [0.05, 0.2]}
-    certified = run(scene, certified=True, show_progress=False, **axes)
+    certified = run(scene, certified=True, show_progress=False, width=1, **axes)
     found = plane(scene, starts=4, transient=300, **axes)
     np.testing.assert_allclose(certified.data.transversal_exponent.values, found.exponent, atol=1e-9)
     apart = scene.replace(links=[(SPRING, ring(4)), (DAMPER, star(4))])
     with pytest.raises(ValueError, match="do not commute"):
-        run(apart, certified=True, show_progress=False, **axes)
+        run(apart, certified=True, show_progress=False, width=1, **axes)
 
 
 def rossler(strengths: np.ndarray) -> Orbits:

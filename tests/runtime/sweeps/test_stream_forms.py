@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import os
 import signal
-import subprocess
 import sys
 import tracemalloc
 import warnings
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from streams import MAP, PAIR, UP, contents, kill_again_and_again, partial, warm
+from streams import MAP, PAIR, UP, contents, die_at_the_copy, forking, kill_again_and_again, partial, warm
 
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cli import main
@@ -127,16 +126,10 @@ def test_a_kill_while_the_result_is_written_loses_nothing(ending: str, tmp_path:
     path = tmp_path / f"a{ending}"
     stream(PAIR, path, width=8, show_progress=False)
     before = contents(path)
-    code = (
-        "import os, signal\n"
-        "from streams import MAP\n"
-        "from synchain.runtime.results import store\n"
-        "from synchain.runtime.sweeps.stream import stream\n"
-        "store._copy = lambda *rest: os.kill(os.getpid(), signal.SIGKILL)\n"
-        f"stream(MAP, {str(path)!r}, overwrite=True, workers=1, show_progress=False)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[2], timeout=120, check=False)
-    assert done.returncode == -signal.SIGKILL
+    process = forking().Process(target=die_at_the_copy, args=(MAP, path))
+    process.start()
+    process.join(120)
+    assert process.exitcode == -signal.SIGKILL
     assert contents(path) == before
     assert len(list(tmp_path.iterdir())) > 2  # what it was writing
     assert open_result(partial(path)).success
