@@ -193,7 +193,7 @@ def test_the_browser_has_no_complaint_and_asks_for_nothing(folder: Path) -> None
 
 
 @needs_browser
-@pytest.mark.parametrize("options", [(), (DARK,)], ids=["light", "dark"])
+@pytest.mark.parametrize("options", [pytest.param((), marks=pytest.mark.long), (DARK,)], ids=["light", "dark"])
 def test_formulas_axes_and_graph_are_seen(folder: Path, options: tuple[str, ...]) -> None:
     whole = seen(folder, "page", *options)
     ground = whole[5, 5]

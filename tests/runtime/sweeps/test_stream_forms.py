@@ -66,7 +66,11 @@ def ctrl_c(progress: Any) -> None:
 
 
 @pytest.mark.parametrize("ending", EVERY)
-@pytest.mark.parametrize("scene", [MAP, UP, PAIR, CHUNKS], ids=["map", "up", "one cell", "chunks"])
+@pytest.mark.parametrize(
+    "scene",
+    [pytest.param(MAP, marks=pytest.mark.long), UP, pytest.param(PAIR, marks=pytest.mark.long), CHUNKS],
+    ids=["map", "up", "one cell", "chunks"],
+)
 def test_a_file_that_is_filled_holds_what_one_that_is_saved_holds(scene: Scene, ending: str, tmp_path: Path) -> None:
     whole = run(scene, workers=1, show_progress=False)
     whole.save(tmp_path / f"saved{ending}")
@@ -82,7 +86,7 @@ def test_a_file_that_is_filled_holds_what_one_that_is_saved_holds(scene: Scene, 
 
 
 @pytest.mark.parametrize("ending", FURTHER)
-@pytest.mark.parametrize("scene", [MAP, UP], ids=["map", "up"])
+@pytest.mark.parametrize("scene", [MAP, pytest.param(UP, marks=pytest.mark.long)], ids=["map", "up"])
 def test_an_interrupted_run_says_what_is_finished_and_goes_on(scene: Scene, ending: str, tmp_path: Path) -> None:
     path, seen = tmp_path / f"a{ending}", []
     with pytest.raises(SweepInterrupted) as caught:
