@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import multiprocessing
+import multiprocessing.context
 import os
 import random
 import shutil
+import signal
 import time
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -16,6 +18,7 @@ from synchain.models.sweeps.axis import Axis
 from synchain.runtime.cells.kernels import kernel
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.opening.open import open_result
+from synchain.runtime.results import store
 from synchain.runtime.support.progress import Progress
 from synchain.runtime.sweeps.stream import stream
 
@@ -58,6 +61,22 @@ def last(said: Connection) -> int:
         return found
 
 
+def forking() -> multiprocessing.context.ForkServerContext:
+    """Processes that start with everything imported and compiled."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["streams_warm"])
+    here, known = str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")
+    if here not in known.split(os.pathsep):
+        os.environ["PYTHONPATH"] = os.pathsep.join([here, known])
+    return context
+
+
+def die_at_the_copy(scene: Scene, path: Path) -> None:
+    """A run that is killed when it begins to write the result."""
+    store._copy = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
+    stream(scene, path, overwrite=True, workers=1, show_progress=False)
+
+
 def kill_again_and_again(scene: Scene, folder: Path, times: int, seed: int, ending: str = ".nc") -> tuple[int, int]:
     """Kill sittings at random moments so many times; returns how often blocks were kept and how often the sweep got done.
 
@@ -66,9 +85,7 @@ def kill_again_and_again(scene: Scene, folder: Path, times: int, seed: int, endi
     warm()
     stream(scene, folder / f"whole{ending}", workers=2, show_progress=False)
     expected = contents(folder / f"whole{ending}")
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["streams_warm"])
-    os.environ["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
+    context = forking()
     dice, path = random.Random(seed), folder / f"cut{ending}"
     span, killed, kept, done = float("inf"), -2, 0, 0  # the first two are left alone, to see how long it takes
     while killed < times:

@@ -30,7 +30,7 @@ def between(low: float, high: float) -> st.SearchStrategy[float]:
     return st.floats(low, high, allow_nan=False, width=64)
 
 
-RING = topology("one_way_ring", 3)
+RING = topology("one_way_ring", 2)
 SHARED: dict[str, Any] = {"record": (), "transient": 0.0, "time_unit": "time", "max_steps": 1_000_000}
 STRUCTURES: dict[str, tuple[Scene, str, dict[str, st.SearchStrategy[float]], float]] = {
     "friction": (

@@ -49,7 +49,7 @@ def by_hand(links: int, end: float, delta: float = 0.1) -> np.ndarray:
     return found.y[:, -1]
 
 
-@pytest.mark.parametrize(("links", "integrator"), [(5, "auto"), (4, "cash_karp"), (4, "taylor")])
+@pytest.mark.parametrize(("links", "integrator"), [(4, "auto"), (4, "cash_karp"), (4, "taylor")])
 def test_a_pendulum_of_many_links_moves_as_its_matrices_say(links, integrator):
     found = end_of(hanging(links, integrator=integrator))
     assert np.abs(found - by_hand(links, 2.0)).max() < 1e-12
@@ -60,9 +60,9 @@ def test_implicit_steps_of_a_mass_matrix_are_right_to_their_tolerance():
     assert np.abs(found - by_hand(4, 2.0)).max() < 1e-9
 
 
-def test_the_energy_of_a_pendulum_of_five_links_stays():
-    scene = hanging(5, parameters={"delta": 0.0}, window=20.0)
-    energy = ByHand(5, 1.0).energy
+def test_the_energy_of_a_pendulum_of_four_links_stays():
+    scene = hanging(4, parameters={"delta": 0.0}, window=20.0)
+    energy = ByHand(4, 1.0).energy
     assert abs(energy(end_of(scene)) - energy(np.array(scene.y0))) < 1e-11
 
 

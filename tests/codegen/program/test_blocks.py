@@ -223,7 +223,9 @@ STATES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("states", STATES)
+@pytest.mark.parametrize(
+    "states", [*STATES[::2], *(pytest.param(states, marks=pytest.mark.long) for states in STATES[1::2])]
+)
 def test_states_may_have_any_name(states, same_numbers):
     same_numbers(network(states=states))
 

@@ -33,7 +33,7 @@ from synchain.codegen.simd.lanes import (
     store,
 )
 
-WIDTHS = (1, 2, 4, 8)
+WIDTHS = (1, *(pytest.param(width, marks=pytest.mark.long) for width in (2, 4)), 8)
 INF, NAN = np.inf, np.nan
 SPECIAL = [0.0, -0.0, 1.0, -1.0, INF, -INF, NAN, 5e-324, -5e-324, 2.3e-308, 1.7e308, -1.7e308, 0.5, -0.5, 1.5, 2.5]
 PAIRS = np.array(list(itertools.product(SPECIAL, SPECIAL)))  # 256 pairs

@@ -7,6 +7,7 @@ import functools
 import itertools
 import random
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -228,7 +229,7 @@ def refused(eq: Equations, m: integrators.Integrator, looped: bool) -> str:
 METHODS = [name for name in integrators.names() if name != "taylor"]
 
 
-def steps_of_cases() -> Iterator[tuple[str, str, bool]]:
+def steps_of_cases() -> Iterator[Any]:
     """Every method on three networks; on the others those that differ in more than numbers: `switching` has two steps."""
     for case, looped in itertools.product(NETWORKS, (False, True)):
         if case in ("friction 1", "looped", "inertial"):
@@ -239,7 +240,11 @@ def steps_of_cases() -> Iterator[tuple[str, str, bool]]:
             methods = ["dop853", "rodas5p", "ros34pw2", "switching"]
         else:
             methods = ["ros34pw2", "switching"]
-        yield from ((case, method, looped) for method in methods)
+        for method in methods:
+            dear = (
+                not looped and method == "dop853" and case in ("pendula", "telescopes")
+            )  # its stages: the implicit ones
+            yield pytest.param(case, method, looped, marks=[pytest.mark.long] if dear else [])
 
 
 @pytest.mark.parametrize(("case", "method", "looped"), list(steps_of_cases()))

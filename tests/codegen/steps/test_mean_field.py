@@ -63,7 +63,7 @@ def stepped(equations: Equations, method: str, far: float = 0.0) -> np.ndarray:
 
 @pytest.mark.parametrize("method", ["dop853", "taylor"])
 @pytest.mark.parametrize("name", RATES)
-@pytest.mark.parametrize("n", [3, 4, 20])
+@pytest.mark.parametrize("n", [3, pytest.param(4, marks=pytest.mark.long), 20])
 def test_sums_do_what_listed_links_do(name: str, method: str, n: int) -> None:
     field, listed = (stepped(network(name, n, how), method) for how in (False, True))
     assert abs(field - listed).max() < 4e-15 * max(1.0, abs(listed).max())

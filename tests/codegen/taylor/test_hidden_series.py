@@ -66,8 +66,13 @@ def test_a_pulse_beside_a_large_motion_counts():
     assert found == pytest.approx(slow + 10 * math.pi * special.i0e(200.0), abs=3e-7)
 
 
-@pytest.mark.parametrize("power", [4, 5, 6, 7, 8, 9, 10, 11, 12, 15])
-@pytest.mark.parametrize("rtol", [1e-2, 1e-4, 1e-6, 1e-8, 1e-11, 1e-13])
+def some(chosen: tuple, others: tuple) -> list:
+    """Parameters of which the others are tried with --long."""
+    return [*chosen, *(pytest.param(other, marks=pytest.mark.long) for other in others)]
+
+
+@pytest.mark.parametrize("power", some((4, 5, 8, 11, 15), (6, 7, 9, 10, 12)))
+@pytest.mark.parametrize("rtol", some((1e-2, 1e-8, 1e-13), (1e-4, 1e-6, 1e-11)))
 def test_a_spring_without_a_linear_term_keeps_its_energy(power, rtol):
     """Near x = 0 the coefficients of x'' = -x**n stand n + 1 orders apart: the last three say nothing."""
     force = X**power if power % 2 else X ** (power - 1) * sp.Abs(X)

@@ -58,7 +58,7 @@ def test_what_has_no_set_valued_form(acceleration: sp.Expr, law: sp.Expr, words:
 def test_the_smooth_law_tends_to_the_exact_one() -> None:
     """Period two at omega = 1.15: the distance after 20 periods falls like 1/sqrt(kappa), the exact law's error does not
     count."""
-    exact = run(scene(rtol=1e-12), show_progress=False).states("end")[0]
+    exact = run(scene(rtol=1e-12, record=("section",)), show_progress=False).states("end")[0]
     gaps = []
     for kappa in (1e5, 1e7, 1e9):
         smooth = run(scene(contact="atan", rtol=1e-10, parameters={"kappa": kappa}), show_progress=False)
@@ -94,7 +94,7 @@ def test_equal_oscillators_stay_equal_although_the_state_is_unstable() -> None:
 @pytest.mark.parametrize("width", [1, *(pytest.param(width, marks=pytest.mark.long) for width in (2, 4))])
 def test_lanes_do_not_change_a_bit(width: int) -> None:
     cells = {"sigma": np.linspace(0.0, 0.4, 21), "show_progress": False}
-    s = scene(2, rtol=1e-8, window=50.0, record=())
+    s = scene(2, rtol=1e-8, window=50.0, record=("section",))  # the drivers of other tests
     np.testing.assert_array_equal(run(s, width=width, **cells).end, run(s, width=16, workers=2, **cells).end)
 
 

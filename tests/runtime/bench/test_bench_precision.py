@@ -153,7 +153,12 @@ def test_the_paper_method_is_held_back_by_stability():
     assert slow[0, 1] > 100 * fast[0, 1]
 
 
-@pytest.mark.parametrize("peer", peers.names())
+def marked(peer):
+    """A peer that a compiler of C++ builds takes ten times as long as the others."""
+    return pytest.param(peer, marks=[pytest.mark.long] if peer.startswith("boost") else [])
+
+
+@pytest.mark.parametrize("peer", [marked(peer) for peer in peers.names()])
 def test_peers_solve_the_smooth_case(peer):
     module = peers.load(peer)
     if why := peers.absent(module):

@@ -95,7 +95,7 @@ def alone_switching() -> Outcome:
     return run(1, chunks(1), method="switching")
 
 
-@pytest.mark.parametrize("width", [1, 4, 8])
+@pytest.mark.parametrize("width", [1, pytest.param(4, marks=pytest.mark.long), 8])
 @pytest.mark.parametrize("size", [29, 11, 3])
 def test_widths_and_chunks_change_nothing(alone, width, size):
     same(run(width, chunks(size)), alone)
@@ -116,7 +116,7 @@ def test_the_order_of_cells_changes_nothing_where_they_change_sides(alone_switch
     same(run(8, chunks(29), order=order, method="switching"), alone_switching, order)
 
 
-@pytest.mark.parametrize("width", [4, 8])
+@pytest.mark.parametrize("width", [pytest.param(4, marks=pytest.mark.long), 8])
 def test_threads_change_nothing(alone, width):
     same(run(width, chunks(4), workers=2), alone)
 

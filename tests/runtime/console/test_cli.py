@@ -693,7 +693,13 @@ def test_warnings_are_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.C
     assert capsys.readouterr().err == "warning: the cache is read-only\n"
 
 
-@pytest.mark.parametrize("words", ["topologies", "kernel two_oscillators", "equations figure_4a", "spectrum chain 40"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        pytest.param("topologies", marks=pytest.mark.long), "kernel two_oscillators",
+        pytest.param("equations figure_4a", marks=pytest.mark.long), "spectrum chain 40",
+    ],
+)  # fmt: skip
 def test_a_reader_that_leaves_early_ends_it_quietly(words: str) -> None:
     command = f"'{sys.executable}' -m synchain.runtime {words} | true; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60, env=BUFFERED)

@@ -126,7 +126,14 @@ def test_all_figures_are_made_without_names(
     assert make(None, tmp_path) == make([], tmp_path) == [tmp_path / name for name in PAPER]
 
 
-@pytest.mark.parametrize("name", ["figure_1b", "figure_4a", "figure_4d", "figure_8", "msf", "thresholds"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "figure_1b",
+        "figure_4a",
+        *(pytest.param(name, marks=pytest.mark.long) for name in ("figure_4d", "figure_8", "msf", "thresholds")),
+    ],
+)
 def test_files_depend_on_the_numbers_alone(name: str, tmp_path: Path, simulation: Simulation) -> None:
     first = make([name], tmp_path / "a")
     with mpl.rc_context(

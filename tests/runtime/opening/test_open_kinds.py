@@ -94,9 +94,12 @@ def test_states_of_a_basin_have_labels() -> None:
     assert KINDS["Basin"].data.initial.sel(component="v", node=1).values.tolist() == [2.0, 6.0, 10.0]
 
 
+EVERY = ("sync_error", "section", "trajectory")
+
+
 @pytest.fixture(scope="module")
 def result() -> Any:
-    scene = PAIR.replace(topology=topology("chain", 3), transient=0.0, window=2.0, record=("trajectory",), samples=5)
+    scene = PAIR.replace(topology=topology("chain", 3), transient=0.0, window=2.0, record=EVERY, samples=5)
     scene = scene.replace(initial={"x": [0.1, 0.2, 0.3], "v": [0.0, 0.05, 0.06]})
     return run(scene, sigma=[0.1, 0.2, 0.3], show_progress=False)
 
@@ -192,35 +195,36 @@ def test_a_forged_file_is_refused_in_one_line(change: Callable[[Any], Any], word
 def test_a_result_of_the_former_layout_is_refused(result: Any, tmp_path: Path) -> None:
     from synchain.runtime.results.store import write_data
 
-    old = result.data.drop_vars(("end", "trajectory")).assign(end=(("sigma", "state"), result.states("end")))
+    old = result.data.drop_vars(("end", "trajectory", "section")).assign(end=(("sigma", "state"), result.states("end")))
     write_data(old, tmp_path / "old.nc")
     with pytest.raises(ValueError, match="an earlier version wrote it"):
         open_result(tmp_path / "old.nc")
 
 
-@pytest.mark.parametrize(("ending", "package"), [(end, form.package) for end, form in KNOWN.items() if form.package])
-def test_an_absent_package_is_named_in_one_line_before_anything_runs(ending: str, package: str, tmp_path: Path) -> None:
-    path = str(tmp_path / f"a{ending}")
+def test_an_absent_package_is_named_in_one_line_before_anything_runs(tmp_path: Path) -> None:
+    packages = {ending: form.package for ending, form in KNOWN.items() if form.package}
     code = (
-        f"import sys; sys.modules[{package!r}] = None\n"
+        f"import sys; sys.modules.update(dict.fromkeys({list(packages.values())!r}))\n"
         "from kept_values import PAIR, every_kind\n"
         "from synchain.runtime.opening.open import open_result\n"
         "from synchain.runtime.sweeps.stream import stream\n"
-        f"open({path!r}[:-len({ending!r})] + '.there' + {ending!r}, 'w').close()\n"
-        f"calls = (lambda: every_kind()['Plane'].save({path!r}), lambda: stream(PAIR, {path!r}),\n"
-        f"         lambda: open_result({path!r}[:-len({ending!r})] + '.there' + {ending!r}))\n"
-        "for call in calls:\n"
-        "    try:\n"
-        "        call()\n"
-        "    except ModuleNotFoundError as error:\n"
-        "        print(error)\n"
+        f"for ending in {list(packages)!r}:\n"
+        f"    path, there = {str(tmp_path / 'a')!r} + ending, {str(tmp_path / 'there')!r} + ending\n"
+        "    open(there, 'w').close()\n"
+        "    calls = (lambda: every_kind()['Plane'].save(path), lambda: stream(PAIR, path), lambda: open_result(there))\n"
+        "    for call in calls:\n"
+        "        try:\n"
+        "            call()\n"
+        "        except ModuleNotFoundError as error:\n"
+        "            print(error)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=Path(__file__).parents[2])
     lines = done.stdout.splitlines()
-    assert len(lines) == 3, done.stderr
-    words = f'needs the package {package}; install it: python -m pip install "synchain[files]", or end the name in .nc'
-    assert all(line.endswith(words) for line in lines)
-    assert [part.name for part in tmp_path.iterdir()] == [f"a.there{ending}"]
+    assert len(lines) == 3 * len(packages), done.stderr
+    words = 'needs the package {}; install it: python -m pip install "synchain[files]", or end the name in .nc'
+    expected = [words.format(package) for package in packages.values() for _ in range(3)]
+    assert all(line.endswith(end) for line, end in zip(lines, expected, strict=True))
+    assert sorted(part.name for part in tmp_path.iterdir()) == sorted(f"there{ending}" for ending in packages)
 
 
 def test_another_folder_is_not_replaced(tmp_path: Path) -> None:

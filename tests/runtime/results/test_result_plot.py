@@ -113,9 +113,10 @@ def test_rounding_is_drawn_as_zero(pair: Callable[..., Result]) -> None:
 
 
 def test_observables_are_drawn_by_name_and_where_nothing_else_is_recorded() -> None:
-    scene = Scene("harmonic", "spring", chain(2), record=(), transient=0, window=1, observe={
+    scene = Scene("harmonic", "spring", chain(2), record=(), integrator="dop853", transient=0, window=1, observe={
         "error": "end(nodes.mean(x))", "own": "end(x)"}, axes={"sigma": (0.3, 0.1, 0.2)})  # fmt: skip
-    found = run(scene, show_progress=False)
+    given = {"show_progress": False, "width": 1}  # the drivers of other tests
+    found = run(scene, **given)
     axes = result_plot.draw_result(found)
     assert (axes.get_xlabel(), axes.get_ylabel()) == (r"$\sigma$", "error")
     x, y = axes.lines[0].get_data()
@@ -124,14 +125,14 @@ def test_observables_are_drawn_by_name_and_where_nothing_else_is_recorded() -> N
     assert len(result_plot.draw_result(found, kind="own").lines) == 2
     with pytest.raises(ValueError, match=r"unknown kind of plot 'owm'; known: .*did you mean 'own'"):
         result_plot.draw_result(found, kind="owm")
-    several = run(scene, realisations=4, draws={"x": "uniform(-1, 1)"}, show_progress=False)
+    several = run(scene, realisations=4, draws={"x": "uniform(-1, 1)"}, **given)
     lines = result_plot.draw_result(several).lines
     assert len(lines) == 5
     np.testing.assert_allclose(lines[-1].get_ydata(), several.data["error"].values[[1, 2, 0]].mean(axis=1))
     assert {line.get_linestyle() for line in lines} == {"-"}
-    alone = {"realisations": 4, "draws": {"x": "uniform(-1, 1)"}, "show_progress": False}
+    alone = {"realisations": 4, "draws": {"x": "uniform(-1, 1)"}, **given}
     for drawn in (scene.replace(axes=()), scene.replace(axes=(), record=("sync_error",), observe=None)):
         (dots,) = result_plot.draw_result(run(drawn, **alone)).lines
         assert (dots.get_linestyle(), dots.get_marker()) == ("None", "."), drawn
-    with_error = run(scene.replace(record=("sync_error",), observe={"own": "end(x)"}), show_progress=False)
+    with_error = run(scene.replace(record=("sync_error",), observe={"own": "end(x)"}), **given)
     assert result_plot.draw_result(with_error).get_ylabel() == "average synchronisation error"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from synchain.runtime.cli import main
 from synchain.runtime.seeing.page import provenance_rows
 from synchain.runtime.seeing.report import Effort, _ends, _strengths, report
 from synchain.runtime.stability.msf import msf
+from synchain.runtime.sweeps.run import run
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed")
@@ -155,10 +157,13 @@ def test_ranges_that_end_with_the_grid_are_said_to_do_so(strengths: list[float],
 
 
 @pytest.mark.parametrize(("record", "pictures"), [(("sync_error",), 3), ((), 2)])
-def test_observables_and_the_sweep_are_shown(record: tuple[str, ...], pictures: int) -> None:
+def test_observables_and_the_sweep_are_shown(
+    record: tuple[str, ...], pictures: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("synchain.runtime.seeing.report.run", partial(run, width=1))  # the drivers of other tests
     scene = Scene(
         "harmonic", "spring", topology("chain", 2), record=record, transient=1, window=1, axes={"sigma": [0.1, 0.2]},
-        observe={"place": "mean(nodes.mean(x))"},
+        observe={"place": "mean(nodes.mean(x))"}, integrator="dop853",
     )  # fmt: skip
     page = report(scene, FAST, show_progress=False)
     assert page.count("<img ") == pictures
@@ -188,7 +193,7 @@ def test_the_browser_has_no_complaint_and_asks_for_nothing(folder: Path) -> None
 
 
 @needs_browser
-@pytest.mark.parametrize("options", [(), (DARK,)], ids=["light", "dark"])
+@pytest.mark.parametrize("options", [pytest.param((), marks=pytest.mark.long), (DARK,)], ids=["light", "dark"])
 def test_formulas_axes_and_graph_are_seen(folder: Path, options: tuple[str, ...]) -> None:
     whole = seen(folder, "page", *options)
     ground = whole[5, 5]

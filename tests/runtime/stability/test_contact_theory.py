@@ -23,10 +23,13 @@ ONE = topology("chain", 1)
 
 
 def block(friction: str, x: float = 0.0, v: float = 0.0, **more: Any) -> Scene:
-    """One block without a drive and with load 1, unless told otherwise; keywords set the scene or its parameters."""
+    """One block without a drive and with load 1, unless told otherwise; keywords set the scene or its parameters.
+
+    All record sections, so that they share drivers.
+    """
     keys = {"transient", "window", "record", "section", "samples", "rtol", "max_steps", "oscillator", "time_unit"}
     own = {name: more.pop(name) for name in keys & set(more)}
-    settings = {"transient": 0.0, "rtol": 1e-13, "record": (), "time_unit": "time", **own}
+    settings = {"transient": 0.0, "rtol": 1e-13, "record": ("section",), "time_unit": "time", **own}
     start = {"x": [x], "v": [v]}
     return Scene(
         topology=ONE, friction=friction, contact="set-valued", initial=start, parameters={"epsilon": 1.0, "u": 0.0,
@@ -49,7 +52,7 @@ def test_amplitude_under_coulomb_friction(omega: float, r: float) -> None:
     amplitude = float(mp.sqrt(far**2 - mpf(r) ** 2 * late**2))
     scene = block(
         "coulomb", amplitude, 0.1, theta_b=0.0, mu=r, u=1.0, omega=omega, transient=2000, window=3, time_unit="period",
-        record=("section",), section="v_1 falling",
+        section="v_1 falling",
     )  # fmt: skip
     turns = finished(scene).states("section")[:, 0]
     assert len(turns) == 3
@@ -84,7 +87,6 @@ def test_cycle_of_leine() -> None:
         mu_s=1.0,
         delta=3.0,
         window=100.0,
-        record=("section",),
         section="v_1 falling",
     )
     data = finished(scene).data
@@ -248,8 +250,7 @@ def test_propagator_against_differences_of_the_flow(
     )  # fmt: skip
     modes = finished(scene).states("trajectory")[:, 2]
     assert set(modes) == kinds
-    scene = scene.replace(record=(), samples=0)
-    pair = scene.replace(topology=topology("chain", 2), initial={"x": [x, x], "v": [v, v]})
+    pair = scene.replace(record=(), samples=0, topology=topology("chain", 2), initial={"x": [x, x], "v": [v, v]})
     orbits = Orbits.make(pair, np.array([0.0]), np.array([[x, v, 0.0]]), 1)
     orbits.block, orbits.integrator = 1.0, orbits.integrator_of(orbits.strengths)
     found = orbits.propagators()[0][0, 0]

@@ -22,7 +22,7 @@ def test_a_loose_tolerance_is_in_the_error(what: str) -> None:
     scene, values = SCENES[what]
     options = {"periods": 3000, "precision": 0.0, "starts": 1, "parameters": values}
     exact = sc.exponents(scene, ALPHA, rtol=1e-11, **options)
-    for rtol in (1e-2, 1e-3, 1e-4):
+    for rtol in (1e-2, 1e-4):
         found = sc.exponents(scene, ALPHA, rtol=rtol, **options)
         apart = np.abs(found.exponent - exact.exponent)
         assert np.all(apart <= 2.0 * found.stderr), rtol

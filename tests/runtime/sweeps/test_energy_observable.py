@@ -55,7 +55,7 @@ CONSERVATIVE = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CONSERVATIVE)
+@pytest.mark.parametrize("name", [pytest.param("fput", marks=pytest.mark.long), "swing", "few", "inerter"])
 def test_a_conservative_network_keeps_the_energy_of_its_nodes_and_links(name: str) -> None:
     """To the tolerance of the steps, where the nodes' own energy moves by more than a tenth of what the links hold."""
     own = nodes.sum(sp.Symbol("v") ** 2 / 2)

@@ -16,15 +16,16 @@ CIRCLE = sc.Scene(
     sc.Field({"x": "y", "y": "-x"}), initial={"x": [0.0], "y": [1.0]}, transient=0, window=50, time_unit="time",
     record=("trajectory",), samples=2, observe={"height": sc.end(sp.Symbol("x"))}, rtol=1e-10,
 )  # fmt: skip
-"""Its stops, sections and records are those of test_stop: the tests share a driver."""
+"""Its stops, sections and records are those of test_stop: the tests share drivers."""
+METHODS = [("taylor", 1), ("dop853", 2)]
 NEAR, FAR = 0.999, -0.95
 NEARBY = {"near": sc.Section(x_1 - NEAR, "both"), "far": sc.Section(x_1 - FAR, "rising")}
 
 
-@pytest.mark.parametrize("integrator", ["taylor", "dop853"])
-def test_sections_near_an_extremum_have_all_their_points(integrator: str) -> None:
+@pytest.mark.parametrize(("integrator", "width"), METHODS)
+def test_sections_near_an_extremum_have_all_their_points(integrator: str, width: int) -> None:
     circle = CIRCLE.replace(integrator=integrator, sections=NEARBY, stop=x_1 - 2)
-    data = sc.run(circle, show_progress=False).data
+    data = sc.run(circle, show_progress=False, width=width).data
     turns = 2 * math.pi * np.arange(8)
     near = np.sort(np.concatenate([math.asin(NEAR) + turns, math.pi - math.asin(NEAR) + turns]))
     far = 2 * math.pi + math.asin(FAR) + turns
@@ -33,10 +34,10 @@ def test_sections_near_an_extremum_have_all_their_points(integrator: str) -> Non
         np.testing.assert_allclose(data[f"{name}_time"].values[: len(times)], times, rtol=0, atol=1e-7)
 
 
-@pytest.mark.parametrize("integrator", ["taylor", "dop853"])
-def test_a_stop_near_an_extremum_ends_its_cell_the_first_time(integrator: str) -> None:
+@pytest.mark.parametrize(("integrator", "width"), METHODS)
+def test_a_stop_near_an_extremum_ends_its_cell_the_first_time(integrator: str, width: int) -> None:
     circle = CIRCLE.replace(integrator=integrator, sections=NEARBY, stop=x_1 - NEAR)
-    found = sc.run(circle, show_progress=False)
+    found = sc.run(circle, show_progress=False, width=width)
     np.testing.assert_allclose(found.states(), [NEAR, math.sqrt(1 - NEAR**2)], rtol=0, atol=1e-9)
 
 

@@ -21,29 +21,31 @@ SCENE = Scene(
     oscillator="rotor", coupling="torsion", topology=ring(4), integrator="dop853", rtol=1e-9, record=("sync_error",),
     transient=0.0, window=5.0, time_unit="time", observe={"frequency": mean(rate(x)), "middle": end(nodes.mean(x))},
 )  # fmt: skip
+FEW = SCENE.replace(topology=chain(2))
+"""Its kernels compile in half of the time."""
 DRAWS = {
     "power": normal(0.1, 0.2),
     "x": uniform(-1.0, 1.0),
     "delta": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6],
-    "v": [[0.1 * k, 0.0, 0.0, -0.1 * k] for k in range(6)],
+    "v": [[0.1 * k, -0.1 * k] for k in range(6)],
 }
 
 
 def test_cells_are_those_of_the_drawn_numbers() -> None:
     """Each realisation on a grid is the cell that a scene with its numbers runs."""
-    found = run(SCENE, show_progress=False, width=8, sigma=[0.1, 0.4], realisations=6, draws=DRAWS, rng=7)
+    found = run(FEW, show_progress=False, width=8, sigma=[0.1, 0.4], realisations=6, draws=DRAWS, rng=7)
     assert found.frequency.dims == ("sigma", "realisation", "node")
     assert found.scene.shape == (2, 6)
-    numbers = {name: found.data[name].values for name in ("delta", *(f"power_{i}" for i in range(1, 5)))}
+    numbers = {name: found.data[name].values for name in ("delta", *(f"power_{i}" for i in (1, 2)))}
     assert numbers["delta"].tolist() == DRAWS["delta"]
     for k in (0, 5):
-        start = {c: [float(found.data[f"{c}_{i}"][k]) for i in range(1, 5)] for c in ("x", "v")}
+        start = {c: [float(found.data[f"{c}_{i}"][k]) for i in (1, 2)] for c in ("x", "v")}
         own = {
-            "power": [float(numbers[f"power_{i}"][k]) for i in range(1, 5)],
+            "power": [float(numbers[f"power_{i}"][k]) for i in (1, 2)],
             "delta": DRAWS["delta"][k],
             "sigma": 0.4,
         }
-        one = run(SCENE.replace(parameters=own, initial=start), show_progress=False, width=8)
+        one = run(FEW.replace(parameters=own, initial=start), show_progress=False, width=8)
         np.testing.assert_array_equal(found.end.values[1, k], one.end.values)
         np.testing.assert_array_equal(found.frequency.values[1, k], one.frequency.values)
         assert float(found.sync_error[1, k]) == float(one.sync_error)
@@ -52,15 +54,15 @@ def test_cells_are_those_of_the_drawn_numbers() -> None:
 def test_what_is_drawn_depends_on_the_seed_and_the_name_alone() -> None:
     """Neither workers, lanes and blocks nor other draws change it; another seed does."""
     axes = {"realisations": 40, "rng": 3, "show_progress": False}
-    found = run(SCENE, draws={"power": normal(0, 1), "x_2": uniform(0, 1)}, width=8, **axes)
+    found = run(FEW, draws={"power": normal(0, 1), "x_2": uniform(0, 1)}, width=8, **axes)
     assert found.data.power_1.dims == ("realisation",)
-    other = run(SCENE, draws={"x_2": uniform(0, 1), "power": normal(0, 1)}, width=1, workers=1, **axes)
+    other = run(FEW, draws={"x_2": uniform(0, 1), "power": normal(0, 1)}, width=1, workers=1, **axes)
     for name in ("end", "frequency", "sync_error", "power_1", "x_2"):
         np.testing.assert_array_equal(other.data[name], found.data[name])
-    alone = SCENE.replace(realisations=40, draws={"power_3": normal(0, 1)}, rng=3)
-    assert {axis.name: axis.values for axis in alone.drawn}["power_3"] == tuple(found.data.power_3.values.tolist())
+    alone = FEW.replace(realisations=40, draws={"power_2": normal(0, 1)}, rng=3)
+    assert {axis.name: axis.values for axis in alone.drawn}["power_2"] == tuple(found.data.power_2.values.tolist())
     assert alone.replace(rng=4).drawn != alone.drawn
-    assert [axis.name for axis in alone.drawn] == ["power_3"]
+    assert [axis.name for axis in alone.drawn] == ["power_2"]
 
 
 def test_numbers_have_their_distribution() -> None:
@@ -85,23 +87,23 @@ def test_numbers_have_their_distribution() -> None:
 
 
 def test_files_keep_what_was_drawn(tmp_path: Path) -> None:
-    scene = SCENE.replace(realisations=3, draws={"power": "normal(0, 1/2)", "sigma": [0.1, 0.2, 0.3]}, rng=1)
+    scene = FEW.replace(realisations=3, draws={"power": "normal(0, 1/2)", "sigma": [0.1, 0.2, 0.3]}, rng=1)
     assert Scene.from_dict(scene.as_dict()) == scene
-    found = run(scene, show_progress=False)
+    found = run(scene, show_progress=False, width=8)
     found.save(tmp_path / "whole.nc")
     opened = open_result(tmp_path / "whole.nc")
     assert opened.scene == scene
-    np.testing.assert_array_equal(opened.data.power_4, found.data.power_4)
-    assert stream(scene, tmp_path / "streamed.nc", show_progress=False).success
+    np.testing.assert_array_equal(opened.data.power_2, found.data.power_2)
+    assert stream(scene, tmp_path / "streamed.nc", show_progress=False, width=8).success
     assert (tmp_path / "streamed.nc").read_bytes() == (tmp_path / "whole.nc").read_bytes()
 
 
 def test_one_realisation_of_a_zipped_sweep() -> None:
     """Zipped axes are one dimension, realisations another."""
-    scene = SCENE.replace(axes={"sigma": [0.1, 0.2], "x_1": [0.5, 0.6]}, zipped=True)
+    scene = FEW.replace(axes={"sigma": [0.1, 0.2], "x_1": [0.5, 0.6]}, zipped=True)
     found = run(scene, show_progress=False, width=1, realisations=3, draws={"x_2": [0.1, 0.2, 0.3]})
     assert found.middle.dims == ("cell", "realisation")
-    one = run(SCENE.replace(parameters={"sigma": 0.2}), show_progress=False, width=1, x_1=0.6, x_2=0.3)
+    one = run(FEW.replace(parameters={"sigma": 0.2}), show_progress=False, width=1, x_1=0.6, x_2=0.3)
     assert float(found.middle[1, 2]) == float(one.middle)
 
 

@@ -28,7 +28,7 @@ FREE = Scene(
 
 
 def ran(scene: Scene, **more: Any) -> Result:
-    return run(scene, workers=1, show_progress=False, **more)
+    return run(scene, workers=1, width=1, show_progress=False, **more)
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ import threading
 import time
 import warnings
 from concurrent.futures import Executor, Future
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from synchain.models.inputs.plugins import allow_code
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.cells.reduce import reduce_scene
+from synchain.runtime.commands.run import stopped_by_signals
 from synchain.runtime.figures.result_plot import draw_result
 from synchain.runtime.opening.open import open_result
 from synchain.runtime.results.block_log import HEAD, BlockLog
@@ -359,8 +361,27 @@ sigma = { from = 0.0, to = 0.3, count = 300 }
 """
 
 
+@pytest.mark.parametrize("sign", [signal.SIGTERM, signal.SIGHUP])
+def test_signals_stop_like_ctrl_c_unless_they_are_ignored(sign):
+    before = signal.getsignal(sign)
+    try:
+        for handler, error in ((lambda *_: None, pytest.raises(KeyboardInterrupt)), (signal.SIG_IGN, nullcontext())):
+            signal.signal(sign, handler)
+            with error, stopped_by_signals():
+                signal.raise_signal(sign)
+            assert signal.getsignal(sign) is handler
+    finally:
+        signal.signal(sign, before)
+
+
 @pytest.mark.parametrize(
-    "sign", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL], ids=lambda sign: sign.name
+    "sign",
+    [
+        signal.SIGINT,
+        signal.SIGTERM,
+        *(pytest.param(sign, marks=pytest.mark.long) for sign in (signal.SIGHUP, signal.SIGKILL)),
+    ],
+    ids=lambda sign: sign.name,
 )
 def test_the_real_program_is_stopped_and_goes_on(sign, tmp_path):
     scene = tmp_path / "slow.toml"
@@ -501,7 +522,7 @@ def own(tmp_path) -> Path:
 
 def falling(path: Path) -> Scene:
     axes = {"rate": [0.01 * k for k in range(400)]}
-    return Scene(oscillator=str(path), axes=axes, transient=0, window=2, record=("trajectory",), samples=3)
+    return Scene(oscillator=str(path), axes=axes, transient=0, window=2, record=())
 
 
 def test_a_result_says_that_its_model_has_changed(own, tmp_path):
@@ -511,13 +532,13 @@ def test_a_result_says_that_its_model_has_changed(own, tmp_path):
     own.write_text("# another comment\n" + FALLING)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert open_result(path).data.trajectory.identical(result.data.trajectory)
+        assert open_result(path).data.end.identical(result.data.end)
         with pytest.raises(FileExistsError, match="holds the result of this scene already"):
             stream(falling(own), path, show_progress=False)
     own.write_text(FALLING.replace("-rate * x", "-rate * x**3"))
     with pytest.warns(UserWarning, match=r"a\.nc: the code of its model has changed since it was written"):
         opened = open_result(path)
-    assert opened.data.trajectory.identical(result.data.trajectory)
+    assert opened.data.end.identical(result.data.end)
     for options in ({}, {"resume": True}):
         with pytest.raises(ValueError, match=r"a\.nc comes of another model: the code of its scene has changed since"):
             stream(falling(own), path, show_progress=False, **options)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import os
 import signal
-import subprocess
 import sys
 import tracemalloc
 import warnings
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from streams import MAP, PAIR, UP, contents, kill_again_and_again, partial, warm
+from streams import MAP, PAIR, UP, contents, die_at_the_copy, forking, kill_again_and_again, partial, warm
 
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cli import main
@@ -67,7 +66,11 @@ def ctrl_c(progress: Any) -> None:
 
 
 @pytest.mark.parametrize("ending", EVERY)
-@pytest.mark.parametrize("scene", [MAP, UP, PAIR, CHUNKS], ids=["map", "up", "one cell", "chunks"])
+@pytest.mark.parametrize(
+    "scene",
+    [pytest.param(MAP, marks=pytest.mark.long), UP, pytest.param(PAIR, marks=pytest.mark.long), CHUNKS],
+    ids=["map", "up", "one cell", "chunks"],
+)
 def test_a_file_that_is_filled_holds_what_one_that_is_saved_holds(scene: Scene, ending: str, tmp_path: Path) -> None:
     whole = run(scene, workers=1, show_progress=False)
     whole.save(tmp_path / f"saved{ending}")
@@ -83,7 +86,7 @@ def test_a_file_that_is_filled_holds_what_one_that_is_saved_holds(scene: Scene, 
 
 
 @pytest.mark.parametrize("ending", FURTHER)
-@pytest.mark.parametrize("scene", [MAP, UP], ids=["map", "up"])
+@pytest.mark.parametrize("scene", [MAP, pytest.param(UP, marks=pytest.mark.long)], ids=["map", "up"])
 def test_an_interrupted_run_says_what_is_finished_and_goes_on(scene: Scene, ending: str, tmp_path: Path) -> None:
     path, seen = tmp_path / f"a{ending}", []
     with pytest.raises(SweepInterrupted) as caught:
@@ -127,16 +130,10 @@ def test_a_kill_while_the_result_is_written_loses_nothing(ending: str, tmp_path:
     path = tmp_path / f"a{ending}"
     stream(PAIR, path, width=8, show_progress=False)
     before = contents(path)
-    code = (
-        "import os, signal\n"
-        "from streams import MAP\n"
-        "from synchain.runtime.results import store\n"
-        "from synchain.runtime.sweeps.stream import stream\n"
-        "store._copy = lambda *rest: os.kill(os.getpid(), signal.SIGKILL)\n"
-        f"stream(MAP, {str(path)!r}, overwrite=True, workers=1, show_progress=False)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[2], timeout=120, check=False)
-    assert done.returncode == -signal.SIGKILL
+    process = forking().Process(target=die_at_the_copy, args=(MAP, path))
+    process.start()
+    process.join(120)
+    assert process.exitcode == -signal.SIGKILL
     assert contents(path) == before
     assert len(list(tmp_path.iterdir())) > 2  # what it was writing
     assert open_result(partial(path)).success
@@ -223,15 +220,14 @@ def test_pieces_cover_an_array_once_and_in_order(shape: tuple[int, ...]) -> None
 
 @pytest.mark.parametrize("ending", EVERY)
 def test_the_command_writes_every_form_and_its_figure(ending: str, tmp_path: Path, capsys: Any) -> None:
-    words = ["run", "two_oscillators", "--out", str(tmp_path), "--format", ending[1:]]
+    PAIR.save(tmp_path / "pair.toml")
+    words = ["run", str(tmp_path / "pair.toml"), "--out", str(tmp_path), "--format", ending[1:]]
     words += ["--set", "sigma=0.1,0.2", "transient=1", "window=2"]
     assert main(words) == 0
     assert main(words) == 0
     assert "nothing was run (--overwrite runs it again)" in capsys.readouterr().out
-    assert sorted(part.name for part in tmp_path.iterdir()) == sorted(
-        [f"two_oscillators{ending}", "two_oscillators.png"]
-    )
-    assert open_result(tmp_path / f"two_oscillators{ending}").success
+    assert sorted(part.name for part in tmp_path.iterdir()) == sorted([f"pair{ending}", "pair.png", "pair.toml"])
+    assert open_result(tmp_path / f"pair{ending}").success
 
 
 def test_the_command_knows_the_forms() -> None:

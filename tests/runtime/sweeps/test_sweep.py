@@ -25,7 +25,8 @@ from synchain.runtime.sweeps.prepare import prepare
 from synchain.runtime.sweeps.run import run
 
 PAIR = Scene(topology=chain(2), transient=5, window=10, parameters={"sigma": 0.1})
-SECTIONS = PAIR.replace(record=("sync_error", "section"))
+SECTIONS = PAIR.replace(record=("sync_error", "section", "trajectory"), samples=2)
+"""All records, as most tests of sweeps have them: they share a driver."""
 
 
 def test_grid_is_laid_out_with_the_last_axis_fastest():
@@ -80,7 +81,7 @@ def test_divergence_ends_a_cell_and_leaves_its_neighbours_alone():
     scene = Scene(
         oscillator="duffing", integrator="rodas5p", transient=0, window=5, parameters={"beta": -1.0, "u": 0.0}
     )
-    result = run(scene, x_1=[0.1, 5.0, 0.2])
+    result = run(scene, x_1=[0.1, 5.0, 0.2], width=8)
     assert result.status.values.tolist() == [Status.FINISHED, Status.DIVERGED, Status.FINISHED]
     np.testing.assert_array_equal(result.end[2], run(scene, x_1=0.2).end)
 
@@ -231,7 +232,7 @@ def test_steepest_jump_of_unequal_nodes_sets_the_tolerance(kappas):
 
 def test_loose_tolerance_is_not_silently_wrong():
     """With rtol = 1e-3 taken literally the oscillator slips through its stick phase and the error is of order 0.1."""
-    loose, tight = (run(PAIR.replace(rtol=rtol, window=40)) for rtol in (1e-3, 1e-9))
+    loose, tight = (run(SECTIONS.replace(rtol=rtol, window=40)) for rtol in (1e-3, 1e-9))
     assert loose.data.attrs["rtol_used"] == pytest.approx(1e-5)
     assert float(np.abs(loose.end - tight.end).max()) < 1e-4
 
