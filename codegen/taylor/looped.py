@@ -36,6 +36,7 @@ from .step import (
     ending,
     falling,
     finished,
+    jumps,
     lane,
     largest,
     loose,
@@ -70,8 +71,8 @@ class Section:
 
     head, index, count: the loop, its variable and the number of its turns in the whole numbering; `setting` loads what the
     turn needs at any order, `places` are the states that it reads, and where they stand, `lent` are series that other
-    sections need too, `gaps` those of contacts, or what links add to them, `mode` says whether these slip and
-    `jumps` whether they begin to with a jump.
+    sections need too, `gaps` those of contacts, or what links add to them, `mode` says whether these slip, `exact` whether
+    it begins with a jump.
     """
 
     graph: Graph
@@ -84,7 +85,7 @@ class Section:
     lent: set[Series] = field(default_factory=set)
     gaps: list[Series] = field(default_factory=list)
     mode: str = ""
-    jumps: bool = False
+    exact: bool = False
     adds: bool = False
     waves: dict[Series, Section] = field(default_factory=dict)
     kept: list[str] = field(default_factory=list)
@@ -226,15 +227,15 @@ class Section:
     def passages(self, degree: int) -> list[str]:
         """The statements that end the step at the kinks of this section."""
         found = [
-            f"passed = passage({self.load(kink, str(degree))}, load(dense, {self.slot(kink.size, '0')}, WIDTH), PASSED, NEAREST*passed, dense, "
-            f"{self.where(kink.base, '0')}, {self.stride(kink.base)}, {degree}, passed)"
+            f"passed = passage({self.load(kink, str(degree))}, load(dense, {self.slot(kink.size, '0')}, WIDTH), PASSED, "
+            f"NEAREST*passed, dense, {self.where(kink.base, '0')}, {self.stride(kink.base)}, {degree}, passed)"
             for kink in self.graph.kinks
         ]
         if self.mode:
             sizes = [f"load(dense, at_sizes + {place}, WIDTH)" for place in GAPS]
             places = [f"at_gaps + {place}" for place in GAPS]
             found.append(f"stuck = 1.0 - {self.mode}*{self.mode}")
-            found += closed("stuck", self.jumps, sizes, places, "2*NODES", "at_closing", degree)
+            found += closed("stuck", self.exact, sizes, places, "2*NODES", "at_closing", degree)
         return self.turns([*self.setting, *found]) if found else []
 
     def lengths(self, order: int, orders: Sequence[int]) -> list[str]:
@@ -308,7 +309,7 @@ class LoopWriter:
 
     def __init__(self, equations: Equations, order: int) -> None:
         self.equations, self.order, self.places = equations, order, places(equations)
-        self.fields = mean_fields(equations)
+        self.fields, self.exact = mean_fields(equations), jumps(equations)
         self.links = sum(len(layer.links) for layer in equations.listed)
         eq = equations
         named = {s for node in eq.nodes for s in (*node.state, *node.parameters)}
@@ -363,7 +364,7 @@ class LoopWriter:
         found = self.read(section, rates, {**moving, **seen}, constants, kind.node.inertia)
         section.rates, section.gaps = self.parted(kind.node, found)
         if kind.node.contact is not None:
-            section.mode, section.jumps = self.swap[kind.node.state[2]].name, kind.node.contact.jumps
+            section.mode, section.exact = self.swap[kind.node.state[2]].name, self.exact
         return section
 
     def of_links(self, edge: Edge, rates: Sequence[sp.Expr], more: Iterable[sp.Symbol] = ()) -> Hoisted:
@@ -642,7 +643,7 @@ class LoopWriter:
             *(f"size_{k} = maximum(size_{k}, absolute({at.format(k=k)})*weight)" for k in orders),
         )
         lines += ["unseen = 0.0*scale"] if watching else []
-        lines += [loose(any(section.jumps for section in sections))] if self.equations.sticks else []
+        lines += [loose(self.exact)] if self.equations.sticks else []
         lines += [line for section in sections for line in section.lengths(p, orders)]
         reaches = [f"{-1.0 / k!r}*log(size_{k})" for k in orders]
         lines.append(f"reach = minimum({reaches[0]}, minimum({reaches[1]}, {reaches[2]}))")

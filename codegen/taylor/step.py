@@ -39,6 +39,7 @@ __all__ = [
     "extreme",
     "falling",
     "finished",
+    "jumps",
     "lane",
     "largest",
     "loose",
@@ -117,13 +118,10 @@ class TaylorStep:
 
 
 @dataclass(slots=True)
-class Gap:
-    """How far a contact is from changing its mode: while it slips the sliding velocity, twice, while it sticks the distances
-    of its load from the limits of static friction.
-    """
+class Gaps:
+    """The two gaps of a contact (`Contact.gaps`), the name of its mode, and those of the sizes that the gaps begin with."""
 
     mode: str
-    jumps: bool
     series: tuple[Series, Series]
     sizes: tuple[str, ...] = ()
 
@@ -132,7 +130,7 @@ class Gap:
         names = [f"size_{self.mode}_{word}" for word in ("rise", "fall")]
         self.sizes = tuple(at.keep(name, magnitude(at, s)) for name, s in zip(names, self.series, strict=True))
 
-    def closings(self, at: Written, order: int, first: int) -> list[str]:
+    def closings(self, at: Written, order: int, first: int, exact: bool) -> list[str]:
         """End the step where one of them closes."""
         stuck, rows, size = f"stuck_{self.mode}", range(order + 1), order + 1
         stored = [lane(at.at(series, k)) for series in self.series for k in rows]
@@ -140,7 +138,7 @@ class Gap:
         return [
             f"{stuck} = 1.0 - {self.mode}*{self.mode}",
             *(f"store(dense, {first + k}, {value})" for k, value in enumerate(stored)),
-            *closed(stuck, self.jumps, self.sizes, places, "1", str(first + 2 * size), order),
+            *closed(stuck, exact, self.sizes, places, "1", str(first + 2 * size), order),
         ]
 
 
@@ -240,8 +238,8 @@ class StepWriter:
         self.graph = Graph(self.supply)
         self.noted: list[Series] = []
         self.rates = self.read()
-        self.gaps = self.contacts()
-        self.graph.settle([*self.rates, *self.noted, *(s for gap in self.gaps for s in gap.series)])
+        self.contacts, self.exact = self.read_contacts(), jumps(equations)
+        self.graph.settle([*self.rates, *self.noted, *self.gaps])
         self.at = Written({}, {}, [])
 
     def read(self) -> list[Series]:
@@ -260,9 +258,14 @@ class StepWriter:
         right = {slot: self.graph.sum(terms[slot]) for slot in self.states}
         return list((solved(self.graph, self.masses(), right) if eq.inertial else right).values())
 
-    def contacts(self) -> list[Gap]:
+    @property
+    def gaps(self) -> list[Series]:
+        """The gaps of all contacts."""
+        return [s for gaps in self.contacts for s in gaps.series]
+
+    def read_contacts(self) -> list[Gaps]:
         """What closes when a contact sticks, lets go or turns."""
-        eq, found = self.equations, list[Gap]()
+        eq, found = self.equations, list[Gaps]()
         moving, swap = self.parted({TIME: self.time}, {s: s for s in (sp.Symbol(x, real=True) for x in eq.state)})
         shared = self.supply.fresh("shared_")
         for i in range(eq.n):
@@ -270,7 +273,7 @@ class StepWriter:
             if contact is not None:
                 mode = eq.symbols(i)[2]
                 rise, fall = self.graph.read(Template.of(contact.gaps(mode), moving, shared), moving, swap)
-                found.append(Gap(self.called[mode.name], contact.jumps, (rise, fall)))
+                found.append(Gaps(self.called[mode.name], (rise, fall)))
         return found
 
     def masses(self) -> dict[tuple[int, int], Series]:
@@ -347,8 +350,8 @@ class StepWriter:
         self.put("# order 0")
         for s in self.graph.series:
             at.put(s, s.begin(at), s in self.graph.inline_start)
-        for gap in self.gaps:
-            gap.begin(at)
+        for gaps in self.contacts:
+            gaps.begin(at)
         self.flush()
 
     def coefficients(self, k: int) -> None:
@@ -360,8 +363,7 @@ class StepWriter:
         for state, slope in zip(self.states.values(), slopes, strict=True):
             at.put(state, times(Name(f"r{k}"), slope))
         at.values[self.time, k] = Name("scale") if k == 1 else ZERO
-        ends = [*self.graph.kinks, *(s for gap in self.gaps for s in gap.series)]
-        for s in self.graph.series if k < self.order else self.graph.behind(ends):
+        for s in self.graph.series if k < self.order else self.graph.behind([*self.graph.kinks, *self.gaps]):
             at.put(s, s.coefficient(at), s in self.graph.inline)
         self.flush()
 
@@ -402,8 +404,8 @@ class StepWriter:
 
     def loads(self, sizes: Mapping[int, list[Expression]]) -> None:
         """Append how large the last coefficients of the gaps of contacts are."""
-        self.put(*([loose(any(gap.jumps for gap in self.gaps))] if self.gaps else []))
-        for series, size in (pair for gap in self.gaps for pair in zip(gap.series, gap.sizes, strict=True)):
+        self.put(*([loose(self.exact)] if self.contacts else []))
+        for series, size in zip(self.gaps, (size for gaps in self.contacts for size in gaps.sizes), strict=True):
             self.put(f"w_{size} = 1.0/(atol + loose*{size})")
             for k, found in sizes.items():
                 if (e := self.at.at(series, k)) != ZERO:
@@ -421,8 +423,8 @@ class StepWriter:
             self.put(*(f"store(dense, {first + k}, {lane(at.at(kink.base, k))})" for k in range(p + 1)))
             side = show(at.at(kink, p))
             self.put(f"passed = passage({side}, {kink.size}, PASSED, NEAREST*passed, dense, {first}, 1, {p}, passed)")
-        for gap in self.gaps:
-            self.put(*gap.closings(at, p, first))
+        for gaps in self.contacts:
+            self.put(*gaps.closings(at, p, first, self.exact))
         self.put(*ended())
 
     @property
@@ -555,20 +557,25 @@ SOONEST = "nearest = 1e-13*maximum(t, 1.0)/scale"
 """How soon a step may end at a contact."""
 
 
-def loose(jumps: bool) -> str:
+def jumps(equations: Equations) -> bool:
+    """True if slip of some contact begins with a jump of acceleration."""
+    return any(node.contact is not None and node.contact.jumps for node in equations.nodes)
+
+
+def loose(exact: bool) -> str:
     """The tolerance of loads.
 
     One that is wrong by some part sets a body free too early or late, with less than the power 3/2 of it as velocity, unless
     friction falls at once.
     """
-    return "loose = rtol" if jumps else "loose = math.sqrt(rtol*math.sqrt(rtol))"
+    return "loose = rtol" if exact else "loose = math.sqrt(rtol*math.sqrt(rtol))"
 
 
 def closed(
-    stuck: str, jumps: bool, sizes: Sequence[str], places: Sequence[str], stride: str, room: str, order: int
+    stuck: str, exact: bool, sizes: Sequence[str], places: Sequence[str], stride: str, room: str, order: int
 ) -> list[str]:
     """The statements that end a step where one of the two gaps of a contact closes, whose coefficients stand in memory."""
-    late = "0.0*t" if jumps else f"{LATE!r}*{stuck}"
+    late = "0.0*t" if exact else f"{LATE!r}*{stuck}"
     return [
         f"passed = closing({side}, {late}, {size}, nearest, dense, {first}, {stride}, {room}, {order}, passed)"
         for side, size, first in zip(("1.0 + 0.0*t", stuck), sizes, places, strict=True)

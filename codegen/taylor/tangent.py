@@ -93,6 +93,7 @@ class OrbitWriter(StepWriter):
         self.left: dict[tuple[str, int], Expression] = {}
         self.places: dict[str, int] = {}
         super().__init__(equations, order)
+        self.exact = True  # deviations feel the time of an event to first order
 
     def read(self) -> list[Series]:
         """The rates of the states; what is wanted beside them is noted."""

@@ -87,7 +87,8 @@ def test_curves_stay_apart_where_crossings_change_places() -> None:
 
 
 def test_files_beside_the_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(skeleton, "compute", lambda name, runs: small())
+    known = small()
+    monkeypatch.setattr(skeleton, "compute", lambda name, runs: known)
     monkeypatch.setattr(maker, "QUICK", SMALL)
     written = make(["skeleton"], tmp_path, quick=True)
     assert {path.name for path in written} == {
