@@ -26,8 +26,9 @@ from .names import LANES
 # Columns of `panels`: registers of strengths, first node, nodes with weights, nodes for comparison, where the weights of
 # the first register begin (in registers), and where those of the nodes for comparison begin (in numbers).
 FROM, TO, NODE, POINTS, EXTRAS, WEIGHTS, CHECKS = PANEL = 0, 1, 2, 3, 4, 5, 6
-# Registers of strengths whose propagators are interpolated together: a number of a node is loaded once for all of them.
-TILE = 4
+# Registers of strengths whose propagators are interpolated together: a number of a node is loaded once for all of them, and
+# a weight once for several entries.
+TILE = 2
 
 
 @njit(error_model="numpy")
@@ -129,47 +130,50 @@ def misfit(panel, weights, table, columns, parts, stride):
 
 
 @njit(error_model="numpy")
-def real_entries(which, count, panel, weights, table, entries, stride, found):
-    """The real propagators in the registers which … which+3 of a panel of `count`: register TILE*slot + k of `found`.
+def real_entries(which, count, panel, weights, table, columns, stride, found):
+    """The real propagators in the registers which … which+1 of a panel of `count`: register TILE*slot + k of `found`.
 
-    Behind the last register of the panel it stands again.
+    Behind the last register of the panel it stands again, and behind the last of four entries so does this one.
     """
-    points, node, first = int(panel[POINTS]), int(panel[NODE]), int(panel[WEIGHTS])
+    points, node, first, last = int(panel[POINTS]), int(panel[NODE]), int(panel[WEIGHTS]), columns * columns - 1
     a, b = first + points * which, first + points * min(which + 1, count - 1)
-    c, d = first + points * min(which + 2, count - 1), first + points * min(which + 3, count - 1)
-    for slot in range(entries):
-        place = slot * stride + node
-        one, two = broadcast(0.0, LANES), broadcast(0.0, LANES)
-        three, four = one, two
+    for slot in range(0, last + 1, 4):
+        second, third, fourth = min(slot + 1, last), min(slot + 2, last), min(slot + 3, last)
+        p, q, r, s = slot * stride + node, second * stride + node, third * stride + node, fourth * stride + node
+        zero = broadcast(0.0, LANES)
+        a_p, a_q, a_r, a_s, b_p, b_q, b_r, b_s = zero, zero, zero, zero, zero, zero, zero, zero
         for j in range(points):
-            value = broadcast(table[place + j], LANES)
-            one = fma(load(weights, a + j, LANES), value, one)
-            two = fma(load(weights, b + j, LANES), value, two)
-            three = fma(load(weights, c + j, LANES), value, three)
-            four = fma(load(weights, d + j, LANES), value, four)
-        store(found, TILE * slot, one)
-        store(found, TILE * slot + 1, two)
-        store(found, TILE * slot + 2, three)
-        store(found, TILE * slot + 3, four)
+            u, v = load(weights, a + j, LANES), load(weights, b + j, LANES)
+            x, y = broadcast(table[p + j], LANES), broadcast(table[q + j], LANES)
+            a_p, b_p, a_q, b_q = fma(u, x, a_p), fma(v, x, b_p), fma(u, y, a_q), fma(v, y, b_q)
+            x, y = broadcast(table[r + j], LANES), broadcast(table[s + j], LANES)
+            a_r, b_r, a_s, b_s = fma(u, x, a_r), fma(v, x, b_r), fma(u, y, a_s), fma(v, y, b_s)
+        for at, one, two in ((slot, a_p, b_p), (second, a_q, b_q), (third, a_r, b_r), (fourth, a_s, b_s)):
+            store(found, TILE * at, one)
+            store(found, TILE * at + 1, two)
 
 
 @njit(error_model="numpy")
 def complex_entries(which, count, panel, weights, table, columns, stride, found):
     """As `real_entries`, of complex propagators: the imaginary part of an entry is `columns` slots further on."""
-    points, node = int(panel[POINTS]), int(panel[NODE])
+    points, node, last, apart = int(panel[POINTS]), int(panel[NODE]), columns * columns - 1, columns * stride
     for k in range(min(TILE, count - which)):
         at = int(panel[WEIGHTS]) + 2 * points * (which + k)
-        for c in range(columns):
-            for r in range(columns):
-                slot = 2 * columns * c + r
-                real, imaginary = broadcast(0.0, LANES), broadcast(0.0, LANES)
-                for j in range(points):
-                    u, v = load(weights, at + 2 * j, LANES), load(weights, at + 2 * j + 1, LANES)
-                    x, y = table[slot * stride + node + j], table[(slot + columns) * stride + node + j]
-                    real = fma(u, x, fma(v, -y, real))
-                    imaginary = fma(u, y, fma(v, x, imaginary))
-                store(found, TILE * slot + k, real)
-                store(found, TILE * (slot + columns) + k, imaginary)
+        for entry in range(0, last + 1, 2):
+            other = min(entry + 1, last)
+            one, two = entry + entry // columns * columns, other + other // columns * columns
+            p, q, zero = one * stride + node, two * stride + node, broadcast(0.0, LANES)
+            real_p, imaginary_p, real_q, imaginary_q = zero, zero, zero, zero
+            for j in range(points):
+                u, v = load(weights, at + 2 * j, LANES), load(weights, at + 2 * j + 1, LANES)
+                x, y = table[p + j], table[p + apart + j]
+                real_p, imaginary_p = fma(u, x, fma(v, -y, real_p)), fma(u, y, fma(v, x, imaginary_p))
+                x, y = table[q + j], table[q + apart + j]
+                real_q, imaginary_q = fma(u, x, fma(v, -y, real_q)), fma(u, y, fma(v, x, imaginary_q))
+            store(found, TILE * one + k, real_p)
+            store(found, TILE * (one + columns) + k, imaginary_p)
+            store(found, TILE * two + k, real_q)
+            store(found, TILE * (two + columns) + k, imaginary_q)
 
 
 @njit(error_model="numpy")
@@ -184,19 +188,19 @@ def own_entries(which, count, panel, table, entries, stride, found):
 def product(first, k, travellers, found, columns, parts):
     """Apply the propagators of register k of `found` to the deviations of one register."""
     moved = address(found, TILE * columns * parts * LANES)
-    for r in range(parts):
-        store(moved, r, broadcast(0.0, LANES))
-    for c in range(columns):
-        x = load(travellers, first + c, LANES)
-        for r in range(parts):
-            store(moved, r, fma(load(found, TILE * (parts * c + r) + k, LANES), x, load(moved, r, LANES)))
+    for r in range(columns):
+        real, imaginary = broadcast(0.0, LANES), broadcast(0.0, LANES)
+        for c in range(columns):
+            a, x = load(found, TILE * (parts * c + r) + k, LANES), load(travellers, first + c, LANES)
+            real = fma(a, x, real)
+            if parts > columns:
+                b, y = (
+                    load(found, TILE * (parts * c + columns + r) + k, LANES), load(travellers, first + columns + c, LANES)
+                )  # fmt: skip
+                real, imaginary = fma(-b, y, real), fma(a, y, fma(b, x, imaginary))
+        store(moved, r, real)
         if parts > columns:
-            y = load(travellers, first + columns + c, LANES)
-            for r in range(columns):
-                real = load(found, TILE * (parts * c + r) + k, LANES)
-                imaginary = load(found, TILE * (parts * c + columns + r) + k, LANES)
-                store(moved, r, fma(-imaginary, y, load(moved, r, LANES)))
-                store(moved, columns + r, fma(real, y, load(moved, columns + r, LANES)))
+            store(moved, columns + r, imaginary)
     for r in range(parts):
         store(travellers, first + r, load(moved, r, LANES))
 
@@ -212,7 +216,7 @@ def transport(panel, weights, table, exponents, travellers, lifts, found, column
         if int(panel[POINTS]) == 0:
             own_entries(which, count, panel, table, columns * parts, stride, found)
         elif parts == columns:
-            real_entries(which, count, panel, weights, table, columns * parts, stride, found)
+            real_entries(which, count, panel, weights, table, columns, stride, found)
         else:
             complex_entries(which, count, panel, weights, table, columns, stride, found)
         for k in range(min(TILE, count - which)):

@@ -244,9 +244,7 @@ class Batches:
         rates = self.sums[:whole, :, strengths] / (self.per_batch * self.block * self.unit)
         if freedom < FEWEST:
             return np.full(rates.shape[1:], np.inf)
-        parts = np.zeros((freedom, *rates.shape[1:]))
-        for wave, rate in zip(_waves(freedom, whole), rates, strict=True):
-            parts += wave[:, None, None] * rate
+        parts = np.tensordot(_waves(freedom, whole), rates, axes=(0, 0))
         return np.asarray(stdtrit(freedom, ndtr(2.0)) / 2.0 * np.sqrt((parts**2).mean(axis=0) / whole))
 
     def error(self, strengths: slice = ALL) -> np.ndarray:
@@ -271,5 +269,5 @@ class Batches:
 @lru_cache(maxsize=8)
 def _waves(count: int, batches: int) -> np.ndarray:
     """The lowest terms (batches, count) of the orthonormal cosine transform of some batches, but the mean."""
-    angles = [[math.pi * j * (k + 0.5) / batches for j in range(1, count + 1)] for k in range(batches)]
-    return math.sqrt(2.0 / batches) * np.array([[math.cos(angle) for angle in row] for row in angles])
+    angles = np.outer(np.arange(batches) + 0.5, np.arange(1, count + 1)) * (math.pi / batches)
+    return math.sqrt(2.0 / batches) * np.cos(angles)

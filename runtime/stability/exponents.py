@@ -473,9 +473,14 @@ def average(orbits: Orbits, averaging: Averaging, reporter: Reporter) -> tuple[n
     length : float
         Time averaged over.
     """
-    batches = Batches(orbits.unit, orbits.block)
+    batches, steps = Batches(orbits.unit, orbits.block), np.zeros(())
     for left in averaging.rounds(batches, lambda: batches.largest_error(averaging.precision), reporter):
-        parts = batches.ahead(left)
-        for growth, blocks in zip(orbits.growths(parts), parts, strict=True):
+        if batches.blocks == 0:
+            growths, steps = orbits.tried(left)
+            parts = np.ones(len(growths), dtype=np.int64)
+        else:
+            parts = batches.ahead(left)
+            growths = orbits.growths(parts)
+        for growth, blocks in zip(growths, parts, strict=True):
             batches.add(growth, int(blocks))
-    return batches.mean(), np.hypot(batches.error_by_start(), orbits.error_of_steps()), batches.time
+    return batches.mean(), np.hypot(batches.error_by_start(), steps), batches.time

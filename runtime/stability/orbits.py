@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -31,10 +31,10 @@ NODES, PARTS = (13, 21, 29, 37, 61), (1, 2, 4, 8, 16)
 BLOCKS, FREE_BLOCKS = (8.0, 4.0, 2.0, 1.0), (1.0, 0.5, 0.25, 0.125)
 """Lengths of a block that are tried, in periods of the drive and in units of 2 pi."""
 
-STEP, BLOCK = 200, 40_000
+STEP, BLOCK = 200, 60_000
 """Multiplications that take as long as a step of a deviation, and as a block without any."""
 
-BESIDE = 6
+BESIDE = 42
 """Nodes that cost a strength as much as what else is done for it in a block."""
 
 FAR = 300.0
@@ -290,22 +290,31 @@ class Orbits:
         """
         return self.integrator.follow(self.block * self.unit, batches, self.travellers)
 
-    def error_of_steps(self) -> np.ndarray:
-        """Advance by TRIED blocks.
+    def tried(self, most: int) -> tuple[np.ndarray, np.ndarray]:
+        """Advance by TRIED blocks, or by fewer.
+
+        Parameters
+        ----------
+        most : int
+            Most blocks.
 
         Returns
         -------
-        ndarray, shape (starts, m)
+        growths : ndarray, shape (blocks, starts, m)
+            Logarithm of the growth of each deviation over each block.
+        error : ndarray, shape (starts, m)
             The error of growth rates that is due to the steps (`averages.error_of_steps`).
         """
-        usual, looser, one = [], [], np.ones(1, dtype=np.int64)
-        for _ in range(TRIED):
-            vectors = self.travellers.vectors.copy()
-            with self.integrator.loosened(SLACK):
-                looser.append(self.growths(one)[0])
-            self.travellers.vectors[:] = vectors
+        usual, states, vectors, one = [], [], [], np.ones(1, dtype=np.int64)
+        for _ in range(min(most, TRIED)):
+            states.append(self.integrator.state)
+            vectors.append(self.travellers.vectors.copy())
             usual.append(self.growths(one)[0])
-        return error_of_steps(usual, looser, self.block * self.unit)
+        beside = self.integrator.beside(np.concatenate(states), SLACK)
+        travellers = replace(self.travellers, vectors=np.concatenate(vectors))
+        length = self.block * self.unit
+        looser = beside.follow(length, one, travellers)[0].reshape(-1, *usual[0].shape)
+        return np.array(usual), error_of_steps(usual, looser, length)
 
 
 def _joined(scene: Scene, strengths: np.ndarray) -> Scene:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -280,6 +280,24 @@ class VariationalIntegrator:
         """
         self.control[[Control.RTOL, Control.ATOL]] *= ratio
 
+    def beside(self, state: np.ndarray, ratio: float) -> VariationalIntegrator:
+        """Return an integrator with the same deviations along other orbits, with looser tolerances.
+
+        Parameters
+        ----------
+        state : ndarray, shape (cells, dimension)
+            States of the orbits, a multiple of those of this integrator; each takes the parameters of one in turn.
+        ratio : float
+            Looser over usual tolerance.
+        """
+        times = len(state) // len(self.state)
+        numbers, period, vectors = (
+            np.concatenate([part] * times) for part in (self.numbers, self.period, self.vectors)
+        )
+        other = replace(self, state=state, numbers=numbers, period=period, vectors=vectors, control=self.control.copy())
+        other.loosen(ratio)
+        return other
+
     @contextmanager
     def loosened(self, ratio: float) -> Iterator[None]:
         """Multiply the tolerances of what is integrated inside; states, deviations and tolerances are as before after it.
@@ -321,11 +339,10 @@ class VariationalIntegrator:
         end, sums, counts = np.empty((cells, dimension)), np.empty((cells, 4)), np.zeros((cells, 6), dtype=np.int64)
         given = (self.state, self.numbers, spans, self.control, self.strengths, vectors, growth, end, sums, counts)
         rest = (*given, *panels)
-        cuts = np.linspace(0, cells, min(cells, self.workers) + 1).astype(int)
-        if len(cuts) == 2:
+        if min(cells, self.workers) == 1:
             self.kernel.drive(0, cells, *rest)
         else:
-            self._share(cuts, rest)
+            self._share(np.linspace(0, cells, min(cells, self.workers) + 1).astype(int), rest)
         bad = np.flatnonzero(counts[:, 0] != Status.FINISHED)
         if len(bad):
             status = Status(int(counts[bad[0], 0]))
