@@ -6,7 +6,6 @@ Stable ranges are grey; the published ranges of two oscillators are drawn beside
 from __future__ import annotations
 
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -44,8 +43,6 @@ HIGHEST = 1.2
 MARKED = 60
 """Most strengths that are marked; more would cover the line."""
 
-_KEPT: WeakKeyDictionary[FigureRuns, dict[Scene, MSF]] = WeakKeyDictionary()
-
 
 def curve(scene: Scene, runs: FigureRuns) -> MSF:
     """Return the master stability function of a scene's oscillator on 0 … HIGHEST.
@@ -62,11 +59,8 @@ def curve(scene: Scene, runs: FigureRuns) -> MSF:
     MSF
     """
     pair = scene.replace(topology=topology("chain", 2), initial=None, axes=(), record=None, title="", sigma=0.0)
-    kept = _KEPT.setdefault(runs, {})
-    if pair not in kept:
-        alpha = np.linspace(0.0, HIGHEST, min(runs.quality.points or 241, 241))
-        kept[pair] = msf(pair, alpha, **effort(runs))
-    return kept[pair]
+    alpha = np.linspace(0.0, HIGHEST, min(runs.quality.points or 241, 241))
+    return runs.once(("msf", pair), lambda: msf(pair, alpha, **effort(runs)))
 
 
 def effort(runs: FigureRuns) -> dict[str, Any]:
@@ -77,8 +71,7 @@ def effort(runs: FigureRuns) -> dict[str, Any]:
         "periods": 5.0 * quality.criterion.transient,
         "transient": 200.0,
         "starts": min(quality.criterion.starts, 4),
-        "workers": runs.workers,
-        "show_progress": runs.show_progress,
+        **runs.options,
     }
 
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Hashable
+from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
-from typing import Any
+from threading import Event, Lock
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -15,12 +18,15 @@ from synchain.models.sweeps.axis import Axis
 from ..prediction.intervals import Interval, scale
 from ..results.result import Result
 from ..support.execution import Execution
+from ..support.progress import Progress
 from ..sweeps.run import run
 from ..synchronisation.criterion import QUICK as FIRST_LOOK
 from ..synchronisation.criterion import Criterion
 from ..synchronisation.threshold import Sweep, probe, project, simulate
 
 __all__ = ["FULL", "QUICK", "FigureRuns", "Quality", "thin"]
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,14 +67,14 @@ QUICK = Quality(241, 121, FIRST_LOOK, 2e-3, (5,))
 
 
 class FigureRuns:
-    """Runs each scene once and keeps the result for all figures.
+    """Computes what figures share once, also for figures in threads of their own.
 
     Parameters
     ----------
     quality : Quality
         Resolution of the figures.
     workers : int, optional
-        Number of threads; all cores by default.
+        Number of threads of a run; all cores by default.
     show_progress : bool or None
         Whether to show a progress bar for each run; None shows it on terminals only.
     """
@@ -77,25 +83,41 @@ class FigureRuns:
         self, quality: Quality = FULL, *, workers: int | None = None, show_progress: bool | None = False
     ) -> None:
         self.quality = quality
-        self.workers = workers
-        self.show_progress = show_progress
-        self._runs: dict[Scene, Result] = {}
-        self._sweeps: dict[Scene, Sweep] = {}
+        self.execution = Execution(workers, show_progress=show_progress, progress=self._heed)
+        self._lock, self._stopped = Lock(), Event()
+        self._made: dict[Hashable, Future[Any]] = {}
+
+    def stop(self) -> None:
+        """End what runs in other threads: it raises KeyboardInterrupt."""
+        self._stopped.set()
+
+    def _heed(self, progress: Progress) -> None:
+        if self._stopped.is_set():
+            raise KeyboardInterrupt
+
+    def once(self, what: Hashable, make: Callable[[], T]) -> T:
+        """Return what `make` returned when `what` was first asked for; other threads wait for it."""
+        with self._lock:
+            own = what not in self._made
+            made = self._made.setdefault(what, Future())
+        if own:
+            try:
+                made.set_result(make())
+            except BaseException as problem:
+                made.set_exception(problem)
+        found: T = made.result()
+        return found
 
     def run(self, scene: Scene) -> Result:
         """Run a scene on its own axes, thinned to the quality."""
         scene = thin(scene, self.quality.points).replace(title="")
-        if scene not in self._runs:
-            self._runs[scene] = run(scene, workers=self.workers, show_progress=self.show_progress)
-        return self._runs[scene]
+        return self.once(("run", scene), lambda: run(scene, **self.options))
 
     def pair(self, scene: Scene) -> Sweep:
         """Run the two-oscillator probe of a scene's oscillator over alpha from 0 to 1.2."""
         pair = scene.replace(topology=topology("chain", 2), initial=None, axes=(), title="", sigma=0.0)
-        if pair not in self._sweeps:
-            alpha = 2.0 * np.array(thin(_swept(pair, 0.6, 601), self.quality.grid).axes[0].values)
-            self._sweeps[pair] = probe(pair, alpha, **self._options())
-        return self._sweeps[pair]
+        alpha = 2.0 * np.array(thin(_swept(pair, 0.6, 601), self.quality.grid).axes[0].values)
+        return self.once(("pair", pair), lambda: probe(pair, alpha, **self._options()))
 
     def network(self, scene: Scene) -> Sweep:
         """Simulate a scene's network on its own grid of sigma to find its synchronous ranges."""
@@ -103,10 +125,9 @@ class FigureRuns:
             found = self.pair(scene)
             return Sweep(0.5 * found.x, found.error, found.share, tuple(scale(found.intervals, 0.5)))
         scene = thin(scene, self.quality.grid).replace(title="")
-        if scene not in self._sweeps:
-            sigma = np.array(scene.axes[0].values)
-            self._sweeps[scene] = simulate(scene.replace(axes=(), record=("sync_error",)), sigma, **self._options())
-        return self._sweeps[scene]
+        sigma = np.array(scene.axes[0].values)
+        one = scene.replace(axes=(), record=("sync_error",))
+        return self.once(("network", scene), lambda: simulate(one, sigma, **self._options()))
 
     def after(self, scene: Scene, sigma: np.ndarray, transient: float) -> Sweep:
         """Simulate a scene's network after a transient of another length.
@@ -138,12 +159,18 @@ class FigureRuns:
         largest = max(abs(value) for value in scene.spectrum.values)
         return _swept(scene, round(1.2 / largest, 3), 301)
 
+    @property
+    def options(self) -> dict[str, Any]:
+        """Who does the work of a public function, as its keywords."""
+        done_by = self.execution
+        return {"workers": done_by.workers, "show_progress": done_by.show_progress, "progress": done_by.progress}
+
     def _options(self) -> dict[str, Any]:
         """Options of probes and simulations."""
         return {
             "resolution": self.quality.resolution,
             "criterion": self.quality.criterion,
-            "execution": Execution(self.workers, show_progress=self.show_progress),
+            "execution": self.execution,
         }
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 
@@ -15,6 +17,9 @@ from .style import context, new_figure, save
 from .tables import as_csv
 
 __all__ = ["make"]
+
+AT_ONCE = 2
+"""Figures that are computed at a time."""
 
 
 def make(
@@ -59,15 +64,30 @@ def make(
     folder = output_folder(out)
     runs = FigureRuns(QUICK if quick else FULL, workers=workers)
     written: list[Path] = []
-    with Reporter(len(wanted), show_progress, unit="figure") as reporter:
-        for drawing in reporter.each(wanted):
-            written += produce(drawing, runs, folder)
+    with Reporter(len(wanted), show_progress, unit="figure") as reporter, _computed(wanted, runs) as computed:
+        for drawing, data in zip(wanted, reporter.each(computed), strict=True):
+            written += produce(drawing, data, folder)
     return written
 
 
-def produce(drawing: Drawing, runs: FigureRuns, folder: Path) -> list[Path]:
-    """Compute one figure and write its files: first the numbers, then the drawing."""
-    data = drawing.compute(runs)
+@contextmanager
+def _computed(wanted: Sequence[Drawing], runs: FigureRuns) -> Iterator[Iterator[object]]:
+    """The data of figures in turn.
+
+    They are computed AT_ONCE at a time, so that compilation and spectra of one do not leave the cores idle. What runs
+    is stopped if the caller does not go on, at Ctrl-C for one.
+    """
+    with ThreadPoolExecutor(min(AT_ONCE, runs.execution.size)) as pool:
+        try:
+            yield pool.map(lambda drawing: drawing.compute(runs), wanted)
+        except BaseException:
+            runs.stop()
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def produce(drawing: Drawing, data: object, folder: Path) -> list[Path]:
+    """Write the files of one figure: first the numbers, then the drawing."""
     texts = {f"{drawing.name}.csv": as_csv(drawing.table(data))}
     ranges, document = drawing.ranges(data), drawing.document(data)
     if ranges is not None:

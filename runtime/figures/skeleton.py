@@ -112,7 +112,15 @@ def compute(name: str, runs: FigureRuns) -> Skeleton:
     grid = runs.quality.grid
     values, looks = (values, looks) if grid is None else (max(3, (grid + 1) // 3), max(1, grid // 12))
     swept = scene.replace(axes=(Axis.between("omega", LOW, HIGH, cloud),))
-    found = skeleton(scene.replace(axes=()), "omega", np.linspace(LOW, HIGH, values), PERIODS, looks)
+    found = skeleton(
+        scene.replace(axes=()),
+        "omega",
+        np.linspace(LOW, HIGH, values),
+        PERIODS,
+        looks,
+        show_progress=runs.execution.show_progress,
+        progress=runs.execution.progress,
+    )
     return Skeleton(Diagram(runs.run(swept), "omega", ()), tuple(_placed(scene, branch) for branch in found))
 
 

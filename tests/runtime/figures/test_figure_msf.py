@@ -89,13 +89,15 @@ def test_one_function_serves_every_figure_of_the_same_runs_and_no_other(simulati
 
 
 def test_effort_follows_the_quality() -> None:
-    assert exponent.effort(FigureRuns(Quality(), workers=3)) == {
+    runs = FigureRuns(Quality(), workers=3)
+    assert exponent.effort(runs) == {
         "precision": 1e-3,
         "periods": 5000.0,
         "transient": 200.0,
         "starts": 4,
         "workers": 3,
         "show_progress": False,
+        "progress": runs.execution.progress,
     }
     quick = exponent.effort(FigureRuns(QUICK))
     assert quick["precision"] > 1e-3

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import math
 import struct
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Barrier, Event
 from typing import Any
 
 import matplotlib as mpl
@@ -14,6 +18,7 @@ import pytest
 from figure_samples import TINY, Simulation, drawn, pretend, rows, words
 
 from synchain.models.scenes.file import load_scene, scene_names
+from synchain.models.scenes.scene import Scene
 from synchain.runtime.figures import Drawing, load, names, projection, style, sync_error
 from synchain.runtime.figures import make as maker
 from synchain.runtime.figures.figure_runs import FULL, QUICK, FigureRuns, Quality, thin
@@ -21,6 +26,7 @@ from synchain.runtime.figures.make import make
 from synchain.runtime.figures.tables import Table, as_csv
 from synchain.runtime.support import progress
 from synchain.runtime.support.status import Status
+from synchain.runtime.sweeps.run import run
 
 PAPER = (
     "figure_1b",
@@ -71,7 +77,7 @@ def test_every_figure_keeps_the_contract(name: str) -> None:
 
 
 def test_bars_of_figures_are_those_of_all_functions(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], simulation: Simulation
 ) -> None:
     monkeypatch.setattr(maker, "produce", lambda *given: [])
     for shown in (False, True):
@@ -157,6 +163,88 @@ def test_the_bar_is_shown_when_wanted(
     assert capsys.readouterr().err == ""
     make(["figure_4a"], tmp_path, show_progress=True)
     assert "1/1" in capsys.readouterr().err
+
+
+# -- several at a time -------------------------------------------------------------------------------------------
+
+
+class Pretended:
+    """A drawing whose data a function of its runs makes."""
+
+    def __init__(self, name: str, compute: Callable[[FigureRuns], object]) -> None:
+        self.name, self.compute = name, compute
+
+
+def written(
+    monkeypatch: pytest.MonkeyPatch,
+    folder: Path,
+    produce: Callable[[Pretended, object, Path], list[Path]] = lambda drawing, data, folder: [],
+    workers: int = 2,
+    **figures: Callable[[FigureRuns], object],
+) -> None:
+    """Make figures whose data functions make."""
+    drawings = {name: Pretended(name, compute) for name, compute in figures.items()}
+    monkeypatch.setattr(maker, "load", drawings.__getitem__)
+    monkeypatch.setattr(maker, "produce", produce)
+    make(list(figures), folder, workers=workers, show_progress=False)
+
+
+def test_two_figures_are_computed_at_a_time(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    both = Barrier(2, timeout=20.0)
+    written(monkeypatch, tmp_path, a=lambda runs: both.wait(), b=lambda runs: both.wait())
+
+
+def test_one_worker_computes_one_figure_at_a_time(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    running, most = [], []
+
+    def compute(runs: FigureRuns) -> None:
+        running.append(1)
+        time.sleep(0.05)
+        most.append(len(running))
+        running.pop()
+
+    written(monkeypatch, tmp_path, workers=1, a=compute, b=compute, c=compute)
+    assert most == [1, 1, 1]
+
+
+def test_an_interrupt_ends_the_figures_of_other_threads(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    begun, ended = Event(), []
+
+    def long(runs: FigureRuns) -> None:
+        begun.set()
+        scene, end = Scene("van_der_pol", transient=0.0, window=1.0), time.monotonic() + 20.0
+        try:
+            while time.monotonic() < end:
+                run(scene, **runs.options)
+        except KeyboardInterrupt:
+            ended.append(True)
+            raise
+
+    def interrupted(drawing: Pretended, data: object, folder: Path) -> list[Path]:
+        assert begun.wait(20.0)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        written(monkeypatch, tmp_path, interrupted, a=lambda runs: None, b=long)
+    assert ended == [True]
+
+
+def test_figures_at_a_time_share_their_runs() -> None:
+    runs, made, both = FigureRuns(TINY), [], Barrier(2, timeout=20.0)
+
+    def make_it() -> object:
+        time.sleep(0.1)
+        made.append(object())
+        return made[0]
+
+    def ask(_: int) -> object:
+        both.wait()
+        return runs.once("this", make_it)
+
+    with ThreadPoolExecutor(2) as pool:
+        first, second = pool.map(ask, range(2))
+    assert first is second is made[0]
+    assert len(made) == 1
 
 
 def test_a_table_has_rows_as_long_as_its_head() -> None:
