@@ -315,8 +315,9 @@ PYTHON: dict[str, Any] = {
     "any_lane": bool, "lane_bits": int, "absolute": abs, "maximum": _maximum, "minimum": _minimum, "np": np, "math": math,
     "sign": lambda x: (x > 0) - (x < 0),
 }  # fmt: skip
-FLOATS = {**PYTHON, **{n: getattr(math, n) for n in ("exp", "log", "sin", "cos", "atan", "tanh", "sqrt", "floor")}}
-DIGITS = {**PYTHON, **{n: getattr(mpmath, n) for n in ("exp", "log", "sin", "cos", "atan", "tanh", "sqrt", "floor")}}
+SAME = ("exp", "log", "sin", "cos", "atan", "atan2", "tanh", "asinh", "erf", "sqrt", "floor")
+FLOATS = {**PYTHON, **{n: getattr(math, n) for n in SAME}}
+DIGITS = {**PYTHON, **{n: getattr(mpmath, n) for n in SAME}}
 """What generated text calls, on Python floats and on mpmath numbers."""
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from typing import Any
 
 import sympy as sp
@@ -11,7 +11,7 @@ from synchain.models.dynamics.equations import Equations
 
 from ..program.expressions import Expression, Load, Name, Number, Product, Slice, call, plus
 from ..program.printers import NUMPY
-from ..program.statements import Array, Do, Return, Statement, Store, let, whole
+from ..program.statements import Array, Do, Return, Statement, Store, called, let, whole
 from .body import (
     check_inertia,
     is_unrolled,
@@ -67,29 +67,30 @@ def to_python(equations: Equations, values: Mapping[str, float] | None = None) -
     arguments = "".join(f", {name}={value}" if value else f", {name}" for name, value in given.items())
     after = "" if known or not given else f", args=({next(iter(given))}, …)"
     use = f'solve_ivp(rhs, (0.0, 100.0), start, method="Radau", jac=jac{after}, rtol=1e-8, atol=1e-10)'
+    check_inertia(model, "python")
+    rhs: list[Statement] = [let("rates", call("np.empty_like", "state"))]
+    rhs += rhs_statements(model, reads=False) if small else _rhs(model)
+    rhs += _solved(model, small, Name("rates"))
+    jac = _jac(model, small, given)
+    pattern = SPARSITY if small or not model.inertial else COUPLED
+    kind = "DIMENSION x DIMENSION" if small else "a sparse matrix"
     lines = [f"# {line}".rstrip() for line in header(equations, model, changed, known)]
-    lines += ["#", f"# Use: {use}", "", *_imports(model, small), ""]
+    lines += ["#", f"# Use: {use}", "", *_imports(model, small, called([*rhs, *jac])), ""]
     lines += [
         f"NODES, DIMENSION = {model.n}, {model.dimension}",
         f"STATE = {_state(model)}",
         *_tables(model, small),
         "",
     ]
-    check_inertia(model, "python")
-    rhs: list[Statement] = [let("rates", call("np.empty_like", "state"))]
-    rhs += rhs_statements(model, reads=False) if small else _rhs(model)
-    rhs += _solved(model, small, Name("rates"))
     lines += _function("rhs", arguments, "Return d(state)/dt, DIMENSION numbers.", rhs)
-    jac = _jac(model, small, given)
-    pattern = SPARSITY if small or not model.inertial else COUPLED
-    kind = "DIMENSION x DIMENSION" if small else "a sparse matrix"
     return "\n".join([*lines, *_function("jac", arguments, f"Return d(rates)/d(state), {kind}.", jac), *pattern]) + "\n"
 
 
-def _imports(model: Equations, small: bool) -> list[str]:
+def _imports(model: Equations, small: bool, functions: Set[str]) -> list[str]:
     solver = "from numpy.linalg import solve" if small else "from scipy.sparse.linalg import spsolve as solve"
-    functions = ["from scipy.sparse import csc_matrix", *([solver] if model.inertial else [])]
-    return ["import numpy as np", *sorted(functions)]
+    lines = ["from scipy.sparse import csc_matrix", *([solver] if model.inertial else [])]
+    lines += ["from scipy.special import erf"] if "erf" in functions else []
+    return ["import numpy as np", *sorted(lines)]
 
 
 def _jac(model: Equations, small: bool, given: Mapping[str, str]) -> list[Statement]:

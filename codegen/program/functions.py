@@ -12,7 +12,7 @@ FUNCTIONS: dict[type, str] = {
     sp.exp: "exp", sp.log: "log", sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.sinh: "sinh", sp.cosh: "cosh",
     sp.tanh: "tanh", sp.asin: "asin", sp.acos: "acos", sp.atan: "atan", sp.asinh: "asinh", sp.acosh: "acosh",
     sp.atanh: "atanh", sp.atan2: "atan2", sp.floor: "floor", sp.ceiling: "ceiling", sp.Abs: "absolute",
-    sp.sign: "sign", sp.Max: "maximum", sp.Min: "minimum",
+    sp.sign: "sign", sp.Max: "maximum", sp.Min: "minimum", sp.erf: "erf",
 }  # fmt: skip
 """What a program calls the functions of SymPy; a square root is called "sqrt"."""
 
@@ -23,18 +23,15 @@ def _named(prefix: str, **own: str) -> Mapping[str, str]:
     return {name: own.get(name, prefix + name) for name in NAMES}
 
 
-LANES: Mapping[str, str] = {
-    name: name
-    for name in ("exp", "log", "sin", "cos", "atan", "tanh", "absolute", "sign", "maximum", "minimum", "floor", "sqrt")
-}
+LANES = _named("")
 """The functions on lanes."""
 
 C99 = _named("", absolute="fabs", maximum="fmax", minimum="fmin", ceiling="ceil")
 """The functions of math.h, and one that the text defines: sign."""
 
 NUMPY = _named("np.", asin="np.arcsin", acos="np.arccos", atan="np.arctan", asinh="np.arcsinh", acosh="np.arccosh",
-               atanh="np.arctanh", atan2="np.arctan2", absolute="np.abs", ceiling="np.ceil")  # fmt: skip
-"""The functions of NumPy."""
+               atanh="np.arctanh", atan2="np.arctan2", absolute="np.abs", ceiling="np.ceil", erf="erf")  # fmt: skip
+"""The functions of NumPy, and one of SciPy: erf."""
 
 MATH = _named("math.", absolute="abs", sign="np.sign", maximum="max", minimum="min", ceiling="math.ceil")
 """The functions of Python's math that Numba compiles."""

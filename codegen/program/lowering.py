@@ -41,10 +41,9 @@ class UnprintableError(ValueError):
 
 
 class Lowering:
-    """The rules of lanes: no power function, so powers are products and roots; constants are folded."""
+    """The rules of lanes: powers are products and roots where they can be; constants are folded."""
 
     names: Mapping[str, str] = functions.LANES
-    powers = "integer or half-integer powers, or exp and log"
 
     def __call__(self, e: sp.Expr) -> Expression:
         """Return the expression as a tree.
@@ -101,9 +100,13 @@ class Lowering:
 
     def general_power(self, base: sp.Expr, exponent: sp.Expr) -> Expression:
         """A power whose exponent is neither negative nor a half."""
-        if exponent.is_Integer and exponent <= 16:
-            return Product((self(base),) * int(exponent))
-        raise UnprintableError(f"no printing rule for the power {base**exponent}; use {self.powers}")
+        if not exponent.is_Integer:
+            return call("exp", self(exponent * sp.log(base)))
+        if exponent > 16:
+            raise UnprintableError(
+                f"no printing rule for the power {base**exponent}; expected whole exponents up to 16"
+            )
+        return Product((self(base),) * int(exponent))
 
     def function(self, e: sp.Expr) -> Expression:
         """The call of a function; Max and Min of several are nested pairs."""

@@ -1,4 +1,4 @@
-"""Further elementary functions of lanes, which Taylor steps call once a step: for their first coefficients alone.
+"""Further elementary functions of lanes.
 
 They are made of those in codegen/simd/elementary.py.  `ERF` and `ERFCX` are our own Chebyshev fits in 40-digit arithmetic;
 beside each stands its error.
@@ -12,9 +12,23 @@ from numba.extending import intrinsic
 
 from .elementary import atan, cos, exp, expm1, lane_function, log, sin
 from .lane_types import INT64, Lane, constant, vector
-from .lanes import absolute, copysign, fma, minimum, select, sqrt
+from .lanes import absolute, copysign, floor, fma, maximum, minimum, select, sqrt
 
-__all__ = ["acos", "asin", "cosh", "erf", "power", "power_of_two", "sinh", "tan"]
+__all__ = [
+    "acos",
+    "acosh",
+    "asin",
+    "asinh",
+    "atan2",
+    "atanh",
+    "ceiling",
+    "cosh",
+    "erf",
+    "power",
+    "power_of_two",
+    "sinh",
+    "tan",
+]
 
 ERF = (
     1.1283791670955126, -0.37612638903183543, 0.11283791670945006, -0.02686617064323777, 0.0052239776071164225,
@@ -63,6 +77,62 @@ def asin(x):
 def acos(x):
     """Inverse cosine; NaN beyond [-1, 1]."""
     return 2.0 * atan(sqrt((1.0 - x) / (1.0 + x)))
+
+
+@lane_function
+def _log_of_more(x):
+    """log(1 + x) for x >= 0; what 1 + x was rounded by counts to first order."""
+    more = 1.0 + x
+    return select(more < 1e300, log(more) - ((more - 1.0) - x) / more, log(x))
+
+
+@lane_function
+def asinh(x):
+    """Inverse hyperbolic sine."""
+    size = absolute(x)
+    low = minimum(size, 1e9)
+    square = low * low
+    value = _log_of_more(low + square / (1.0 + sqrt(1.0 + square)))
+    value = select(size > 1e9, log(size) + 0.6931471805599453, value)
+    return select(x == x, copysign(value, x), x)
+
+
+@lane_function
+def acosh(x):
+    """Inverse hyperbolic cosine; NaN below 1."""
+    over = x - 1.0
+    low = minimum(over, 1e9)
+    value = _log_of_more(low + sqrt(low * (low + 2.0)))
+    value = select(over > 1e9, log(x) + 0.6931471805599453, value)
+    return select(over >= 0.0, value, (x - x) / (x - x))
+
+
+@lane_function
+def atanh(x):
+    """Inverse hyperbolic tangent; infinite at -1 and 1, NaN beyond."""
+    size = absolute(x)
+    value = 0.5 * _log_of_more(2.0 * size / (1.0 - size))
+    value = select(size == 1.0, 1.0 / (1.0 - size), value)
+    return select(size <= 1.0, copysign(value, x), (x - x) / (x - x))
+
+
+@lane_function
+def atan2(y, x):
+    """The angle of the point (x, y), from -pi to pi."""
+    high, wide = absolute(y), absolute(x)
+    steep = high > wide
+    large = maximum(high, wide)
+    ratio = minimum(high, wide) / select(large > 0.0, large, 1.0)
+    angle = atan(select(high == wide, select(large > 0.0, 1.0, 0.0), ratio))  # of infinite ones too
+    angle = select(steep, 1.5707963267948966 - angle, angle)
+    angle = select(copysign(1.0 + 0.0 * angle, x) < 0.0, 3.141592653589793 - angle, angle)
+    return select((x == x) & (y == y), copysign(angle, y), x + y)
+
+
+@lane_function
+def ceiling(x):
+    """The next whole number above."""
+    return -floor(-x)
 
 
 @lane_function

@@ -16,9 +16,8 @@ from sympy.functions.elementary.piecewise import Piecewise
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.jumps import JUMPING, KINKED, jumps
+from synchain.models.mechanics.jumps import KINKED, jumps
 
-from ..program import functions
 from ..program.expressions import ONE, ZERO, Expression, Name, Negation, Number
 from ..program.lowering import lower
 from ..program.passes import Names
@@ -49,14 +48,15 @@ __all__ = ["STARTS", "Graph", "Template", "is_analytic", "is_linear", "jump", "s
 
 STARTS: dict[type[sp.Expr], str] = {
     sp.exp: "exp", sp.log: "log", sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.sinh: "sinh", sp.cosh: "cosh",
-    sp.tanh: "tanh", sp.atan: "atan", sp.asin: "asin", sp.acos: "acos", sp.erf: "erf",
+    sp.tanh: "tanh", sp.atan: "atan", sp.asin: "asin", sp.acos: "acos", sp.asinh: "asinh", sp.acosh: "acosh",
+    sp.atanh: "atanh", sp.erf: "erf",
 }  # fmt: skip
 """The analytic functions, and the function of lanes that gives the first coefficient.
 
 The others follow from the derivative that SymPy knows.
 """
 
-ODD = (sp.sin, sp.tan, sp.sinh, sp.tanh, sp.atan, sp.asin, sp.erf)
+ODD = (sp.sin, sp.tan, sp.sinh, sp.tanh, sp.atan, sp.asin, sp.asinh, sp.atanh, sp.erf)
 EVEN = (sp.cos, sp.cosh)
 
 STEADY = ("sin", "cos")
@@ -67,14 +67,18 @@ PLAIN = 3
 
 
 def jump(equations: Equations) -> sp.Expr | None:
-    """Return a part of some equations that jumps in the states or in time, or is a root at a kink; None if there is none."""
+    """Return a part of some equations without a series in the states or in time; None if there is none."""
     return next((part for own, moving in _templates(equations) for part in _unserial(own, moving)), None)
 
 
 def is_analytic(equations: Equations) -> bool:
     """True if no rate has a jump or a kink in the states or in time."""
-    parts, known = (*JUMPING, *KINKED, Piecewise), _templates(equations)
-    return not any(part.free_symbols & moving for own, moving in known for e in own for part in e.atoms(*parts))
+    return not any(
+        part.free_symbols & moving and type(part) not in STARTS
+        for own, moving in _templates(equations)
+        for e in own
+        for part in e.atoms(sp.Function, *KINKED)
+    )
 
 
 def _templates(equations: Equations) -> Iterator[tuple[Sequence[sp.Expr], set[sp.Symbol]]]:
@@ -95,11 +99,14 @@ def is_linear(equations: Equations) -> bool:
 
 
 def _unserial(expressions: Sequence[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:
-    """The parts without series: those that jump, and roots at a kink."""
+    """The parts without series: those that jump, roots at a kink, and functions without a recurrence."""
+    known = (*STARTS, *KINKED, Piecewise)
+    functions = {part for e in expressions for part in e.atoms(sp.Function) if not isinstance(part, known)}
     powers = {part for e in expressions for part in e.atoms(sp.Pow) if part.base.free_symbols & moving}
     roots = [p for p in powers if p.exp.is_integer is not True]
     roots = [p for p in roots if any(isinstance(f, (*KINKED, Piecewise)) for f in sp.Mul.make_args(p.base))]
-    return sorted([*jumps(expressions, moving), *roots], key=sp.default_sort_key)
+    unknown = (part for part in functions if part.free_symbols & moving)
+    return sorted({*jumps(expressions, moving), *roots, *unknown}, key=sp.default_sort_key)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +122,7 @@ class Template:
         symbols = frozenset(moving)
         for part in _unserial(expressions, symbols):
             raise ValueError(
-                f"taylor: a function that jumps, or has no series at its kink; found {part}; expected continuous functions, "
+                f"taylor: a function that jumps, or has no series; found {part}; expected continuous functions, "
                 f"analytic on either side of a kink; use integrator dop853 or rodas5p"
             )
         shared, reduced = sp.cse(expressions, symbols=supply, order="canonical")
@@ -327,18 +334,7 @@ class Graph:
         number, rest = e.as_coeff_Mul()
         if number != 1:
             return times(self.constant(number), self.constant(rest))
-        return self.named(e, _text(self.printable(e)))
-
-    def printable(self, e: sp.Expr) -> sp.Expr:
-        """The same constant with names for the values that the printer has no rule for."""
-        if not e.args or e.is_number:
-            return e
-        e = e.func(*(self.printable(a) for a in e.args))
-        if e.is_Pow and e.base != sp.E and not (2 * e.exp).is_Integer:
-            return sp.Symbol(self.named(e, f"power({_text(e.base)}, {_text(e.exp)})").text, real=True)
-        if type(e) in STARTS and functions.FUNCTIONS.get(type(e)) not in functions.LANES:
-            return sp.Symbol(self.named(e, f"{STARTS[type(e)]}({_text(e.args[0])})").text, real=True)
-        return e
+        return self.named(e, _text(e))
 
     def named(self, e: sp.Expr, text: str) -> Name:
         """The name of a constant, which is computed once."""
@@ -395,9 +391,6 @@ class Graph:
 
     def function(self, e: sp.Expr) -> Series:
         """A function of one argument, even and odd ones of the argument without its sign."""
-        if type(e) not in STARTS:
-            known = ", ".join(sorted(STARTS.values()))
-            raise ValueError(f"taylor: no recurrence for {type(e).__name__} in {e}; known: {known}, sqrt, powers")
         argument = self.of(e.args[0])
         factor, inner = split(argument)
         if factor == Number(-1.0) and type(e) in (*ODD, *EVEN):

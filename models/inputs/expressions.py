@@ -19,8 +19,8 @@ EXPONENT, MAGNITUDE = 16, 1e100
 
 FUNCTIONS: Mapping[str, Any] = {
     "abs": sp.Abs, "acos": sp.acos, "acosh": sp.acosh, "asin": sp.asin, "asinh": sp.asinh, "atan": sp.atan,
-    "atan2": sp.atan2, "atanh": sp.atanh, "ceiling": sp.ceiling, "cos": sp.cos, "cosh": sp.cosh, "exp": sp.exp,
-    "floor": sp.floor, "log": sp.log, "max": sp.Max, "min": sp.Min, "sign": sp.sign, "sin": sp.sin, "sinh": sp.sinh,
+    "atan2": sp.atan2, "atanh": sp.atanh, "ceiling": sp.ceiling, "cos": sp.cos, "cosh": sp.cosh, "erf": sp.erf,
+    "exp": sp.exp, "floor": sp.floor, "log": sp.log, "max": sp.Max, "min": sp.Min, "sign": sp.sign, "sin": sp.sin, "sinh": sp.sinh,
     "sqrt": sp.sqrt, "tan": sp.tan, "tanh": sp.tanh,
 }  # fmt: skip
 """The functions that a model may call, by their names in text; generated code knows the same ones."""

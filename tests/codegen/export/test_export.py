@@ -53,7 +53,15 @@ def one_way(n: int) -> Equations:
     """A one-way ring whose weights are no units, each node with every function that has a counterpart."""
     x, y, a, b = real("x", "y", "a", "b")
     smooth = (
-        sp.tan(x / 3) + sp.sinh(x) - sp.cosh(y) * sp.tanh(a * y) + sp.asin(x / 4) - sp.acos(y / 5) + sp.asinh(b * x)
+        sp.tan(x / 3)
+        + sp.sinh(x)
+        - sp.cosh(y) * sp.tanh(a * y)
+        + sp.asin(x / 4)
+        - sp.acos(y / 5)
+        + sp.asinh(b * x)
+        + sp.erf(x)
+        - sp.acosh(2 + x**2)
+        + sp.atanh(sp.sin(y) / 2)
     )
     kinks = sp.Max(x, y, a) - sp.Min(x * y, b) + sp.atan2(x, 3 + y) + sp.floor(10 * x) - sp.ceiling(7 * y)
     chosen = sp.Piecewise((x**2, sp.And(x > y, x < 2)), (y**5 / 7, sp.Or(y >= 1, y <= -1)), (sp.Rational(1, 3), True))

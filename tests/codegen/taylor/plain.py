@@ -35,7 +35,7 @@ WORDS: dict[str, Any] = {
     "absolute": np.abs, "maximum": np.fmax, "minimum": np.fmin, "fma": lambda a, b, c: a * b + c, "truncated": _kept(-(1 << 44)),
     "power": np.power, "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "sin": np.sin, "cos": np.cos, "tan": np.tan,
     "sinh": np.sinh, "cosh": np.cosh, "tanh": np.tanh, "atan": np.arctan, "asin": np.arcsin, "acos": np.arccos,
-    "erf": special.erf, "math": math, "WIDTH": 1, "DENSE": False,
+    "asinh": np.arcsinh, "acosh": np.arccosh, "atanh": np.arctanh, "erf": special.erf, "math": math, "WIDTH": 1, "DENSE": False,
 }  # fmt: skip
 
 

@@ -1,0 +1,47 @@
+"""Every function that a model may call, in steps of stages, beside SciPy; series of functions have tests of their own."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.special import erf
+
+import synchain as sc
+from synchain.models.inputs.expressions import FUNCTIONS
+
+SMOOTH = (
+    "acos(x/9) - acosh(2 + x*x) + asin(x/9) - asinh(3*x) + atan(x) - atanh(x/9) + cos(x) - cosh(x/3) + erf(2*x)"
+    " - exp(x/3) + log(3 + x) - sin(x) + sinh(x/4) - sqrt(3 + x) + tan(x/9) - tanh(x) + (3 + x)**(1/3) - 2**x"
+    " + (3 + v)**(x/5)"
+)
+KINKED = "abs(x)*abs(v) + max(x, 0)*x - min(x, v)*v"
+ROUGH = "atan2(x, 3 + v) + 0*floor(9 + x/9)*ceiling(x/9 - 9) + 0*sign(9 + x) - 0*max(x, v)"
+OTHERWISE = {
+    "acos": np.arccos, "acosh": np.arccosh, "asin": np.arcsin, "asinh": np.arcsinh, "atan": np.arctan,
+    "atan2": np.arctan2, "atanh": np.arctanh, "abs": abs, "ceiling": np.ceil, "cos": np.cos, "cosh": np.cosh, "erf": erf,
+    "exp": np.exp, "floor": np.floor, "log": np.log, "max": max, "min": min, "sign": np.sign, "sin": np.sin,
+    "sinh": np.sinh, "sqrt": np.sqrt, "tan": np.tan, "tanh": np.tanh,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", [SMOOTH, f"{KINKED} + {ROUGH}"], ids=["smooth", "rough"])
+def test_all_functions_of_models_run(text: str) -> None:
+    field = sc.Field({"x": "v", "v": f"-x - v/5 + ({text})/9"}, initial={"x": 0.5, "v": 0.1})
+    integrator = "rodas5p" if text == SMOOTH else "auto"
+    settings = {"transient": 0.0, "window": 2.0, "time_unit": "time", "rtol": 1e-10, "integrator": integrator}
+    found = sc.run(sc.Scene(field, **settings), show_progress=False)
+
+    def rates(t: float, y: np.ndarray) -> list[float]:
+        x, v = y
+        return [v, -x - v / 5 + eval(text, {**OTHERWISE, "x": x, "v": v}) / 9]
+
+    exact = solve_ivp(rates, (0.0, 2.0), [0.5, 0.1], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    np.testing.assert_allclose(found.end.values.ravel(), exact, rtol=0.0, atol=1e-8)
+
+
+def test_no_function_is_left_out() -> None:
+    called = set(re.findall(r"([a-z0-9]+)\(", f"{SMOOTH} {KINKED} {ROUGH}"))
+    assert called == set(FUNCTIONS)
