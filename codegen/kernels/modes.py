@@ -167,9 +167,7 @@ class Parts:
         made = cls(stages)
         states = {sp.Symbol(name, real=True) for name in variation.orbit.state} | {TIME}
         for key, e in variation.matrix:
-            rest = e.xreplace(dict.fromkeys(variation.parameters, sp.S.Zero))
-            terms = [(rest, sp.S.One), *((e.diff(s), s) for s in variation.parameters)]
-            made.rows[key] = [(made.slot(c, states), s) for c, s in terms if c != 0]
+            made.rows[key] = [(made.slot(c, states), s) for c, s in variation.parts(e)]
         return made
 
     def slot(self, coefficient: sp.Expr, states: set[sp.Symbol]) -> sp.Expr:

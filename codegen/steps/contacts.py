@@ -14,7 +14,7 @@ from synchain.models.mechanics.friction import Contact
 
 from ..program.expressions import ZERO, Compare, Expression, Load, Name, Number, Product, call, plus
 from ..program.lowering import lower
-from ..program.passes import Body, Hoist, Names, share
+from ..program.passes import Hoist, Names, share
 from ..program.statements import Assign, Function, If, Role, Statement, accumulate, let, store
 from .fields import assigned
 from .names import NAMES
@@ -66,7 +66,7 @@ def _looped(equations: Equations, names: Names) -> list[Statement]:
     used = body.symbols.union(*(e.free_symbols for e in (*fixed.table, *link)))
     before = [*_parameters(equations, used), *(let(s.name, lane(lower(e))) for e, s in fixed.table.items())]
     own: list[Statement] = [let(s.name, Load("y", _place(k, "i"))) for k, s in enumerate(node.state) if s in used]
-    own += places(equations).own(body)
+    own += places(equations).own(body.symbols)
     own += assigned(body)
     own += [store("out", _place(k, "i"), lane(lower(e))) for k, e in enumerate(body.results)]
     if not force:
@@ -84,9 +84,7 @@ def _force(equations: Equations, contact: Contact) -> tuple[list[Statement], tup
     edge, swap = joint.edge, named(joint)
     velocity, mode = edge.here[1], edge.here[2]
     force = edge.rhs[1].xreplace({mode: sp.S.One, velocity: contact.speed})
-    found = link_ends(edge) + at.own(Body((), (force,)))
-    found += [let(name, load) for name, load in at.of_source(edge, force.free_symbols)]
-    found += [let(name, load) for name, load in at.of_link(force.free_symbols)]
+    found = [*link_ends(edge), *at.of_link(edge, force.free_symbols)]
     for place, states in (("i", edge.here), ("j", edge.there)):
         found += [let(swap[s].name, Load("y", _place(k, place))) for k, s in enumerate(states) if force.has(s)]
     found.append(let("f_link", lower(force.xreplace(swap))))

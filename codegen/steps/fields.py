@@ -80,7 +80,7 @@ class MeanField:
         used = {s for e in self.sums.values() for s in e.free_symbols}
         body = share([e.xreplace(swap) for e in self.sums.values()], names)
         there = self.states(places, base, "_there", "j")
-        there += [let(name, load) for name, load in places.of_source(self.edge, used)]
+        there += places.of_source(self.edge, used)
         there += assigned(body)
         for total, e in zip(self.sums, body.results, strict=True):
             found += [let(total.name, 0.0 * Name("h")), let(f"{total}_rest", 0.0 * Name("h"))]
@@ -93,7 +93,7 @@ class MeanField:
         found += [let(s.name, lower(e.xreplace(NOW))) for s, e in self.shared.items()]
         own = {e: sp.Symbol(f"{s}_own", real=True) for s, e in self.alike.items()}
         body = share([e.xreplace(own).xreplace(swap) for e in self.rates], names)
-        here = self.states(places, base, "_here", "i") + places.own(body)
+        here = [*self.states(places, base, "_here", "i"), *places.own(body.symbols)]
         here += [let(f"{s}_own", Load("dense", place + "i")) for s, place in at.items()]
         here += assigned(body)
         for c, e in enumerate(body.results):

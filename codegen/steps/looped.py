@@ -17,7 +17,6 @@ from synchain.models.mechanics.components import Block
 from ..integrators import Integrator
 from ..program.expressions import Expression, Load, Name, Product, Value, call, linear, negative, plus, scaled
 from ..program.lowering import lower
-from ..program.passes import Body
 from ..program.statements import (
     Assign,
     Do,
@@ -114,7 +113,7 @@ class Looped(Step):
         """The right-hand side of the nodes of one kind."""
         body = self.kinds[kind.number].rhs
         left = [f"f_{s.name}" for s in kind.node.state]
-        found = self.places.read(kind.node, base) + self.places.own(body)
+        found = self.places.read(kind.node, base) + self.places.own(body.symbols)
         found += self.node_call("node", kind.number, body, left, {})
         for c, (name, e) in enumerate(zip(left, body.results, strict=True)):
             value = lane(lower(e)) if self.is_plain(e) else Name(name)
@@ -140,10 +139,8 @@ class Looped(Step):
 
     def link(self, joint: Joint, base: str, used: tuple[sp.Expr, ...], states: bool = True) -> list[Statement]:
         """The ends of a link, its weight, the parameters that `used` uses, and the states of both ends."""
-        read, body = self.places.read, Body((), used)
-        found = link_ends(joint.edge) + self.places.own(body)
-        found += [let(name, load) for name, load in self.places.of_source(joint.edge, body.symbols)]
-        found += [let(name, load) for name, load in self.places.of_link(body.symbols)]
+        read, symbols = self.places.read, {s for e in used for s in e.free_symbols}
+        found = [*link_ends(joint.edge), *self.places.of_link(joint.edge, symbols)]
         if states:
             found += read(joint.target, base, "_here", "i") + read(joint.source, base, "_there", "j")
         return found
@@ -200,7 +197,7 @@ class Looped(Step):
         size, place = len(state), self.places.place
         names = [f"f_{r.name}" for r in state] + [entry(r, c) for r in state for c in state]
         names += [f"ft_{r.name}" for r in state]
-        found = self.places.read(kind.node, "y") + self.places.own(body)
+        found = self.places.read(kind.node, "y") + self.places.own(body.symbols)
         found += self.node_call("node_linear", kind.number, body, names, {})
         named = [e if self.is_plain(e) else sp.Symbol(k, real=True) for k, e in zip(names, body.results, strict=True)]
         for c in range(size):
@@ -359,9 +356,9 @@ class LoopMass:
 
     def node(self, kind: Kind, used: Block, base: str) -> list[Statement]:
         """What some masses of a node are made of: its states and its own parameters."""
-        w, results = self.writer, tuple(e for row in used for e in row)
+        w, symbols = self.writer, {s for row in used for e in row for s in e.free_symbols}
         states = [] if kind.node.constant_inertia else w.places.read(kind.node, base)
-        return states + w.places.own(Body((), results))
+        return [*states, *w.places.own(symbols)]
 
     # -- explicit methods -------------------------------------------------------------------------------------
 

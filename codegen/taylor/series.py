@@ -108,8 +108,6 @@ class Constant(Series):
 class State(Series):
     """A state variable: its coefficient k comes from coefficient k - 1 of its rate, outside this file."""
 
-    rate: Series | None = None
-
 
 @dataclass(eq=False, slots=True)
 class Time(Series):
