@@ -65,10 +65,10 @@ def _looped(equations: Equations, names: Names) -> list[Statement]:
     force, link = _force(equations, node.contact)
     used = body.symbols.union(*(e.free_symbols for e in (*fixed.table, *link)))
     before = [*_parameters(equations, used), *(let(s.name, lane(lower(e))) for e, s in fixed.table.items())]
-    own: list[Statement] = [let(s.name, Load("y", _place(k, "i"))) for k, s in enumerate(node.state) if s in used]
-    own += places(equations).own(body.symbols)
-    own += assigned(body)
-    own += [store("out", _place(k, "i"), lane(lower(e))) for k, e in enumerate(body.results)]
+    at = places(equations)
+    own: list[Statement] = [let(s.name, Load("y", at.place(k))) for k, s in enumerate(node.state) if s in used]
+    own += [*at.own(body.symbols), *assigned(body)]
+    own += [store("out", at.place(k), lane(lower(e))) for k, e in enumerate(body.results)]
     if not force:
         return [*before, nodes.over(own)]
     unpacked = Assign(NAMES, Name("graph"), whole=True)
@@ -86,9 +86,9 @@ def _force(equations: Equations, contact: Contact) -> tuple[list[Statement], tup
     force = edge.rhs[1].xreplace({mode: sp.S.One, velocity: contact.speed})
     found = [*link_ends(edge), *at.of_link(edge, force.free_symbols)]
     for place, states in (("i", edge.here), ("j", edge.there)):
-        found += [let(swap[s].name, Load("y", _place(k, place))) for k, s in enumerate(states) if force.has(s)]
+        found += [let(swap[s].name, Load("y", at.place(k, place))) for k, s in enumerate(states) if force.has(s)]
     found.append(let("f_link", lower(force.xreplace(swap))))
-    return [*found, *(accumulate("out", _place(k, "i"), "f_link") for k in FORCES)], (force,)
+    return [*found, *(accumulate("out", at.place(k), "f_link") for k in FORCES)], (force,)
 
 
 def event_functions(variation: Variation, names: Names) -> list[Function]:
@@ -132,10 +132,6 @@ def _gained(entries: Sequence[Entry], size: int, names: Names) -> list[Statement
         rows.setdefault(row, []).append(Product((lower(e), register("modes", size, column))))
     stores = [store("modes", size * Name("which") + row, plus(*terms)) for row, terms in rows.items()]
     return [*assigned(body), *stores]
-
-
-def _place(c: int, index: str) -> Expression:
-    return c * Name("NODES") + index
 
 
 def _parameters(equations: Equations, used: set[sp.Symbol]) -> list[Statement]:

@@ -38,8 +38,7 @@ from .mass import added_masses, momentum_slopes, turned_masses
 from .names import NAMES
 from .places import Joint, Kind, link_ends, named, places, span
 from .program import Program
-from .step import NOW, Step, lane, time_term
-from .unrolled import entry
+from .step import NOW, Step, lane, linearised
 
 __all__ = ["Looped"]
 
@@ -195,9 +194,7 @@ class Looped(Step):
         """Slopes, matrix entries and time slopes of the nodes of one kind."""
         body, state = self.kinds[kind.number].linear, kind.node.state
         size, place = len(state), self.places.place
-        names = [f"f_{r.name}" for r in state] + [entry(r, c) for r in state for c in state]
-        names += [f"ft_{r.name}" for r in state]
-        found = self.places.read(kind.node, "y") + self.places.own(body.symbols)
+        names, found = linearised(state), [*self.places.read(kind.node, "y"), *self.places.own(body.symbols)]
         found += self.node_call("node_linear", kind.number, body, names, {})
         named = [e if self.is_plain(e) else sp.Symbol(k, real=True) for k, e in zip(names, body.results, strict=True)]
         for c in range(size):
@@ -234,8 +231,8 @@ class Looped(Step):
                 found += self.load_stages(place, m.big_c[i])
                 more, terms = self.mass.known(place, terms[0], linear(m.big_c[i], self.stages(i)))
                 found += more
-            if m.d[i] != 0.0 and row in self.timed_rows:
-                terms.append(time_term(m.d[i], Load("dense", plus(Name("TIME_SLOPE"), place))))
+            if row in self.timed_rows:
+                terms += self.time_slope(i, Load("dense", plus(Name("TIME_SLOPE"), place)))
             self.put(rows.over([*found, store("dense", plus(Name(f"K{i + 1}"), place), plus(*terms))]))
         if i > 0:
             self.mass.carried(i)
@@ -275,9 +272,7 @@ class Looped(Step):
         found += [let("total", Name("total") + "e"), let("error", call("maximum", "error", "e"))]
         dense: list[Statement] = self.load_stages(PLACE, [0.0] * self.early + [1.0] * late)
         for j, row in enumerate(m.dense):
-            value = lane(linear(row, values))
-            scaled_value = value if m.implicit else Product((Name("h"), value))
-            dense.append(store("dense", j * Name("DIMENSION") + PLACE, scaled_value))
+            dense.append(store("dense", j * Name("DIMENSION") + PLACE, self.dense_value(row, values)))
         self.put(STATES.over([*found, If(Name("DENSE"), tuple(dense))]))
         self.put(Return((Name("error") + 0.0 * Name("total"),), "NaN or infinite where any estimate is"))
 

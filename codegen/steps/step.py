@@ -12,7 +12,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
 from ..integrators import Integrator
-from ..program.expressions import Expression, Load, Name, Negation, Number, Product, Value, call, linear
+from ..program.expressions import ZERO, Expression, Load, Name, Negation, Number, Product, Value, call, linear
 from ..program.lowering import lower
 from ..program.passes import Body
 from ..program.statements import Assign, Comment, Function, Return, Role, Statement, let, operations
@@ -23,12 +23,13 @@ __all__ = [
     "PAIR",
     "SCALED",
     "Step",
+    "entry",
     "function_name",
     "function_of",
     "lane",
+    "linearised",
     "node_function",
     "prefix",
-    "time_term",
 ]
 
 LARGEST_INLINED = 400
@@ -79,12 +80,15 @@ def prefix(vector: str) -> str:
     return "" if vector == "y" else f"{vector}_"
 
 
-def time_term(weight: float, slope: Expression) -> Expression:
-    """weight * h * slope with its sign in front."""
-    if isinstance(slope, Negation):
-        weight, slope = -weight, slope.value
-    term = Product((Number(abs(weight)), Name("h"), slope))
-    return Negation(term) if weight < 0 else term
+def entry(r: sp.Symbol, c: sp.Symbol) -> str:
+    """The name of d(rhs of r)/dc: j_vx, and j_speed_by_place where letters run together."""
+    return f"j_{r.name}{c.name}" if len(r.name) == len(c.name) == 1 else f"j_{r.name}_by_{c.name}"
+
+
+def linearised(state: Sequence[sp.Symbol]) -> list[str]:
+    """The names of rates, of the entries of their Jacobian row by row, and of their time derivatives."""
+    entries = (entry(r, c) for r in state for c in state)
+    return [*(f"f_{r.name}" for r in state), *entries, *(f"ft_{r.name}" for r in state)]
 
 
 class Step(ABC):
@@ -192,6 +196,21 @@ class Step(ABC):
         """What a row of coefficients adds to the state at the start: stages of explicit methods are rates."""
         total = linear(row, values)
         return total if self.method.implicit else Product((Name("h"), total))
+
+    def dense_value(self, row: Sequence[float], values: Sequence[str]) -> Expression:
+        """What a row of the dense output holds of a state: stages of explicit methods are rates."""
+        value = lane(linear(row, values))
+        return value if self.method.implicit else Product((Name("h"), value))
+
+    def time_slope(self, i: int, slope: Expression) -> list[Expression]:
+        """What a time slope adds to stage i of an implicit method."""
+        weight = self.method.d[i]
+        if weight == 0.0 or slope == ZERO:
+            return []
+        if isinstance(slope, Negation):
+            weight, slope = -weight, slope.value
+        term = Product((Number(abs(weight)), Name("h"), slope))
+        return [Negation(term) if weight < 0 else term]
 
     def stiff_error(self, error: Value, last: Expression, share: Expression) -> Expression:
         """The error of a state, at least that of its dense output times 1 - 2 share: the share that is not stiff.

@@ -15,9 +15,9 @@ from ..program.statements import If, Return, let, store
 from .blocks import NodeBlocks
 from .elimination import Entries, plan, times, write_factors, write_solve
 from .mass import Mass
-from .step import NOW, Step, lane, prefix, time_term
+from .step import NOW, Step, entry, lane, linearised, prefix
 
-__all__ = ["Unrolled", "entry", "stage_state"]
+__all__ = ["Unrolled", "stage_state"]
 
 
 class Unrolled(Step):
@@ -108,8 +108,7 @@ class Unrolled(Step):
         own: list[dict[str, sp.Expr]] = []
         for i in range(eq.n):
             states, body, at = eq.node_at(i).state, self.first_of(self.of(i)), self.at(i, "y")
-            words = [f"f_{r}" for r in states] + [entry(r, c) for r in states for c in states]
-            words += [f"ft_{r}" for r in states] if implicit else []
+            words = linearised(states)[: len(body.results)]
             names = [f"{word}_{i + 1}" for word in words]
             function = "node_linear" if implicit else "node_local"
             self.put(*self.node_call(function, eq.kind_of[i], body, names, at))
@@ -215,9 +214,7 @@ class Unrolled(Step):
             terms = [known.get(name, Name(f"f_{name}"))]
             if i > 0 and name not in known:
                 terms.append(Product((Name("rate"), sums[name])))
-            if m.d[i] != 0.0 and self.time_slopes[slot] != ZERO:
-                terms.append(time_term(m.d[i], self.time_slopes[slot]))
-            self.let(f"r_{name}", plus(*terms))
+            self.let(f"r_{name}", plus(*terms, *self.time_slope(i, self.time_slopes[slot])))
             rights[slot], results[slot] = f"r_{name}", f"k{i + 1}_{name}"
         self.put(*write_solve(self.steps, self.factors, rights, results))
 
@@ -236,8 +233,7 @@ class Unrolled(Step):
                 self.stage(i)
             for j, row in enumerate(m.dense):
                 for slot, name in enumerate(self.state):
-                    value = lane(linear(row, self.stages(name, len(row))))
-                    value = value if m.implicit else Product((Name("h"), value))
+                    value = self.dense_value(row, self.stages(name, len(row)))
                     self.put(store("dense", j * len(self.state) + slot, value))
             if m.dense_error:
                 self.stiff_errors()
@@ -283,11 +279,6 @@ def stage_state(row: Sequence[float], previous: Sequence[float], name: str) -> E
     if len(previous) > 0 and tuple(row) == (*previous, 1.0):
         return Name(f"u_{name}") + names[-1]
     return linear(row, names, name)
-
-
-def entry(r: sp.Symbol, c: sp.Symbol) -> str:
-    """The name of d(rhs of r)/dc: j_vx, and j_speed_by_place where letters run together."""
-    return f"j_{r.name}{c.name}" if len(r.name) == len(c.name) == 1 else f"j_{r.name}_by_{c.name}"
 
 
 def size(e: sp.Expr) -> Expression:
