@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import sympy as sp
@@ -38,6 +38,7 @@ __all__ = [
     "default_width",
     "describe",
     "emit",
+    "module",
     "node_functions",
 ]
 
@@ -161,7 +162,6 @@ def emit(
     _check_records(equations, records, section, watched, multiplicity)
     width = default_width(equations, method) if width is None else width
     ordered = tuple(r for r in Record if r in records)
-    weights = tuple(multiplicity) if multiplicity is not None and "sync_error" in ordered else None
     looped = _is_looped(equations, method, unroll)
     if looped:
         method = _for_many(method, equations, unroll)
@@ -180,12 +180,8 @@ def emit(
         *_section(equations, plain, section if "section" in ordered else None),
         *watched.functions(equations, plain),
     ]
-    if chosen.cuts or watched:
-        functions.append(driver.text("dense"))
-    if watched.has_rates:
-        functions.append(driver.text("slope"))
-    text = "\n\n\n".join([*functions, *map(LANES.function, events)]) + "\n"
-    head = describe(equations, plain, method, (*ordered, *watched.words(equations)), count)
+    functions += [driver.text("dense")] if chosen.cuts or watched else []
+    functions += [driver.text("slope")] if watched.has_rates else []
     constants = {
         "WIDTH": width,
         "DENSE": bool(ordered or watched) or (plain.sticks and not method.series),
@@ -193,15 +189,28 @@ def emit(
     }
     if looped:
         constants |= {"NODES": plain.n, "DIMENSION": plain.dimension, "DENSE_ROWS": method.dense_rows}
-    named = "\n".join(f"{name} = {value}" for name, value in (*constants.items(), *watched.tables(equations).items()))
-    code = "\n\n\n".join([imports(f"{named}\n{text}"), named, text])
-    sizes = _dimensions(plain, method, scratch)._replace(
-        observed=watched.count(equations),
-        sections=len(watched.sections) or int("section" in ordered),
-        kept=watched.kept,
+    return KernelSource(
+        describe(equations, plain, method, (*ordered, *watched.words(equations)), count),
+        module({**constants, **watched.tables(equations)}, functions, events),
+        equations,
+        method,
+        chosen,
+        _dimensions(plain, method, scratch)._replace(
+            observed=watched.count(equations),
+            sections=len(watched.sections) or int("section" in ordered),
+            kept=watched.kept,
+        ),
+        (1,) * equations.n if multiplicity is None or "sync_error" not in ordered else tuple(multiplicity),
+        elimination,
+        rule_of(method) if watched.observed else (),
     )
-    rule = rule_of(method) if watched.observed else ()
-    return KernelSource(head, code, equations, method, chosen, sizes, weights or (1,) * equations.n, elimination, rule)
+
+
+def module(constants: Mapping[str, object], steps: Sequence[str], events: Sequence[Function]) -> str:
+    """The code of a kernel: what it imports, its constants, the functions of its steps, and those of events."""
+    named = "\n".join(f"{name} = {value}" for name, value in constants.items())
+    text = "\n\n\n".join([*steps, *map(LANES.function, events)]) + "\n"
+    return "\n\n\n".join([imports(f"{named}\n{text}"), named, text])
 
 
 def _check_records(
