@@ -23,11 +23,12 @@ __all__ = [
     "Linked",
     "Place",
     "Storing",
+    "array_tables",
     "check_inertia",
     "is_unrolled",
     "link_body",
-    "link_numbers",
     "link_places",
+    "link_tables",
     "mass_body",
     "node_body",
     "node_mass_body",
@@ -103,13 +104,14 @@ def node_rate_symbols(node: Node) -> tuple[sp.Symbol, ...]:
     return tuple(sp.Symbol(f"rate_i{k}", real=True) for k in range(len(node.state)))
 
 
-def link_places(equations: Equations, link: Linked | None = None) -> tuple[dict[Place, sp.Expr], dict[Place, sp.Expr]]:
-    """The entries that a link adds to the block of its target, and those in the block (target, source)."""
+def link_places(equations: Equations, link: Linked | None = None) -> dict[tuple[bool, Place], sp.Expr]:
+    """The entries that a link adds to the block of its target, False, and those in the block (target, source), True."""
     edge = _edge(equations, link)
     if edge is None:
-        return {}, {}
-    here = _places(_at_rates(edge, edge.jacobian_here(), edge.here))
-    return here, _places(_at_rates(edge, edge.jacobian_there(), edge.there))
+        return {}
+    blocks = ((False, edge.jacobian_here(), edge.here), (True, edge.jacobian_there(), edge.there))
+    found = ((there, _places(_at_rates(edge, block, states))) for there, block, states in blocks)
+    return {(there, place): e for there, block in found for place, e in block.items()}
 
 
 def rate_symbols(edge: Edge) -> tuple[sp.Symbol, ...]:
@@ -183,11 +185,7 @@ def link_body(equations: Equations, link: Linked | None = None, jacobian: bool =
     edge = _edge(equations, link)
     if edge is None:
         return Body((), ())
-    table: dict[Any, sp.Expr] = dict(enumerate(edge.rhs))
-    if jacobian:
-        table = {
-            (there, place): e for there in (False, True) for place, e in link_places(equations, link)[there].items()
-        }
+    table: dict[Any, sp.Expr] = {**link_places(equations, link)} if jacobian else dict(enumerate(edge.rhs))
     return _body({place: e.xreplace(_weight(link)) for place, e in table.items()})
 
 
@@ -238,13 +236,20 @@ def wrapped(numbers: Iterable[str], indent: str = "    ", width: int = 110) -> l
     return [*lines, line.rstrip()]
 
 
-def link_numbers(equations: Equations) -> list[str]:
-    """For each link, if links differ in a parameter, which of its numbers is that of the link."""
-    if not equations.numbered:
-        return []
-    ((name, layer), *_) = equations.numbered.items()
-    places = {own: k for k, own in enumerate(layer.names(name))}
-    return [str(places[layer.name(name, link)]) for link in layer.links]
+def link_tables(equations: Equations) -> dict[str, list[str]]:
+    """The ends of the links and, if links differ in a parameter, which of its numbers is that of a link."""
+    tables = {name: [str(link[end]) for link in equations.links] for end, name in enumerate(("TARGET", "SOURCE"))}
+    if equations.numbered:
+        ((name, layer), *_) = equations.numbered.items()
+        places = {own: k for k, own in enumerate(layer.names(name))}
+        tables["NUMBER"] = [str(places[layer.name(name, link)]) for link in layer.links]
+    return tables
+
+
+def array_tables(equations: Equations) -> list[str]:
+    """Lines that make NumPy arrays of the tables of the links and of their weights; none without links."""
+    tables = {**link_tables(equations), "WEIGHT": weights(equations)} if equations.links else {}
+    return [line for name, table in tables.items() for line in (f"{name} = np.array([", *wrapped(table), "])")]
 
 
 def weights(equations: Equations) -> list[str]:

@@ -78,7 +78,7 @@ def jacobian_statements(equations: Equations, reads: bool = True) -> list[Statem
     body = node_body(equations, True).statements(_loads(equations, None, here, reads), store_own)
     found.append(_loop("i_", "NODES", body))
     if equations.links:
-        slots = [(there, place) for there, block in enumerate(link_places(equations)) for place in block]
+        slots = list(link_places(equations))
 
         def store_link(place: Any, value: Expression) -> Statement:
             slot = place_of(slots.index(place), "LINKS", "link_")
