@@ -15,6 +15,7 @@ from synchain.models.mechanics.components import Block, Edge, Node
 
 from ..program.expressions import Expression
 from ..program.lowering import Library, number
+from ..program.passes import real
 from ..program.statements import Statement, let
 
 __all__ = [
@@ -101,7 +102,7 @@ def node_mass_body(equations: Equations, i: int = 0) -> Body:
 
 def node_rate_symbols(node: Node) -> tuple[sp.Symbol, ...]:
     """Symbols for the rates of the states of a node."""
-    return tuple(sp.Symbol(f"rate_i{k}", real=True) for k in range(len(node.state)))
+    return tuple(real(f"rate_i{k}") for k in range(len(node.state)))
 
 
 def link_places(equations: Equations, link: Linked | None = None) -> dict[tuple[bool, Place], sp.Expr]:
@@ -117,7 +118,7 @@ def link_places(equations: Equations, link: Linked | None = None) -> dict[tuple[
 def rate_symbols(edge: Edge) -> tuple[sp.Symbol, ...]:
     """Symbols for the rates of the states at both ends of a link."""
     ends = (("i", edge.here), ("j", edge.there))
-    return tuple(sp.Symbol(f"rate_{end}{k}", real=True) for end, states in ends for k in range(len(states)))
+    return tuple(real(f"rate_{end}{k}") for end, states in ends for k in range(len(states)))
 
 
 def _at_rates(edge: Edge, block: Block, states: tuple[sp.Symbol, ...]) -> Block:
@@ -191,7 +192,7 @@ def link_body(equations: Equations, link: Linked | None = None, jacobian: bool =
 
 def parameters(equations: Equations, bodies: Iterable[Body]) -> list[int]:
     """The places, in Equations.parameters, of the parameters that all nodes share and some bodies use."""
-    used = {s.name for body in bodies for s in body.uses(_parameter_symbols(equations))}
+    used = {s.name for body in bodies for s in body.uses(map(real, equations.parameters))}
     return [k for k, name in enumerate(equations.parameters) if name in used]
 
 
@@ -202,10 +203,6 @@ def own_parameters(equations: Equations, i: int) -> dict[sp.Symbol, int]:
     return {s: names.index(f"{s.name}_{i + 1}") for s in own}
 
 
-def _parameter_symbols(equations: Equations) -> list[sp.Symbol]:
-    return [sp.Symbol(name, real=True) for name in equations.parameters]
-
-
 def _places(block: tuple[tuple[sp.Expr, ...], ...]) -> dict[Place, sp.Expr]:
     table = {(r, c): e for r, row in enumerate(block) for c, e in enumerate(row)}
     return {place: e for place, e in table.items() if e != 0}
@@ -214,7 +211,7 @@ def _places(block: tuple[tuple[sp.Expr, ...], ...]) -> dict[Place, sp.Expr]:
 def _body(table: dict, every: bool = False) -> Body:
     """Common parts are computed once: w1, w2, …, which no symbol of a portable model is called."""
     kept = {place: sp.sympify(e) for place, e in table.items() if every or e != 0}
-    names = (sp.Symbol(f"w{k}", real=True) for k in range(1, 1_000_000))
+    names = (real(f"w{k}") for k in range(1, 1_000_000))
     conditions = {pair.cond for e in kept.values() for choice in e.atoms(sp.Piecewise) for pair in choice.args}
     hidden = {
         c: sp.Symbol(f"condition {k}") for k, c in enumerate(sorted(conditions - {sp.true}, key=sp.default_sort_key))

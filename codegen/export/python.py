@@ -10,6 +10,7 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 
 from ..program.expressions import Expression, Load, Name, Number, Product, Slice, call, plus
+from ..program.passes import real
 from ..program.printers import NUMPY
 from ..program.statements import Array, Do, Return, Statement, Store, let, whole
 from .body import (
@@ -208,14 +209,14 @@ def _loads(model: Equations) -> tuple[dict[sp.Symbol, Expression], dict[sp.Symbo
     def state(index: Expression) -> Load:
         return Load("state", index, None)
 
-    varied = {sp.Symbol(name, real=True): f"np.asarray({name}, dtype=float)" for name in model.varied}
+    varied = {real(name): f"np.asarray({name}, dtype=float)" for name in model.varied}
     own: dict[sp.Symbol, Expression] = {s: state(_part(c)) for c, s in enumerate(model.node.state)}
     own |= {s: Name(text) for s, text in varied.items()}
     if model.edge is None or not model.links:
         return own, {}
     ends: dict[sp.Symbol, Expression] = {s: Load(text, Name("TARGET"), None) for s, text in varied.items()}
     for name in model.numbered:
-        ends[sp.Symbol(name, real=True)] = Load(f"np.asarray({name}, dtype=float)", Name("NUMBER"), None)
+        ends[real(name)] = Load(f"np.asarray({name}, dtype=float)", Name("NUMBER"), None)
     for index, states in (("TARGET", model.edge.here), ("SOURCE", model.edge.there)):
         ends |= {s: state(_at(c, index)) for c, s in enumerate(states)}
     return own, ends | {model.edge.weight: Name("WEIGHT")}

@@ -22,7 +22,7 @@ from ..driver.dimensions import ModeDimensions
 from ..integrators import Integrator, integrator
 from ..program.expressions import ZERO, Expression, Load, Name, Number, Product, Value, call, linear, plus
 from ..program.lowering import lower
-from ..program.passes import Names, share
+from ..program.passes import Names, real, share
 from ..program.printers import LANES
 from ..program.statements import Assign, Comment, Function, Return, Role, Statement, let, operations, store
 from ..simd import lanes
@@ -140,7 +140,7 @@ def _renamed(variation: Variation, plain: Equations) -> Variation:
     """The matrix and the events in the names that the kernel uses."""
     old = (*variation.orbit.state, *variation.orbit.parameters)
     new = (*plain.state, *plain.parameters)
-    swap = {sp.Symbol(a, real=True): sp.Symbol(b, real=True) for a, b in zip(old, new, strict=True)}
+    swap = {real(a): real(b) for a, b in zip(old, new, strict=True)}
     matrix = tuple((key, e.xreplace(swap)) for key, e in variation.matrix)
     events = None if variation.events is None else variation.events.map(lambda e: e.xreplace(swap))
     return replace(variation, orbit=plain, matrix=matrix, events=events)
@@ -162,7 +162,7 @@ class Parts:
     def of(cls, variation: Variation, stages: int) -> Parts:
         """The parts of a variation."""
         made = cls(stages)
-        states = {sp.Symbol(name, real=True) for name in variation.orbit.state} | {TIME}
+        states = {real(name) for name in variation.orbit.state} | {TIME}
         for key, e in variation.matrix:
             made.rows[key] = [(made.slot(c, states), s) for c, s in variation.parts(e)]
         return made
@@ -213,8 +213,8 @@ class Parts:
 
 def _functions(parts: Parts, state: tuple[str, ...], names: Names) -> dict[str, Function]:
     """The functions `steady`, `moving` and `bent`: coefficients, and derivatives of the moving ones along a stage."""
-    along = {sp.Symbol(s, real=True): sp.Symbol(f"along_{s}", real=True) for s in state}
-    lag = sp.Symbol("lag", real=True)
+    along = {real(s): real(f"along_{s}") for s in state}
+    lag = real("lag")
     bent = [sp.Add(*(derivative(e, s) * k for s, k in along.items()), derivative(e, TIME) * lag) for e in parts.moving]
     described = {
         "steady": ("Coefficients of the modes that do not move.", list(parts.steady)),

@@ -18,7 +18,7 @@ from ..driver.dimensions import Dimensions, ModeDimensions
 from ..integrators import Integrator, integrator
 from ..program.expressions import Load, Number, call
 from ..program.lowering import lower
-from ..program.passes import Names
+from ..program.passes import Names, real
 from ..program.printers import LANES
 from ..program.statements import Function, Return, Role, Statement, let, operations
 from ..simd import lanes
@@ -389,8 +389,8 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
     if section is None:
         return []
     renamed = zip((*equations.state, *equations.parameters), (*plain.state, *plain.parameters), strict=True)
-    swap = {_real(old): _real(new) for old, new in renamed}
-    section = section.xreplace({s: _real(s.name) for s in section.free_symbols})
+    swap = {real(old): real(new) for old, new in renamed}
+    section = section.xreplace({s: real(s.name) for s in section.free_symbols})
     used = {s.name for s in section.free_symbols}
     unknown = sorted(used - set(equations.state) - set(equations.parameters) - {"t"})
     if unknown:
@@ -402,7 +402,7 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
     for slot, (name, shown) in enumerate(zip(equations.parameters, plain.parameters, strict=True)):
         if name in used:
             body.append(let(shown, Load("y", Number(equations.dimension + slot))))
-    value = lower(section.xreplace({_real("t"): sp.Symbol("(t + theta*h)")}).xreplace(swap))
+    value = lower(section.xreplace({real("t"): sp.Symbol("(t + theta*h)")}).xreplace(swap))
     about = "The section function at the fraction theta of the step."
     return [
         Function(
@@ -413,7 +413,3 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
             role=Role.ENTRY,
         )
     ]
-
-
-def _real(name: str) -> sp.Symbol:
-    return sp.Symbol(name, real=True)

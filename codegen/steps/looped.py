@@ -17,6 +17,7 @@ from synchain.models.mechanics.components import Block
 from ..integrators import Integrator
 from ..program.expressions import Expression, Load, Name, Product, Value, call, linear, negative, plus, scaled
 from ..program.lowering import lower
+from ..program.passes import real
 from ..program.statements import (
     Assign,
     Do,
@@ -196,7 +197,7 @@ class Looped(Step):
         size, place = len(state), self.places.place
         names, found = linearised(state), [*self.places.read(kind.node, "y"), *self.places.own(body.symbols)]
         found += self.node_call("node_linear", kind.number, body, names, {})
-        named = [e if self.is_plain(e) else sp.Symbol(k, real=True) for k, e in zip(names, body.results, strict=True)]
+        named = [e if self.is_plain(e) else real(k) for k, e in zip(names, body.results, strict=True)]
         for c in range(size):
             found.append(store("dense", plus(Name("SLOPE"), place(c)), lane(lower(named[c]))))
             if self.places.row_of(c) in self.timed_rows:
@@ -387,7 +388,7 @@ class LoopMass:
         """Add d(M F)/dy of the nodes at fixed F to the matrix."""
         w = self.writer
         for kind in self.heavy:
-            rates = [sp.Symbol(f"g_{s.name}", real=True) for s in kind.node.state]
+            rates = [real(f"g_{s.name}") for s in kind.node.state]
             turned = turned_masses(kind.node, rates)
             if turned:
                 found = [*self.node(kind, turned, "y"), *w.places.read(kind.node, "RATES", prefix="g_")]
@@ -410,7 +411,7 @@ class LoopMass:
         if self.constant or not edge.inertia:
             return own
         ends = ((joint.target, "_here"), (joint.source, "_there"))
-        rates = tuple(tuple(sp.Symbol(f"g_{s.name}{suffix}", real=True) for s in node.state) for node, suffix in ends)
+        rates = tuple(tuple(real(f"g_{s.name}{suffix}") for s in node.state) for node, suffix in ends)
         turned = momentum_slopes(edge, *rates)
         here, there = (
             tuple(tuple(a - b for a, b in zip(*rows, strict=True)) for rows in zip(*blocks, strict=True))

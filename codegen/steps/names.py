@@ -11,6 +11,7 @@ import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
 
+from ..program.passes import real
 from ..simd import elementary, lanes, special
 
 __all__ = ["NAMES", "RESERVED", "tidy"]
@@ -62,10 +63,10 @@ def tidy(equations: Equations) -> Equations:
         if _clashes(s.name) or (numbered and NUMBERED.search(s.name)):
             name = _free(s.name, taken)
             taken.add(name)
-            swap[s] = sp.Symbol(name, real=True)
+            swap[s] = real(name)
     in_links = dict(swap)  # within an edge this name means the weight
     for weight in sorted(weights & own, key=str):
-        in_links[weight] = sp.Symbol(_free(f"{weight.name}_of_link", taken), real=True)
+        in_links[weight] = real(_free(f"{weight.name}_of_link", taken))
     if not in_links:
         return equations
     return equations.map_templates(

@@ -21,6 +21,7 @@ from synchain.models.graphs.links import Link
 from synchain.models.mechanics.components import Edge, Node
 
 from ..program.expressions import Expression, Load, Name, Number, Value, as_expression, plus
+from ..program.passes import real
 from ..program.statements import Assign, Loop, Statement, let, whole
 
 __all__ = [
@@ -128,7 +129,7 @@ class Places:
 
     def own(self, used: Container[sp.Symbol]) -> list[Assign]:
         """Load the parameters that a node has for itself, those `used`."""
-        return [let(name, Load("p", self.parameter(k))) for k, name in enumerate(self.varied) if _real(name) in used]
+        return [let(name, Load("p", self.parameter(k))) for k, name in enumerate(self.varied) if real(name) in used]
 
     def of_source(self, edge: Edge, used: Container[sp.Symbol], index: str = "j") -> list[Assign]:
         """Load the parameters that a link takes of its source, those `used`."""
@@ -138,7 +139,7 @@ class Places:
     def of_link(self, edge: Edge, used: Container[sp.Symbol], index: str = "j") -> list[Assign]:
         """Load the parameters `used` that differ: those of the target, those of the source, and those of the link."""
         places = ((name, Number(self.behind + k * self.links) + "e") for k, name in enumerate(self.numbered))
-        numbers = [let(name, Load("p", Load("where", at, None))) for name, at in places if _real(name) in used]
+        numbers = [let(name, Load("p", Load("where", at, None))) for name, at in places if real(name) in used]
         return [*self.own(used), *self.of_source(edge, used, index), *numbers]
 
     def entry(self, slot: str, a: int, b: int) -> Expression:
@@ -172,10 +173,6 @@ class MixedPlaces(Places):
         return self.place(self.size + number, index)
 
 
-def _real(name: str) -> sp.Symbol:
-    return sp.Symbol(name, real=True)
-
-
 def places(equations: Equations) -> Places:
     """Return where loops find the nodes and links of a network."""
     return (MixedPlaces if equations.mixed else Places)(equations)
@@ -191,11 +188,11 @@ def named(joint: Joint) -> dict[sp.Symbol, sp.Symbol]:
     """Return what the states at both ends of a link, and parameters of its source, are called in its loop."""
     ends = ((joint.edge.here, joint.target, "_here"), (joint.edge.there, joint.source, "_there"))
     states = {
-        s: sp.Symbol(f"{own.name}{suffix}", real=True)
+        s: real(f"{own.name}{suffix}")
         for symbols, node, suffix in ends
         for s, own in zip(symbols, node.state, strict=True)
     }
-    return states | {s: sp.Symbol(f"{own.name}_there", real=True) for s, own in joint.edge.theirs}
+    return states | {s: real(f"{own.name}_there") for s, own in joint.edge.theirs}
 
 
 def joint_numbers(equations: Equations) -> list[int]:

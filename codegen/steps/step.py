@@ -14,7 +14,7 @@ from synchain.models.mechanics.components import TIME
 from ..integrators import Integrator
 from ..program.expressions import ZERO, Expression, Load, Name, Negation, Number, Product, Value, call, linear
 from ..program.lowering import lower
-from ..program.passes import Body
+from ..program.passes import Body, real
 from ..program.statements import Assign, Comment, Function, Return, Role, Statement, let, operations
 from .blocks import NodeBlocks
 
@@ -35,7 +35,7 @@ __all__ = [
 LARGEST_INLINED = 400
 """Operations of a function up to which its body stands in each stage; copies of longer ones take long to compile."""
 
-NOW = {TIME: sp.Symbol("now", real=True)}
+NOW = {TIME: real("now")}
 """What the time of a stage is called in the expressions of links."""
 
 PAIR = '''
@@ -241,7 +241,7 @@ class Step(ABC):
     @property
     def varied(self) -> set[sp.Symbol]:
         """The parameters of the template that have a value for each node."""
-        return {sp.Symbol(name, real=True) for name in self.equations.varied}
+        return {real(name) for name in self.equations.varied}
 
     def arguments(self, body: Body, results: Sequence[sp.Expr]) -> list[sp.Symbol]:
         """What a node function must be given: state first, then the rest by name."""

@@ -11,6 +11,7 @@ from synchain.models.dynamics.equations import Equations
 from ..integrators import Integrator
 from ..program.expressions import ZERO, Call, Expression, Load, Name, Number, Product, call, linear, plus
 from ..program.lowering import lower
+from ..program.passes import real
 from ..program.statements import If, Return, let, store
 from .blocks import NodeBlocks
 from .elimination import Entries, plan, times, write_factors, write_solve
@@ -36,7 +37,7 @@ class Unrolled(Step):
     def at(self, i: int, base: str) -> dict[sp.Symbol, sp.Symbol]:
         """The names of the states of node i in a vector, and of the parameters that it has for itself."""
         states = self.equations.node_at(i).state
-        found = {s: sp.Symbol(f"{prefix(base)}{s.name}_{i + 1}", real=True) for s in states}
+        found = {s: real(f"{prefix(base)}{s.name}_{i + 1}") for s in states}
         return {**self.equations.at_node(i), **found}
 
     def stages(self, name: str, count: int) -> list[str]:
@@ -65,7 +66,7 @@ class Unrolled(Step):
     def links(self, base: str, out: str, at: Mapping[sp.Symbol, sp.Symbol] = NOW) -> None:
         """Add what the links contribute to the right-hand side, `at` the time of a stage or at that of the start."""
         eq, terms = self.equations, dict[str, list[Expression]]()
-        staged = {sp.Symbol(n, real=True): sp.Symbol(prefix(base) + n, real=True) for n in self.state} | dict(at)
+        staged = {real(n): real(prefix(base) + n) for n in self.state} | dict(at)
         for link, edge in eq.linked():
             for s, e in zip(eq.node_at(link[0]).state, edge.rhs, strict=True):
                 term = e.xreplace(eq.at_link(link, edge)).xreplace(staged)
@@ -117,7 +118,7 @@ class Unrolled(Step):
                 plain = self.is_plain(e)
                 if plain and k < len(states):
                     self.let(name, lower(e.xreplace(at)))
-                found[word] = (e.xreplace(at) if plain else sp.Symbol(name, real=True)).xreplace(kept)
+                found[word] = (e.xreplace(at) if plain else real(name)).xreplace(kept)
             own.append(found)
         self.links("y", "f", {})
         return own
@@ -126,7 +127,7 @@ class Unrolled(Step):
         """Keep time terms that stand for themselves in the linearisation, where stages give these names other values."""
         results = [e for blocks in self.kinds for e in self.first_of(blocks).results if self.is_plain(e)]
         moved = self.wanted([blocks.rhs for blocks in self.kinds]) & {s for e in results for s in e.free_symbols}
-        kept = {s: sp.Symbol(f"at_{s.name}", real=True) for s in sorted(moved, key=lambda s: s.name)}
+        kept = {s: real(f"at_{s.name}") for s in sorted(moved, key=lambda s: s.name)}
         self.put(*(let(there.name, here.name) for here, there in kept.items()))
         return kept
 

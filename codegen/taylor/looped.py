@@ -16,7 +16,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Block, Edge, Node
 
 from ..program.expressions import ONE, ZERO, Expression, Name, Number
-from ..program.passes import Hoist, Names
+from ..program.passes import Hoist, Names, real
 from ..program.printers import LANES
 from ..program.statements import Assign
 from ..steps.fields import MeanField, compensated, mean_fields
@@ -24,7 +24,7 @@ from ..steps.names import NAMES
 from ..steps.places import Joint, Kind, Span, places
 from .graph import Graph, Template
 from .length import finished, last_orders, reach, unseen
-from .masses import moved, solved
+from .masses import moving, solved
 from .passage import closed, first_passage, functions, jumps, loose, passed
 from .series import Constant, Series, State, Time, magnitude
 from .step import TaylorStep, broken, called, returned
@@ -295,7 +295,7 @@ def weighed(error: str, last: Mapping[int, str]) -> list[str]:
 
 def theirs(edge: Edge) -> dict[sp.Symbol, sp.Symbol]:
     """What the parameters are called that a link takes of its source."""
-    return {s: sp.Symbol(f"{own.name}_there", real=True) for s, own in edge.theirs}
+    return {s: real(f"{own.name}_there") for s, own in edge.theirs}
 
 
 def head_of(span: Span) -> str:
@@ -315,7 +315,7 @@ class LoopWriter:
         named |= {s for edge in eq.edges for s in (edge.weight, *edge.parameters)}
         words = sorted({s.name for s in named} | set(eq.parameters))
         self.called = called(words)
-        self.swap = {sp.Symbol(old, real=True): sp.Symbol(new, real=True) for old, new in self.called.items()}
+        self.swap = {real(old): real(new) for old, new in self.called.items()}
         self.names = Names([*words, *self.called.values(), *(s + end for s in words for end in ("_here", "_there"))])
         self.time = Time(name="t")
         self.waves = Section(Graph(self.names), "", "", 1)
@@ -337,7 +337,7 @@ class LoopWriter:
     @property
     def varied(self) -> list[sp.Symbol]:
         """Parameters that have a value for each node or link."""
-        return [sp.Symbol(name, real=True) for name in self.equations.differing]
+        return [real(name) for name in self.equations.differing]
 
     def node(self, kind: Kind, found: Hoisted) -> Section:
         """The rates of the nodes of a kind."""
@@ -412,7 +412,7 @@ class LoopWriter:
                 moving[s] = State(name=name)
                 section.places[moving[s]] = self.place(c, index)
             else:
-                fixed[s] = sp.Symbol(name, real=True)
+                fixed[s] = real(name)
                 section.setting.append(f"{name} = load(y, {self.place(c, index)}, WIDTH)")
         return moving, fixed
 
@@ -439,7 +439,7 @@ class LoopWriter:
         target = Section(Graph(self.names), nodes, "i", self.equations.n, adds=True)
         made = dict(zip(field.sums, found, strict=True))
         lent = {e: made[s] for s, e in field.alike.items() if made[s] in totals.graph.series}
-        borrowed = {e: sp.Symbol(series.name, real=True) for e, series in lent.items()}
+        borrowed = {e: real(series.name) for e, series in lent.items()}
         wanted = [e.xreplace(borrowed) for e in rates.rates]
         used = {s for e in wanted for s in e.free_symbols}
         moving, fixed = self.field_end(target, field, "_here", used)
@@ -475,11 +475,10 @@ class LoopWriter:
         """Where state c of a node stands."""
         return LANES.text(self.places.place(c, index))
 
-    def moves(self, node: Node) -> tuple[bool, ...]:
+    def moves(self, node: Node) -> list[bool]:
         """Which states of a node move: one at rest, such as the mode of a contact, is a constant of the step."""
-        found = [moved(node)] + [moved(joint.edge) for joint in self.places.joints if joint.target == node]
-        found += [moved(field.edge) for field in self.fields]
-        return tuple(map(any, zip(*found, strict=True)))
+        edges = [joint.edge for joint in self.places.joints if joint.target == node]
+        return moving(node, [*edges, *(field.edge for field in self.fields)])
 
     def loaded(self, loads: Sequence[Assign]) -> list[str]:
         """Lines that load parameters."""

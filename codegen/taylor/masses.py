@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from synchain.models.mechanics.components import Edge, Node
 
@@ -12,12 +12,17 @@ from ..steps.mass import added_masses
 from .graph import Graph, split
 from .series import Constant, Row, Series, Unknown
 
-__all__ = ["moved", "solved"]
+__all__ = ["moving", "solved"]
 
 Factor = tuple[Expression, Series]
 
 
-def moved(part: Node | Edge) -> list[bool]:
+def moving(node: Node, edges: Iterable[Edge]) -> list[bool]:
+    """Which states of a node move, by its own rates or by links to it; one at rest, such as the mode of a contact, does not."""
+    return [any(found) for found in zip(_moved(node), *map(_moved, edges), strict=True)]
+
+
+def _moved(part: Node | Edge) -> list[bool]:
     """Which states a node or a link can move: by a right-hand side, or by masses that couple them to others."""
     blocks = [added_masses(part)] if isinstance(part, Node) else part.inertia
     coupled = [[any(e != 0 for e in row) for row in block] for block in blocks if block]

@@ -6,6 +6,7 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import compress
 
 import sympy as sp
 
@@ -13,10 +14,10 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Edge, Node
 
 from ..program.expressions import ONE, ZERO, Expression, Name, Number
-from ..program.passes import Names
+from ..program.passes import Names, real
 from .graph import STARTS, Graph, Template
 from .length import finished, last_orders, reach, unseen
-from .masses import moved, solved
+from .masses import moving, solved
 from .passage import closed, first_passage, functions, jumps, loose, passed
 from .series import Constant, Series, State, Time, magnitude
 from .terms import absolute, add, lane, largest, show, statement, times
@@ -228,13 +229,11 @@ class StepWriter(LineWriter):
         self.supply = Names([*taken, *self.names, *own, *(s.name for edge in equations.edges for s in edge.parameters)])
         super().__init__(Graph(self.supply), order)
         self.time = Time(name="t")
-        moving = {
-            slot
-            for i, places in enumerate(equations.places)
-            for slot, moves in zip(places, moving_states(equations, i), strict=True)
-            if moves
-        }
-        self.states = {slot: State(name=self.names[slot]) for slot in sorted(moving)}
+        found = list[int]()
+        for i, places in enumerate(equations.places):
+            moves = moving(equations.node_at(i), (edge for link, edge in equations.linked() if link[0] == i))
+            found += compress(places, moves)
+        self.states = {slot: State(name=self.names[slot]) for slot in sorted(found)}
         self.noted: list[Series] = []
         self.rates = self.read()
         self.contacts, self.exact = self.read_contacts(), jumps(equations)
@@ -294,14 +293,14 @@ class StepWriter(LineWriter):
 
     def of_network(self) -> tuple[dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]]:
         """What the symbols of the whole network stand for."""
-        return self.meanings({TIME: self.time}, {s: s for s in _symbols(self.equations.state)})
+        return self.meanings({TIME: self.time}, {s: s for s in map(real, self.equations.state)})
 
     def meanings(
         self, known: dict[sp.Symbol, Series], values: Mapping[sp.Symbol, sp.Expr]
     ) -> tuple[dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]]:
         """Symbols of a template that stand for series, and those that stand for constants."""
-        slots = {s: slot for slot, s in enumerate(_symbols(self.equations.state))}
-        called = dict(zip(_symbols(self.called), _symbols(self.called.values()), strict=True))
+        slots = {s: slot for slot, s in enumerate(map(real, self.equations.state))}
+        called = {real(old): real(new) for old, new in self.called.items()}
         moving, swap = dict(known), dict[sp.Symbol, sp.Expr](called)
         for s, e in values.items():
             if slots.get(e) in self.states:
@@ -432,12 +431,6 @@ def _horner(lines: list[str], name: str, coefficients: Sequence[Expression]) -> 
     return Name(name)
 
 
-def moving_states(equations: Equations, i: int) -> tuple[bool, ...]:
-    """Which states of node i move; one at rest, such as the mode of a contact, is a constant of the step."""
-    found = [moved(equations.node_at(i))] + [moved(edge) for link, edge in equations.linked() if link[0] == i]
-    return tuple(map(any, zip(*found, strict=True)))
-
-
 def write_step(equations: Equations, order: int) -> TaylorStep:
     """Return the Taylor step of some order for equations with names that a kernel can use (`tidy`).
 
@@ -486,10 +479,6 @@ def _unlike(name: str, taken: set[str], order: int) -> str:
     while any(f"{name}_{k}" in taken for k in range(order + 1)):
         name += "_"
     return name
-
-
-def _symbols(names: Iterable[str]) -> list[sp.Symbol]:
-    return [sp.Symbol(name, real=True) for name in names]
 
 
 def _masses(node: Node) -> list[sp.Expr]:
