@@ -342,17 +342,12 @@ class LoopWriter:
     def node(self, kind: Kind, found: Hoisted) -> Section:
         """The rates of the nodes of a kind."""
         node, section = kind.node, Section(Graph(self.names), head_of(kind.span), "i", self.equations.n)
-        moving: dict[sp.Symbol, Series] = {}
-        for c, (s, moves) in enumerate(zip(node.state, self.moves(node), strict=True)):
-            if moves:
-                moving[s] = State(name=self.called[s.name])
-                section.places[moving[s]] = self.place(c)
-            else:
-                section.setting.append(f"{self.called[s.name]} = load(y, {self.place(c)}, WIDTH)")
+        moving, fixed = self.end(section, node.state, node, ("", "i"), node.state)
         used = {s for e in (*found.rates, *(e for row in node.inertia for e in row)) for s in e.free_symbols}
         section.setting += self.loaded(self.places.own(used))
         moving |= self.seen(section, self.waves, found.waves)
-        self.store(section, node, self.read(section, found.rates, moving, found.constants, node.inertia))
+        swap = {**found.constants, **fixed}
+        self.store(section, node, self.read(section, found.rates, moving, swap, node.inertia))
         if node.contact is not None:
             section.mode = self.called[node.state[2].name]
         return section
@@ -397,7 +392,7 @@ class LoopWriter:
         at: tuple[str, str],
         used: Container[sp.Symbol],
     ) -> tuple[dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]]:
-        """The states at one end of a link that are used: series of those that move, names of those at rest.
+        """The states of a node, or of one end of a link, that are used: series of those that move, names of those at rest.
 
         `at` is what stands behind their names, and the number of the node there.
         """
