@@ -66,9 +66,9 @@ class Section:
     """
 
     graph: Graph
-    head: str
-    index: str
-    count: int
+    head: str = ""
+    index: str = ""
+    count: int = 1
     setting: list[str] = field(default_factory=list)
     places: dict[Series, str] = field(default_factory=dict)
     rates: list[tuple[str, Series]] = field(default_factory=list)
@@ -103,6 +103,10 @@ class Section:
     def start(self, series: Series) -> Expression:
         """Coefficient 0 of a series."""
         return series.value if isinstance(series, Constant) else self.values[series]
+
+    def now(self, series: Series, first: bool) -> Expression:
+        """Coefficient 0 of a series, or k."""
+        return self.start(series) if first else self.of(series)
 
     def before(self, series: Series) -> Expression:
         """Coefficient k - 1 of a series."""
@@ -156,9 +160,10 @@ class Section:
 
     @property
     def remembered(self) -> set[Series]:
-        """Series whose earlier coefficients are needed."""
+        """Series whose earlier coefficients are needed, or all that is made once for other sections."""
         used = {used for s in self.graph.series for used in s.convolved}
-        return (used | {*self.graph.watched, *self.graph.positive} | self.lent) - set(self.places) - set(self.waves)
+        used |= {*self.graph.watched, *self.graph.positive, *self.lent}
+        return (used - {*self.places, *self.waves}) | (set() if self.index else {s for _, s in self.rates})
 
     # -- text -----------------------------------------------------------------------------------------------------
 
@@ -170,7 +175,7 @@ class Section:
             self.lines += [f"{name} = load(dense, {self.slot(name, '0')}, WIDTH)" for name in self.kept]
         self.lines += [f"{s.name} = {self.load(s, order)}" for s in outer]
         self.values = {s: Name(s.name) for s in outer}
-        remembered = self.remembered | ({s for _, s in self.rates} if not self.index else set())
+        remembered = self.remembered
         for s in self.graph.series:
             value = s.begin(self) if first else s.coefficient(self)
             inline = s in (self.graph.inline_start if first else self.graph.inline) and s not in remembered
@@ -186,16 +191,14 @@ class Section:
     def finish(self, first: bool) -> None:
         """Append the statements that use coefficient 0, or k, of the rates."""
         for place, rate in self.rates if self.index else ():
-            value = self.start(rate) if first else self.of(rate)
+            value = self.now(rate, first)
             if not self.adds:
                 text = f"{show(value)} + 0.0*scale" if isinstance(rate, Constant) else show(value)
                 self.lines.append(f"store(dense, at_rates + {place}, {text})")
             elif value != ZERO:
                 self.put(f"at_rates + {place}", value)
         for place, gap in zip(GAPS, self.gaps, strict=False):
-            self.put(
-                f"at_gaps + {place if first else f'k*2*NODES + {place}'}", self.start(gap) if first else self.of(gap)
-            )
+            self.put(f"at_gaps + {place if first else f'k*2*NODES + {place}'}", self.now(gap, first))
             if first:
                 self.put(f"at_sizes + {place}", magnitude(self, gap))
 
@@ -262,7 +265,7 @@ class Totals(Section):
     def finish(self, first: bool) -> None:
         """Add the coefficients to the sums; those of a constant beyond the first are zero."""
         for name, rate in self.rates:
-            value = self.start(rate) if first else self.of(rate)
+            value = self.now(rate, first)
             if value != ZERO:
                 self.lines += [
                     *statement(f"{name}_value", value),
@@ -318,7 +321,7 @@ class LoopWriter:
         self.swap = {real(old): real(new) for old, new in self.called.items()}
         self.names = Names([*words, *self.called.values(), *(s + end for s in words for end in ("_here", "_there"))])
         self.time = Time(name="t")
-        self.waves = Section(Graph(self.names), "", "", 1)
+        self.waves = Section(Graph(self.names))
         kinds, joints = self.places.kinds, self.places.joints
         nodes = [self.hoisted(with_gaps(kind.node), [*kind.node.state, *self.varied]) for kind in kinds]
         links = [self.of_links(joint.edge, with_pushes(joint)) for joint in joints]
@@ -425,7 +428,7 @@ class LoopWriter:
         found = self.read(totals, sums.rates, moving, {**sums.constants, **fixed, **theirs(field.edge)})
         totals.rates = [(s.name, series) for s, series in zip(field.sums, found, strict=True)]
         yield totals
-        combined = Section(Graph(self.names), "", "", 1)
+        combined = Section(Graph(self.names))
         moving = self.seen(combined, self.waves, shared.waves)
         moving |= self.seen(combined, combined, {s: State(name=s.name) for s in field.sums})
         common = dict(zip(field.shared, self.read(combined, shared.rates, moving, shared.constants), strict=True))
@@ -517,8 +520,8 @@ class LoopWriter:
 
     # -- text -------------------------------------------------------------------------------------------------
 
-    def write(self) -> tuple[list[str], int]:
-        """All statements, and the groups of workspace that they need."""
+    def step(self) -> TaylorStep:
+        """The step, which takes the graph and the weights of its links."""
         eq = self.equations
         orders, later = ([line for section in self.sections for line in section.text(k)] for k in "0k")
         bases, size = self.bases()
@@ -537,7 +540,8 @@ class LoopWriter:
         if not self.ends:
             lines += self.next_states(f"{1.0 / self.order!r}*scale", str(self.order))
         lines += self.closing()
-        return lines, size
+        before = [*functions(self.ends, eq.sticks), CONVOLUTION]
+        return TaylorStep.of(lines, self.order, size, ", graph, weights", before)
 
     def bases(self) -> tuple[list[str], int]:
         """Where everything stands in the workspace, and how much it takes."""
@@ -548,14 +552,11 @@ class LoopWriter:
         if eq.sticks:
             sizes |= {"gaps": (p + 1) * 2 * eq.n, "sizes": 2 * eq.n, "closing": p + 1}
         for section in self.sections:
-            kept = {
-                s.name for s in section.remembered | ({s for _, s in section.rates} if not section.index else set())
-            }
+            kept = {s.name for s in section.remembered}
             sizes |= {name: self.orders * section.count for name in sorted(kept - {"t", ""})}
             sizes |= {name: section.count for name in section.kept}
-            sizes |= (
-                dict.fromkeys((name for name, _ in section.rates), self.orders) if isinstance(section, Totals) else {}
-            )
+            if isinstance(section, Totals):
+                sizes |= {name: self.orders for name, _ in section.rates}
         lines, size = [], 0
         for name, groups in sizes.items():
             lines.append(f"at_{name} = DENSE_ROWS*DIMENSION + {size}")
@@ -621,8 +622,4 @@ def write_looped(equations: Equations, order: int) -> TaylorStep:
     if equations.inertial and equations.link_count:
         found = "links with inertia" if equations.inertial_links else "links of nodes with a mass matrix"
         raise ValueError(f"taylor: found {found} in a network that is stepped in loops; use dop853 or rodas5p")
-    writer = LoopWriter(equations, order)
-    lines, size = writer.write()
-    return TaylorStep.of(
-        lines, order, size, ", graph, weights", [*functions(writer.ends, equations.sticks), CONVOLUTION]
-    )
+    return LoopWriter(equations, order).step()
