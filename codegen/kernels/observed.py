@@ -195,7 +195,7 @@ class _Writer:
             values = [e.xreplace(self.reduced) for e in values]
         slot = 0
         for value in values:
-            if self._per_node(value):
+            if any(s.name in self.own for s in node_symbols(value)):
                 inside, (computed,) = self._node_values([value])
                 inside.append(store("out", plus(Number(slot), Name("i")), computed))
                 body.append(Loop("i", Number(0), Number(self.n), tuple(inside)))
@@ -213,9 +213,6 @@ class _Writer:
             return value.xreplace({real(name): real(f"{name}_{number}") for name in names})
 
         return e.replace(AtNode, at_node)
-
-    def _per_node(self, e: sp.Expr) -> bool:
-        return any(s.name in self.own for s in node_symbols(e))
 
     def _innermost(self, values: Sequence[sp.Expr]) -> list[sp.Expr]:
         """The reductions that hold no other, in a fixed order."""

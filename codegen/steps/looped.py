@@ -251,10 +251,10 @@ class Looped(Step):
     def finish(self) -> None:
         """Compute the new state, the error and the dense output; stages that serve this alone run if DENSE."""
         m, values = self.method, self.stages(len(self.method.c))
-        late = len(m.c) - self.early
+        late = len(m.c) - m.stages
         if late:
             with self.apart() as stages:
-                for i in range(self.early, len(m.c)):
+                for i in range(m.stages, len(m.c)):
                     self.stage(i)
             self.put(If(Name("DENSE"), tuple(stages)))
         self.note("new state, error and dense output")
@@ -266,12 +266,12 @@ class Looped(Step):
             with self.apart() as masses:
                 self.mass.gather("y", "MASS")
             self.put(If(Name("DENSE"), tuple(masses)))
-        found = [*self.load_stages(PLACE, [1.0] * self.early), let("old", Load("y", PLACE))]
+        found = [*self.load_stages(PLACE, [1.0] * m.stages), let("old", Load("y", PLACE))]
         found += [let("new", Name("old") + self.increment(m.b, values)), store("y_new", PLACE, "new")]
         found += [let("e", error), *self.stiff_errors(values)]
         found += [let("e", call("scaled", "e", "old", "new", "rtol", "atol"))]
         found += [let("total", Name("total") + "e"), let("error", call("maximum", "error", "e"))]
-        dense: list[Statement] = self.load_stages(PLACE, [0.0] * self.early + [1.0] * late)
+        dense: list[Statement] = self.load_stages(PLACE, [0.0] * m.stages + [1.0] * late)
         for j, row in enumerate(m.dense):
             dense.append(store("dense", j * Name("DIMENSION") + PLACE, self.dense_value(row, values)))
         self.put(STATES.over([*found, If(Name("DENSE"), tuple(dense))]))

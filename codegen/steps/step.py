@@ -144,7 +144,7 @@ class Step(ABC):
             self.let("shift", 1.0 / Name("reach"))
             self.let("rate", Name("shift") * gamma)
             self.linearise()
-        for i in range(self.early):
+        for i in range(self.method.stages):
             self.stage(i)
             if after is not None:
                 after(i)
@@ -160,11 +160,6 @@ class Step(ABC):
             out = "f" if self.method.implicit else f"k{i + 1}"
             self.slopes("u" if i > 0 else "y", out)
         self.solve(i)
-
-    @property
-    def early(self) -> int:
-        """How many stages are computed before the new state."""
-        return self.method.stages
 
     @abstractmethod
     def opening(self) -> None:

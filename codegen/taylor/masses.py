@@ -42,10 +42,10 @@ def solved(graph: Graph, masses: Mapping[Entry, Series], right: Mapping[int, Ser
         The right-hand sides r by row.  A row of the identity, whose rate no other row needs, is its own rate.
     """
     entries = {key: found for key, s in masses.items() if (found := _factor(s))[0] != ZERO}
-    coupled = sorted({k for key, e in entries.items() if not (key[0] == key[1] and _is_one(e)) for k in key})
+    coupled = sorted({k for key, e in entries.items() if not (key[0] == key[1] and e == (ONE, _UNIT)) for k in key})
     place = {slot: number for number, slot in enumerate(coupled)}
     inner = {(place[r], place[c]): e for (r, c), e in entries.items() if r in place and c in place}
-    symmetric = all(_same(inner.get((c, r)), e) for (r, c), e in inner.items())
+    symmetric = all(inner.get((c, r)) == e for (r, c), e in inner.items())
     order = plan(len(coupled), set(inner)).order
     rows: list[Row] = []
     for r in order:
@@ -66,11 +66,3 @@ def _factor(series: Series) -> Factor:
 
 
 _UNIT = Constant(ONE)
-
-
-def _is_one(e: Factor) -> bool:
-    return e == (ONE, _UNIT)
-
-
-def _same(one: Factor | None, other: Factor) -> bool:
-    return one is not None and one == other
