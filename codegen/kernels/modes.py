@@ -29,7 +29,7 @@ from ..simd import lanes
 from ..steps.blocks import analyse
 from ..steps.contacts import event_functions, register
 from ..steps.elimination import plan, write_factors, write_solve
-from ..steps.names import tidy
+from ..steps.names import renamed, tidy
 from ..steps.step import SCALED, Step, node_function
 from ..steps.unrolled import Unrolled, stage_state
 from ..taylor import write_tangent
@@ -138,9 +138,7 @@ def _stages(variation: Variation, method: Integrator, names: Names) -> tuple[lis
 
 def _renamed(variation: Variation, plain: Equations) -> Variation:
     """The matrix and the events in the names that the kernel uses."""
-    old = (*variation.orbit.state, *variation.orbit.parameters)
-    new = (*plain.state, *plain.parameters)
-    swap = {real(a): real(b) for a, b in zip(old, new, strict=True)}
+    swap = renamed(variation.orbit, plain)
     matrix = tuple((key, e.xreplace(swap)) for key, e in variation.matrix)
     events = None if variation.events is None else variation.events.map(lambda e: e.xreplace(swap))
     return replace(variation, orbit=plain, matrix=matrix, events=events)

@@ -25,7 +25,7 @@ from ..simd import lanes
 from ..steps.blocks import NodeBlocks, analyse
 from ..steps.contacts import push_functions
 from ..steps.looped import Looped
-from ..steps.names import tidy
+from ..steps.names import renamed, tidy
 from ..steps.program import FILL_LIMIT, Program, program, workspace
 from ..steps.step import PAIR, SCALED, Step, function_name, node_function
 from ..steps.unrolled import Unrolled
@@ -353,8 +353,7 @@ def describe(
     more: str = "",
 ) -> str:
     """The docstring at the head of a kernel module."""
-    named, written = ((*eq.state, *eq.parameters) for eq in (equations, plain))
-    swapped = tuple(f"{a} as {b}" for a, b in zip(named, written, strict=True) if a != b)
+    swapped = tuple(f"{a} as {b}" for a, b in renamed(equations, plain).items() if a != b)
     rows = [
         f"Generated kernel: {equations.n} oscillator{'s' * (equations.n > 1)}, {equations.link_count} links, {method.name}.",
         "",
@@ -388,8 +387,6 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
     """The section function at a fraction of the step; a kernel without sections has none."""
     if section is None:
         return []
-    renamed = zip((*equations.state, *equations.parameters), (*plain.state, *plain.parameters), strict=True)
-    swap = {real(old): real(new) for old, new in renamed}
     section = section.xreplace({s: real(s.name) for s in section.free_symbols})
     used = {s.name for s in section.free_symbols}
     unknown = sorted(used - set(equations.state) - set(equations.parameters) - {"t"})
@@ -402,7 +399,7 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
     for slot, (name, shown) in enumerate(zip(equations.parameters, plain.parameters, strict=True)):
         if name in used:
             body.append(let(shown, Load("y", Number(equations.dimension + slot))))
-    value = lower(section.xreplace({real("t"): sp.Symbol("(t + theta*h)")}).xreplace(swap))
+    value = lower(section.xreplace({real("t"): sp.Symbol("(t + theta*h)")}).xreplace(renamed(equations, plain)))
     about = "The section function at the fraction theta of the step."
     return [
         Function(

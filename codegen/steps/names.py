@@ -14,7 +14,7 @@ from synchain.models.dynamics.equations import Equations
 from ..program.passes import real
 from ..simd import elementary, lanes, special
 
-__all__ = ["NAMES", "RESERVED", "tidy"]
+__all__ = ["NAMES", "RESERVED", "renamed", "tidy"]
 
 NAMES = (
     "target", "source", "node_slot", "here_slot", "there_slot", "order", "place", "row_start", "after_start", "column",
@@ -72,6 +72,12 @@ def tidy(equations: Equations) -> Equations:
     return equations.map_templates(
         lambda node: node.map(lambda e: e.xreplace(swap)), lambda edge: edge.map(lambda e: e.xreplace(in_links)), swap
     )
+
+
+def renamed(equations: Equations, plain: Equations) -> dict[sp.Symbol, sp.Symbol]:
+    """Return what the states and parameters of some equations are called in others that have the same."""
+    old, new = ((*eq.state, *eq.parameters) for eq in (equations, plain))
+    return {real(a): real(b) for a, b in zip(old, new, strict=True)}
 
 
 def _clashes(name: str) -> bool:
