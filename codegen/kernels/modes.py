@@ -34,7 +34,7 @@ from ..steps.step import SCALED, Step, node_function
 from ..steps.unrolled import Unrolled, stage_state
 from ..taylor import write_tangent
 from .driver import Driver, KernelKind
-from .sweep import AUTO, LARGEST_UNROLLED, KernelSource, describe, module, node_functions
+from .sweep import AUTO, LARGEST_UNROLLED, KernelSource, describe, free_names, module, node_functions
 
 __all__ = ["emit_modes"]
 
@@ -88,7 +88,7 @@ def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int
         raise ValueError(f"tangent dynamics: found integrator {method.name}; expected a Rosenbrock or a Taylor method")
     width = lanes.native_width() if width is None else width
     plain = tidy(equations)
-    names = Names([*plain.state, *plain.parameters, *(s.name for s in plain.node.state)])
+    names = free_names(plain)
     variation = _renamed(variation, plain)
     functions, sizes, count = (_series if method.series else _stages)(variation, method, names)
     deviations = f"{variation.size} deviations, {width} modes a register"

@@ -38,6 +38,7 @@ __all__ = [
     "default_width",
     "describe",
     "emit",
+    "free_names",
     "module",
     "node_functions",
 ]
@@ -162,15 +163,9 @@ def emit(
     _check_records(equations, records, section, watched, multiplicity)
     width = default_width(equations, method) if width is None else width
     ordered = tuple(r for r in Record if r in records)
-    looped = _is_looped(equations, method, unroll)
-    if looped:
-        method = _for_many(method, equations, unroll)
-        equations = equations.without_fields() if method.implicit else equations
-    elimination = program(equations, fill, method.implicit or equations.inertial) if looped else None
-    plain = tidy(equations)
-    weight = [edge.weight.name for edge in plain.edges]
-    states = [s.name for node in plain.nodes for s in node.state]
-    names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
+    equations, method, elimination = _planned(equations, method, unroll, fill)
+    plain, looped = tidy(equations), elimination is not None
+    names = free_names(plain)
     functions, scratch, count = (_series if method.series else _stages)(plain, method, names, elimination)
     seen = bool(watched.observed), bool(watched.sections), watched.stop is not None
     traits = looped, method.smooth is not None, plain.sticks, method.series, *seen
@@ -244,6 +239,24 @@ def default_width(equations: Equations, method: Integrator) -> int:
     most = 2 if method.implicit else 6
     moving = sum(len(equations.nodes[kind].continuous) for kind in equations.kind_of[: most + 1])
     return lanes.native_width(2 if moving <= most else 1)
+
+
+def _planned(
+    equations: Equations, method: Integrator, unroll: int, fill: float
+) -> tuple[Equations, Integrator, Program | None]:
+    """Equations and method as they are stepped, and the elimination that steps in loops run through."""
+    if not _is_looped(equations, method, unroll):
+        return equations, method, None
+    method = _for_many(method, equations, unroll)
+    equations = equations.without_fields() if method.implicit else equations
+    return equations, method, program(equations, fill, method.implicit or equations.inertial)
+
+
+def free_names(plain: Equations) -> Names:
+    """Return a supply of names that no symbol of the equations has."""
+    weights = [edge.weight.name for edge in plain.edges]
+    states = [s.name for node in plain.nodes for s in node.state]
+    return Names([*plain.state, *plain.parameters, *states, *plain.varied, *weights])
 
 
 def _is_looped(equations: Equations, method: Integrator, unroll: int) -> bool:
