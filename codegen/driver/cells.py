@@ -189,8 +189,10 @@ def turn_over(which, cell, spans, control, clock, y, dims):
     put(clock, PERIODS, which, clock[PERIODS * WIDTH + which] + 1.0)
     restart(which, clock)
     if dims.repeats:
-        if clock[CYCLE * WIDTH + which] == 0.0:
-            compare(which, clock, y, control, dims)
+        if clock[DUE * WIDTH + which] > 0.0:
+            approach(which, clock, y, control, dims)
+        elif clock[CYCLE * WIDTH + which] == 0.0:
+            compare(which, clock, y, dims)
         if clock[CYCLE * WIDTH + which] > 0.0 and control[NO_JUMPS] == 0.0:
             jump(which, cell, spans, clock)
     begin(which, cell, spans, clock)
@@ -222,30 +224,41 @@ def restart(which, clock):
 
 
 @njit(error_model="numpy")
-def compare(which, clock, y, control, dims):
+def approach(which, clock, y, control, dims):
+    """Look whether a free clock comes near a motion that repeats itself: its steps stop at the ends of all periods then."""
+    saved, gap, size = dims.dimension + dims.parameters, 0.0, 0.0
+    for c in range(dims.dimension):
+        gap += abs(y[c * WIDTH + which] - y[(saved + c) * WIDTH + which])
+        size += abs(y[c * WIDTH + which])
+    near = gap <= max(NEAR, JITTER * control[RTOL]) * size
+    put(clock, DUE, which, 0.0 if near else clock[PERIODS * WIDTH + which] + PROBE)
+    save(which, clock, y, dims)
+
+
+@njit(error_model="numpy")
+def compare(which, clock, y, dims):
     """Look for a cycle of periods: compare with a saved period, and save the present one after 1, 2, 4 … 32, 32 … periods.
 
     Source: Brent, BIT Numerical Mathematics 20, 176 (1980), with a bound that finds short cycles soon.
     """
-    periods, saved = clock[PERIODS * WIDTH + which], dims.dimension + dims.parameters
-    lag, gap, size = periods - clock[SAVED_AT * WIDTH + which], 0.0, 0.0
+    saved, same = dims.dimension + dims.parameters, True
     for c in range(dims.dimension):
-        gap += abs(y[c * WIDTH + which] - y[(saved + c) * WIDTH + which])
-        size += abs(y[c * WIDTH + which])
-    same = gap == 0.0
+        same = same and y[c * WIDTH + which] == y[(saved + c) * WIDTH + which]
     for k, group in enumerate(REPEATING):
         same = same and clock[group * WIDTH + which] == y[(saved + dims.dimension + k) * WIDTH + which]
-    if clock[DUE * WIDTH + which] > 0.0:
-        near = gap <= max(NEAR, JITTER * control[RTOL]) * size
-        put(clock, DUE, which, 0.0 if near else periods + PROBE)
-    elif same:
+    lag = clock[PERIODS * WIDTH + which] - clock[SAVED_AT * WIDTH + which]
+    if same:
         put(clock, CYCLE, which, lag)
-        return
-    elif lag < clock[POWER * WIDTH + which]:
-        return
-    else:
+    elif lag >= clock[POWER * WIDTH + which]:
         put(clock, POWER, which, min(LONGEST_CYCLE, clock[POWER * WIDTH + which] * 2.0))
-    put(clock, SAVED_AT, which, periods)
+        save(which, clock, y, dims)
+
+
+@njit(error_model="numpy")
+def save(which, clock, y, dims):
+    """Save the state and what else must repeat, behind state and parameters."""
+    saved = dims.dimension + dims.parameters
+    put(clock, SAVED_AT, which, clock[PERIODS * WIDTH + which])
     for c in range(dims.dimension):
         put(y, saved + c, which, y[c * WIDTH + which])
     for k, group in enumerate(REPEATING):

@@ -15,6 +15,7 @@ from synchain.models.mechanics.components import Block, Edge, Node
 
 from ..program.expressions import Expression
 from ..program.lowering import Library, number
+from ..program.passes import real
 from ..program.statements import Statement, let
 
 __all__ = [
@@ -23,11 +24,12 @@ __all__ = [
     "Linked",
     "Place",
     "Storing",
+    "array_tables",
     "check_inertia",
     "is_unrolled",
     "link_body",
-    "link_numbers",
     "link_places",
+    "link_tables",
     "mass_body",
     "node_body",
     "node_mass_body",
@@ -100,22 +102,23 @@ def node_mass_body(equations: Equations, i: int = 0) -> Body:
 
 def node_rate_symbols(node: Node) -> tuple[sp.Symbol, ...]:
     """Symbols for the rates of the states of a node."""
-    return tuple(sp.Symbol(f"rate_i{k}", real=True) for k in range(len(node.state)))
+    return tuple(real(f"rate_i{k}") for k in range(len(node.state)))
 
 
-def link_places(equations: Equations, link: Linked | None = None) -> tuple[dict[Place, sp.Expr], dict[Place, sp.Expr]]:
-    """The entries that a link adds to the block of its target, and those in the block (target, source)."""
+def link_places(equations: Equations, link: Linked | None = None) -> dict[tuple[bool, Place], sp.Expr]:
+    """The entries that a link adds to the block of its target, False, and those in the block (target, source), True."""
     edge = _edge(equations, link)
     if edge is None:
-        return {}, {}
-    here = _places(_at_rates(edge, edge.jacobian_here(), edge.here))
-    return here, _places(_at_rates(edge, edge.jacobian_there(), edge.there))
+        return {}
+    blocks = ((False, edge.jacobian_here(), edge.here), (True, edge.jacobian_there(), edge.there))
+    found = ((there, _places(_at_rates(edge, block, states))) for there, block, states in blocks)
+    return {(there, place): e for there, block in found for place, e in block.items()}
 
 
 def rate_symbols(edge: Edge) -> tuple[sp.Symbol, ...]:
     """Symbols for the rates of the states at both ends of a link."""
     ends = (("i", edge.here), ("j", edge.there))
-    return tuple(sp.Symbol(f"rate_{end}{k}", real=True) for end, states in ends for k in range(len(states)))
+    return tuple(real(f"rate_{end}{k}") for end, states in ends for k in range(len(states)))
 
 
 def _at_rates(edge: Edge, block: Block, states: tuple[sp.Symbol, ...]) -> Block:
@@ -183,17 +186,13 @@ def link_body(equations: Equations, link: Linked | None = None, jacobian: bool =
     edge = _edge(equations, link)
     if edge is None:
         return Body((), ())
-    table: dict[Any, sp.Expr] = dict(enumerate(edge.rhs))
-    if jacobian:
-        table = {
-            (there, place): e for there in (False, True) for place, e in link_places(equations, link)[there].items()
-        }
+    table: dict[Any, sp.Expr] = {**link_places(equations, link)} if jacobian else dict(enumerate(edge.rhs))
     return _body({place: e.xreplace(_weight(link)) for place, e in table.items()})
 
 
 def parameters(equations: Equations, bodies: Iterable[Body]) -> list[int]:
     """The places, in Equations.parameters, of the parameters that all nodes share and some bodies use."""
-    used = {s.name for body in bodies for s in body.uses(_parameter_symbols(equations))}
+    used = {s.name for body in bodies for s in body.uses(map(real, equations.parameters))}
     return [k for k, name in enumerate(equations.parameters) if name in used]
 
 
@@ -204,10 +203,6 @@ def own_parameters(equations: Equations, i: int) -> dict[sp.Symbol, int]:
     return {s: names.index(f"{s.name}_{i + 1}") for s in own}
 
 
-def _parameter_symbols(equations: Equations) -> list[sp.Symbol]:
-    return [sp.Symbol(name, real=True) for name in equations.parameters]
-
-
 def _places(block: tuple[tuple[sp.Expr, ...], ...]) -> dict[Place, sp.Expr]:
     table = {(r, c): e for r, row in enumerate(block) for c, e in enumerate(row)}
     return {place: e for place, e in table.items() if e != 0}
@@ -216,7 +211,7 @@ def _places(block: tuple[tuple[sp.Expr, ...], ...]) -> dict[Place, sp.Expr]:
 def _body(table: dict, every: bool = False) -> Body:
     """Common parts are computed once: w1, w2, …, which no symbol of a portable model is called."""
     kept = {place: sp.sympify(e) for place, e in table.items() if every or e != 0}
-    names = (sp.Symbol(f"w{k}", real=True) for k in range(1, 1_000_000))
+    names = (real(f"w{k}") for k in range(1, 1_000_000))
     conditions = {pair.cond for e in kept.values() for choice in e.atoms(sp.Piecewise) for pair in choice.args}
     hidden = {
         c: sp.Symbol(f"condition {k}") for k, c in enumerate(sorted(conditions - {sp.true}, key=sp.default_sort_key))
@@ -238,13 +233,20 @@ def wrapped(numbers: Iterable[str], indent: str = "    ", width: int = 110) -> l
     return [*lines, line.rstrip()]
 
 
-def link_numbers(equations: Equations) -> list[str]:
-    """For each link, if links differ in a parameter, which of its numbers is that of the link."""
-    if not equations.numbered:
-        return []
-    ((name, layer), *_) = equations.numbered.items()
-    places = {own: k for k, own in enumerate(layer.names(name))}
-    return [str(places[layer.name(name, link)]) for link in layer.links]
+def link_tables(equations: Equations) -> dict[str, list[str]]:
+    """The ends of the links and, if links differ in a parameter, which of its numbers is that of a link."""
+    tables = {name: [str(link[end]) for link in equations.links] for end, name in enumerate(("TARGET", "SOURCE"))}
+    if equations.numbered:
+        ((name, layer), *_) = equations.numbered.items()
+        places = {own: k for k, own in enumerate(layer.names(name))}
+        tables["NUMBER"] = [str(places[layer.name(name, link)]) for link in layer.links]
+    return tables
+
+
+def array_tables(equations: Equations) -> list[str]:
+    """Lines that make NumPy arrays of the tables of the links and of their weights; none without links."""
+    tables = {**link_tables(equations), "WEIGHT": weights(equations)} if equations.links else {}
+    return [line for name, table in tables.items() for line in (f"{name} = np.array([", *wrapped(table), "])")]
 
 
 def weights(equations: Equations) -> list[str]:

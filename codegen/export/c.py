@@ -10,10 +10,9 @@ from synchain.models.dynamics.equations import Equations
 from ..program.expressions import Expression, Name, Number, call
 from ..program.printers import C99
 from ..program.statements import Array, Do, Statement, called, used
-from .body import check_inertia, is_unrolled, link_numbers, link_places, node_places, weights, wrapped
-from .header import given_values, header
+from .body import is_unrolled, link_places, link_tables, node_places, weights, wrapped
+from .header import Exported
 from .loops import jacobian_statements, mass_statements, rhs_statements
-from .names import portable
 
 __all__ = ["to_c"]
 
@@ -59,18 +58,16 @@ def to_c(equations: Equations, values: Mapping[str, float] | None = None) -> str
     `values` (name -> number) are written as PARAMETERS' defaults.  Raises ValueError for functions that C99 lacks and for
     unknown or missing values.
     """
-    known = given_values(equations, values)
-    model, changed = portable(equations)
-    known = dict(zip(model.parameters, known.values(), strict=bool(known)))
-    small = is_unrolled(model)
-    check_inertia(model, "c")
-    rhs, jacobian = _rhs(model), _jacobian(model, small)
+    exported = Exported.of(equations, values, "c")
+    model, known, small = exported.model, exported.numbers, is_unrolled(exported.model)
+    rhs = [*rhs_statements(model), *_solved(model, "rates", Number(1))]
+    jacobian = _jacobian(model, small)
     functions = [*_function(f"void rhs({ARGUMENTS}rates)", rhs), ""]
     functions += _function(f"void jacobian({ARGUMENTS}{'matrix' if small else 'values'})", jacobian)
     functions += [] if small else ["", *_places(model)]
     lines = [
         "/*",
-        *(f" * {_safe(line)}".rstrip() for line in header(equations, model, changed, known)),
+        *(f" * {_safe(line)}".rstrip() for line in exported.head),
         *_usage(small),
         " */",
         "",
@@ -107,15 +104,12 @@ def _usage(small: bool) -> list[str]:
 def _sizes(model: Equations, small: bool) -> list[str]:
     names = {"NODES": model.n, "DIMENSION": model.dimension, "PARAMETERS": len(model.parameters)}
     if not small:
-        here, there = link_places(model)
         links = len(model.links)
-        names |= {"LINKS": links, "ENTRIES": len(node_places(model)) * model.n + (len(here) + len(there)) * links}
+        names |= {"LINKS": links, "ENTRIES": len(node_places(model)) * model.n + len(link_places(model)) * links}
     lines = [f"enum {{ {', '.join(f'{name} = {value}' for name, value in names.items())} }};", ""]
     if small or not model.links:
         return lines
-    tables = {"TARGET": [str(i) for i, _, _ in model.links], "SOURCE": [str(j) for _, j, _ in model.links]}
-    tables |= {"NUMBER": link_numbers(model)} if model.numbered else {}
-    for name, table in tables.items():
+    for name, table in link_tables(model).items():
         lines += [f"static const int {name}[LINKS] = {{", *wrapped(table), "};"]
     if any(e.has(edge.weight) for edge in model.edges for e in edge.rhs):
         lines += ["static const double WEIGHT[LINKS] = {", *wrapped(weights(model)), "};"]
@@ -127,10 +121,6 @@ def _function(head: str, body: Sequence[Statement]) -> list[str]:
     arguments = re.findall(r"(\w+)[,)]", head)
     unused = [f"(void){name};" for name in arguments if name not in used(body)]
     return [head, "{", *(f"    {line}" for line in (*unused, *C99.lines(body))), "}"]
-
-
-def _rhs(model: Equations) -> list[Statement]:
-    return [*rhs_statements(model), *_solved(model, "rates", Number(1))]
 
 
 def _solved(model: Equations, name: str, columns: Expression) -> list[Statement]:
@@ -154,9 +144,9 @@ def _places(model: Equations) -> list[str]:
     lines = []
     for r, c in node_places(model):
         lines.append(_place("i", "NODES", f"{r}*NODES + i", f"{c}*NODES + i"))
-    for source, block in zip(("TARGET", "SOURCE"), link_places(model), strict=True):
-        for r, c in block:
-            lines.append(_place("link", "LINKS", f"{r}*NODES + TARGET[link]", f"{c}*NODES + {source}[link]"))
+    for there, (r, c) in link_places(model):
+        end = "SOURCE" if there else "TARGET"
+        lines.append(_place("link", "LINKS", f"{r}*NODES + TARGET[link]", f"{c}*NODES + {end}[link]"))
     inner = ["int k = 0;", *lines] if lines else ["(void)rows;", "(void)columns;"]
     return ["void jacobian_places(int *rows, int *columns)", "{", *(f"    {line}" for line in inner), "}"]
 

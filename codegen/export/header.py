@@ -3,20 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.checks import check_number, short_repr, suggestion
 
-__all__ = ["given_values", "header"]
+from .body import check_inertia
+from .names import portable
+
+__all__ = ["Exported"]
 
 SHOWN = 12
 """Of more states only the first and last are listed."""
 
 
-def header(
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """Equations in names of the exported text, the values of its parameters if they are given, and the lines of its head."""
+
+    model: Equations
+    numbers: dict[str, float]
+    head: list[str]
+
+    @classmethod
+    def of(cls, equations: Equations, values: Mapping[str, float] | None, language: str) -> Exported:
+        """Rename what needs it; ValueError for values that do not fit, and for masses that a language cannot solve for."""
+        known = _given(equations, values)
+        model, changed = portable(equations)
+        check_inertia(model, language)
+        known = dict(zip(model.parameters, known.values(), strict=bool(known)))
+        return cls(model, known, _header(equations, model, changed, known))
+
+
+def _header(
     equations: Equations, model: Equations, changed: Mapping[str, str], values: Mapping[str, float]
 ) -> list[str]:
-    """Return lines without comment marks; `model` has the names of the text, `changed` lists those that differ."""
+    """Lines without comment marks; `model` has the names of the text, `changed` lists those that differ."""
     states = list(model.state)
     if len(states) > SHOWN:
         states = [*states[:3], "…", *states[-3:]]
@@ -43,7 +65,7 @@ def _equations(equations: Equations) -> list[str]:
         return ["(equations with functions that have no short form: see below)"]
 
 
-def given_values(equations: Equations, values: Mapping[str, float] | None) -> dict[str, float]:
+def _given(equations: Equations, values: Mapping[str, float] | None) -> dict[str, float]:
     """Return the values of all parameters, or none; ValueError where one is unknown, missing or not finite."""
     if values is None:
         return {}

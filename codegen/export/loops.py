@@ -13,6 +13,7 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 
 from ..program.expressions import Expression, Load, Name, Number, plus
+from ..program.passes import real
 from ..program.statements import Accumulate, Identity, Loop, Statement, Store, Titled, let, whole
 from .body import (
     Body,
@@ -78,7 +79,7 @@ def jacobian_statements(equations: Equations, reads: bool = True) -> list[Statem
     body = node_body(equations, True).statements(_loads(equations, None, here, reads), store_own)
     found.append(_loop("i_", "NODES", body))
     if equations.links:
-        slots = [(there, place) for there, block in enumerate(link_places(equations)) for place in block]
+        slots = list(link_places(equations))
 
         def store_link(place: Any, value: Expression) -> Statement:
             slot = place_of(slots.index(place), "LINKS", "link_")
@@ -187,7 +188,7 @@ def _pair(
     else:
         for name, layer in equations.numbered.items():
             first = Number(equations.parameters.index(layer.names(name)[0]))
-            found[sp.Symbol(name, real=True)] = _at("numbers", first + _at("NUMBER", Name("link_")))
+            found[real(name)] = _at("numbers", first + _at("NUMBER", Name("link_")))
     return found | {s: _at("rates", place) for s, place in zip(rate_symbols(edge), places, strict=True)}
 
 

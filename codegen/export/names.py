@@ -12,6 +12,8 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import Edge
 
+from ..program.passes import real
+
 __all__ = ["portable"]
 
 _C = """auto break case char const continue default do double else enum extern float for goto if inline int long register
@@ -63,14 +65,14 @@ def _edge(edge: Edge, outer: dict[sp.Symbol, sp.Symbol], taken: set[str]) -> tup
             swap[s] = outer[s]
         else:
             free = s.name not in taken and _fine(s.name)
-            swap[s] = sp.Symbol(s.name, real=True) if free else _renamed(s, taken, True)
+            swap[s] = real(s.name) if free else _renamed(s, taken, True)
             taken.add(swap[s].name)
             if swap[s].name != s.name:
                 changed[s.name] = swap[s].name
     for s in (*edge.here, *edge.there):
         swap[s] = _renamed(s, taken, s.name in taken)
         taken.add(swap[s].name)
-    swap[edge.weight] = sp.Symbol("weight_", real=True)
+    swap[edge.weight] = real("weight_")
     return edge.map(lambda e: e.xreplace(swap)), changed
 
 
@@ -82,7 +84,7 @@ def _fine(name: str) -> bool:
 def _renamed(s: sp.Symbol, taken: set[str], occupied: bool = False) -> sp.Symbol:
     """The symbol itself where its name is fine and free, else one of a similar name."""
     if _fine(s.name) and not occupied:
-        return sp.Symbol(s.name, real=True)
+        return real(s.name)
     name = re.sub("_+", "_", "".join(map(_ascii, unicodedata.normalize("NFKC", s.name)))).strip("_") or "symbol"
     name = name if name[0].isalpha() else f"s_{name}"
     base, number = name if _fine(name) else f"{name}_", 2
@@ -90,7 +92,7 @@ def _renamed(s: sp.Symbol, taken: set[str], occupied: bool = False) -> sp.Symbol
     while name in taken or not _fine(name):
         name, number = f"{base.rstrip('_')}_{number}", number + 1
     taken.add(name)
-    return sp.Symbol(name, real=True)
+    return real(name)
 
 
 def _ascii(letter: str) -> str:

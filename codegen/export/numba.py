@@ -9,10 +9,9 @@ from synchain.models.dynamics.equations import Equations
 from ..program.expressions import Load, Name, Number, call
 from ..program.printers import MATH
 from ..program.statements import Array, Loop, let, store
-from .body import check_inertia, is_unrolled, link_numbers, weights, wrapped
-from .header import given_values, header
+from .body import array_tables, is_unrolled, wrapped
+from .header import Exported
 from .loops import mass_statements, rhs_statements
-from .names import portable
 
 __all__ = ["to_numba"]
 
@@ -23,24 +22,18 @@ def to_numba(equations: Equations, values: Mapping[str, float] | None = None) ->
     Up to eight nodes are written out, more are loops; `values` (name -> number) become the array PARAMETERS.  Raises
     ValueError for functions that Python's math lacks and for unknown or missing values.
     """
-    known = given_values(equations, values)
-    model, changed = portable(equations)
-    known = dict(zip(model.parameters, known.values(), strict=bool(known)))
-    lines = [f"# {line}".rstrip() for line in header(equations, model, changed, known)]
+    exported = Exported.of(equations, values, "numba")
+    model = exported.model
+    lines = [f"# {line}".rstrip() for line in exported.head]
     lines += ["#", "# Use: numbalsoda.lsoda(rhs.address, state, times, data=numbers); numbers in the order above."]
     lines += ["", "import math", "", "import numpy as np", "from numba import cfunc, types", ""]
     lines += [f"NODES, DIMENSION = {model.n}, {model.dimension}"]
-    if known:
-        lines += ["PARAMETERS = np.array([", *wrapped(map(repr, known.values())), "])"]
+    if exported.numbers:
+        lines += ["PARAMETERS = np.array([", *wrapped(map(repr, exported.numbers.values())), "])"]
     if not is_unrolled(model) and model.links:
-        ends = {"TARGET": [str(i) for i, _, _ in model.links], "SOURCE": [str(j) for _, j, _ in model.links]}
-        ends |= {"NUMBER": link_numbers(model)} if model.numbered else {}
-        lines += [f"LINKS = {len(model.links)}"]
-        for name, table in {**ends, "WEIGHT": weights(model)}.items():
-            lines += [f"{name} = np.array([", *wrapped(table), "])"]
+        lines += [f"LINKS = {len(model.links)}", *array_tables(model)]
     pointer = "types.CPointer(types.double)"
     lines += [f"lsoda_sig = types.void(types.double, {pointer}, {pointer}, {pointer})", "", ""]
-    check_inertia(model, "numba")
     lines += ["@cfunc(lsoda_sig)", "def rhs(t, state, rates, numbers):"]
     body = rhs_statements(model)
     if model.inertial:

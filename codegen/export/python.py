@@ -10,23 +10,21 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 
 from ..program.expressions import Expression, Load, Name, Number, Product, Slice, call, plus
+from ..program.passes import real
 from ..program.printers import NUMPY
 from ..program.statements import Array, Do, Return, Statement, Store, called, let, whole
 from .body import (
-    check_inertia,
+    array_tables,
     is_unrolled,
     link_body,
-    link_numbers,
     link_places,
     mass_body,
     node_body,
     node_places,
-    weights,
     wrapped,
 )
-from .header import given_values, header
+from .header import Exported
 from .loops import jacobian_statements, mass_statements, place_of, rhs_statements
-from .names import portable
 
 __all__ = ["to_python"]
 
@@ -59,22 +57,19 @@ def to_python(equations: Equations, values: Mapping[str, float] | None = None) -
     Up to eight nodes are written out and jac is dense; more are array operations and jac is a sparse matrix.  Raises
     ValueError for functions that NumPy lacks and for unknown or missing values.
     """
-    known = given_values(equations, values)
-    model, changed = portable(equations)
-    known = dict(zip(model.parameters, known.values(), strict=bool(known)))
-    small = is_unrolled(model)
+    exported = Exported.of(equations, values, "python")
+    model, known, small = exported.model, exported.numbers, is_unrolled(exported.model)
     given = _arguments(model, known)
     arguments = "".join(f", {name}={value}" if value else f", {name}" for name, value in given.items())
     after = "" if known or not given else f", args=({next(iter(given))}, …)"
     use = f'solve_ivp(rhs, (0.0, 100.0), start, method="Radau", jac=jac{after}, rtol=1e-8, atol=1e-10)'
-    check_inertia(model, "python")
     rhs: list[Statement] = [let("rates", call("np.empty_like", "state"))]
     rhs += rhs_statements(model, reads=False) if small else _rhs(model)
     rhs += _solved(model, small, Name("rates"))
     jac = _jac(model, small, given)
     pattern = SPARSITY if small or not model.inertial else COUPLED
     kind = "DIMENSION x DIMENSION" if small else "a sparse matrix"
-    lines = [f"# {line}".rstrip() for line in header(equations, model, changed, known)]
+    lines = [f"# {line}".rstrip() for line in exported.head]
     lines += ["#", f"# Use: {use}", "", *_imports(model, small, called([*rhs, *jac])), ""]
     lines += [
         f"NODES, DIMENSION = {model.n}, {model.dimension}",
@@ -175,18 +170,11 @@ def _tables(model: Equations, small: bool) -> list[str]:
         places = _small_places(model)
         lines = ["ROWS = [", *wrapped(str(r) for r, _ in places), "]"] if places else ["ROWS = []"]
         return lines + (["COLUMNS = [", *wrapped(str(c) for _, c in places), "]"] if places else ["COLUMNS = []"])
-    lines = ["NODE = np.arange(NODES)"]
-    if model.links:
-        ends = {"TARGET": [str(i) for i, _, _ in model.links], "SOURCE": [str(j) for _, j, _ in model.links]}
-        ends |= {"NUMBER": link_numbers(model)} if model.numbered else {}
-        for name, table in {**ends, "WEIGHT": weights(model)}.items():
-            lines += [f"{name} = np.array([", *wrapped(table), "])"]
-    here, there = link_places(model)
-    rows: list[Expression] = [_at(r, "NODE") for r, _ in node_places(model)] + [
-        _at(r, "TARGET") for r, _ in (*here, *there)
-    ]
-    columns: list[Expression] = [_at(c, "NODE") for _, c in node_places(model)] + [_at(c, "TARGET") for _, c in here]
-    columns += [_at(c, "SOURCE") for _, c in there]
+    lines = ["NODE = np.arange(NODES)", *array_tables(model)]
+    own, links = node_places(model), link_places(model)
+    rows = [_at(r, "NODE") for r, _ in own] + [_at(r, "TARGET") for _, (r, _) in links]
+    columns = [_at(c, "NODE") for _, c in own]
+    columns += [_at(c, "SOURCE" if there else "TARGET") for there, (_, c) in links]
     heavy = sorted({r for _, (r, _) in dict(mass_body(model).results)})
     if heavy:
         lines += NUMPY.lines([let("HEAVY", _joined([_at(r, "NODE") for r in heavy]))])
@@ -222,14 +210,14 @@ def _loads(model: Equations) -> tuple[dict[sp.Symbol, Expression], dict[sp.Symbo
     def state(index: Expression) -> Load:
         return Load("state", index, None)
 
-    varied = {sp.Symbol(name, real=True): f"np.asarray({name}, dtype=float)" for name in model.varied}
+    varied = {real(name): f"np.asarray({name}, dtype=float)" for name in model.varied}
     own: dict[sp.Symbol, Expression] = {s: state(_part(c)) for c, s in enumerate(model.node.state)}
     own |= {s: Name(text) for s, text in varied.items()}
     if model.edge is None or not model.links:
         return own, {}
     ends: dict[sp.Symbol, Expression] = {s: Load(text, Name("TARGET"), None) for s, text in varied.items()}
     for name in model.numbered:
-        ends[sp.Symbol(name, real=True)] = Load(f"np.asarray({name}, dtype=float)", Name("NUMBER"), None)
+        ends[real(name)] = Load(f"np.asarray({name}, dtype=float)", Name("NUMBER"), None)
     for index, states in (("TARGET", model.edge.here), ("SOURCE", model.edge.there)):
         ends |= {s: state(_at(c, index)) for c, s in enumerate(states)}
     return own, ends | {model.edge.weight: Name("WEIGHT")}
@@ -251,7 +239,7 @@ def _jacobian(model: Equations) -> list[Statement]:
     own, ends = _loads(model)
     mine = list(node_places(model))
     found = node_body(model, True).statements(own, lambda place, e: Store("values", _part(mine.index(place)), e))
-    slots = [(there, place) for there, block in enumerate(link_places(model)) for place in block]
+    slots = list(link_places(model))
     if not slots:
         return found
     behind = len(mine) * Name("NODES")

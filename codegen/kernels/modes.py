@@ -22,19 +22,19 @@ from ..driver.dimensions import ModeDimensions
 from ..integrators import Integrator, integrator
 from ..program.expressions import ZERO, Expression, Load, Name, Number, Product, Value, call, linear, plus
 from ..program.lowering import lower
-from ..program.passes import Names, share
+from ..program.passes import Names, real, share
 from ..program.printers import LANES
 from ..program.statements import Assign, Comment, Function, Return, Role, Statement, let, operations, store
 from ..simd import lanes
 from ..steps.blocks import analyse
 from ..steps.contacts import event_functions, register
 from ..steps.elimination import plan, write_factors, write_solve
-from ..steps.names import tidy
+from ..steps.names import renamed, tidy
 from ..steps.step import SCALED, Step, node_function
 from ..steps.unrolled import Unrolled, stage_state
 from ..taylor import write_tangent
-from .driver import Driver, KernelKind, imports
-from .sweep import AUTO, LARGEST_UNROLLED, KernelSource, describe, node_functions
+from .driver import Driver, KernelKind
+from .sweep import AUTO, LARGEST_UNROLLED, KernelSource, describe, free_names, module, node_functions
 
 __all__ = ["emit_modes"]
 
@@ -88,23 +88,20 @@ def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int
         raise ValueError(f"tangent dynamics: found integrator {method.name}; expected a Rosenbrock or a Taylor method")
     width = lanes.native_width() if width is None else width
     plain = tidy(equations)
-    names = Names([*plain.state, *plain.parameters, *(s.name for s in plain.node.state)])
+    names = free_names(plain)
     variation = _renamed(variation, plain)
     functions, sizes, count = (_series if method.series else _stages)(variation, method, names)
-    text = "\n\n\n".join([*functions, *map(LANES.function, event_functions(variation, names))]) + "\n"
     deviations = f"{variation.size} deviations, {width} modes a register"
-    head = describe(equations, plain, method, (), count, deviations)
-    constants = f"WIDTH = 1\nLANES = {width}\nDENSE = {plain.sticks or method.series}"
+    constants = {"WIDTH": 1, "LANES": width, "DENSE": plain.sticks or method.series}
     events = variation.events
-    owners = (-1,) * variation.size if events is None else tuple(events.owners)
     return KernelSource(
-        head,
-        "\n\n\n".join([imports(text), constants, text]),
+        describe(equations, plain, method, (), count, deviations),
+        module(constants, functions, event_functions(variation, names)),
         equations,
         method,
         Driver(KernelKind.MODES, width, contacts=plain.sticks, series=method.series),
         _dimensions(variation, method, *sizes),
-        owners,
+        (-1,) * variation.size if events is None else tuple(events.owners),
     )
 
 
@@ -141,9 +138,7 @@ def _stages(variation: Variation, method: Integrator, names: Names) -> tuple[lis
 
 def _renamed(variation: Variation, plain: Equations) -> Variation:
     """The matrix and the events in the names that the kernel uses."""
-    old = (*variation.orbit.state, *variation.orbit.parameters)
-    new = (*plain.state, *plain.parameters)
-    swap = {sp.Symbol(a, real=True): sp.Symbol(b, real=True) for a, b in zip(old, new, strict=True)}
+    swap = renamed(variation.orbit, plain)
     matrix = tuple((key, e.xreplace(swap)) for key, e in variation.matrix)
     events = None if variation.events is None else variation.events.map(lambda e: e.xreplace(swap))
     return replace(variation, orbit=plain, matrix=matrix, events=events)
@@ -165,11 +160,9 @@ class Parts:
     def of(cls, variation: Variation, stages: int) -> Parts:
         """The parts of a variation."""
         made = cls(stages)
-        states = {sp.Symbol(name, real=True) for name in variation.orbit.state} | {TIME}
+        states = {real(name) for name in variation.orbit.state} | {TIME}
         for key, e in variation.matrix:
-            rest = e.xreplace(dict.fromkeys(variation.parameters, sp.S.Zero))
-            terms = [(rest, sp.S.One), *((e.diff(s), s) for s in variation.parameters)]
-            made.rows[key] = [(made.slot(c, states), s) for c, s in terms if c != 0]
+            made.rows[key] = [(made.slot(c, states), s) for c, s in variation.parts(e)]
         return made
 
     def slot(self, coefficient: sp.Expr, states: set[sp.Symbol]) -> sp.Expr:
@@ -183,6 +176,30 @@ class Parts:
         return sp.Symbol(f"a{self.moving[coefficient]}")
 
     @property
+    def fixed(self) -> dict[Place, str]:
+        """The names of the entries that do not move and are computed once, not those that stand for themselves."""
+        return {
+            (r, c): f"g{r}_{c}"
+            for (r, c), terms in self.rows.items()
+            if not any(_moves(e) for e, _ in terms) and not (len(terms) == 1 and terms[0][1] == 1)
+        }
+
+    def at_stage(self, i: int) -> dict[Place, sp.Expr]:
+        """The entries of A at a stage: numbers, names of fixed entries, and sums with the stage's moving coefficients."""
+        swap = {sp.Symbol(f"a{k}"): sp.Symbol(f"a{i + 1}_{k}") for k in self.moving.values()}
+        found = {key: self.total(key).xreplace(swap) for key in self.rows}
+        return found | {key: sp.Symbol(name) for key, name in self.fixed.items()}
+
+    def total(self, place: Place) -> sp.Expr:
+        """The sum that an entry of A is."""
+        return sp.Add(*(coefficient * strength for coefficient, strength in self.rows[place]))
+
+    def loads(self, i: int, bent: bool = False) -> list[Statement]:
+        """Load the moving coefficients at stage i, or their derivatives along it."""
+        word = "b" if bent else "a"
+        return [let(f"{word}{i + 1}_{k}", _shared(self.value(i, k) + bent)) for k in self.moving.values()]
+
+    @property
     def size(self) -> int:
         """Length of the shared array."""
         return HEAD + len(self.steady) + 2 * self.stages * len(self.moving)
@@ -194,8 +211,8 @@ class Parts:
 
 def _functions(parts: Parts, state: tuple[str, ...], names: Names) -> dict[str, Function]:
     """The functions `steady`, `moving` and `bent`: coefficients, and derivatives of the moving ones along a stage."""
-    along = {sp.Symbol(s, real=True): sp.Symbol(f"along_{s}", real=True) for s in state}
-    lag = sp.Symbol("lag", real=True)
+    along = {real(s): real(f"along_{s}") for s in state}
+    lag = real("lag")
     bent = [sp.Add(*(derivative(e, s) * k for s, k in along.items()), derivative(e, TIME) * lag) for e in parts.moving]
     described = {
         "steady": ("Coefficients of the modes that do not move.", list(parts.steady)),
@@ -253,18 +270,13 @@ def _mode_step(variation: Variation, parts: Parts, method: Integrator) -> list[S
     body += [let(s, register("strengths", len(strengths), k)) for k, s in enumerate(strengths)]
     body += [let(f"d{c}", register("old", size, c)) for c in range(size)]
     body += [let(name, _shared(HEAD + k)) for k, name in enumerate(parts.steady.values())]
-    fixed = {}
-    for (r, c), terms in parts.rows.items():
-        if all(not _moves(a) for a, _ in terms) and not (len(terms) == 1 and terms[0][1] == 1):
-            fixed[r, c] = f"g{r}_{c}"
-            body.append(let(f"g{r}_{c}", lower(sp.Add(*(a * s for a, s in terms)))))
-    stages = [_at_stage(parts, fixed, i) for i in range(method.stages)]
-    body += [let(f"a1_{k}", _shared(parts.value(0, k))) for k in range(len(parts.moving))]
+    body += [let(name, lower(parts.total(key))) for key, name in parts.fixed.items()]
+    body += parts.loads(0)
     steps = plan(size, set(parts.rows))
-    factors = write_factors(steps, stages[0], tuple(f"d{c}" for c in range(size)))
+    factors = write_factors(steps, parts.at_stage(0), tuple(f"d{c}" for c in range(size)))
     body += [Comment("factors of shift - A"), *factors.statements]
     for i in range(method.stages):
-        body += _mode_stage(parts, stages[i], method, i, size)
+        body += _mode_stage(parts, method, i, size)
         right = {c: f"r{c}" for c in range(size)}
         body += write_solve(steps, factors, right, {c: f"k{i + 1}_d{c}" for c in range(size)})
     body.append(Comment("new deviation, its error and its size"))
@@ -280,28 +292,16 @@ def _moves(coefficient: sp.Expr) -> bool:
     return coefficient.is_Symbol and coefficient.name.startswith("a")
 
 
-def _at_stage(parts: Parts, fixed: Mapping[Place, str], i: int) -> dict[Place, sp.Expr]:
-    """The entries of A at a stage: numbers, names of steady entries, and sums with the stage's moving coefficients."""
-    swap = {sp.Symbol(f"a{k}"): sp.Symbol(f"a{i + 1}_{k}") for k in parts.moving.values()}
-    made = {}
-    for key, terms in parts.rows.items():
-        e = sp.Symbol(fixed[key]) if key in fixed else sp.Add(*(a * s for a, s in terms)).xreplace(swap)
-        made[key] = e
-    return made
-
-
-def _mode_stage(
-    parts: Parts, entries: Mapping[Place, sp.Expr], method: Integrator, i: int, size: int
-) -> list[Statement]:
+def _mode_stage(parts: Parts, method: Integrator, i: int, size: int) -> list[Statement]:
     """Stage state, A times it, and what the moving Jacobian adds."""
     body: list[Statement] = [Comment(f"stage {i + 1}")]
     if i > 0:
-        body += [let(f"a{i + 1}_{k}", _shared(parts.value(i, k))) for k in range(len(parts.moving))]
+        body += parts.loads(i)
         body += [let(f"u_d{c}", stage_state(method.a[i], method.a[i - 1], f"d{c}")) for c in range(size)]
-    body += [let(f"b{i + 1}_{k}", _shared(parts.value(i, k) + 1)) for k in range(len(parts.moving))]
+    body += parts.loads(i, bent=True)
     for r in range(size):
         terms: list[sp.Expr] = []
-        for (row, c), e in entries.items():
+        for (row, c), e in parts.at_stage(i).items():
             if row == r:
                 terms.append(e * sp.Symbol(f"u_d{c}" if i > 0 else f"d{c}"))
                 bends = [sp.Symbol(f"b{i + 1}_{str(a)[1:]}") * s for a, s in parts.rows[row, c] if _moves(a)]

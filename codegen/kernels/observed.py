@@ -26,6 +26,7 @@ from synchain.models.mechanics.components import TIME
 from ..integrators import Integrator
 from ..program.expressions import Expression, Load, Name, Number, call, plus
 from ..program.lowering import lower
+from ..program.passes import real
 from ..program.statements import Function, Loop, Role, Statement, let, store
 
 __all__ = ["UNWATCHED", "Watched", "rule_of", "with_rows"]
@@ -162,13 +163,8 @@ class _Writer:
         self.n, self.sums, self.state = plain.n, sums, frozenset(equations.state)
         self.own = self._places(equations.components, plain.components, equations.state, plain)
         self.own |= self._parameters(equations.varied, plain.varied, equations)
-        self.whole: dict[str, tuple[str, Expression]] = {}
-        for slot, (name, shown) in enumerate(zip(equations.state, plain.state, strict=True)):
-            self.whole[name] = (shown, Number(slot))
-        self.numbers = {
-            name: (shown, Number(plain.dimension + slot))
-            for slot, (name, shown) in enumerate(zip(equations.parameters, plain.parameters, strict=True))
-        }
+        self.whole = _numbered(equations.state, plain.state, 0)
+        self.numbers = _numbered(equations.parameters, plain.parameters, plain.dimension)
         self.components, self.varied = equations.components, equations.varied
         self.reduced: dict[sp.Expr, sp.Symbol] = {}
 
@@ -199,7 +195,7 @@ class _Writer:
             values = [e.xreplace(self.reduced) for e in values]
         slot = 0
         for value in values:
-            if self._per_node(value):
+            if any(s.name in self.own for s in node_symbols(value)):
                 inside, (computed,) = self._node_values([value])
                 inside.append(store("out", plus(Number(slot), Name("i")), computed))
                 body.append(Loop("i", Number(0), Number(self.n), tuple(inside)))
@@ -214,12 +210,9 @@ class _Writer:
         names = (*self.components, *self.varied)
 
         def at_node(value: sp.Expr, number: sp.Integer) -> sp.Expr:
-            return value.xreplace({_real(name): _real(f"{name}_{number}") for name in names})
+            return value.xreplace({real(name): real(f"{name}_{number}") for name in names})
 
         return e.replace(AtNode, at_node)
-
-    def _per_node(self, e: sp.Expr) -> bool:
-        return any(s.name in self.own for s in node_symbols(e))
 
     def _innermost(self, values: Sequence[sp.Expr]) -> list[sp.Expr]:
         """The reductions that hold no other, in a fixed order."""
@@ -234,7 +227,7 @@ class _Writer:
             return begins
         inside, computed = self._node_values([r.args[0] for r in found])
         for r, value in zip(found, computed, strict=True):
-            symbol = _real(f"_total{len(self.reduced)}")
+            symbol = real(f"_total{len(self.reduced)}")
             begins.append(let(symbol.name, BEGINS[type(r)] + 0.0 * Name("theta")))
             linear = type(r) in (NodeSum, NodeMean)
             function = {NodeMaximum: "maximum", NodeMinimum: "minimum"}.get(type(r), "")
@@ -245,14 +238,14 @@ class _Writer:
     def _row_sum(self, r: sp.Expr) -> list[Statement]:
         """The loop that adds up a value of some nodes or links."""
         k = int(r.args[0])
-        rows, total = self.sums[k], _real(f"_total{len(self.reduced)}")
+        rows, total = self.sums[k], real(f"_total{len(self.reduced)}")
         inside: list[Statement] = []
         swap = {}
         for number, (s, entries) in enumerate(rows.at):
             entry: Expression = Load(table_name(k, number), Name("e"), None)
             if isinstance(entries[0], str):
                 entry = _inside(entry) if entries[0] in self.state else Load("y", entry)
-            swap[s] = _real(f"_row{number}")
+            swap[s] = real(f"_row{number}")
             inside.append(let(swap[s].name, entry))
         value = lower(self._shown(rows.value.xreplace(swap)))
         inside.append(let(total.name, Name(total.name) + value))
@@ -263,7 +256,7 @@ class _Writer:
         """The statements that a loop over nodes needs for some values, and the values."""
         loads = self._loads(values, self.own)
         shown = [self._shown(e) for e in values]
-        parts, results = sp.cse(shown, symbols=(sp.Symbol(f"_part{k}", real=True) for k in range(10**6)))
+        parts, results = sp.cse(shown, symbols=(real(f"_part{k}") for k in range(10**6)))
         return [*loads, *(let(s.name, lower(e)) for s, e in parts)], [lower(e) for e in results]
 
     def _loads(self, values: Sequence[sp.Expr], places: Mapping[str, tuple[str, Expression]]) -> list[Statement]:
@@ -286,19 +279,20 @@ class _Writer:
         """The expression in the names of the function."""
         names = {name: shown for name, (shown, _) in (*self.whole.items(), *self.numbers.items(), *self.own.items())}
         names[TIME.name] = "now"
-        rates = {r: _real(f"_rate_{names[r.args[0].name]}") for r in e.atoms(Rate)}
+        rates = {r: real(f"_rate_{names[r.args[0].name]}") for r in e.atoms(Rate)}
         e = e.xreplace(self.reduced).xreplace(rates)
-        return e.xreplace({_real(name): _real(shown) for name, shown in names.items() if name != shown})
+        return e.xreplace({real(name): real(shown) for name, shown in names.items() if name != shown})
 
 
 def _inside(place: Expression) -> Expression:
     return call("inside", "theta", place, "y", "y_new", "dense", "dims")
 
 
+def _numbered(names: Sequence[str], shown: Sequence[str], first: int) -> dict[str, tuple[str, Expression]]:
+    """Name and place of variables that stand one behind another."""
+    return {a: (b, Number(slot)) for slot, (a, b) in enumerate(zip(names, shown, strict=True), start=first)}
+
+
 def _row(first: int) -> Expression:
     """The place of a variable of node i, that of the first node being known."""
     return plus(Number(first), Name("i")) if first else Name("i")
-
-
-def _real(name: str) -> sp.Symbol:
-    return sp.Symbol(name, real=True)

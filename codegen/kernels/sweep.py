@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import sympy as sp
@@ -18,14 +18,14 @@ from ..driver.dimensions import Dimensions, ModeDimensions
 from ..integrators import Integrator, integrator
 from ..program.expressions import Load, Number, call
 from ..program.lowering import lower
-from ..program.passes import Names
+from ..program.passes import Names, real
 from ..program.printers import LANES
 from ..program.statements import Function, Return, Role, Statement, let, operations
 from ..simd import lanes
 from ..steps.blocks import NodeBlocks, analyse
 from ..steps.contacts import push_functions
 from ..steps.looped import Looped
-from ..steps.names import tidy
+from ..steps.names import renamed, tidy
 from ..steps.program import FILL_LIMIT, Program, program, workspace
 from ..steps.step import PAIR, SCALED, Step, function_name, node_function
 from ..steps.unrolled import Unrolled
@@ -38,6 +38,8 @@ __all__ = [
     "default_width",
     "describe",
     "emit",
+    "free_names",
+    "module",
     "node_functions",
 ]
 
@@ -161,16 +163,9 @@ def emit(
     _check_records(equations, records, section, watched, multiplicity)
     width = default_width(equations, method) if width is None else width
     ordered = tuple(r for r in Record if r in records)
-    weights = tuple(multiplicity) if multiplicity is not None and "sync_error" in ordered else None
-    looped = _is_looped(equations, method, unroll)
-    if looped:
-        method = _for_many(method, equations, unroll)
-        equations = equations.without_fields() if method.implicit else equations
-    elimination = program(equations, fill, method.implicit or equations.inertial) if looped else None
-    plain = tidy(equations)
-    weight = [edge.weight.name for edge in plain.edges]
-    states = [s.name for node in plain.nodes for s in node.state]
-    names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
+    equations, method, elimination = _planned(equations, method, unroll, fill)
+    plain, looped = tidy(equations), elimination is not None
+    names = free_names(plain)
     functions, scratch, count = (_series if method.series else _stages)(plain, method, names, elimination)
     seen = bool(watched.observed), bool(watched.sections), watched.stop is not None
     traits = looped, method.smooth is not None, plain.sticks, method.series, *seen
@@ -180,12 +175,8 @@ def emit(
         *_section(equations, plain, section if "section" in ordered else None),
         *watched.functions(equations, plain),
     ]
-    if chosen.cuts or watched:
-        functions.append(driver.text("dense"))
-    if watched.has_rates:
-        functions.append(driver.text("slope"))
-    text = "\n\n\n".join([*functions, *map(LANES.function, events)]) + "\n"
-    head = describe(equations, plain, method, (*ordered, *watched.words(equations)), count)
+    functions += [driver.text("dense")] if chosen.cuts or watched else []
+    functions += [driver.text("slope")] if watched.has_rates else []
     constants = {
         "WIDTH": width,
         "DENSE": bool(ordered or watched) or (plain.sticks and not method.series),
@@ -193,15 +184,28 @@ def emit(
     }
     if looped:
         constants |= {"NODES": plain.n, "DIMENSION": plain.dimension, "DENSE_ROWS": method.dense_rows}
-    named = "\n".join(f"{name} = {value}" for name, value in (*constants.items(), *watched.tables(equations).items()))
-    code = "\n\n\n".join([imports(f"{named}\n{text}"), named, text])
-    sizes = _dimensions(plain, method, scratch)._replace(
-        observed=watched.count(equations),
-        sections=len(watched.sections) or int("section" in ordered),
-        kept=watched.kept,
+    return KernelSource(
+        describe(equations, plain, method, (*ordered, *watched.words(equations)), count),
+        module({**constants, **watched.tables(equations)}, functions, events),
+        equations,
+        method,
+        chosen,
+        _dimensions(plain, method, scratch)._replace(
+            observed=watched.count(equations),
+            sections=len(watched.sections) or int("section" in ordered),
+            kept=watched.kept,
+        ),
+        (1,) * equations.n if multiplicity is None or "sync_error" not in ordered else tuple(multiplicity),
+        elimination,
+        rule_of(method) if watched.observed else (),
     )
-    rule = rule_of(method) if watched.observed else ()
-    return KernelSource(head, code, equations, method, chosen, sizes, weights or (1,) * equations.n, elimination, rule)
+
+
+def module(constants: Mapping[str, object], steps: Sequence[str], events: Sequence[Function]) -> str:
+    """The code of a kernel: what it imports, its constants, the functions of its steps, and those of events."""
+    named = "\n".join(f"{name} = {value}" for name, value in constants.items())
+    text = "\n\n\n".join([*steps, *map(LANES.function, events)]) + "\n"
+    return "\n\n\n".join([imports(f"{named}\n{text}"), named, text])
 
 
 def _check_records(
@@ -235,6 +239,24 @@ def default_width(equations: Equations, method: Integrator) -> int:
     most = 2 if method.implicit else 6
     moving = sum(len(equations.nodes[kind].continuous) for kind in equations.kind_of[: most + 1])
     return lanes.native_width(2 if moving <= most else 1)
+
+
+def _planned(
+    equations: Equations, method: Integrator, unroll: int, fill: float
+) -> tuple[Equations, Integrator, Program | None]:
+    """Equations and method as they are stepped, and the elimination that steps in loops run through."""
+    if not _is_looped(equations, method, unroll):
+        return equations, method, None
+    method = _for_many(method, equations, unroll)
+    equations = equations.without_fields() if method.implicit else equations
+    return equations, method, program(equations, fill, method.implicit or equations.inertial)
+
+
+def free_names(plain: Equations) -> Names:
+    """Return a supply of names that no symbol of the equations has."""
+    weights = [edge.weight.name for edge in plain.edges]
+    states = [s.name for node in plain.nodes for s in node.state]
+    return Names([*plain.state, *plain.parameters, *states, *plain.varied, *weights])
 
 
 def _is_looped(equations: Equations, method: Integrator, unroll: int) -> bool:
@@ -344,8 +366,7 @@ def describe(
     more: str = "",
 ) -> str:
     """The docstring at the head of a kernel module."""
-    named, written = ((*eq.state, *eq.parameters) for eq in (equations, plain))
-    swapped = tuple(f"{a} as {b}" for a, b in zip(named, written, strict=True) if a != b)
+    swapped = tuple(f"{a} as {b}" for a, b in renamed(equations, plain).items() if a != b)
     rows = [
         f"Generated kernel: {equations.n} oscillator{'s' * (equations.n > 1)}, {equations.link_count} links, {method.name}.",
         "",
@@ -379,9 +400,7 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
     """The section function at a fraction of the step; a kernel without sections has none."""
     if section is None:
         return []
-    renamed = zip((*equations.state, *equations.parameters), (*plain.state, *plain.parameters), strict=True)
-    swap = {_real(old): _real(new) for old, new in renamed}
-    section = section.xreplace({s: _real(s.name) for s in section.free_symbols})
+    section = section.xreplace({s: real(s.name) for s in section.free_symbols})
     used = {s.name for s in section.free_symbols}
     unknown = sorted(used - set(equations.state) - set(equations.parameters) - {"t"})
     if unknown:
@@ -393,7 +412,7 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
     for slot, (name, shown) in enumerate(zip(equations.parameters, plain.parameters, strict=True)):
         if name in used:
             body.append(let(shown, Load("y", Number(equations.dimension + slot))))
-    value = lower(section.xreplace({_real("t"): sp.Symbol("(t + theta*h)")}).xreplace(swap))
+    value = lower(section.xreplace({real("t"): sp.Symbol("(t + theta*h)")}).xreplace(renamed(equations, plain)))
     about = "The section function at the fraction theta of the step."
     return [
         Function(
@@ -404,7 +423,3 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
             role=Role.ENTRY,
         )
     ]
-
-
-def _real(name: str) -> sp.Symbol:
-    return sp.Symbol(name, real=True)

@@ -11,7 +11,12 @@ from dataclasses import dataclass, field
 import sympy as sp
 from sympy.functions.elementary.piecewise import ExprCondPair
 
-__all__ = ["Body", "Hoist", "Names", "share"]
+__all__ = ["Body", "Hoist", "Names", "real", "share"]
+
+
+def real(name: str) -> sp.Symbol:
+    """Return the symbol of that name that models have."""
+    return sp.Symbol(name, real=True)
 
 
 class Names:
@@ -28,7 +33,7 @@ class Names:
             number += 1
             if name not in self.taken:
                 self.taken.add(name)
-                yield sp.Symbol(name, real=True)
+                yield real(name)
 
 
 @dataclass

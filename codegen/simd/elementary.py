@@ -24,23 +24,21 @@ from .lanes import (
     copysign,
     floor,  # re-exported: kernels take all their functions from here
     fma,
-    round_even,
     scale_binary,
     select,
     split_binary,
     sqrt,
 )
 
-__all__ = ["atan", "cos", "exp", "expm1", "floor", "log", "sign", "sin", "sincos", "sqrt", "tanh"]
+__all__ = ["atan", "cos", "exp", "expm1", "floor", "log", "sign", "sin", "sqrt", "tanh"]
 
 MAGIC = 6755399441055744.0  # 1.5 * 2**52: adding it rounds to an integer and leaves that in the low bits
 LOG2E = 1.4426950408889634
 LN2_HIGH, LN2_LOW = 0.6931471805599453, 2.3190468138462996e-17
 LN2_SHORT, LN2_REST = 0.6931471803691238, 1.9082149292705877e-10  # the first has 21 trailing zero bits
-HALF_PI, HALF_PI_LOW, HALF_PI_REST = 1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33
-TWO_OVER_PI = 0.6366197723675814
 PI, PI_LOW, PI_REST = 3.141592653589793, 1.2246467991473532e-16, -2.9947698097183397e-33
 ONE_OVER_PI = 0.3183098861837907
+HALF_PI, HALF_PI_LOW = 1.5707963267948966, 6.123233995736766e-17
 LARGE, SMALL = 2.0**64, 2.0**-64
 
 ATAN = (
@@ -204,30 +202,6 @@ def cos(x):
     """Cosine, as the sine a quarter turn further; NaN for infinite x, no accuracy for |x| > 1e15."""
     shifted = fma(x, ONE_OVER_PI, 0.5) + MAGIC
     return _alternating_sine(x, (shifted - MAGIC) - 0.5, shifted)
-
-
-@lane_function
-def sincos(x):
-    """The pair (sin x, cos x), cheaper than both apart; NaN for infinite x, no accuracy for |x| > 1e15."""
-    k = round_even(x * TWO_OVER_PI)
-    r = fma(k, -HALF_PI_REST, fma(k, -HALF_PI_LOW, fma(k, -HALF_PI, x)))
-    r = select(absolute(r) < 1.0, r, r * 0.0)
-    z = r * r
-    s = fma(fma(1.5896681864241067e-10, z, -2.505075630735003e-08), z, 2.755731368145892e-06)
-    s = fma(fma(fma(s, z, -0.00019841269829780957), z, 0.008333333333322384), z, -0.16666666666666632)
-    s = fma(s, r * z, r)
-    c = fma(fma(-1.1359566430737872e-11, z, 2.0875721777215395e-09), z, -2.7557314341943445e-07)
-    c = fma(fma(fma(c, z, 2.4801587289448662e-05), z, -0.0013888888888874075), z, 0.0416666666666666)
-    half = 0.5 * z
-    top = 1.0 - half
-    c = top + (((1.0 - top) - half) + z * z * c)
-    turn = k - 4.0 * floor(k * 0.25)
-    swap = (turn == 1.0) | (turn == 3.0)
-    sine = select(swap, c, s)
-    cosine = select(swap, s, c)
-    sine = select(turn > 1.5, -sine, sine)
-    cosine = select((turn == 1.0) | (turn == 2.0), -cosine, cosine)
-    return sine, cosine
 
 
 @lane_function

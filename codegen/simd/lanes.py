@@ -24,7 +24,7 @@ from .lane_types import BOOL, DOUBLE, INT64, Lane, Mask, as_lane, common_width, 
 
 __all__ = [
     "Lane", "Mask", "absolute", "any_lane", "broadcast", "copysign", "floor", "fma", "lane_bits", "load",
-    "maximum", "minimum", "native_width", "one_lane", "round_even",
+    "maximum", "minimum", "native_width", "one_lane",
     "scale_binary", "select", "split_binary", "sqrt", "store", "truncated",
 ]  # fmt: skip
 
@@ -188,7 +188,6 @@ def _extreme(relation: str) -> Any:
 
 absolute = _llvm_function("fabs", 1)
 floor = _llvm_function("floor", 1)
-round_even = _llvm_function("rint", 1)
 sqrt = _llvm_function("sqrt", 1)
 copysign = _llvm_function("copysign", 2)
 minimum = _extreme("<")

@@ -13,7 +13,7 @@ import sympy as sp
 
 from synchain.models.mechanics.components import TIME, Node
 
-from ..program.passes import Body, Hoist, Names, share
+from ..program.passes import Body, Hoist, Names, real, share
 
 __all__ = ["NodeBlocks", "analyse"]
 
@@ -42,7 +42,7 @@ def analyse(node: Node, names: Names, varied: Iterable[str] = ()) -> NodeBlocks:
     size = len(node.state)
     entries = [e for row in node.jacobian() for e in row]
     outputs = [*node.rhs, *entries, *node.time_derivative()]
-    moving = frozenset(node.state) | {sp.Symbol(name, real=True) for name in varied}
+    moving = frozenset(node.state) | {real(name) for name in varied}
     waves = Hoist(moving, names.fresh("hoisted_"), frozenset({TIME}))
     outputs = [waves.apply(e) for e in outputs]
     steady = Hoist(moving | {TIME} | set(waves.table.values()), names.fresh("fixed_"))

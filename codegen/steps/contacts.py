@@ -14,7 +14,7 @@ from synchain.models.mechanics.friction import Contact
 
 from ..program.expressions import ZERO, Compare, Expression, Load, Name, Number, Product, call, plus
 from ..program.lowering import lower
-from ..program.passes import Body, Hoist, Names, share
+from ..program.passes import Hoist, Names, real, share
 from ..program.statements import Assign, Function, If, Role, Statement, accumulate, let, store
 from .fields import assigned
 from .names import NAMES
@@ -49,7 +49,7 @@ def _columns(contact: Contact) -> tuple[sp.Expr, ...]:
 def _written_out(equations: Equations, names: Names) -> list[Statement]:
     contacts = [found for i in range(equations.n) if (found := equations.contact_at(i)) is not None]
     body = share([e for column in zip(*map(_columns, contacts), strict=True) for e in column], names.fresh("z"))
-    states = [let(name, Load("y", Number(k))) for k, name in enumerate(equations.state) if _in(name, body.symbols)]
+    states = [let(name, Load("y", Number(k))) for k, name in enumerate(equations.state) if real(name) in body.symbols]
     stores = [store("out", k, lane(lower(e))) for k, e in enumerate(body.results)]
     return [*states, *_parameters(equations, body.symbols), *assigned(body), *stores]
 
@@ -59,16 +59,16 @@ def _looped(equations: Equations, names: Names) -> list[Statement]:
     node, nodes = equations.node, span("i", "NODES")
     if node.contact is None:
         return []
-    varied = (sp.Symbol(name, real=True) for name in equations.varied)
+    varied = (real(name) for name in equations.varied)
     fixed = Hoist(frozenset((*node.state, *varied)), names.fresh("fixed"), frozenset({TIME}))
     body = share([fixed.apply(e) for e in _columns(node.contact)], names.fresh("z"))
     force, link = _force(equations, node.contact)
     used = body.symbols.union(*(e.free_symbols for e in (*fixed.table, *link)))
     before = [*_parameters(equations, used), *(let(s.name, lane(lower(e))) for e, s in fixed.table.items())]
-    own: list[Statement] = [let(s.name, Load("y", _place(k, "i"))) for k, s in enumerate(node.state) if s in used]
-    own += places(equations).own(body)
-    own += assigned(body)
-    own += [store("out", _place(k, "i"), lane(lower(e))) for k, e in enumerate(body.results)]
+    at = places(equations)
+    own: list[Statement] = [let(s.name, Load("y", at.place(k))) for k, s in enumerate(node.state) if s in used]
+    own += [*at.own(body.symbols), *assigned(body)]
+    own += [store("out", at.place(k), lane(lower(e))) for k, e in enumerate(body.results)]
     if not force:
         return [*before, nodes.over(own)]
     unpacked = Assign(NAMES, Name("graph"), whole=True)
@@ -84,13 +84,11 @@ def _force(equations: Equations, contact: Contact) -> tuple[list[Statement], tup
     edge, swap = joint.edge, named(joint)
     velocity, mode = edge.here[1], edge.here[2]
     force = edge.rhs[1].xreplace({mode: sp.S.One, velocity: contact.speed})
-    found = link_ends(edge) + at.own(Body((), (force,)))
-    found += [let(name, load) for name, load in at.of_source(edge, force.free_symbols)]
-    found += [let(name, load) for name, load in at.of_link(force.free_symbols)]
+    found = [*link_ends(edge), *at.of_link(edge, force.free_symbols)]
     for place, states in (("i", edge.here), ("j", edge.there)):
-        found += [let(swap[s].name, Load("y", _place(k, place))) for k, s in enumerate(states) if force.has(s)]
+        found += [let(swap[s].name, Load("y", at.place(k, place))) for k, s in enumerate(states) if force.has(s)]
     found.append(let("f_link", lower(force.xreplace(swap))))
-    return [*found, *(accumulate("out", _place(k, "i"), "f_link") for k in FORCES)], (force,)
+    return [*found, *(accumulate("out", at.place(k), "f_link") for k in FORCES)], (force,)
 
 
 def event_functions(variation: Variation, names: Names) -> list[Function]:
@@ -106,10 +104,10 @@ def _release(events: Events, variation: Variation, names: Names) -> list[Functio
     used = set().union(*(e.free_symbols for e in events.expressions))
     known = enumerate((*equations.state, *equations.parameters))  # the orbit is one, its numbers fill a register
     body: list[Statement] = [
-        let(name, call("broadcast", Load("y", Number(k), None), "LANES")) for k, name in known if _in(name, used)
+        let(name, call("broadcast", Load("y", Number(k), None), "LANES")) for k, name in known if real(name) in used
     ]
     loaded = enumerate(strengths)
-    body += [let(s, register("strengths", len(strengths), k)) for k, s in loaded if _in(s, used)]
+    body += [let(s, register("strengths", len(strengths), k)) for k, s in loaded if real(s) in used]
     for i, sides in enumerate(events.exits):
         after = [
             If(Compare(sign, Name("after"), ZERO), tuple(_gained(entries, size, names)))
@@ -136,14 +134,6 @@ def _gained(entries: Sequence[Entry], size: int, names: Names) -> list[Statement
     return [*assigned(body), *stores]
 
 
-def _place(c: int, index: str) -> Expression:
-    return c * Name("NODES") + index
-
-
 def _parameters(equations: Equations, used: set[sp.Symbol]) -> list[Statement]:
     first = equations.dimension
-    return [let(p, Load("p", Number(first + k))) for k, p in enumerate(equations.parameters) if _in(p, used)]
-
-
-def _in(name: str, used: set[sp.Symbol]) -> bool:
-    return sp.Symbol(name, real=True) in used
+    return [let(p, Load("p", Number(first + k))) for k, p in enumerate(equations.parameters) if real(p) in used]

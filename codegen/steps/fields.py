@@ -18,7 +18,7 @@ from synchain.models.mechanics.components import Edge, Node
 
 from ..program.expressions import Load, Name, Value, as_expression, plus
 from ..program.lowering import lower
-from ..program.passes import Body, share
+from ..program.passes import Body, real, share
 from ..program.statements import Statement, accumulate, let, store
 from .places import Joint, Places, named, span
 from .step import NOW
@@ -45,7 +45,7 @@ class MeanField:
     def of(cls, number: int, edge: Edge, node: Node, pairs: AllPairs, parts: Separated) -> MeanField:
         """The mean field of this number among those of a network."""
         weight = {edge.weight: sp.Rational(pairs.weight.numerator, pairs.weight.denominator)}
-        symbols = {e: sp.Symbol(f"sum_{number}_{k}", real=True) for k, e in enumerate(parts.sources) if e != 1}
+        symbols = {e: real(f"sum_{number}_{k}") for k, e in enumerate(parts.sources) if e != 1}
         totals = {sp.S.One: sp.Integer(pairs.n), **symbols}
         shared: dict[sp.Expr, sp.Symbol] = {}
         rates = []
@@ -55,7 +55,7 @@ class MeanField:
                 grouped[target] = grouped.get(target, sp.S.Zero) + factor.xreplace(weight) * totals[source]
             rate = -own.xreplace(weight)
             for target, total in grouped.items():
-                s = shared.setdefault(total, sp.Symbol(f"sum_{number}_of_{len(shared)}", real=True))
+                s = shared.setdefault(total, real(f"sum_{number}_of_{len(shared)}"))
                 rate += target.xreplace(weight) * s
             rates.append(rate)
         sums = {s: e.xreplace(weight) for e, s in symbols.items()}
@@ -73,27 +73,27 @@ class MeanField:
 
         What a node is as a source and as a target is computed once, and stands in FIELD behind `kept` others meanwhile.
         """
-        names = (sp.Symbol(f"sum_part_{k}", real=True) for k in count())
+        names = (real(f"sum_part_{k}") for k in count())
         swap = named(Joint(self.edge, self.node, self.node, span("e", 0))) | NOW
         found = places.read(self.node, base, "_first", "0") if self.shifted else []
         at = {s: Name("FIELD") + k * Name("NODES") for k, s in enumerate(self.alike, start=kept)}
         used = {s for e in self.sums.values() for s in e.free_symbols}
         body = share([e.xreplace(swap) for e in self.sums.values()], names)
         there = self.states(places, base, "_there", "j")
-        there += [let(name, load) for name, load in places.of_source(self.edge, used)]
+        there += places.of_source(self.edge, used)
         there += assigned(body)
         for total, e in zip(self.sums, body.results, strict=True):
             found += [let(total.name, 0.0 * Name("h")), let(f"{total}_rest", 0.0 * Name("h"))]
             if total in at:
                 there += [let(f"{total}_own", lower(e)), store("dense", at[total] + "j", f"{total}_own")]
-                e = sp.Symbol(f"{total}_own", real=True)
+                e = real(f"{total}_own")
             there += compensated(total.name, lower(e))
         if self.sums:
             found.append(span("j", "NODES").over(there))
         found += [let(s.name, lower(e.xreplace(NOW))) for s, e in self.shared.items()]
-        own = {e: sp.Symbol(f"{s}_own", real=True) for s, e in self.alike.items()}
+        own = {e: real(f"{s}_own") for s, e in self.alike.items()}
         body = share([e.xreplace(own).xreplace(swap) for e in self.rates], names)
-        here = self.states(places, base, "_here", "i") + places.own(body)
+        here = [*self.states(places, base, "_here", "i"), *places.own(body.symbols)]
         here += [let(f"{s}_own", Load("dense", place + "i")) for s, place in at.items()]
         here += assigned(body)
         for c, e in enumerate(body.results):

@@ -17,7 +17,7 @@ from synchain.models.mechanics.components import Block
 from ..integrators import Integrator
 from ..program.expressions import Expression, Load, Name, Product, Value, call, linear, negative, plus, scaled
 from ..program.lowering import lower
-from ..program.passes import Body
+from ..program.passes import real
 from ..program.statements import (
     Assign,
     Do,
@@ -39,8 +39,7 @@ from .mass import added_masses, momentum_slopes, turned_masses
 from .names import NAMES
 from .places import Joint, Kind, link_ends, named, places, span
 from .program import Program
-from .step import NOW, Step, lane, time_term
-from .unrolled import entry
+from .step import NOW, Step, lane, linearised
 
 __all__ = ["Looped"]
 
@@ -114,7 +113,7 @@ class Looped(Step):
         """The right-hand side of the nodes of one kind."""
         body = self.kinds[kind.number].rhs
         left = [f"f_{s.name}" for s in kind.node.state]
-        found = self.places.read(kind.node, base) + self.places.own(body)
+        found = self.places.read(kind.node, base) + self.places.own(body.symbols)
         found += self.node_call("node", kind.number, body, left, {})
         for c, (name, e) in enumerate(zip(left, body.results, strict=True)):
             value = lane(lower(e)) if self.is_plain(e) else Name(name)
@@ -140,10 +139,8 @@ class Looped(Step):
 
     def link(self, joint: Joint, base: str, used: tuple[sp.Expr, ...], states: bool = True) -> list[Statement]:
         """The ends of a link, its weight, the parameters that `used` uses, and the states of both ends."""
-        read, body = self.places.read, Body((), used)
-        found = link_ends(joint.edge) + self.places.own(body)
-        found += [let(name, load) for name, load in self.places.of_source(joint.edge, body.symbols)]
-        found += [let(name, load) for name, load in self.places.of_link(body.symbols)]
+        read, symbols = self.places.read, {s for e in used for s in e.free_symbols}
+        found = [*link_ends(joint.edge), *self.places.of_link(joint.edge, symbols)]
         if states:
             found += read(joint.target, base, "_here", "i") + read(joint.source, base, "_there", "j")
         return found
@@ -198,11 +195,9 @@ class Looped(Step):
         """Slopes, matrix entries and time slopes of the nodes of one kind."""
         body, state = self.kinds[kind.number].linear, kind.node.state
         size, place = len(state), self.places.place
-        names = [f"f_{r.name}" for r in state] + [entry(r, c) for r in state for c in state]
-        names += [f"ft_{r.name}" for r in state]
-        found = self.places.read(kind.node, "y") + self.places.own(body)
+        names, found = linearised(state), [*self.places.read(kind.node, "y"), *self.places.own(body.symbols)]
         found += self.node_call("node_linear", kind.number, body, names, {})
-        named = [e if self.is_plain(e) else sp.Symbol(k, real=True) for k, e in zip(names, body.results, strict=True)]
+        named = [e if self.is_plain(e) else real(k) for k, e in zip(names, body.results, strict=True)]
         for c in range(size):
             found.append(store("dense", plus(Name("SLOPE"), place(c)), lane(lower(named[c]))))
             if self.places.row_of(c) in self.timed_rows:
@@ -237,8 +232,8 @@ class Looped(Step):
                 found += self.load_stages(place, m.big_c[i])
                 more, terms = self.mass.known(place, terms[0], linear(m.big_c[i], self.stages(i)))
                 found += more
-            if m.d[i] != 0.0 and row in self.timed_rows:
-                terms.append(time_term(m.d[i], Load("dense", plus(Name("TIME_SLOPE"), place))))
+            if row in self.timed_rows:
+                terms += self.time_slope(i, Load("dense", plus(Name("TIME_SLOPE"), place)))
             self.put(rows.over([*found, store("dense", plus(Name(f"K{i + 1}"), place), plus(*terms))]))
         if i > 0:
             self.mass.carried(i)
@@ -256,10 +251,10 @@ class Looped(Step):
     def finish(self) -> None:
         """Compute the new state, the error and the dense output; stages that serve this alone run if DENSE."""
         m, values = self.method, self.stages(len(self.method.c))
-        late = len(m.c) - self.early
+        late = len(m.c) - m.stages
         if late:
             with self.apart() as stages:
-                for i in range(self.early, len(m.c)):
+                for i in range(m.stages, len(m.c)):
                     self.stage(i)
             self.put(If(Name("DENSE"), tuple(stages)))
         self.note("new state, error and dense output")
@@ -271,16 +266,14 @@ class Looped(Step):
             with self.apart() as masses:
                 self.mass.gather("y", "MASS")
             self.put(If(Name("DENSE"), tuple(masses)))
-        found = [*self.load_stages(PLACE, [1.0] * self.early), let("old", Load("y", PLACE))]
+        found = [*self.load_stages(PLACE, [1.0] * m.stages), let("old", Load("y", PLACE))]
         found += [let("new", Name("old") + self.increment(m.b, values)), store("y_new", PLACE, "new")]
         found += [let("e", error), *self.stiff_errors(values)]
         found += [let("e", call("scaled", "e", "old", "new", "rtol", "atol"))]
         found += [let("total", Name("total") + "e"), let("error", call("maximum", "error", "e"))]
-        dense: list[Statement] = self.load_stages(PLACE, [0.0] * self.early + [1.0] * late)
+        dense: list[Statement] = self.load_stages(PLACE, [0.0] * m.stages + [1.0] * late)
         for j, row in enumerate(m.dense):
-            value = lane(linear(row, values))
-            scaled_value = value if m.implicit else Product((Name("h"), value))
-            dense.append(store("dense", j * Name("DIMENSION") + PLACE, scaled_value))
+            dense.append(store("dense", j * Name("DIMENSION") + PLACE, self.dense_value(row, values)))
         self.put(STATES.over([*found, If(Name("DENSE"), tuple(dense))]))
         self.put(Return((Name("error") + 0.0 * Name("total"),), "NaN or infinite where any estimate is"))
 
@@ -359,9 +352,9 @@ class LoopMass:
 
     def node(self, kind: Kind, used: Block, base: str) -> list[Statement]:
         """What some masses of a node are made of: its states and its own parameters."""
-        w, results = self.writer, tuple(e for row in used for e in row)
+        w, symbols = self.writer, {s for row in used for e in row for s in e.free_symbols}
         states = [] if kind.node.constant_inertia else w.places.read(kind.node, base)
-        return states + w.places.own(Body((), results))
+        return [*states, *w.places.own(symbols)]
 
     # -- explicit methods -------------------------------------------------------------------------------------
 
@@ -395,7 +388,7 @@ class LoopMass:
         """Add d(M F)/dy of the nodes at fixed F to the matrix."""
         w = self.writer
         for kind in self.heavy:
-            rates = [sp.Symbol(f"g_{s.name}", real=True) for s in kind.node.state]
+            rates = [real(f"g_{s.name}") for s in kind.node.state]
             turned = turned_masses(kind.node, rates)
             if turned:
                 found = [*self.node(kind, turned, "y"), *w.places.read(kind.node, "RATES", prefix="g_")]
@@ -418,7 +411,7 @@ class LoopMass:
         if self.constant or not edge.inertia:
             return own
         ends = ((joint.target, "_here"), (joint.source, "_there"))
-        rates = tuple(tuple(sp.Symbol(f"g_{s.name}{suffix}", real=True) for s in node.state) for node, suffix in ends)
+        rates = tuple(tuple(real(f"g_{s.name}{suffix}") for s in node.state) for node, suffix in ends)
         turned = momentum_slopes(edge, *rates)
         here, there = (
             tuple(tuple(a - b for a, b in zip(*rows, strict=True)) for rows in zip(*blocks, strict=True))

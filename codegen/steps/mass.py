@@ -18,7 +18,7 @@ from synchain.models.mechanics.components import Block, Edge, Node
 
 from ..program.expressions import Expression, Name, Product, call
 from ..program.lowering import lower
-from ..program.passes import Names
+from ..program.passes import Names, real
 from ..program.statements import Assign, Function, Return, Statement, let
 from .elimination import Entries, Entry, Factors, Plan, plan, write_elimination, write_solve
 from .step import Step, function_of, prefix
@@ -150,9 +150,9 @@ class Mass:
             return jacobian
         self.solve("y", "f", "g")
         found, rows, names = dict(jacobian), set(self.rows), self.writer.state
-        states = [sp.Symbol(name, real=True) for name in names]
+        states = [real(name) for name in names]
         for (row, column), e in self.entries.items():
-            rate = sp.Symbol(f"{'g' if column in rows else 'f'}_{names[column]}", real=True)
+            rate = real(f"{'g' if column in rows else 'f'}_{names[column]}")
             for k, s in enumerate(states):
                 if e.has(s):
                     found[row, k] = found.get((row, k), sp.S.Zero) - derivative(e, s) * rate

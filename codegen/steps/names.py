@@ -11,9 +11,10 @@ import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
 
+from ..program.passes import real
 from ..simd import elementary, lanes, special
 
-__all__ = ["NAMES", "RESERVED", "tidy"]
+__all__ = ["NAMES", "RESERVED", "renamed", "tidy"]
 
 NAMES = (
     "target", "source", "node_slot", "here_slot", "there_slot", "order", "place", "row_start", "after_start", "column",
@@ -62,15 +63,21 @@ def tidy(equations: Equations) -> Equations:
         if _clashes(s.name) or (numbered and NUMBERED.search(s.name)):
             name = _free(s.name, taken)
             taken.add(name)
-            swap[s] = sp.Symbol(name, real=True)
+            swap[s] = real(name)
     in_links = dict(swap)  # within an edge this name means the weight
     for weight in sorted(weights & own, key=str):
-        in_links[weight] = sp.Symbol(_free(f"{weight.name}_of_link", taken), real=True)
+        in_links[weight] = real(_free(f"{weight.name}_of_link", taken))
     if not in_links:
         return equations
     return equations.map_templates(
         lambda node: node.map(lambda e: e.xreplace(swap)), lambda edge: edge.map(lambda e: e.xreplace(in_links)), swap
     )
+
+
+def renamed(equations: Equations, plain: Equations) -> dict[sp.Symbol, sp.Symbol]:
+    """Return what the states and parameters of some equations are called in others that have the same."""
+    old, new = ((*eq.state, *eq.parameters) for eq in (equations, plain))
+    return {real(a): real(b) for a, b in zip(old, new, strict=True)}
 
 
 def _clashes(name: str) -> bool:

@@ -21,8 +21,8 @@ from synchain.models.graphs.links import Link
 from synchain.models.mechanics.components import Edge, Node
 
 from ..program.expressions import Expression, Load, Name, Number, Value, as_expression, plus
-from ..program.passes import Body
-from ..program.statements import Loop, Statement, let, whole
+from ..program.passes import real
+from ..program.statements import Assign, Loop, Statement, let, whole
 
 __all__ = [
     "Joint",
@@ -127,24 +127,20 @@ class Places:
         loads = [Load("y", at) if base == "y" else Load("dense", plus(Name(base), at)) for at in places]
         return [let(f"{prefix}{s.name}{suffix}", load) for s, load in zip(node.state, loads, strict=True)]
 
-    def own(self, body: Body) -> list[Statement]:
-        """Load the parameters that a node has for itself, those that a body uses."""
-        used = {s.name for s in body.symbols}
-        return [let(name, Load("p", self.parameter(k))) for k, name in enumerate(self.varied) if name in used]
+    def own(self, used: Container[sp.Symbol]) -> list[Assign]:
+        """Load the parameters that a node has for itself, those `used`."""
+        return [let(name, Load("p", self.parameter(k))) for k, name in enumerate(self.varied) if real(name) in used]
 
-    def of_link(self, used: Container[sp.Symbol]) -> list[tuple[str, Expression]]:
-        """The parameters that a link has for itself, those `used`, and where its numbers are."""
+    def of_source(self, edge: Edge, used: Container[sp.Symbol], index: str = "j") -> list[Assign]:
+        """Load the parameters that a link takes of its source, those `used`."""
+        taken = [own.name for s, own in edge.theirs if s in used]
+        return [let(f"{name}_there", Load("p", self.parameter(self.varied.index(name), index))) for name in taken]
+
+    def of_link(self, edge: Edge, used: Container[sp.Symbol], index: str = "j") -> list[Assign]:
+        """Load the parameters `used` that differ: those of the target, those of the source, and those of the link."""
         places = ((name, Number(self.behind + k * self.links) + "e") for k, name in enumerate(self.numbered))
-        return [(name, Load("p", Load("where", at, None))) for name, at in places if sp.Symbol(name, real=True) in used]
-
-    def of_source(self, edge: Edge, used: Container[sp.Symbol], index: str = "j") -> list[tuple[str, Expression]]:
-        """What the parameters are called that a link takes of its source, those `used`, and where they are."""
-        known = {name: k for k, name in enumerate(self.varied)}
-        return [
-            (f"{own.name}_there", Load("p", self.parameter(known[own.name], index)))
-            for s, own in edge.theirs
-            if s in used
-        ]
+        numbers = [let(name, Load("p", Load("where", at, None))) for name, at in places if real(name) in used]
+        return [*self.own(used), *self.of_source(edge, used, index), *numbers]
 
     def entry(self, slot: str, a: int, b: int) -> Expression:
         """Where an entry of a node's or a link's block stands in a matrix, by the array of its slots."""
@@ -192,11 +188,11 @@ def named(joint: Joint) -> dict[sp.Symbol, sp.Symbol]:
     """Return what the states at both ends of a link, and parameters of its source, are called in its loop."""
     ends = ((joint.edge.here, joint.target, "_here"), (joint.edge.there, joint.source, "_there"))
     states = {
-        s: sp.Symbol(f"{own.name}{suffix}", real=True)
+        s: real(f"{own.name}{suffix}")
         for symbols, node, suffix in ends
         for s, own in zip(symbols, node.state, strict=True)
     }
-    return states | {s: sp.Symbol(f"{own.name}_there", real=True) for s, own in joint.edge.theirs}
+    return states | {s: real(f"{own.name}_there") for s, own in joint.edge.theirs}
 
 
 def joint_numbers(equations: Equations) -> list[int]:

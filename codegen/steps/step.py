@@ -12,9 +12,9 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
 from ..integrators import Integrator
-from ..program.expressions import Expression, Load, Name, Negation, Number, Product, Value, call, linear
+from ..program.expressions import ZERO, Expression, Load, Name, Negation, Number, Product, Value, call, linear
 from ..program.lowering import lower
-from ..program.passes import Body
+from ..program.passes import Body, real
 from ..program.statements import Assign, Comment, Function, Return, Role, Statement, let, operations
 from .blocks import NodeBlocks
 
@@ -23,18 +23,19 @@ __all__ = [
     "PAIR",
     "SCALED",
     "Step",
+    "entry",
     "function_name",
     "function_of",
     "lane",
+    "linearised",
     "node_function",
     "prefix",
-    "time_term",
 ]
 
 LARGEST_INLINED = 400
 """Operations of a function up to which its body stands in each stage; copies of longer ones take long to compile."""
 
-NOW = {TIME: sp.Symbol("now", real=True)}
+NOW = {TIME: real("now")}
 """What the time of a stage is called in the expressions of links."""
 
 PAIR = '''
@@ -79,12 +80,15 @@ def prefix(vector: str) -> str:
     return "" if vector == "y" else f"{vector}_"
 
 
-def time_term(weight: float, slope: Expression) -> Expression:
-    """weight * h * slope with its sign in front."""
-    if isinstance(slope, Negation):
-        weight, slope = -weight, slope.value
-    term = Product((Number(abs(weight)), Name("h"), slope))
-    return Negation(term) if weight < 0 else term
+def entry(r: sp.Symbol, c: sp.Symbol) -> str:
+    """The name of d(rhs of r)/dc: j_vx, and j_speed_by_place where letters run together."""
+    return f"j_{r.name}{c.name}" if len(r.name) == len(c.name) == 1 else f"j_{r.name}_by_{c.name}"
+
+
+def linearised(state: Sequence[sp.Symbol]) -> list[str]:
+    """The names of rates, of the entries of their Jacobian row by row, and of their time derivatives."""
+    entries = (entry(r, c) for r in state for c in state)
+    return [*(f"f_{r.name}" for r in state), *entries, *(f"ft_{r.name}" for r in state)]
 
 
 class Step(ABC):
@@ -140,7 +144,7 @@ class Step(ABC):
             self.let("shift", 1.0 / Name("reach"))
             self.let("rate", Name("shift") * gamma)
             self.linearise()
-        for i in range(self.early):
+        for i in range(self.method.stages):
             self.stage(i)
             if after is not None:
                 after(i)
@@ -156,11 +160,6 @@ class Step(ABC):
             out = "f" if self.method.implicit else f"k{i + 1}"
             self.slopes("u" if i > 0 else "y", out)
         self.solve(i)
-
-    @property
-    def early(self) -> int:
-        """How many stages are computed before the new state."""
-        return self.method.stages
 
     @abstractmethod
     def opening(self) -> None:
@@ -193,6 +192,21 @@ class Step(ABC):
         total = linear(row, values)
         return total if self.method.implicit else Product((Name("h"), total))
 
+    def dense_value(self, row: Sequence[float], values: Sequence[str]) -> Expression:
+        """What a row of the dense output holds of a state: stages of explicit methods are rates."""
+        value = lane(linear(row, values))
+        return value if self.method.implicit else Product((Name("h"), value))
+
+    def time_slope(self, i: int, slope: Expression) -> list[Expression]:
+        """What a time slope adds to stage i of an implicit method."""
+        weight = self.method.d[i]
+        if weight == 0.0 or slope == ZERO:
+            return []
+        if isinstance(slope, Negation):
+            weight, slope = -weight, slope.value
+        term = Product((Number(abs(weight)), Name("h"), slope))
+        return [Negation(term) if weight < 0 else term]
+
     def stiff_error(self, error: Value, last: Expression, share: Expression) -> Expression:
         """The error of a state, at least that of its dense output times 1 - 2 share: the share that is not stiff.
 
@@ -222,7 +236,7 @@ class Step(ABC):
     @property
     def varied(self) -> set[sp.Symbol]:
         """The parameters of the template that have a value for each node."""
-        return {sp.Symbol(name, real=True) for name in self.equations.varied}
+        return {real(name) for name in self.equations.varied}
 
     def arguments(self, body: Body, results: Sequence[sp.Expr]) -> list[sp.Symbol]:
         """What a node function must be given: state first, then the rest by name."""

@@ -11,13 +11,14 @@ from synchain.models.dynamics.equations import Equations
 from ..integrators import Integrator
 from ..program.expressions import ZERO, Call, Expression, Load, Name, Number, Product, call, linear, plus
 from ..program.lowering import lower
+from ..program.passes import real
 from ..program.statements import If, Return, let, store
 from .blocks import NodeBlocks
 from .elimination import Entries, plan, times, write_factors, write_solve
 from .mass import Mass
-from .step import NOW, Step, lane, prefix, time_term
+from .step import NOW, Step, entry, lane, linearised, prefix
 
-__all__ = ["Unrolled", "entry", "stage_state"]
+__all__ = ["Unrolled", "stage_state"]
 
 
 class Unrolled(Step):
@@ -36,7 +37,7 @@ class Unrolled(Step):
     def at(self, i: int, base: str) -> dict[sp.Symbol, sp.Symbol]:
         """The names of the states of node i in a vector, and of the parameters that it has for itself."""
         states = self.equations.node_at(i).state
-        found = {s: sp.Symbol(f"{prefix(base)}{s.name}_{i + 1}", real=True) for s in states}
+        found = {s: real(f"{prefix(base)}{s.name}_{i + 1}") for s in states}
         return {**self.equations.at_node(i), **found}
 
     def stages(self, name: str, count: int) -> list[str]:
@@ -65,7 +66,7 @@ class Unrolled(Step):
     def links(self, base: str, out: str, at: Mapping[sp.Symbol, sp.Symbol] = NOW) -> None:
         """Add what the links contribute to the right-hand side, `at` the time of a stage or at that of the start."""
         eq, terms = self.equations, dict[str, list[Expression]]()
-        staged = {sp.Symbol(n, real=True): sp.Symbol(prefix(base) + n, real=True) for n in self.state} | dict(at)
+        staged = {real(n): real(prefix(base) + n) for n in self.state} | dict(at)
         for link, edge in eq.linked():
             for s, e in zip(eq.node_at(link[0]).state, edge.rhs, strict=True):
                 term = e.xreplace(eq.at_link(link, edge)).xreplace(staged)
@@ -108,8 +109,7 @@ class Unrolled(Step):
         own: list[dict[str, sp.Expr]] = []
         for i in range(eq.n):
             states, body, at = eq.node_at(i).state, self.first_of(self.of(i)), self.at(i, "y")
-            words = [f"f_{r}" for r in states] + [entry(r, c) for r in states for c in states]
-            words += [f"ft_{r}" for r in states] if implicit else []
+            words = linearised(states)[: len(body.results)]
             names = [f"{word}_{i + 1}" for word in words]
             function = "node_linear" if implicit else "node_local"
             self.put(*self.node_call(function, eq.kind_of[i], body, names, at))
@@ -118,7 +118,7 @@ class Unrolled(Step):
                 plain = self.is_plain(e)
                 if plain and k < len(states):
                     self.let(name, lower(e.xreplace(at)))
-                found[word] = (e.xreplace(at) if plain else sp.Symbol(name, real=True)).xreplace(kept)
+                found[word] = (e.xreplace(at) if plain else real(name)).xreplace(kept)
             own.append(found)
         self.links("y", "f", {})
         return own
@@ -127,7 +127,7 @@ class Unrolled(Step):
         """Keep time terms that stand for themselves in the linearisation, where stages give these names other values."""
         results = [e for blocks in self.kinds for e in self.first_of(blocks).results if self.is_plain(e)]
         moved = self.wanted([blocks.rhs for blocks in self.kinds]) & {s for e in results for s in e.free_symbols}
-        kept = {s: sp.Symbol(f"at_{s.name}", real=True) for s in sorted(moved, key=lambda s: s.name)}
+        kept = {s: real(f"at_{s.name}") for s in sorted(moved, key=lambda s: s.name)}
         self.put(*(let(there.name, here.name) for here, there in kept.items()))
         return kept
 
@@ -215,9 +215,7 @@ class Unrolled(Step):
             terms = [known.get(name, Name(f"f_{name}"))]
             if i > 0 and name not in known:
                 terms.append(Product((Name("rate"), sums[name])))
-            if m.d[i] != 0.0 and self.time_slopes[slot] != ZERO:
-                terms.append(time_term(m.d[i], self.time_slopes[slot]))
-            self.let(f"r_{name}", plus(*terms))
+            self.let(f"r_{name}", plus(*terms, *self.time_slope(i, self.time_slopes[slot])))
             rights[slot], results[slot] = f"r_{name}", f"k{i + 1}_{name}"
         self.put(*write_solve(self.steps, self.factors, rights, results))
 
@@ -236,8 +234,7 @@ class Unrolled(Step):
                 self.stage(i)
             for j, row in enumerate(m.dense):
                 for slot, name in enumerate(self.state):
-                    value = lane(linear(row, self.stages(name, len(row))))
-                    value = value if m.implicit else Product((Name("h"), value))
+                    value = self.dense_value(row, self.stages(name, len(row)))
                     self.put(store("dense", j * len(self.state) + slot, value))
             if m.dense_error:
                 self.stiff_errors()
@@ -283,11 +280,6 @@ def stage_state(row: Sequence[float], previous: Sequence[float], name: str) -> E
     if len(previous) > 0 and tuple(row) == (*previous, 1.0):
         return Name(f"u_{name}") + names[-1]
     return linear(row, names, name)
-
-
-def entry(r: sp.Symbol, c: sp.Symbol) -> str:
-    """The name of d(rhs of r)/dc: j_vx, and j_speed_by_place where letters run together."""
-    return f"j_{r.name}{c.name}" if len(r.name) == len(c.name) == 1 else f"j_{r.name}_by_{c.name}"
 
 
 def size(e: sp.Expr) -> Expression:

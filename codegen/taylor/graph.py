@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import reduce
+from typing import TypeVar, cast
 
 import sympy as sp
 from sympy.functions.elementary.piecewise import Piecewise
@@ -55,6 +56,8 @@ STARTS: dict[type[sp.Expr], str] = {
 
 The others follow from the derivative that SymPy knows.
 """
+
+S = TypeVar("S", bound=Series)
 
 ODD = (sp.sin, sp.tan, sp.sinh, sp.tanh, sp.atan, sp.asin, sp.asinh, sp.atanh, sp.erf)
 EVEN = (sp.cos, sp.cosh)
@@ -199,13 +202,13 @@ class Graph:
 
     # -- series that are made once ----------------------------------------------------------------------------
 
-    def put(self, kind: type[Series], *parts: object) -> Series:
+    def put(self, kind: type[S], *parts: object) -> S:
         """The series of this kind with these parts."""
         key = (kind, *parts)
         if key not in self.known:
             self.known[key] = kind(*parts)
             self.series.append(self.known[key])
-        return self.known[key]
+        return cast("S", self.known[key])
 
     def sum(self, terms: Sequence[tuple[Expression, Series]], constant: Expression = ZERO) -> Series:
         """constant + sum of factor * series; a difference and its negative share a series."""
@@ -240,17 +243,6 @@ class Graph:
         (a, left), (b, right) = split(left), split(right)
         inner = self.put(Square, left) if left is right else self.put(Product, left, right)
         return self.sum([(times(a, b), inner)])
-
-    def ratio(self, above: Series, below: Series) -> Series:
-        """above / below."""
-        return self.put(Ratio, above, below)
-
-    def slope(self, series: Series) -> Slope:
-        """The derivative of a series."""
-        found = self.put(Slope, series)
-        if not isinstance(found, Slope):
-            raise TypeError(f"found {found}; expected a slope")
-        return found
 
     def choice(self, gap: Series, above: Series, below: Series) -> Series:
         """`above` where a series is positive, `below` where it is negative; they agree where it is zero."""
@@ -356,26 +348,24 @@ class Graph:
         above = [self.of(f) for f in _sorted(e.args) if not _is_divisor(f)]
         below = [self.of(1 / f) for f in _sorted(e.args) if _is_divisor(f)]
         top = reduce(self.product, above) if above else Constant(ONE)
-        return self.ratio(top, reduce(self.product, below)) if below else top
+        return self.put(Ratio, top, reduce(self.product, below)) if below else top
 
     def power(self, base: sp.Expr, exponent: sp.Expr) -> Series:
         if self.moves(exponent):
             return self.of(sp.exp(exponent * sp.log(base), evaluate=False))
         if not (2 * exponent).is_Integer:
             inner = self.of(base)
-            return self.put(Power, inner, self.slope(inner), self.constant(exponent.xreplace(self.swap)))
+            return self.put(Power, inner, self.put(Slope, inner), self.constant(exponent.xreplace(self.swap)))
         if exponent.is_negative:
-            return self.ratio(Constant(ONE), self.of(base**-exponent))
+            return self.put(Ratio, Constant(ONE), self.of(base**-exponent))
         if exponent == sp.S.Half:
             return self.put(SquareRoot, self.of(base))
         if not exponent.is_Integer:
             return self.product(self.of(base ** (exponent - sp.S.Half)), self.of(sp.sqrt(base)))
         half = self.of(base ** (exponent // 2))
-        return (
-            self.product(half, half)
-            if exponent % 2 == 0
-            else self.product(self.of(base ** (exponent - 1)), self.of(base))
-        )
+        if exponent % 2 == 0:
+            return self.product(half, half)
+        return self.product(self.of(base ** (exponent - 1)), self.of(base))
 
     def kinked(self, e: sp.Expr) -> Series:
         """An absolute value, the largest or smallest of some, or a choice."""
@@ -415,9 +405,9 @@ class Graph:
             quotient = QuotientIntegral(name, argument, divisor, value, name=self.fresh(name))
             self.known[key] = quotient
             self.series.append(quotient)
-            quotient.slope = self.slope(quotient)
+            quotient.slope = self.put(Slope, quotient)
             return quotient
-        integral = Integral(name, argument, self.slope(argument), value, name=self.fresh(name))
+        integral = Integral(name, argument, self.put(Slope, argument), value, name=self.fresh(name))
         self.known[key] = integral
         self.series.append(integral)
         integral.factor = self.inside(derivative, place, argument)
@@ -425,7 +415,7 @@ class Graph:
 
     def saturating(self, argument: Series) -> Series:
         """tanh of a series; its slope is a series of its own, because 1 - tanh**2 has no digits where tanh is nearly 1."""
-        slope = self.slope(argument)
+        slope = self.put(Slope, argument)
         found = Integral("tanh", argument, slope, name=self.fresh("tanh"))
         bell = SquaredSecant("cosh", argument, slope, -2.0, name=self.fresh("squaredsecant"))
         self.known[sp.tanh, argument] = found

@@ -15,35 +15,20 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Block, Edge, Node
 
-from ..program.expressions import ONE, ZERO, Call, Expression, Name, Number
-from ..program.passes import Body, Hoist, Names
+from ..program.expressions import ONE, ZERO, Expression, Name, Number
+from ..program.passes import Hoist, Names, real
 from ..program.printers import LANES
+from ..program.statements import Assign
 from ..steps.fields import MeanField, compensated, mean_fields
 from ..steps.names import NAMES
 from ..steps.places import Joint, Kind, Span, places
 from .graph import Graph, Template
-from .masses import moved, solved
+from .length import finished, last_orders, reach, unseen
+from .masses import moving, solved
+from .passage import closed, first_passage, functions, jumps, loose, passed
 from .series import Constant, Series, State, Time, magnitude
-from .step import (
-    FARTHEST,
-    NEXT,
-    SOONEST,
-    TaylorStep,
-    broken,
-    called,
-    closed,
-    ended,
-    ending,
-    falling,
-    finished,
-    jumps,
-    lane,
-    largest,
-    loose,
-    returned,
-    unseen,
-)
-from .terms import add, show, statement
+from .step import TaylorStep, broken, called, returned
+from .terms import absolute, add, lane, largest, show, statement
 
 __all__ = ["write_looped"]
 
@@ -61,8 +46,14 @@ def convolution(dense, left, left_step, right, right_step, k, first, end):
 GAPS = ("i", "NODES + i")
 """Where the two gaps of the contact of a node stand among those of one order."""
 
-Hoisted = tuple[list[sp.Expr], dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]]
-"""Rates, the series of their names for what depends on time, and the constants behind their other names."""
+
+@dataclass(frozen=True, slots=True)
+class Hoisted:
+    """Rates in names: of series for what depends on time alone, of constants for what depends on parameters alone."""
+
+    rates: list[sp.Expr]
+    waves: dict[sp.Symbol, Series] = field(default_factory=dict)
+    constants: dict[sp.Symbol, sp.Expr] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -71,21 +62,19 @@ class Section:
 
     head, index, count: the loop, its variable and the number of its turns in the whole numbering; `setting` loads what the
     turn needs at any order, `places` are the states that it reads, and where they stand, `lent` are series that other
-    sections need too, `gaps` those of contacts, or what links add to them, `mode` says whether these slip, `exact` whether
-    it begins with a jump.
+    sections need too, `gaps` those of contacts, or what links add to them, `mode` says whether these slip.
     """
 
     graph: Graph
-    head: str
-    index: str
-    count: int
+    head: str = ""
+    index: str = ""
+    count: int = 1
     setting: list[str] = field(default_factory=list)
     places: dict[Series, str] = field(default_factory=dict)
     rates: list[tuple[str, Series]] = field(default_factory=list)
     lent: set[Series] = field(default_factory=set)
     gaps: list[Series] = field(default_factory=list)
     mode: str = ""
-    exact: bool = False
     adds: bool = False
     waves: dict[Series, Section] = field(default_factory=dict)
     kept: list[str] = field(default_factory=list)
@@ -114,6 +103,10 @@ class Section:
     def start(self, series: Series) -> Expression:
         """Coefficient 0 of a series."""
         return series.value if isinstance(series, Constant) else self.values[series]
+
+    def now(self, series: Series, first: bool) -> Expression:
+        """Coefficient 0 of a series, or k."""
+        return self.start(series) if first else self.of(series)
 
     def before(self, series: Series) -> Expression:
         """Coefficient k - 1 of a series."""
@@ -167,9 +160,10 @@ class Section:
 
     @property
     def remembered(self) -> set[Series]:
-        """Series whose earlier coefficients are needed."""
+        """Series whose earlier coefficients are needed, or all that is made once for other sections."""
         used = {used for s in self.graph.series for used in s.convolved}
-        return (used | {*self.graph.watched, *self.graph.positive} | self.lent) - set(self.places) - set(self.waves)
+        used |= {*self.graph.watched, *self.graph.positive, *self.lent}
+        return (used - {*self.places, *self.waves}) | (set() if self.index else {s for _, s in self.rates})
 
     # -- text -----------------------------------------------------------------------------------------------------
 
@@ -181,7 +175,7 @@ class Section:
             self.lines += [f"{name} = load(dense, {self.slot(name, '0')}, WIDTH)" for name in self.kept]
         self.lines += [f"{s.name} = {self.load(s, order)}" for s in outer]
         self.values = {s: Name(s.name) for s in outer}
-        remembered = self.remembered | ({s for _, s in self.rates} if not self.index else set())
+        remembered = self.remembered
         for s in self.graph.series:
             value = s.begin(self) if first else s.coefficient(self)
             inline = s in (self.graph.inline_start if first else self.graph.inline) and s not in remembered
@@ -197,16 +191,14 @@ class Section:
     def finish(self, first: bool) -> None:
         """Append the statements that use coefficient 0, or k, of the rates."""
         for place, rate in self.rates if self.index else ():
-            value = self.start(rate) if first else self.of(rate)
+            value = self.now(rate, first)
             if not self.adds:
                 text = f"{show(value)} + 0.0*scale" if isinstance(rate, Constant) else show(value)
                 self.lines.append(f"store(dense, at_rates + {place}, {text})")
             elif value != ZERO:
                 self.put(f"at_rates + {place}", value)
         for place, gap in zip(GAPS, self.gaps, strict=False):
-            self.put(
-                f"at_gaps + {place if first else f'k*2*NODES + {place}'}", self.start(gap) if first else self.of(gap)
-            )
+            self.put(f"at_gaps + {place if first else f'k*2*NODES + {place}'}", self.now(gap, first))
             if first:
                 self.put(f"at_sizes + {place}", magnitude(self, gap))
 
@@ -222,38 +214,37 @@ class Section:
         for s in self.graph.positive:
             found += [f"value = {self.load(s, str(order - 1))}", f"for k in range({order - 2}, -1, -1):"]
             found += [f"    value = value*ratio + {self.load(s, 'k')}", broken("value", self.load(s, "0"))]
-        return self.turns([*self.setting, *found]) if found else []
+        return self.run(found)
 
-    def passages(self, degree: int) -> list[str]:
-        """The statements that end the step at the kinks of this section."""
-        found = [
-            f"passed = passage({self.load(kink, str(degree))}, load(dense, {self.slot(kink.size, '0')}, WIDTH), PASSED, "
-            f"NEAREST*passed, dense, {self.where(kink.base, '0')}, {self.stride(kink.base)}, {degree}, passed)"
-            for kink in self.graph.kinks
-        ]
+    def passages(self, degree: int, exact: bool) -> list[str]:
+        """The statements that end the step at the kinks and contacts of this section."""
+        found = []
+        for kink in self.graph.kinks:
+            size, first = f"load(dense, {self.slot(kink.size, '0')}, WIDTH)", self.where(kink.base, "0")
+            found.append(passed(self.load(kink, str(degree)), size, first, self.stride(kink.base), degree))
         if self.mode:
             sizes = [f"load(dense, at_sizes + {place}, WIDTH)" for place in GAPS]
             places = [f"at_gaps + {place}" for place in GAPS]
             found.append(f"stuck = 1.0 - {self.mode}*{self.mode}")
-            found += closed("stuck", self.exact, sizes, places, "2*NODES", "at_closing", degree)
-        return self.turns([*self.setting, *found]) if found else []
+            found += closed("stuck", exact, sizes, places, "2*NODES", "at_closing", degree)
+        return self.run(found)
 
-    def lengths(self, order: int, orders: Sequence[int]) -> list[str]:
+    def lengths(self, order: int) -> list[str]:
         """The statements that make the step no longer than the series of this section let it be."""
         found = []
         for s in self.graph.gaps:
-            sizes = {k: Call("absolute", (Name(self.load(s, str(k))),)) for k in (0, 1, 2, *orders)}
-            found += statement("largest", largest(sizes[k] for k in range(3)))
-            found.append("weight = 1.0/(atol + rtol*largest)")
-            found += [f"size_{k} = maximum(size_{k}, {show(sizes[k])}*weight)" for k in orders]
+            found += statement("largest", largest(absolute(Name(self.load(s, str(k)))) for k in range(3)))
+            found += weighed("rtol*largest", {k: self.load(s, str(k)) for k in last_orders(order)})
         for place in GAPS if self.mode else ():
-            found.append(f"weight = 1.0/(atol + loose*load(dense, at_sizes + {place}, WIDTH))")
-            for k in orders:
-                size = f"absolute(load(dense, at_gaps + {k}*2*NODES + {place}, WIDTH))*weight"
-                found.append(f"size_{k} = maximum(size_{k}, {size})")
+            last = {k: f"load(dense, at_gaps + {k}*2*NODES + {place}, WIDTH)" for k in last_orders(order)}
+            found += weighed(f"loose*load(dense, at_sizes + {place}, WIDTH)", last)
         for s in self.graph.watched:
             found += unseen([Name(self.load(s, str(k))) for k in range(order)])
-        return self.turns([*self.setting, *found]) if found else []
+        return self.run(found)
+
+    def run(self, lines: list[str]) -> list[str]:
+        """Statements, if there are any, that are run through behind what a turn needs."""
+        return self.turns([*self.setting, *lines]) if lines else []
 
     def turns(self, lines: list[str]) -> list[str]:
         """Statements that are run through in the section's loop."""
@@ -274,7 +265,7 @@ class Totals(Section):
     def finish(self, first: bool) -> None:
         """Add the coefficients to the sums; those of a constant beyond the first are zero."""
         for name, rate in self.rates:
-            value = self.start(rate) if first else self.of(rate)
+            value = self.now(rate, first)
             if value != ZERO:
                 self.lines += [
                     *statement(f"{name}_value", value),
@@ -299,6 +290,17 @@ def with_pushes(joint: Joint) -> list[sp.Expr]:
     return [*edge.rhs, push, -push]
 
 
+def weighed(error: str, last: Mapping[int, str]) -> list[str]:
+    """Statements that let the last coefficients of something count, in units of the error that it may have."""
+    sizes = (f"size_{k} = maximum(size_{k}, absolute({value})*weight)" for k, value in last.items())
+    return [f"weight = 1.0/(atol + {error})", *sizes]
+
+
+def theirs(edge: Edge) -> dict[sp.Symbol, sp.Symbol]:
+    """What the parameters are called that a link takes of its source."""
+    return {s: real(f"{own.name}_there") for s, own in edge.theirs}
+
+
 def head_of(span: Span) -> str:
     """The head of the loop over a part of a numbering."""
     return LANES.loop(span.index, span.start, span.stop) + ":"
@@ -315,63 +317,49 @@ class LoopWriter:
         named = {s for node in eq.nodes for s in (*node.state, *node.parameters)}
         named |= {s for edge in eq.edges for s in (edge.weight, *edge.parameters)}
         words = sorted({s.name for s in named} | set(eq.parameters))
-        self.called: dict[str, str] = {}
-        for name in words:
-            self.called[name] = called(name, {*words, *self.called.values()})
-        self.swap = {sp.Symbol(old, real=True): sp.Symbol(new, real=True) for old, new in self.called.items()}
-        taken = {*words, *self.called.values(), *(f"{s}{end}" for s in words for end in ("_here", "_there"))}
-        self.names = Names(taken)
+        self.called = called(words)
+        self.swap = {real(old): real(new) for old, new in self.called.items()}
+        self.names = Names([*words, *self.called.values(), *(s + end for s in words for end in ("_here", "_there"))])
         self.time = Time(name="t")
-        self.waves = Section(Graph(self.names), "", "", 1)
+        self.waves = Section(Graph(self.names))
         kinds, joints = self.places.kinds, self.places.joints
-        nodes = [self.hoisted(with_gaps(kind.node), [*kind.node.state, *self.varied()]) for kind in kinds]
+        nodes = [self.hoisted(with_gaps(kind.node), [*kind.node.state, *self.varied]) for kind in kinds]
         links = [self.of_links(joint.edge, with_pushes(joint)) for joint in joints]
         fields = [self.of_field(field) for field in self.fields]
         self.waves.graph.settle([s for _, s in self.waves.rates])
         if self.waves.rates:
             self.waves.waves[self.time] = self.waves
-        self.sections = [self.node(kind, *found) for kind, found in zip(kinds, nodes, strict=True)]
-        self.sections += [self.link(joint, *found) for joint, found in zip(joints, links, strict=True)]
+        self.sections = [self.waves, *map(self.node, kinds, nodes), *map(self.link, joints, links)]
         for mean, parts in zip(self.fields, fields, strict=True):
             self.sections += self.field(mean, *parts)
-        self.kinks = eq.sticks or any(section.graph.kinks for section in (self.waves, *self.sections))
-        self.orders = order + 1 if self.kinks else order
+        self.ends = eq.sticks or any(section.graph.kinks for section in self.sections)
+        self.orders = order + 1 if self.ends else order
 
     # -- sections ---------------------------------------------------------------------------------------------
 
+    @property
     def varied(self) -> list[sp.Symbol]:
         """Parameters that have a value for each node or link."""
-        return [sp.Symbol(name, real=True) for name in self.equations.differing]
+        return [real(name) for name in self.equations.differing]
 
-    def node(
-        self,
-        kind: Kind,
-        rates: Sequence[sp.Expr],
-        waves: Mapping[sp.Symbol, Series],
-        constants: Mapping[sp.Symbol, sp.Expr],
-    ) -> Section:
+    def node(self, kind: Kind, found: Hoisted) -> Section:
         """The rates of the nodes of a kind."""
-        moves = self.moves(kind.node)
-        states = [s for s, moving in zip(kind.node.state, moves, strict=True) if moving]
-        fixed = [s for s in kind.node.state if s not in states]
-        section = Section(Graph(self.names), head_of(kind.span), "i", self.equations.n)
-        used = (*with_gaps(kind.node), *(e for row in kind.node.inertia for e in row))
-        section.setting += self.own(used, fixed, kind.node, "i", "")
-        moving = {s: State(name=self.swap[s].name) for s in states}
-        component = {s: c for c, s in enumerate(kind.node.state)}
-        section.places = {state: self.place(component[s]) for s, state in moving.items()}
-        seen = self.seen(section, self.waves, waves)
-        found = self.read(section, rates, {**moving, **seen}, constants, kind.node.inertia)
-        section.rates, section.gaps = self.parted(kind.node, found)
-        if kind.node.contact is not None:
-            section.mode, section.exact = self.swap[kind.node.state[2]].name, self.exact
+        node, section = kind.node, Section(Graph(self.names), head_of(kind.span), "i", self.equations.n)
+        moving, fixed = self.end(section, node.state, node, ("", "i"), node.state)
+        used = {s for e in (*found.rates, *(e for row in node.inertia for e in row)) for s in e.free_symbols}
+        section.setting += self.loaded(self.places.own(used))
+        moving |= self.seen(section, self.waves, found.waves)
+        swap = {**found.constants, **fixed}
+        self.store(section, node, self.read(section, found.rates, moving, swap, node.inertia))
+        if node.contact is not None:
+            section.mode = self.called[node.state[2].name]
         return section
 
     def of_links(self, edge: Edge, rates: Sequence[sp.Expr], more: Iterable[sp.Symbol] = ()) -> Hoisted:
         """Rates by links, and of `more` symbols that move, parted like those of nodes if time enters them."""
         if not edge.forced:
-            return list(rates), {}, {}
-        own = (edge.weight, *edge.here, *edge.there, *(s for s, _ in edge.theirs), *self.varied(), *more)
+            return Hoisted(list(rates))
+        own = (edge.weight, *edge.here, *edge.there, *(s for s, _ in edge.theirs), *self.varied, *more)
         return self.hoisted(rates, own)
 
     def of_field(self, field: MeanField) -> tuple[Hoisted, Hoisted, Hoisted]:
@@ -381,39 +369,23 @@ class LoopWriter:
         first, second, third = (self.of_links(field.edge, e, more) for e in (sums, shared, field.rates))
         return first, second, third
 
-    def link(
-        self,
-        joint: Joint,
-        rates: Sequence[sp.Expr],
-        waves: Mapping[sp.Symbol, Series],
-        constants: Mapping[sp.Symbol, sp.Expr],
-    ) -> Section:
+    def link(self, joint: Joint, found: Hoisted) -> Section:
         """What the links of a joint add."""
-        edge = joint.edge
+        edge, used = joint.edge, {s for e in found.rates for s in e.free_symbols}
         section = Section(Graph(self.names), head_of(joint.span), "e", self.links, adds=True)
-        weight = self.called[edge.weight.name]
-        section.setting += ["i, j_there = target[e], source[e]", f"{weight} = weights[e]"]
-        given = with_pushes(joint)
-        used = {s for e in given for s in e.free_symbols}
+        section.setting += ["i, j_there = target[e], source[e]", f"{self.called[edge.weight.name]} = weights[e]"]
         moving, fixed = self.end(section, edge.here, joint.target, ("_here", "i"), used)
         others, more = self.end(section, edge.there, joint.source, ("_there", "j_there"), used)
-        moving |= others
-        swap: dict[sp.Symbol, sp.Expr] = {**constants, **fixed, **more}
-        section.setting += self.own(given, [], joint.target, "i", "_here")
-        for name, load in self.places.of_source(edge, used, "j_there"):
-            section.setting.append(f"{name} = {LANES.text(load)}")
-        for name, load in self.places.of_link(used):
-            section.setting.append(f"{self.called[name]} = {LANES.text(load)}")
-        swap |= {s: sp.Symbol(f"{own.name}_there", real=True) for s, own in edge.theirs}
-        seen = self.seen(section, self.waves, waves)
-        found = self.read(section, rates, {**moving, **seen}, swap)
-        section.rates, section.gaps = self.parted(joint.target, found)
+        section.setting += self.loaded(self.places.of_link(edge, used, "j_there"))
+        moving |= others | self.seen(section, self.waves, found.waves)
+        swap = {**found.constants, **fixed, **more, **theirs(edge)}
+        self.store(section, joint.target, self.read(section, found.rates, moving, swap))
         return section
 
-    def parted(self, node: Node, found: Sequence[Series]) -> tuple[list[tuple[str, Series]], list[Series]]:
-        """The rates of a node, with their places, and its gaps."""
+    def store(self, section: Section, node: Node, found: Sequence[Series]) -> None:
+        """Let a section store what was read for a node: its rates at their places, and behind them its gaps."""
         size = len(node.state)
-        return [(self.place(c), rate) for c, rate in enumerate(found[:size])], list(found[size:])
+        section.rates, section.gaps = [(self.place(c), rate) for c, rate in enumerate(found[:size])], list(found[size:])
 
     def end(
         self,
@@ -423,7 +395,7 @@ class LoopWriter:
         at: tuple[str, str],
         used: Container[sp.Symbol],
     ) -> tuple[dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]]:
-        """The states at one end of a link that are used: series of those that move, names of those at rest.
+        """The states of a node, or of one end of a link, that are used: series of those that move, names of those at rest.
 
         `at` is what stands behind their names, and the number of the node there.
         """
@@ -438,7 +410,7 @@ class LoopWriter:
                 moving[s] = State(name=name)
                 section.places[moving[s]] = self.place(c, index)
             else:
-                fixed[s] = sp.Symbol(name, real=True)
+                fixed[s] = real(name)
                 section.setting.append(f"{name} = load(y, {self.place(c, index)}, WIDTH)")
         return moving, fixed
 
@@ -447,36 +419,34 @@ class LoopWriter:
 
         Source functions that are functions of the target too are series once.
         """
-        edge, node, nodes = field.edge, field.node, self.places.kinds[0].span
-        totals = Totals(Graph(self.names), head_of(nodes), "i", self.equations.n)
-        used = {s for e in sums[0] for s in e.free_symbols}
+        nodes = head_of(self.places.kinds[0].span)
+        totals = Totals(Graph(self.names), nodes, "i", self.equations.n)
+        used = {s for e in sums.rates for s in e.free_symbols}
         moving, fixed = self.field_end(totals, field, "_there", used)
-        for name, load in self.places.of_source(edge, used, "i"):
-            totals.setting.append(f"{name} = {LANES.text(load)}")
-        swap = {**sums[2], **fixed, **{s: sp.Symbol(f"{own.name}_there", real=True) for s, own in edge.theirs}}
-        found = self.read(totals, sums[0], {**moving, **self.seen(totals, self.waves, sums[1])}, swap)
+        totals.setting += self.loaded(self.places.of_source(field.edge, used, "i"))
+        moving |= self.seen(totals, self.waves, sums.waves)
+        found = self.read(totals, sums.rates, moving, {**sums.constants, **fixed, **theirs(field.edge)})
         totals.rates = [(s.name, series) for s, series in zip(field.sums, found, strict=True)]
         yield totals
-        combined = Section(Graph(self.names), "", "", 1)
-        moving = self.seen(combined, self.waves, shared[1])
+        combined = Section(Graph(self.names))
+        moving = self.seen(combined, self.waves, shared.waves)
         moving |= self.seen(combined, combined, {s: State(name=s.name) for s in field.sums})
-        common = dict(zip(field.shared, self.read(combined, shared[0], moving, shared[2]), strict=True))
+        common = dict(zip(field.shared, self.read(combined, shared.rates, moving, shared.constants), strict=True))
         combined.rates = [("", series) for series in common.values() if not isinstance(series, Constant)]
         yield combined
-        target = Section(Graph(self.names), head_of(nodes), "i", self.equations.n, adds=True)
+        target = Section(Graph(self.names), nodes, "i", self.equations.n, adds=True)
         made = dict(zip(field.sums, found, strict=True))
         lent = {e: made[s] for s, e in field.alike.items() if made[s] in totals.graph.series}
-        borrowed = {e: sp.Symbol(series.name, real=True) for e, series in lent.items()}
-        wanted = [e.xreplace(borrowed) for e in rates[0]]
+        borrowed = {e: real(series.name) for e, series in lent.items()}
+        wanted = [e.xreplace(borrowed) for e in rates.rates]
         used = {s for e in wanted for s in e.free_symbols}
         moving, fixed = self.field_end(target, field, "_here", used)
-        target.setting += self.own(wanted, [], node, "i", "_here")
+        target.setting += self.loaded(self.places.own(used))
         lent = {e: series for e, series in lent.items() if borrowed[e] in used}
         totals.lent |= set(lent.values())
         moving |= self.seen(target, totals, {borrowed[e]: series for e, series in lent.items()})
-        moving |= self.seen(target, combined, common) | self.seen(target, self.waves, rates[1])
-        found = self.read(target, wanted, moving, {**rates[2], **fixed})
-        target.rates = [(self.place(c), rate) for c, rate in enumerate(found)]
+        moving |= self.seen(target, combined, common) | self.seen(target, self.waves, rates.waves)
+        self.store(target, field.node, self.read(target, wanted, moving, {**rates.constants, **fixed}))
         yield target
 
     def field_end(
@@ -503,25 +473,14 @@ class LoopWriter:
         """Where state c of a node stands."""
         return LANES.text(self.places.place(c, index))
 
-    def moves(self, node: Node) -> tuple[bool, ...]:
+    def moves(self, node: Node) -> list[bool]:
         """Which states of a node move: one at rest, such as the mode of a contact, is a constant of the step."""
-        found = [moved(node)] + [moved(joint.edge) for joint in self.places.joints if joint.target == node]
-        found += [moved(field.edge) for field in self.fields]
-        return tuple(map(any, zip(*found, strict=True)))
+        edges = [joint.edge for joint in self.places.joints if joint.target == node]
+        return moving(node, [*edges, *(field.edge for field in self.fields)])
 
-    def own(
-        self, used: Sequence[sp.Expr], fixed: Sequence[sp.Symbol], node: Node, index: str, suffix: str
-    ) -> list[str]:
-        """Load the constants that a node has for itself: states at rest and parameters that vary."""
-        lines = [
-            f"{self.called[s.name]}{suffix} = load(y, {self.place(c, index)}, WIDTH)"
-            for c, s in enumerate(node.state)
-            if s in fixed
-        ]
-        for line in LANES.lines(self.places.own(Body((), tuple(used)))):
-            name, _, rest = line.partition(" = ")
-            lines.append(f"{self.called[name]} = {rest}")
-        return lines
+    def loaded(self, loads: Sequence[Assign]) -> list[str]:
+        """Lines that load parameters."""
+        return [f"{self.called.get(s.targets[0], s.targets[0])} = {LANES.text(s.value)}" for s in loads]
 
     def hoisted(self, given: Sequence[sp.Expr], moving: Sequence[sp.Symbol]) -> Hoisted:
         """Some rates with names for what depends on time and parameters, series for what depends on time, and the rest,
@@ -538,7 +497,7 @@ class LoopWriter:
             template = Template.of([e], [TIME], self.names.fresh("shared_"))
             (waves[symbol],) = self.waves.graph.read(template, {TIME: self.time}, self.swap)
             self.waves.rates.append(("", waves[symbol]))
-        return rates, waves, constants
+        return Hoisted(rates, waves, constants)
 
     def read(
         self,
@@ -561,11 +520,10 @@ class LoopWriter:
 
     # -- text -------------------------------------------------------------------------------------------------
 
-    def write(self) -> tuple[list[str], int]:
-        """All statements, and the groups of workspace that they need."""
+    def step(self) -> TaylorStep:
+        """The step, which takes the graph and the weights of its links."""
         eq = self.equations
-        orders = [self.waves.text("0"), *(section.text("0") for section in self.sections)]
-        later = [self.waves.text("k"), *(section.text("k") for section in self.sections)]
+        orders, later = ([line for section in self.sections for line in section.text(k)] for k in "0k")
         bases, size = self.bases()
         lines = [*bases, f"{', '.join(NAMES)} = graph", "LINKS = target.size"]
         for slot, name in enumerate(eq.parameters, start=eq.dimension):
@@ -576,16 +534,14 @@ class LoopWriter:
         if self.waves.rates:
             lines += ["store(dense, at_t, t)", "store(dense, at_t + 1, scale)", f"for k in range(2, {self.order + 1}):"]
             lines += ["    store(dense, at_t + k, 0.0*scale)"]
-        lines += [line for part in orders for line in part]
-        lines += ["# all further orders", f"for k in range(1, {self.orders}):"]
-        lines += [
-            f"    {line}" for line in ("number = 1.0*k", "inverse = 1.0/k", *self.next_states("inverse*scale", "k"))
-        ]
-        lines += [f"    {line}" for part in later for line in part]
-        if not self.kinks:
+        lines += [*orders, "# all further orders", f"for k in range(1, {self.orders}):"]
+        turn = ("number = 1.0*k", "inverse = 1.0/k", *self.next_states("inverse*scale", "k"), *later)
+        lines += [f"    {line}" for line in turn]
+        if not self.ends:
             lines += self.next_states(f"{1.0 / self.order!r}*scale", str(self.order))
         lines += self.closing()
-        return lines, size
+        before = [*functions(self.ends, eq.sticks), CONVOLUTION]
+        return TaylorStep.of(lines, self.order, size, ", graph, weights", before)
 
     def bases(self) -> tuple[list[str], int]:
         """Where everything stands in the workspace, and how much it takes."""
@@ -595,15 +551,12 @@ class LoopWriter:
             sizes["t"] = p + 1
         if eq.sticks:
             sizes |= {"gaps": (p + 1) * 2 * eq.n, "sizes": 2 * eq.n, "closing": p + 1}
-        for section in (self.waves, *self.sections):
-            kept = {
-                s.name for s in section.remembered | ({s for _, s in section.rates} if not section.index else set())
-            }
+        for section in self.sections:
+            kept = {s.name for s in section.remembered}
             sizes |= {name: self.orders * section.count for name in sorted(kept - {"t", ""})}
             sizes |= {name: section.count for name in section.kept}
-            sizes |= (
-                dict.fromkeys((name for name, _ in section.rates), self.orders) if isinstance(section, Totals) else {}
-            )
+            if isinstance(section, Totals):
+                sizes |= {name: self.orders for name, _ in section.rates}
         lines, size = [], 0
         for name, groups in sizes.items():
             lines.append(f"at_{name} = DENSE_ROWS*DIMENSION + {size}")
@@ -631,33 +584,18 @@ class LoopWriter:
         """Step length, new state and dense output."""
         p = self.order
         at = "load(dense, at_states + {k}*DIMENSION + {{0}}, WIDTH)"
-        sections = (self.waves, *self.sections)
-        watching = any(section.graph.watched for section in sections)
-        orders = (p, p - 1, p - 2)
+        sections, contacts = self.sections, self.equations.sticks
+        watching, orders = any(section.graph.watched for section in sections), last_orders(p)
         lines = ["# step length", *(f"size_{k} = 0.0*scale" for k in orders)]
         largest = "absolute(load(y, {0}, WIDTH))"
         for k in (1, 2):
             largest = f"maximum({largest}, absolute({at.format(k=k)}))"
-        lines += self.states(
-            f"weight = 1.0/(atol + rtol*{largest})",
-            *(f"size_{k} = maximum(size_{k}, absolute({at.format(k=k)})*weight)" for k in orders),
-        )
+        lines += self.states(*weighed(f"rtol*{largest}", {k: at.format(k=k) for k in orders}))
         lines += ["unseen = 0.0*scale"] if watching else []
-        lines += [loose(self.exact)] if self.equations.sticks else []
-        lines += [line for section in sections for line in section.lengths(p, orders)]
-        reaches = [f"{-1.0 / k!r}*log(size_{k})" for k in orders]
-        lines.append(f"reach = minimum({reaches[0]}, minimum({reaches[1]}, {reaches[2]}))")
-        lines += [falling(p)] if watching else []
-        lines += finished(p, NEXT if watching and not self.equations.sticks else FARTHEST)
-        if self.kinks:
-            found = [line for section in sections for line in section.passages(p)]
-            lines += [
-                "# first passage",
-                "passed = ratio",
-                *([SOONEST] if self.equations.sticks else []),
-                *found,
-                *ended(),
-            ]
+        lines += [loose(self.exact)] if contacts else []
+        lines += [line for section in sections for line in section.lengths(p)]
+        lines += [f"reach = {show(reach(orders))}", *finished(p, watching, contacts)]
+        lines += first_passage([line for section in sections for line in section.passages(p, self.exact)], contacts)
         lines += ["# new state", "total = 0.0*scale"]
         lines += self.states(
             f"new = {at.format(k=p)}",
@@ -670,7 +608,7 @@ class LoopWriter:
         lines += ["if DENSE:", "    raised = ratio", f"    for k in range(1, {p + 1}):"]
         inner = self.states(f"store(dense, (k - 1)*DIMENSION + {{0}}, raised*{at.format(k='k')})")
         lines += [f"        {line}" for line in (*inner, "raised = raised*ratio")]
-        return [*lines, returned(self.kinks)]
+        return [*lines, returned(self.ends)]
 
 
 def write_looped(equations: Equations, order: int) -> TaylorStep:
@@ -684,6 +622,4 @@ def write_looped(equations: Equations, order: int) -> TaylorStep:
     if equations.inertial and equations.link_count:
         found = "links with inertia" if equations.inertial_links else "links of nodes with a mass matrix"
         raise ValueError(f"taylor: found {found} in a network that is stepped in loops; use dop853 or rodas5p")
-    writer = LoopWriter(equations, order)
-    lines, size = writer.write()
-    return TaylorStep.of(lines, order, size, ", graph, weights", [*ending(writer.kinks, equations.sticks), CONVOLUTION])
+    return LoopWriter(equations, order).step()

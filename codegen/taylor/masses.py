@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from synchain.models.mechanics.components import Edge, Node
 
@@ -12,12 +12,17 @@ from ..steps.mass import added_masses
 from .graph import Graph, split
 from .series import Constant, Row, Series, Unknown
 
-__all__ = ["moved", "solved"]
+__all__ = ["moving", "solved"]
 
 Factor = tuple[Expression, Series]
 
 
-def moved(part: Node | Edge) -> list[bool]:
+def moving(node: Node, edges: Iterable[Edge]) -> list[bool]:
+    """Which states of a node move, by its own rates or by links to it; one at rest, such as the mode of a contact, does not."""
+    return [any(found) for found in zip(_moved(node), *map(_moved, edges), strict=True)]
+
+
+def _moved(part: Node | Edge) -> list[bool]:
     """Which states a node or a link can move: by a right-hand side, or by masses that couple them to others."""
     blocks = [added_masses(part)] if isinstance(part, Node) else part.inertia
     coupled = [[any(e != 0 for e in row) for row in block] for block in blocks if block]
@@ -37,10 +42,10 @@ def solved(graph: Graph, masses: Mapping[Entry, Series], right: Mapping[int, Ser
         The right-hand sides r by row.  A row of the identity, whose rate no other row needs, is its own rate.
     """
     entries = {key: found for key, s in masses.items() if (found := _factor(s))[0] != ZERO}
-    coupled = sorted({k for key, e in entries.items() if not (key[0] == key[1] and _is_one(e)) for k in key})
+    coupled = sorted({k for key, e in entries.items() if not (key[0] == key[1] and e == (ONE, _UNIT)) for k in key})
     place = {slot: number for number, slot in enumerate(coupled)}
     inner = {(place[r], place[c]): e for (r, c), e in entries.items() if r in place and c in place}
-    symmetric = all(_same(inner.get((c, r)), e) for (r, c), e in inner.items())
+    symmetric = all(inner.get((c, r)) == e for (r, c), e in inner.items())
     order = plan(len(coupled), set(inner)).order
     rows: list[Row] = []
     for r in order:
@@ -61,11 +66,3 @@ def _factor(series: Series) -> Factor:
 
 
 _UNIT = Constant(ONE)
-
-
-def _is_one(e: Factor) -> bool:
-    return e == (ONE, _UNIT)
-
-
-def _same(one: Factor | None, other: Factor) -> bool:
-    return one is not None and one == other

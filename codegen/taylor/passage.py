@@ -1,4 +1,4 @@
-"""Where a series leaves its side of zero: the functions that a step with kinks or contacts is written with.
+"""Where a series leaves its side of zero: the functions of a step with kinks or contacts, and the statements that call them.
 
 Between kinks the solution is analytic. A step that would pass a kink ends just behind it, and the next one finds itself on
 the other side: nothing has to be remembered. A contact keeps its mode until its gap closes: the sliding velocity while it
@@ -7,7 +7,11 @@ slips, and while it sticks the distances of its load from the limits of static f
 
 from __future__ import annotations
 
-__all__ = ["CLOSING", "PASSAGE"]
+from collections.abc import Sequence
+
+from synchain.models.dynamics.equations import Equations
+
+__all__ = ["closed", "first_passage", "functions", "jumps", "loose", "passed"]
 
 PASSAGE = '''
 PASSED, ROUNDING, NEAREST = 1e-10, 1e-15, 1e-8
@@ -74,3 +78,52 @@ def closing(side, late, size, nearest, dense, first, stride, room, degree, ratio
         first, stride = room, 1
     return passage(side, 1e4*size, 1e-14 + late, nearest, dense, first, stride, degree, ratio)
 '''.strip()
+
+LATE = 1e-10
+"""How late a body may be set free, as a part of the way that its load goes in a step, if slip begins without a jump."""
+
+SOONEST = "nearest = 1e-13*maximum(t, 1.0)/scale"
+"""How soon a step may end at a contact."""
+
+
+def jumps(equations: Equations) -> bool:
+    """True if slip of some contact begins with a jump of acceleration."""
+    return any(node.contact is not None and node.contact.jumps for node in equations.nodes)
+
+
+def loose(exact: bool) -> str:
+    """The tolerance of loads.
+
+    One that is wrong by some part sets a body free too early or late, with less than the power 3/2 of it as velocity, unless
+    friction falls at once.
+    """
+    return "loose = rtol" if exact else "loose = math.sqrt(rtol*math.sqrt(rtol))"
+
+
+def closed(
+    stuck: str, exact: bool, sizes: Sequence[str], places: Sequence[str], stride: str, room: str, order: int
+) -> list[str]:
+    """The statements that end a step where one of the two gaps of a contact closes, whose coefficients stand in memory."""
+    late = "0.0*t" if exact else f"{LATE!r}*{stuck}"
+    return [
+        f"passed = closing({side}, {late}, {size}, nearest, dense, {first}, {stride}, {room}, {order}, passed)"
+        for side, size, first in zip(("1.0 + 0.0*t", stuck), sizes, places, strict=True)
+    ]
+
+
+def passed(side: str, size: str, first: str, stride: str, order: int) -> str:
+    """The statement that ends a step where the series of a kink passes zero, whose coefficients stand in memory."""
+    return f"passed = passage({side}, {size}, PASSED, NEAREST*passed, dense, {first}, {stride}, {order}, passed)"
+
+
+def first_passage(found: Sequence[str], contacts: bool) -> list[str]:
+    """The statements that end a step at the first of the passages that are `found` one after another."""
+    if not found:
+        return []
+    begun = ["# first passage", "passed = ratio", *([SOONEST] if contacts else [])]
+    return [*begun, *found, "until = select(passed < ratio, passed*scale, length)", "ratio = passed"]
+
+
+def functions(ends: bool, contacts: bool) -> list[str]:
+    """The functions that find the ends of steps."""
+    return [text for text, needed in ((PASSAGE, ends), (CLOSING, contacts)) if needed]

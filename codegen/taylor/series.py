@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from ..program.expressions import ONE, ZERO, Call, Expression, Name, Number
-from .terms import add, over, show, times
+from .terms import absolute, add, over, show, times
 
 __all__ = ["Choice", "Constant", "Integral", "Kink", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
            "Row", "Series", "Slope", "Square", "SquareRoot", "State", "Time", "Unknown"]  # fmt: skip
@@ -107,8 +107,6 @@ class Constant(Series):
 @dataclass(eq=False, slots=True)
 class State(Series):
     """A state variable: its coefficient k comes from coefficient k - 1 of its rate, outside this file."""
-
-    rate: Series | None = None
 
 
 @dataclass(eq=False, slots=True)
@@ -387,11 +385,7 @@ def magnitude(at: Start, series: Series) -> Expression:
     if isinstance(series, Linear):
         parts = [times(factor, at.start(inner)) for factor, inner in series.terms]
         parts += [] if series.constant == ZERO else [series.constant]
-    return add(*map(_absolute, parts))
-
-
-def _absolute(e: Expression) -> Expression:
-    return Number(abs(e.value)) if isinstance(e, Number) else Call("absolute", (e,))
+    return add(*(Number(abs(e.value)) if isinstance(e, Number) else absolute(e) for e in parts))
 
 
 def _chosen(side: Expression, above: Expression, below: Expression) -> Expression:

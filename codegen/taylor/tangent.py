@@ -8,21 +8,22 @@ LANES modes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation
-from synchain.models.mechanics.components import TIME
 
-from ..program.expressions import ONE, ZERO, Call, Expression, Name, Number
+from ..program.expressions import ZERO, Expression, Name, Number
+from ..program.lowering import lower
 from ..program.passes import Names
 from .graph import Graph, Template, is_analytic
+from .length import last_orders, reach
 from .series import Series, State
-from .step import StepWriter, TaylorStep, Written, check_order, extreme, largest, polynomial
-from .terms import add, show, statement, times
+from .step import LineWriter, StepWriter, TaylorStep, check_order, polynomial
+from .terms import absolute, add, largest, show, times
 
 __all__ = ["TangentStep", "write_tangent"]
 
@@ -95,23 +96,23 @@ class OrbitWriter(StepWriter):
         super().__init__(equations, order)
         self.exact = True  # deviations feel the time of an event to first order
 
-    def read(self) -> list[Series]:
+    def read(self) -> dict[State, Series]:
         """The rates of the states; what is wanted beside them is noted."""
         rates = super().read()
-        moving, swap = self.parted({TIME: self.time}, {s: s for s in map(_real, self.equations.state)})
+        moving, swap = self.of_network()
         found = self.graph.read(Template.of(self.wanted, moving, self.supply.fresh("shared_")), moving, swap)
         self.noted = list(dict.fromkeys(found))
         self.called_so = {e: f"a{self.noted.index(series)}" for e, series in zip(self.wanted, found, strict=True)}
         return rates
 
     def opening(self) -> None:
-        """The first coefficients of all series."""
+        """Compute the first coefficients of all series."""
         super().opening()
         self.put("store(shared, 0, scale)")
         self.leave()
 
     def coefficients(self, k: int) -> None:
-        """Coefficients k of the states, and of all series but in the last order."""
+        """Compute coefficients k of the states, and of all series but in the last order."""
         super().coefficients(k)
         if k < self.order:
             self.leave()
@@ -119,113 +120,85 @@ class OrbitWriter(StepWriter):
     def leave(self) -> None:
         """Leave coefficients k of what is wanted."""
         for which, series in enumerate(self.noted):
-            name, value = f"a{which}_{self.at.k}", self.at.of(series)
+            name, value = f"a{which}_{self.k}", self.of(series)
             if not isinstance(value, Number):
                 self.places[name] = HEAD + len(self.places)
                 self.put(f"store(shared, {self.places[name]}, {show(value)})")
                 value = Name(name)
-            self.left[f"a{which}", self.at.k] = value
+            self.left[f"a{which}", self.k] = value
 
 
-class ModeWriter:
+class ModeWriter(LineWriter):
     """Writes the step of the modes in one register, from what an orbit leaves."""
 
     def __init__(self, variation: Variation, orbit: OrbitWriter) -> None:
-        self.variation, self.orbit, self.order = variation, orbit, orbit.order
-        self.at = Written({}, {}, [])
-        self.deviations = [State(name=f"d{c}") for c in range(variation.size)]
+        super().__init__(Graph(Names([s.name for s in variation.parameters])), orbit.order)
+        self.size, self.called_so, strengths = variation.size, orbit.called_so, variation.parameters
         self.outer = {name: State(name=name) for name in orbit.called_so.values()}
-        self.at.values |= {(self.outer[name], k): value for (name, k), value in orbit.left.items()}
-        self.graph = Graph(Names([s.name for s in variation.parameters]))
-        self.lines: list[str] = []
-        self.rates = [self.rate(row) for row in range(variation.size)]
-        self.graph.settle(self.rates)
+        self.values |= {(self.outer[name], k): value for (name, k), value in orbit.left.items()}
+        self.put(f"scale = {_shared(0)}")
+        self.put(*(f"{s.name} = load(strengths, {_place(len(strengths), k)}, LANES)" for k, s in enumerate(strengths)))
+        self.put(*(f"d{c}_0 = load(old, {_place(self.size, c)}, LANES)" for c in range(self.size)))
+        self.put(*(f"{name} = {_shared(place)}" for name, place in orbit.places.items()))
+        deviations = [State(name=f"d{c}") for c in range(self.size)]
+        self.values |= {(d, 0): Name(f"{d.name}_0") for d in deviations}
+        self.rates = {d: self.rate(variation, row, deviations) for row, d in enumerate(deviations)}
+        self.graph.settle([*self.rates.values()])
 
-    def rate(self, row: int) -> Series:
+    def rate(self, variation: Variation, row: int, deviations: Sequence[State]) -> Series:
         """The rate of a deviation: each entry is what does not move times it, and convolutions for what does."""
         terms: list[tuple[Expression, Series]] = []
-        for (r, c), e in self.variation.matrix:
+        for (r, c), e in variation.matrix:
             if r != row:
                 continue
             fixed: Expression = ZERO
-            for coefficient, strength in _parted(self.variation, e):
-                series = self.outer[self.orbit.called_so[coefficient]]
+            for coefficient, strength in variation.parts(e):
+                series, factor = self.outer[self.called_so[coefficient]], lower(strength)
                 if self.moves(series):
-                    terms.append((strength, self.graph.product(series, self.deviations[c])))
+                    terms.append((factor, self.graph.product(series, deviations[c])))
                 else:
-                    fixed = add(fixed, times(strength, self.at.start(series)))
+                    fixed = add(fixed, times(factor, self.start(series)))
             if not isinstance(fixed, Number | Name):  # what each order multiplies by is made once
-                self.lines.append(f"g{r}_{c} = {show(fixed)}")
+                self.put(f"g{r}_{c} = {show(fixed)}")
                 fixed = Name(f"g{r}_{c}")
             if fixed != ZERO:
-                terms.append((fixed, self.deviations[c]))
+                terms.append((fixed, deviations[c]))
         return self.graph.sum(terms)
 
     def moves(self, series: Series) -> bool:
         """True if any later coefficient of a series is not zero."""
-        return any(self.at.at(series, k) != ZERO for k in range(1, self.order))
+        return any(self.at(series, k) != ZERO for k in range(1, self.order))
 
     def write(self) -> str:
         """The function `mode_step`."""
-        size, strengths, head = self.variation.size, self.variation.parameters, [f"scale = {_shared(0)}"]
-        head += [f"{s.name} = load(strengths, {_place(len(strengths), k)}, LANES)" for k, s in enumerate(strengths)]
-        head += [f"d{c}_0 = load(old, {_place(size, c)}, LANES)" for c in range(size)]
-        head += [f"{name} = {_shared(place)}" for name, place in self.orbit.places.items()]
-        self.lines = [*head, *self.lines, "# order 0"]
-        self.at.values |= {(d, 0): Name(f"{d.name}_0") for d in self.deviations}
-        for s in self.graph.series:
-            self.at.put(s, s.begin(self.at), s in self.graph.inline_start)
-        self.flush()
+        self.opening()
         for k in range(1, self.order + 1):
             self.coefficients(k)
         self.length()
-        self.lines += ["# new deviation", "square = ratio*ratio"]
-        for c, s in enumerate(self.deviations):
-            self.lines += polynomial(s.name, [self.at.at(s, k) for k in range(self.order + 1)])
-            self.lines.append(f"store(new, {_place(size, c)}, n_{s.name})")
-        self.lines.append(f"total = {' + '.join(f'absolute(n_{s.name})' for s in self.deviations)}")
-        self.lines.append("return math.nan if any_lane(~(total < math.inf)) else length")
+        self.put("# new deviation", "square = ratio*ratio")
+        for c, d in enumerate(self.rates):
+            self.put(*polynomial(d.name, [self.at(d, k) for k in range(self.order + 1)]))
+            self.put(f"store(new, {_place(self.size, c)}, n_{d.name})")
+        self.put(f"total = {' + '.join(f'absolute(n_{d.name})' for d in self.rates)}")
+        self.put("return math.nan if any_lane(~(total < math.inf)) else length")
         return "\n".join([*HEADING, *(f"    {line}" for line in self.lines)])
-
-    def flush(self) -> None:
-        """Turn statements into text."""
-        self.lines += [line for assign in self.at.lines for line in statement(*assign)]
-        self.at.lines.clear()
-
-    def coefficients(self, k: int) -> None:
-        """Coefficients k of the deviations, and of all series but in the last order."""
-        at = self.at
-        self.lines += [f"# order {k}", f"r{k} = {show(times(Number(1.0 / k), Name('scale')))}"]
-        slopes = [at.at(rate, k - 1) for rate in self.rates]
-        at.k = k
-        for d, slope in zip(self.deviations, slopes, strict=True):
-            at.put(d, times(Name(f"r{k}"), slope))
-        if k < self.order:
-            for s in self.graph.series:
-                at.put(s, s.coefficient(at), s in self.graph.inline)
-        self.flush()
 
     def length(self) -> None:
         """The length of the step: the last three coefficients are small beside the deviation at its beginning."""
-        self.lines += ["# step length", f"size = {show(largest(_sizes(self.at.at(s, 0) for s in self.deviations)))}"]
-        self.lines.append("weight = 1.0/(tolerance*size + 2.2250738585072014e-308)")
-        reaches: list[Expression] = []
-        fits = []
-        for k in (self.order, self.order - 1, self.order - 2):
-            last = [e for s in self.deviations if (e := self.at.at(s, k)) != ZERO]
-            if last:
-                self.lines.append(f"size_{k} = {show(times(largest(_sizes(last)), Name('weight')))}")
-                fits.append(f"({show(times(Name(f'size_{k}'), Name(f'ratio**{k}')))} <= 1.0)")
-                reaches.append(times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))))
-        self.lines += ["ratio = longest/scale", "length = longest"]
-        if reaches:
-            place = _place(self.variation.size, 0)
-            self.lines += [
+        self.put("# step length", f"size = {show(largest(absolute(self.at(d, 0)) for d in self.rates))}")
+        self.put("weight = 1.0/(tolerance*size + 2.2250738585072014e-308)")
+        found = {k: [absolute(e) for d in self.rates if (e := self.at(d, k)) != ZERO] for k in last_orders(self.order)}
+        known = [k for k, last in found.items() if last]
+        self.put(*(f"size_{k} = {show(times(largest(found[k]), Name('weight')))}" for k in known))
+        self.put("ratio = longest/scale", "length = longest")
+        if known:
+            fits = (f"({show(times(Name(f'size_{k}'), Name(f'ratio**{k}')))} <= 1.0)" for k in known)
+            self.put(
                 f"if any_lane(~({' & '.join(fits)})):  # not all of them go so far",
-                f"    lengths = truncated(scale*exp({show(extreme('minimum', reaches))}))",
-                f"    length = common_length(lengths, longest, new, {place})",
+                f"    lengths = truncated(scale*exp({show(reach(known))}))",
+                f"    length = common_length(lengths, longest, new, {_place(self.size, 0)})",
                 "    ratio = length/scale",
-            ]
+            )
 
 
 def write_tangent(variation: Variation, order: int) -> TangentStep:
@@ -249,24 +222,11 @@ def write_tangent(variation: Variation, order: int) -> TangentStep:
         raise ValueError(
             "taylor: found a kink beside deviations along an orbit; expected analytic functions; use rodas5p"
         )
-    wanted = dict.fromkeys(c for _, e in variation.matrix for c, _ in _parted(variation, e))
+    wanted = dict.fromkeys(c for _, e in variation.matrix for c, _ in variation.parts(e))
     check_order(order)
     orbit = OrbitWriter(variation.orbit, order, list(wanted))
     step = orbit.step(", shared")
     return TangentStep(step, (COMMON, ModeWriter(variation, orbit).write(), CARRY), HEAD + len(orbit.places))
-
-
-def _parted(variation: Variation, e: sp.Expr) -> Iterator[tuple[sp.Expr, Expression]]:
-    """An entry of A as coefficients times strengths of a mode."""
-    rest = e.xreplace(dict.fromkeys(variation.parameters, sp.S.Zero))
-    strengths: list[tuple[sp.Expr, Expression]] = [(e.diff(s), Name(s.name)) for s in variation.parameters]
-    for coefficient, strength in ((rest, ONE), *strengths):
-        if coefficient != 0:
-            yield coefficient, strength
-
-
-def _sizes(values: Iterable[Expression]) -> list[Expression]:
-    return [Call("absolute", (e,)) for e in values]
 
 
 def _place(size: int, k: int) -> str:
@@ -277,7 +237,3 @@ def _place(size: int, k: int) -> str:
 
 def _shared(place: int) -> str:
     return f"shared[{place}]"
-
-
-def _real(name: str) -> sp.Symbol:
-    return sp.Symbol(name, real=True)

@@ -5,9 +5,12 @@ Recurrences are built of them, and are never rearranged: a step of order 24 has 
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 from ..program.expressions import (
     ONE,
     ZERO,
+    Call,
     Expression,
     Negation,
     Number,
@@ -20,7 +23,7 @@ from ..program.expressions import (
 )
 from ..program.printers import LANES
 
-__all__ = ["add", "over", "show", "statement", "times"]
+__all__ = ["absolute", "add", "extreme", "lane", "largest", "over", "show", "statement", "times"]
 
 WIDEST = 110
 """Columns of a statement on one line."""
@@ -68,6 +71,31 @@ def over(above: Expression, below: Expression) -> Expression:
 
 
 show = LANES.text
+
+
+def absolute(e: Expression) -> Expression:
+    """The absolute value."""
+    return Call("absolute", (e,))
+
+
+def lane(value: Expression) -> str:
+    """The text of a value that is stored: numbers become lanes."""
+    if isinstance(value, Number):
+        return f"broadcast({show(value)}, WIDTH)"
+    return show(value)
+
+
+def largest(values: Iterable[Expression]) -> Expression:
+    """The largest of some values."""
+    return extreme("maximum", list(values))
+
+
+def extreme(function: str, values: Sequence[Expression]) -> Expression:
+    """Nested calls of a function of two values."""
+    if len(values) == 1:
+        return values[0]
+    half = len(values) // 2
+    return Call(function, (extreme(function, values[:half]), extreme(function, values[half:])))
 
 
 def statement(target: str, value: Expression) -> list[str]:

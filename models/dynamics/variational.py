@@ -102,6 +102,12 @@ class Variation:
             if any(slope.has(*self.parameters) for slope in slopes):
                 raise ValueError(f"variation: entry ({row}, {column}) is not linear in the strengths of a mode: {e}")
 
+    def parts(self, e: sp.Expr) -> list[tuple[sp.Expr, sp.Expr]]:
+        """Return an entry of A as coefficients that are not zero, each with the strength that it multiplies, or 1."""
+        rest = e.xreplace(dict.fromkeys(self.parameters, sp.S.Zero))
+        found = [(rest, sp.S.One), *((e.diff(s), s) for s in self.parameters)]
+        return [(coefficient, strength) for coefficient, strength in found if coefficient != 0]
+
 
 def expect_continuous(orbit: Equations) -> None:
     """Raise ValueError for rates that jump in the state."""

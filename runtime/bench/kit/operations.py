@@ -29,7 +29,6 @@ PRIMITIVE = {"fma": 2, "sqrt": 1} | dict.fromkeys(
         "maximum",
         "minimum",
         "one_lane",
-        "round_even",
         "scale_binary",
         "select",
         "split_binary",

@@ -20,19 +20,11 @@ EXTENDED = np.finfo(np.longdouble).eps < 1e-18
 """False where long double is no better than double: references then come from mpmath, on fewer points."""
 
 
-def pair_sine(x):
-    return elementary.sincos(x)[0]
-
-
-def pair_cosine(x):
-    return elementary.sincos(x)[1]
-
-
 def all_functions() -> dict[str, Callable]:
     named = {name: getattr(elementary, name) for name in NAMES}
     named["sqrt"] = njit(lambda x: elementary.sqrt(x))
     named["floor"] = njit(lambda x: elementary.floor(x))
-    return {**named, "pair sine": njit(pair_sine), "pair cosine": njit(pair_cosine)}
+    return named
 
 
 @functools.cache
@@ -56,7 +48,6 @@ def at(x: np.ndarray, width: int = 8) -> dict[str, np.ndarray]:
 
 def exactly(name: str, x: np.ndarray) -> np.ndarray:
     """The function in extended precision."""
-    name = {"pair sine": "sin", "pair cosine": "cos"}.get(name, name)
     if EXTENDED:
         return getattr(np, {"atan": "arctan"}.get(name, name))(x.astype(np.longdouble))
     with mpmath.workdps(40):
@@ -97,7 +88,7 @@ CASES = {
     "log": {"all": (np.abs(scaled(-307, 308)), 1.5), "around one": (spread(0.5, 2.0), 1.5),
             "near one": (1.0 + scaled(-15, -3), 1.5), "denormal": (np.abs(scaled(-323, -307)), 1.5)},
     "atan": ATAN,
-    "sin": CIRCULAR, "cos": CIRCULAR, "pair sine": CIRCULAR, "pair cosine": CIRCULAR,
+    "sin": CIRCULAR, "cos": CIRCULAR,
     "tanh": {"usual": (spread(-3.0, 3.0), 1.5), "wide": (spread(-25.0, 25.0), 1.5), "small": (scaled(-307, -1), 1.0),
              "flat": (spread(17.0, 21.0), 1.5)},
 }  # fmt: skip
@@ -109,7 +100,7 @@ def test_errors_in_units_of_the_last_place(name, where):
     assert error(name, x) <= bound
 
 
-@pytest.mark.parametrize("name", ["sin", "cos", "pair sine", "pair cosine"])
+@pytest.mark.parametrize("name", ["sin", "cos"])
 def test_circular_functions_near_their_zeros(name):
     # the doubles next to multiples of pi/2, where the reduction cancels most
     x = np.arange(1, POINTS // 8) * (np.pi / 2)
@@ -225,4 +216,4 @@ def test_the_same_bits_at_every_width(width):
 
 
 def test_everything_is_tested():
-    assert set(elementary.__all__) == {*NAMES, "sincos"}
+    assert set(elementary.__all__) == set(NAMES)

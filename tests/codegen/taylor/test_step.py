@@ -276,6 +276,16 @@ def test_words_of_the_step_are_free_for_symbols(name):
     assert abs(ends[0][0]) < 10.0  # no NaN
 
 
+def test_symbols_that_are_called_otherwise_stay_apart():
+    """A name that the step needs, what it is called instead, and what that would be called again."""
+    clashing, plain = (sp.symbols(names, real=True) for names in ("i_b i_b_ user_i_b", "a b c"))
+    ends = []
+    for p, q, r in (clashing, plain):
+        eq = alone([X, V], [V, r - p * X - q * V], [p, q, r])
+        ends.append(march(eq, 8, [0.3, 0.1], 2.0, 1e-8, numbers=[1.1, 0.3, 0.2])[0].tolist())
+    assert ends[0] == ends[1]
+
+
 def test_orders_grow_with_the_tolerance_and_are_few():
     orders = [order_for(10.0**-k, 10.0 ** -(k + 1)) for k in range(1, 16)]
     assert orders == sorted(orders)

@@ -1,0 +1,78 @@
+"""How long a Taylor step may be: the statements that follow those of the sizes of the last coefficients.
+
+The step length is that of A. Jorba & M. Zou, Experimental Mathematics 14, 99 (2005), section 3.2, from the last three
+coefficients, so that no series that has zeros at every second or third place is taken for an exact one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..program.expressions import ZERO, Call, Expression, Name, Number
+from .terms import extreme, largest, statement, times
+
+__all__ = ["finished", "last_orders", "reach", "unseen"]
+
+FARTHEST = 16.0
+"""How many times longer than `scale` a step may be."""
+
+NEXT = 2.0
+"""The same where series are watched, so that what is zero in double precision now is seen when it has begun.
+
+Contacts end their slips by events: the first steps behind one would be a third of all steps.
+"""
+
+LOW = (1, 2, 3)
+"""The low orders with which high ones are compared, beside the last one below half the highest.
+
+The series of x' = v, v' = -x**n from x = 0 has its coefficients n + 1 orders apart: of those of x**n, n or 2 n + 1 is high.
+"""
+
+HIDDEN, LOST = 1e-9, 1e-110
+"""Least that the low coefficients of a series are taken for: shares of the high ones, and of the absolute tolerance.
+
+The first is for zeros of the low ones alone, the second for zeros of high order, which no step would reach otherwise.
+"""
+
+
+def last_orders(order: int) -> tuple[int, int, int]:
+    """The orders whose coefficients say how far a series reaches."""
+    return order, order - 1, order - 2
+
+
+def reach(orders: Sequence[int]) -> Expression:
+    """The logarithm of the share of `scale` that a step may go by its `size_…` of some orders."""
+    return extreme("minimum", [times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))) for k in orders])
+
+
+def unseen(coefficients: Sequence[Expression]) -> list[str]:
+    """How much larger the high coefficients of a series are than its low ones, the largest so far."""
+    half = len(coefficients) // 2
+    low, high = (
+        [Call("absolute", (e,)) for k in places if (e := coefficients[k]) != ZERO]
+        for places in ((*LOW, half - 1), range(half, len(coefficients)))
+    )
+    if not (low and high):
+        return []
+    return [
+        *statement("high", largest(high)),
+        *statement("low", largest(low)),
+        f"unseen = maximum(unseen, high/(low + ({HIDDEN!r}*high + {LOST!r}*atol)))",
+    ]
+
+
+def finished(order: int, watched: bool, contacts: bool) -> list[str]:
+    """The length of the step from the logarithm of its share of `scale`.
+
+    No step goes on behind the place where the terms of a watched series stop falling.
+    """
+    falling = ", ".join(f"{-1.0 / k!r}*log(unseen)" for k in (order - 2, order // 2))
+    farthest = NEXT if watched and not contacts else FARTHEST
+    return [
+        *([f"reach = minimum(reach, minimum({falling}))"] if watched else []),
+        # weights are those of a step as long as `scale`; a shorter one changes the states less
+        f"reach = minimum(reach, {(order - 2) / (order - 4)!r}*reach)",
+        f"length = minimum(truncated(scale*exp(reach)), {farthest!r}*scale)",
+        "length = minimum(length, h)",
+        "ratio = length/scale",
+    ]
