@@ -12,7 +12,7 @@ class Dimensions(NamedTuple):
 
     nodes: int
     components: int
-    """States of a node that the synchronisation error compares."""
+    """States of a node that the synchronisation error compares; 0 if it is not recorded."""
     dimension: int
     """State variables of the network."""
     parameters: int
@@ -30,14 +30,19 @@ class Dimensions(NamedTuple):
     sections: int
     """Sections of which points are taken."""
     kept: int
-    """Most values that a point of a section on a function keeps."""
+    """Most values that a point of a section on a function keeps; -1 if points are whole states."""
+    looks: int
+    """Pieces of a step between which functions of the state are looked at."""
+    sampled: int
+    """1 if the trajectory is recorded, else 0."""
+    stops: int
+    """1 if a function of the state ends a cell, else 0."""
 
 
 class ModeDimensions(NamedTuple):
     """What a driver that carries deviations along an orbit must know."""
 
     nodes: int
-    components: int
     dimension: int
     parameters: int
     dense_rows: int

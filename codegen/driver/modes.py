@@ -35,6 +35,23 @@ from .cells import put
 from .cells import restart
 from .cells import turn_over
 from .cells import watch
+from .clock import ACCEPTED
+from .clock import ATOL
+from .clock import BASE
+from .clock import BOUND
+from .clock import CLOCK
+from .clock import FINISHED
+from .clock import MAX_STEP
+from .clock import N_ACCEPTED
+from .clock import N_REJECTED
+from .clock import PERIODS
+from .clock import REJECTED
+from .clock import RTOL
+from .clock import STATUS
+from .clock import STEP
+from .clock import STOP
+from .clock import STOPPED_AT
+from .clock import TIME
 from .contacts import change_modes
 from .contacts import note_rush
 from .contacts import take_back
@@ -63,23 +80,6 @@ from .propagators import part
 from .propagators import settle
 from .propagators import tabulate
 from .propagators import transport
-from .recording import ACCEPTED
-from .recording import ATOL
-from .recording import BASE
-from .recording import BOUND
-from .recording import CLOCK
-from .recording import FINISHED
-from .recording import MAX_STEP
-from .recording import N_ACCEPTED
-from .recording import N_REJECTED
-from .recording import PERIODS
-from .recording import REJECTED
-from .recording import RTOL
-from .recording import STATUS
-from .recording import STEP
-from .recording import STOP
-from .recording import STOPPED_AT
-from .recording import TIME
 
 # --- kernel text below ---
 # Steps between two scalings: a step's growth is bounded by its error, that of so many stays far from overflow.
@@ -271,7 +271,7 @@ def march(
                 strong[(kinds * which + k) * LANES + lane] = strengths[k, which * LANES + lane]
     tolerance = control[RTOL] * control[LOOSENESS]
     for cell in range(first, last):
-        fill(0, cell, start, numbers, spans, control, clock, y, growth, old, dims)
+        fill(0, cell, start, numbers, spans, control, clock, y, dims)
         status, begun, moved = FINISHED, False, address(travellers, cell * groups * parts * LANES)
         for batch in range(batches.size):
             for _ in range(batches[batch]):
