@@ -53,7 +53,7 @@ def locate(k, hits, low, high, g_low, g_high, t, h, y, y_new, dense, found, dims
 
 
 @njit(error_model="numpy", forceinline=True)
-def turning(i, looks, before, first, last, behind):
+def turning(i, looks, share, before, first, last, behind):
     """Where a parabola through three of four equidistant values turns between the inner two, as the fraction of the step.
 
     `first` is the value at look i; the outer ones are NaN where the step ends.  Zero where nothing turns.
@@ -65,13 +65,13 @@ def turning(i, looks, before, first, last, behind):
     low, high = 0.5 if i > 0 else 0.0, 0.5 if i + 2 <= looks else 1.0  # each turn is seen from the nearer look
     place = select((left > 0.0) & (left < high), left, 0.0)
     place = select((right + 1.0 > low) & (right < 0.0), right + 1.0, place)
-    return select(place > 0.0, (i + place) / looks, 0.0)
+    return select(place > 0.0, (i + place) * share, 0.0)
 
 
 @njit(error_model="numpy")
-def between(k, i, wanted, before, first, last, behind, t, h, y, y_new, dense, found, dims, section):
+def between(k, i, share, wanted, before, first, last, behind, t, h, y, y_new, dense, found, dims, section):
     """Where section function k turns between looks i and i + 1, and its value there; look i + 1 where it does not turn."""
-    turn, place = turning(i, dims.looks, before, first, last, behind), broadcast((i + 1) / dims.looks, WIDTH)
+    turn, place = turning(i, dims.looks, share, before, first, last, behind), broadcast((i + 1) * share, WIDTH)
     turns = (first * last > 0.0) & (turn > 0.0) & wanted
     if any_lane(turns):
         place = select(turns, turn, place)

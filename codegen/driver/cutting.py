@@ -47,14 +47,14 @@ def keep_points(k, theta, hits, t, h, y, y_new, dense, found, cell, counts, poin
 @njit(error_model="numpy")
 def cut_one(k, counted, t, h, y, y_new, dense, found, cell, counts, points, direction, dims, section):
     """Find points of section k between the looks into a step, and beside an extremum between two of them."""
-    zero = broadcast(0.0, WIDTH)
+    zero, share = broadcast(0.0, WIDTH), 1.0 / dims.looks  # a power of two
     before, g0 = zero / zero, surface(k, zero, t, h, y, y_new, dense, found, dims, section)
-    g1 = surface(k, zero + 1.0 / dims.looks, t, h, y, y_new, dense, found, dims, section)
+    g1 = surface(k, zero + share, t, h, y, y_new, dense, found, dims, section)
     for i in range(dims.looks):
-        low, high, behind = zero + i / dims.looks, zero + (i + 1) / dims.looks, zero / zero
+        low, high, behind = zero + i * share, zero + (i + 1) * share, zero / zero
         if i + 2 <= dims.looks:
-            behind = surface(k, zero + (i + 2) / dims.looks, t, h, y, y_new, dense, found, dims, section)
-        middle, g = between(k, i, counted, before, g0, g1, behind, t, h, y, y_new, dense, found, dims, section)
+            behind = surface(k, zero + (i + 2) * share, t, h, y, y_new, dense, found, dims, section)
+        middle, g = between(k, i, share, counted, before, g0, g1, behind, t, h, y, y_new, dense, found, dims, section)
         for left, right, g_left, g_right in ((low, middle, g0, g), (middle, high, g, g1)):
             hits = crosses(g_left, g_right, direction) & counted
             if any_lane(hits):

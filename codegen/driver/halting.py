@@ -35,15 +35,17 @@ def shorten(hits, part, y, y_new, dense, dims):
 def halt(accept, t, h, clock, y, y_new, dense, found, dims, section):
     """End the step of a lane where the last section function passes zero, and mark the lane; returns the lengths."""
     now, k = load(clock, BASE, WIDTH) + t, dims.sections * (1 + dims.kept)
-    zero, part = broadcast(0.0, WIDTH), broadcast(1.0, WIDTH)
+    zero, part, share = broadcast(0.0, WIDTH), broadcast(1.0, WIDTH), 1.0 / dims.looks  # a power of two
     before, g0 = zero / zero, surface(k, zero, now, h, y, y_new, dense, found, dims, section)
-    g1 = surface(k, zero + 1.0 / dims.looks, now, h, y, y_new, dense, found, dims, section)
+    g1 = surface(k, zero + share, now, h, y, y_new, dense, found, dims, section)
     hits = accept & (zero > 0.0)
     for i in range(dims.looks):
-        low, behind = zero + i / dims.looks, zero / zero
+        low, behind = zero + i * share, zero / zero
         if i + 2 <= dims.looks:
-            behind = surface(k, zero + (i + 2) / dims.looks, now, h, y, y_new, dense, found, dims, section)
-        middle, g = between(k, i, accept & ~hits, before, g0, g1, behind, now, h, y, y_new, dense, found, dims, section)
+            behind = surface(k, zero + (i + 2) * share, now, h, y, y_new, dense, found, dims, section)
+        middle, g = between(
+            k, i, share, accept & ~hits, before, g0, g1, behind, now, h, y, y_new, dense, found, dims, section
+        )
         passes = crosses(g0, g, 0.0) & accept & ~hits
         if any_lane(passes):
             place = locate(k, passes, low, middle, g0, g, now, h, y, y_new, dense, found, dims, section)

@@ -179,7 +179,7 @@ def admit(queue, last, flying, clock, y, cell, start, numbers, spans, control, m
 
 
 @njit(error_model="numpy", forceinline=True)
-def attempt(mode, clock, y, dense, y_new, middle, out, control, dims, step, step_smooth, pushes, network):
+def attempt(mode, clock, y, dense, y_new, middle, out, control, dims, functions, network):
     """One step of all lanes of a group: times, lengths, the mask of accepted steps and a bound of the eigenvalues."""
     t, h = load(clock, TIME, WIDTH), aim(clock, control)
     power, rate = 1.0 / (dims.error_order + 1.0), h
@@ -187,30 +187,32 @@ def attempt(mode, clock, y, dense, y_new, middle, out, control, dims, step, step
         limit = minimum(load(clock, STOP, WIDTH) - t, control[MAX_STEP])
         if LOOPED:
             graph, weights = network
-            h, reach = step(
+            h, reach = functions.step(
                 t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL], graph, weights
             )
         else:
-            h, reach = step(t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL])
+            h, reach = functions.step(
+                t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL]
+            )
         accept = accept_series(clock, reach, limit)
         if CONTACTS:
             note_rush(accept, t, h, clock)
         return t, h, accept, rate
     if SWITCHING:
         if mode == SMOOTH:
-            error, rate = step_smooth(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
+            error, rate = functions.step_smooth(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
             power = 1.0 / (dims.smooth_error_order + 1.0)
             store(clock, SMOOTH_STEPS, load(clock, SMOOTH_STEPS, WIDTH) + 1.0)
         else:
-            error, rate = step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
+            error, rate = functions.step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
     elif LOOPED:
         graph, weights = network
-        error = step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL], graph, weights)
+        error = functions.step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL], graph, weights)
     else:
-        error = step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
+        error = functions.step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
     accept = judge(clock, h, error, power)
     if CONTACTS:
-        accept = take_back(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, pushes)
+        accept = take_back(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, functions.pushes)
     return t, h, accept, rate
 
 
@@ -231,13 +233,13 @@ def conclude(mode, t, h, accept, rate, clock, y, y_new, out, control, dims, push
 
 @njit(error_model="numpy", nogil=True, cache=True)
 def drive(
-    step, step_smooth, pushes, section, values, halt, observe, cut, tally, sample, dims, multiplicity, rule, network,
-    first, last, start, numbers, spans, control, end, sums, counts, points, samples,
+    functions, dims, multiplicity, rule, network, first, last, start, numbers, spans, control, end, sums, counts, points,
+    samples,
 ):  # fmt: skip
     """Run the cells first … last-1.
 
-    step, step_smooth, pushes, section, values: functions of a scene; halt, observe, cut, tally, sample: its records.
-    dims: the sizes of its arrays; what is 0 there is not recorded, and its functions are not called.
+    functions: those of a scene and those that record.  dims: the sizes of its arrays; what is 0 there is not recorded,
+    and its functions are not called.
     multiplicity (nodes): how many oscillators each node stands for.  rule (points, 4): of the quadrature of a step
     (codegen/kernels/observed.py).  network: of one that is stepped through in loops, the arrays of its
     program (codegen/steps/program.py) and the weights of its links.
@@ -304,19 +306,25 @@ def drive(
                 continue
             if full == 0:
                 break
-        t, h, accept, rate = attempt(
-            mode, clock, y, dense, y_new, middle, out, steering, dims, step, step_smooth, pushes, network
-        )
+        t, h, accept, rate = attempt(mode, clock, y, dense, y_new, middle, out, steering, dims, functions, network)
         if dims.stops:
-            h = halt(accept, t, h, clock, y, y_new, dense, found, dims, section)
+            h = functions.halt(accept, t, h, clock, y, y_new, dense, found, dims, functions.section)
         counted, now = accept & (t >= load(clock, START, WIDTH)), load(clock, BASE, WIDTH) + t
         if dims.components > 0:
-            observe(counted, accept, h, clock, y, y_new, dense, middle, members, dims)
+            functions.observe(counted, accept, h, clock, y, y_new, dense, middle, members, dims)
         if dims.sections > 0 and any_lane(counted):
-            cut(counted, now, h, y, y_new, dense, found, cell, counts, points, steering, dims, section)
+            functions.cut(
+                counted, now, h, y, y_new, dense, found, cell, counts, points, steering, dims, functions.section
+            )
         if dims.observed > 0 and any_lane(counted):
-            tally(lane_bits(counted), now, h, y, y_new, dense, seen, cell, sums, steering, rule, dims, values)
+            functions.tally(
+                lane_bits(counted), now, h, y, y_new, dense, seen, cell, sums, steering, rule, dims, functions.values
+            )
         if dims.sampled and any_lane(accept):
-            sample(lane_bits(accept), arrive(clock, t, h), h, clock, y, y_new, dense, cell, spans, samples, dims)
-        look, flips = conclude(mode, t, h, accept, rate, clock, y, y_new, out, steering, dims, pushes, network)
+            functions.sample(
+                lane_bits(accept), arrive(clock, t, h), h, clock, y, y_new, dense, cell, spans, samples, dims
+            )
+        look, flips = conclude(
+            mode, t, h, accept, rate, clock, y, y_new, out, steering, dims, functions.pushes, network
+        )
     block[0] = 0.0  # the memory behind the addresses is held until here

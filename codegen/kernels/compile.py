@@ -45,6 +45,7 @@ from ..simd.lane_types import Lane, Mask
 from ..steps.names import NAMES
 from .cache import Folder, cache_folder, open_folder
 from .driver import Driver, KernelKind, Recorder
+from .functions import Functions, FunctionsType
 from .installation import InstallationError
 from .processor import processor
 from .sweep import KernelSource
@@ -107,21 +108,8 @@ def signatures(driver: Driver) -> dict[str, Any]:
         known = {"step": step, "step_smooth": step, "pushes": pushes, **_recorded(driver.width)}
         arrays = (*[_input] * 3, _vector, _matrix, _matrix, _counts, _cube, _cube)
         own = (_sizes(Dimensions), _vector, _matrix, types.Tuple(more))
-    functions = [types.FunctionType(known[name]) for name in driver.functions]
-    return {**known, driver.entry: types.void(*functions, *own, types.int64, types.int64, *arrays)}
-
-
-class Absent(types.WrapperAddressProtocol):
-    """In the place of a function that a driver takes and does not call."""
-
-    def __init__(self, kind: Any) -> None:
-        self.kind = kind
-
-    def __wrapper_address__(self) -> int:
-        return -1  # Numba's word for none
-
-    def signature(self) -> Any:
-        return self.kind
+    functions = FunctionsType({name: known[name] for name in driver.functions})
+    return {**known, driver.entry: types.void(functions, *own, types.int64, types.int64, *arrays)}
 
 
 LOG = logging.getLogger(__name__)
@@ -323,14 +311,14 @@ def _kernel(source: KernelSource) -> Kernel:
         wanted = {name: known[name] for name in source.functions}
         compiled = _modules[source.code] = _module(source.code, "kernel", wanted, _what(source))
     found = ChainMap(compiled.functions, *(r.functions for r in recorders))
-    functions = [found[name] if name in found else Absent(known[name]) for name in source.driver.functions]
+    functions = Functions(known[source.driver.entry].args[0], [found.get(name) for name in source.driver.functions])
     if source.kind is KernelKind.MODES:
-        own = (*functions, source.dimensions, np.array(source.marks, np.int64))
+        own: tuple[Any, ...] = (functions, source.dimensions, np.array(source.marks, np.int64))
     else:
         loops = source.elimination
         network = () if loops is None else (loops.arrays, loops.weights)
         own = (
-            *functions,
+            functions,
             source.dimensions,
             np.array(source.marks, np.float64),
             np.reshape(source.rule, (-1, 4)),
@@ -442,7 +430,6 @@ def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) 
             function._cache._cache_file = code
             function.compile(wanted[name])
             function.disable_compile()  # arrays of another type are a mistake of ours, not a reason to compile anew
-            _remember(function)
     finally:
         numba.config.CACHE_DIR = elsewhere
         del sys.modules[path.stem]
@@ -452,20 +439,21 @@ def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) 
     return Compiled(functions, str(path), hits)
 
 
-def _remember(function: Any) -> None:
-    """Keep the address of a function's machine code, which Numba else searches at each call of a driver."""
-    (found,) = function.overloads.values()
-    library = found.library
-    library.get_pointer_to_function = functools.cache(library.get_pointer_to_function)
-    function.get_compile_result = lambda signature: found
-
-
 @functools.cache
 def _surroundings() -> str:
     """Everything besides the text that the machine code depends on."""
     here = [
         Path(m.__file__).read_text(encoding="utf-8")
-        for m in (decorator, addresses, lane_types, lanes, elementary, special, dimensions)
+        for m in (
+            decorator,
+            addresses,
+            lane_types,
+            lanes,
+            elementary,
+            special,
+            dimensions,
+            sys.modules[Functions.__module__],
+        )
         if m.__file__
     ]
     versions = [sys.version, numba.__version__, importlib.metadata.version("llvmlite"), platform.machine()]

@@ -16,7 +16,7 @@ def configure(parser: ArgumentParser) -> None:
         "action",
         choices=("info", "clear", "warm"),
         help="info: folder, number of kernels and size; clear: delete the kernels and drivers; they are compiled again "
-        "when needed; warm: compile the drivers that most scenes share",
+        "when needed; warm: compile the drivers and recorders that most scenes share",
     )
 
 

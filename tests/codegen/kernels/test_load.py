@@ -61,15 +61,15 @@ from synchain.codegen.simd import address, broadcast
 
 @njit(error_model="numpy", nogil=True, cache=True)
 def drive(
-    step, step_smooth, pushes, section, values, halt, observe, cut, tally, sample, dims, multiplicity, rule, network,
-    first, last, start, numbers, spans, control, end, sums, counts, points, samples,
+    functions, dims, multiplicity, rule, network, first, last, start, numbers, spans, control, end, sums, counts, points,
+    samples,
 ):
     old, new, zero = np.zeros(dims.dimension), np.zeros(dims.dimension), broadcast(0.0, 1)
     y, y_new = address(old, 0), address(new, 0)
     for i in range(first, last):
         for c in range(dims.dimension):
             old[c] = start[i, c]
-        step(zero, zero, y, y, y_new, y_new, 0.0, 0.0)
+        functions.step(zero, zero, y, y, y_new, y_new, 0.0, 0.0)
         for c in range(dims.dimension):
             end[i, c] = new[c]
 """
