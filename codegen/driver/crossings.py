@@ -12,7 +12,7 @@ from .names import WIDTH
 @njit(error_model="numpy", forceinline=True)
 def surface(k, theta, t, h, y, y_new, dense, found, dims, section):
     """Section function k at the fraction theta of the step."""
-    section(theta, t, h, y, y_new, dense, found, dims)
+    section(theta, t, h, y, y_new, dense, found, dims[:2])
     return load(found, k, WIDTH)
 
 

@@ -20,7 +20,7 @@ def keep(k, theta, t, h, y, y_new, dense, found, where, dims, section):
         for c in range(dims.dimension):
             store(where, c, inside(theta, c, y, y_new, dense, dims))
         return
-    section(theta, t, h, y, y_new, dense, found, dims)
+    section(theta, t, h, y, y_new, dense, found, dims[:2])
     store(where, 0, broadcast(1.0 * k, WIDTH))
     for c in range(dims.kept):
         store(where, c + 1, load(found, dims.sections + k * dims.kept + c, WIDTH))

@@ -10,14 +10,14 @@ __all__ = ["Dimensions", "ModeDimensions"]
 class Dimensions(NamedTuple):
     """What a driver of a sweep must know of a scene and of its integrator."""
 
+    dimension: int
+    """State variables of the network; this and the next are all that functions of a scene are told."""
+    dense_rows: int
+    """Coefficients of the dense output for each state variable."""
     nodes: int
     components: int
     """States of a node that the synchronisation error compares; 0 if it is not recorded."""
-    dimension: int
-    """State variables of the network."""
     parameters: int
-    dense_rows: int
-    """Coefficients of the dense output for each state variable."""
     workspace: int
     """Groups of scratch memory behind the dense output."""
     error_order: int
@@ -42,10 +42,10 @@ class Dimensions(NamedTuple):
 class ModeDimensions(NamedTuple):
     """What a driver that carries deviations along an orbit must know."""
 
-    nodes: int
     dimension: int
-    parameters: int
     dense_rows: int
+    nodes: int
+    parameters: int
     workspace: int
     error_order: int
     repeats: int

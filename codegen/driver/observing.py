@@ -125,7 +125,7 @@ def climb(added, begin, width, t, h, y, y_new, dense, seen, cell, sums, control,
             for _ in range(CLIMBS):
                 if open_lanes == 0:
                     break
-                values((load(there, 0, WIDTH) + begin) * width, t, h, y, y_new, dense, address(at, 0), dims)
+                values((load(there, 0, WIDTH) + begin) * width, t, h, y, y_new, dense, address(at, 0), dims[:2])
                 for which in range(WIDTH):
                     if (open_lanes >> which) & 1:
                         a, m, b, at_a, at_m, at_b = ends[which]
@@ -158,7 +158,7 @@ def tally(counted, t, h, y, y_new, dense, seen, cell, sums, control, rule, dims,
         width, halved, added = 1.0 / (1 << level), 0, 0
         for point in range(points):
             theta = broadcast((k + rule[point, POINT]) * width, WIDTH)
-            values(theta, t, h, y, y_new, dense, address(seen, point * dims.observed * WIDTH), dims)
+            values(theta, t, h, y, y_new, dense, address(seen, point * dims.observed * WIDTH), dims[:2])
         for which in range(WIDTH):
             if (open_lanes[level] >> which) & 1:
                 if level < DEEPEST and rough(which, seen, rule, control, dims):

@@ -68,7 +68,7 @@ def _sizes(kind: type[Dimensions] | type[ModeDimensions]) -> Any:
 def _recorded(width: int) -> dict[str, Any]:
     """The types of the functions that record, and of those of a scene that these call, by name."""
     lane, mask, sizes = Lane(width), Mask(width), _sizes(Dimensions)
-    values = types.void(lane, lane, lane, *[ADDRESS] * 4, sizes)
+    values = types.void(lane, lane, lane, *[ADDRESS] * 4, types.UniTuple(types.int64, 2))
     looks, cells = types.FunctionType(values), types.int64[::1]
     step = (lane, lane, *[ADDRESS] * 3)
     return {
