@@ -10,8 +10,9 @@ lowering      From SymPy to the expressions of a program; decides how powers and
 dialect       What a printer knows of one language: lanes for Numba, NumPy, Python's math, C99.
 step          Generated function: advances all states of one cell by one step of an integrator.
 stage         One evaluation of the right-hand side within a step.
-driver        Fixed text that calls the step: step size, events, records, the next cell of a lane.
-              It is compiled once for a width, a set of records and a kind of step.
+driver        Fixed text that calls the step: step size, events, the next cell of a lane.
+              It is compiled once for a width and a kind of step.
+recorder      Fixed text of a function that the driver calls for one record, if the scene wants it.
 kernel        The functions of a scene, a module that Numba compiles, and the driver that runs them.
 digest        Hash of the text of a kernel.
 record        What a kernel writes: mean errors, section points, trajectories.

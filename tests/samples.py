@@ -357,8 +357,9 @@ class Interpreted:
 
     def section(self, theta: Any, t: Any, h: Any, p: list, step: Step) -> Any:
         """The section function at the fraction theta of a step."""
-        y = [*step.y, *p]
-        return self.names["section"](theta, t, h, y, step.y_new, step.dense, self.source.dimensions)
+        y, found = [*step.y, *p], [None]
+        self.names["section"](theta, t, h, y, step.y_new, step.dense, found, self.source.dimensions)
+        return found[0]
 
 
 def take_step(

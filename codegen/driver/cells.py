@@ -18,80 +18,73 @@ from ..simd.lanes import load
 from ..simd.lanes import one_lane
 from ..simd.lanes import select
 from ..simd.lanes import store
+from .clock import ACCEPTED
+from .clock import BASE
+from .clock import BOUND
+from .clock import BUDGET
+from .clock import CANCEL
+from .clock import CHANGE
+from .clock import CHATTERING
+from .clock import CLIMB
+from .clock import CLOCK
+from .clock import CYCLE
+from .clock import DIVERGED
+from .clock import DUE
+from .clock import END
+from .clock import FAR
+from .clock import FINISHED
+from .clock import FIRST_MARK
+from .clock import FIRST_STEP
+from .clock import FROM
+from .clock import HALTED
+from .clock import HIGH
+from .clock import INTERRUPTED
+from .clock import LAPSE
+from .clock import LAST
+from .clock import LEFT
+from .clock import LONGEST_RUSH
+from .clock import MARK
+from .clock import MARKED_AT
+from .clock import MAX_STEPS
+from .clock import MEAN
+from .clock import MEMORY
+from .clock import MODE
+from .clock import N_ACCEPTED
+from .clock import N_REJECTED
+from .clock import N_SKIPPED
+from .clock import N_SMOOTH
+from .clock import NEXT_SAMPLE
+from .clock import NO_JUMPS
+from .clock import ORIGIN
+from .clock import PACE
+from .clock import PEAK
+from .clock import PERIOD
+from .clock import PERIODS
+from .clock import POWER
+from .clock import RECORD
+from .clock import REJECTED
+from .clock import RTOL
+from .clock import RUSH
+from .clock import SAVED_AT
+from .clock import SKIPPED
+from .clock import SMOOTH_STEPS
+from .clock import START
+from .clock import STATUS
+from .clock import STEP
+from .clock import STOP
+from .clock import STOPPED
+from .clock import STOPPED_AT
+from .clock import SUM_BEFORE
+from .clock import SYNC
+from .clock import SYNC_PEAK
+from .clock import SYNC_SUM
+from .clock import TIME
+from .clock import TOWER
+from .clock import UNDERFLOW
+from .clock import UNTIL
 from .names import CONTACTS
-from .names import HALTS
-from .names import OBSERVED
-from .names import SECTION
 from .names import SERIES
-from .names import SYNC_ERROR
-from .names import TRAJECTORY
 from .names import WIDTH
-from .recording import ACCEPTED
-from .recording import BASE
-from .recording import BOUND
-from .recording import BUDGET
-from .recording import CANCEL
-from .recording import CHANGE
-from .recording import CHATTERING
-from .recording import CLIMB
-from .recording import CLOCK
-from .recording import CYCLE
-from .recording import DIVERGED
-from .recording import DUE
-from .recording import END
-from .recording import FAR
-from .recording import FINISHED
-from .recording import FIRST_MARK
-from .recording import FIRST_STEP
-from .recording import FROM
-from .recording import HALTED
-from .recording import HIGH
-from .recording import INTERRUPTED
-from .recording import LAPSE
-from .recording import LAST
-from .recording import LEFT
-from .recording import LONGEST_RUSH
-from .recording import MARK
-from .recording import MARKED_AT
-from .recording import MAX_STEPS
-from .recording import MEAN
-from .recording import MEMORY
-from .recording import MODE
-from .recording import N_ACCEPTED
-from .recording import N_REJECTED
-from .recording import N_SKIPPED
-from .recording import N_SMOOTH
-from .recording import NEXT_SAMPLE
-from .recording import NO_JUMPS
-from .recording import ORIGIN
-from .recording import PACE
-from .recording import PEAK
-from .recording import PERIOD
-from .recording import PERIODS
-from .recording import POWER
-from .recording import RECORD
-from .recording import REJECTED
-from .recording import RTOL
-from .recording import RUSH
-from .recording import SAMPLE_GAP
-from .recording import SAVED_AT
-from .recording import SKIPPED
-from .recording import SMOOTH_STEPS
-from .recording import START
-from .recording import STATUS
-from .recording import STEP
-from .recording import STOP
-from .recording import STOPPED
-from .recording import STOPPED_AT
-from .recording import SUM_BEFORE
-from .recording import SYNC
-from .recording import SYNC_PEAK
-from .recording import SYNC_SUM
-from .recording import TIME
-from .recording import TOWER
-from .recording import UNDERFLOW
-from .recording import UNTIL
-from .recording import spread
 
 # --- kernel text below ---
 # What must repeat for the future to repeat, saved behind state and parameters: the state and these of the clock.
@@ -100,8 +93,6 @@ LONGEST_CYCLE = 32.0
 # Taylor steps go on beyond the ends of periods, but for one in PROBE, a multiple of many lengths of cycles.  Once a state
 # there is as near as NEAR, or so many rtol, to that at the last one, the steps stop at the ends of all periods.
 PROBE, NEAR, JITTER = 60.0, 1e-6, 100.0
-# True if every step of the window counts: nothing in it can be left out.
-WHOLE = SECTION or TRAJECTORY or OBSERVED
 
 
 @njit(error_model="numpy")
@@ -119,7 +110,7 @@ def put(array, slot, which, value):
 
 
 @njit(error_model="numpy")
-def fill(which, cell, start, numbers, spans, control, clock, y, samples, multiplicity, dims):
+def fill(which, cell, start, numbers, spans, control, clock, y, dims):
     """Put a cell into a lane; a lane without a cell of its own (cell < 0) idles on a copy of the first one."""
     idle, cell = cell < 0, max(cell, 0)
     for slot in range(CLOCK):
@@ -140,14 +131,8 @@ def fill(which, cell, start, numbers, spans, control, clock, y, samples, multipl
     put(clock, POWER, which, 1.0)
     put(clock, LEFT, which, -1.0)
     put(clock, NEXT_SAMPLE, which, spans[cell, 0])
-    if TRAJECTORY and samples.shape[1] > 1:
-        put(clock, SAMPLE_GAP, which, (spans[cell, 1] - spans[cell, 0]) / (samples.shape[1] - 1))
     watch(which, control, clock)
     begin(which, cell, spans, clock)
-    if SYNC_ERROR:
-        now = np.empty(WIDTH)
-        store(now, 0, spread(y, multiplicity, dims))
-        put(clock, SYNC, which, now[which])
     if idle:
         vacate(which, clock)
 
@@ -196,8 +181,6 @@ def turn_over(which, cell, spans, control, clock, y, dims):
         if clock[CYCLE * WIDTH + which] > 0.0 and control[NO_JUMPS] == 0.0:
             jump(which, cell, spans, clock)
     begin(which, cell, spans, clock)
-    if SYNC_ERROR and not WHOLE and clock[SYNC * WIDTH + which] < spans[cell, 3]:
-        settle_down(which, cell, spans, clock)
 
 
 @njit(error_model="numpy")
@@ -267,13 +250,13 @@ def save(which, clock, y, dims):
 
 @njit(error_model="numpy")
 def jump(which, cell, spans, clock):
-    """Leave out whole cycles: before the window always, inside it after one whole cycle was measured."""
+    """Leave out whole cycles: before the window always, inside it after one whole cycle was measured, unless LEFT is 0."""
     period, now = clock[PERIOD * WIDTH + which], clock[PERIODS * WIDTH + which]
     cycle = clock[CYCLE * WIDTH + which]
     start, end = spans[cell, 0], spans[cell, 1]
     if now * period < start:
         leap(which, math.floor((start / period - now) / cycle + 1e-9) * cycle, clock)
-    elif not WHOLE:
+    else:
         left = clock[LEFT * WIDTH + which]
         if left < 0.0:
             put(clock, LEFT, which, cycle)
@@ -303,7 +286,7 @@ def unbounded(which, clock, control):
     longer and longer.  Even if growth ended here, the steps that are left would not do.
     """
     steps = clock[ACCEPTED * WIDTH + which] + clock[REJECTED * WIDTH + which]
-    if HALTS or steps < clock[MARK * WIDTH + which]:
+    if steps < clock[MARK * WIDTH + which]:
         return False
     t, size, before = clock[TIME * WIDTH + which], clock[HIGH * WIDTH + which], clock[LAPSE * WIDTH + which]
     now = clock[BASE * WIDTH + which] + t
@@ -331,7 +314,7 @@ def outcome(which, clock, y, control, dims):
         if not size < FAR:  # NaN too
             return DIVERGED
         largest = max(largest, size)
-    if HALTS and clock[HALTED * WIDTH + which] != 0.0:
+    if clock[HALTED * WIDTH + which] != 0.0:
         return STOPPED
     if t >= clock[END * WIDTH + which]:
         return FINISHED

@@ -21,33 +21,31 @@ from ..simd.lanes import select
 from ..simd.lanes import store
 from ..simd.lanes import truncated
 from ..simd.special import power_of_two
+from .clock import ACCEPTED
+from .clock import BASE
+from .clock import BOUND
+from .clock import CHANGE
+from .clock import DUE
+from .clock import END
+from .clock import FAR
+from .clock import FROM
+from .clock import HIGH
+from .clock import LONGEST_RUSH
+from .clock import MARK
+from .clock import MAX_STEP
+from .clock import MEMORY
+from .clock import PERIOD
+from .clock import PERIODS
+from .clock import REJECTED
+from .clock import RUSH
+from .clock import SMOOTH
+from .clock import START
+from .clock import STEP
+from .clock import STOP
+from .clock import TIME
+from .clock import UNTIL
 from .names import CONTACTS
-from .names import HALTS
 from .names import WIDTH
-from .recording import ACCEPTED
-from .recording import BASE
-from .recording import BOUND
-from .recording import CHANGE
-from .recording import DUE
-from .recording import END
-from .recording import FAR
-from .recording import FROM
-from .recording import HALTED
-from .recording import HIGH
-from .recording import LONGEST_RUSH
-from .recording import MARK
-from .recording import MAX_STEP
-from .recording import MEMORY
-from .recording import PERIOD
-from .recording import PERIODS
-from .recording import REJECTED
-from .recording import RUSH
-from .recording import SMOOTH
-from .recording import START
-from .recording import STEP
-from .recording import STOP
-from .recording import TIME
-from .recording import UNTIL
 
 
 # --- kernel text below ---
@@ -154,8 +152,7 @@ def pause(clock, largest):
     marked = load(clock, ACCEPTED, WIDTH) + load(clock, REJECTED, WIDTH) >= load(clock, MARK, WIDTH)
     stopped = (t >= load(clock, END, WIDTH)) | (t >= load(clock, BOUND, WIDTH))
     found = stopped | marked | (h <= 4e-16 * maximum(t, 1.0)) | (largest >= FAR)
-    found = found | (load(clock, RUSH, WIDTH) >= LONGEST_RUSH) if CONTACTS else found
-    return found | (load(clock, HALTED, WIDTH) > 0.0) if HALTS else found
+    return found | (load(clock, RUSH, WIDTH) >= LONGEST_RUSH) if CONTACTS else found
 
 
 @njit(error_model="numpy", forceinline=True)

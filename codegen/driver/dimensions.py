@@ -10,14 +10,14 @@ __all__ = ["Dimensions", "ModeDimensions"]
 class Dimensions(NamedTuple):
     """What a driver of a sweep must know of a scene and of its integrator."""
 
-    nodes: int
-    components: int
-    """States of a node that the synchronisation error compares."""
     dimension: int
-    """State variables of the network."""
-    parameters: int
+    """State variables of the network; this and the next are all that functions of a scene are told."""
     dense_rows: int
     """Coefficients of the dense output for each state variable."""
+    nodes: int
+    components: int
+    """States of a node that the synchronisation error compares; 0 if it is not recorded."""
+    parameters: int
     workspace: int
     """Groups of scratch memory behind the dense output."""
     error_order: int
@@ -30,17 +30,22 @@ class Dimensions(NamedTuple):
     sections: int
     """Sections of which points are taken."""
     kept: int
-    """Most values that a point of a section on a function keeps."""
+    """Most values that a point of a section on a function keeps; -1 if points are whole states."""
+    looks: int
+    """Pieces of a step between which functions of the state are looked at."""
+    sampled: int
+    """1 if the trajectory is recorded, else 0."""
+    stops: int
+    """1 if a function of the state ends a cell, else 0."""
 
 
 class ModeDimensions(NamedTuple):
     """What a driver that carries deviations along an orbit must know."""
 
-    nodes: int
-    components: int
     dimension: int
-    parameters: int
     dense_rows: int
+    nodes: int
+    parameters: int
     workspace: int
     error_order: int
     repeats: int

@@ -5,10 +5,10 @@ from __future__ import annotations
 from numba import njit
 
 from ..simd.lanes import any_lane, broadcast, load, select, store
+from .clock import BASE, HALTED, MARK
+from .crossings import between, crosses, locate, surface
 from .dense import inside
 from .names import SERIES, WIDTH
-from .recording import BASE, HALTED, LOOKS, between, crosses, locate
-from .sections import surface
 
 
 # --- kernel text below ---
@@ -31,19 +31,21 @@ def shorten(hits, part, y, y_new, dense, dims):
         store(y_new, c, select(hits, end, load(y_new, c, WIDTH)))
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", cache=True)
 def halt(accept, t, h, clock, y, y_new, dense, found, dims, section):
     """End the step of a lane where the last section function passes zero, and mark the lane; returns the lengths."""
     now, k = load(clock, BASE, WIDTH) + t, dims.sections * (1 + dims.kept)
-    zero, part = broadcast(0.0, WIDTH), broadcast(1.0, WIDTH)
+    zero, part, share = broadcast(0.0, WIDTH), broadcast(1.0, WIDTH), 1.0 / dims.looks  # a power of two
     before, g0 = zero / zero, surface(k, zero, now, h, y, y_new, dense, found, dims, section)
-    g1 = surface(k, zero + 1.0 / LOOKS, now, h, y, y_new, dense, found, dims, section)
+    g1 = surface(k, zero + share, now, h, y, y_new, dense, found, dims, section)
     hits = accept & (zero > 0.0)
-    for i in range(LOOKS):
-        low, behind = zero + i / LOOKS, zero / zero
-        if i + 2 <= LOOKS:
-            behind = surface(k, zero + (i + 2) / LOOKS, now, h, y, y_new, dense, found, dims, section)
-        middle, g = between(k, i, accept & ~hits, before, g0, g1, behind, now, h, y, y_new, dense, found, dims, section)
+    for i in range(dims.looks):
+        low, behind = zero + i * share, zero / zero
+        if i + 2 <= dims.looks:
+            behind = surface(k, zero + (i + 2) * share, now, h, y, y_new, dense, found, dims, section)
+        middle, g = between(
+            k, i, share, accept & ~hits, before, g0, g1, behind, now, h, y, y_new, dense, found, dims, section
+        )
         passes = crosses(g0, g, 0.0) & accept & ~hits
         if any_lane(passes):
             place = locate(k, passes, low, middle, g0, g, now, h, y, y_new, dense, found, dims, section)
@@ -52,4 +54,5 @@ def halt(accept, t, h, clock, y, y_new, dense, found, dims, section):
     if any_lane(hits):
         shorten(hits, part, y, y_new, dense, dims)
         store(clock, HALTED, select(hits, 1.0, load(clock, HALTED, WIDTH)))
+        store(clock, MARK, select(hits, 0.0, load(clock, MARK, WIDTH)))  # at once, they need a look
     return part * h

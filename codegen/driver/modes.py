@@ -35,6 +35,23 @@ from .cells import put
 from .cells import restart
 from .cells import turn_over
 from .cells import watch
+from .clock import ACCEPTED
+from .clock import ATOL
+from .clock import BASE
+from .clock import BOUND
+from .clock import CLOCK
+from .clock import FINISHED
+from .clock import MAX_STEP
+from .clock import N_ACCEPTED
+from .clock import N_REJECTED
+from .clock import PERIODS
+from .clock import REJECTED
+from .clock import RTOL
+from .clock import STATUS
+from .clock import STEP
+from .clock import STOP
+from .clock import STOPPED_AT
+from .clock import TIME
 from .contacts import change_modes
 from .contacts import note_rush
 from .contacts import take_back
@@ -63,23 +80,6 @@ from .propagators import part
 from .propagators import settle
 from .propagators import tabulate
 from .propagators import transport
-from .recording import ACCEPTED
-from .recording import ATOL
-from .recording import BASE
-from .recording import BOUND
-from .recording import CLOCK
-from .recording import FINISHED
-from .recording import MAX_STEP
-from .recording import N_ACCEPTED
-from .recording import N_REJECTED
-from .recording import PERIODS
-from .recording import REJECTED
-from .recording import RTOL
-from .recording import STATUS
-from .recording import STEP
-from .recording import STOP
-from .recording import STOPPED_AT
-from .recording import TIME
 
 # --- kernel text below ---
 # Steps between two scalings: a step's growth is bounded by its error, that of so many stays far from overflow.
@@ -167,8 +167,7 @@ def hand_back(modes, powers, registers, vectors, growth, parts):
 
 @njit(error_model="numpy", forceinline=True)
 def attempt(
-    t, clock, y, y_new, dense, middle, out, steering, shared, strengths, old, new, registers, tolerance, dims, step, carry,
-    pushes,
+    t, clock, y, y_new, dense, middle, out, steering, shared, strengths, old, new, registers, tolerance, dims, functions,
 ):  # fmt: skip
     """One step of the orbit and its modes; returns its length and whether it is accepted.
 
@@ -177,7 +176,7 @@ def attempt(
     """
     if SERIES:
         limit = minimum(load(clock, STOP, WIDTH) - t, steering[MAX_STEP])
-        own, reach = step(
+        own, reach = functions.step(
             t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, steering[RTOL], steering[ATOL], shared
         )
         h, good = own, own > 0.0
@@ -186,23 +185,23 @@ def attempt(
                 note_rush(good, t, own, clock)
                 limit = select(own < reach, own, limit)
             store(shared, LENGTH, own)
-            h = broadcast(carry(shared, strengths, old, new, registers, tolerance), WIDTH)
+            h = broadcast(functions.carry(shared, strengths, old, new, registers, tolerance), WIDTH)
             if any_lane(h < own):
                 for c in range(dims.dimension):
                     store(y_new, c, inside(h / own, c, y, y_new, dense, dims))
         return h, accept_series(clock, h, limit)
     h = aim(clock, steering)
-    error = step(t, h, y, y, y_new, dense, steering[RTOL], steering[ATOL], shared)
+    error = functions.step(t, h, y, y, y_new, dense, steering[RTOL], steering[ATOL], shared)
     if any_lane(error <= 1.0) and registers > 0:
-        worst = watched(shared, strengths, old, new, registers - 1, tolerance, carry)
+        worst = watched(shared, strengths, old, new, registers - 1, tolerance, functions.carry)
         if worst <= 1.0 and registers > 1:
-            worst = max(worst, watched(shared, strengths, old, new, 0, tolerance, carry))
+            worst = max(worst, watched(shared, strengths, old, new, 0, tolerance, functions.carry))
         error = maximum(error, broadcast(worst, WIDTH))
     accept = judge(clock, h, error, 1.0 / (dims.error_order + 1.0))
     if CONTACTS:
-        accept = take_back(accept, t, h, clock, y, y_new, dense, middle, out, (), dims, pushes)
+        accept = take_back(accept, t, h, clock, y, y_new, dense, middle, out, (), dims, functions.pushes)
     if any_lane(accept):
-        carry(shared, strengths, old, new, 1, registers - 1)
+        functions.carry(shared, strengths, old, new, 1, registers - 1)
     return h, accept
 
 
@@ -218,13 +217,13 @@ def renew(cell, spans, control, clock):
 
 @njit(error_model="numpy", nogil=True, cache=True)
 def march(
-    step, carry, pushes, release, dims, owners, first, last, start, numbers, spans, control, strengths, vectors, growth,
-    end, sums, counts, batches, places, panels, weights, travellers, gains, misfits,
+    functions, dims, owners, first, last, start, numbers, spans, control, strengths, vectors, growth, end, sums, counts,
+    batches, places, panels, weights, travellers, gains, misfits,
 ):  # fmt: skip
     """Run the cells first … last-1, each an orbit with all modes.
 
-    step, carry, pushes, release: functions of a scene; those that this driver does not call may be any.  dims: the sizes
-    of its arrays.  owners (mode): the contact that each component of a deviation is a velocity of, -1 for the others.
+    functions: those of a scene.  dims: the sizes of its arrays.  owners (mode): the contact that each component of a
+    deviation is a velocity of, -1 for the others.
     start, numbers, spans, control, end, sums, counts as in a sweep.  strengths (dims.strengths, modes): the same for all
     cells, sorted by size; vectors (cells, mode, modes): deviations at the start.  The number of modes is a multiple of
     LANES.
@@ -271,7 +270,7 @@ def march(
                 strong[(kinds * which + k) * LANES + lane] = strengths[k, which * LANES + lane]
     tolerance = control[RTOL] * control[LOOSENESS]
     for cell in range(first, last):
-        fill(0, cell, start, numbers, spans, control, clock, y, growth, old, dims)
+        fill(0, cell, start, numbers, spans, control, clock, y, dims)
         status, begun, moved = FINISHED, False, address(travellers, cell * groups * parts * LANES)
         for batch in range(batches.size):
             for _ in range(batches[batch]):
@@ -301,7 +300,7 @@ def march(
                     moving, t = 0 if still else active, load(clock, TIME, WIDTH)
                     h, accept = attempt(
                         t, clock, y, y_new, dense, middle, out, steering, shared, carried, old, new, moving, tolerance,
-                        dims, step, carry, pushes,
+                        dims, functions,
                     )  # fmt: skip
                     t_new = arrive(clock, t, h)
                     if any_lane(accept) and not still:
@@ -313,10 +312,13 @@ def march(
                     if CONTACTS:
                         for i in range(dims.nodes):
                             slips[i] = y[2 * dims.nodes + i]
-                        change_modes(accept, t_new, y, out, (), dims, pushes)
+                        change_modes(accept, t_new, y, out, (), dims, functions.pushes)
                         for i in range(dims.nodes):
                             if y[2 * dims.nodes + i] != slips[i]:
-                                saltate(i, slips[i], clock[TIME], y, out, carried, old, active, owners, dims, release)
+                                saltate(
+                                    i, slips[i], clock[TIME], y, out, carried, old, active, owners, dims,
+                                    functions.release,
+                                )  # fmt: skip
                                 landed = landed or y[2 * dims.nodes + i] == 0.0
                     if SERIES:
                         wrap(clock)

@@ -15,13 +15,6 @@ CONTACTS = False
 """True if oscillators stick and slip: their third state is the mode, which events change."""
 SERIES = False
 """True if the step is a Taylor step: it tells how long it is and how far its series reach, which are its dense output."""
-SYNC_ERROR = False
-SECTION = False
-TRAJECTORY = False
-OBSERVED = False
-HALTS = False
-"""Records of this driver; what is False costs nothing."""
-
 LANES = 1
 """Modes in one register of a driver that carries deviations along an orbit."""
 

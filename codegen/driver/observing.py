@@ -1,4 +1,4 @@
-"""What a kernel adds up of observed values: integrals over the window by a rule of Gauss and Lobatto, and extremes."""
+"""The record of observed values: integrals over the window by a rule of Gauss and Lobatto, and extremes."""
 
 from __future__ import annotations
 
@@ -7,15 +7,17 @@ from numba import njit
 
 from ..simd.addresses import address
 from ..simd.lanes import broadcast, load, store
+from .clock import ATOL, OBSERVED, RTOL
 from .names import WIDTH
-from .recording import ATOL, RTOL
 
 # --- kernel text below ---
-# Columns of `sums` behind those of every kernel: the time that was observed, then six columns for each value.
-LENGTH, TALLIES, TALLY = 4, 5, 6
+# Columns of `sums` behind the time that was observed: six for each value.
+TALLIES, TALLY = OBSERVED + 1, 6
 FIRST, SUM, SQUARES, LARGEST, LEAST, LATEST = 0, 1, 2, 3, 4, 5
-# Each point of the rule has four numbers; no panel of a step is shorter than 2^-DEEPEST.
-POINT, WEIGHT, TOP, NEXT, ROW, DEEPEST = 0, 1, 2, 3, 4, 12
+# Columns of the rule.
+POINT, WEIGHT, TOP, NEXT = 0, 1, 2, 3
+# No panel of a step is shorter than 2^-DEEPEST.
+DEEPEST = 12
 # Most parabolas for an extreme between the points of a panel.
 CLIMBS = 8
 
@@ -29,10 +31,10 @@ def rough(which, seen, rule, control, dims):
     """
     for k in range(dims.observed):
         top = following = size = 0.0
-        for point in range(len(rule) // ROW):
+        for point in range(len(rule)):
             value = seen[(point * dims.observed + k) * WIDTH + which]
-            top += rule[ROW * point + TOP] * value
-            following += rule[ROW * point + NEXT] * value
+            top += rule[point, TOP] * value
+            following += rule[point, NEXT] * value
             size = max(size, abs(value))
         last = max(abs(top), abs(following))
         if last * last > size * (control[RTOL] * size + control[ATOL]):
@@ -46,8 +48,8 @@ def add(which, i, length, seen, sums, rule, dims):
 
     The integrals are those of the distance from the first value, so that variances keep their digits.
     """
-    for point in range(len(rule) // ROW):
-        share, begins = length * rule[ROW * point + WEIGHT], point == 0 and sums[i, LENGTH] == 0.0
+    for point in range(len(rule)):
+        share, begins = length * rule[point, WEIGHT], point == 0 and sums[i, OBSERVED] == 0.0
         for k in range(dims.observed):
             value, at = seen[(point * dims.observed + k) * WIDTH + which], TALLIES + TALLY * k
             if begins:
@@ -58,7 +60,7 @@ def add(which, i, length, seen, sums, rule, dims):
             sums[i, at + LARGEST] = max(sums[i, at + LARGEST], value)
             sums[i, at + LEAST] = min(sums[i, at + LEAST], value)
             sums[i, at + LATEST] = value
-    sums[i, LENGTH] += length
+    sums[i, OBSERVED] += length
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -78,7 +80,7 @@ def bracket(which, k, sign, best, seen, rule, ends, dims):
 
     Returns where it may be, as a share of the panel, and whether it is higher than `best` there.
     """
-    last, found, guess = len(rule) // ROW - 1, False, 0.0
+    last, found, guess = len(rule) - 1, False, 0.0
     for point in range(last + 1):
         low, high, centre = max(point - 1, 0), min(point + 1, last), min(max(point, 1), last - 1)
         at_low, at_point, at_high = (
@@ -89,16 +91,16 @@ def bracket(which, k, sign, best, seen, rule, ends, dims):
         if at_low > at_point or at_high > at_point:
             continue
         place, height = vertex(
-            rule[ROW * (centre - 1)],
-            rule[ROW * centre],
-            rule[ROW * (centre + 1)],
+            rule[centre - 1, POINT],
+            rule[centre, POINT],
+            rule[centre + 1, POINT],
             sign * seen[((centre - 1) * dims.observed + k) * WIDTH + which],
             sign * seen[(centre * dims.observed + k) * WIDTH + which],
             sign * seen[((centre + 1) * dims.observed + k) * WIDTH + which],
         )
-        if height > best and rule[ROW * low] < place < rule[ROW * high]:
+        if height > best and rule[low, POINT] < place < rule[high, POINT]:
             found, best, guess = True, height, place
-            ends[0], ends[1], ends[2] = rule[ROW * low], rule[ROW * point], rule[ROW * high]
+            ends[0], ends[1], ends[2] = rule[low, POINT], rule[point, POINT], rule[high, POINT]
             ends[3], ends[4], ends[5] = at_low, at_point, at_high
     return guess, found
 
@@ -123,7 +125,7 @@ def climb(added, begin, width, t, h, y, y_new, dense, seen, cell, sums, control,
             for _ in range(CLIMBS):
                 if open_lanes == 0:
                     break
-                values((load(there, 0, WIDTH) + begin) * width, t, h, y, y_new, dense, address(at, 0), dims)
+                values((load(there, 0, WIDTH) + begin) * width, t, h, y, y_new, dense, address(at, 0), dims[:2])
                 for which in range(WIDTH):
                     if (open_lanes >> which) & 1:
                         a, m, b, at_a, at_m, at_b = ends[which]
@@ -142,21 +144,21 @@ def climb(added, begin, width, t, h, y, y_new, dense, seen, cell, sums, control,
                             open_lanes &= ~(1 << which)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", cache=True)
 def tally(counted, t, h, y, y_new, dense, seen, cell, sums, control, rule, dims, values):
     """Add the step of the lanes in `counted` to what is observed; its panels are halved where a value needs it.
 
     Panel k of some level spans k 2^-level … (k + 1) 2^-level of the step; each lane halves those that it needs.
     """
-    points, lengths = len(rule) // ROW, np.empty(WIDTH)
+    points, lengths = len(rule), np.empty(WIDTH)
     store(lengths, 0, h)
     open_lanes = np.zeros(DEEPEST + 1, np.int64)
     open_lanes[0], level, k = counted, 0, 0
     while True:
         width, halved, added = 1.0 / (1 << level), 0, 0
         for point in range(points):
-            theta = broadcast((k + rule[ROW * point + POINT]) * width, WIDTH)
-            values(theta, t, h, y, y_new, dense, address(seen, point * dims.observed * WIDTH), dims)
+            theta = broadcast((k + rule[point, POINT]) * width, WIDTH)
+            values(theta, t, h, y, y_new, dense, address(seen, point * dims.observed * WIDTH), dims[:2])
         for which in range(WIDTH):
             if (open_lanes[level] >> which) & 1:
                 if level < DEEPEST and rough(which, seen, rule, control, dims):

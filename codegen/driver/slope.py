@@ -11,12 +11,13 @@ from .names import SERIES, WIDTH
 # --- kernel text below ---
 @njit(error_model="numpy", forceinline=True)
 def slope(theta, c, y, y_new, dense, dims):
-    """Derivative of state variable c by the fraction of the step."""
-    inner = load(dense, (dims.dense_rows - 1) * dims.dimension + c, WIDTH)
+    """Derivative of state variable c by the fraction of the step; of `dims`, the first two are looked at."""
+    dimension, rows = dims[0], dims[1]
+    inner = load(dense, (rows - 1) * dimension + c, WIDTH)
     bent = 0.0 * inner
-    for j in range(dims.dense_rows - 2, -1, -1):
+    for j in range(rows - 2, -1, -1):
         bent = inner + theta * bent
-        inner = load(dense, j * dims.dimension + c, WIDTH) + theta * inner
+        inner = load(dense, j * dimension + c, WIDTH) + theta * inner
     if SERIES:
         return inner + theta * bent
     change = load(y_new, c, WIDTH) - load(y, c, WIDTH)

@@ -32,10 +32,34 @@ from .cells import move
 from .cells import occupied
 from .cells import outcome
 from .cells import put
+from .cells import settle_down
 from .cells import turn_over
 from .cells import vacant
 from .cells import vacate
 from .cells import waiting
+from .clock import ALL
+from .clock import ATOL
+from .clock import BASE
+from .clock import BOUND
+from .clock import CANCEL
+from .clock import CHANGE
+from .clock import CLOCK
+from .clock import LEFT
+from .clock import MARK
+from .clock import MAX_STEP
+from .clock import MAX_STEPS
+from .clock import MEMORY
+from .clock import MODE
+from .clock import OBSERVED
+from .clock import RTOL
+from .clock import SMOOTH
+from .clock import SMOOTH_STEPS
+from .clock import START
+from .clock import STEP
+from .clock import STIFF
+from .clock import STOP
+from .clock import SYNC
+from .clock import TIME
 from .contacts import change_modes
 from .contacts import note_rush
 from .contacts import take_back
@@ -47,50 +71,39 @@ from .control import judge
 from .control import pause
 from .control import turned
 from .control import wrap
-from .halting import halt
 from .names import CONTACTS
-from .names import HALTS
 from .names import LOOPED
-from .names import OBSERVED
-from .names import SECTION
 from .names import SERIES
 from .names import SWITCHING
-from .names import SYNC_ERROR
-from .names import TRAJECTORY
 from .names import WIDTH
-from .observing import LENGTH
-from .observing import ROW
-from .observing import tally
-from .recording import ALL
-from .recording import ATOL
-from .recording import BASE
-from .recording import BOUND
-from .recording import CANCEL
-from .recording import CHANGE
-from .recording import CLOCK
-from .recording import DIRECTION
-from .recording import FURTHER
-from .recording import MAX_STEP
-from .recording import MEMORY
-from .recording import MODE
-from .recording import RTOL
-from .recording import SMOOTH
-from .recording import SMOOTH_STEPS
-from .recording import START
-from .recording import STEP
-from .recording import STIFF
-from .recording import STOP
-from .recording import TIME
-from .recording import cut
-from .recording import observe
-from .recording import sample
+from .spread import spread
 
 
 # --- kernel text below ---
+@njit(error_model="numpy", forceinline=True)
+def whole(dims):
+    """True if every step of the window counts: nothing in it can be left out."""
+    return dims.sections + dims.observed + dims.sampled > 0
+
+
+@njit(error_model="numpy")
+def enter(which, cell, start, numbers, spans, control, clock, y, multiplicity, dims):
+    """Put a cell into a lane, with what its records begin with."""
+    fill(which, cell, start, numbers, spans, control, clock, y, dims)
+    if whole(dims):
+        put(clock, LEFT, which, 0.0)
+    if dims.stops:
+        put(clock, MARK, which, control[MAX_STEPS])
+    if dims.components > 0:
+        now = np.empty(WIDTH)
+        store(now, 0, spread(y, multiplicity, dims))
+        put(clock, SYNC, which, now[which])
+
+
 @njit(error_model="numpy")
 def settle(
     mode, look, flips, queue, last, clock, y, cell, away_clock, away_y, away_cell, lot_clock, lot_y, lot_cell, start,
-    numbers, spans, control, end, sums, counts, samples, multiplicity, dims,
+    numbers, spans, control, end, sums, counts, multiplicity, dims,
 ):  # fmt: skip
     """See to the lanes in `look`: periods turn over, finished cells leave, others change sides; returns the queue's head.
 
@@ -103,7 +116,7 @@ def settle(
                 flip = False
                 if not SWITCHING and queue < last and control[CANCEL] == 0.0:
                     cell[which] = queue
-                    fill(which, queue, start, numbers, spans, control, clock, y, samples, multiplicity, dims)
+                    enter(which, queue, start, numbers, spans, control, clock, y, multiplicity, dims)
                     queue += 1
                 elif not fetch(which, mode, clock, y, cell, lot_clock, lot_y, lot_cell, dims):
                     vacate(which, clock)
@@ -111,6 +124,9 @@ def settle(
             status = outcome(which, clock, y, control, dims)
             if status == 0 and clock[TIME * WIDTH + which] >= clock[BOUND * WIDTH + which]:
                 turn_over(which, cell[which], spans, control, clock, y, dims)
+                near = clock[SYNC * WIDTH + which] < spans[cell[which], 3]
+                if near and dims.components > 0 and not whole(dims):
+                    settle_down(which, cell[which], spans, clock)
                 status = outcome(which, clock, y, control, dims)
             if status != 0:
                 finish(which, status, clock, y, cell[which], spans, end, sums, counts, dims)
@@ -149,21 +165,21 @@ def change_sides(which, mode, clock, y, cell, away_clock, away_y, away_cell, lot
 
 
 @njit(error_model="numpy")
-def admit(queue, last, flying, clock, y, cell, start, numbers, spans, control, samples, multiplicity, dims):
+def admit(queue, last, flying, clock, y, cell, start, numbers, spans, control, multiplicity, dims):
     """Take cells from the queue into free lanes while fewer than `flying` are wanted; returns the head of the queue."""
     while flying > 0 and queue < last and control[CANCEL] == 0.0:
         which = vacant(cell)
         if which < 0:
             break
         cell[which] = queue
-        fill(which, queue, start, numbers, spans, control, clock, y, samples, multiplicity, dims)
+        enter(which, queue, start, numbers, spans, control, clock, y, multiplicity, dims)
         queue += 1
         flying -= 1
     return queue
 
 
 @njit(error_model="numpy", forceinline=True)
-def attempt(mode, clock, y, dense, y_new, middle, out, control, dims, step, step_smooth, pushes, network):
+def attempt(mode, clock, y, dense, y_new, middle, out, control, dims, functions, network):
     """One step of all lanes of a group: times, lengths, the mask of accepted steps and a bound of the eigenvalues."""
     t, h = load(clock, TIME, WIDTH), aim(clock, control)
     power, rate = 1.0 / (dims.error_order + 1.0), h
@@ -171,30 +187,32 @@ def attempt(mode, clock, y, dense, y_new, middle, out, control, dims, step, step
         limit = minimum(load(clock, STOP, WIDTH) - t, control[MAX_STEP])
         if LOOPED:
             graph, weights = network
-            h, reach = step(
+            h, reach = functions.step(
                 t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL], graph, weights
             )
         else:
-            h, reach = step(t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL])
+            h, reach = functions.step(
+                t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL]
+            )
         accept = accept_series(clock, reach, limit)
         if CONTACTS:
             note_rush(accept, t, h, clock)
         return t, h, accept, rate
     if SWITCHING:
         if mode == SMOOTH:
-            error, rate = step_smooth(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
+            error, rate = functions.step_smooth(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
             power = 1.0 / (dims.smooth_error_order + 1.0)
             store(clock, SMOOTH_STEPS, load(clock, SMOOTH_STEPS, WIDTH) + 1.0)
         else:
-            error, rate = step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
+            error, rate = functions.step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
     elif LOOPED:
         graph, weights = network
-        error = step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL], graph, weights)
+        error = functions.step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL], graph, weights)
     else:
-        error = step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
+        error = functions.step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
     accept = judge(clock, h, error, power)
     if CONTACTS:
-        accept = take_back(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, pushes)
+        accept = take_back(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, functions.pushes)
     return t, h, accept, rate
 
 
@@ -215,14 +233,15 @@ def conclude(mode, t, h, accept, rate, clock, y, y_new, out, control, dims, push
 
 @njit(error_model="numpy", nogil=True, cache=True)
 def drive(
-    step, step_smooth, section, values, pushes, dims, multiplicity, rule, network, first, last, start, numbers, spans,
-    control, end, sums, counts, points, samples,
+    functions, dims, multiplicity, rule, network, first, last, start, numbers, spans, control, end, sums, counts, points,
+    samples,
 ):  # fmt: skip
     """Run the cells first … last-1.
 
-    step, step_smooth, section, values, pushes: functions of a scene; those that this driver does not call may be any.
-    dims: the sizes of its arrays.  multiplicity (nodes): how many oscillators each node stands for.  rule: of the
-    quadrature of a step, four numbers for each point (codegen/kernels/observed.py).  network: of one that is stepped through in loops, the arrays of its
+    functions: those of a scene and those that record.  dims: the sizes of its arrays; what is 0 there is not recorded,
+    and its functions are not called.
+    multiplicity (nodes): how many oscillators each node stands for.  rule (points, 4): of the quadrature of a step
+    (codegen/kernels/observed.py).  network: of one that is stepped through in loops, the arrays of its
     program (codegen/steps/program.py) and the weights of its links.
     start (cells, dimension), numbers (cells, parameters), spans (cells, 4): start and end of the window, the period after
     which the right-hand side repeats (0: none), and the synchronisation error below which a cell that records nothing
@@ -235,8 +254,7 @@ def drive(
     group = CLOCK + 2 * size + dims.parameters + len(REPEATING)
     groups = 3 if SWITCHING else 1
     scratch = 9 * dims.nodes if CONTACTS else 0
-    crossed = dims.sections * (1 + dims.kept) + (1 if HALTS else 0)
-    watched = len(rule) // ROW * dims.observed if OBSERVED else 0
+    crossed, watched = dims.sections * (1 + max(0, dims.kept)) + dims.stops, len(rule) * dims.observed
     block = aligned((2 * size + groups * (group + rows) + dims.workspace + scratch + watched + crossed) * WIDTH)
     y_new, middle, out = address(block, 0), address(block, size * WIDTH), address(block, 2 * size * WIDTH)
     first_group = (2 * size + scratch) * WIDTH
@@ -247,15 +265,16 @@ def drive(
     away_clock, away_y, away_dense, lot_clock, lot_y = clock, y, dense, clock, y
     cell, away_cell, lot_cell = np.full(WIDTH, -1), np.full(WIDTH, -1), np.full(WIDTH, -1)
     for which in range(WIDTH):
-        fill(which, -1, start, numbers, spans, control, clock, y, samples, members, dims)
+        enter(which, -1, start, numbers, spans, control, clock, y, members, dims)
     if SWITCHING:
         away_clock, away_y = address(clock, group * WIDTH), address(y, group * WIDTH)
         lot_clock, lot_y = address(away_clock, group * WIDTH), address(away_y, group * WIDTH)
         away_dense = address(dense, rows * WIDTH)
         for which in range(WIDTH):
-            fill(which, -1, start, numbers, spans, control, away_clock, away_y, samples, members, dims)
-    if OBSERVED:
-        sums[first:last, LENGTH:] = 0.0
+            enter(which, -1, start, numbers, spans, control, away_clock, away_y, members, dims)
+    for i in range(first, last):
+        for column in range(OBSERVED, sums.shape[1]):
+            sums[i, column] = 0.0
     mode, queue, look, flips = STIFF, first, ALL, 0
     while True:
         if SWITCHING and look != 0:
@@ -263,21 +282,18 @@ def drive(
             head = queue
             flips = flips & held(cell)  # an idle lane may ask for anything; who moves in must not inherit it
             if mode == STIFF:
-                queue = admit(queue, last, room, clock, y, cell, start, numbers, spans, control, samples, members, dims)
+                queue = admit(queue, last, room, clock, y, cell, start, numbers, spans, control, members, dims)
                 look = look if queue == head else ALL
             else:
                 queue = admit(
-                    queue, last, room, away_clock, away_y, away_cell, start, numbers, spans, control, samples,
-                    members, dims,
-                )  # fmt: skip
+                    queue, last, room, away_clock, away_y, away_cell, start, numbers, spans, control, members, dims
+                )
             room -= queue - head
-            queue = admit(
-                queue, last, room, lot_clock, lot_y, lot_cell, start, numbers, spans, control, samples, members, dims
-            )
+            queue = admit(queue, last, room, lot_clock, lot_y, lot_cell, start, numbers, spans, control, members, dims)
         if look != 0:
             queue = settle(
                 mode, look, flips, queue, last, clock, y, cell, away_clock, away_y, away_cell, lot_clock, lot_y, lot_cell,
-                start, numbers, spans, control, end, sums, counts, samples, members, dims,
+                start, numbers, spans, control, end, sums, counts, members, dims,
             )  # fmt: skip
             full, other, flips = occupied(cell), occupied(away_cell), 0
             waits = occupied(lot_cell) > 0 or (queue < last and control[CANCEL] == 0.0)
@@ -290,23 +306,25 @@ def drive(
                 continue
             if full == 0:
                 break
-        t, h, accept, rate = attempt(
-            mode, clock, y, dense, y_new, middle, out, steering, dims, step, step_smooth, pushes, network
+        t, h, accept, rate = attempt(mode, clock, y, dense, y_new, middle, out, steering, dims, functions, network)
+        if dims.stops:
+            h = functions.halt(accept, t, h, clock, y, y_new, dense, found, dims, functions.section)
+        counted, now = accept & (t >= load(clock, START, WIDTH)), load(clock, BASE, WIDTH) + t
+        if dims.components > 0:
+            functions.observe(counted, accept, h, clock, y, y_new, dense, middle, members, dims)
+        if dims.sections > 0 and any_lane(counted):
+            functions.cut(
+                counted, now, h, y, y_new, dense, found, cell, counts, points, steering, dims, functions.section
+            )
+        if dims.observed > 0 and any_lane(counted):
+            functions.tally(
+                lane_bits(counted), now, h, y, y_new, dense, seen, cell, sums, steering, rule, dims, functions.values
+            )
+        if dims.sampled and any_lane(accept):
+            functions.sample(
+                lane_bits(accept), arrive(clock, t, h), h, clock, y, y_new, dense, cell, spans, samples, dims
+            )
+        look, flips = conclude(
+            mode, t, h, accept, rate, clock, y, y_new, out, steering, dims, functions.pushes, network
         )
-        if HALTS:
-            h = halt(accept, t, h, clock, y, y_new, dense, found, dims, section)
-        counted = accept & (t >= load(clock, START, WIDTH))
-        if SYNC_ERROR:
-            observe(clock, y, h, counted, accept, y_new, dense, middle, members, dims)
-        if SECTION and any_lane(counted):
-            now = load(clock, BASE, WIDTH) + t
-            for k in range(dims.sections):
-                way = steering[DIRECTION if k == 0 else FURTHER + k - 1]
-                cut(k, counted, now, h, y, y_new, dense, found, cell, counts, points, way, dims, section)
-        if OBSERVED and any_lane(counted):
-            now = load(clock, BASE, WIDTH) + t
-            tally(lane_bits(counted), now, h, y, y_new, dense, seen, cell, sums, steering, rule, dims, values)
-        if TRAJECTORY and any_lane(accept):
-            sample(clock, y, arrive(clock, t, h), h, lane_bits(accept), y_new, dense, cell, spans, samples, dims)
-        look, flips = conclude(mode, t, h, accept, rate, clock, y, y_new, out, steering, dims, pushes, network)
     block[0] = 0.0  # the memory behind the addresses is held until here

@@ -34,7 +34,7 @@ __all__ = ["Folder", "cache_folder", "clear", "describe", "open_folder"]
 DIGEST = hashlib.sha256().digest_size
 
 KINDS = ("kernel", "driver")
-"""The modules in the folder, by the beginnings of their names: the functions of a scene, and what runs them."""
+"""The modules in the folder, by the beginnings of their names: the functions of a scene, and what runs and records them."""
 
 PATIENCE = 120.0
 """Seconds after which a process no longer waits for another one that compiles the same kernel."""

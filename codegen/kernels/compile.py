@@ -1,9 +1,9 @@
 """From the text of a kernel to machine code, through a cache on disk that is named by content.
 
-The functions of a scene are one module, the driver that runs them is another, which scenes share.  Scenes of one code
-share the first module too: kernels of loops are alike for all graphs of a size.  A module file is named by the hash of
-everything that could change the machine code: its code, the sources of the lanes, the versions of Python, Numba and
-llvmlite, and the processor.
+The functions of a scene are one module; the driver that runs them and the functions that record are others, which
+scenes share.  Scenes of one code share the first module too: kernels of loops are alike for all graphs of a size.  A
+module file is named by the hash of everything that could change the machine code: its code, the sources of the lanes,
+the versions of Python, Numba and llvmlite, and the processor.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import sys
 import tempfile
 import threading
 import warnings
+from collections import ChainMap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -40,15 +41,16 @@ from ..driver import dimensions
 from ..driver.dimensions import Dimensions, ModeDimensions
 from ..simd import addresses, decorator, elementary, lane_types, lanes, special
 from ..simd.addresses import ADDRESS
-from ..simd.lane_types import Lane
+from ..simd.lane_types import Lane, Mask
 from ..steps.names import NAMES
 from .cache import Folder, cache_folder, open_folder
-from .driver import Driver, KernelKind
+from .driver import Driver, KernelKind, Recorder
+from .functions import Functions, FunctionsType
 from .installation import InstallationError
 from .processor import processor
 from .sweep import KernelSource
 
-__all__ = ["Compiled", "Kernel", "forget", "load", "load_driver"]
+__all__ = ["Compiled", "Kernel", "forget", "load", "load_shared"]
 
 _vector, _matrix, _counts = types.float64[::1], types.float64[:, ::1], types.int64[:, ::1]
 _cube = types.float64[:, :, ::1]
@@ -63,8 +65,25 @@ def _sizes(kind: type[Dimensions] | type[ModeDimensions]) -> Any:
     return types.NamedUniTuple(types.int64, len(kind._fields), kind)
 
 
+def _recorded(width: int) -> dict[str, Any]:
+    """The types of the functions that record, and of those of a scene that these call, by name."""
+    lane, mask, sizes = Lane(width), Mask(width), _sizes(Dimensions)
+    values = types.void(lane, lane, lane, *[ADDRESS] * 4, types.UniTuple(types.int64, 2))
+    looks, cells = types.FunctionType(values), types.int64[::1]
+    step = (lane, lane, *[ADDRESS] * 3)
+    return {
+        "section": values,
+        "values": values,
+        "halt": lane(mask, lane, lane, *[ADDRESS] * 5, sizes, looks),
+        "observe": types.void(mask, mask, lane, *[ADDRESS] * 6, sizes),
+        "cut": types.void(mask, *step, ADDRESS, cells, _counts, _cube, ADDRESS, sizes, looks),
+        "tally": types.void(types.int64, *step, ADDRESS, cells, _matrix, ADDRESS, _matrix, sizes, looks),
+        "sample": types.void(types.int64, lane, lane, *[ADDRESS] * 4, cells, _input, _cube, sizes),
+    }
+
+
 def signatures(driver: Driver) -> dict[str, Any]:
-    """Return the types of the functions of a scene that a driver calls, and those of its own entry, by name."""
+    """Return the types of the functions that a driver takes, and that of its own entry, by name."""
     more = _graph if driver.looped else ()
     if driver.kind is KernelKind.MODES:
         one, lane = Lane(1), Lane(driver.width)
@@ -81,23 +100,16 @@ def signatures(driver: Driver) -> dict[str, Any]:
         arrays += (types.int64[::1], _matrix, _matrix, _vector, _matrix, _cube, _vector)
         own: tuple[Any, ...] = (_sizes(ModeDimensions), types.int64[::1])
     else:
-        lane, sizes = Lane(driver.width), _sizes(Dimensions)
+        lane = Lane(driver.width)
         times = (lane, lane, lane) if driver.series else (lane, lane)
-        step = (*times, *[ADDRESS] * 4, types.float64, types.float64, *more)
         result = types.UniTuple(lane, 2) if driver.switching or driver.series else lane
-        values = types.void(lane, lane, lane, *[ADDRESS] * 4, sizes)
-        known = {
-            "step": result(*step),
-            "step_smooth": result(*step),
-            "section": values if driver.functional else lane(lane, lane, lane, *[ADDRESS] * 3, sizes),
-            "values": values,
-            "pushes": types.void(lane, *[ADDRESS] * 3, *more),
-        }
+        step = result(*times, *[ADDRESS] * 4, types.float64, types.float64, *more)
+        pushes = types.void(lane, *[ADDRESS] * 3, *more)
+        known = {"step": step, "step_smooth": step, "pushes": pushes, **_recorded(driver.width)}
         arrays = (*[_input] * 3, _vector, _matrix, _matrix, _counts, _cube, _cube)
-        own = (sizes, _vector, _vector, types.Tuple(more))
-    functions = [types.FunctionType(known[name]) for name in driver.functions]
-    entry = types.void(*functions, *own, types.int64, types.int64, *arrays)
-    return {**{name: known[name] for name in dict.fromkeys(driver.functions)}, driver.entry: entry}
+        own = (_sizes(Dimensions), _vector, _matrix, types.Tuple(more))
+    functions = FunctionsType({name: known[name] for name in driver.functions})
+    return {**known, driver.entry: types.void(functions, *own, types.int64, types.int64, *arrays)}
 
 
 LOG = logging.getLogger(__name__)
@@ -230,18 +242,18 @@ def load(source: KernelSource) -> Kernel:
         return _load(source)
 
 
-def load_driver(driver: Driver) -> Compiled:
-    """Compile a driver, or load its machine code from the cache.
+def load_shared(part: Driver | Recorder) -> Compiled:
+    """Compile a driver or a recorder, or load its machine code from the cache.
 
     Parameters
     ----------
-    driver
-        What the text of the driver depends on.
+    part
+        What the text depends on.
 
     Returns
     -------
     Compiled
-        The same object for the same driver within a process.  No warning is given if it is not kept on disk: `problem`
+        The same object for the same part within a process.  No warning is given if it is not kept on disk: `problem`
         says why.
 
     Raises
@@ -251,7 +263,7 @@ def load_driver(driver: Driver) -> Compiled:
     """
     _check_numba()
     with _lock:
-        return _driver(driver)
+        return _shared(part)
 
 
 def forget() -> None:
@@ -261,7 +273,7 @@ def forget() -> None:
     """
     with _lock:
         _load.cache_clear()
-        _driver.cache_clear()
+        _shared.cache_clear()
         _held.clear()
         _modules.clear()
 
@@ -285,25 +297,33 @@ def _load(source: KernelSource) -> Kernel:
 
 
 @functools.cache
-def _driver(driver: Driver) -> Compiled:
-    """The driver; a process needs few, and keeps them."""
-    return _module(driver.text, "driver", {driver.entry: signatures(driver)[driver.entry]}, f"the {driver}")
+def _shared(part: Driver | Recorder) -> Compiled:
+    """The driver or the recorder; a process needs few, and keeps them."""
+    known = signatures(part) if isinstance(part, Driver) else _recorded(part.width)
+    return _module(part.text, "driver", {part.entry: known[part.entry]}, f"the {part}")
 
 
 def _kernel(source: KernelSource) -> Kernel:
     known = signatures(source.driver)
-    driver = _driver(source.driver)
+    driver, *recorders = map(_shared, source.shared)
     compiled = _modules.get(source.code)
     if compiled is None:
-        wanted = {name: known[name] for name in source.driver.functions}
+        wanted = {name: known[name] for name in source.functions}
         compiled = _modules[source.code] = _module(source.code, "kernel", wanted, _what(source))
-    functions = [compiled.functions[name] for name in source.driver.functions]
+    found = ChainMap(compiled.functions, *(r.functions for r in recorders))
+    functions = Functions(known[source.driver.entry].args[0], [found.get(name) for name in source.driver.functions])
     if source.kind is KernelKind.MODES:
-        own = (*functions, source.dimensions, np.array(source.marks, np.int64))
+        own: tuple[Any, ...] = (functions, source.dimensions, np.array(source.marks, np.int64))
     else:
         loops = source.elimination
         network = () if loops is None else (loops.arrays, loops.weights)
-        own = (*functions, source.dimensions, np.array(source.marks, np.float64), np.array(source.rule), network)
+        own = (
+            functions,
+            source.dimensions,
+            np.array(source.marks, np.float64),
+            np.reshape(source.rule, (-1, 4)),
+            network,
+        )
     return Kernel(source, compiled, driver, own)
 
 
@@ -410,7 +430,6 @@ def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) 
             function._cache._cache_file = code
             function.compile(wanted[name])
             function.disable_compile()  # arrays of another type are a mistake of ours, not a reason to compile anew
-            _remember(function)
     finally:
         numba.config.CACHE_DIR = elsewhere
         del sys.modules[path.stem]
@@ -420,20 +439,21 @@ def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) 
     return Compiled(functions, str(path), hits)
 
 
-def _remember(function: Any) -> None:
-    """Keep the address of a function's machine code, which Numba else searches at each call of a driver."""
-    (found,) = function.overloads.values()
-    library = found.library
-    library.get_pointer_to_function = functools.cache(library.get_pointer_to_function)
-    function.get_compile_result = lambda signature: found
-
-
 @functools.cache
 def _surroundings() -> str:
     """Everything besides the text that the machine code depends on."""
     here = [
         Path(m.__file__).read_text(encoding="utf-8")
-        for m in (decorator, addresses, lane_types, lanes, elementary, special, dimensions)
+        for m in (
+            decorator,
+            addresses,
+            lane_types,
+            lanes,
+            elementary,
+            special,
+            dimensions,
+            sys.modules[Functions.__module__],
+        )
         if m.__file__
     ]
     versions = [sys.version, numba.__version__, importlib.metadata.version("llvmlite"), platform.machine()]

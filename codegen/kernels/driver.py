@@ -1,18 +1,16 @@
-"""The text of a driver: one module for a width, a set of records and a kind of step, whatever the scene."""
+"""The texts of drivers and of functions that record: modules for a width and a kind of step, whatever the scene."""
 
 from __future__ import annotations
 
-import hashlib
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-
-from synchain.models.dynamics.record import Record
 
 from .. import driver, simd
 from ..simd.lanes import native_width
 
-__all__ = ["Driver", "KernelKind", "common_drivers"]
+__all__ = ["RECORDERS", "Driver", "KernelKind", "Recorder", "common_drivers"]
 
 
 class KernelKind(StrEnum):
@@ -22,54 +20,66 @@ class KernelKind(StrEnum):
     MODES = "modes"
 
 
+RECORDERS = {
+    "halt": ("dense", "crossings", "halting"),
+    "observe": ("dense", "spread", "comparing"),
+    "cut": ("dense", "crossings", "cutting"),
+    "tally": ("observing",),
+    "sample": ("dense", "sampling"),
+}
+"""The functions that record, in the order in which a driver of sweeps takes them, and the parts of the text of each."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recorder:
+    """What the text of a function that records depends on; all drivers that agree in it call the same machine code.
+
+    `entry` is its name; `series` is True if it looks into Taylor steps.
+    """
+
+    entry: str
+    width: int
+    series: bool
+
+    def __str__(self) -> str:
+        return f"recorder {_list(self.entry, self.width, *['series'] * self.series)}"
+
+    @property
+    def text(self) -> str:
+        """The module."""
+        return _module(str(self), {"WIDTH": self.width, "SERIES": self.series}, RECORDERS[self.entry])
+
+
 @dataclass(frozen=True, slots=True)
 class Driver:
     """What the text of a driver depends on; scenes that agree in it share its machine code.
 
     `width` is the number of cells in a register, or of modes in one; `series` is True for Taylor steps, which choose
-    their length; `observes` is True if values of the scene are observed, `sections` if it has sections on functions,
-    `halts` if a function of the state, the last of these, ends a cell.
+    their length.
     """
 
     kind: KernelKind
     width: int
-    records: tuple[Record, ...] = ()
     looped: bool = False
     switching: bool = False
     contacts: bool = False
     series: bool = False
-    observes: bool = False
-    sections: bool = False
-    halts: bool = False
 
     def __str__(self) -> str:
-        names = ("looped", "switching", "contacts", "observes", "sections", "halts")
-        traits = [name for name in names if getattr(self, name)]
+        traits = [name for name in ("looped", "switching", "contacts", "series") if getattr(self, name)]
         subject = "orbits and their modes" if self.kind is KernelKind.MODES else "sweeps"
-        records = ", ".join(("final state", *self.records))
-        lanes = f"{self.width} lane{'s' * (self.width != 1)}"
-        return f"driver of {', '.join((subject, lanes, *traits))} ({records})"
+        return f"driver of {_list(subject, self.width, *traits)}"
 
     @property
     def functions(self) -> tuple[str, ...]:
-        """The functions of a scene, in the order in which the driver takes them; `step` stands for those not called."""
-        wanted: tuple[tuple[str, bool], ...] = (
-            ("step_smooth", self.switching), ("section", self.cuts or self.halts),
-            ("values", self.observes), ("pushes", self.contacts),
-        )  # fmt: skip
+        """The functions of a scene and those that record, in the order in which the driver takes them."""
         if self.kind is KernelKind.MODES:
-            wanted = (("carry", True), ("pushes", self.contacts), ("release", self.contacts))
-        return ("step", *(name if called else "step" for name, called in wanted))
+            return "step", "carry", "pushes", "release"
+        return "step", "step_smooth", "pushes", "section", "values", *RECORDERS
 
-    @property
-    def cuts(self) -> bool:
-        """True if section points are taken."""
-        return self.sections or Record.SECTION in self.records
-
-    @property
-    def functional(self) -> bool:
-        """True if functions of the state are looked at, for sections or for the end of a cell."""
-        return self.sections or self.halts
+    def recorder(self, entry: str) -> Recorder:
+        """Return the function that records, by its name; `tally` leaves the inside of a step to the scene."""
+        return Recorder(entry, self.width, self.series and entry != "tally")
 
     @property
     def entry(self) -> str:
@@ -77,68 +87,43 @@ class Driver:
         return "march" if self.kind is KernelKind.MODES else "drive"
 
     @property
-    def constants(self) -> dict[str, int | bool]:
-        """The names by which the text is specialised."""
+    def text(self) -> str:
+        """The module."""
         modes = self.kind is KernelKind.MODES
-        return {
+        constants = {
             "WIDTH": 1 if modes else self.width,
             **({"LANES": self.width} if modes else {}),
-            **{name.upper(): name in self.records for name in Record},
-            "SECTION": self.cuts,
-            "OBSERVED": self.observes,
-            "HALTS": self.halts,
             "CONTACTS": self.contacts,
             "SWITCHING": self.switching,
             "LOOPED": self.looped,
             "SERIES": self.series,
         }
-
-    @property
-    def text(self) -> str:
-        """The module."""
-        last = "modes" if self.kind is KernelKind.MODES else "sweep"
-        chosen = [
-            name
-            for name, called in (("contacts", self.contacts), ("observing", self.observes), ("halting", self.halts))
-            if called
-        ]
-        surfaces = "sections" if self.functional else "one_section"
-        pieces = (
-            "dense",
-            *([surfaces] if self.cuts or self.halts else []),
-            "recording",
-            "cells",
-            "control",
-            *chosen,
-            *(["propagators"] if last == "modes" else []),
-            last,
+        contacts, last = (
+            ["contacts"] if self.contacts else [],
+            ["propagators", "modes"] if modes else ["spread", "sweep"],
         )
-        lines = [
-            f'"""Driver of {"orbits and their modes" if last == "modes" else "sweeps"}, {self.width} lanes.',
-            "",
-            f"Records     {', '.join(('final state', *self.records))}",
-            '"""',
-        ]
-        constants = "\n".join(f"{name} = {value!r}" for name, value in self.constants.items())
-        body = "\n\n\n".join(map(driver.text, pieces)) + "\n"
-        return "\n\n\n".join(["\n".join(lines), imports(body), constants, body])
-
-    @property
-    def digest(self) -> str:
-        """Hexadecimal SHA-256 of the text."""
-        return hashlib.sha256(self.text.encode()).hexdigest()
+        return _module(str(self), constants, ("dense", "cells", "control", *contacts, *last))
 
 
-def common_drivers() -> list[Driver]:
-    """Return the drivers that most scenes need: of written-out steps at the processor's width."""
+def _list(subject: str, width: int, *traits: str) -> str:
+    """A subject, its lanes and its traits as a text."""
+    return ", ".join((subject, f"{width} lane{'s' * (width != 1)}", *traits))
+
+
+def _module(title: str, constants: Mapping[str, int | bool], pieces: Sequence[str]) -> str:
+    """The text of a module of files of the driver, specialised by constants."""
+    head = "\n".join(f"{name} = {value!r}" for name, value in constants.items())
+    body = "\n\n\n".join(map(driver.text, ("clock", *pieces))) + "\n"
+    return "\n\n\n".join([f'"""{title[0].upper()}{title[1:]}."""', imports(body), head, body])
+
+
+def common_drivers() -> list[Driver | Recorder]:
+    """Return the drivers and records that most scenes need: of written-out steps at the processor's width."""
     width = native_width()
-    sync_error, section, trajectory = Record.SYNC_ERROR, Record.SECTION, Record.TRAJECTORY
-    records = ((), (sync_error,), (section,), (trajectory,), (sync_error, section))
     ways = ((False, False), (False, True), (True, True))  # contacts, series
-    return [
-        *(Driver(KernelKind.SWEEP, width, r, contacts=c, series=s) for c, s in ways for r in records),
-        *(Driver(KernelKind.MODES, width, contacts=c, series=s) for c, s in ways),
-    ]
+    sweeps = [Driver(KernelKind.SWEEP, width, contacts=c, series=s) for c, s in ways]
+    modes = [Driver(KernelKind.MODES, width, contacts=c, series=s) for c, s in ways]
+    return [*sweeps, *modes, *(d.recorder(name) for name in ("observe", "cut", "sample") for d in sweeps[:2])]
 
 
 WORDS = re.compile(r'"""(?:.|\n)*?"""|"[^"\n]*"|\'[^\'\n]*\'|#[^\n]*|(?<![\w.])([A-Za-z_]\w*)')

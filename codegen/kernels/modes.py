@@ -326,7 +326,6 @@ def _dimensions(variation: Variation, method: Integrator, shared: int, workspace
     plain = variation.orbit
     return ModeDimensions(
         nodes=plain.n,
-        components=len(plain.node.continuous),
         dimension=plain.dimension,
         parameters=len(plain.parameters),
         dense_rows=method.dense_rows,

@@ -36,7 +36,7 @@ BEGINS = {NodeSum: 0.0, NodeMean: 0.0, NodeMaximum: -LARGEST, NodeMinimum: LARGE
 """What the loop of a reduction begins with."""
 
 
-def rule_of(method: Integrator) -> tuple[float, ...]:
+def rule_of(method: Integrator) -> tuple[tuple[float, ...], ...]:
     """Return the rule of Gauss and Lobatto on a step from 0 to 1: each point with four numbers.
 
     These are the point, its weight, and its weights in the last two Legendre coefficients of the interpolant.  A rule
@@ -51,7 +51,7 @@ def rule_of(method: Integrator) -> tuple[float, ...]:
     weights = 1.0 / (count * (count - 1) * last(points) ** 2)
     top, following = weights * last(points) * (count - 1), weights * before(points) * (2 * count - 3)
     rows = zip((points + 1.0) / 2.0, weights, top, following, strict=True)
-    return tuple(float(number) for row in rows for number in row)
+    return tuple(tuple(map(float, row)) for row in rows)
 
 
 def with_rows(equations: Equations, value: sp.Expr) -> bool:

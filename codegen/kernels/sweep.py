@@ -16,11 +16,9 @@ from synchain.models.graphs.links import LINK_LIMIT
 from .. import driver
 from ..driver.dimensions import Dimensions, ModeDimensions
 from ..integrators import Integrator, integrator
-from ..program.expressions import Load, Number, call
-from ..program.lowering import lower
 from ..program.passes import Names, real
 from ..program.printers import LANES
-from ..program.statements import Function, Return, Role, Statement, let, operations
+from ..program.statements import Function, Role, operations
 from ..simd import lanes
 from ..steps.blocks import NodeBlocks, analyse
 from ..steps.contacts import push_functions
@@ -30,7 +28,7 @@ from ..steps.program import FILL_LIMIT, Program, program, workspace
 from ..steps.step import PAIR, SCALED, Step, function_name, node_function
 from ..steps.unrolled import Unrolled
 from ..taylor import write_looped, write_step
-from .driver import Driver, KernelKind, imports
+from .driver import RECORDERS, Driver, KernelKind, Recorder, imports
 from .observed import UNWATCHED, Watched, rule_of
 
 __all__ = [
@@ -71,7 +69,7 @@ class KernelSource:
     dimensions: Dimensions | ModeDimensions = field(repr=False)
     marks: tuple[int, ...] = field(repr=False)
     elimination: Program | None = field(default=None, repr=False, compare=False)
-    rule: tuple[float, ...] = field(default=(), repr=False)
+    rule: tuple[tuple[float, ...], ...] = field(default=(), repr=False)
 
     @property
     def text(self) -> str:
@@ -84,9 +82,30 @@ class KernelSource:
         return self.method.name
 
     @property
-    def records(self) -> tuple[Record, ...]:
-        """What the kernel records besides the final state."""
-        return self.driver.records
+    def functions(self) -> tuple[str, ...]:
+        """The functions of its module that the driver calls."""
+        driver, sizes = self.driver, self.dimensions
+        if isinstance(sizes, ModeDimensions):
+            return ("step", "carry", *(("pushes", "release") if driver.contacts else ()))
+        wanted = (
+            ("step_smooth", driver.switching), ("pushes", driver.contacts),
+            ("section", sizes.sections or sizes.stops), ("values", sizes.observed),
+        )  # fmt: skip
+        return ("step", *(name for name, called in wanted if called))
+
+    @property
+    def recorders(self) -> tuple[Recorder, ...]:
+        """The functions that record what the scene wants."""
+        sizes = self.dimensions
+        if isinstance(sizes, ModeDimensions):
+            return ()
+        wanted = sizes.stops, sizes.components, sizes.sections, sizes.observed, sizes.sampled
+        return tuple(self.driver.recorder(name) for name, asked in zip(RECORDERS, wanted, strict=True) if asked)
+
+    @property
+    def shared(self) -> tuple[Driver | Recorder, ...]:
+        """The modules besides its own."""
+        return (self.driver, *self.recorders)
 
     @property
     def width(self) -> int:
@@ -105,8 +124,8 @@ class KernelSource:
 
     @property
     def digest(self) -> str:
-        """Hexadecimal SHA-256 of the text and of its driver's."""
-        return hashlib.sha256(f"{self.text}{self.driver.text}".encode()).hexdigest()
+        """Hexadecimal SHA-256 of the text and of those of its driver and recorders."""
+        return hashlib.sha256("".join([self.text, *(m.text for m in self.shared)]).encode()).hexdigest()
 
 
 def emit(
@@ -167,15 +186,14 @@ def emit(
     plain, looped = tidy(equations), elimination is not None
     names = free_names(plain)
     functions, scratch, count = (_series if method.series else _stages)(plain, method, names, elimination)
-    seen = bool(watched.observed), bool(watched.sections), watched.stop is not None
-    traits = looped, method.smooth is not None, plain.sticks, method.series, *seen
-    chosen = Driver(KernelKind.SWEEP, width, ordered, *traits)
+    chosen = Driver(KernelKind.SWEEP, width, looped, method.smooth is not None, plain.sticks, method.series)
+    cut = _cut(equations, section) if section is not None and "section" in ordered else UNWATCHED
     events = [
         *push_functions(plain, names, looped),
-        *_section(equations, plain, section if "section" in ordered else None),
+        *cut.functions(equations, plain),
         *watched.functions(equations, plain),
     ]
-    functions += [driver.text("dense")] if chosen.cuts or watched else []
+    functions += [driver.text("dense")] if cut or watched else []
     functions += [driver.text("slope")] if watched.has_rates else []
     constants = {
         "WIDTH": width,
@@ -191,9 +209,12 @@ def emit(
         method,
         chosen,
         _dimensions(plain, method, scratch)._replace(
+            components=len(plain.compared) if "sync_error" in ordered else 0,
             observed=watched.count(equations),
-            sections=len(watched.sections) or int("section" in ordered),
-            kept=watched.kept,
+            sections=len(cut.sections or watched.sections),
+            kept=-1 if cut else watched.kept,
+            sampled=int("trajectory" in ordered),
+            stops=int(watched.stop is not None),
         ),
         (1,) * equations.n if multiplicity is None or "sync_error" not in ordered else tuple(multiplicity),
         elimination,
@@ -299,7 +320,7 @@ def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimension
     methods = [m for m in (method, method.smooth) if m is not None]
     return Dimensions(
         nodes=plain.n,
-        components=len(plain.compared),
+        components=0,
         dimension=plain.dimension,
         parameters=len(plain.parameters),
         dense_rows=max(m.dense_rows for m in methods),
@@ -310,6 +331,9 @@ def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimension
         observed=0,
         sections=0,
         kept=0,
+        looks=4 if plain.sticks else 8 if method.series else 2,  # Taylor steps are several times longer than others
+        sampled=0,
+        stops=0,
     )
 
 
@@ -396,30 +420,11 @@ def _step(name: str, writer: Step, looped: bool) -> Function:
     return Function(name, arguments, about, tuple(writer.statements), role=Role.ENTRY)
 
 
-def _section(equations: Equations, plain: Equations, section: sp.Expr | None) -> list[Function]:
-    """The section function at a fraction of the step; a kernel without sections has none."""
-    if section is None:
-        return []
+def _cut(equations: Equations, section: sp.Expr) -> Watched:
+    """The section on a state as a function of the state."""
     section = section.xreplace({s: real(s.name) for s in section.free_symbols})
     used = {s.name for s in section.free_symbols}
     unknown = sorted(used - set(equations.state) - set(equations.parameters) - {"t"})
     if unknown:
         raise ValueError(f"section function {section}: unknown symbol {unknown[0]!r}; use the state, parameters and t")
-    body: list[Statement] = []
-    for slot, (name, shown) in enumerate(zip(equations.state, plain.state, strict=True)):
-        if name in used:
-            body.append(let(shown, call("inside", "theta", slot, "y", "y_new", "dense", "dims")))
-    for slot, (name, shown) in enumerate(zip(equations.parameters, plain.parameters, strict=True)):
-        if name in used:
-            body.append(let(shown, Load("y", Number(equations.dimension + slot))))
-    value = lower(section.xreplace({real("t"): sp.Symbol("(t + theta*h)")}).xreplace(renamed(equations, plain)))
-    about = "The section function at the fraction theta of the step."
-    return [
-        Function(
-            "section",
-            ("theta", "t", "h", "y", "y_new", "dense", "dims"),
-            about,
-            (*body, Return((value,))),
-            role=Role.ENTRY,
-        )
-    ]
+    return Watched(sections=((section,),))

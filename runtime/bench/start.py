@@ -46,15 +46,15 @@ scene = Scene(topology=topology("chain", int(sys.argv[1])), axes={"omega": [1.0,
 scene.equations
 marks.append(time.perf_counter())
 from synchain.runtime.cells.kernels import kernel_source
-from synchain.codegen.kernels.compile import load, load_driver
+from synchain.codegen.kernels.compile import load, load_shared
 marks.append(time.perf_counter())
 source = kernel_source(scene, reduce=False)
 marks.append(time.perf_counter())
-driver = load_driver(source.driver)
+shared = [load_shared(part) for part in source.shared]
 marks.append(time.perf_counter())
 compiled = load(source)
 marks.append(time.perf_counter())
-cached = {driver.from_cache, compiled.from_cache}
+cached = {made.from_cache for made in (*shared, compiled)}
 print(json.dumps([[b - a for a, b in zip(marks, marks[1:])], cached.pop() if len(cached) == 1 else None]))
 """
 

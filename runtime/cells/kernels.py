@@ -82,9 +82,8 @@ def warn_of_chords(source: KernelSource) -> None:
     """Warn if states between steps are recorded by an integrator that has only straight lines
     there.
     """
-    between = [record for record in ("trajectory", "section") if record in source.records]
-    between += ["sections"] if source.driver.sections else []
-    between += ["observables"] if source.driver.observes else []
+    words = {"sample": "trajectory", "cut": "sections", "tally": "observables"}
+    between = [words[r.entry] for r in reversed(source.recorders) if r.entry in words]
     if between and source.method.dense_order < 2:
         warnings.warn(
             f"{source.integrator} draws straight lines between its steps, so errors of {' and '.join(between)} are not bounded "

@@ -16,7 +16,7 @@ def configure(parser: ArgumentParser) -> None:
         "action",
         choices=("info", "clear", "warm"),
         help="info: folder, number of kernels and size; clear: delete the kernels and drivers; they are compiled again "
-        "when needed; warm: compile the drivers that most scenes share",
+        "when needed; warm: compile the drivers and recorders that most scenes share",
     )
 
 
@@ -45,10 +45,10 @@ def execute(arguments: Namespace) -> int:
 def _warm() -> int:
     """Compile the common drivers that the folder does not hold yet, with a line for each."""
     from synchain.codegen.kernels import driver
-    from synchain.codegen.kernels.compile import load_driver
+    from synchain.codegen.kernels.compile import load_shared
 
     for common in driver.common_drivers():
-        made = load_driver(common)
+        made = load_shared(common)
         if made.problem:
             raise Failed(f"drivers are not kept on disk: {made.problem}")
         print(f"{'was there' if made.from_cache else 'compiled':9}  {common}", flush=True)

@@ -61,15 +61,15 @@ from synchain.codegen.simd import address, broadcast
 
 @njit(error_model="numpy", nogil=True, cache=True)
 def drive(
-    step, step_smooth, section, values, pushes, dims, multiplicity, rule, network, first, last, start, numbers, spans,
-    control, end, sums, counts, points, samples,
+    functions, dims, multiplicity, rule, network, first, last, start, numbers, spans, control, end, sums, counts, points,
+    samples,
 ):
     old, new, zero = np.zeros(dims.dimension), np.zeros(dims.dimension), broadcast(0.0, 1)
     y, y_new = address(old, 0), address(new, 0)
     for i in range(first, last):
         for c in range(dims.dimension):
             old[c] = start[i, c]
-        step(zero, zero, y, y, y_new, y_new, 0.0, 0.0)
+        functions.step(zero, zero, y, y, y_new, y_new, 0.0, 0.0)
         for c in range(dims.dimension):
             end[i, c] = new[c]
 """
@@ -378,7 +378,7 @@ def test_kernels_that_nobody_holds_are_freed(folder):
 
 def told(lines: list[str]) -> list[str]:
     """The first words of the lines of a process that fills a cache."""
-    assert all(line.endswith("driver of sweeps, 1 lane (final state)") for line in lines)
+    assert all(line.endswith("driver of sweeps, 1 lane") for line in lines)
     return [line.partition("  ")[0] for line in lines]
 
 
@@ -417,12 +417,12 @@ def test_a_cache_that_cannot_be_filled_is_an_error(tmp_path, monkeypatch, capsys
 
 def test_the_common_drivers_are_those_of_common_scenes():
     common = driver.common_drivers()
-    assert len({made.text for made in common}) == len(common) == 18
+    assert len({made.text for made in common}) == len(common) == 12
     width, speed = lanes.native_width(), real("v_1")[0]
     for records in ((), ("sync_error",), ("section",), ("trajectory",), ("sync_error", "section")):
         for method in ("rodas5p", "taylor"):
             equations = friction_chain(3) if method == "rodas5p" else harmonic_chain(3)
-            assert emit(equations, method, records, speed, width).driver in common
+            assert {*emit(equations, method, records, speed, width).shared} <= {*common}
     assert emit_modes(network_variation(friction_chain(2))).driver in common
     assert emit_modes(network_variation(harmonic_chain(2)), "taylor").driver in common
 
@@ -432,8 +432,8 @@ def test_the_common_drivers_compile(folder, capsys):
     for word in ("compiled", "was there"):
         loading.forget()
         assert main(["cache", "warm"]) == 0
-        assert [line.startswith(word) for line in capsys.readouterr().out.splitlines()] == [True] * 18
-    assert cache.describe()["drivers"] == 18
+        assert [line.startswith(word) for line in capsys.readouterr().out.splitlines()] == [True] * 12
+    assert cache.describe()["drivers"] == 12
 
 
 # -- damage --------------------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from samples import CASES, TABLE, friction_chain, real
 
 from synchain.codegen import simd
 from synchain.codegen.integrators import integrator
-from synchain.codegen.kernels.driver import Driver, KernelKind, imports
+from synchain.codegen.kernels.driver import RECORDERS, Driver, KernelKind, Recorder, imports
 from synchain.codegen.kernels.modes import emit_modes
 from synchain.codegen.kernels.sweep import emit
 from synchain.codegen.program.lowering import UnprintableError
@@ -23,7 +23,6 @@ from synchain.codegen.steps.names import tidy
 from synchain.codegen.taylor import write_looped, write_step
 from synchain.models import chain
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.record import Record
 from synchain.models.dynamics.variational import mode
 from synchain.models.mechanics.components import Node
 from synchain.models.scenes.scene import Scene
@@ -39,14 +38,13 @@ def test_golden_kernels(golden):
 
 
 DRIVERS = {
-    "sync_error": Driver(KernelKind.SWEEP, 8, (Record.SYNC_ERROR,)),
-    "section": Driver(KernelKind.SWEEP, 8, (Record.SECTION,)),
     "contacts": Driver(KernelKind.SWEEP, 8, contacts=True),
     "looped": Driver(KernelKind.SWEEP, 8, looped=True),
     "switching": Driver(KernelKind.SWEEP, 8, switching=True),
+    "series": Driver(KernelKind.SWEEP, 8, series=True),
     "modes": Driver(KernelKind.MODES, 8, contacts=True),
     "modes_series": Driver(KernelKind.MODES, 8, contacts=True, series=True),
-}
+} | {name: Recorder(name, 8, False) for name in RECORDERS}
 
 
 @pytest.mark.parametrize("name", DRIVERS)
@@ -80,7 +78,8 @@ def test_scenes_of_the_same_kind_share_a_driver():
         emit(friction_chain(2), "rodas5p", ("section",), V_1, width=4, unroll=0).driver,
         emit(friction_chain(1), "switching", ("section",), V_1, width=4).driver,
     }
-    assert len({driver.text for driver in ways}) == 5
+    assert few.recorders == other.recorders == (Recorder("cut", 4, False),)
+    assert len({driver.text for driver in ways}) == 4
 
 
 def written() -> str:
@@ -120,10 +119,11 @@ def test_the_header_says_what_runs():
 
 def test_records_that_are_not_wanted_cost_nothing():
     source = emit(friction_chain(1), "cash_karp", (), width=4)
-    for flag in ("SYNC_ERROR", "SECTION", "TRAJECTORY"):
-        assert f"\n{flag} = False\n" in source.driver.text
-        wanted = emit(friction_chain(1), "cash_karp", (flag.lower(),), V_1, width=4)
-        assert f"\n{flag} = True\n" in wanted.driver.text
+    assert source.recorders == ()
+    for record, name in (("sync_error", "observe"), ("section", "cut"), ("trajectory", "sample")):
+        wanted = emit(friction_chain(1), "cash_karp", (record,), V_1, width=4)
+        assert wanted.recorders == (Recorder(name, 4, False),)
+        assert wanted.driver == source.driver
     assert "\nDENSE = False\n" in source.text
     assert "def section(" not in source.text
     assert "def section(" in emit(friction_chain(1), "cash_karp", ("section",), V_1, width=4).text

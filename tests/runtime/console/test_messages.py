@@ -46,7 +46,7 @@ def test_what_rounds_to_zero_has_no_sign():
 def test_compiling_is_told_and_loading_is_not(tmp_path, monkeypatch, caplog):
     monkeypatch.setenv("SYNCHAIN_CACHE", str(tmp_path / "kernels"))
     said = (
-        "compiling the driver of sweeps, 1 lane (final state), ",
+        "compiling the driver of sweeps, 1 lane, ",
         "compiling a kernel for 1 oscillator (cash_karp), ",
     )
     with caplog.at_level(logging.INFO, "synchain"):

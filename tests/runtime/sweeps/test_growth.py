@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import synchain as sc
-from synchain.codegen.driver import recording
+from synchain.codegen.driver import clock as clocks
 from synchain.codegen.driver.cells import unbounded
 from synchain.runtime.support.status import Status
 
@@ -60,16 +60,16 @@ def test_linear_growth_has_its_exponent() -> None:
 
 def clock(**values: float) -> np.ndarray:
     """The clock of one lane."""
-    found = np.zeros(recording.CLOCK)
+    found = np.zeros(clocks.CLOCK)
     for name, value in values.items():
-        found[getattr(recording, name)] = value
+        found[getattr(clocks, name)] = value
     return found
 
 
 def control(steps: float) -> np.ndarray:
     """A budget."""
-    found = np.zeros(recording.FURTHER)
-    found[recording.MAX_STEPS] = steps
+    found = np.zeros(clocks.FURTHER)
+    found[clocks.MAX_STEPS] = steps
     return found
 
 
