@@ -163,6 +163,7 @@ class _Writer:
         self.n, self.sums, self.state = plain.n, sums, frozenset(equations.state)
         self.own = self._places(equations.components, plain.components, equations.state, plain)
         self.own |= self._parameters(equations.varied, plain.varied, equations)
+        self.own = {name: place for name, place in self.own.items() if name not in self.state}  # the network's own name
         self.whole = _numbered(equations.state, plain.state, 0)
         self.numbers = _numbered(equations.parameters, plain.parameters, plain.dimension)
         self.components, self.varied = equations.components, equations.varied
