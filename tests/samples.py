@@ -349,7 +349,7 @@ class Interpreted:
 
     @classmethod
     def of(cls, source: KernelSource, functions: dict[str, Any]) -> Interpreted:
-        return cls(source, plain(f"{driver.text('dense')}\n\n\n{source.text}", functions))
+        return cls(source, plain(f"{driver.text('driver.dense')}\n\n\n{source.text}", functions))
 
     def inside(self, theta: Any, c: int, step: Step) -> Any:
         """State variable c at the fraction theta of a step."""

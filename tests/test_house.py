@@ -45,6 +45,7 @@ ARROWS = {
     "codegen.simd": "",
     "codegen.integrators": "",
     "codegen.driver": "simd",
+    "codegen.recorders": "driver simd",
     "codegen.program": "",
     "codegen.steps": "program integrators simd models",
     "codegen.taylor": "steps program integrators simd models",

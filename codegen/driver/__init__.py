@@ -15,12 +15,13 @@ MARK = "# --- kernel text below ---\n"
 
 @functools.cache
 def text(name: str) -> str:
-    """Return the part of a file of this folder that a generated module contains.
+    """Return the part of a file that a generated module contains.
 
     Parameters
     ----------
     name
-        Name of the file without its suffix.
+        Room and name of the file, such as "driver.dense".
     """
-    file = files(__name__).joinpath(f"{name}.py").read_text(encoding="utf-8")
-    return file.split(MARK, 1)[1].strip("\n")
+    room, _, file = name.partition(".")
+    whole = files(__name__.rpartition(".")[0]).joinpath(room, f"{file}.py").read_text(encoding="utf-8")
+    return whole.split(MARK, 1)[1].strip("\n")

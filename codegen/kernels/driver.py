@@ -21,11 +21,11 @@ class KernelKind(StrEnum):
 
 
 RECORDERS = {
-    "halt": ("dense", "crossings", "halting"),
-    "observe": ("dense", "spread", "comparing"),
-    "cut": ("dense", "crossings", "cutting"),
-    "tally": ("observing",),
-    "sample": ("dense", "sampling"),
+    "halt": ("driver.dense", "recorders.crossings", "recorders.halting"),
+    "observe": ("driver.dense", "driver.spread", "recorders.comparing"),
+    "cut": ("driver.dense", "recorders.crossings", "recorders.cutting"),
+    "tally": ("recorders.observing",),
+    "sample": ("driver.dense", "recorders.sampling"),
 }
 """The functions that record, in the order in which a driver of sweeps takes them, and the parts of the text of each."""
 
@@ -98,11 +98,10 @@ class Driver:
             "LOOPED": self.looped,
             "SERIES": self.series,
         }
-        contacts, last = (
-            ["contacts"] if self.contacts else [],
-            ["propagators", "modes"] if modes else ["spread", "sweep"],
-        )
-        return _module(str(self), constants, ("dense", "cells", "control", *contacts, *last))
+        contacts = ["contacts"] if self.contacts else []
+        last = ["propagators", "modes"] if modes else ["spread", "sweep"]
+        pieces = [f"driver.{name}" for name in ("dense", "cells", "control", *contacts, *last)]
+        return _module(str(self), constants, pieces)
 
 
 def _list(subject: str, width: int, *traits: str) -> str:
@@ -111,9 +110,9 @@ def _list(subject: str, width: int, *traits: str) -> str:
 
 
 def _module(title: str, constants: Mapping[str, int | bool], pieces: Sequence[str]) -> str:
-    """The text of a module of files of the driver, specialised by constants."""
+    """The text of a module of some files, specialised by constants."""
     head = "\n".join(f"{name} = {value!r}" for name, value in constants.items())
-    body = "\n\n\n".join(map(driver.text, ("clock", *pieces))) + "\n"
+    body = "\n\n\n".join(map(driver.text, ("driver.clock", *pieces))) + "\n"
     return "\n\n\n".join([f'"""{title[0].upper()}{title[1:]}."""', imports(body), head, body])
 
 

@@ -193,8 +193,8 @@ def emit(
         *cut.functions(equations, plain),
         *watched.functions(equations, plain),
     ]
-    functions += [driver.text("dense")] if cut or watched else []
-    functions += [driver.text("slope")] if watched.has_rates else []
+    functions += [driver.text("driver.dense")] if cut or watched else []
+    functions += [driver.text("driver.slope")] if watched.has_rates else []
     constants = {
         "WIDTH": width,
         "DENSE": bool(ordered or watched) or (plain.sticks and not method.series),
@@ -311,7 +311,7 @@ def _stages(
     functions += dict.fromkeys(f for writer in steps.values() for f in writer.functions)
     stepping = [_step(name, writer, looped) for name, writer in steps.items()]
     made = [*map(LANES.function, functions), SCALED, *([PAIR] if looped and len(method.e) > 1 else [])]
-    made += [driver.text("sparse")] if looped and steps["step"].solves else []
+    made += [driver.text("driver.sparse")] if looped and steps["step"].solves else []
     scratch = workspace(steps["step"], elimination) if elimination is not None else 0
     return [*made, *map(LANES.function, stepping)], scratch, sum(operations(f.body) for f in stepping)
 

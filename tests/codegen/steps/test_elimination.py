@@ -194,7 +194,7 @@ def test_the_program_solves_the_system(links, weighted):
     for (r, c), e in eq.jacobian().items():
         matrix[r, c] = float(e.subs({"sigma": 0.0}).xreplace({sp.Symbol("sigma", real=True): sp.Rational(2, 5)}))
     shifted = 3.0 * np.eye(2 * n) - matrix
-    space = plain(driver.text("sparse"), {**FLOATS, "NODES": n, "DIMENSION": 2 * n, "WIDTH": 1})
+    space = plain(driver.text("driver.sparse"), {**FLOATS, "NODES": n, "DIMENSION": 2 * n, "WIDTH": 1})
     dense = [0.0] * (made.entries + 3 * 2 * n)
     dense[: 2 * n] = np.diag(shifted).tolist()
     place(dense, shifted, arrays, n)

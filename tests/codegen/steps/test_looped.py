@@ -70,7 +70,7 @@ def solved(equations, made: Program, matrix: np.ndarray, right: np.ndarray) -> n
     """The solution by the generated program, run by Python itself."""
     size = equations.dimension
     arrays = dict(zip(NAMES, made.arrays, strict=True))
-    space = plain(driver.text("sparse"), {**FLOATS, "DIMENSION": size, "WIDTH": 1})
+    space = plain(driver.text("driver.sparse"), {**FLOATS, "DIMENSION": size, "WIDTH": 1})
     rows = np.repeat(arrays["order"], np.diff(arrays["row_start"]))
     apart = 0 if made.exact else made.entries
     x = made.entries + apart

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from numba import njit
 
+from ..driver.clock import SYNC, SYNC_PEAK, SYNC_SUM
+from ..driver.dense import inside
+from ..driver.names import SERIES, WIDTH
+from ..driver.spread import spread
 from ..simd.lanes import broadcast, load, maximum, select, store
-from .clock import SYNC, SYNC_PEAK, SYNC_SUM
-from .dense import inside
-from .names import SERIES, WIDTH
-from .spread import spread
 
 
 # --- kernel text below ---

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from numba import njit
 
+from ..driver.names import WIDTH
 from ..simd.lanes import absolute, any_lane, broadcast, load, select
-from .names import WIDTH
 
 
 # --- kernel text below ---

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ..driver.clock import ATOL, OBSERVED, RTOL
+from ..driver.names import WIDTH
 from ..simd.addresses import address
 from ..simd.lanes import broadcast, load, store
-from .clock import ATOL, OBSERVED, RTOL
-from .names import WIDTH
 
 # --- kernel text below ---
 # Columns of `sums` behind the time that was observed: six for each value.

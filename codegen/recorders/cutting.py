@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ..driver.clock import DIRECTION, FURTHER, N_POINTS
+from ..driver.dense import inside
+from ..driver.names import WIDTH
 from ..simd.lanes import any_lane, broadcast, lane_bits, load, store
-from .clock import DIRECTION, FURTHER, N_POINTS
 from .crossings import between, crosses, locate, surface
-from .dense import inside
-from .names import WIDTH
 
 
 # --- kernel text below ---

@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numba import njit
 
+from ..driver.clock import BASE, END, NEXT_SAMPLE
+from ..driver.dense import inside
+from ..driver.names import WIDTH
 from ..simd.lanes import load, store
-from .clock import BASE, END, NEXT_SAMPLE
-from .dense import inside
-from .names import WIDTH
 
 
 # --- kernel text below ---

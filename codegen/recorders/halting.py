@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from numba import njit
 
+from ..driver.clock import BASE, HALTED, MARK
+from ..driver.dense import inside
+from ..driver.names import SERIES, WIDTH
 from ..simd.lanes import any_lane, broadcast, load, select, store
-from .clock import BASE, HALTED, MARK
 from .crossings import between, crosses, locate, surface
-from .dense import inside
-from .names import SERIES, WIDTH
 
 
 # --- kernel text below ---
