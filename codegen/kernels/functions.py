@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numba import types
 from numba.core import cgutils
+from numba.core.datamodel import default_manager
 from numba.core.imputils import impl_ret_borrowed, lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import NativeValue, models, register_model, unbox
@@ -32,11 +33,13 @@ class Functions:
     def __init__(self, kind: FunctionsType, functions: Sequence[Any]) -> None:
         self._numba_type_ = kind
         self.functions = functions
-        self.table = np.zeros((len(functions), 3), np.uintp)  # Numba's addresses of a function: the last is called
-        for row, function in zip(self.table, functions, strict=True):
+        addresses = default_manager.lookup(next(iter(kind.kinds.values())))._fields  # Numba has several of a function
+        self.table = np.zeros((len(functions), len(addresses)), np.uintp)
+        called = self.table[:, addresses.index("jit_addr")]
+        for k, function in enumerate(functions):
             if function is not None:
                 (found,) = function.overloads.values()
-                row[2] = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
+                called[k] = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
         self.address = self.table.ctypes.data
 
 
