@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ..inputs.checks import check_text, short_repr
-from ..inputs.expressions import EXPONENT, FUNCTIONS, Expressions
+from ..inputs.expressions import FUNCTIONS, Expressions
 from ..inputs.reader import Algebra, Expression, NoMeaning, parse
 from .observable import Observable, Window, nodes, rate, real
 
@@ -20,13 +20,12 @@ LENGTH = 4000
 """Most characters."""
 
 KNOWN: Mapping[str, Callable[..., sp.Expr]] = {
-    **{name: FUNCTIONS[name] for name in ("abs", "atan", "cos", "exp", "floor", "log", "max", "min", "sign", "sin",
-                                          "sqrt", "tanh")},
+    **FUNCTIONS,
     "rate": rate,
     **{f"nodes.{name}": getattr(nodes, name) for name in ("sum", "mean", "maximum", "minimum", "std")},
     "nodes[3]": nodes[3],
-}  # fmt: skip
-"""The functions of observables, by their names in text: of numbers those that lanes have."""
+}
+"""The functions of observables, by their names in text."""
 
 SPELLINGS = {"Abs": "abs", "Max": "max", "Min": "min"}
 """How SymPy spells some of them."""
@@ -119,11 +118,6 @@ class _OfNodes(Expressions):
 
     def name(self, name: str) -> sp.Basic:
         return sp.pi if name == "pi" else sp.Symbol(name, real=True)
-
-    def power(self, base: sp.Basic, exponent: sp.Basic) -> sp.Basic:
-        if not (exponent.is_Rational and exponent.q <= 2):
-            raise NoMeaning(f"found the exponent {short_repr(exponent)}; expected halves up to {EXPONENT}")
-        return Expressions.power(self, base, exponent)
 
     def compare(self, sign: str, a: sp.Basic, b: sp.Basic) -> sp.Basic:
         raise NoMeaning(f"found the condition {a} {sign} {b}; expected a value, such as the difference {a} - ({b})")

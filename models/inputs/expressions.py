@@ -135,6 +135,8 @@ class Expressions(Algebra[sp.Basic]):
         lower, upper = self.value(base), self.value(exponent)
         if upper.is_number and not abs(upper) <= EXPONENT:
             raise NoMeaning(f"found the exponent {short_repr(upper)}; expected at most {EXPONENT}")
+        if lower.is_number and not lower.is_positive and not upper.is_number:
+            raise NoMeaning(f"found the power {short_repr(lower**upper)} of a number; expected a positive one")
         return lower**upper
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[sp.Basic]]:

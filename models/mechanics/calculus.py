@@ -69,7 +69,24 @@ def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
             inner = kink.args[0]
             outer = smooth.diff(dummy).xreplace(shown)
             total += outer * sp.sign(inner) * derivative(inner, symbol)
-    return _settled(total)
+    return _joined(_settled(total))
+
+
+def _joined(e: sp.Expr) -> sp.Expr:
+    """An expression whose products have one power of each base: w sign(w) |w|**p/|w| is |w|**p, which is a number at w = 0."""
+    powers = [p for p in e.atoms(sp.Pow) if p.base.free_symbols and not p.exp.is_Integer]
+    if not any(p.exp.free_symbols or p.base.has(sp.Abs, sp.Max, sp.Min) for p in powers):
+        return e
+
+    def joined(product: sp.Mul) -> sp.Expr:
+        factors = set(product.args)
+        for sign in sorted(factors & product.atoms(sp.sign), key=sp.default_sort_key):
+            inner = next((w for w in (sign.args[0], -sign.args[0]) if w in factors), None)
+            if inner is not None:
+                product = product / sign / inner * sp.Abs(inner) * (1 if inner == sign.args[0] else -1)
+        return sp.powsimp(product, combine="exp")
+
+    return e.replace(lambda part: isinstance(part, sp.Mul), joined)
 
 
 def _settled(e: sp.Expr) -> sp.Expr:

@@ -45,3 +45,18 @@ def test_all_functions_of_models_run(text: str) -> None:
 def test_no_function_is_left_out() -> None:
     called = set(re.findall(r"([a-z0-9]+)\(", f"{SMOOTH} {KINKED} {ROUGH}"))
     assert called == set(FUNCTIONS)
+
+
+@pytest.mark.parametrize("text", ["v*abs(v)**0.5", "v*abs(v)**q", "sign(v)*abs(v)**q"])
+def test_powers_of_sizes_are_numbers_at_rest(text: str) -> None:
+    """A node at rest: |v|**q, its derivative, and what is divided by |v| there."""
+    q = {"q": 1.5} if "q" in text else {}
+    node = sc.Lagrangian("v**2/2", "x**2/2", Q={"x": f"-0.6*{text}"}, coordinates=["x"], parameters=q)
+    settings = {"transient": 0.0, "window": 2.0, "time_unit": "time", "rtol": 1e-9, "integrator": "rodas5p"}
+    found = sc.run(sc.Scene(node, initial={"x": 0.3, "v": 0.0}, **settings), show_progress=False)
+
+    def rates(t: float, y: np.ndarray) -> list[float]:
+        return [y[1], -y[0] - 0.6 * eval(text, {**OTHERWISE, "v": y[1], **q})]
+
+    exact = solve_ivp(rates, (0.0, 2.0), [0.3, 0.0], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    np.testing.assert_allclose(found.end.values.ravel(), exact, rtol=0.0, atol=1e-8)
