@@ -299,9 +299,10 @@ def _mode_stage(parts: Parts, method: Integrator, i: int, size: int) -> list[Sta
         body += parts.loads(i)
         body += [let(f"u_d{c}", stage_state(method.a[i], method.a[i - 1], f"d{c}")) for c in range(size)]
     body += parts.loads(i, bent=True)
+    entries = parts.at_stage(i)
     for r in range(size):
         terms: list[sp.Expr] = []
-        for (row, c), e in parts.at_stage(i).items():
+        for (row, c), e in entries.items():
             if row == r:
                 terms.append(e * sp.Symbol(f"u_d{c}" if i > 0 else f"d{c}"))
                 bends = [sp.Symbol(f"b{i + 1}_{str(a)[1:]}") * s for a, s in parts.rows[row, c] if _moves(a)]
