@@ -31,8 +31,6 @@ class Dimensions(NamedTuple):
     """Sections of which points are taken."""
     kept: int
     """Most values that a point of a section on a function keeps; -1 if points are whole states."""
-    looks: int
-    """Pieces of a step between which functions of the state are looked at."""
     sampled: int
     """1 if the trajectory is recorded, else 0."""
     stops: int

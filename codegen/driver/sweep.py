@@ -240,7 +240,7 @@ def drive(
 
     functions: those of a scene and those that record.  dims: the sizes of its arrays; what is 0 there is not recorded,
     and its functions are not called.
-    multiplicity (nodes): how many oscillators each node stands for.  rule (points, 4): of the quadrature of a step
+    multiplicity (nodes): how many oscillators each node stands for.  rule (points, 4 + points): of the panels of a step
     (codegen/kernels/observed.py).  network: of one that is stepped through in loops, the arrays of its
     program (codegen/steps/program.py) and the weights of its links.
     start (cells, dimension), numbers (cells, parameters), spans (cells, 4): start and end of the window, the period after
@@ -254,7 +254,8 @@ def drive(
     group = CLOCK + 2 * size + dims.parameters + len(REPEATING)
     groups = 3 if SWITCHING else 1
     scratch = 9 * dims.nodes if CONTACTS else 0
-    crossed, watched = dims.sections * (1 + max(0, dims.kept)) + dims.stops, len(rule) * dims.observed
+    watched = len(rule) * dims.observed
+    crossed = (len(rule) + 2) * (dims.sections * (1 + max(0, dims.kept)) + dims.stops)
     block = aligned((2 * size + groups * (group + rows) + dims.workspace + scratch + watched + crossed) * WIDTH)
     y_new, middle, out = address(block, 0), address(block, size * WIDTH), address(block, 2 * size * WIDTH)
     first_group = (2 * size + scratch) * WIDTH
@@ -308,13 +309,13 @@ def drive(
                 break
         t, h, accept, rate = attempt(mode, clock, y, dense, y_new, middle, out, steering, dims, functions, network)
         if dims.stops:
-            h = functions.halt(accept, t, h, clock, y, y_new, dense, found, dims, functions.section)
+            h = functions.halt(accept, t, h, clock, y, y_new, dense, found, steering, rule, dims, functions.section)
         counted, now = accept & (t >= load(clock, START, WIDTH)), load(clock, BASE, WIDTH) + t
         if dims.components > 0:
             functions.observe(counted, accept, h, clock, y, y_new, dense, middle, members, dims)
         if dims.sections > 0 and any_lane(counted):
             functions.cut(
-                counted, now, h, y, y_new, dense, found, cell, counts, points, steering, dims, functions.section
+                counted, now, h, y, y_new, dense, found, cell, counts, points, steering, rule, dims, functions.section
             )
         if dims.observed > 0 and any_lane(counted):
             functions.tally(

@@ -69,15 +69,15 @@ def _recorded(width: int) -> dict[str, Any]:
     """The types of the functions that record, and of those of a scene that these call, by name."""
     lane, mask, sizes = Lane(width), Mask(width), _sizes(Dimensions)
     values = types.void(lane, lane, lane, *[ADDRESS] * 4, types.UniTuple(types.int64, 2))
-    looks, cells = types.FunctionType(values), types.int64[::1]
+    called, cells = types.FunctionType(values), types.int64[::1]
     step = (lane, lane, *[ADDRESS] * 3)
     return {
         "section": values,
         "values": values,
-        "halt": lane(mask, lane, lane, *[ADDRESS] * 5, sizes, looks),
+        "halt": lane(mask, lane, lane, *[ADDRESS] * 6, _matrix, sizes, called),
         "observe": types.void(mask, mask, lane, *[ADDRESS] * 6, sizes),
-        "cut": types.void(mask, *step, ADDRESS, cells, _counts, _cube, ADDRESS, sizes, looks),
-        "tally": types.void(types.int64, *step, ADDRESS, cells, _matrix, ADDRESS, _matrix, sizes, looks),
+        "cut": types.void(mask, *step, ADDRESS, cells, _counts, _cube, ADDRESS, _matrix, sizes, called),
+        "tally": types.void(types.int64, *step, ADDRESS, cells, _matrix, ADDRESS, _matrix, sizes, called),
         "sample": types.void(types.int64, lane, lane, *[ADDRESS] * 4, cells, _input, _cube, sizes),
     }
 
@@ -321,7 +321,7 @@ def _kernel(source: KernelSource) -> Kernel:
             functions,
             source.dimensions,
             np.array(source.marks, np.float64),
-            np.reshape(source.rule, (-1, 4)),
+            np.array(source.rule),
             network,
         )
     return Kernel(source, compiled, driver, own)

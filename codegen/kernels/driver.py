@@ -21,10 +21,10 @@ class KernelKind(StrEnum):
 
 
 RECORDERS = {
-    "halt": ("driver.dense", "recorders.crossings", "recorders.halting"),
+    "halt": ("driver.dense", "recorders.panels", "recorders.crossings", "recorders.halting"),
     "observe": ("driver.dense", "driver.spread", "recorders.comparing"),
-    "cut": ("driver.dense", "recorders.crossings", "recorders.cutting"),
-    "tally": ("recorders.observing",),
+    "cut": ("driver.dense", "recorders.panels", "recorders.crossings", "recorders.cutting"),
+    "tally": ("recorders.panels", "recorders.observing"),
     "sample": ("driver.dense", "recorders.sampling"),
 }
 """The functions that record, in the order in which a driver of sweeps takes them, and the parts of the text of each."""

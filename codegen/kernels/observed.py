@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import sympy as sp
+from numpy.polynomial.legendre import Legendre, legvander
+from scipy.special import comb
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.observable import (
@@ -37,21 +40,31 @@ BEGINS = {NodeSum: 0.0, NodeMean: 0.0, NodeMaximum: -LARGEST, NodeMinimum: LARGE
 
 
 def rule_of(method: Integrator) -> tuple[tuple[float, ...], ...]:
-    """Return the rule of Gauss and Lobatto on a step from 0 to 1: each point with four numbers.
+    """Return the rule of Gauss and Lobatto on a panel from 0 to 1: a row for each point.
 
-    These are the point, its weight, and its weights in the last two Legendre coefficients of the interpolant.  A rule
-    of m points is exact for polynomials of degree 2 m - 3 (Abramowitz & Stegun, *Handbook of Mathematical Functions*,
-    1964, 25.4.32).  Steps of high order are long, and the rule has more points for them.
+    These are the point, its weight, its weights in the upper half of the Legendre coefficients of the interpolant, the last
+    one first, and a row of the matrix that turns values at all points into the Bernstein coefficients of the interpolant
+    (Farouki, *Computer Aided Geometric Design* 29, 379 (2012)).  A rule of m points is exact for polynomials of degree 2 m - 3 (Abramowitz &
+    Stegun, *Handbook of Mathematical Functions*, 1964, 25.4.32).  Steps of high order are long, and the rule has more
+    points for them.
     """
     order = max(m.order for m in (method, method.smooth) if m is not None)
-    count = 11 if method.series else max(5, order - 1)
-    last, before = (np.polynomial.legendre.Legendre.basis(k) for k in (count - 1, count - 2))
+    return _lobatto(11 if method.series else max(5, order - 1))
+
+
+@cache
+def _lobatto(count: int) -> tuple[tuple[float, ...], ...]:
+    """The rule of some number of points."""
+    degrees = np.arange(count)
+    last = Legendre.basis(count - 1)
     inner = np.sort(last.deriv().roots().real)
-    points = np.concatenate([[-1.0], (inner - inner[::-1]) / 2.0, [1.0]])
-    weights = 1.0 / (count * (count - 1) * last(points) ** 2)
-    top, following = weights * last(points) * (count - 1), weights * before(points) * (2 * count - 3)
-    rows = zip((points + 1.0) / 2.0, weights, top, following, strict=True)
-    return tuple(tuple(map(float, row)) for row in rows)
+    ends = np.concatenate([[-1.0], (inner - inner[::-1]) / 2.0, [1.0]])
+    weights = 1.0 / (count * (count - 1) * last(ends) ** 2)
+    legendre = weights[:, None] * legvander(ends, count - 1) * np.append(2 * degrees[:-1] + 1, count - 1)
+    points = (ends + 1.0) / 2.0
+    bernstein = comb(count - 1, degrees) * points[:, None] ** degrees * (1.0 - points[:, None]) ** degrees[::-1]
+    rule = np.column_stack([points, weights, legendre[:, : count // 2 : -1], np.linalg.inv(bernstein)])
+    return tuple(map(tuple, rule.tolist()))
 
 
 def with_rows(equations: Equations, value: sp.Expr) -> bool:

@@ -58,7 +58,7 @@ class KernelSource:
 
     `marks` says of each node how many oscillators it stands for, or of each component of a mode which contact's velocity
     it is (-1: none).  `elimination` holds the integer arrays that a kernel of loops runs through; None if its steps are
-    written out.  `rule` has the points and weights by which observed values are integrated over a step.
+    written out.  `rule` has the points at which functions of the state are looked at inside a step, and the weights of its integrals.
     """
 
     head: str = field(repr=False)
@@ -69,7 +69,7 @@ class KernelSource:
     dimensions: Dimensions | ModeDimensions = field(repr=False)
     marks: tuple[int, ...] = field(repr=False)
     elimination: Program | None = field(default=None, repr=False, compare=False)
-    rule: tuple[tuple[float, ...], ...] = field(default=(), repr=False)
+    rule: tuple[tuple[float, ...], ...] = field(default=((),), repr=False)
 
     @property
     def text(self) -> str:
@@ -218,7 +218,7 @@ def emit(
         ),
         (1,) * equations.n if multiplicity is None or "sync_error" not in ordered else tuple(multiplicity),
         elimination,
-        rule_of(method) if watched.observed else (),
+        rule_of(method),
     )
 
 
@@ -331,7 +331,6 @@ def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimension
         observed=0,
         sections=0,
         kept=0,
-        looks=4 if plain.sticks else 8 if method.series else 2,  # Taylor steps are several times longer than others
         sampled=0,
         stops=0,
     )

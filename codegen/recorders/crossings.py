@@ -1,19 +1,112 @@
-"""The zeros of functions of the state inside a step."""
+"""The zeros of functions of the state inside a step.
+
+A step is one panel at first.  All functions are computed at the points of the rule of a panel, and the polynomial through
+them is written in the Bernstein basis, whose coefficients bound it.  A panel is halved until each function passes zero in
+it at most once, as far as its last Legendre coefficients tell what the polynomial misses.
+"""
 
 from __future__ import annotations
 
 from numba import njit
 
+from ..driver.clock import ATOL, RTOL
 from ..driver.names import WIDTH
-from ..simd.lanes import absolute, any_lane, broadcast, load, select
-
+from ..simd.addresses import address
+from ..simd.lanes import absolute, any_lane, broadcast, load, maximum, select, store
+from .panels import DEEPEST, POINT, TOP
 
 # --- kernel text below ---
+# What a polynomial misses is taken to be less than MARGIN times the sum of the upper half of its Legendre coefficients.
+MARGIN = 32.0
+# Rounding of the coefficients in the Bernstein basis, as a part of the largest value.
+ROUNDING = 1e-13
+
+
+@njit(error_model="numpy", forceinline=True)
+def values_of(dims):
+    """How many values the section functions, what their points keep, and the stop are."""
+    return dims.sections * (1 + max(0, dims.kept)) + dims.stops
+
+
 @njit(error_model="numpy", forceinline=True)
 def surface(k, theta, t, h, y, y_new, dense, found, dims, section):
     """Section function k at the fraction theta of the step."""
     section(theta, t, h, y, y_new, dense, found, dims[:2])
     return load(found, k, WIDTH)
+
+
+@njit(error_model="numpy", forceinline=True)
+def at_point(k, point, found, dims):
+    """Section function k at a point of the panel; the values behind `found` itself are those of a place beside them."""
+    return load(found, (point + 1) * values_of(dims) + k, WIDTH)
+
+
+@njit(error_model="numpy")
+def begin(k, wanted, found, rule, dims):
+    """Let the lanes in `wanted` seek passages of function k in the next step."""
+    depth = (len(rule) + 1) * values_of(dims) + k
+    store(found, depth, select(wanted, 0.0, broadcast(-1.0, WIDTH)))
+
+
+@njit(error_model="numpy")
+def look(place, width, t, h, y, y_new, dense, found, rule, dims, section):
+    """Compute all functions at the points of a panel."""
+    for point in range(len(rule)):
+        theta = broadcast((place + rule[point, POINT]) * width, WIDTH)
+        section(theta, t, h, y, y_new, dense, address(found, (point + 1) * values_of(dims) * WIDTH), dims[:2])
+
+
+@njit(error_model="numpy")
+def simple(k, found, rule, control, dims):
+    """Where function k passes zero at most once in a panel, or where it has no value at all.
+
+    It does so where all Bernstein coefficients lie on one side of zero; where all of their differences do, so that the
+    function is monotonic; and where they change sides once and what the polynomial misses is within the tolerances.
+    """
+    zero = broadcast(0.0, WIDTH)
+    matrix = rule.shape[1] - len(rule)
+    missed, size, known = zero, zero, zero > 0.0
+    for column in range(TOP, matrix):
+        coefficient = zero
+        for point in range(len(rule)):
+            coefficient = coefficient + rule[point, column] * at_point(k, point, found, dims)
+        missed = missed + MARGIN * absolute(coefficient)  # NaN if the function has no value at some point
+    for point in range(len(rule)):
+        value = at_point(k, point, found, dims)
+        size, known = maximum(size, absolute(value)), known | (value == value)
+    small = max(control[RTOL], ROUNDING) * size + control[ATOL]
+    least, slack = maximum(missed, small), missed + ROUNDING * size
+    side, changes, before = zero, zero, zero
+    clear, rising, falling = zero == 0.0, zero == 0.0, zero == 0.0
+    for row in range(len(rule)):
+        coefficient = zero
+        for point in range(len(rule)):
+            coefficient = coefficient + rule[row, matrix + point] * at_point(k, point, found, dims)
+        here = select(coefficient > least, 1.0, select(coefficient < -least, -1.0, zero))
+        changes = changes + select(here * side < 0.0, 1.0, zero)
+        clear, side = clear & ~(here == 0.0), select(here == 0.0, side, here)
+        if row > 0:
+            rising, falling = rising & (coefficient - before > slack), falling & (before - coefficient > slack)
+        before = coefficient
+    resolved = (missed <= small) & (changes < 1.5)
+    return (clear & (changes == 0.0)) | rising | falling | resolved | ~known
+
+
+@njit(error_model="numpy")
+def ready(k, level, found, rule, control, dims):
+    """The lanes that need not halve a panel of some level for function k, and whether others do.
+
+    Each lane remembers how deep it goes: it looks at panels of that level and above.
+    """
+    place = (len(rule) + 1) * values_of(dims) + k
+    depth = load(found, place, WIDTH)
+    wanted = depth >= 1.0 * level
+    done = wanted
+    if level < DEEPEST:
+        done = wanted & simple(k, found, rule, control, dims)
+    halved = wanted & ~done
+    store(found, place, select(halved, level + 1.0, select(done, 1.0 * level, depth)))
+    return done, any_lane(halved)
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -29,9 +122,9 @@ def crosses(before, after, direction):
 
 @njit(error_model="numpy")
 def locate(k, hits, low, high, g_low, g_high, t, h, y, y_new, dense, found, dims, section):
-    """Zero of section function k between two fractions of the step, to rounding, in the lanes of `hits`.
+    """Zero of section function k between two fractions of the step, to rounding, in the lanes of `hits`, and these lanes.
 
-    Regula falsi with the Anderson-Bjorck weight (BIT 13, 253, 1973), bisection where that stalls.
+    Regula falsi with the Anderson-Bjorck weight (BIT 13, 253, 1973), bisection where that stalls.  A pole is no zero.
     """
     a, b, fa, fb = select(hits, low, high), high, g_low, g_high
     for tried in range(60):
@@ -49,31 +142,4 @@ def locate(k, hits, low, high, g_low, g_high, t, h, y, y_new, dense, found, dims
         near, f_near = select(other, b, a), select(other, fb, fa * select(weight > 0.0, weight, 0.5))
         a, fa = select(active, select(done, c, near), b), select(active, f_near, fa)
         b, fb = c, fc
-    return b
-
-
-@njit(error_model="numpy", forceinline=True)
-def turning(i, looks, share, before, first, last, behind):
-    """Where a parabola through three of four equidistant values turns between the inner two, as the fraction of the step.
-
-    `first` is the value at look i; the outer ones are NaN where the step ends.  Zero where nothing turns.
-    """
-    left, right = (
-        0.5 * (before - last) / (before - 2.0 * first + last),
-        0.5 * (first - behind) / (first - 2.0 * last + behind),
-    )
-    low, high = 0.5 if i > 0 else 0.0, 0.5 if i + 2 <= looks else 1.0  # each turn is seen from the nearer look
-    place = select((left > 0.0) & (left < high), left, 0.0)
-    place = select((right + 1.0 > low) & (right < 0.0), right + 1.0, place)
-    return select(place > 0.0, (i + place) * share, 0.0)
-
-
-@njit(error_model="numpy")
-def between(k, i, share, wanted, before, first, last, behind, t, h, y, y_new, dense, found, dims, section):
-    """Where section function k turns between looks i and i + 1, and its value there; look i + 1 where it does not turn."""
-    turn, place = turning(i, dims.looks, share, before, first, last, behind), broadcast((i + 1) * share, WIDTH)
-    turns = (first * last > 0.0) & (turn > 0.0) & wanted
-    if any_lane(turns):
-        place = select(turns, turn, place)
-        return place, select(turns, surface(k, place, t, h, y, y_new, dense, found, dims, section), last)
-    return place, last
+    return b, hits & (absolute(fb) <= 2.0 * maximum(absolute(g_low), absolute(g_high)))

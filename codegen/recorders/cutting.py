@@ -9,7 +9,8 @@ from ..driver.clock import DIRECTION, FURTHER, N_POINTS
 from ..driver.dense import inside
 from ..driver.names import WIDTH
 from ..simd.lanes import any_lane, broadcast, lane_bits, load, store
-from .crossings import between, crosses, locate, surface
+from .crossings import at_point, begin, crosses, locate, look, ready
+from .panels import POINT, following
 
 
 # --- kernel text below ---
@@ -45,29 +46,36 @@ def keep_points(k, theta, hits, t, h, y, y_new, dense, found, cell, counts, poin
 
 
 @njit(error_model="numpy")
-def cut_one(k, counted, t, h, y, y_new, dense, found, cell, counts, points, direction, dims, section):
-    """Find points of section k between the looks into a step, and beside an extremum between two of them."""
-    zero, share = broadcast(0.0, WIDTH), 1.0 / dims.looks  # a power of two
-    before, g0 = zero / zero, surface(k, zero, t, h, y, y_new, dense, found, dims, section)
-    g1 = surface(k, zero + share, t, h, y, y_new, dense, found, dims, section)
-    for i in range(dims.looks):
-        low, high, behind = zero + i * share, zero + (i + 1) * share, zero / zero
-        if i + 2 <= dims.looks:
-            behind = surface(k, zero + (i + 2) * share, t, h, y, y_new, dense, found, dims, section)
-        middle, g = between(k, i, share, counted, before, g0, g1, behind, t, h, y, y_new, dense, found, dims, section)
-        for left, right, g_left, g_right in ((low, middle, g0, g), (middle, high, g, g1)):
-            hits = crosses(g_left, g_right, direction) & counted
-            if any_lane(hits):
-                theta = locate(k, hits, left, right, g_left, g_right, t, h, y, y_new, dense, found, dims, section)
-                keep_points(
-                    k, theta, lane_bits(hits), t, h, y, y_new, dense, found, cell, counts, points, dims, section
-                )
-        before, g0, g1 = g0, g1, behind
+def cut_panel(
+    k, done, place, width, t, h, y, y_new, dense, found, cell, counts, points, direction, rule, dims, section
+):  # fmt: skip
+    """Find the points of section k between the points of a panel, in the lanes of `done`."""
+    for point in range(len(rule) - 1):
+        g_low, g_high = at_point(k, point, found, dims), at_point(k, point + 1, found, dims)
+        hits = crosses(g_low, g_high, direction) & done
+        if any_lane(hits):
+            low = broadcast((place + rule[point, POINT]) * width, WIDTH)
+            high = broadcast((place + rule[point + 1, POINT]) * width, WIDTH)
+            theta, hits = locate(k, hits, low, high, g_low, g_high, t, h, y, y_new, dense, found, dims, section)
+            keep_points(k, theta, lane_bits(hits), t, h, y, y_new, dense, found, cell, counts, points, dims, section)
 
 
 @njit(error_model="numpy", cache=True)
-def cut(counted, t, h, y, y_new, dense, found, cell, counts, points, control, dims, section):
+def cut(counted, t, h, y, y_new, dense, found, cell, counts, points, control, rule, dims, section):
     """Find the section points of a step in the lanes of `counted`."""
     for k in range(dims.sections):
-        way = control[DIRECTION if k == 0 else FURTHER + k - 1]
-        cut_one(k, counted, t, h, y, y_new, dense, found, cell, counts, points, way, dims, section)
+        begin(k, counted, found, rule, dims)
+    level, place = 0, 0
+    while True:
+        width, halved = 1.0 / (1 << level), False
+        look(place, width, t, h, y, y_new, dense, found, rule, dims, section)
+        for k in range(dims.sections):
+            way = control[DIRECTION if k == 0 else FURTHER + k - 1]
+            done, deeper = ready(k, level, found, rule, control, dims)
+            cut_panel(
+                k, done, place, width, t, h, y, y_new, dense, found, cell, counts, points, way, rule, dims, section
+            )
+            halved = halved | deeper
+        level, place = following(level, place, halved)
+        if level == 0:
+            break

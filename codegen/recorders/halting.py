@@ -8,7 +8,8 @@ from ..driver.clock import BASE, HALTED, MARK
 from ..driver.dense import inside
 from ..driver.names import SERIES, WIDTH
 from ..simd.lanes import any_lane, broadcast, load, select, store
-from .crossings import between, crosses, locate, surface
+from .crossings import at_point, begin, crosses, locate, look, ready, values_of
+from .panels import POINT, following
 
 
 # --- kernel text below ---
@@ -32,25 +33,29 @@ def shorten(hits, part, y, y_new, dense, dims):
 
 
 @njit(error_model="numpy", cache=True)
-def halt(accept, t, h, clock, y, y_new, dense, found, dims, section):
+def halt(accept, t, h, clock, y, y_new, dense, found, control, rule, dims, section):
     """End the step of a lane where the last section function passes zero, and mark the lane; returns the lengths."""
-    now, k = load(clock, BASE, WIDTH) + t, dims.sections * (1 + dims.kept)
-    zero, part, share = broadcast(0.0, WIDTH), broadcast(1.0, WIDTH), 1.0 / dims.looks  # a power of two
-    before, g0 = zero / zero, surface(k, zero, now, h, y, y_new, dense, found, dims, section)
-    g1 = surface(k, zero + share, now, h, y, y_new, dense, found, dims, section)
-    hits = accept & (zero > 0.0)
-    for i in range(dims.looks):
-        low, behind = zero + i * share, zero / zero
-        if i + 2 <= dims.looks:
-            behind = surface(k, zero + (i + 2) * share, now, h, y, y_new, dense, found, dims, section)
-        middle, g = between(
-            k, i, share, accept & ~hits, before, g0, g1, behind, now, h, y, y_new, dense, found, dims, section
-        )
-        passes = crosses(g0, g, 0.0) & accept & ~hits
-        if any_lane(passes):
-            place = locate(k, passes, low, middle, g0, g, now, h, y, y_new, dense, found, dims, section)
-            part, hits = select(passes, place, part), hits | passes
-        before, g0, g1 = g0, g1, behind
+    now, k = load(clock, BASE, WIDTH) + t, values_of(dims) - 1
+    part, hits = broadcast(1.0, WIDTH), accept & ~accept
+    begin(k, accept, found, rule, dims)
+    level, place = 0, 0
+    while True:
+        width = 1.0 / (1 << level)
+        look(place, width, now, h, y, y_new, dense, found, rule, dims, section)
+        done, halved = ready(k, level, found, rule, control, dims)
+        for point in range(len(rule) - 1):
+            g_low, g_high = at_point(k, point, found, dims), at_point(k, point + 1, found, dims)
+            passes = crosses(g_low, g_high, 0.0) & done & ~hits
+            if any_lane(passes):
+                low = broadcast((place + rule[point, POINT]) * width, WIDTH)
+                high = broadcast((place + rule[point + 1, POINT]) * width, WIDTH)
+                zero, passes = locate(
+                    k, passes, low, high, g_low, g_high, now, h, y, y_new, dense, found, dims, section
+                )
+                part, hits = select(passes, zero, part), hits | passes
+        level, place = following(level, place, halved)
+        if level == 0:
+            break
     if any_lane(hits):
         shorten(hits, part, y, y_new, dense, dims)
         store(clock, HALTED, select(hits, 1.0, load(clock, HALTED, WIDTH)))

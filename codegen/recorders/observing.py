@@ -9,15 +9,12 @@ from ..driver.clock import ATOL, OBSERVED, RTOL
 from ..driver.names import WIDTH
 from ..simd.addresses import address
 from ..simd.lanes import broadcast, load, store
+from .panels import DEEPEST, NEXT, POINT, TOP, WEIGHT, following
 
 # --- kernel text below ---
 # Columns of `sums` behind the time that was observed: six for each value.
 TALLIES, TALLY = OBSERVED + 1, 6
 FIRST, SUM, SQUARES, LARGEST, LEAST, LATEST = 0, 1, 2, 3, 4, 5
-# Columns of the rule.
-POINT, WEIGHT, TOP, NEXT = 0, 1, 2, 3
-# No panel of a step is shorter than 2^-DEEPEST.
-DEEPEST = 12
 # Most parabolas for an extreme between the points of a panel.
 CLIMBS = 8
 
@@ -146,10 +143,7 @@ def climb(added, begin, width, t, h, y, y_new, dense, seen, cell, sums, control,
 
 @njit(error_model="numpy", cache=True)
 def tally(counted, t, h, y, y_new, dense, seen, cell, sums, control, rule, dims, values):
-    """Add the step of the lanes in `counted` to what is observed; its panels are halved where a value needs it.
-
-    Panel k of some level spans k 2^-level … (k + 1) 2^-level of the step; each lane halves those that it needs.
-    """
+    """Add the step of the lanes in `counted` to what is observed; each lane halves the panels that it needs."""
     points, lengths = len(rule), np.empty(WIDTH)
     store(lengths, 0, h)
     open_lanes = np.zeros(DEEPEST + 1, np.int64)
@@ -167,12 +161,8 @@ def tally(counted, t, h, y, y_new, dense, seen, cell, sums, control, rule, dims,
                     add(which, cell[which], width * lengths[which], seen, sums, rule, dims)
                     added |= 1 << which
         climb(added, float(k), width, t, h, y, y_new, dense, seen, cell, sums, control, rule, dims, values)
-        if halved != 0:
-            level, k = level + 1, 2 * k
-            open_lanes[level] = halved
-            continue
-        while k & 1:
-            level, k = level - 1, k >> 1
+        level, k = following(level, k, halved != 0)
         if level == 0:
             break
-        k += 1
+        if halved != 0:
+            open_lanes[level] = halved

@@ -1,4 +1,4 @@
-"""Passages of a function near its extremum, which the ends of a step do not show, and layers far from the state."""
+"""Passages of a function that the ends of a step do not show, and layers far from the state."""
 
 from __future__ import annotations
 
@@ -39,6 +39,41 @@ def test_a_stop_near_an_extremum_ends_its_cell_the_first_time(integrator: str, w
     circle = CIRCLE.replace(integrator=integrator, sections=NEARBY, stop=x_1 - NEAR)
     found = sc.run(circle, show_progress=False, width=width)
     np.testing.assert_allclose(found.states(), [NEAR, math.sqrt(1 - NEAR**2)], rtol=0, atol=1e-9)
+
+
+PASSAGES = {
+    "often": "sin(20*t) + x_1/2", "half": "sqrt(x_1) - 1/2", "kink": "abs(x_1 - 1/10) - 1/50", "cusp": "sqrt(abs(x_1 - 1/7)) - 1/50",
+    "bell": "exp(-50*(x_1 - 3/10)**2) - 1/2", "jump": "floor(3*x_1) + 1/2", "touch": "(x_1 - 1/2)**2 - 1e-6",
+    "edge": "sqrt(x_1**2 - 1/100) - 1/100", "pole": "1/x_1", "poles": "tan(2*x_1)",
+}  # fmt: skip
+"""Functions that pass zero often, beside places where they have no value, twice in a short time, or at no pole."""
+
+
+def passages(function: str, last: float) -> np.ndarray:
+    """Where a function of x = sin t changes its sign, from its values at very many times; poles are left out."""
+    t = np.linspace(0.0, last, 3_000_001)
+    with np.errstate(all="ignore"):
+        values = sp.lambdify((sp.Symbol("t"), x_1), sp.sympify(function), "numpy")(t, np.sin(t))
+        small = np.maximum(abs(values[1:]), abs(values[:-1])) < 50
+    return t[1:][(values[:-1] * values[1:] < 0) & small]
+
+
+@pytest.mark.parametrize(("integrator", "width"), METHODS)
+def test_no_passage_is_missed_inside_a_step(integrator: str, width: int) -> None:
+    sections = {name: sc.Section(function, "both", keep="x") for name, function in PASSAGES.items()}
+    data = sc.run(CIRCLE.replace(integrator=integrator, sections=sections), show_progress=False, width=width).data
+    for name, function in PASSAGES.items():
+        expected = passages(function, 50)
+        assert int(data[f"{name}_count"]) == len(expected), name
+        np.testing.assert_allclose(data[f"{name}_time"].values[: len(expected)], expected, rtol=0, atol=2e-5)
+
+
+@pytest.mark.parametrize(("integrator", "width"), METHODS)
+@pytest.mark.parametrize("name", ["half", "kink", "touch"])
+def test_a_stop_is_the_first_passage(integrator: str, width: int, name: str) -> None:
+    circle = CIRCLE.replace(integrator=integrator, sections=NEARBY, stop=PASSAGES[name])
+    found = sc.run(circle, show_progress=False, width=width)
+    assert float(found.end_time) == pytest.approx(passages(PASSAGES[name], 5)[0], abs=2e-6)
 
 
 @pytest.mark.parametrize("steepness", [5, 20, 100])
