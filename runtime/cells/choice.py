@@ -55,11 +55,12 @@ TURNING = (sp.atan, sp.tanh, sp.erf, sp.Abs)
 def chosen_integrator(reduction: Reduction) -> Integrator:
     """Return the integrator of a scene, the fastest at equal error where the scene says "auto".
 
-    Power series where all functions are continuous, and analytic between kinks, and the equations are
-    not stiff, in the extreme cells of the sweep; between the events of set-valued friction too.  Nodes with a mass matrix
-    take explicit steps in their place: the recurrences of a dense matrix take longer to compile than most runs.  Otherwise
-    Rosenbrock steps, or a switching pair of methods for two oscillators at a tight tolerance.  A mean field of more nodes
-    than Rosenbrock steps can take, whose Jacobian has an entry for each pair, takes explicit steps however stiff it is.
+    Where the equations are not stiff in the extreme cells of the sweep, and between the events of set-valued friction:
+    power series if all functions are continuous, and analytic between kinks, explicit steps otherwise. Nodes or links with
+    a mass matrix take explicit steps too: the recurrences of a dense matrix take longer to compile than most runs.
+    Elsewhere Rosenbrock steps, or a switching pair of methods for two oscillators at a tight tolerance. A mean field of
+    more nodes than Rosenbrock steps can take, whose Jacobian has an entry for each pair, takes explicit steps however
+    stiff it is.
 
     Parameters
     ----------
@@ -89,9 +90,10 @@ def _chosen(scene: Scene, equations: Equations, stiffness_of: Callable[[], float
         return _taylor(scene, equations)
     if scene.integrator != "auto":
         return integrator(scene.integrator)
-    if not equations.inertial_links and jump(equations) is None and (equations.sticks or stiffness_of() < STIFF):
-        return integrator("dop853") if equations.inertial else _taylor(scene, equations)
-    if equations.sticks or any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
+    calm = equations.sticks or stiffness_of() < STIFF
+    if calm and not equations.inertial and jump(equations) is None:
+        return _taylor(scene, equations)
+    if calm or any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
         return integrator("dop853")
     pair = equations.n == 2 and not (equations.mixed or equations.inertial) and scene.rtol <= 1e-9
     return integrator("switching" if pair else AUTO)
@@ -203,7 +205,7 @@ BLOWN = 1e6
 
 
 def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[[np.ndarray], Plan]) -> None:
-    """Warn if Taylor steps of some cells were short because the equations are stiff or the motion has no bound.
+    """Warn if explicit steps of some cells were short because the equations are stiff or the motion has no bound.
 
     The three cells with the shortest steps are looked at, where they ended, unless they ended at a singularity.
 
@@ -220,7 +222,7 @@ def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[
     broken = np.isin(buffers.counts[:, Count.STATUS], (Status.STEP_UNDERFLOW, Status.DIVERGED))
     lengths = np.where((steps > 0) & (times > 0.0) & ~broken, times / np.maximum(steps, 1), math.inf)
     cells = np.argsort(lengths)[:3]
-    rows = rows_of(cells)
+    rows, kind = rows_of(cells), "Taylor" if source.method.series else source.method.name
     for cell, start, numbers in zip(cells, rows.start, rows.numbers, strict=True):
         if not math.isfinite(lengths[cell]) or not np.isfinite(buffers.end[cell]).all():
             continue
@@ -229,14 +231,14 @@ def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[
             size = np.abs(buffers.end[cell]).max()
             if size > BLOWN * max(1.0, np.abs(start).max()):
                 warnings.warn(
-                    f"a state grew to {size:.3g} in {steps[cell]} Taylor steps of a cell; expected a bounded motion; "
+                    f"a state grew to {size:.3g} in {steps[cell]} {kind} steps of a cell; expected a bounded motion; "
                     "check the signs and the size of the parameters",
                     RuntimeWarning,
                     stacklevel=4,
                 )
                 return
             warnings.warn(
-                f"stiff equations: found a rate of {fastest:.3g} beside slow motion, and {steps[cell]} Taylor steps in a cell; "
+                f"stiff equations: found a rate of {fastest:.3g} beside slow motion, and {steps[cell]} {kind} steps in a cell; "
                 "expected few; integrator = 'rodas5p' takes longer steps",
                 RuntimeWarning,
                 stacklevel=4,
@@ -336,8 +338,14 @@ def _turned(
 
 @lru_cache(maxsize=64)
 def _turns(rates: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...]) -> tuple[tuple[sp.Symbol, sp.Expr], ...]:
-    """For each turning function a state, and the value of it at which the argument is zero."""
-    gaps = {part.args[0] for e in rates for part in e.atoms(*TURNING)}
+    """For each turning function a state, and the value of it at which the argument is zero.
+
+    A root of a size is steep at a point, and has no layer.
+    """
+    roots = {
+        p: sp.S.Zero for e in rates for p in e.atoms(sp.Pow) if isinstance(p.base, sp.Abs) and (1 - p.exp).is_positive
+    }
+    gaps = {part.args[0] for e in rates for part in e.xreplace(roots).atoms(*TURNING)}
     found = []
     for gap in sorted(gaps, key=sp.default_sort_key):
         slopes = ((s, gap.diff(s)) for s in states)

@@ -98,7 +98,7 @@ class Memory:
         """Warn of cells whose equations are stiff for the kernel that ran them."""
         job = self.prepared.job
         source = job.kernel.origin
-        if source.driver.series and not source.driver.contacts:
+        if not (source.method.implicit or source.driver.contacts):
             reduction = self.prepared.reduction
             warn_of_stiffness(source, self.buffers, lambda cells: reduction.rows(job.planner.rows(cells)))
 

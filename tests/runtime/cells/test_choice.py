@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from synchain.models import Field, Scene, chain
 from synchain.runtime import run
@@ -34,7 +35,10 @@ def method(scene: Scene) -> tuple[str, int]:
         (Scene(topology=chain(20), parameters={"kappa": 10.0}), "taylor"),
         (Scene(topology=chain(3)), "rodas5p"),  # its layer is steep, although the start lies outside
         (Scene(topology=chain(3), friction="coulomb"), "rodas5p"),
-        (Scene(topology=chain(3), contact="sign"), "rodas5p"),  # it jumps
+        (Scene(topology=chain(3), contact="sign"), "dop853"),  # it jumps
+        (Scene(oscillator="duffing", coupling="inerter", topology=chain(3), parameters={"sigma": 0.1}), "dop853"),
+        (Scene(Field({"x": "v", "v": "-x - 1000*max(0, x - 1)**1.5"})), "dop853"),  # no series beside its kink
+        (Scene(Field({"x": "v", "v": "-x - 100*v - 1000*max(0, x - 1)**1.5"})), "rodas5p"),
         (Scene(oscillator="chua", coupling="x->x", topology=chain(2)), "taylor"),
         (Scene(topology=chain(2), rtol=1e-10, parameters={"sigma": 0.1}), "switching"),
     ],
@@ -140,6 +144,32 @@ def test_stiffness_that_appears_is_said():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         run(scene, mu=[1.0, 2.0], show_progress=False)
+
+
+def test_stiffness_that_appears_is_said_of_explicit_steps_too():
+    scene = Scene(
+        Field({"x": "v", "v": "s*(1 - x**2)*v - x - max(0, v - 10)**1.5"}, parameters={"s": 1}), record=(), transient=0,
+        window=20, time_unit="time", initial={"x": 1.0, "v": 9.0},
+    )  # fmt: skip
+    with pytest.warns(
+        RuntimeWarning, match=r"stiff equations: found a rate of .* dop853 steps.*integrator = 'rodas5p'"
+    ):
+        run(scene, s=[1.0, 100.0], show_progress=False)
+
+
+def test_a_slope_without_bound_at_the_start_ends_no_run():
+    """The rate of sign(v) |v|^(1/2) is finite at rest, its slope is not."""
+    scene = Scene(
+        Field({"x": "v", "v": "cos(t) - x/2 - sign(v)*abs(v)**0.5"}), record=(), transient=0, window=5, time_unit="time",
+        initial={"x": 0.0, "v": 0.0}, rtol=1e-9,
+    )  # fmt: skip
+    found = run(scene, show_progress=False)
+
+    def rates(t: float, y: np.ndarray) -> list[float]:
+        return [y[1], np.cos(t) - y[0] / 2 - np.sign(y[1]) * np.sqrt(abs(y[1]))]
+
+    expected = solve_ivp(rates, (0, 5), [0, 0], "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+    np.testing.assert_allclose(found.states(), expected, rtol=0, atol=1e-7)
 
 
 def test_a_singularity_is_not_called_stiff():
