@@ -200,6 +200,9 @@ def _stiffest(rates: Iterable[tuple[float, float]]) -> float:
     return max((fastest / max(1.0, turning) for fastest, turning in rates), default=0.0)
 
 
+FEW = 100
+"""Steps of a cell that are no crawling, however short."""
+
 BLOWN = 1e6
 """Growth of a state from which on its fast rates are those of a solution without bound."""
 
@@ -237,6 +240,8 @@ def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[
                     stacklevel=4,
                 )
                 return
+            if steps[cell] < FEW:
+                continue
             warnings.warn(
                 f"stiff equations: found a rate of {fastest:.3g} beside slow motion, and {steps[cell]} {kind} steps in a cell; "
                 "expected few; integrator = 'rodas5p' takes longer steps",

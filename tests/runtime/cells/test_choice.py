@@ -155,6 +155,9 @@ def test_stiffness_that_appears_is_said_of_explicit_steps_too():
         RuntimeWarning, match=r"stiff equations: found a rate of .* dop853 steps.*integrator = 'rodas5p'"
     ):
         run(scene, s=[1.0, 100.0], show_progress=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run(scene.replace(window=1), s=[1.0, 100.0], show_progress=False)  # 25 steps
 
 
 def test_a_slope_without_bound_at_the_start_ends_no_run():
