@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Callable
 from types import FrameType
@@ -18,10 +19,13 @@ def effort(function: Callable[[], Any]) -> tuple[Any, int]:
         nonlocal count
         count += event in ("call", "c_call")
 
-    before = sys.getprofile()
+    before, collecting = sys.getprofile(), gc.isenabled()
+    gc.disable()  # what other tests have left is not to be counted
     sys.setprofile(note)
     try:
         result = function()
     finally:
         sys.setprofile(before)
+        if collecting:
+            gc.enable()
     return result, count

@@ -23,11 +23,11 @@ import sympy as sp
 
 from ..graphs.links import LINK_LIMIT
 from ..inputs.node_name import LinkName
-from ..mechanics.components import Edge
+from ..mechanics.components import TIME, Edge
 from ..symmetries.partitions import class_links, coarsest_balanced
 from .equations import Equations
 
-__all__ = ["NoQuotient", "collapse", "quotient", "substitute_constants"]
+__all__ = ["NoQuotient", "collapse", "quotient", "substitute_constants", "without_drive"]
 
 
 class NoQuotient(ValueError):
@@ -77,6 +77,25 @@ def substitute_constants(equations: Equations, values: Mapping[str, int | Fracti
     )
     acting = tuple(layer for layer in reduced.layers if any(edge.acts for _, edge in layer.edge_of))
     return replace(reduced, layers=acting)
+
+
+def without_drive(equations: Equations, values: Mapping[str, float]) -> Equations:
+    """Return the equations without a drive whose strength is 0; the same equations if there is none, or another drive.
+
+    Parameters
+    ----------
+    equations : Equations
+        Equations of a network.
+    values : mapping of str to float
+        Numbers by the names of all parameters.
+    """
+    if not equations.forced or equations.mixed:
+        return equations
+    rates = [*(e for node in equations.nodes for e in node.rhs), *(e for edge in equations.edges for e in edge.rhs)]
+    timed = {s.name for e in rates for term in sp.Add.make_args(e) if term.has(TIME) for s in term.free_symbols}
+    common = set(equations.parameters) - equations.single
+    quiet = substitute_constants(equations, {name: 0 for name in sorted(timed & common) if values[name] == 0})
+    return equations if quiet.forced or len(quiet.layers) < len(equations.layers) else quiet
 
 
 def _check_constants(equations: Equations, values: Mapping[str, int | Fraction]) -> None:

@@ -22,7 +22,7 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, splu
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.reduction import substitute_constants
+from synchain.models.dynamics.reduction import without_drive
 from synchain.models.dynamics.variational import expect_continuous
 from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
@@ -243,10 +243,7 @@ def equilibrium(
 
 def _at_rest(scene: Scene) -> Equations:
     """The equations without a drive whose strength is zero; ValueError if they have no equilibria, or none of Newton's."""
-    equations = scene.equations
-    if equations.forced and not equations.mixed:
-        common = set(equations.parameters) - equations.single
-        equations = substitute_constants(equations, {name: 0 for name in sorted(common) if scene.parameters[name] == 0})
+    equations = without_drive(scene.equations, scene.parameters)
     if equations.forced:
         raise ValueError(
             f"equilibrium: found a drive, time enters the equations of {scene!r}; expected none; `periodic_orbit` finds "

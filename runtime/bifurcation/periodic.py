@@ -20,6 +20,7 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import brentq
 
+from synchain.models.dynamics.reduction import without_drive
 from synchain.models.inputs.checks import short_repr
 from synchain.models.mechanics.friction import SLIP
 from synchain.models.scenes.scene import Scene
@@ -210,7 +211,7 @@ def periodic_orbit(
     few = {name: "a few steps of Newton's method are soon done" for name in ("show_progress", "progress")}
     scene = coupled_cell(Given(periodic_orbit, parameters, more, {**NEWTON, **few}), scene, TOLERANCE)
     check_periods(periods)
-    if not scene.forced:
+    if not without_drive(scene.equations, scene.parameters).forced:
         return _limit_cycle(scene, periods, start)
     state = _settled(scene) if start is None else _state(scene, start)
     best, steps, kept = np.inf, 0, state
@@ -229,7 +230,9 @@ def periodic_orbit(
         state = state + _correction(matrix, gap)
         steps += 1
     if not best < 1e-9 * max(1.0, float(np.abs(kept).max())):
-        raise ArithmeticError(f"no orbit of {periods} drive periods near the start: the best residual was {best:.1e}")
+        raise ArithmeticError(
+            f"no orbit of {periods} drive period{'s' * (periods > 1)} near the start: the best residual was {best:.1e}"
+        )
     return PeriodicOrbit(scene, int(periods), kept, _sorted(monodromy), best, steps)
 
 

@@ -119,7 +119,7 @@ def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
         timed = any(e.has(sp.Symbol("t", real=True)) for _, e in orbit.variation.matrix)
         return _periodic(orbit, Motion.LINEAR, 1) if timed else _steady(orbit, Motion.LINEAR)
     closed = max(RETURN, 0.1 * orbit.scene.rtol)
-    if not orbit.scene.forced:
+    if not orbit.forced:
         return _free(orbit, closed)
     integrator = orbit.integrator_of(orbit.strengths[:1])
     for _ in range(3):

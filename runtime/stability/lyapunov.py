@@ -24,6 +24,7 @@ import numpy as np
 import sympy as sp
 import xarray as xr
 
+from synchain.models.dynamics.reduction import without_drive
 from synchain.models.dynamics.variational import PHASE, Variation, network_variation, phase_shifted, with_volume
 from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
@@ -328,10 +329,10 @@ class TangentFrame:
             If time enters without a known period.
         """
         unit = unit_of_time(scene)
-        network = network_variation(scene.equations)
+        network = network_variation(without_drive(scene.equations, scene.parameters))
         sticks = network.events is not None
         variation = network if sticks else Variation(with_volume(network.orbit), network.size, network.matrix)
-        variation = phase_shifted(variation) if scene.forced else variation
+        variation = phase_shifted(variation) if variation.orbit.forced else variation
         values = {**scene.parameters, PHASE.name: 0.0}
         numbers = np.array([[values[name] for name in variation.orbit.parameters]])
         state = np.array([[*scene.y0, *(0.0 for _ in range(0 if sticks else scene.n))]])

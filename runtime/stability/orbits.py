@@ -13,6 +13,7 @@ import sympy as sp
 from synchain.codegen.integrators import Integrator
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.mode_inertia import inertia_of_modes
+from synchain.models.dynamics.reduction import without_drive
 from synchain.models.dynamics.variational import Variation, mode
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
@@ -118,8 +119,8 @@ class Orbits:
             number of strengths than there are layers of links.
         """
         scene = scene if scene.model.linked else _joined(scene, strengths)
-        variation = _variation(scene.equations, bool(np.iscomplexobj(strengths)))
-        layers = len(scene.equations.layers)
+        equations = without_drive(scene.equations, scene.parameters)
+        variation, layers = _variation(equations, bool(np.iscomplexobj(strengths))), len(equations.layers)
         if strengths.size != len(strengths) * layers:
             raise ValueError(
                 f"transversal modes: found {layers} layer{'s' * (layers > 1)} of links, so that a mode has as many strengths; expected "
@@ -136,6 +137,11 @@ class Orbits:
     def components(self) -> int:
         """State variables of one deviation, real or complex."""
         return len(self.variation.orbit.node.continuous)
+
+    @property
+    def forced(self) -> bool:
+        """True if a drive acts."""
+        return self.variation.orbit.forced
 
     @property
     def linear(self) -> bool:
@@ -204,7 +210,7 @@ class Orbits:
         one.advance(self.unit)
         taken = STEP * self.components * one.steps / len(self.state)
         most = max(4.0, periods / BATCHES)
-        blocks = [b for b in BLOCKS if b <= most and periods % b == 0.0] if self.scene.forced else FREE_BLOCKS
+        blocks = [b for b in BLOCKS if b <= most and periods % b == 0.0] if self.forced else FREE_BLOCKS
         lines = 1 if self.strengths.ndim == 1 else len(lines_of(self.strengths)[1])
         for block, nodes, parts in _choices(blocks, lines * taken, len(self.strengths) * self.components**2):
             chosen = strength_interpolation(self.strengths, nodes, parts)

@@ -159,7 +159,7 @@ def test_what_is_refused() -> None:
         strobe(Scene(oscillator="lorenz", coupling="x->x", topology=PAIR), np.zeros(3), 1)
     with pytest.raises(ValueError, match="periods = 0; expected a whole number, at least 1"):
         periodic_orbit(scene(), 0)
-    with pytest.raises(ArithmeticError, match="no orbit of 1 drive periods near the start"):
+    with pytest.raises(ArithmeticError, match="no orbit of 1 drive period near the start"):
         periodic_orbit(scene(), 1, start=[50.0, -40.0], omega=1.55)
 
 

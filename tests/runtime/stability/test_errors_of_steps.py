@@ -12,7 +12,7 @@ from synchain.runtime.stability.variational_integrator import VariationalIntegra
 SCENES = {
     "periodic": (sc.Scene("duffing"), {}),
     "smoothed": (sc.Scene("friction"), {"omega": 1.4, "kappa": 50.0}),
-    "drive of another frequency": (sc.Scene("van_der_pol"), {}),
+    "drive of another frequency": (sc.Scene("van_der_pol"), {"u": 0.1, "omega": 1.9}),
 }
 ALPHA = [0.0, 0.1, 0.3]
 

@@ -57,6 +57,18 @@ def test_exponents_along_a_cycle_are_eigenvalues(mu: float) -> None:
     assert found.stderr.max() < 1e-7
 
 
+def test_a_drive_of_amplitude_zero_is_none() -> None:
+    """The shipped oscillator has one, at any frequency; with an amplitude it is a drive."""
+    shipped = Scene("van_der_pol", "v->v", chain(2), initial={"x": 1, "v": 0.1}, parameters={"omega": 1.7})
+    period, expected = floquet(1.0)
+    cycle = periodic_orbit(shipped)
+    assert cycle.period == pytest.approx(period, rel=1e-9)
+    found = exponents(shipped, [0.0, 0.1, 0.5], starts=1, rtol=1e-9)
+    np.testing.assert_allclose(found.exponent, expected, atol=1e-8)
+    with pytest.raises(ArithmeticError, match="no orbit of 1 drive period"):
+        periodic_orbit(shipped, u=0.01)
+
+
 @pytest.mark.parametrize("omega", [0.02, 2.0, 1e3])
 def test_any_unit_of_time(omega: float) -> None:
     """z' = omega (1 + 2 i - |z|^2) z with both parts coupled: -alpha, beside the 0 of the motion itself."""
