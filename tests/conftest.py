@@ -22,6 +22,11 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(50_000, 20, 20)
 
 
+def pytest_sessionfinish() -> None:
+    """Leave all to the end of the process: pytest would look for garbage among it twice."""
+    gc.freeze()
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out what takes minutes, unless it was asked for or named."""
     if config.getoption("--long") or any(".py" in argument for argument in config.args):

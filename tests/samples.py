@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import re
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -124,11 +125,27 @@ def choices() -> Equations:
     return Equations.of_equal_nodes(node, Edge((x, v), (x_2, v_2), w, (sp.S.Zero, rope), (sigma, b)), 2, path(2))
 
 
-CASES: dict[str, Equations] = {
-    "choices": choices(),
-    "friction 1": friction_chain(1), "friction 3": friction_chain(3), "harmonic": harmonic_chain(2), "looped": looped(),
-    "parametric": parametric(), "third order": third_order(), "tanh pair": tanh_pair(), "waving": waving(),
-}  # fmt: skip
+class Late(Mapping[str, Equations]):
+    """Networks by name; each is derived when it is first asked for, not while tests are collected."""
+
+    def __init__(self, makers: Mapping[str, Callable[[], Equations]]) -> None:
+        self.makers = {name: functools.cache(make) for name, make in makers.items()}
+
+    def __getitem__(self, name: str) -> Equations:
+        return self.makers[name]()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.makers)
+
+    def __len__(self) -> int:
+        return len(self.makers)
+
+
+CASES = Late({
+    "choices": choices, "friction 1": lambda: friction_chain(1), "friction 3": lambda: friction_chain(3),
+    "harmonic": lambda: harmonic_chain(2), "looped": looped, "parametric": parametric, "third order": third_order,
+    "tanh pair": tanh_pair, "waving": waving,
+})  # fmt: skip
 
 
 def varied() -> Equations:
@@ -189,12 +206,11 @@ def numbered(n: int = 3, mutual: bool = True) -> Equations:
     return Scene("duffing", coupling, graph, parameters=own, **draws).equations
 
 
-def unequal() -> dict[str, Equations]:
-    """Networks whose nodes differ or whose links have inertia; a child process that needs none does not derive them."""
-    return {
-        "numbered": numbered(), "numbered one way": numbered(mutual=False), "varied": varied(), "inertial": inertial(),
-        "clocks": clocks(), "two kinds": two_kinds(), "pendula": pendula(), "telescopes": telescopes(),
-    }  # fmt: skip
+UNEQUAL = Late({
+    "numbered": numbered, "numbered one way": lambda: numbered(mutual=False), "varied": varied, "inertial": inertial,
+    "clocks": clocks, "two kinds": two_kinds, "pendula": pendula, "telescopes": telescopes,
+})  # fmt: skip
+"""Networks whose nodes differ or whose links have inertia."""
 
 
 def numbers(equations: Equations, **changed: float) -> list[float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -229,12 +230,6 @@ def test_an_axis_of_the_strength_is_refused_where_something_depends_on_it(tmp_pa
         runtime.exponents(between_equal_states, [0.1, 0.2])
 
 
-def made(name: str) -> Scene:
-    """Two equal nodes x' = -s x with a link, whose parameter s is called otherwise."""
-    node = Field({"x": f"-{name}*x"}, parameters={name: 2.0})
-    return Scene(node, "x->x", chain(2), initial={"x": [1.0, 1.0]}, transient=0.0, window=1.0, time_unit="time")
-
-
 COLLIDING = (
     "seed",
     "rtol",
@@ -250,19 +245,26 @@ COLLIDING = (
 )
 
 
+@functools.cache
+def colliding() -> Scene:
+    """Two equal nodes x' = -p x with a link, whose rate p is the product of all parameters."""
+    node = Field({"x": f"-{'*'.join(COLLIDING)}*x"}, parameters=dict.fromkeys(COLLIDING, 1.0))
+    return Scene(node, "x->x", chain(2), initial={"x": [1.0, 1.0]}, transient=0.0, window=1.0, time_unit="time")
+
+
 @pytest.mark.parametrize("name", COLLIDING)
 def test_parameters_with_the_names_of_keywords_go_into_the_mapping(name: str) -> None:
-    scene = made(name)
+    scene = colliding()
     found = runtime.exponents(scene, [0.0, 0.5], parameters={name: 3.0}, starts=1)
     np.testing.assert_allclose(found.exponent, [-3.0, -3.5], rtol=1e-9)
-    end = runtime.run(scene, parameters={name: [1.0, 2.0]}, show_progress=False).end
-    np.testing.assert_allclose(end.sel(component="x", node=1), np.exp([-1.0, -2.0]), rtol=1e-7)
+    end = runtime.run(scene, parameters={name: [0.5, 2.0]}, show_progress=False).end
+    np.testing.assert_allclose(end.sel(component="x", node=1), np.exp([-0.5, -2.0]), rtol=1e-7)
     assert Given(runtime.run, {name: 1.5}).sweep(scene).parameters[name] == 1.5
     assert runtime.msf(scene, [0.0, 0.5], parameters={name: 3.0}, starts=1).scene.parameters[name] == 3.0
 
 
 def test_certificates_take_parameters_with_the_names_of_fields() -> None:
-    scene = made("seed").replace(record=("sync_error",))
+    scene = colliding().replace(record=("sync_error",))
     found = runtime.run(scene, parameters={"seed": [1.0, 2.0]}, sigma=0.5, certified=True, show_progress=False)
     np.testing.assert_allclose(found.data["transversal_exponent"], [-2.0, -3.0], rtol=1e-9)
 

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
+from types import BuiltinFunctionType
 from typing import Any
 
 import numba
 from llvmlite.binding.newpassmanagers import ModulePassManager
 from numba import types
-from numba.core import base, codegen, postproc, transforms
+from numba.core import base, codegen, errors, interpreter, ir, lowering, postproc, transforms, typeinfer, utils
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, register_pass
-from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRewrites
+from numba.core.typed_passes import AnnotateTypes, InlineOverloads, NativeLowering, NopythonRewrites
+from numba.core.typing.context import BaseContext
 from numba.core.untyped_passes import InlineClosureLikes, InlineInlinables, WithLifting
 
 __all__ = ["njit", "without_repetition"]
@@ -58,10 +60,10 @@ class _LinkedLowering(NativeLowering):
 
 
 class _Compiler(CompilerBase):
-    """Numba's compiler without the passes for what kernels have none of."""
+    """Numba's compiler without the passes for what kernels have none of, or nobody reads."""
 
-    unused = (InlineClosureLikes, InlineInlinables, InlineOverloads, NopythonRewrites, WithLifting)
-    """Closures, functions that are inlined by Numba, expressions of whole arrays, `with`."""
+    unused = (AnnotateTypes, InlineClosureLikes, InlineInlinables, InlineOverloads, NopythonRewrites, WithLifting)
+    """The listing with types, closures, functions that are inlined by Numba, expressions of whole arrays, `with`."""
 
     def define_pipelines(self) -> list[PassManager]:
         manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
@@ -104,7 +106,7 @@ def without_repetition() -> Iterator[None]:
     No function is a generator or leaves compiled code, which is all that needs the variables alive at the start of a
     block.  LLVM does not optimise the functions that a module only names, and does not thread jumps before it has merged
     the blocks of inlined functions, thousands in a kernel: its own passes do it later and come to the same machine code.
-    One look finds a locale that LLVM cannot read.
+    One look finds a locale that LLVM cannot read.  No kernel has a `with`, updates a dictionary or is warned of.
     """
     with ExitStack() as stack:
         for owner, name, instead in _instead():
@@ -113,11 +115,62 @@ def without_repetition() -> Iterator[None]:
         yield
 
 
+class _Told:
+    """What tells an error of Numba where it happened, without the generator of Numba's own."""
+
+    __slots__ = ("given", "words")
+
+    def __init__(self, words: str, /, **given: Any) -> None:
+        self.words, self.given = words, given
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
+        if isinstance(error, errors.NumbaError):
+            error.add_context(self.words.format(**self.given))
+
+
+def _variables(statement: Any, value: Any) -> list[Any]:
+    """Return the variables in a part of a statement, in order; most parts are variables, places and names."""
+    found: list[Any] = []
+    for part in value.values() if isinstance(value, dict) else value if isinstance(value, (list, tuple)) else (value,):
+        if isinstance(part, ir.Var):
+            found.append(part)
+        elif isinstance(part, ir.Inst):
+            found += part.list_vars()
+        elif isinstance(part, (list, tuple, dict)):
+            found += _variables(statement, part)
+    return found
+
+
+def _optimize_functions(library: Any, module: Any) -> None:
+    """Let LLVM optimise what a module defines."""
+    module.data_layout = library._codegen._data_layout
+    for function in module.functions:
+        if not function.is_declaration:
+            manager, builder = library._codegen._function_pass_manager()
+            manager.run(function, builder)
+
+
+def _lifetimes(processor: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
+    """Find out which variables live how long."""
+    source = processor.func_ir
+    source.blocks = transforms.canonicalize_cfg(source.blocks)
+    source.variable_lifetime = postproc.VariableLifetime(source.blocks)
+    source.generator_info = None
+    if emit_dels:
+        processor._insert_var_dels(extend_lifetimes=extend_lifetimes)
+
+
 def _instead() -> list[tuple[Any, str, Callable[..., Any]]]:
     """What stands in the place of functions of Numba, by owner and name; each remembers its answers for itself."""
     resolve, call, size = types.Function.get_call_type, types.Dispatcher.get_call_type, base.BaseContext.get_abi_sizeof
+    value_type, literal = BaseContext.resolve_value_type, lowering._lit_or_omitted
     meanings: dict[Any, Any] = {}
+    operators: dict[Any, Any] = {}
     sizes: dict[str, int] = {}
+    unknown = types.Omitted(ir.UNDEFINED)
     look = functools.cache(codegen.CPUCodegen._check_llvm_bugs)
 
     def meaning(function: Any, context: Any, args: Any, kws: Any) -> Any:
@@ -131,34 +184,37 @@ def _instead() -> list[tuple[Any, str, Callable[..., Any]]]:
     def of_any_integer(function: Any, context: Any, args: Any, kws: Any) -> Any:
         return call(function, context, tuple(map(types.unliteral, args)), kws)
 
+    def of_operators(context: Any, value: Any) -> Any:
+        if not (isinstance(value, BuiltinFunctionType) and value in utils.OPERATORS_TO_BUILTINS):
+            return value_type(context, value)
+        if value not in operators:
+            operators[value] = value_type(context, value)
+        return operators[value]
+
+    def of_known(value: Any) -> Any:
+        return unknown if value is ir.UNDEFINED else literal(value)
+
     def abi_size(context: Any, kind: Any) -> int:
         key = str(kind)
         if key not in sizes:
             sizes[key] = size(context, kind)
         return sizes[key]
 
-    def optimize_functions(library: Any, module: Any) -> None:
-        module.data_layout = library._codegen._data_layout
-        for function in module.functions:
-            if not function.is_declaration:
-                manager, builder = library._codegen._function_pass_manager()
-                manager.run(function, builder)
-
-    def lifetimes(processor: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
-        source = processor.func_ir
-        source.blocks = transforms.canonicalize_cfg(source.blocks)
-        source.variable_lifetime = postproc.VariableLifetime(source.blocks)
-        source.generator_info = None
-        if emit_dels:
-            processor._insert_var_dels(extend_lifetimes=extend_lifetimes)
-
     return [
         (types.Function, "get_call_type", meaning),
         (types.Dispatcher, "get_call_type", of_any_integer),
+        (BaseContext, "resolve_value_type", of_operators),
+        (lowering, "_lit_or_omitted", of_known),
+        (lowering, "new_error_context", _Told),
+        (typeinfer, "new_error_context", _Told),
+        (interpreter.errors.WarningsFixer, "catch_warnings", lambda fixer, **place: nullcontext()),
+        (ir.Inst, "_rec_list_vars", _variables),
+        (interpreter, "peep_hole_delete_with_exit", lambda code: code),
+        (interpreter, "peep_hole_fuse_dict_add_updates", lambda code: code),
         (base, "_has_loc", functools.cache(base._has_loc)),
         (base.BaseContext, "get_abi_sizeof", abi_size),
-        (postproc.PostProcessor, "run", lifetimes),
-        (codegen.CPUCodeLibrary, "_optimize_functions", optimize_functions),
+        (postproc.PostProcessor, "run", _lifetimes),
+        (codegen.CPUCodeLibrary, "_optimize_functions", _optimize_functions),
         (codegen.CPUCodegen, "_check_llvm_bugs", look),
         (ModulePassManager, "add_jump_threading_pass", lambda passes, threshold=-1: None),
     ]

@@ -113,7 +113,7 @@ def test_rounding_is_drawn_as_zero(pair: Callable[..., Result]) -> None:
 
 
 def test_observables_are_drawn_by_name_and_where_nothing_else_is_recorded() -> None:
-    scene = Scene("harmonic", "spring", chain(2), record=(), integrator="dop853", transient=0, window=1, observe={
+    scene = Scene("harmonic", "spring", chain(2), record=(), integrator="cash_karp", transient=0, window=1, observe={
         "error": "end(nodes.mean(x))", "own": "end(x)"}, axes={"sigma": (0.3, 0.1, 0.2)})  # fmt: skip
     given = {"show_progress": False, "width": 1}  # the drivers of other tests
     found = run(scene, **given)
