@@ -31,6 +31,7 @@ from ..program.expressions import Expression, Load, Name, Number, call, plus
 from ..program.lowering import lower
 from ..program.passes import real
 from ..program.statements import Function, Loop, Role, Statement, let, store
+from .rounding import magnitude
 
 __all__ = ["UNWATCHED", "Watched", "rule_of", "with_rows"]
 
@@ -101,10 +102,15 @@ class Watched:
 
     @property
     def events(self) -> tuple[sp.Expr, ...]:
-        """The section functions, what each keeps, filled up with zeros, and what ends a cell."""
+        """The section functions, what each keeps, filled up with zeros, what ends a cell, and the sizes of the terms.
+
+        The sizes are those of the terms of each function and of what ends a cell, 0 if it has a single one.
+        """
         rows = [[*parts[1:], *[sp.S.Zero] * (self.kept + 1 - len(parts))] for parts in self.sections]
-        last = [] if self.stop is None else [self.stop]
-        return (*(parts[0] for parts in self.sections), *(e for row in rows for e in row), *last)
+        first, last = [parts[0] for parts in self.sections], [] if self.stop is None else [self.stop]
+        sizes = [(e, magnitude(e)) for e in (*first, *last)]
+        terms = [sp.S.Zero if size == sp.Abs(e) else size for e, size in sizes]
+        return (*first, *(e for row in rows for e in row), *last, *terms)
 
     @property
     def has_rates(self) -> bool:

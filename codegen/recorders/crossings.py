@@ -18,27 +18,30 @@ from .panels import DEEPEST, POINT, TOP
 # --- kernel text below ---
 # What a polynomial misses is taken to be less than MARGIN times the sum of the upper half of its Legendre coefficients.
 MARGIN = 32.0
-# Rounding of the coefficients in the Bernstein basis, as a part of the largest value.
-ROUNDING = 1e-13
+# Rounding of the coefficients in the Bernstein basis, as a part of the largest value, and that of a function, as a part of
+# the size of its terms.
+ROUNDING, NOISE = 1e-13, 1.5e-14
 
 
 @njit(error_model="numpy", forceinline=True)
 def values_of(dims):
-    """How many values the section functions, what their points keep, and the stop are."""
-    return dims.sections * (1 + max(0, dims.kept)) + dims.stops
+    """How many values the section functions, what their points keep, the stop, and the sizes of the terms are."""
+    return dims.sections * (2 + max(0, dims.kept)) + 2 * dims.stops
 
 
 @njit(error_model="numpy", forceinline=True)
-def surface(k, theta, t, h, y, y_new, dense, found, dims, section):
-    """Section function k at the fraction theta of the step."""
-    section(theta, t, h, y, y_new, dense, found, dims[:2])
-    return load(found, k, WIDTH)
+def settled(k, row, found, dims):
+    """Section function k in a row of values, 0 where it is rounding of its terms."""
+    number = k if k < dims.sections else dims.sections  # the stop is the last one
+    size = load(found, (row + 1) * values_of(dims) - dims.sections - dims.stops + number, WIDTH)
+    value = load(found, row * values_of(dims) + k, WIDTH)
+    return select(absolute(value) <= NOISE * size, 0.0 * size, value)
 
 
 @njit(error_model="numpy", forceinline=True)
 def at_point(k, point, found, dims):
-    """Section function k at a point of the panel; the values behind `found` itself are those of a place beside them."""
-    return load(found, (point + 1) * values_of(dims) + k, WIDTH)
+    """Section function k at a point of the panel; row 0 has the values at a place beside them."""
+    return settled(k, point + 1, found, dims)
 
 
 @njit(error_model="numpy")
@@ -121,12 +124,32 @@ def crosses(before, after, direction):
 
 
 @njit(error_model="numpy")
-def locate(k, hits, low, high, g_low, g_high, t, h, y, y_new, dense, found, dims, section):
-    """Zero of section function k between two fractions of the step, to rounding, in the lanes of `hits`, and these lanes.
+def arrive(k, low, high, t, h, y, y_new, dense, found, dims, section):
+    """Where section function k comes to zero, or goes beyond, between two fractions of the step, by bisection."""
+    a, b = low, high
+    section(low, t, h, y, y_new, dense, found, dims[:2])
+    before = settled(k, 0, found, dims)
+    for _ in range(60):
+        if not any_lane(absolute(b - a) > 1e-15):
+            break
+        c = 0.5 * (a + b)
+        section(c, t, h, y, y_new, dense, found, dims[:2])
+        beyond = settled(k, 0, found, dims) * before <= 0.0
+        a, b = select(beyond, a, c), select(beyond, c, b)
+    return b
 
-    Regula falsi with the Anderson-Bjorck weight (BIT 13, 253, 1973), bisection where that stalls.  A pole is no zero.
+
+@njit(error_model="numpy")
+def locate(k, hits, point, low, high, t, h, y, y_new, dense, found, dims, section):
+    """Zero of section function k between two points of a panel, to rounding, in the lanes of `hits`, and these lanes.
+
+    Regula falsi with the Anderson-Bjorck weight (BIT 13, 253, 1973), bisection where that stalls.  A stretch of zeros has
+    its beginning as the zero; a pole is none.
     """
-    a, b, fa, fb = select(hits, low, high), high, g_low, g_high
+    g_low = load(found, (point + 1) * values_of(dims) + k, WIDTH)
+    g_high = load(found, (point + 2) * values_of(dims) + k, WIDTH)
+    stays = hits & ~(g_low * g_high < 0.0)
+    a, b, fa, fb = select(hits & ~stays, low, high), high, g_low, g_high
     for tried in range(60):
         active = absolute(b - a) > 1e-15  # the others are done and must not move, whatever their neighbours need
         if not any_lane(active):
@@ -135,11 +158,18 @@ def locate(k, hits, low, high, g_low, g_high, t, h, y, y_new, dense, found, dims
         good = (secant - a) * (b - secant) > 0.0
         c = select(good, secant, 0.5 * (a + b)) if tried % 4 != 3 else 0.5 * (a + b)
         c = select(active, c, b)
-        fc = surface(k, c, t, h, y, y_new, dense, found, dims, section)
+        section(c, t, h, y, y_new, dense, found, dims[:2])
+        fc = load(found, k, WIDTH)
         done = (fc == 0.0) | (absolute(c - b) <= 1e-15)
         other = fc * fb < 0.0  # the zero lies between c and b
         weight = 1.0 - fc / fb
         near, f_near = select(other, b, a), select(other, fb, fa * select(weight > 0.0, weight, 0.5))
         a, fa = select(active, select(done, c, near), b), select(active, f_near, fa)
         b, fb = c, fc
-    return b, hits & (absolute(fb) <= 2.0 * maximum(absolute(g_low), absolute(g_high)))
+    zeros = hits & ~stays & (fb == 0.0)
+    if any_lane(zeros):
+        section(maximum(b - 1e-12, low), t, h, y, y_new, dense, found, dims[:2])
+        stays = stays | (zeros & (load(found, k, WIDTH) == 0.0))
+    if any_lane(stays):
+        b = select(stays, arrive(k, low, b, t, h, y, y_new, dense, found, dims, section), b)
+    return b, hits & (stays | (absolute(fb) <= 2.0 * maximum(absolute(g_low), absolute(g_high))))

@@ -56,7 +56,7 @@ def cut_panel(
         if any_lane(hits):
             low = broadcast((place + rule[point, POINT]) * width, WIDTH)
             high = broadcast((place + rule[point + 1, POINT]) * width, WIDTH)
-            theta, hits = locate(k, hits, low, high, g_low, g_high, t, h, y, y_new, dense, found, dims, section)
+            theta, hits = locate(k, hits, point, low, high, t, h, y, y_new, dense, found, dims, section)
             keep_points(k, theta, lane_bits(hits), t, h, y, y_new, dense, found, cell, counts, points, dims, section)
 
 

@@ -8,7 +8,7 @@ from ..driver.clock import BASE, HALTED, MARK
 from ..driver.dense import inside
 from ..driver.names import SERIES, WIDTH
 from ..simd.lanes import any_lane, broadcast, load, select, store
-from .crossings import at_point, begin, crosses, locate, look, ready, values_of
+from .crossings import at_point, begin, crosses, locate, look, ready
 from .panels import POINT, following
 
 
@@ -35,7 +35,7 @@ def shorten(hits, part, y, y_new, dense, dims):
 @njit(error_model="numpy", cache=True)
 def halt(accept, t, h, clock, y, y_new, dense, found, control, rule, dims, section):
     """End the step of a lane where the last section function passes zero, and mark the lane; returns the lengths."""
-    now, k = load(clock, BASE, WIDTH) + t, values_of(dims) - 1
+    now, k = load(clock, BASE, WIDTH) + t, dims.sections * (1 + max(0, dims.kept))
     part, hits = broadcast(1.0, WIDTH), accept & ~accept
     begin(k, accept, found, rule, dims)
     level, place = 0, 0
@@ -49,9 +49,7 @@ def halt(accept, t, h, clock, y, y_new, dense, found, control, rule, dims, secti
             if any_lane(passes):
                 low = broadcast((place + rule[point, POINT]) * width, WIDTH)
                 high = broadcast((place + rule[point + 1, POINT]) * width, WIDTH)
-                zero, passes = locate(
-                    k, passes, low, high, g_low, g_high, now, h, y, y_new, dense, found, dims, section
-                )
+                zero, passes = locate(k, passes, point, low, high, now, h, y, y_new, dense, found, dims, section)
                 part, hits = select(passes, zero, part), hits | passes
         level, place = following(level, place, halved)
         if level == 0:

@@ -76,6 +76,41 @@ def test_a_stop_is_the_first_passage(integrator: str, width: int, name: str) -> 
     assert float(found.end_time) == pytest.approx(passages(PASSAGES[name], 5)[0], abs=2e-6)
 
 
+@pytest.mark.parametrize(("integrator", "width"), METHODS)
+def test_rounding_is_no_passage(integrator: str, width: int) -> None:
+    """Two oscillators with one start: what is zero for ever, but for rounding, passes nothing and stops nothing."""
+    zeros = [
+        "10*(x_1 - x_2)", "x_1**2 + v_1**2 - x_2**2 - v_2**2", "exp(x_1)*exp(-x_2) - 1", "sin(x_1)**2 + cos(x_1)**2 - 1",
+        "1e8*nodes.std(x)", "x_1 + v_1 - x_2 - v_2",
+    ]  # fmt: skip
+    pair = sc.Scene(
+        "van_der_pol", "spring", sc.chain(2), initial={"x": 1.0, "v": 0.0}, parameters={"sigma": 0.3}, transient=0, window=50,
+        time_unit="time", record=(), integrator=integrator, stop="v_1 - v_2 - 3/10*(x_1 - x_2)",
+        sections={f"s{k}": sc.Section(function, "both", keep="x") for k, function in enumerate(zeros)},
+    )  # fmt: skip
+    data = sc.run(pair, show_progress=False, width=width, reduce=False).data
+    assert [int(data[f"s{k}_count"]) for k in range(len(zeros))] == [0] * len(zeros)
+    assert float(data.end_time) == 50.0
+    apart = sc.run(pair, show_progress=False, width=width, x_2=1.2).data
+    assert int(apart.s0_count) > 0
+    assert float(apart.end_time) < 50.0
+
+
+@pytest.mark.parametrize(("integrator", "width"), METHODS)
+def test_a_stretch_of_zeros_is_passed_where_it_begins(integrator: str, width: int) -> None:
+    """A function that comes to zero and stays passes there, once; one that leaves zero does not."""
+    functions = {
+        "stairs": ("floor(t) - 3", [3.0]), "edge": ("min(t - 3, 0)", [3.0]), "above": ("max(x_1, 0)", [math.pi, 3 * math.pi]),
+        "tenths": ("floor(10*x_1)", [math.pi - math.asin(0.1), 2 * math.pi, 3 * math.pi - math.asin(0.1)]),
+    }  # fmt: skip
+    sections = {name: sc.Section(function, "both", keep="x") for name, (function, _) in functions.items()}
+    circle = CIRCLE.replace(integrator=integrator, sections=sections, window=10, rtol=1e-12, stop="x_1 - 2")
+    data = sc.run(circle, show_progress=False, width=width).data
+    for name, (_, times) in functions.items():
+        found = data[f"{name}_time"].values[: int(data[f"{name}_count"])]
+        np.testing.assert_allclose(found, times, rtol=0, atol=1e-10, err_msg=name)
+
+
 @pytest.mark.parametrize("steepness", [5, 20, 100])
 def test_a_layer_that_is_saturated_now_is_not_stepped_over(steepness: int) -> None:
     """In double precision tanh is 1 and its slope 0 when |v| > 19/steepness: a mass with steep friction crosses v = 0."""
