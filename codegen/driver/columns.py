@@ -66,6 +66,8 @@ class Tally(IntEnum):
     LARGEST = 3
     LEAST = 4
     LATEST = 5
+    SIZE = 6
+    """The largest absolute value at the points of the last step."""
 
 
 class Count(IntEnum):

@@ -13,9 +13,11 @@ from ..driver.clock import ATOL, RTOL
 from ..driver.names import WIDTH
 from ..simd.addresses import address
 from ..simd.lanes import absolute, any_lane, broadcast, load, maximum, select, store
-from .panels import DEEPEST, POINT, TOP
+from .panels import POINT, TOP
 
 # --- kernel text below ---
+# No panel of a step is shorter than 2^-DEEPEST.
+DEEPEST = 12
 # What a polynomial misses is taken to be less than MARGIN times the sum of the upper half of its Legendre coefficients.
 MARGIN = 32.0
 # Rounding of the coefficients in the Bernstein basis, as a part of the largest value, and that of a function, as a part of

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 
@@ -9,23 +11,30 @@ from ..driver.clock import ATOL, OBSERVED, RTOL
 from ..driver.names import WIDTH
 from ..simd.addresses import address
 from ..simd.lanes import broadcast, load, store
-from .panels import DEEPEST, NEXT, POINT, TOP, WEIGHT, following
+from .panels import NEXT, POINT, TOP, WEIGHT, following
 
 # --- kernel text below ---
-# Columns of `sums` behind the time that was observed: six for each value.
-TALLIES, TALLY = OBSERVED + 1, 6
-FIRST, SUM, SQUARES, LARGEST, LEAST, LATEST = 0, 1, 2, 3, 4, 5
+# Columns of `sums` behind the time that was observed: seven for each value.
+TALLIES, TALLY = OBSERVED + 1, 7
+FIRST, SUM, SQUARES, LARGEST, LEAST, LATEST, SIZE = 0, 1, 2, 3, 4, 5, 6
+# Panels of this width and less hold a jump or a singular place, and are halved while what they add is not exact enough.
+NARROW = 0.000244140625
+# No panel of a step is shorter than 2^-DEEPEST.
+DEEPEST = 40
 # Most parabolas for an extreme between the points of a panel.
 CLIMBS = 8
 
 
 @njit(error_model="numpy")
-def rough(which, seen, rule, control, dims):
+def rough(which, i, width, seen, sums, rule, control, dims):
     """True if the rule is not good enough for a value of a lane: its last Legendre coefficients are too large.
 
     The rule is exact to about twice the degree of the interpolant, so its error is about the square of the last
-    coefficient over the size of the value (Trefethen, SIAM Review 50, 67 (2008), theorem 4.5, for analytic functions).
+    coefficient over the size of the value (Trefethen, SIAM Review 50, 67 (2008), theorem 4.5, for analytic functions).  A
+    narrow panel is compared with the size of the value at the points of the whole step; a value that is not exact enough
+    in the narrowest panel is NaN.
     """
+    found = False
     for k in range(dims.observed):
         top = following = size = 0.0
         for point in range(len(rule)):
@@ -33,10 +42,15 @@ def rough(which, seen, rule, control, dims):
             top += rule[point, TOP] * value
             following += rule[point, NEXT] * value
             size = max(size, abs(value))
-        last = max(abs(top), abs(following))
+        last, at = max(abs(top), abs(following)), TALLIES + TALLY * k
+        if width == 1.0:
+            sums[i, at + SIZE] = size
+        allowed = control[RTOL] * sums[i, at + SIZE] + control[ATOL]
         if last * last > size * (control[RTOL] * size + control[ATOL]):
-            return True
-    return False
+            found = found | (width > NARROW) | (16.0 * width * last > allowed)
+            if width * (1 << DEEPEST) <= 1.0 and width * last > 16.0 * allowed:
+                sums[i, at + SUM] = math.nan
+    return found
 
 
 @njit(error_model="numpy")
@@ -155,7 +169,7 @@ def tally(counted, t, h, y, y_new, dense, seen, cell, sums, control, rule, dims,
             values(theta, t, h, y, y_new, dense, address(seen, point * dims.observed * WIDTH), dims[:2])
         for which in range(WIDTH):
             if (open_lanes[level] >> which) & 1:
-                if level < DEEPEST and rough(which, seen, rule, control, dims):
+                if rough(which, cell[which], width, seen, sums, rule, control, dims) and level < DEEPEST:
                     halved |= 1 << which
                 else:
                     add(which, cell[which], width * lengths[which], seen, sums, rule, dims)

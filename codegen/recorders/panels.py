@@ -8,8 +8,6 @@ from numba import njit
 # Columns of the rule (codegen/kernels/observed.py), which has a row for each point; behind TOP and NEXT stand the weights
 # of lower Legendre coefficients, and a square matrix is the last.
 POINT, WEIGHT, TOP, NEXT = 0, 1, 2, 3
-# No panel of a step is shorter than 2^-DEEPEST.
-DEEPEST = 12
 
 
 @njit(error_model="numpy", forceinline=True)

@@ -153,7 +153,7 @@ class Unrolled(Step):
         |z| <= |D| + sqrt|K| in any norm; otherwise the largest row sum is taken.
         """
         eq = self.equations
-        self.mass.refuse("a step that bounds the eigenvalues")
+        self.mass.refuse(f"integrator {self.method.name}, a step that bounds the eigenvalues")
         first_kind = eq.nodes[0]
         half = len(first_kind.state) // 2
         positions_move = len(first_kind.state) % 2 == 0 and first_kind.rhs[:half] == first_kind.state[half:]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import sympy as sp
@@ -54,6 +55,8 @@ class Section:
         object.__setattr__(self, "level", check_number("section level", self.level))
         if self.keep is not None:
             kept = (self.keep,) if isinstance(self.keep, str | sp.Expr) else self.keep
+            if not isinstance(kept, Iterable):
+                raise TypeError(f"section keep: found {short_repr(kept)}; expected expressions, such as ('v', 'x_1')")
             object.__setattr__(self, "keep", tuple(_text("section keep", e) for e in kept))
 
     @classmethod

@@ -189,10 +189,10 @@ def _mode_rates(
     for (row, column), e in variation.matrix:
         table[row][column] = e
     entries, orbit = tuple(map(tuple, table)), variation.orbit
-    names = (*orbit.state, *orbit.parameters, *(s.name for s in variation.parameters))
+    names = (*orbit.state, *orbit.parameters, *(s.name for s in variation.parameters), TIME.name)
     for cell in zip(state[:NODES], numbers[:NODES], strict=True):
         for strong in (0.0 * largest, largest):
-            values = dict(zip(names, np.concatenate([*cell, strong]), strict=True))
+            values = dict(zip(names, np.concatenate([*cell, strong, [0.0]]), strict=True))
             yield _eigenvalue_parts([_value(entries, {}, values)])
 
 
@@ -229,7 +229,7 @@ def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[
     for cell, start, numbers in zip(cells, rows.start, rows.numbers, strict=True):
         if not math.isfinite(lengths[cell]) or not np.isfinite(buffers.end[cell]).all():
             continue
-        fastest, turning = _rates(source.equations, buffers.end[cell], numbers)
+        fastest, turning = _rates(source.equations, buffers.end[cell], numbers, times[cell])
         if fastest * lengths[cell] > 1.0 and fastest > STIFF * max(1.0, turning):
             size = np.abs(buffers.end[cell]).max()
             if size > BLOWN * max(1.0, np.abs(start).max()):
@@ -244,21 +244,22 @@ def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[
                 continue
             warnings.warn(
                 f"stiff equations: found a rate of {fastest:.3g} beside slow motion, and {steps[cell]} {kind} steps in a cell; "
-                "expected few; integrator = 'rodas5p' takes longer steps",
+                "expected few; the result may be worse than rtol says; integrator = 'rodas5p' takes longer steps",
                 RuntimeWarning,
                 stacklevel=4,
             )
             return
 
 
-def _rates(equations: Equations, state: np.ndarray, numbers: np.ndarray) -> tuple[float, float]:
+def _rates(equations: Equations, state: np.ndarray, numbers: np.ndarray, time: float = 0.0) -> tuple[float, float]:
     """The fastest decay or growth at a state, and the fastest turning; 0 where there are no numbers."""
-    return _eigenvalue_parts(_blocks(equations, _named(equations, state, numbers)))
+    return _eigenvalue_parts(_blocks(equations, _named(equations, state, numbers, time)))
 
 
-def _named(equations: Equations, state: np.ndarray, numbers: np.ndarray) -> dict[str, float]:
-    """States and parameters by name."""
-    return dict(zip(equations.state, state, strict=True)) | dict(zip(equations.parameters, numbers, strict=True))
+def _named(equations: Equations, state: np.ndarray, numbers: np.ndarray, time: float = 0.0) -> dict[str, float]:
+    """States, parameters and the time by name."""
+    found = dict(zip(equations.state, state, strict=True)) | dict(zip(equations.parameters, numbers, strict=True))
+    return {**found, TIME.name: time}
 
 
 def _eigenvalue_parts(blocks: Iterable[np.ndarray]) -> tuple[float, float]:
@@ -363,10 +364,10 @@ def _value(
 ) -> np.ndarray:
     """The numbers of a block; NaN where it has none."""
     symbols, function = _compiled(entries)
-    known: dict[sp.Symbol, float] = {TIME: 0.0}
+    known: dict[sp.Symbol, float] = {}
     for s in symbols:
         e = at.get(s, s)
-        known[s] = 0.0 if s == TIME else float(e) if e.is_number else values[e.name]
+        known[s] = float(e) if e.is_number else values[e.name]
     size = len(entries)
     try:
         with np.errstate(all="ignore"):

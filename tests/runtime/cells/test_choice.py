@@ -160,6 +160,14 @@ def test_stiffness_that_appears_is_said_of_explicit_steps_too():
         run(scene.replace(window=1), s=[1.0, 100.0], show_progress=False)  # 25 steps
 
 
+def test_stiffness_that_comes_with_time_is_said() -> None:
+    scene = Scene(
+        Field({"x": "-exp(min(t, 9))*(x - cos(t))"}), record=(), transient=0, window=10, time_unit="time", initial={"x": 0.0}
+    )  # fmt: skip
+    with pytest.warns(RuntimeWarning, match="stiff equations: found a rate of 8.1e"):
+        run(scene, show_progress=False)
+
+
 def test_a_slope_without_bound_at_the_start_ends_no_run():
     """The rate of sign(v) |v|^(1/2) is finite at rest, its slope is not."""
     scene = Scene(

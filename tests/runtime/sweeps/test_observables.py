@@ -114,6 +114,26 @@ def test_kinks_are_found(integrator: str) -> None:
     assert float(found.top[0]) == pytest.approx(1.0, abs=1e-11)
 
 
+@pytest.mark.parametrize("integrator", ["taylor", "dop853"])
+def test_jumps_and_singular_places_are_integrated_or_said(integrator: str) -> None:
+    """Over x = cos t from 0 to 2 pi; the mean of 1/x has no value, that of |x|^(-1/2) none to ten digits of 2^-40 of a step."""
+    last = 2 * math.pi
+    expected = {
+        "mean(max(sign(x), 0))": 0.5, "variance(sign(x))": 1.0, "mean(floor(x + 1/2))": 0.0,
+        "mean(log(abs(x)))": -math.log(2), "mean(1/x)": math.nan, "mean(1/sqrt(abs(x)))": math.nan,
+    }  # fmt: skip
+    scene = Scene(
+        "harmonic", initial={"x": 1.0, "v": 0.0}, transient=0, window=last, time_unit="time", record=(), rtol=1e-10,
+        integrator=integrator, observe={f"o{k}": text for k, text in enumerate(expected)},
+    )  # fmt: skip
+    found = run(scene, show_progress=False)
+    for k, (text, value) in enumerate(expected.items()):
+        np.testing.assert_allclose(float(found.data[f"o{k}"].squeeze()), value, rtol=0, atol=1e-9, err_msg=text)
+    loose = run(scene.replace(rtol=1e-6), show_progress=False)
+    exact = math.gamma(0.25) / (math.gamma(0.75) * math.sqrt(math.pi))
+    assert float(loose.o5.squeeze()) == pytest.approx(exact, rel=1e-4)
+
+
 @pytest.mark.parametrize("integrator", ["taylor", "rodas5p", pytest.param("dop853", marks=pytest.mark.long)])
 def test_extremes_between_the_points_of_the_rule_are_found(integrator: str) -> None:
     """Of x = cos t and v = -sin t, smooth ones within the tolerance and one with a kink nearly so."""
