@@ -373,7 +373,7 @@ class Interpreted:
 
     def section(self, theta: Any, t: Any, h: Any, p: list, step: Step) -> Any:
         """The section function at the fraction theta of a step."""
-        y, found = [*step.y, *p], [None]
+        y, found = [*step.y, *p], [None, None]  # its value, and the size of its terms
         self.names["section"](theta, t, h, y, step.y_new, step.dense, found, self.source.dimensions)
         return found[0]
 

@@ -131,6 +131,11 @@ def test_wrong_sections_are_refused(given: dict[str, object], words: str) -> Non
     assert "\n" not in str(error.value)
 
 
+def test_what_is_kept_is_a_list_of_expressions() -> None:
+    with pytest.raises(TypeError, match=r"section keep: found 3; expected expressions, such as \('v', 'x_1'\)"):
+        Section("x_1", "both", keep=3)  # type: ignore[arg-type]
+
+
 def test_two_ways_to_say_a_section_are_refused() -> None:
     with pytest.raises(ValueError, match="found 'section' beside sections"):
         Scene(record=("section",), sections={"gap": Section("x_1")})
