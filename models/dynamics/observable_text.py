@@ -120,7 +120,10 @@ class _OfNodes(Expressions):
         return sp.pi if name == "pi" else sp.Symbol(name, real=True)
 
     def compare(self, sign: str, a: sp.Basic, b: sp.Basic) -> sp.Basic:
-        raise NoMeaning(f"found the condition {a} {sign} {b}; expected a value, such as the difference {a} - ({b})")
+        raise NoMeaning(
+            f"found the condition {a} {sign} {b}; expected a value, such as the difference {a} - ({b}); "
+            "sign, max and min make choices"
+        )
 
     def function(self, name: str) -> Callable[..., sp.Expr] | None:
         one = _ONE_NODE.fullmatch(name)
