@@ -255,7 +255,7 @@ def drive(
     groups = 3 if SWITCHING else 1
     scratch = 9 * dims.nodes if CONTACTS else 0
     watched = len(rule) * dims.observed
-    crossed = (len(rule) + 2) * (dims.sections * (2 + max(0, dims.kept)) + 2 * dims.stops)
+    crossed = (len(rule) + 1) * (dims.sections * (3 + max(0, dims.kept)) + 3 * dims.stops)
     block = aligned((2 * size + groups * (group + rows) + dims.workspace + scratch + watched + crossed) * WIDTH)
     y_new, middle, out = address(block, 0), address(block, size * WIDTH), address(block, 2 * size * WIDTH)
     first_group = (2 * size + scratch) * WIDTH

@@ -12,7 +12,7 @@ from numba import njit
 from ..driver.clock import ATOL, RTOL
 from ..driver.names import WIDTH
 from ..simd.addresses import address
-from ..simd.lanes import absolute, any_lane, broadcast, load, maximum, select, store
+from ..simd.lanes import absolute, any_lane, broadcast, load, maximum, minimum, select, store
 from .panels import POINT, TOP
 
 # --- kernel text below ---
@@ -32,25 +32,39 @@ def values_of(dims):
 
 
 @njit(error_model="numpy", forceinline=True)
+def value_of(k, row, found, dims):
+    """Function k in a row of values; the stop is the last one, behind what the points of sections keep."""
+    place = k if k < dims.sections else dims.sections * (1 + max(0, dims.kept))
+    return load(found, row * values_of(dims) + place, WIDTH)
+
+
+@njit(error_model="numpy", forceinline=True)
 def settled(k, row, found, dims):
-    """Section function k in a row of values, 0 where it is rounding of its terms."""
-    number = k if k < dims.sections else dims.sections  # the stop is the last one
-    size = load(found, (row + 1) * values_of(dims) - dims.sections - dims.stops + number, WIDTH)
-    value = load(found, row * values_of(dims) + k, WIDTH)
+    """Function k in a row of values, 0 where it is rounding of its terms."""
+    value = value_of(k, row, found, dims)
+    size = load(found, (row + 1) * values_of(dims) - dims.sections - dims.stops + k, WIDTH)
     return select(absolute(value) <= NOISE * size, 0.0 * size, value)
 
 
 @njit(error_model="numpy", forceinline=True)
-def at_point(k, point, found, dims):
-    """Section function k at a point of the panel; row 0 has the values at a place beside them."""
-    return settled(k, point + 1, found, dims)
+def memory(k, rule, dims):
+    """Where function k has how deep its lanes go, and behind it its settled values at the points of a panel.
+
+    Before that stand one row of values, of a place beside the points, and one for each point.
+    """
+    return (len(rule) + 1) * (values_of(dims) + k)
+
+
+@njit(error_model="numpy", forceinline=True)
+def at_point(k, point, found, rule, dims):
+    """The settled value of function k at a point of the panel."""
+    return load(found, memory(k, rule, dims) + 1 + point, WIDTH)
 
 
 @njit(error_model="numpy")
 def begin(k, wanted, found, rule, dims):
     """Let the lanes in `wanted` seek passages of function k in the next step."""
-    depth = (len(rule) + 1) * values_of(dims) + k
-    store(found, depth, select(wanted, 0.0, broadcast(-1.0, WIDTH)))
+    store(found, memory(k, rule, dims), select(wanted, 0.0, broadcast(-1.0, WIDTH)))
 
 
 @njit(error_model="numpy")
@@ -59,6 +73,19 @@ def look(place, width, t, h, y, y_new, dense, found, rule, dims, section):
     for point in range(len(rule)):
         theta = broadcast((place + rule[point, POINT]) * width, WIDTH)
         section(theta, t, h, y, y_new, dense, address(found, (point + 1) * values_of(dims) * WIDTH), dims[:2])
+
+
+@njit(error_model="numpy")
+def far(k, found, rule, dims):
+    """Settle the values of function k in a panel; returns where they are much further from zero than from each other."""
+    lowest = highest = settled(k, 1, found, dims)
+    known = lowest == lowest
+    for point in range(len(rule)):
+        value = settled(k, point + 1, found, dims)
+        store(found, memory(k, rule, dims) + 1 + point, value)
+        lowest, highest, known = minimum(lowest, value), maximum(highest, value), known & (value == value)
+    spread = 8.0 * (highest - lowest)
+    return known & ((lowest > spread) | (highest < -spread))
 
 
 @njit(error_model="numpy")
@@ -74,10 +101,10 @@ def simple(k, found, rule, control, dims):
     for column in range(TOP, matrix):
         coefficient = zero
         for point in range(len(rule)):
-            coefficient = coefficient + rule[point, column] * at_point(k, point, found, dims)
+            coefficient = coefficient + rule[point, column] * at_point(k, point, found, rule, dims)
         missed = missed + MARGIN * absolute(coefficient)  # NaN if the function has no value at some point
     for point in range(len(rule)):
-        value = at_point(k, point, found, dims)
+        value = at_point(k, point, found, rule, dims)
         size, known = maximum(size, absolute(value)), known | (value == value)
     small = max(control[RTOL], ROUNDING) * size + control[ATOL]
     least, slack = maximum(missed, small), missed + ROUNDING * size
@@ -86,7 +113,7 @@ def simple(k, found, rule, control, dims):
     for row in range(len(rule)):
         coefficient = zero
         for point in range(len(rule)):
-            coefficient = coefficient + rule[row, matrix + point] * at_point(k, point, found, dims)
+            coefficient = coefficient + rule[row, matrix + point] * at_point(k, point, found, rule, dims)
         here = select(coefficient > least, 1.0, select(coefficient < -least, -1.0, zero))
         changes = changes + select(here * side < 0.0, 1.0, zero)
         clear, side = clear & ~(here == 0.0), select(here == 0.0, side, here)
@@ -103,12 +130,13 @@ def ready(k, level, found, rule, control, dims):
 
     Each lane remembers how deep it goes: it looks at panels of that level and above.
     """
-    place = (len(rule) + 1) * values_of(dims) + k
+    place = memory(k, rule, dims)
     depth = load(found, place, WIDTH)
     wanted = depth >= 1.0 * level
-    done = wanted
-    if level < DEEPEST:
-        done = wanted & simple(k, found, rule, control, dims)
+    done = far(k, found, rule, dims) | ~wanted
+    if level < DEEPEST and any_lane(~done):
+        done = done | simple(k, found, rule, control, dims)
+    done = wanted & done if level < DEEPEST else wanted
     halved = wanted & ~done
     store(found, place, select(halved, level + 1.0, select(done, 1.0 * level, depth)))
     return done, any_lane(halved)
@@ -148,8 +176,7 @@ def locate(k, hits, point, low, high, t, h, y, y_new, dense, found, dims, sectio
     Regula falsi with the Anderson-Bjorck weight (BIT 13, 253, 1973), bisection where that stalls.  A stretch of zeros has
     its beginning as the zero; a pole is none.
     """
-    g_low = load(found, (point + 1) * values_of(dims) + k, WIDTH)
-    g_high = load(found, (point + 2) * values_of(dims) + k, WIDTH)
+    g_low, g_high = value_of(k, point + 1, found, dims), value_of(k, point + 2, found, dims)
     stays = hits & ~(g_low * g_high < 0.0)
     a, b, fa, fb = select(hits & ~stays, low, high), high, g_low, g_high
     for tried in range(60):
@@ -161,7 +188,7 @@ def locate(k, hits, point, low, high, t, h, y, y_new, dense, found, dims, sectio
         c = select(good, secant, 0.5 * (a + b)) if tried % 4 != 3 else 0.5 * (a + b)
         c = select(active, c, b)
         section(c, t, h, y, y_new, dense, found, dims[:2])
-        fc = load(found, k, WIDTH)
+        fc = value_of(k, 0, found, dims)
         done = (fc == 0.0) | (absolute(c - b) <= 1e-15)
         other = fc * fb < 0.0  # the zero lies between c and b
         weight = 1.0 - fc / fb
@@ -171,7 +198,7 @@ def locate(k, hits, point, low, high, t, h, y, y_new, dense, found, dims, sectio
     zeros = hits & ~stays & (fb == 0.0)
     if any_lane(zeros):
         section(maximum(b - 1e-12, low), t, h, y, y_new, dense, found, dims[:2])
-        stays = stays | (zeros & (load(found, k, WIDTH) == 0.0))
+        stays = stays | (zeros & (value_of(k, 0, found, dims) == 0.0))
     if any_lane(stays):
         b = select(stays, arrive(k, low, b, t, h, y, y_new, dense, found, dims, section), b)
     return b, hits & (stays | (absolute(fb) <= 2.0 * maximum(absolute(g_low), absolute(g_high))))

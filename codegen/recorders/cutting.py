@@ -51,7 +51,7 @@ def cut_panel(
 ):  # fmt: skip
     """Find the points of section k between the points of a panel, in the lanes of `done`."""
     for point in range(len(rule) - 1):
-        g_low, g_high = at_point(k, point, found, dims), at_point(k, point + 1, found, dims)
+        g_low, g_high = at_point(k, point, found, rule, dims), at_point(k, point + 1, found, rule, dims)
         hits = crosses(g_low, g_high, direction) & done
         if any_lane(hits):
             low = broadcast((place + rule[point, POINT]) * width, WIDTH)

@@ -35,7 +35,7 @@ def shorten(hits, part, y, y_new, dense, dims):
 @njit(error_model="numpy", cache=True)
 def halt(accept, t, h, clock, y, y_new, dense, found, control, rule, dims, section):
     """End the step of a lane where the last section function passes zero, and mark the lane; returns the lengths."""
-    now, k = load(clock, BASE, WIDTH) + t, dims.sections * (1 + max(0, dims.kept))
+    now, k = load(clock, BASE, WIDTH) + t, dims.sections
     part, hits = broadcast(1.0, WIDTH), accept & ~accept
     begin(k, accept, found, rule, dims)
     level, place = 0, 0
@@ -44,7 +44,7 @@ def halt(accept, t, h, clock, y, y_new, dense, found, control, rule, dims, secti
         look(place, width, now, h, y, y_new, dense, found, rule, dims, section)
         done, halved = ready(k, level, found, rule, control, dims)
         for point in range(len(rule) - 1):
-            g_low, g_high = at_point(k, point, found, dims), at_point(k, point + 1, found, dims)
+            g_low, g_high = at_point(k, point, found, rule, dims), at_point(k, point + 1, found, rule, dims)
             passes = crosses(g_low, g_high, 0.0) & done & ~hits
             if any_lane(passes):
                 low = broadcast((place + rule[point, POINT]) * width, WIDTH)
