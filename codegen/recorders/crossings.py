@@ -12,7 +12,7 @@ from numba import njit
 from ..driver.clock import ATOL, RTOL
 from ..driver.names import WIDTH
 from ..simd.addresses import address
-from ..simd.lanes import absolute, any_lane, broadcast, load, maximum, minimum, select, store
+from ..simd.lanes import absolute, any_lane, broadcast, load, maximum, select, store
 from .panels import POINT, TOP
 
 # --- kernel text below ---
@@ -69,23 +69,12 @@ def begin(k, wanted, found, rule, dims):
 
 @njit(error_model="numpy")
 def look(place, width, t, h, y, y_new, dense, found, rule, dims, section):
-    """Compute all functions at the points of a panel."""
+    """Compute all functions at the points of a panel, and settle them."""
     for point in range(len(rule)):
         theta = broadcast((place + rule[point, POINT]) * width, WIDTH)
         section(theta, t, h, y, y_new, dense, address(found, (point + 1) * values_of(dims) * WIDTH), dims[:2])
-
-
-@njit(error_model="numpy")
-def far(k, found, rule, dims):
-    """Settle the values of function k in a panel; returns where they are much further from zero than from each other."""
-    lowest = highest = settled(k, 1, found, dims)
-    known = lowest == lowest
-    for point in range(len(rule)):
-        value = settled(k, point + 1, found, dims)
-        store(found, memory(k, rule, dims) + 1 + point, value)
-        lowest, highest, known = minimum(lowest, value), maximum(highest, value), known & (value == value)
-    spread = 8.0 * (highest - lowest)
-    return known & ((lowest > spread) | (highest < -spread))
+        for k in range(dims.sections + dims.stops):
+            store(found, memory(k, rule, dims) + 1 + point, settled(k, point + 1, found, dims))
 
 
 @njit(error_model="numpy")
@@ -133,10 +122,9 @@ def ready(k, level, found, rule, control, dims):
     place = memory(k, rule, dims)
     depth = load(found, place, WIDTH)
     wanted = depth >= 1.0 * level
-    done = far(k, found, rule, dims) | ~wanted
-    if level < DEEPEST and any_lane(~done):
-        done = done | simple(k, found, rule, control, dims)
-    done = wanted & done if level < DEEPEST else wanted
+    done = wanted
+    if level < DEEPEST:
+        done = wanted & simple(k, found, rule, control, dims)
     halved = wanted & ~done
     store(found, place, select(halved, level + 1.0, select(done, 1.0 * level, depth)))
     return done, any_lane(halved)
