@@ -91,10 +91,16 @@ def without_drive(equations: Equations, values: Mapping[str, float]) -> Equation
     """
     if not equations.forced or equations.mixed:
         return equations
+    common = set(equations.parameters) - equations.single
+    return _without_drive(equations, tuple(sorted(name for name in common if values[name] == 0)))
+
+
+@lru_cache(maxsize=64)
+def _without_drive(equations: Equations, zeros: tuple[str, ...]) -> Equations:
+    """The same for parameters that are 0; Newton's method on an orbit needs it at every step."""
     rates = [*(e for node in equations.nodes for e in node.rhs), *(e for edge in equations.edges for e in edge.rhs)]
     timed = {s.name for e in rates for term in sp.Add.make_args(e) if term.has(TIME) for s in term.free_symbols}
-    common = set(equations.parameters) - equations.single
-    quiet = substitute_constants(equations, {name: 0 for name in sorted(timed & common) if values[name] == 0})
+    quiet = substitute_constants(equations, {name: 0 for name in zeros if name in timed})
     return equations if quiet.forced or len(quiet.layers) < len(equations.layers) else quiet
 
 

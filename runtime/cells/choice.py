@@ -229,10 +229,13 @@ def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[
     for cell, start, numbers in zip(cells, rows.start, rows.numbers, strict=True):
         if not math.isfinite(lengths[cell]) or not np.isfinite(buffers.end[cell]).all():
             continue
+        size = np.abs(buffers.end[cell]).max()
+        blown = size > BLOWN * max(1.0, np.abs(start).max())
+        if steps[cell] < FEW and not blown:
+            continue
         fastest, turning = _rates(source.equations, buffers.end[cell], numbers, times[cell])
         if fastest * lengths[cell] > 1.0 and fastest > STIFF * max(1.0, turning):
-            size = np.abs(buffers.end[cell]).max()
-            if size > BLOWN * max(1.0, np.abs(start).max()):
+            if blown:
                 warnings.warn(
                     f"a state grew to {size:.3g} in {steps[cell]} {kind} steps of a cell; expected a bounded motion; "
                     "check the signs and the size of the parameters",
@@ -240,8 +243,6 @@ def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[
                     stacklevel=4,
                 )
                 return
-            if steps[cell] < FEW:
-                continue
             warnings.warn(
                 f"stiff equations: found a rate of {fastest:.3g} beside slow motion, and {steps[cell]} {kind} steps in a cell; "
                 "expected few; the result may be worse than rtol says; integrator = 'rodas5p' takes longer steps",
