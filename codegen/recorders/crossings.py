@@ -158,12 +158,14 @@ def arrive(k, low, high, t, h, y, y_new, dense, found, dims, section):
 
 
 @njit(error_model="numpy")
-def locate(k, hits, point, low, high, t, h, y, y_new, dense, found, dims, section):
+def locate(k, hits, point, place, width, t, h, y, y_new, dense, found, rule, dims, section):
     """Zero of section function k between two points of a panel, to rounding, in the lanes of `hits`, and these lanes.
 
     Regula falsi with the Anderson-Bjorck weight (BIT 13, 253, 1973), bisection where that stalls.  A stretch of zeros has
     its beginning as the zero; a pole is none.
     """
+    low = broadcast((place + rule[point, POINT]) * width, WIDTH)
+    high = broadcast((place + rule[point + 1, POINT]) * width, WIDTH)
     g_low, g_high = value_of(k, point + 1, found, dims), value_of(k, point + 2, found, dims)
     stays = hits & ~(g_low * g_high < 0.0)
     a, b, fa, fb = select(hits & ~stays, low, high), high, g_low, g_high

@@ -10,7 +10,7 @@ from ..driver.dense import inside
 from ..driver.names import WIDTH
 from ..simd.lanes import any_lane, broadcast, lane_bits, load, store
 from .crossings import at_point, begin, crosses, locate, look, ready
-from .panels import POINT, following
+from .panels import following
 
 
 # --- kernel text below ---
@@ -54,9 +54,7 @@ def cut_panel(
         g_low, g_high = at_point(k, point, found, rule, dims), at_point(k, point + 1, found, rule, dims)
         hits = crosses(g_low, g_high, direction) & done
         if any_lane(hits):
-            low = broadcast((place + rule[point, POINT]) * width, WIDTH)
-            high = broadcast((place + rule[point + 1, POINT]) * width, WIDTH)
-            theta, hits = locate(k, hits, point, low, high, t, h, y, y_new, dense, found, dims, section)
+            theta, hits = locate(k, hits, point, place, width, t, h, y, y_new, dense, found, rule, dims, section)
             keep_points(k, theta, lane_bits(hits), t, h, y, y_new, dense, found, cell, counts, points, dims, section)
 
 

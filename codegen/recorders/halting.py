@@ -9,7 +9,7 @@ from ..driver.dense import inside
 from ..driver.names import SERIES, WIDTH
 from ..simd.lanes import any_lane, broadcast, load, select, store
 from .crossings import at_point, begin, crosses, locate, look, ready
-from .panels import POINT, following
+from .panels import following
 
 
 # --- kernel text below ---
@@ -47,9 +47,9 @@ def halt(accept, t, h, clock, y, y_new, dense, found, control, rule, dims, secti
             g_low, g_high = at_point(k, point, found, rule, dims), at_point(k, point + 1, found, rule, dims)
             passes = crosses(g_low, g_high, 0.0) & done & ~hits
             if any_lane(passes):
-                low = broadcast((place + rule[point, POINT]) * width, WIDTH)
-                high = broadcast((place + rule[point + 1, POINT]) * width, WIDTH)
-                zero, passes = locate(k, passes, point, low, high, now, h, y, y_new, dense, found, dims, section)
+                zero, passes = locate(
+                    k, passes, point, place, width, now, h, y, y_new, dense, found, rule, dims, section
+                )
                 part, hits = select(passes, zero, part), hits | passes
         level, place = following(level, place, halved)
         if level == 0:
