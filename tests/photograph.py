@@ -17,6 +17,7 @@ import hashlib
 import io
 import json
 import math
+import os
 import platform
 import sys
 import tempfile
@@ -25,6 +26,7 @@ from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import family_sizes
 import llvmlite.binding as llvm
@@ -84,6 +86,9 @@ __all__ = ["SCENES", "Picture", "camera", "compare", "take"]
 WIDTH = 4
 """Lanes of every sweep; tests/runtime/cells/test_determinism.py has the kernel of the friction pair too."""
 
+ELSE_WIDTH = 8
+"""Lanes of all else: how many strengths of a mode are looked at follows from it, and the last digits of exponents with it."""
+
 ALL = ("sync_error", "section", "trajectory")
 LONGEST = 200
 """Longer texts are kept as their SHA-256."""
@@ -142,7 +147,8 @@ def camera() -> dict[str, str]:
 
 def take(name: str, whole: bool = False) -> dict[str, Any]:
     """Return the quantities of a scene in JSON types; `whole` keeps long texts as they are."""
-    return {quantity: _encoded(value, whole) for quantity, value in sorted(SCENES[name].see().items())}
+    with patch.dict(os.environ, SYNCHAIN_WIDTH=str(ELSE_WIDTH)):
+        return {quantity: _encoded(value, whole) for quantity, value in sorted(SCENES[name].see().items())}
 
 
 def _encoded(value: Any, whole: bool) -> Any:

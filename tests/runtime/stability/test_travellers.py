@@ -158,7 +158,8 @@ def test_the_largest_error_is_the_largest_or_too_large() -> None:
     error = batches.error()
     assert batches.largest_error(error.max()) == error.max()
     assert batches.worst == 2
-    assert batches.largest_error(0.5 * error.max()) == error.max()
+    # of one column BLAS adds in another order
+    assert batches.largest_error(0.5 * error.max()) == pytest.approx(error.max(), rel=1e-14)
     batches.worst = 0
-    assert batches.largest_error(0.5 * error[0]) == error[0]
+    assert batches.largest_error(0.5 * error[0]) == pytest.approx(error[0], rel=1e-14)
     assert batches.largest_error(error.max()) == error.max()
