@@ -17,23 +17,26 @@ from sympy.functions.elementary.piecewise import Piecewise
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.jumps import KINKED, jumps
+from synchain.models.mechanics.jumps import JUMPING, KINKED
 
 from ..program.expressions import ONE, ZERO, Expression, Name, Negation, Number
 from ..program.lowering import lower
 from ..program.passes import Names
 from ..program.printers import LANES
+from .leaps import Leap, leaping, templates, unpassed
 from .series import (
+    Brink,
     Choice,
     Constant,
+    Fraction,
     Integral,
     Kink,
+    Leaping,
     Linear,
     Power,
     Product,
     QuotientIntegral,
     Ratio,
-    Row,
     Series,
     Slope,
     Square,
@@ -41,7 +44,7 @@ from .series import (
     SquareRoot,
     State,
     Time,
-    Unknown,
+    Whole,
 )  # fmt: skip
 from .terms import add, times
 
@@ -70,26 +73,40 @@ PLAIN = 3
 
 
 def jump(equations: Equations) -> sp.Expr | None:
-    """Return a part of some equations without a series in the states or in time; None if there is none."""
-    return next((part for own, moving in _templates(equations) for part in _unserial(own, moving)), None)
+    """Return a part of some equations that no Taylor step passes; None if there is none."""
+    serial = (part for own, ends in templates(equations) for part in _unserial(own, _moving(ends)))
+    return min({*unpassed(equations), *serial}, key=sp.default_sort_key, default=None)
+
+
+def check_jumps(equations: Equations) -> None:
+    """Raise ValueError for equations with a part that no Taylor step passes."""
+    part = jump(equations)
+    if part is not None:
+        jumps = isinstance(part, (*JUMPING, Piecewise))
+        why = (
+            "along which motion may slide, or which a contact or a mass matrix feels"
+            if jumps
+            else "which has no series"
+        )
+        raise ValueError(
+            f"taylor: found {part}, {why}; expected functions with a series between zeros, and jumps that motion passes; "
+            "use integrator dop853 or rodas5p"
+        )
 
 
 def is_analytic(equations: Equations) -> bool:
     """True if no rate has a jump or a kink in the states or in time."""
     return not any(
-        part.free_symbols & moving and type(part) not in STARTS
-        for own, moving in _templates(equations)
+        part.free_symbols & _moving(ends) and type(part) not in STARTS
+        for own, ends in templates(equations)
         for e in own
         for part in e.atoms(sp.Function, *KINKED)
     )
 
 
-def _templates(equations: Equations) -> Iterator[tuple[Sequence[sp.Expr], set[sp.Symbol]]]:
-    """Right-hand sides and masses of each kind of node and link, and what moves in them."""
-    for node in equations.nodes:
-        yield (*node.rhs, *(e for row in node.inertia for e in row)), {TIME, *node.state}
-    for edge in equations.edges:
-        yield edge.expressions, {TIME, *edge.here, *edge.there}
+def _moving(ends: Iterable[Iterable[sp.Symbol]]) -> set[sp.Symbol]:
+    """What moves within a step: time, and the states at each end."""
+    return {TIME, *(s for end in ends for s in end)}
 
 
 def is_linear(equations: Equations) -> bool:
@@ -101,15 +118,14 @@ def is_linear(equations: Equations) -> bool:
     return fixed and equations.constant_mass
 
 
-def _unserial(expressions: Sequence[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:
-    """The parts without series: those that jump, roots at a kink, and functions without a recurrence."""
-    known = (*STARTS, *KINKED, Piecewise)
-    functions = {part for e in expressions for part in e.atoms(sp.Function) if not isinstance(part, known)}
+def _unserial(expressions: Sequence[sp.Expr], moving: Set[sp.Symbol]) -> set[sp.Expr]:
+    """The parts without series: roots at a kink, and functions without a recurrence."""
+    sided = (*KINKED, *JUMPING, Piecewise)
+    functions = {part for e in expressions for part in e.atoms(sp.Function) if not isinstance(part, (*STARTS, *sided))}
     powers = {part for e in expressions for part in e.atoms(sp.Pow) if part.base.free_symbols & moving}
-    roots = [p for p in powers if p.exp.is_integer is not True]
-    roots = [p for p in roots if any(isinstance(f, (*KINKED, Piecewise)) for f in sp.Mul.make_args(p.base))]
-    unknown = (part for part in functions if part.free_symbols & moving)
-    return sorted({*jumps(expressions, moving), *roots, *unknown}, key=sp.default_sort_key)
+    roots = {p for p in powers if p.exp.is_integer is not True}
+    roots = {p for p in roots if any(isinstance(f, sided) for f in sp.Mul.make_args(p.base))}
+    return roots | {part for part in functions if part.free_symbols & moving}
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,14 +137,9 @@ class Template:
 
     @classmethod
     def of(cls, expressions: Sequence[sp.Expr], moving: Iterable[sp.Symbol], supply: Iterator[sp.Symbol]) -> Template:
-        """Share the repeated parts under names of the supply; ValueError for functions of `moving` symbols that jump."""
+        """Share the repeated parts under names of the supply; of those, and of symbols, some are `moving`."""
         symbols = frozenset(moving)
-        for part in _unserial(expressions, symbols):
-            raise ValueError(
-                f"taylor: a function that jumps, or has no series; found {part}; expected continuous functions, "
-                f"analytic on either side of a kink; use integrator dop853 or rodas5p"
-            )
-        shared, reduced = sp.cse(expressions, symbols=supply, order="canonical")
+        shared, reduced = sp.cse(leaping(expressions, symbols), symbols=supply, order="canonical")
         constant: dict[sp.Symbol, sp.Expr] = {}
         statements = []
         for symbol, e in shared:
@@ -244,12 +255,23 @@ class Graph:
         inner = self.put(Square, left) if left is right else self.put(Product, left, right)
         return self.sum([(times(a, b), inner)])
 
-    def choice(self, gap: Series, above: Series, below: Series) -> Series:
-        """`above` where a series is positive, `below` where it is negative; they agree where it is zero."""
+    def choice(self, gap: Series, *values: Series) -> Series:
+        """One of some values: above where a series is positive, below where it is negative, between them where it is zero.
+
+        Two values agree where the series is zero.
+        """
         factor, inner = split(gap)
-        if _negative(factor) and isinstance(factor, Number):
-            above, below = below, above
-        return self.put(Choice, self.put(Kink, inner if isinstance(factor, Number) else gap), above, below)
+        side, kind = (Kink, Choice) if len(values) == 2 else (Brink, Leaping)
+        if not isinstance(factor, Number):
+            return self.put(kind, self.put(side, gap), *values)
+        return self.put(kind, self.put(side, inner), *(reversed(values) if _negative(factor) else values))
+
+    def whole(self, series: Series) -> Series:
+        """The whole number below a series."""
+        factor, inner = split(series)
+        part = self.put(Fraction, series, inner if factor == Number(-1.0) else series)
+        rest = self.sum([(Number(-1.0), part)], ONE)
+        return self.put(Whole, series, self.put(Brink, part), self.put(Brink, rest))
 
     def larger(self, left: Series, right: Series) -> Series:
         """The larger one of two series."""
@@ -315,6 +337,10 @@ class Graph:
             return self.power(e.base, e.exp)
         if isinstance(e, (*KINKED, Piecewise)):
             return self.kinked(e)
+        if isinstance(e, Leap):
+            return self.choice(*map(self.of, e.args))
+        if isinstance(e, sp.floor):
+            return self.whole(self.of(e.args[0]))
         return self.function(e)
 
     def constant(self, e: sp.Expr) -> Expression:
@@ -458,7 +484,7 @@ def _hiding(roots: Iterable[Series]) -> set[Series]:
             continue
         seen.add(s)
         match s:
-            case Linear() | Choice():
+            case Linear() | Choice() | Leaping():
                 open_ends += s.linear
             case Integral() | QuotientIntegral():
                 open_ends.append(s.argument)
@@ -476,7 +502,7 @@ def _hiding(roots: Iterable[Series]) -> set[Series]:
 def _degree(series: Series) -> float:
     """The degree of a series as a polynomial in states, time, and sines and cosines of such; inf if it is none."""
     match series:
-        case Linear() | Choice():
+        case Linear() | Choice() | Leaping():
             return max(map(_degree, series.linear), default=0.0)
         case Product():
             return _degree(series.left) + _degree(series.right)
@@ -510,8 +536,13 @@ def _negative(e: Expression) -> bool:
 
 def _words() -> tuple[str, ...]:
     """What names of series begin with."""
-    kinds = (Choice, Kink, Linear, Power, Product, Ratio, Row, Slope, Square, SquaredSecant, SquareRoot, Unknown)
-    return (*(kind.__name__.lower() for kind in kinds), *STARTS.values())
+    return (*dict.fromkeys(kind.__name__.lower() for kind in _kinds(Series)), *STARTS.values())
+
+
+def _kinds(kind: type[Series]) -> Iterator[type[Series]]:
+    for own in kind.__subclasses__():
+        yield own
+        yield from _kinds(own)
 
 
 def _text(e: sp.Expr) -> str:

@@ -22,11 +22,11 @@ from ..program.statements import Assign
 from ..steps.fields import MeanField, compensated, mean_fields
 from ..steps.names import NAMES
 from ..steps.places import Joint, Kind, Span, places
-from .graph import Graph, Template
+from .graph import Graph, Template, check_jumps
 from .length import finished, last_orders, reach, unseen
 from .masses import moving, solved
-from .passage import closed, first_passage, functions, jumps, loose, passed
-from .series import Constant, Series, State, Time, magnitude
+from .passage import closed, first_passage, functions, jumps, leapt, loose, passed
+from .series import Brink, Constant, Series, State, Time, magnitude
 from .step import TaylorStep, broken, called, returned
 from .terms import absolute, add, lane, largest, show, statement
 
@@ -221,7 +221,8 @@ class Section:
         found = []
         for kink in self.graph.kinks:
             size, first = f"load(dense, {self.slot(kink.size, '0')}, WIDTH)", self.where(kink.base, "0")
-            found.append(passed(self.load(kink, str(degree)), size, first, self.stride(kink.base), degree))
+            side, place = self.load(kink, str(degree)), (size, first, self.stride(kink.base), degree)
+            found += leapt(self.load(kink, "0"), side, *place) if isinstance(kink, Brink) else [passed(side, *place)]
         if self.mode:
             sizes = [f"load(dense, at_sizes + {place}, WIDTH)" for place in GAPS]
             places = [f"at_gaps + {place}" for place in GAPS]
@@ -539,8 +540,9 @@ class LoopWriter:
         lines += [f"    {line}" for line in turn]
         if not self.ends:
             lines += self.next_states(f"{1.0 / self.order!r}*scale", str(self.order))
-        lines += self.closing()
-        before = [*functions(self.ends, eq.sticks), CONVOLUTION]
+        ending = self.closing()
+        lines += ending
+        before = [*functions(ending), CONVOLUTION]
         return TaylorStep.of(lines, self.order, size, ", graph, weights", before)
 
     def bases(self) -> tuple[list[str], int]:
@@ -595,7 +597,7 @@ class LoopWriter:
         lines += [loose(self.exact)] if contacts else []
         lines += [line for section in sections for line in section.lengths(p)]
         lines += [f"reach = {show(reach(orders))}", *finished(p, watching, contacts)]
-        lines += first_passage([line for section in sections for line in section.passages(p, self.exact)], contacts)
+        lines += first_passage([line for section in sections for line in section.passages(p, self.exact)])
         lines += ["# new state", "total = 0.0*scale"]
         lines += self.states(
             f"new = {at.format(k=p)}",
@@ -622,4 +624,5 @@ def write_looped(equations: Equations, order: int) -> TaylorStep:
     if equations.inertial and equations.link_count:
         found = "links with inertia" if equations.inertial_links else "links of nodes with a mass matrix"
         raise ValueError(f"taylor: found {found} in a network that is stepped in loops; use dop853 or rodas5p")
+    check_jumps(equations)
     return LoopWriter(equations, order).step()

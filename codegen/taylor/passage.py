@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from synchain.models.dynamics.equations import Equations
 
-__all__ = ["closed", "first_passage", "functions", "jumps", "loose", "passed"]
+__all__ = ["closed", "first_passage", "functions", "jumps", "leapt", "loose", "passed"]
 
 PASSAGE = '''
 PASSED, ROUNDING, NEAREST = 1e-10, 1e-15, 1e-8
@@ -79,11 +79,28 @@ def closing(side, late, size, nearest, dense, first, stride, room, degree, ratio
     return passage(side, 1e4*size, 1e-14 + late, nearest, dense, first, stride, degree, ratio)
 '''.strip()
 
+LEAVING = '''
+@njit(error_model='numpy')
+def leaving(begun, side, size, nearest, dense, first, stride, degree, ratio):
+    """How far to go, at most to `ratio`, from a jump where a step begins: so far that the next one begins beside it."""
+    active, place = (absolute(begun) < 0.5) & (absolute(side) > 0.5), 0.0*ratio + nearest
+    begins = active
+    for _ in range(60):
+        spread = 0.0*ratio
+        for k in range(degree, 0, -1):
+            spread = (spread + absolute(load(dense, first + k*stride, WIDTH)))*place
+        active = active & (spread <= 2.0*ROUNDING*size) & (place < ratio)
+        if not any_lane(active):
+            break
+        place = select(active, 2.0*place, place)
+    return select(begins, minimum(place, ratio), ratio)
+'''.strip()
+
 LATE = 1e-10
 """How late a body may be set free, as a part of the way that its load goes in a step, if slip begins without a jump."""
 
 SOONEST = "nearest = 1e-13*maximum(t, 1.0)/scale"
-"""How soon a step may end at a contact."""
+"""How soon a step may end at a contact or a jump."""
 
 
 def jumps(equations: Equations) -> bool:
@@ -116,14 +133,29 @@ def passed(side: str, size: str, first: str, stride: str, order: int) -> str:
     return f"passed = passage({side}, {size}, PASSED, NEAREST*passed, dense, {first}, {stride}, {order}, passed)"
 
 
-def first_passage(found: Sequence[str], contacts: bool) -> list[str]:
+def leapt(begun: str, side: str, size: str, first: str, stride: str, order: int) -> list[str]:
+    """The statements that end a step where a series passes a jump, which is on the side `begun` at first, and then on `side`.
+
+    A passage is as exact as rounding lets it be, of the way until there, not of that of a step without it.
+    """
+    rest = f"dense, {first}, {stride}, {order}, passed)"
+    return [
+        f"passed = leaving({begun}, {side}, {size}, 0.01*nearest, {rest}",
+        *2 * [f"passed = passage({side}, 1e4*{size}, 2e-15, 0.01*nearest, {rest}"],
+    ]
+
+
+def first_passage(found: Sequence[str]) -> list[str]:
     """The statements that end a step at the first of the passages that are `found` one after another."""
     if not found:
         return []
-    begun = ["# first passage", "passed = ratio", *([SOONEST] if contacts else [])]
+    soonest = any("nearest" in line for line in found)
+    begun = ["# first passage", "passed = ratio", *([SOONEST] if soonest else [])]
     return [*begun, *found, "until = select(passed < ratio, passed*scale, length)", "ratio = passed"]
 
 
-def functions(ends: bool, contacts: bool) -> list[str]:
-    """The functions that find the ends of steps."""
-    return [text for text, needed in ((PASSAGE, ends), (CLOSING, contacts)) if needed]
+def functions(statements: Sequence[str]) -> list[str]:
+    """The functions that statements call which end a step."""
+    called = "\n".join(statements)
+    texts = {"passed = ": PASSAGE, "closing(": CLOSING, "leaving(": LEAVING}
+    return [text for word, text in texts.items() if word in called]

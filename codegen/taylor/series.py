@@ -19,8 +19,9 @@ from typing import Protocol
 from ..program.expressions import ONE, ZERO, Call, Expression, Name, Number
 from .terms import absolute, add, over, show, times
 
-__all__ = ["Choice", "Constant", "Integral", "Kink", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
-           "Row", "Series", "Slope", "Square", "SquareRoot", "State", "Time", "Unknown"]  # fmt: skip
+__all__ = ["Brink", "Choice", "Constant", "Fraction", "Integral", "Kink", "Leaping", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
+           "Row", "Series", "Slope", "Square", "SquareRoot", "State", "Time", "Unknown",
+           "Whole"]  # fmt: skip
 
 
 class Order(Protocol):
@@ -379,11 +380,86 @@ class Choice(Series):
         return _chosen(at.of(self.kink), at.of(self.above), at.of(self.below))
 
 
+@dataclass(eq=False, slots=True)
+class Brink(Kink):
+    """The side of zero on which a series lies where another one jumps; 0 at zero itself."""
+
+    def begin(self, at: Start) -> Expression:
+        self.size = at.keep(f"size_{self.name}", magnitude(at, self.base))
+        return Call("side_of", (at.start(self.base), ZERO))
+
+
+@dataclass(eq=False, slots=True)
+class Leaping(Series):
+    """One of three series by the side, 1, 0 or -1, of a series with a brink."""
+
+    brink: Brink
+    above: Series
+    at: Series
+    below: Series
+
+    @property
+    def linear(self) -> tuple[Series, ...]:
+        return self.brink, self.above, self.at, self.below
+
+    def begin(self, at: Start) -> Expression:
+        return _one(at.start(self.brink), at.start(self.above), at.start(self.at), at.start(self.below))
+
+    def coefficient(self, at: Order) -> Expression:
+        return _one(at.of(self.brink), at.of(self.above), at.of(self.at), at.of(self.below))
+
+
+@dataclass(eq=False, slots=True)
+class Fraction(Series):
+    """A series less the whole number below its start; `turned` is the series, or a sum that it is the negative of."""
+
+    base: Series
+    turned: Series
+
+    @property
+    def linear(self) -> tuple[Series, ...]:
+        return (self.base,)
+
+    def begin(self, at: Start) -> Expression:
+        return add(at.start(self.base), times(Number(-1.0), Call("floor", (at.start(self.base),))))
+
+    def coefficient(self, at: Order) -> Expression:
+        return at.of(self.base)
+
+
+@dataclass(eq=False, slots=True)
+class Whole(Series):
+    """The whole number below the start of a series; the brinks are those of its distances from this and the next one."""
+
+    base: Series
+    lower: Brink
+    upper: Brink
+
+    @property
+    def linear(self) -> tuple[Series, ...]:
+        return self.lower, self.upper
+
+    @property
+    def started(self) -> tuple[Series, ...]:
+        return (self.base,)
+
+    def begin(self, at: Start) -> Expression:
+        return Call("floor", (at.start(self.base),))
+
+    def coefficient(self, at: Order) -> Expression:
+        return ZERO
+
+
 def magnitude(at: Start, series: Series) -> Expression:
     """The sum of the sizes of the terms that a series begins with: rounding is a small part of it."""
+    if isinstance(series, Fraction):
+        return magnitude(at, series.turned)
     parts = [at.start(series)]
     if isinstance(series, Linear):
-        parts = [times(factor, at.start(inner)) for factor, inner in series.terms]
+        parts = [
+            times(factor, magnitude(at, inner) if isinstance(inner, Fraction) else at.start(inner))
+            for factor, inner in series.terms
+        ]
         parts += [] if series.constant == ZERO else [series.constant]
     return add(*(Number(abs(e.value)) if isinstance(e, Number) else absolute(e) for e in parts))
 
@@ -394,6 +470,14 @@ def _chosen(side: Expression, above: Expression, below: Expression) -> Expressio
     if above == times(Number(-1.0), below):
         return times(side, above)
     return Call("select", (Name(f"{show(side)} > 0.0"), above, below))
+
+
+def _one(side: Expression, above: Expression, middle: Expression, below: Expression) -> Expression:
+    if middle in (above, below):
+        return _chosen(side, above, below) if middle == below else _chosen(times(Number(-1.0), side), below, above)
+    if middle == ZERO and above == times(Number(-1.0), below):
+        return times(side, above)
+    return Call("select", (Name(f"{show(side)} < 0.0"), below, _chosen(side, above, middle)))
 
 
 @dataclass(eq=False, slots=True)

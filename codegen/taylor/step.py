@@ -15,11 +15,11 @@ from synchain.models.mechanics.components import TIME, Edge, Node
 
 from ..program.expressions import ONE, ZERO, Expression, Name, Number
 from ..program.passes import Names, real
-from .graph import STARTS, Graph, Template
+from .graph import STARTS, Graph, Template, check_jumps
 from .length import finished, last_orders, reach, unseen
 from .masses import moving, solved
-from .passage import closed, first_passage, functions, jumps, loose, passed
-from .series import Constant, Series, State, Time, magnitude
+from .passage import closed, first_passage, functions, jumps, leapt, loose, passed
+from .series import Brink, Constant, Series, State, Time, magnitude
 from .terms import absolute, add, lane, largest, show, statement, times
 
 __all__ = [
@@ -36,7 +36,7 @@ __all__ = [
 
 WORDS = frozenset(
     {"unseen", "high", "low", "largest", "scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "j_there",
-     "slope_scale", "convolution", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", "nearest", "loose", "closing", *STARTS.values()}
+     "slope_scale", "convolution", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", "nearest", "loose", "closing", "leaving", "floor", *STARTS.values()}
 )  # fmt: skip
 PREFIXES = ("positive_", "i_", "e_", "half_", "w_", "n_", "size_", "odd_", "stuck_")
 """Names of the step; a user's symbol of that name is called otherwise within the step."""
@@ -317,11 +317,11 @@ class StepWriter(LineWriter):
         for k in range(1, self.order + 1):
             self.coefficients(k)
         self.length()
-        passages = first_passage(self.passages(), bool(self.gaps))
+        passages = first_passage(self.passages())
         self.put(*passages)
         self.closing(bool(passages))
         room = 3 * (self.order + 1) if self.gaps else self.order + 1 if passages else 0
-        before = functions(bool(passages), bool(self.gaps))
+        before = functions(passages)
         return TaylorStep.of(self.lines, self.order, room, more, before)
 
     def opening(self) -> None:
@@ -378,7 +378,8 @@ class StepWriter(LineWriter):
         first, p, found = self.order * self.equations.dimension, self.order, list[str]()
         for kink in self.graph.kinks:
             found += (f"store(dense, {first + k}, {lane(self.at(kink.base, k))})" for k in range(p + 1))
-            found.append(passed(show(self.at(kink, p)), kink.size, str(first), "1", p))
+            side, place = show(self.at(kink, p)), (kink.size, str(first), "1", p)
+            found += leapt(show(self.at(kink, 0)), side, *place) if isinstance(kink, Brink) else [passed(side, *place)]
         for gaps in self.contacts:
             found += gaps.closings(self, p, first, self.exact)
         return found
@@ -447,6 +448,7 @@ def write_step(equations: Equations, order: int) -> TaylorStep:
         For an order that is too small, and for functions that jump.
     """
     check_order(order)
+    check_jumps(equations)
     return StepWriter(equations, order).step()
 
 

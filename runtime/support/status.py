@@ -35,7 +35,8 @@ class Status(IntEnum):
 _MESSAGES = {
     Status.NOT_RUN: "the cell was not started",
     Status.FINISHED: "reached the end of the window",
-    Status.STEP_BUDGET: "used up max_steps before the end; raise max_steps or loosen rtol and atol",
+    Status.STEP_BUDGET: "used up max_steps before the end; raise max_steps or loosen rtol and atol, unless the motion slides "
+    "along a jump, such as sign(v) in the rate of v",
     Status.STEP_UNDERFLOW: "the step size fell below rounding; the equations may be singular here, or the tolerance "
     "tighter than double precision allows",
     Status.DIVERGED: "the state grew without bound, beyond 2^53 or with steps that shrink so that max_steps will not do, or "

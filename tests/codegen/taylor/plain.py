@@ -33,7 +33,7 @@ WORDS: dict[str, Any] = {
     "load": lambda array, slot, width: array[slot], "store": _store, "broadcast": lambda a, width: np.float64(a),
     "select": lambda mask, yes, no: yes if mask else no, "any_lane": bool, "njit": lambda **options: lambda f: f,
     "absolute": np.abs, "maximum": np.fmax, "minimum": np.fmin, "fma": lambda a, b, c: a * b + c, "truncated": _kept(-(1 << 44)),
-    "power": np.power, "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "sin": np.sin, "cos": np.cos, "tan": np.tan,
+    "power": np.power, "floor": np.floor, "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "sin": np.sin, "cos": np.cos, "tan": np.tan,
     "sinh": np.sinh, "cosh": np.cosh, "tanh": np.tanh, "atan": np.arctan, "asin": np.arcsin, "acos": np.arccos,
     "asinh": np.arcsinh, "acosh": np.arccosh, "atanh": np.arctanh, "erf": special.erf, "math": math, "WIDTH": 1, "DENSE": False,
 }  # fmt: skip

@@ -259,7 +259,7 @@ def test_states_that_are_no_numbers_give_no_length():
 
 @pytest.mark.parametrize(
     "jumping",
-    [sp.sign(V), sp.floor(X), sp.ceiling(V), sp.Heaviside(X), sp.Piecewise((V, V > 0), (X, True)),
+    [sp.sign(V), sp.floor(V), sp.ceiling(V), sp.Heaviside(V), sp.Piecewise((V, V > 0), (X, True)),
      sp.Piecewise((X, V > 0), (V, True)), sp.Piecewise((0, sp.And(X > 0, V > 0)), (X, True)),
      sp.Piecewise((sp.sin(X), X > 0), (sp.Abs(sp.sign(V)), True)),
      sp.Max(X - A, 0) ** sp.Rational(3, 2), X * sp.sqrt(2 * sp.Abs(V))],
@@ -269,7 +269,8 @@ def test_functions_that_jump_or_are_roots_at_a_kink_are_refused(jumping):
     assert jump(equations) is not None
     for write in (step_of, lambda e, order: write_looped(tidy(e), order)):
         with pytest.raises(
-            ValueError, match=r"taylor: a function that jumps.*; found .*; expected continuous functions"
+            ValueError,
+            match=r"taylor: found .*, (along which motion may slide|which has no series).*; expected functions",
         ):
             write(equations, 8)
 

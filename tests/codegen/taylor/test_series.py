@@ -155,7 +155,7 @@ def test_constants_take_every_function(constant):
 
 
 def test_unknown_functions_and_low_orders_are_refused():
-    with pytest.raises(ValueError, match="has no series; found gamma"):
+    with pytest.raises(ValueError, match=r"found gamma\(.*, which has no series"):
         step_of(alone([X], [sp.gamma(2 + X**2)]), 8)
     with pytest.raises(ValueError, match="order 5; expected at least 6"):
         step_of(alone([X], [X]), 5)

@@ -35,7 +35,9 @@ def method(scene: Scene) -> tuple[str, int]:
         (Scene(topology=chain(20), parameters={"kappa": 10.0}), "taylor"),
         (Scene(topology=chain(3)), "rodas5p"),  # its layer is steep, although the start lies outside
         (Scene(topology=chain(3), friction="coulomb"), "rodas5p"),
-        (Scene(topology=chain(3), contact="sign"), "dop853"),  # it jumps
+        (Scene(topology=chain(3), contact="sign"), "dop853"),  # motion slides along its jump
+        (Scene(Field({"x": "v", "v": "-x - sign(x) + sign(sin(t))"})), "taylor"),  # motion passes its jumps
+        (Scene(Field({"x": "v", "v": "-x - 100*v - sign(x)"})), "rodas5p"),
         (Scene(oscillator="duffing", coupling="inerter", topology=chain(3), parameters={"sigma": 0.1}), "dop853"),
         (Scene(Field({"x": "v", "v": "-x - 1000*max(0, x - 1)**1.5"})), "dop853"),  # no series beside its kink
         (Scene(Field({"x": "v", "v": "-x - 100*v - 1000*max(0, x - 1)**1.5"})), "rodas5p"),
@@ -66,8 +68,10 @@ def test_linear_equations_take_the_highest_order():
     assert method(scene.replace(rtol=1e-2))[1] < 24
 
 
-def test_what_jumps_is_refused():
-    with pytest.raises(ValueError, match=r"taylor: a function that jumps.*; found sign\(.*use integrator dop853"):
+def test_a_jump_along_which_motion_may_slide_is_refused():
+    with pytest.raises(
+        ValueError, match=r"taylor: found sign\(.*, along which motion may slide.*use integrator dop853"
+    ):
         kernel_source(Scene(topology=chain(2), contact="sign", integrator="taylor"))
 
 

@@ -1,0 +1,90 @@
+"""Jumps that Taylor steps pass: of functions of time and of states whose own rates do not jump."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Sequence, Set
+
+import sympy as sp
+from sympy.functions.elementary.piecewise import ExprCondPair, Piecewise
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import TIME
+from synchain.models.mechanics.jumps import INEQUALITIES, JUMPING, jumps
+
+__all__ = ["Leap", "leaping", "templates", "unpassed"]
+
+
+RISING, STRICT = (sp.StrictGreaterThan, sp.GreaterThan), (sp.StrictGreaterThan, sp.StrictLessThan)
+
+
+class Leap(sp.Function):
+    """Leap(gap, above, at, below): one of three values by the sign of a gap, which do not agree at zero."""
+
+    nargs = 4
+    is_extended_real = True
+
+
+def templates(equations: Equations) -> Iterator[tuple[Sequence[sp.Expr], tuple[tuple[sp.Symbol, ...], ...]]]:
+    """Right-hand sides and masses of each kind of node and link, and its states, at each end."""
+    for node in equations.nodes:
+        yield (*node.rhs, *(e for row in node.inertia for e in row)), (node.state,)
+    for edge in equations.edges:
+        yield edge.expressions, (edge.here, edge.there)
+
+
+def unpassed(equations: Equations) -> Iterator[sp.Expr]:
+    """Yield the parts of some equations with a jump that no Taylor step passes.
+
+    Motion can slide along a jump that enters the rate of what it depends on: sign(v) in the rate of v, not in that of x.
+    Contacts take the loads of bodies that stick as continuous, and the solution of a mass matrix jumps as a whole.
+    """
+    known = list(templates(equations))
+    found = [(part, ends) for own, ends in known for part in jumps(own, {TIME, *(s for end in ends for s in end)})]
+    jumping = {c for own, ends in known for c in range(len(ends[0])) if jumps(own[c : c + 1], {TIME, *sum(ends, ())})}
+    for part, ends in found:
+        gaps = _gaps(part)
+        depends = {c for end in ends for c, s in enumerate(end) if any(gap.has(s) for gap in gaps)}
+        if not gaps or depends & jumping or equations.sticks or equations.inertial:
+            yield part
+
+
+def leaping(expressions: Iterable[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:
+    """Some expressions with their jumps as `Leap` or sp.floor, parts that no step passes as they are."""
+    given = list(expressions)
+    parts = set(jumps(given, moving))
+    return [_leaping(e, parts) for e in given] if parts else given
+
+
+def _leaping(e: sp.Basic, parts: Collection[sp.Expr]) -> sp.Basic:
+    if not e.args:
+        return e
+    inner = [_leaping(a, parts) for a in e.args]
+    if e not in parts or not _gaps(e):
+        return e.func(*inner)
+    if isinstance(e, Piecewise):
+        return _choice(inner)
+    if isinstance(e, sp.floor | sp.ceiling):
+        return e.func(*inner) if isinstance(e, sp.floor) else -sp.floor(-inner[0])
+    at, below = (sp.S.Zero, sp.S.NegativeOne) if isinstance(e, sp.sign) else (inner[1], sp.S.Zero)
+    return Leap(inner[0], sp.S.One, at, below)
+
+
+def _choice(pieces: Sequence[ExprCondPair]) -> sp.Expr:
+    """One piece of several by the signs of their gaps."""
+    (piece, condition), *others = pieces
+    if condition == sp.true:
+        return piece
+    rest = _choice(others)
+    above, below = (piece, rest) if isinstance(condition, RISING) else (rest, piece)
+    return Leap(condition.lhs - condition.rhs, above, rest if isinstance(condition, STRICT) else piece, below)
+
+
+def _gaps(part: sp.Expr) -> list[sp.Expr]:
+    """What passes zero, or a whole number, where a part jumps; none for what jumps elsewhere."""
+    if isinstance(part, JUMPING):
+        return [part.args[0]]
+    if isinstance(part, Piecewise) and part.args[-1][1] == sp.true:
+        conditions = [condition for _, condition in part.args[:-1]]
+        if all(isinstance(condition, INEQUALITIES) for condition in conditions):
+            return [condition.lhs - condition.rhs for condition in conditions]
+    return []

@@ -1,0 +1,201 @@
+"""Taylor steps that pass jumps: exact times, starts on a jump, values at zero, and jumps along which motion may slide."""
+
+from __future__ import annotations
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+from march import alone
+from plain import march
+from samples import path
+
+from synchain.codegen.steps.names import tidy
+from synchain.codegen.taylor import jump, write_looped, write_step
+from synchain.models import Field, Rates, Scene, chain, ring
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import TIME as T
+from synchain.models.mechanics.components import Edge, Node
+from synchain.runtime import run
+
+X, V, A, B, W = sp.symbols("x v a b w", real=True)
+BOTH = pytest.mark.parametrize("looped", [False, True], ids=["lines", "loops"])
+TURN = 2.0 * math.pi
+
+
+def preloaded(t: float, a: float) -> list[float]:
+    """x'' = -x - a sign(x) from x = 0, v = 1: half waves about -a and a, to 30 digits."""
+    with mpmath.workdps(30):
+        half = 2 * mpmath.atan2(1, a)  # x = -a + a cos t + sin t is zero again
+        turns = int(t / half)
+        sign, rest = (-1) ** turns, t - turns * half
+        x, v = -a + a * mpmath.cos(rest) + mpmath.sin(rest), -a * mpmath.sin(rest) + mpmath.cos(rest)
+        return [float(sign * x), float(sign * v)]
+
+
+PRELOADED = {
+    "sign": X + A * sp.sign(X),
+    "turned": X - A * sp.sign(-2 * X),
+    "heaviside": X + 2 * A * sp.Heaviside(X) - A,
+    "pieces": sp.Piecewise((X + A, X > 0), (X - A, True)),
+    "three pieces": sp.Piecewise((X + A, X > 0), (X - A, X < 0), (X, True)),
+    "closed": sp.Piecewise((X - A, X <= 0), (X + A, True)),
+    "square": X + A * X / sp.Abs(X),
+    "nested": X + A * sp.sign(X * (2 + sp.sign(X - 1000))),
+}
+
+
+@BOTH
+@pytest.mark.parametrize("form", [form for form in PRELOADED if form != "square"])
+def test_a_preloaded_spring_turns_where_it_should(form, looped):
+    equations = alone([X, V], [V, -PRELOADED[form]], [A])
+    state, steps = march(equations, 20, [0.0, 1.0], 60.3, 1e-14, numbers=[0.5], looped=looped)
+    assert np.abs(state - preloaded(60.3, 0.5)).max() < 2e-12  # 27 passages, each some roundings late
+    assert steps < 150
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-8])
+def test_the_time_of_a_jump_does_not_depend_on_the_tolerance(rtol):
+    """x' = sign(sin t) from a jump: triangles, whose series are exact."""
+    state, steps = march(alone([X], [sp.sign(sp.sin(T))]), 16, [0.0], 100.5 * TURN, rtol)
+    assert state[0] == pytest.approx(math.pi, abs=2e-12)  # 201 passages
+    assert steps < 900
+
+
+@BOTH
+def test_falling_to_and_fro(looped):
+    """x'' = -sign x: parabolas of period 4."""
+    state, steps = march(alone([X, V], [V, -sp.sign(X)]), 12, [0.0, 1.0], 41.0, 1e-10, looped=looped)
+    assert state == pytest.approx([0.5, 0.0], abs=2e-11)
+    assert steps < 60
+
+
+@BOTH
+@pytest.mark.parametrize(
+    "whole", [sp.floor(X), -sp.ceiling(-X), -sp.floor(1 - X) + (1 - sp.Abs(sp.sign(X - sp.floor(X))))]
+)
+def test_steps_of_whole_numbers(whole, looped):
+    """v' = floor x with x = t - 7/2: the sum of -4/2, -3 … 2, 3/2."""
+    state, _ = march(alone([X, V], [sp.S.One, whole]), 8, [-3.5, 0.0], 7.0, 1e-10, looped=looped)
+    assert state.tolist() == pytest.approx([3.5, -2.0 - 3.0 - 2.0 - 1.0 + 0.0 + 1.0 + 2.0 + 1.5], abs=3e-13)
+
+
+def test_whole_numbers_on_the_way_up_and_down():
+    """v' = floor(3 sin t) over a turn, to 30 digits; from a whole number on."""
+    equations = alone([X], [sp.floor(3 * sp.sin(T))])
+    with mpmath.workdps(30):
+        one, two = mpmath.asin(mpmath.mpf(1) / 3), mpmath.asin(mpmath.mpf(2) / 3)
+        up, down = (two - one) * 2 + 2 * (mpmath.pi - 2 * two), -(2 * one + 4 * (two - one) + 3 * (mpmath.pi - 2 * two))
+        exact = float(up + down)
+    assert march(equations, 20, [0.0], TURN, 1e-13)[0][0] == pytest.approx(exact, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("rate", "value"),
+    [(sp.sign(X), 0.0), (sp.Heaviside(X), 0.5), (sp.Heaviside(X, 1), 1.0), (sp.floor(X), 0.0), (sp.ceiling(X), 0.0),
+     (sp.Piecewise((3, X > 0), (5, True)), 5.0), (sp.Piecewise((3, X >= 0), (5, True)), 3.0),
+     (sp.Piecewise((3, X < 0), (5, True)), 5.0), (sp.Piecewise((3, X <= 0), (5, True)), 3.0)],
+)  # fmt: skip
+def test_what_stays_zero_has_the_value_at_zero(rate, value):
+    """x stays at zero; v' is the value there, and the steps are as long as ever."""
+    state, steps = march(alone([X, V], [-X, rate]), 12, [0.0, 0.0], 3.0, 1e-10)
+    assert state[1] == pytest.approx(3.0 * value, rel=1e-14)
+    assert steps < 12
+
+
+@pytest.mark.parametrize("speed", [1.0, -1.0])
+@pytest.mark.parametrize("start", [0.0, 1e-17, -1e-17, 1e-13, -1e-13])
+def test_a_start_on_a_jump_goes_to_its_side(start, speed):
+    state, _ = march(alone([X, V], [A, sp.sign(X)], [A]), 12, [start, 0.0], 2.0, 1e-12, numbers=[speed])
+    assert state[1] == pytest.approx(2.0 * speed, abs=3e-13 + 2.0 * abs(start))
+
+
+@pytest.mark.parametrize("speed", [1.0, -1e-5])
+@pytest.mark.parametrize("offset", [1.0, 1e8])
+def test_a_start_on_a_jump_far_from_zero_leaves_it(offset, speed):
+    """The steps that leave it change x by more than rounding."""
+    equations = alone([X, V], [A, sp.sign(X - B)], [A, B])
+    state, steps = march(equations, 12, [offset, 0.0], 2.0, 1e-12, numbers=[speed, offset])
+    assert state[1] == pytest.approx(math.copysign(2.0, speed), abs=1e-14 + 1e-14 * offset / abs(speed))
+    assert steps < 30
+
+
+def test_two_jumps_at_once_end_one_step():
+    rates = [V, -X - sp.sign(X), W, -B - sp.sign(B)]
+    pair, count = march(alone([X, V, B, W], rates), 16, [0.0, 1.0, 0.0, 1.0], 20.0, 1e-12)
+    _, steps = march(alone([X, V], rates[:2]), 16, [0.0, 1.0], 20.0, 1e-12)
+    assert count == steps
+    assert pair[:2].tolist() == pair[2:].tolist()
+
+
+@pytest.mark.parametrize("given", [X**2 * sp.sign(X), sp.sign(X) * sp.sin(X) ** 3])
+def test_a_jump_of_size_zero_costs_no_digits(given):
+    smooth = {X**2 * sp.sign(X): X * sp.Abs(X)}.get(given, sp.Abs(sp.sin(X)) * sp.sin(X) ** 2)
+    found, expected = (march(alone([X, V], [V, -X - e]), 16, [0.0, 1.0], 20.0, 1e-12)[0] for e in (given, smooth))
+    assert found == pytest.approx(expected, abs=1e-11)
+
+
+# -- networks ---------------------------------------------------------------------------------------------------------
+
+LINE = Scene(
+    Field({"x": "v", "v": "-x - 3/10*v + 2*sign(cos(t)) - 1/2*sign(x - 1/10)"}),
+    Rates({"v": "W*(x_j - x_i + 1/5*floor(x_j - x_i))"}), chain(3),
+    initial={"x": (0.0, 0.4, -0.3), "v": (0.5, 0.0, 0.2)}, transient=0, window=20, time_unit="time", rtol=1e-11, record=(),
+)  # fmt: skip
+
+
+def test_a_network_is_that_of_another_method():
+    assert jump(LINE.equations) is None
+    series, stages = (run(LINE.replace(integrator=name), show_progress=False).data for name in ("auto", "dop853"))
+    assert int(series.steps) < 0.2 * int(stages.steps)
+    # the error of stages, over whose steps rates jump
+    assert np.abs(series.end.values - stages.end.values).max() < 2e-8
+
+
+def test_lines_and_loops_agree_on_the_network():
+    start = [0.0, 0.5, 0.4, 0.0, -0.3, 0.2]
+    lines, loops = (march(LINE.equations, 18, start, 20.0, 1e-12, looped=looped)[0] for looped in (False, True))
+    assert lines == pytest.approx(loops, abs=1e-11)
+
+
+# -- what is refused --------------------------------------------------------------------------------------------------
+
+
+def link(rate: sp.Expr, to: int = 1) -> Equations:
+    here, there, weight = sp.symbols("x_i v_i", real=True), sp.symbols("x_j v_j", real=True), sp.Symbol("g", real=True)
+    rates = [sp.S.Zero, sp.S.Zero]
+    rates[to] = weight * rate.xreplace({X: here[0] - there[0], V: here[1] - there[1]})
+    edge = Edge(here, there, weight, tuple(rates), ())
+    return Equations.of_equal_nodes(Node((X, V), (V, -X), ()), edge, 2, path(2))
+
+
+@pytest.mark.parametrize(
+    "equations",
+    [
+        alone([X, V], [V, -X - sp.sign(V)]),
+        alone([X, V], [V, -X - sp.floor(X + V)]),
+        alone([X, V], [V - sp.sign(V), -X - sp.sign(X)]),  # in turn: the rate of x jumps with v, that of v with x
+        alone([X, V], [V, -X - sp.Piecewise((1, sp.And(X > 0, V > 0)), (0, True))]),
+        link(sp.sign(V)),
+        link(sp.sign(X), to=0),
+    ],
+    ids=["velocity", "both", "in turn", "and", "link", "link of phases"],
+)
+def test_a_jump_along_which_motion_may_slide_is_refused(equations):
+    assert jump(equations) is not None
+    for write in (write_step, write_looped):
+        with pytest.raises(ValueError, match=r"taylor: found .*, along which motion may slide.*; use .* dop853"):
+            write(tidy(equations), 8)
+
+
+def test_links_that_pass_jumps_are_taken():
+    assert jump(link(sp.sign(X))) is None
+
+
+def test_loads_of_contacts_and_masses_may_not_jump():
+    stuck = Scene(topology=ring(3), contact="set-valued", coupling=Rates({"v": "W*(x_j - x_i + sign(x_j - x_i))"}))
+    assert str(jump(stuck.equations)).startswith("sign(")
+    smooth = stuck.replace(coupling=Rates({"v": "W*(x_j - x_i)"}))
+    assert jump(smooth.equations) is None
