@@ -21,7 +21,7 @@ SCENE = Scene(
     oscillator="rotor", coupling="torsion", topology=ring(4), integrator="dop853", rtol=1e-9, record=("sync_error",),
     transient=0.0, window=5.0, time_unit="time", observe={"frequency": mean(rate(x)), "middle": end(nodes.mean(x))},
 )  # fmt: skip
-FEW = SCENE.replace(topology=chain(2), parameters={"power": [0.1, 0.2]})
+FEW = SCENE.replace(topology=chain(2), parameters={"power": [0.1, 0.2], "sigma": 0.3})
 """Its kernels compile in half of the time, and are the same whether the power of each node is drawn or not."""
 DRAWS = {
     "power": normal(0.1, 0.2),
