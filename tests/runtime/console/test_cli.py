@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 import os
@@ -79,7 +80,7 @@ def test_help_names_every_command_and_is_fast_because_nothing_heavy_is_loaded(
     out = capsys.readouterr().out
     assert {"figures", "spectrum", "equations", "kernel", "run", "thresholds", "cache"} <= set(commands.names())
     assert all(f"\n  {name} " in out for name in commands.names())
-    assert not loaded_after("--help") & {"sympy", "numpy", "numba", "matplotlib", "flint", "scipy", "tqdm"}
+    assert not loaded_after()["--help"] & {"sympy", "numpy", "numba", "matplotlib", "flint", "scipy", "tqdm"}
 
 
 @pytest.mark.parametrize("name", commands.names())
@@ -93,32 +94,35 @@ def test_every_command_has_a_help_with_an_example(name: str, capsys: pytest.Capt
     assert captured.err == ""
 
 
-def loaded_after(words: str) -> set[str]:
-    """Top-level modules in a fresh interpreter after a command."""
+LOADS = {
+    "--version": {"sympy", "numpy", "numba", "matplotlib", "argparse.py"},
+    "scenes": {"sympy", "numpy", "numba", "matplotlib"},
+    "topologies": {"sympy", "numpy", "numba", "matplotlib"},
+    "schema": {"numpy", "numba", "matplotlib", "scipy", "xarray"},
+    "spectrum star 6 --json": {"numpy", "numba", "matplotlib", "scipy", "xarray"},
+    "equations figure_4a": {"numpy", "numba", "matplotlib", "scipy", "xarray"},
+}
+"""Commands, the lightest first, and what none of them needs; a later one may find what an earlier one has loaded."""
+
+
+@functools.cache
+def loaded_after() -> dict[str, set[str]]:
+    """Top-level modules of one fresh interpreter after each of the commands."""
     code = (
         "import sys\nfrom synchain.runtime.cli import main\n"
-        f"code = main({words.split()!r})\n"
-        "print(*{n.split('.')[0] for n in sys.modules}, file=sys.stderr)\nsys.exit(code)"
+        f"for words in {['--help', *LOADS]!r}:\n"
+        "    assert main(words.split()) == 0\n"
+        "    print(*{n.split('.')[0] for n in sys.modules}, file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
-    return set(done.stderr.split())
+    return dict(zip(["--help", *LOADS], map(set, map(str.split, done.stderr.splitlines())), strict=True))
 
 
-@pytest.mark.parametrize(
-    ("words", "absent"),
-    [
-        ("spectrum star 6 --json", {"numpy", "numba", "matplotlib", "scipy", "xarray"}),
-        ("equations figure_4a", {"numpy", "numba", "matplotlib", "scipy", "xarray"}),
-        ("scenes", {"sympy", "numpy", "numba", "matplotlib"}),
-        ("schema", {"numpy", "numba", "matplotlib", "scipy", "xarray"}),
-        ("topologies", {"sympy", "numpy", "numba", "matplotlib"}),
-        ("--version", {"sympy", "numpy", "numba", "matplotlib", "argparse.py"}),
-    ],
-)
-def test_a_command_loads_only_what_it_needs(words: str, absent: set[str]) -> None:
-    loaded = loaded_after(words)
+@pytest.mark.parametrize("words", LOADS)
+def test_a_command_loads_only_what_it_needs(words: str) -> None:
+    loaded = loaded_after()[words]
     assert "argparse" in loaded
-    assert not loaded & absent
+    assert not loaded & LOADS[words]
 
 
 def test_spectrum_as_json(capsys: pytest.CaptureFixture[str]) -> None:
@@ -696,11 +700,13 @@ def test_warnings_are_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.C
 @pytest.mark.parametrize(
     "words",
     [
-        pytest.param("topologies", marks=pytest.mark.long), "kernel two_oscillators",
-        pytest.param("equations figure_4a", marks=pytest.mark.long), "spectrum chain 40",
+        *(pytest.param(words, marks=pytest.mark.long) for words in
+          ("topologies", "kernel two_oscillators", "equations figure_4a")),
+        "spectrum chain 40", "spectrum chain 200",
     ],
 )  # fmt: skip
 def test_a_reader_that_leaves_early_ends_it_quietly(words: str) -> None:
+    """Output that is written at the end, and more than a buffer holds."""
     command = f"'{sys.executable}' -m synchain.runtime {words} | true; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60, env=BUFFERED)
     assert (done.returncode, done.stderr) == (0, "")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from figure_samples import rows
 
+from synchain.runtime.cells import kernels
 from synchain.runtime.figures import load, names, skeleton, style
 from synchain.runtime.figures import make as maker
 from synchain.runtime.figures.figure_runs import FigureRuns, Quality
@@ -22,10 +23,11 @@ DOUBLING = 1.2222040752683
 
 @pytest.fixture(autouse=True)
 def narrow(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A range with one bifurcation, and orbits of two drive periods alone."""
+    """A range with one bifurcation, orbits of two drive periods alone, and kernels of one width."""
     monkeypatch.setattr(skeleton, "LOW", 1.2)
     monkeypatch.setattr(skeleton, "HIGH", 1.24)
     monkeypatch.setattr(skeleton, "PERIODS", (2,))
+    monkeypatch.setattr(kernels, "default_width", lambda *_: 1)
 
 
 @cache

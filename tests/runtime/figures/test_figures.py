@@ -105,7 +105,13 @@ def test_a_folder_that_cannot_be_made_is_an_error_before_anything_is_done(
 # -- files -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", [*names(), "transient"])
+ALIKE = {f"figure_{name}" for name in ("4b", "4c", "4e", "4f", "6", "7", "8")}
+"""Figures that are drawn and written as others are, of other scenes."""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.long] * (name in ALIKE)) for name in (*names(), "transient")]
+)
 def test_a_figure_is_written_as_png_svg_and_csv(name: str, tmp_path: Path, simulation: Simulation) -> None:
     written = make([name], tmp_path / "out", quick=True)
     assert set(written) == set((tmp_path / "out").iterdir())
@@ -135,9 +141,11 @@ def test_all_figures_are_made_without_names(
 @pytest.mark.parametrize(
     "name",
     [
-        "figure_1b",
         "figure_4a",
-        *(pytest.param(name, marks=pytest.mark.long) for name in ("figure_4d", "figure_8", "msf", "thresholds")),
+        *(
+            pytest.param(name, marks=pytest.mark.long)
+            for name in ("figure_1b", "figure_4d", "figure_8", "msf", "thresholds")
+        ),
     ],
 )
 def test_files_depend_on_the_numbers_alone(name: str, tmp_path: Path, simulation: Simulation) -> None:

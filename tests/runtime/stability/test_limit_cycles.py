@@ -129,7 +129,7 @@ def test_periodic_orbits_of_undriven_oscillators(tmp_path: Path) -> None:
     [
         (pair(1.0), {"periods": 2}, ValueError, "periods = 2; expected 1 for an oscillator without a drive"),
         (pair(1.0), {"start": [1.0]}, ValueError, "expected a number for each of x, v"),
-        (Scene("lorenz", "x->x", chain(2)), {}, ArithmeticError, "near the motion after 300 units of 2 pi; start"),
+        (Scene("rossler", "x->x", chain(2)), {}, ArithmeticError, "near the motion after 300 units of 2 pi; start"),
         (Scene("pendulum", topology=chain(2)), {}, ArithmeticError, "no attracting cycle near the motion"),
         (pair(-1.0), {}, ArithmeticError, "no cycle: the motion comes to rest at x = 0, v = "),
     ],

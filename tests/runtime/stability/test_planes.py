@@ -80,7 +80,8 @@ def transversal(scene: Scene) -> float:
     jacobian = sp.zeros(2 * n, 2 * n)
     for at, e in equations.jacobian().items():
         jacobian[at] = e
-    rates, slopes = sp.lambdify(symbols, list(equations.rhs())), sp.lambdify(symbols, jacobian)
+    rates, slopes = (sp.lambdify(symbols, made, cse=True) for made in (list(equations.rhs()), jacobian))
+    of_first = sp.lambdify(symbols, list(equations.rhs())[::n], cse=True)
 
     def of_all(t: float, y: np.ndarray) -> np.ndarray:
         state, basis = y[: 2 * n], y[2 * n :].reshape(2 * n, 2 * n)
@@ -88,8 +89,7 @@ def transversal(scene: Scene) -> float:
         return np.concatenate([rates(*values), (np.asarray(slopes(*values)) @ basis).ravel()])
 
     def of_one(t: float, y: np.ndarray) -> np.ndarray:
-        both = np.repeat(y, n)
-        return np.asarray(rates(*both, *numbers, t))[::n]
+        return np.asarray(of_first(*np.repeat(y, n), *numbers, t))
 
     start = solve_ivp(of_one, (0, 100 * period), [0.3, 0.0], method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
     whole = np.concatenate([np.repeat(start, n), np.eye(2 * n).ravel()])

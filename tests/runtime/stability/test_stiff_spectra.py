@@ -14,7 +14,7 @@ SHORT = {"periods": 50, "transient": 10}
 @pytest.mark.parametrize("k", [100, 10**4, 10**6, 10**9])
 def test_a_fast_direction_has_its_exponent(k: int) -> None:
     scene = sc.Scene(sc.Field({"x": "-x", "y": "-k*y"}, parameters={"k": k}, initial={"x": 1, "y": 1}), "x->x")
-    found = sc.lyapunov_spectrum(scene, **SHORT)
+    found = sc.lyapunov_spectrum(scene, periods=10, transient=10)  # the rates are constant
     assert found.resolved.all()
     np.testing.assert_allclose(found.exponent, [-1.0, -k], rtol=1e-8)
 
@@ -44,7 +44,7 @@ def test_the_relaxation_oscillator_of_van_der_pol() -> None:
     """The second exponent is the mean divergence along the cycle, here by SciPy's LSODA."""
     mu = 20.0
     oscillator = sc.Field({"x": "v", "v": "20*(1 - x**2)*v - x"}, initial={"x": 2})
-    found = sc.lyapunov_spectrum(sc.Scene(oscillator, "x->x"), periods=128, transient=20)
+    found = sc.lyapunov_spectrum(sc.Scene(oscillator, "x->x"), periods=64, transient=10)
 
     def rates(_: float, s: np.ndarray) -> list[float]:
         return [s[1], mu * (1 - s[0] ** 2) * s[1] - s[0], mu * (1 - s[0] ** 2)]

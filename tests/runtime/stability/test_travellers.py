@@ -50,7 +50,11 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+TWICE = ("of three states, in the plane",)
+"""What two other cases have, each a part of it."""
+
+
+@pytest.mark.parametrize("case", [pytest.param(case, marks=[pytest.mark.long] * (case in TWICE)) for case in CASES])
 def test_growth_is_that_of_products_of_propagators(case: str) -> None:
     strengths, block, given = CASES[case]
     orbits = settled(strengths, starts=2, **given)  # type: ignore[arg-type]

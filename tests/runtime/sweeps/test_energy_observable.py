@@ -51,7 +51,7 @@ CONSERVATIVE = {
         **EXACT,
     ),
     "few": Scene("harmonic", "cubic_spring", chain(2), parameters={"sigma": 0.7}, observe=EXTREMES, **EXACT),
-    "inerter": Scene("harmonic", "inerter", ring(3), parameters={"sigma": 0.5}, observe=EXTREMES, initial={"v": [1, 0, 0]}, **EXACT),
+    "inerter": Scene("harmonic", "inerter", chain(2), parameters={"sigma": 0.5}, observe=EXTREMES, initial={"v": [1, 0]}, **EXACT),
 }  # fmt: skip
 
 

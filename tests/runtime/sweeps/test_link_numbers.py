@@ -172,7 +172,7 @@ def test_lags_there_and_back_differ() -> None:
 
 
 RANDOM = Scene(
-    "duffing", "spring", ring(10), parameters={"sigma": 0.4}, integrator="dop853",
+    "duffing", "spring", ring(10), parameters={"sigma": 0.4}, integrator="taylor",
     **{**EXACT, "window": 3, "rtol": 1e-10, "record": ["sync_error"]},
 )  # fmt: skip
 """A scene on whose nodes weights and graphs are drawn; tests that give it one width share a kernel."""
@@ -184,7 +184,7 @@ def test_weights_are_drawn(tmp_path: Path) -> None:
     graph = erdos_renyi(10, p=0.5, seed=2)
     scene = RANDOM.replace(topology=graph)
     draws = {"W": uniform(0.5, 1.5)}
-    found = run(scene, draws=draws, width=8, **DRAWN)
+    found = run(scene, draws=draws, width=4, **DRAWN)
     names = [f"{a + 1}_{b + 1}" for a, b in edges_of(graph)]
     assert found.data.W.dims == ("realisation", "W_link")
     assert found.data.W_link.values.tolist() == names
@@ -192,20 +192,20 @@ def test_weights_are_drawn(tmp_path: Path) -> None:
         listed = [
             (*pair, float(found.data.W.sel(W_link=name)[k])) for pair, name in zip(edges_of(graph), names, strict=True)
         ]
-        one = run(scene.replace(topology=from_edges(listed, n=10)), show_progress=False, width=8)
+        one = run(scene.replace(topology=from_edges(listed, n=10)), show_progress=False, width=4)
         np.testing.assert_allclose(found.end.values[k], one.end.values, rtol=0, atol=1e-9)
     assert len(set(found.data.W.values.ravel().tolist())) == 20 * len(names)
     other = scene.replace(draws={"x_1": normal(0.0, 1.0), **draws}, realisations=20, rng=3)
     values = {axis.name: axis.values for axis in other.drawn}
     for name in names:
         assert values[f"W_{name}"] == tuple(found.data.W.sel(W_link=name).values.tolist())
-    alone = run(scene, draws=draws, width=8, workers=1, **DRAWN)
+    alone = run(scene, draws=draws, width=4, workers=1, **DRAWN)
     np.testing.assert_array_equal(alone.end, found.end)
     assert Scene.from_dict(found.scene.as_dict()) == found.scene
-    assert run(found.scene, show_progress=False, width=8).end.identical(found.end)
+    assert run(found.scene, show_progress=False, width=4).end.identical(found.end)
     found.save(tmp_path / "whole.nc")
     assert open_result(tmp_path / "whole.nc").data.identical(found.data)
-    assert stream(scene, tmp_path / "streamed.nc", draws=draws, width=8, **DRAWN).success
+    assert stream(scene, tmp_path / "streamed.nc", draws=draws, width=4, **DRAWN).success
     assert (tmp_path / "streamed.nc").read_bytes() == (tmp_path / "whole.nc").read_bytes()
 
 
@@ -236,7 +236,7 @@ GRAPHS = [erdos_renyi(10, p=0.3, seed=k) for k in range(4)]
 def test_graphs_are_realisations(oscillator: str, coupling: str, tmp_path: Path) -> None:
     """Each realisation is the run on its graph to the last bit, links that it has not add nothing; files keep the graphs."""
     scene = RANDOM.replace(oscillator=oscillator, coupling=coupling)
-    one_width = {"show_progress": False, "width": 8}
+    one_width = {"show_progress": False, "width": 4}
     found = run(scene, realisations=4, draws={"topology": GRAPHS}, sigma=[0.2, 0.4], **one_width)
     assert found.end.dims == ("sigma", "realisation", "component", "node")
     for k, graph in enumerate(GRAPHS):
@@ -297,7 +297,7 @@ def test_the_number_of_edges_is_that_of_the_family() -> None:
 
 def test_runs_on_random_graphs_are_those_on_their_members(tmp_path: Path) -> None:
     scene = drawn("erdos_renyi(10, p=0.3)")
-    one_width = {"show_progress": False, "width": 8}
+    one_width = {"show_progress": False, "width": 4}
     found = run(scene, **one_width)
     graphs = scene.draws["topology"].graphs(4, 3).graphs
     listed = run(RANDOM, realisations=4, draws={"topology": graphs}, **one_width)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -17,7 +18,7 @@ CIRCLE = sc.Scene(
     record=("trajectory",), samples=2, observe={"height": sc.end(sp.Symbol("x"))}, rtol=1e-10,
 )  # fmt: skip
 """Its stops, sections and records are those of test_stop: the tests share drivers."""
-METHODS = [("taylor", 1), ("dop853", 2)]
+METHODS = [("taylor", 1), ("dop853", 4)]
 NEAR, FAR = 0.999, -0.95
 NEARBY = {"near": sc.Section(x_1 - NEAR, "both"), "far": sc.Section(x_1 - FAR, "rising")}
 
@@ -49,6 +50,7 @@ PASSAGES = {
 """Functions that pass zero often, beside places where they have no value, twice in a short time, or at no pole."""
 
 
+@functools.cache
 def passages(function: str, last: float) -> np.ndarray:
     """Where a function of x = sin t changes its sign, from its values at very many times; poles are left out."""
     t = np.linspace(0.0, last, 3_000_001)
@@ -71,7 +73,7 @@ def test_no_passage_is_missed_inside_a_step(integrator: str, width: int) -> None
 @pytest.mark.parametrize(("integrator", "width"), METHODS)
 @pytest.mark.parametrize("name", ["half", "kink", "touch"])
 def test_a_stop_is_the_first_passage(integrator: str, width: int, name: str) -> None:
-    circle = CIRCLE.replace(integrator=integrator, sections=NEARBY, stop=PASSAGES[name])
+    circle = CIRCLE.replace(integrator=integrator, stop=PASSAGES[name])
     found = sc.run(circle, show_progress=False, width=width)
     assert float(found.end_time) == pytest.approx(passages(PASSAGES[name], 5)[0], abs=2e-6)
 
@@ -91,7 +93,7 @@ def test_rounding_is_no_passage(integrator: str, width: int) -> None:
     data = sc.run(pair, show_progress=False, width=width, reduce=False).data
     assert [int(data[f"s{k}_count"]) for k in range(len(zeros))] == [0] * len(zeros)
     assert float(data.end_time) == 50.0
-    apart = sc.run(pair, show_progress=False, width=width, x_2=1.2).data
+    apart = sc.run(pair, show_progress=False, width=width, reduce=False, x_2=1.2).data
     assert int(apart.s0_count) > 0
     assert float(apart.end_time) < 50.0
 
@@ -126,5 +128,5 @@ def test_a_layer_that_is_saturated_now_is_not_stepped_over(steepness: int) -> No
     def rates(t: float, state: np.ndarray) -> list[float]:
         return [state[1], -state[0] - 0.3 * math.tanh(steepness * state[1]) - 0.1 * state[1] + math.cos(t)]
 
-    expected = solve_ivp(rates, (0, 20), [0.5, 0.0], "Radau", rtol=1e-11, atol=1e-12).y[:, -1]
+    expected = solve_ivp(rates, (0, 20), [0.5, 0.0], "DOP853", rtol=1e-12, atol=1e-13, max_step=0.01).y[:, -1]
     np.testing.assert_allclose(found, expected, rtol=0, atol=2e-7)

@@ -20,7 +20,7 @@ TURN = {"turn": {"function": "x_1 - v_1", "direction": "both", "keep": ["x_1"]}}
 TIMES = {"transient": 0.0, "window": 20.0, "time_unit": "time"}
 
 
-@pytest.mark.parametrize(("integrator", "width"), [("dop853", 2), ("rodas5p", 2), ("taylor", 1), ("cash_karp", 2)])
+@pytest.mark.parametrize(("integrator", "width"), [("dop853", 4), ("rodas5p", 4), ("taylor", 1), ("cash_karp", 4)])
 def test_the_end_is_where_the_function_is_zero(integrator: str, width: int) -> None:
     """x = cos t is -1/2 at 2 pi/3; what is observed and sampled is that of the shorter step."""
     scene = Scene(
@@ -53,7 +53,7 @@ def test_cells_stop_each_for_itself_in_any_lanes() -> None:
         oscillator="harmonic", integrator="dop853", rtol=1e-11, record=("trajectory",), samples=2, sections=TURN,
         transient=1.0, window=5.0, time_unit="time", stop="x_1 - 1/2", observe={"speed": mean(v)}, axes={"x_1": [0.4, 0.6, 1.0, -2.0]}, initial={"v": [0.0]},
     )  # fmt: skip
-    found = run(scene, show_progress=False, width=2)
+    found = run(scene, show_progress=False, width=4)
     stops = [np.nan, np.arccos(0.5 / 0.6), np.arccos(0.5), np.arccos(-0.25)]
     assert found.status.values.tolist() == [Status.FINISHED, *[Status.STOPPED] * 3]
     np.testing.assert_allclose(found.end_time[1:], stops[1:], rtol=0, atol=1e-9)
@@ -63,7 +63,7 @@ def test_cells_stop_each_for_itself_in_any_lanes() -> None:
     assert not found.success
     assert int(found.turn_count[0]) >= 1
     for k, start in enumerate(scene.axes[0].values):
-        alone = run(scene.replace(axes={}), show_progress=False, width=2, x_1=start)
+        alone = run(scene.replace(axes={}), show_progress=False, width=4, x_1=start)
         for name in ("end_time", "speed", "turn_count"):
             np.testing.assert_array_equal(alone.data[name], found.data[name][k])
         count = int(alone.turn_count)

@@ -174,13 +174,13 @@ def test_memory_does_not_grow_with_the_file(ending: str, tmp_path: Path) -> None
         path = tmp_path / f"a{cells}{ending}"
         if cells > 20:
             tracemalloc.start()
-        stream(scene, path, width=8, workers=1, show_progress=False)
-        stream(scene, path, width=8, workers=1, resume=True, show_progress=False)
-        peaks.append(tracemalloc.get_traced_memory()[1])
-        tracemalloc.stop()
-        with opened(path) as data:
-            assert data.trajectory.nbytes == 8000 * cells
-    assert peaks[2] < peaks[1] + 1e6
+        found = stream(scene, path, width=8, workers=1, show_progress=False)
+        if cells > 20:
+            found = stream(scene, path, width=8, workers=1, resume=True, show_progress=False)
+            peaks.append(tracemalloc.get_traced_memory()[1])
+            tracemalloc.stop()
+        assert found.data.trajectory.nbytes == 8000 * cells
+    assert peaks[1] < peaks[0] + 1e6
 
 
 @pytest.mark.parametrize("ending", FURTHER)

@@ -62,8 +62,9 @@ def test_parts_of_a_network_synchronise_only_where_uncoupled_oscillators_do():
 
 
 def test_network_in_parts_is_allowed_and_said():
+    parts = from_matrix([[-1, 1, 0], [1, -1, 0], [0, 0, 0]])
     found = thresholds(
-        Scene(topology=PARTS), omega=1.15, sigma=np.linspace(0, 0.3, 7), criterion=SHORT, resolution=0.05
+        Scene(topology=parts), omega=1.15, sigma=np.linspace(0, 0.3, 7), criterion=SHORT, resolution=0.05
     )
     assert any("no complete synchronisation" in words for words in found.warnings)
 
