@@ -265,8 +265,11 @@ def loaded_by(statement: str) -> set[str]:
     [
         ("import synchain", {"sympy", "flint", "numpy", "numba", "matplotlib"}),
         ("from synchain.models import chain; chain(4)", {"sympy", "flint", "numpy", "numba", "matplotlib"}),
-        ("import synchain.models.spectra.solve", {"numpy", "numba", "matplotlib", "scipy"}),
-        ("from synchain.models import star; star(6).spectrum", {"numpy", "numba", "matplotlib", "scipy"}),
+        (
+            "from synchain.models import chain, from_matrix, star; import synchain.models.spectra.solve;"
+            "[str(graph.spectrum) for graph in (star(6), chain(7), from_matrix([[-1, 1], [1, -1]]))]",
+            {"numpy", "numba", "matplotlib", "scipy"},
+        ),
         (
             "from synchain.models import load_scene; load_scene('figure_4a').equations",
             {"numpy", "numba", "matplotlib", "scipy"},

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import random
-import subprocess
-import sys
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
@@ -661,13 +659,3 @@ def test_the_precision_of_arb_is_left_as_it_was() -> None:
     before = flint.ctx.prec
     topology("chain", 5).spectrum.evaluate(60)
     assert flint.ctx.prec == before
-
-
-def test_spectra_need_neither_numpy_nor_numba_nor_matplotlib() -> None:
-    code = (
-        "import sys; from synchain.models.graphs.families import topology; from synchain.models.graphs.topology import from_matrix;"
-        "print(topology('chain', 7).spectrum, from_matrix([[-1, 1], [1, -1]]).spectrum);"
-        "print([m for m in ('numpy', 'numba', 'matplotlib', 'scipy') if m in sys.modules])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
-    assert done.stdout.splitlines()[-1] == "[]"
