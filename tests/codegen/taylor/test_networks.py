@@ -88,7 +88,7 @@ def test_dense_output_of_loops_is_that_of_lines(name):
 
 def test_the_length_of_a_looped_step_is_that_of_the_largest_node_at_every_width():
     """Scalar loops that take a maximum over nodes are what LLVM vectorises; a lost node lets the step be too long."""
-    scene = Scene("harmonic", "spring", ring(9), parameters={"sigma": 0.3})
+    scene = Scene("duffing", "spring", ring(9), parameters={"sigma": 0.3})
     numbers = [scene.parameters[name] for name in scene.equations.parameters]
     single, many = (compiled(scene.equations, 8, width, looped=True) for width in (1, 8))
     dice = np.random.default_rng(3)
