@@ -50,8 +50,13 @@ def by_hand(links: int, end: float, delta: float = 0.1) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("links", "integrator"), [(4, "auto"), pytest.param(4, "cash_karp", marks=pytest.mark.long), (4, "taylor")]
-)
+    ("links", "integrator"),
+    [
+        (4, "auto"),
+        pytest.param(4, "cash_karp", marks=pytest.mark.long),
+        pytest.param(4, "taylor", marks=pytest.mark.long),
+    ],
+)  # single steps: tests/codegen/steps/test_emit.py, tests/codegen/taylor/test_mass_series.py
 def test_a_pendulum_of_many_links_moves_as_its_matrices_say(links, integrator):
     found = end_of(hanging(links, integrator=integrator))
     assert np.abs(found - by_hand(links, 2.0)).max() < 1e-12
