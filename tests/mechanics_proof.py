@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 from types import ModuleType
 
 import sympy as sp
@@ -28,12 +29,15 @@ def vanishes(e: sp.Expr) -> bool:
     inner = sorted({f.args[0] for f in e.atoms(sp.sin, sp.cos)}, key=sp.default_sort_key)
     letters = {a: (sp.Dummy(f"s{k}"), sp.Dummy(f"c{k}")) for k, a in enumerate(inner)}
     e = e.xreplace({sp.sin(a): s for a, (s, _) in letters.items()} | {sp.cos(a): c for a, (_, c) in letters.items()})
-    others = sorted(e.atoms(sp.tanh, sp.log, sp.Function, sp.Abs, sp.sign), key=sp.default_sort_key)
+    others = sorted(e.atoms(sp.Function, sp.Abs, sp.sign, sp.Derivative), key=sp.default_sort_key)
     e = e.xreplace({f: sp.Dummy(f"f{k}") for k, f in enumerate(others)})
-    top = sp.expand(sp.fraction(sp.together(e))[0])
-    for s, c in letters.values():
-        top = sp.expand(sp.rem(top, s**2 + c**2 - 1, s)) if top.has(s) else top
-    return bool(top == 0)
+    symbols = sorted(e.free_symbols, key=sp.default_sort_key)
+    if not symbols:
+        return bool(e == 0)
+    top = sp.QQ.frac_field(*symbols).from_sympy(e).numer
+    known = dict(zip(symbols, top.ring.gens, strict=True))
+    squares = [known[s] ** 2 + known[c] ** 2 - 1 for s, c in letters.values() if s in known and c in known]
+    return not top.rem(squares)  # their leading terms are coprime, so that only multiples of them leave nothing
 
 
 def _odd(function: type[sp.Function], a: sp.Expr) -> sp.Expr:
@@ -109,6 +113,7 @@ def particles(module: ModuleType, values: dict) -> Iterable[tuple[sp.Expr, ...]]
         yield tuple(sp.factor_terms(sp.expand(e)) for e in found)
 
 
+@cache
 def by_lagrange(system: Whole) -> tuple[sp.Matrix, sp.Matrix]:
     """Mass matrix and forcing by LagrangesMethod; each force acts on a point that moves with its coordinate."""
     frame, loads = _loads(system, system.rates, system.forces)
@@ -117,6 +122,7 @@ def by_lagrange(system: Whole) -> tuple[sp.Matrix, sp.Matrix]:
     return method.mass_matrix, method.forcing
 
 
+@cache
 def by_kane(system: Whole) -> tuple[sp.Matrix, sp.Matrix]:
     """Mass matrix and forcing by KanesMethod, from the particles; forces and -dV/dq act on points as above."""
     u = [mechanics.dynamicsymbols(f"u_{k}") for k in range(len(system.q))]

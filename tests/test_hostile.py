@@ -19,6 +19,7 @@ from parts import edge
 
 from synchain.models.claims.language import read_claims
 from synchain.models.claims.verdict import verify
+from synchain.models.graphs import readers
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.symbolic import weight
 from synchain.models.inputs import plugins
@@ -191,11 +192,15 @@ def test_long_axes_of_the_command_line_are_counted_before_they_are_built(tmp_pat
 
 @pytest.mark.parametrize(
     ("options", "words"),
-    [("--edges", "expected at most 4000000 links"), ("--matrix", "more than 2000 rows or columns; expected at most 2000")],
+    [("--edges", "expected at most 4000 links"), ("--matrix", "more than 2000 rows or columns; expected at most 2000")],
 )  # fmt: skip
-def test_large_files_of_graphs_are_refused_by_their_size(options: str, words: str, tmp_path: Path, capsys) -> None:
+def test_large_files_of_graphs_are_refused_by_their_size(
+    options: str, words: str, tmp_path: Path, monkeypatch, capsys
+) -> None:
+    assert readers.LINK_LIMIT == 4_000_000
+    monkeypatch.setattr(readers, "LINK_LIMIT", 4000)
     path = tmp_path / "graph.txt"
-    path.write_text("1 2\n" * 2_000_001 if options == "--edges" else ("0 " * 2001 + "\n") * 2001)
+    path.write_text("1 2\n" * 2001 if options == "--edges" else ("0 " * 2001 + "\n") * 2001)
     assert main(["spectrum", options, str(path)]) == 2
     error = capsys.readouterr().err
     assert words in error

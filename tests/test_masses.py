@@ -49,7 +49,14 @@ def by_hand(links: int, end: float, delta: float = 0.1) -> np.ndarray:
     return found.y[:, -1]
 
 
-@pytest.mark.parametrize(("links", "integrator"), [(4, "auto"), (4, "cash_karp"), (4, "taylor")])
+@pytest.mark.parametrize(
+    ("links", "integrator"),
+    [
+        (4, "auto"),
+        pytest.param(4, "cash_karp", marks=pytest.mark.long),
+        pytest.param(4, "taylor", marks=pytest.mark.long),
+    ],
+)  # single steps: tests/codegen/steps/test_emit.py, tests/codegen/taylor/test_mass_series.py
 def test_a_pendulum_of_many_links_moves_as_its_matrices_say(links, integrator):
     found = end_of(hanging(links, integrator=integrator))
     assert np.abs(found - by_hand(links, 2.0)).max() < 1e-12

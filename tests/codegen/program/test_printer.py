@@ -81,12 +81,13 @@ def test_text_has_the_value_of_the_expression(expression, values):
     found = eval(text, {**FLOATS, **{s.name: v for s, v in zip(SYMBOLS, values, strict=True)}})
     with mpmath.workdps(50):
         numbers = [mpmath.mpf(v) for v in values]
-        exact = sp.lambdify(SYMBOLS, expression, "mpmath")(*numbers)
+        value = sp.lambdify(SYMBOLS, expression, "mpmath")
+        exact = value(*numbers)
         # how far a rounding of the values moves the result: what doubles can do at best
         steps = [
             [v * (1 + mpmath.mpf(2) ** -45 * (i == j)) for j, v in enumerate(numbers)] for i in range(len(numbers))
         ]
-        moved = [abs(sp.lambdify(SYMBOLS, expression, "mpmath")(*step) - exact) for step in steps]
+        moved = [abs(value(*step) - exact) for step in steps]
         allowed = 100 * max(moved) + 1e-11 * (1 + abs(exact))
         assert math.isfinite(found)
         assume(not expression.has(sp.sign, sp.Piecewise) or max(moved) < 1e-6)  # a jump right here

@@ -205,7 +205,7 @@ def test_odd_functions(name):
     np.testing.assert_array_equal(at(-x)[name], -at(x)[name])
 
 
-@pytest.mark.parametrize("width", [1, 2, 4])
+@pytest.mark.parametrize("width", [1, pytest.param(2, marks=pytest.mark.long), 4])
 def test_the_same_bits_at_every_width(width):
     x = np.concatenate([SPECIAL, spread(-5.0, 5.0)[:5000], scaled(-308, 308)[:5000], spread(-746.0, 711.0)[:5000]])
     for name, found in at(x, width).items():

@@ -129,7 +129,7 @@ def test_powers_of_two_are_cut_downwards():
     assert at(x)["power_of_two"].tolist() == [2.0 ** np.floor(np.log2(v)) for v in x]
 
 
-@pytest.mark.parametrize("width", [1, 4])
+@pytest.mark.parametrize("width", [1, pytest.param(4, marks=pytest.mark.long)])
 def test_every_width_has_the_same_bits(width):
     x = np.linspace(-3.0, 3.0, 101)
     one, other = at(x, width), at(x, 8)

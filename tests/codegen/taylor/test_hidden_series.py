@@ -72,7 +72,7 @@ def some(chosen: tuple, others: tuple) -> list:
 
 
 @pytest.mark.parametrize("power", some((4, 5, 8, 11, 15), (6, 7, 9, 10, 12)))
-@pytest.mark.parametrize("rtol", some((1e-2, 1e-8, 1e-13), (1e-4, 1e-6, 1e-11)))
+@pytest.mark.parametrize("rtol", some((1e-2, 1e-13), (1e-4, 1e-6, 1e-8, 1e-11)))
 def test_a_spring_without_a_linear_term_keeps_its_energy(power, rtol):
     """Near x = 0 the coefficients of x'' = -x**n stand n + 1 orders apart: the last three say nothing."""
     force = X**power if power % 2 else X ** (power - 1) * sp.Abs(X)

@@ -79,8 +79,11 @@ UNARY = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("point", POINTS)
-@pytest.mark.parametrize("name", UNARY)
+@pytest.mark.parametrize(
+    ("name", "point"),
+    [pytest.param(name, point, marks=[pytest.mark.long] * ((k + turn) % 2))
+     for k, name in enumerate(UNARY) for turn, point in enumerate(POINTS)],
+)  # fmt: skip
 def test_every_recurrence_is_the_series_of_mpmath(name, point):
     with mpmath.workdps(DIGITS):
         c, b = mpmath.mpf(point), mpmath.mpf("1.7")

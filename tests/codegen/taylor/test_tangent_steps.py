@@ -175,7 +175,7 @@ def duffing_monodromy(state: np.ndarray, values: dict[str, float], alpha: float,
     return x0, v0, mpmath.matrix(columns).T
 
 
-@pytest.mark.parametrize("alpha", [0.0, 0.7])
+@pytest.mark.parametrize("alpha", [pytest.param(0.0, marks=pytest.mark.long), 0.7])
 def test_floquet_multipliers_are_those_of_mpmath(alpha: float) -> None:
     s = scene("duffing", "spring", parameters={"omega": 1.3, "u": 0.6}, transient=60.0)
     orbit = periodic_orbit(s)

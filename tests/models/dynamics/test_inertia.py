@@ -132,7 +132,7 @@ def test_the_matrix_of_inerters_is_that_of_springs() -> None:
     assert node("clock").state[0].name == "theta"
 
 
-@pytest.mark.parametrize("integrator", ["rodas5p", "dop853"])
+@pytest.mark.parametrize("integrator", ["rodas5p", pytest.param("dop853", marks=pytest.mark.long)])
 def test_unequal_masses_move_in_the_modes_of_the_generalised_eigenproblem(integrator: str) -> None:
     """K a = lambda M a with springs to the ground and inerters between: every start is a sum of such modes."""
     weights, sigma, end = np.array([0.5, 2.0]), 0.4, 20.0
@@ -169,7 +169,7 @@ def one_way(name: str) -> Scene:
     return Scene(oscillator="clock", nodes=beam, topology=graph, **{**common, **hanging})
 
 
-SHORT = (("pair", "dop853"), ("feed forward", "rodas5p"), ("static friction", "rodas5p"), ("clocks", "dop853"))
+SHORT = (("static friction", "rodas5p"), ("clocks", "dop853"))
 
 
 @pytest.mark.parametrize(

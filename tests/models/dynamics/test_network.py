@@ -97,10 +97,17 @@ def assemble(oscillator: str, friction: str | None, coupling: str, graph: Topolo
     return network(single, edge(coupling, single, oscillator), graph)
 
 
-@pytest.mark.parametrize("graph", unlike(), ids=identity)
+LAWS = (("friction", "exponential", "spring"), ("duffing", None, "damper"))
+"""All couplings of all oscillators: test_mechanics_proof.py."""
+
+
 @pytest.mark.parametrize(
-    ("oscillator", "friction", "coupling"), [("friction", "exponential", "spring"), ("duffing", None, "damper")]
-)  # all couplings of all oscillators: test_mechanics_proof.py
+    ("oscillator", "friction", "coupling", "graph"),
+    [
+        pytest.param(*law, graph, id=f"{identity(graph)}-{law[2]}", marks=[pytest.mark.long] * ((turn + k) % 2))
+        for k, law in enumerate(LAWS) for turn, graph in enumerate(unlike())
+    ],
+)  # fmt: skip
 def test_template_equals_the_lagrangian_in_one_piece(
     oscillator: str, friction: str | None, coupling: str, graph: Topology
 ) -> None:
@@ -282,7 +289,9 @@ def test_parameters_are_those_of_the_equations(oscillator: str, friction: str | 
     used = set().union(*(e.free_symbols for e in (*single.rhs, *conditions)))
     assert {s.name for s in single.parameters} == {s.name for s in used} - {s.name for s in single.state} - {"t"}
     first, last = single.state[0].name, single.state[-1 if single.contact is None else 1].name
-    springs = () if not is_lagrangian(oscillator) else FORCES
+    springs = FORCES if is_lagrangian(oscillator) else ()
+    if friction and oscillator != "friction":  # each law and contact meets all couplings there, and one of them here
+        springs = springs[len(friction) % len(springs) :][:1]
     for coupling in (*springs, f"{first}->{last}"):
         joined = network(single, edge(coupling, single, oscillator), topology("chain", 2))
         assert joined.parameters == tuple(parameters(oscillator, friction, contact, coupling))

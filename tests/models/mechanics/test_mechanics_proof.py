@@ -113,9 +113,9 @@ def test_the_kinetic_energy_is_that_of_the_particles(oscillator: str) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_wrong_term_is_seen(method: object) -> None:
+    """Of the oscillator whose own terms leave nothing in a test above."""
     system = whole("double_pendulum", None, topology("chain", 1))
     ours = accelerations("double_pendulum", None, topology("chain", 1))
-    assert all(vanishes(e) for e in residual(system, method(system), ours))  # type: ignore[operator]
     wrong = {**ours, "psi_1": ours["psi_1"] + sp.sin(sp.Symbol("psi_1", real=True)) / 1000}
     assert not all(vanishes(e) for e in residual(system, method(system), wrong))  # type: ignore[operator]
     assert not vanishes(sp.sin(TIME) ** 2 + sp.cos(TIME) ** 2 - sp.Rational(999, 1000))

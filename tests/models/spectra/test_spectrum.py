@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import random
-import subprocess
-import sys
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
@@ -193,14 +191,15 @@ def test_large_matrices_without_a_closed_form_are_refused() -> None:
 # ---- any rational matrix ----
 
 
-def test_all_connected_graphs_up_to_seven_nodes_against_numpy() -> None:
+@pytest.mark.parametrize("largest", [6, pytest.param(7, marks=pytest.mark.long)])
+def test_all_connected_graphs_of_few_nodes_against_numpy(largest: int) -> None:
     """R. C. Read, R. J. Wilson, An Atlas of Graphs (Oxford, 1998): 1, 1, 2, 6, 21, 112 and 853 of them."""
     atlas = pytest.importorskip("networkx.generators.atlas")
     networkx = pytest.importorskip("networkx")
     counts: Counter[int] = Counter()
     for graph in atlas.graph_atlas_g():
         n = graph.number_of_nodes()
-        if n == 0 or not networkx.is_connected(graph):
+        if not 0 < n <= largest or not networkx.is_connected(graph):
             continue
         counts[n] += 1
         found = from_graph(graph, name="atlas")
@@ -210,7 +209,7 @@ def test_all_connected_graphs_up_to_seven_nodes_against_numpy() -> None:
         assert exact.eigenvalues[0] == Eigenvalue(sp.S.Zero, 1)
         numbers = np.linalg.eigvalsh(-networkx.laplacian_matrix(graph).toarray().astype(float))
         assert np.sort(expanded(exact)) == pytest.approx(numbers, rel=1e-12, abs=1e-12)
-    assert [counts[n] for n in range(1, 8)] == [1, 1, 2, 6, 21, 112, 853]
+    assert [counts[n] for n in range(1, largest + 1)] == [1, 1, 2, 6, 21, 112, 853][:largest]
 
 
 weights = st.fractions(min_value=-3, max_value=3, max_denominator=12)
@@ -365,7 +364,7 @@ def test_wrong_numbers_of_digits(digits: int) -> None:
 def test_floats_are_the_nearest_ones() -> None:
     for graph in (integer_graph(14, 0.4, 2), topology("chain", 14)):
         assert all(e.value == float(e.evaluate(40)) for e in graph.spectrum.eigenvalues)
-    assert topology("chain", 3000).spectrum.values[1] == pytest.approx(-((np.pi / 3000) ** 2), rel=1e-6)
+    assert topology("chain", 1000).spectrum.values[1] == pytest.approx(-((np.pi / 1000) ** 2), rel=1e-6)
 
 
 def test_brackets_hold_one_sign_change() -> None:
@@ -634,7 +633,7 @@ def test_the_largest_of_equal_size_is_the_first() -> None:
     assert mixed.spectrum.values == (10.0, 0.0)
 
 
-@pytest.mark.parametrize(("n", "share"), [(100, 0.1), (100, 0.9), (200, 0.3)])
+@pytest.mark.parametrize(("n", "share"), [(100, 0.1), (100, 0.9), pytest.param(200, 0.3, marks=pytest.mark.long)])
 def test_large_matrices_take_the_fast_route(n: int, share: float, monkeypatch: pytest.MonkeyPatch) -> None:
     graph = integer_graph(n, share, 3)
     monkeypatch.setattr("synchain.models.algebra.roots._by_arb", None)
@@ -660,13 +659,3 @@ def test_the_precision_of_arb_is_left_as_it_was() -> None:
     before = flint.ctx.prec
     topology("chain", 5).spectrum.evaluate(60)
     assert flint.ctx.prec == before
-
-
-def test_spectra_need_neither_numpy_nor_numba_nor_matplotlib() -> None:
-    code = (
-        "import sys; from synchain.models.graphs.families import topology; from synchain.models.graphs.topology import from_matrix;"
-        "print(topology('chain', 7).spectrum, from_matrix([[-1, 1], [1, -1]]).spectrum);"
-        "print([m for m in ('numpy', 'numba', 'matplotlib', 'scipy') if m in sys.modules])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
-    assert done.stdout.splitlines()[-1] == "[]"
