@@ -25,8 +25,8 @@ from ..steps.places import Joint, Kind, Span, places
 from .graph import Graph, Template, check_jumps
 from .length import finished, last_orders, reach, unseen
 from .masses import moving, solved
-from .passage import closed, first_passage, functions, jumps, leapt, loose, passed
-from .series import Brink, Constant, Series, State, Time, magnitude
+from .passage import Stored, closed, first_passage, functions, jumps, loose
+from .series import Constant, Series, State, Time, magnitude
 from .step import TaylorStep, broken, called, returned
 from .terms import absolute, add, lane, largest, show, statement
 
@@ -220,9 +220,10 @@ class Section:
         """The statements that end the step at the kinks and contacts of this section."""
         found = []
         for kink in self.graph.kinks:
-            size, first = f"load(dense, {self.slot(kink.size, '0')}, WIDTH)", self.where(kink.base, "0")
-            side, place = self.load(kink, str(degree)), (size, first, self.stride(kink.base), degree)
-            found += leapt(self.load(kink, "0"), side, *place) if isinstance(kink, Brink) else [passed(side, *place)]
+            size = f"load(dense, {self.slot(kink.size, '0')}, WIDTH)"
+            begun, side = (self.load(kink, k) for k in ("0", str(degree)))
+            stored = Stored(size, self.where(kink.base, "0"), self.stride(kink.base), degree)
+            found += kink.passages(begun, side, stored)
         if self.mode:
             sizes = [f"load(dense, at_sizes + {place}, WIDTH)" for place in GAPS]
             places = [f"at_gaps + {place}" for place in GAPS]

@@ -8,10 +8,11 @@ slips, and while it sticks the distances of its load from the limits of static f
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from synchain.models.dynamics.equations import Equations
 
-__all__ = ["closed", "first_passage", "functions", "jumps", "leapt", "loose", "passed"]
+__all__ = ["Stored", "closed", "first_passage", "functions", "jumps", "leapt", "loose", "passed"]
 
 PASSAGE = '''
 PASSED, ROUNDING, NEAREST = 1e-10, 1e-15, 1e-8
@@ -128,21 +129,32 @@ def closed(
     ]
 
 
-def passed(side: str, size: str, first: str, stride: str, order: int) -> str:
-    """The statement that ends a step where the series of a kink passes zero, whose coefficients stand in memory."""
-    return f"passed = passage({side}, {size}, PASSED, NEAREST*passed, dense, {first}, {stride}, {order}, passed)"
+class Stored(NamedTuple):
+    """A series whose coefficients stand in memory: the size of the terms that it begins with, where, and how far apart."""
+
+    size: str
+    first: str
+    stride: str
+    order: int
+
+    @property
+    def arguments(self) -> str:
+        """The last arguments of the functions that find where it passes zero."""
+        return f"dense, {self.first}, {self.stride}, {self.order}, passed"
 
 
-def leapt(begun: str, side: str, size: str, first: str, stride: str, order: int) -> list[str]:
+def passed(side: str, series: Stored) -> str:
+    """The statement that ends a step where the series of a kink passes zero."""
+    return f"passed = passage({side}, {series.size}, PASSED, NEAREST*passed, {series.arguments})"
+
+
+def leapt(begun: str, side: str, series: Stored) -> list[str]:
     """The statements that end a step where a series passes a jump, which is on the side `begun` at first, and then on `side`.
 
     A passage is as exact as rounding lets it be, of the way until there, not of that of a step without it.
     """
-    rest = f"dense, {first}, {stride}, {order}, passed)"
-    return [
-        f"passed = leaving({begun}, {side}, {size}, 0.01*nearest, {rest}",
-        *2 * [f"passed = passage({side}, 1e4*{size}, 2e-15, 0.01*nearest, {rest}"],
-    ]
+    passage = f"passed = passage({side}, 1e4*{series.size}, 2e-15, 0.01*nearest, {series.arguments})"
+    return [f"passed = leaving({begun}, {side}, {series.size}, 0.01*nearest, {series.arguments})", passage, passage]
 
 
 def first_passage(found: Sequence[str]) -> list[str]:

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from ..program.expressions import ONE, ZERO, Call, Expression, Name, Number
+from .passage import Stored, leapt, passed
 from .terms import absolute, add, over, show, times
 
 __all__ = ["Brink", "Choice", "Constant", "Fraction", "Integral", "Kink", "Leaping", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
@@ -360,6 +361,10 @@ class Kink(Series):
             return side
         return Call("select", (Name(f"absolute({show(side)}) > 0.5"), side, Call("side_of", (value, ZERO))))
 
+    def passages(self, begun: str, side: str, stored: Stored) -> list[str]:
+        """The statements that end a step where the series leaves its side, `begun` at first, and then `side` (`passed`)."""
+        return [passed(side, stored)]
+
 
 @dataclass(eq=False, slots=True)
 class Choice(Series):
@@ -387,6 +392,10 @@ class Brink(Kink):
     def begin(self, at: Start) -> Expression:
         self.size = at.keep(f"size_{self.name}", magnitude(at, self.base))
         return Call("side_of", (at.start(self.base), ZERO))
+
+    def passages(self, begun: str, side: str, stored: Stored) -> list[str]:
+        """The statements that end a step where the series leaves its side (`leapt`)."""
+        return leapt(begun, side, stored)
 
 
 @dataclass(eq=False, slots=True)

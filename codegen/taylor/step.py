@@ -18,8 +18,8 @@ from ..program.passes import Names, real
 from .graph import STARTS, Graph, Template, check_jumps
 from .length import finished, last_orders, reach, unseen
 from .masses import moving, solved
-from .passage import closed, first_passage, functions, jumps, leapt, loose, passed
-from .series import Brink, Constant, Series, State, Time, magnitude
+from .passage import Stored, closed, first_passage, functions, jumps, loose
+from .series import Constant, Series, State, Time, magnitude
 from .terms import absolute, add, lane, largest, show, statement, times
 
 __all__ = [
@@ -378,8 +378,8 @@ class StepWriter(LineWriter):
         first, p, found = self.order * self.equations.dimension, self.order, list[str]()
         for kink in self.graph.kinks:
             found += (f"store(dense, {first + k}, {lane(self.at(kink.base, k))})" for k in range(p + 1))
-            side, place = show(self.at(kink, p)), (kink.size, str(first), "1", p)
-            found += leapt(show(self.at(kink, 0)), side, *place) if isinstance(kink, Brink) else [passed(side, *place)]
+            begun, side = (show(self.at(kink, k)) for k in (0, p))
+            found += kink.passages(begun, side, Stored(kink.size, str(first), "1", p))
         for gaps in self.contacts:
             found += gaps.closings(self, p, first, self.exact)
         return found
