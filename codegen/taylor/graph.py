@@ -65,6 +65,9 @@ S = TypeVar("S", bound=Series)
 ODD = (sp.sin, sp.tan, sp.sinh, sp.tanh, sp.atan, sp.asin, sp.asinh, sp.atanh, sp.erf)
 EVEN = (sp.cos, sp.cosh)
 
+SINGULAR = (sp.log, sp.tan, sp.asin, sp.acos, sp.acosh, sp.atanh)
+"""Functions with a pole, or with arguments for which they have no value."""
+
 STEADY = ("sin", "cos")
 """Functions of which some low coefficient is always as large as the argument makes the high ones."""
 
@@ -74,24 +77,27 @@ PLAIN = 3
 
 def jump(equations: Equations) -> sp.Expr | None:
     """Return a part of some equations that no Taylor step passes; None if there is none."""
-    serial = (part for own, ends in templates(equations) for part in _unserial(own, _moving(ends)))
-    return min({*unpassed(equations), *serial}, key=sp.default_sort_key, default=None)
+    return next(iter(_obstacles(equations)), None)
 
 
 def check_jumps(equations: Equations) -> None:
     """Raise ValueError for equations with a part that no Taylor step passes."""
-    part = jump(equations)
-    if part is not None:
-        jumps = isinstance(part, (*JUMPING, Piecewise))
-        why = (
-            "along which motion may slide, or which a contact or a mass matrix feels"
-            if jumps
-            else "which has no series"
-        )
+    for part, why in _obstacles(equations).items():
         raise ValueError(
             f"taylor: found {part}, {why}; expected functions with a series between zeros, and jumps that motion passes; "
             "use integrator dop853 or rodas5p"
         )
+
+
+def _obstacles(equations: Equations) -> dict[sp.Expr, str]:
+    """The parts that no Taylor step passes, in a fixed order, and why."""
+    found = dict.fromkeys(
+        unpassed(equations), "along which motion may slide, or which a contact or a mass matrix feels"
+    )
+    for own, ends in templates(equations):
+        found |= dict.fromkeys(_unserial(own, _moving(ends)), "which has no series")
+        found |= dict.fromkeys(_guarding(own, _moving(ends)), "a part of which has a pole, or no value, somewhere")
+    return {part: found[part] for part in sorted(found, key=sp.default_sort_key)}
 
 
 def is_analytic(equations: Equations) -> bool:
@@ -126,6 +132,27 @@ def _unserial(expressions: Sequence[sp.Expr], moving: Set[sp.Symbol]) -> set[sp.
     roots = {p for p in powers if p.exp.is_integer is not True}
     roots = {p for p in roots if any(isinstance(f, sided) for f in sp.Mul.make_args(p.base))}
     return roots | {part for part in functions if part.free_symbols & moving}
+
+
+def _guarding(expressions: Sequence[sp.Expr], moving: Set[sp.Symbol]) -> set[sp.Expr]:
+    """Choices and jumps whose parts have no series at some places, and arcs, which series carry on over a pole.
+
+    All pieces of a choice have series, chosen or not, so that a piece without a value ends a step.
+    """
+    parts = {part for e in expressions for part in e.atoms(Piecewise, *JUMPING, sp.atan)}
+    return {
+        part for part in parts if any(_is_singular(e, moving) for a in part.args for e in a.atoms(sp.Pow, sp.Function))
+    }
+
+
+def _is_singular(e: sp.Expr, moving: Set[sp.Symbol]) -> bool:
+    """True for a root, a quotient or a function that has a pole, or no value, at some values of its argument."""
+    argument = e.args[0]
+    if not argument.free_symbols & moving or argument.is_positive:
+        return False
+    if isinstance(e, sp.Pow):
+        return bool(e.exp.is_integer is not True or e.exp.is_negative)
+    return isinstance(e, SINGULAR)
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,6 +312,11 @@ class Graph:
     def kinks(self) -> list[Kink]:
         """The kinks of all series."""
         return [s for s in self.series if isinstance(s, Kink)]
+
+    @property
+    def brinks(self) -> list[Brink]:
+        """Those of them at which something jumps."""
+        return [kink for kink in self.kinks if isinstance(kink, Brink)]
 
     @property
     def gaps(self) -> list[Series]:

@@ -25,7 +25,7 @@ from ..steps.places import Joint, Kind, Span, places
 from .graph import Graph, Template, check_jumps
 from .length import finished, last_orders, reach, unseen
 from .masses import moving, solved
-from .passage import Stored, closed, first_passage, functions, jumps, loose
+from .passage import Stored, closed, first_passage, functions, jumps, loose, settled, told
 from .series import Constant, Series, State, Time, magnitude
 from .step import TaylorStep, broken, called, returned
 from .terms import absolute, add, lane, largest, show, statement
@@ -132,6 +132,10 @@ class Section:
             self.lines += [*statement(what, value), f"store(dense, {self.slot(what, '0')}, {what} + 0.0*scale)"]
         return what
 
+    def hint(self, series: Series) -> Expression:
+        """The side of zero on which a series that begins at zero lies just after."""
+        return Name(f"load(dense, {self.slot(f'hint_{series.name}', '0')}, WIDTH)")
+
     # -- places ---------------------------------------------------------------------------------------------------
 
     def slot(self, name: str, order: str) -> str:
@@ -221,14 +225,31 @@ class Section:
         found = []
         for kink in self.graph.kinks:
             size = f"load(dense, {self.slot(kink.size, '0')}, WIDTH)"
-            begun, side = (self.load(kink, k) for k in ("0", str(degree)))
             stored = Stored(size, self.where(kink.base, "0"), self.stride(kink.base), degree)
-            found += kink.passages(begun, side, stored)
+            found += kink.passages(self.load(kink, str(degree)), stored)
         if self.mode:
             sizes = [f"load(dense, at_sizes + {place}, WIDTH)" for place in GAPS]
             places = [f"at_gaps + {place}" for place in GAPS]
             found.append(f"stuck = 1.0 - {self.mode}*{self.mode}")
             found += closed("stuck", exact, sizes, places, "2*NODES", "at_closing", degree)
+        return self.run(found)
+
+    @property
+    def hints(self) -> list[str]:
+        """What the sides of series that begin on a jump are called."""
+        return [f"hint_{brink.base.name}" for brink in self.graph.brinks]
+
+    def unknown(self) -> list[str]:
+        """The statements that forget these sides."""
+        return self.run([f"store(dense, {self.slot(hint, '0')}, 0.0*scale)" for hint in self.hints])
+
+    def sides(self, degree: int) -> list[str]:
+        """The statements that take note of those that the coefficients tell."""
+        found = []
+        for brink in self.graph.brinks:
+            begun, side = (self.load(brink, k) for k in ("0", str(degree)))
+            write = f"store(dense, {self.slot(f'hint_{brink.base.name}', '0')}, {{1}})"
+            found += told(show(self.hint(brink.base)), begun, side, write)
         return self.run(found)
 
     def lengths(self, order: int) -> list[str]:
@@ -532,7 +553,7 @@ class LoopWriter:
             if name not in eq.single:
                 lines.append(f"{self.called[name]} = load(p, {slot}, WIDTH)")
         lines += [f"{name} = {text}" for name, text in self.waves.graph.constants.items()]
-        lines += ["# order 0", *self.states("store(dense, at_states + {0}, load(y, {0}, WIDTH))")]
+        head, lines = lines, ["# order 0", *self.states("store(dense, at_states + {0}, load(y, {0}, WIDTH))")]
         if self.waves.rates:
             lines += ["store(dense, at_t, t)", "store(dense, at_t + 1, scale)", f"for k in range(2, {self.order + 1}):"]
             lines += ["    store(dense, at_t + k, 0.0*scale)"]
@@ -541,9 +562,10 @@ class LoopWriter:
         lines += [f"    {line}" for line in turn]
         if not self.ends:
             lines += self.next_states(f"{1.0 / self.order!r}*scale", str(self.order))
-        ending = self.closing()
-        lines += ending
-        before = [*functions(ending), CONVOLUTION]
+        unknown = [line for section in self.sections for line in section.unknown()]
+        sides = [line for section in self.sections for line in section.sides(self.order)]
+        lines = [*head, *settled(unknown, lines, sides), *self.closing()]
+        before = [*functions(lines), CONVOLUTION]
         return TaylorStep.of(lines, self.order, size, ", graph, weights", before)
 
     def bases(self) -> tuple[list[str], int]:
@@ -557,7 +579,7 @@ class LoopWriter:
         for section in self.sections:
             kept = {s.name for s in section.remembered}
             sizes |= {name: self.orders * section.count for name in sorted(kept - {"t", ""})}
-            sizes |= {name: section.count for name in section.kept}
+            sizes |= {name: section.count for name in (*section.kept, *section.hints)}
             if isinstance(section, Totals):
                 sizes |= {name: self.orders for name, _ in section.rates}
         lines, size = [], 0

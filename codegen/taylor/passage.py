@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from synchain.models.dynamics.equations import Equations
 
-__all__ = ["Stored", "closed", "first_passage", "functions", "jumps", "leapt", "loose", "passed"]
+__all__ = ["Stored", "closed", "first_passage", "functions", "jumps", "leapt", "loose", "passed", "settled", "told"]
 
 PASSAGE = '''
 PASSED, ROUNDING, NEAREST = 1e-10, 1e-15, 1e-8
@@ -80,21 +80,17 @@ def closing(side, late, size, nearest, dense, first, stride, room, degree, ratio
     return passage(side, 1e4*size, 1e-14 + late, nearest, dense, first, stride, degree, ratio)
 '''.strip()
 
-LEAVING = '''
-@njit(error_model='numpy')
-def leaving(begun, side, size, nearest, dense, first, stride, degree, ratio):
-    """How far to go, at most to `ratio`, from a jump where a step begins: so far that the next one begins beside it."""
-    active, place = (absolute(begun) < 0.5) & (absolute(side) > 0.5), 0.0*ratio + nearest
-    begins = active
-    for _ in range(60):
-        spread = 0.0*ratio
-        for k in range(degree, 0, -1):
-            spread = (spread + absolute(load(dense, first + k*stride, WIDTH)))*place
-        active = active & (spread <= 2.0*ROUNDING*size) & (place < ratio)
-        if not any_lane(active):
-            break
-        place = select(active, 2.0*place, place)
-    return select(begins, minimum(place, ratio), ratio)
+SIDES = '''
+@njit(error_model='numpy', forceinline=True)
+def side_or(value, hint):
+    """The side of zero on which a value lies, that of a hint at zero."""
+    return select(value > 0.0, 1.0, select(value < 0.0, -1.0, hint))
+
+
+@njit(error_model='numpy', forceinline=True)
+def found_side(begun, side):
+    """The side of a series that begins at zero, if its coefficients have just told it, else 0."""
+    return select((absolute(begun) < 0.5) & (absolute(side) > 0.5), side, 0.0*side)
 '''.strip()
 
 LATE = 1e-10
@@ -148,13 +144,28 @@ def passed(side: str, series: Stored) -> str:
     return f"passed = passage({side}, {series.size}, PASSED, NEAREST*passed, {series.arguments})"
 
 
-def leapt(begun: str, side: str, series: Stored) -> list[str]:
-    """The statements that end a step where a series passes a jump, which is on the side `begun` at first, and then on `side`.
+def leapt(side: str, series: Stored) -> list[str]:
+    """The statements that end a step where a series passes a jump.
 
     A passage is as exact as rounding lets it be, of the way until there, not of that of a step without it.
     """
-    passage = f"passed = passage({side}, 1e4*{series.size}, 2e-15, 0.01*nearest, {series.arguments})"
-    return [f"passed = leaving({begun}, {side}, {series.size}, 0.01*nearest, {series.arguments})", passage, passage]
+    return 2 * [f"passed = passage({side}, 1e4*{series.size}, 2e-15, 0.01*nearest, {series.arguments})"]
+
+
+def settled(hints: Sequence[str], coefficients: Sequence[str], sides: Sequence[str]) -> list[str]:
+    """The statements that make coefficients anew as long as they tell on which sides series lie that begin on a jump.
+
+    Coming down from a whole number takes two turns more: the first tells the way, the second that the number above is left.
+    """
+    if not hints:
+        return [*coefficients]
+    inner = [*coefficients, "# sides of jumps", "news = 0.0*t", *sides, "if not any_lane(news > 0.5):", "    break"]
+    return [*hints, "for _ in range(4):", *(f"    {line}" for line in inner)]
+
+
+def told(hint: str, begun: str, side: str, write: str = "{0} = {1}") -> list[str]:
+    """The statements that take note of a side that the coefficients tell."""
+    return [f"new = found_side({begun}, {side})", "news = news + absolute(new)", write.format(hint, f"{hint} + new")]
 
 
 def first_passage(found: Sequence[str]) -> list[str]:
@@ -169,5 +180,5 @@ def first_passage(found: Sequence[str]) -> list[str]:
 def functions(statements: Sequence[str]) -> list[str]:
     """The functions that statements call which end a step."""
     called = "\n".join(statements)
-    texts = {"passed = ": PASSAGE, "closing(": CLOSING, "leaving(": LEAVING}
+    texts = {"passed = ": PASSAGE, "closing(": CLOSING, "found_side(": SIDES}
     return [text for word, text in texts.items() if word in called]

@@ -61,6 +61,9 @@ class Start(Protocol):
     def keep(self, what: str, value: Expression) -> str:
         """Compute something once; returns its name."""
 
+    def hint(self, series: Series) -> Expression:
+        """The side of zero on which a series that begins at zero lies just after, 1 or -1; 0 while that is not known."""
+
 
 @dataclass(eq=False, slots=True)
 class Series:
@@ -361,8 +364,8 @@ class Kink(Series):
             return side
         return Call("select", (Name(f"absolute({show(side)}) > 0.5"), side, Call("side_of", (value, ZERO))))
 
-    def passages(self, begun: str, side: str, stored: Stored) -> list[str]:
-        """The statements that end a step where the series leaves its side, `begun` at first, and then `side` (`passed`)."""
+    def passages(self, side: str, stored: Stored) -> list[str]:
+        """The statements that end a step where the series leaves its side (`passed`)."""
         return [passed(side, stored)]
 
 
@@ -387,15 +390,19 @@ class Choice(Series):
 
 @dataclass(eq=False, slots=True)
 class Brink(Kink):
-    """The side of zero on which a series lies where another one jumps; 0 at zero itself."""
+    """The side of zero on which a series lies where another one jumps.
+
+    At zero itself it is 0 as long as the series is zero to all orders, and else what the coefficients say, which are made
+    anew then.
+    """
 
     def begin(self, at: Start) -> Expression:
         self.size = at.keep(f"size_{self.name}", magnitude(at, self.base))
-        return Call("side_of", (at.start(self.base), ZERO))
+        return Call("side_or", (at.start(self.base), at.hint(self.base)))
 
-    def passages(self, begun: str, side: str, stored: Stored) -> list[str]:
+    def passages(self, side: str, stored: Stored) -> list[str]:
         """The statements that end a step where the series leaves its side (`leapt`)."""
-        return leapt(begun, side, stored)
+        return leapt(side, stored)
 
 
 @dataclass(eq=False, slots=True)
@@ -420,7 +427,7 @@ class Leaping(Series):
 
 @dataclass(eq=False, slots=True)
 class Fraction(Series):
-    """A series less the whole number below its start; `turned` is the series, or a sum that it is the negative of."""
+    """A series less the whole number below it just after its start; `turned` is it, or a sum that it is the negative of."""
 
     base: Series
     turned: Series
@@ -430,7 +437,7 @@ class Fraction(Series):
         return (self.base,)
 
     def begin(self, at: Start) -> Expression:
-        return add(at.start(self.base), times(Number(-1.0), Call("floor", (at.start(self.base),))))
+        return add(at.start(self.base), times(Number(-1.0), below(at, self.base, self)))
 
     def coefficient(self, at: Order) -> Expression:
         return at.of(self.base)
@@ -438,7 +445,7 @@ class Fraction(Series):
 
 @dataclass(eq=False, slots=True)
 class Whole(Series):
-    """The whole number below the start of a series; the brinks are those of its distances from this and the next one."""
+    """The whole number below a series just after its start; the brinks are those of its distances from this and the next one."""
 
     base: Series
     lower: Brink
@@ -453,10 +460,15 @@ class Whole(Series):
         return (self.base,)
 
     def begin(self, at: Start) -> Expression:
-        return Call("floor", (at.start(self.base),))
+        return below(at, self.base, self.lower.base)
 
     def coefficient(self, at: Order) -> Expression:
         return ZERO
+
+
+def below(at: Start, series: Series, part: Series) -> Expression:
+    """The whole number below a series just after its start; `part` is what lies above."""
+    return add(Call("floor", (at.start(series),)), Call("minimum", (at.hint(part), ZERO)))
 
 
 def magnitude(at: Start, series: Series) -> Expression:

@@ -18,7 +18,7 @@ from ..program.passes import Names, real
 from .graph import STARTS, Graph, Template, check_jumps
 from .length import finished, last_orders, reach, unseen
 from .masses import moving, solved
-from .passage import Stored, closed, first_passage, functions, jumps, loose
+from .passage import Stored, closed, first_passage, functions, jumps, loose, settled, told
 from .series import Constant, Series, State, Time, magnitude
 from .terms import absolute, add, lane, largest, show, statement, times
 
@@ -36,9 +36,9 @@ __all__ = [
 
 WORDS = frozenset(
     {"unseen", "high", "low", "largest", "scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "j_there",
-     "slope_scale", "convolution", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", "nearest", "loose", "closing", "leaving", "floor", *STARTS.values()}
+     "slope_scale", "convolution", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", "nearest", "loose", "closing", "side_or", "found_side", "news", "new", "floor", *STARTS.values()}
 )  # fmt: skip
-PREFIXES = ("positive_", "i_", "e_", "half_", "w_", "n_", "size_", "odd_", "stuck_")
+PREFIXES = ("positive_", "i_", "e_", "half_", "w_", "n_", "size_", "odd_", "stuck_", "hint_")
 """Names of the step; a user's symbol of that name is called otherwise within the step."""
 
 COUNTED = re.compile(r"[rs]\d+$")
@@ -159,6 +159,10 @@ class LineWriter:
             self.kept.add(what)
             self.put(*statement(what, value))
         return what
+
+    def hint(self, series: Series) -> Expression:
+        """The side of zero on which a series that begins at zero lies just after."""
+        return Name(f"hint_{series.name}")
 
     # -- statements -----------------------------------------------------------------------------------------------
 
@@ -316,12 +320,13 @@ class StepWriter(LineWriter):
         self.opening()
         for k in range(1, self.order + 1):
             self.coefficients(k)
+        self.settle()
         self.length()
         passages = first_passage(self.passages())
         self.put(*passages)
         self.closing(bool(passages))
         room = 3 * (self.order + 1) if self.gaps else self.order + 1 if passages else 0
-        before = functions(passages)
+        before = functions(self.lines)
         return TaylorStep.of(self.lines, self.order, room, more, before)
 
     def opening(self) -> None:
@@ -337,6 +342,13 @@ class StepWriter(LineWriter):
         for gaps in self.contacts:
             for name, series in zip(gaps.sizes, gaps.series, strict=True):
                 self.keep(name, magnitude(self, series))
+
+    def settle(self) -> None:
+        """Let the coefficients tell on which sides series lie that begin on a jump."""
+        hints = {brink: show(self.hint(brink.base)) for brink in self.graph.brinks}
+        sides = [told(hint, *(show(self.at(brink, k)) for k in (0, self.order))) for brink, hint in hints.items()]
+        zeros = [f"{hint} = 0.0*t" for hint in hints.values()]
+        self.lines = settled(zeros, self.lines, [line for lines in sides for line in lines])
 
     def state_at(self, slot: int, k: int) -> Expression:
         """Coefficient k of a state."""
@@ -378,8 +390,7 @@ class StepWriter(LineWriter):
         first, p, found = self.order * self.equations.dimension, self.order, list[str]()
         for kink in self.graph.kinks:
             found += (f"store(dense, {first + k}, {lane(self.at(kink.base, k))})" for k in range(p + 1))
-            begun, side = (show(self.at(kink, k)) for k in (0, p))
-            found += kink.passages(begun, side, Stored(kink.size, str(first), "1", p))
+            found += kink.passages(show(self.at(kink, p)), Stored(kink.size, str(first), "1", p))
         for gaps in self.contacts:
             found += gaps.closings(self, p, first, self.exact)
         return found

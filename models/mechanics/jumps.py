@@ -73,13 +73,10 @@ def _joins(choice: Piecewise, moving: Set[sp.Symbol]) -> bool:
 
 
 def _agree(one: sp.Expr, other: sp.Expr, gap: sp.Expr, moving: Set[sp.Symbol]) -> bool:
-    """True if two expressions are equal where `gap` is zero."""
-    at = next((s for s in sorted(gap.free_symbols & moving, key=str) if _steady(gap.diff(s), s)), None)
+    """True if two expressions are equal where `gap` is zero: it is solved for a symbol of which it is a multiple at all places."""
+    slopes = ((s, gap.diff(s)) for s in sorted(gap.free_symbols & moving, key=str))
+    at = next((s for s, slope in slopes if slope != 0 and not slope.free_symbols & moving), None)
     return at is not None and bool(sp.simplify((one - other).subs(at, sp.solve(gap, at)[0])) == 0)
-
-
-def _steady(slope: sp.Expr, symbol: sp.Symbol) -> bool:
-    return bool(slope != 0 and not slope.has(symbol))
 
 
 def rough_at(e: sp.Expr, place: Mapping[sp.Symbol, sp.Expr], symbols: Iterable[sp.Symbol]) -> sp.Expr | None:

@@ -19,6 +19,7 @@ from synchain.codegen.driver.columns import Control
 from synchain.codegen.integrators import Integrator
 from synchain.codegen.kernels.compile import Kernel, load
 from synchain.codegen.kernels.modes import emit_modes
+from synchain.codegen.simd.lane_types import native_width
 from synchain.models.dynamics.variational import Variation
 from synchain.models.scenes.scene import Scene
 
@@ -164,7 +165,7 @@ class VariationalIntegrator:
             Method of the steps; by default the one that suits these strengths.
         """
         method = chosen_for_modes(scene, variation, state, numbers, strengths) if method is None else method
-        kernel = _kernel(variation, method)
+        kernel = _kernel(variation, method, native_width())
         width, count = kernel.origin.width, strengths.shape[1]
         order = np.argsort(np.hypot.reduce(strengths, axis=0) if len(strengths) else np.zeros(count), kind="stable")
         padded = -(-count // width) * width
@@ -370,6 +371,6 @@ class VariationalIntegrator:
 
 
 @lru_cache(maxsize=64)
-def _kernel(variation: Variation, method: Integrator) -> Kernel:
+def _kernel(variation: Variation, method: Integrator, width: int) -> Kernel:
     """Compiled kernel of a variational equation."""
-    return load(emit_modes(variation, method))
+    return load(emit_modes(variation, method, width))

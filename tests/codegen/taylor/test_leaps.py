@@ -122,6 +122,32 @@ def test_a_start_on_a_jump_far_from_zero_leaves_it(offset, speed):
     assert steps < 30
 
 
+@BOTH
+@pytest.mark.parametrize("power", [1, 2, 5])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_start_at_rest_on_a_jump_goes_where_the_series_goes(way, power, looped):
+    """x leaves 3 like t**power, after one coefficient or some: the values are those of its side from the start on."""
+    rates = [A * power * T ** (power - 1), sp.sign(X - 3) + 10 * sp.floor(X) + 100 * sp.ceiling(X)]
+    state, steps = march(alone([X, V], rates, [A]), 12, [3.0, 0.0], 0.9, 1e-10, numbers=[way], looped=looped)
+    assert state.tolist() == pytest.approx([3.0 + way * 0.9**power, 0.9 * (431.0 if way > 0 else 319.0)], rel=1e-14)
+    assert steps < 16
+
+
+@BOTH
+def test_a_start_at_rest_that_its_own_jump_drives(looped):
+    """x'' = 1 + sign(x - 1)/2 from x = 1 at rest."""
+    equations = alone([X, V], [V, 1 + sp.sign(X - 1) / 2])
+    state, _ = march(equations, 12, [1.0, 0.0], 2.0, 1e-10, looped=looped)
+    assert state.tolist() == pytest.approx([4.0, 3.0], rel=1e-14)
+
+
+def test_steps_of_whole_numbers_begin_on_one_on_the_way_down():
+    """x = 3 - t with y' = floor x: 2, 1, 0 … from the first moment on."""
+    state, steps = march(alone([X, V], [-sp.S.One, sp.floor(X)]), 12, [3.0, 0.0], 4.5, 1e-10)
+    assert state.tolist() == pytest.approx([-1.5, 2.0 + 1.0 + 0.0 - 1.0 - 1.0], abs=1e-13)
+    assert steps < 20
+
+
 def test_two_jumps_at_once_end_one_step():
     rates = [V, -X - sp.sign(X), W, -B - sp.sign(B)]
     pair, count = march(alone([X, V, B, W], rates), 16, [0.0, 1.0, 0.0, 1.0], 20.0, 1e-12)
@@ -188,6 +214,36 @@ def test_a_jump_along_which_motion_may_slide_is_refused(equations):
     for write in (write_step, write_looped):
         with pytest.raises(ValueError, match=r"taylor: found .*, along which motion may slide.*; use .* dop853"):
             write(tidy(equations), 8)
+
+
+@pytest.mark.parametrize(
+    "rate",
+    [sp.Piecewise((1 / X, X > 1), (5, True)), sp.Piecewise((1 / X, X > 1), (X, True)),
+     sp.Piecewise((sp.log(X), X > 1), (0, True)), sp.Piecewise((sp.sqrt(X - 1), X > 1), (5, True)), sp.sign(1 / X),
+     sp.sign(sp.tan(T)), sp.floor(X / (1 + V)), sp.atan(sp.tan(T)), sp.Piecewise((1, 1 / X > 0), (0, True))],
+)  # fmt: skip
+def test_poles_of_pieces_gaps_and_arcs_are_refused(rate):
+    """A step would end at the pole of a piece that is not chosen, and arcs go on smoothly over one."""
+    equations = alone([X, V], [sp.S.One, rate])
+    assert jump(equations) is not None
+    with pytest.raises(
+        ValueError, match=r"taylor: found .*, a part of which has a pole, or no value, somewhere; expected"
+    ):
+        write_step(tidy(equations), 8)
+
+
+@pytest.mark.parametrize(
+    "rate", [sp.Piecewise((1 / (1 + X**2), X > 1), (sp.sqrt(2 + X**2), True)), sp.sign(sp.exp(X) - 2), sp.atan(X * V)]
+)
+def test_pieces_gaps_and_arcs_with_values_everywhere_are_taken(rate):
+    assert jump(alone([X, V], [sp.S.One, rate])) is None
+
+
+def test_pieces_that_agree_on_one_side_of_a_product_alone_jump():
+    """1 - 2 a for a v > 0 and 1 elsewhere agree where a = 0, not where v = 0, along which motion slides."""
+    for gap in (X * V, V * X):
+        rate = sp.Piecewise((1 - 2 * X, gap > 0), (1, True))
+        assert jump(alone([X, V], [sp.S.Zero, rate])) == rate
 
 
 def test_links_that_pass_jumps_are_taken():
