@@ -155,12 +155,12 @@ def leapt(side: str, series: Stored) -> list[str]:
 def settled(hints: Sequence[str], coefficients: Sequence[str], sides: Sequence[str]) -> list[str]:
     """The statements that make coefficients anew as long as they tell on which sides series lie that begin on a jump.
 
-    Coming down from a whole number takes two turns more: the first tells the way, the second that the number above is left.
+    Each turn tells one more side at least: what one jump sets off may leave the next one.
     """
     if not hints:
         return [*coefficients]
     inner = [*coefficients, "# sides of jumps", "news = 0.0*t", *sides, "if not any_lane(news > 0.5):", "    break"]
-    return [*hints, "for _ in range(4):", *(f"    {line}" for line in inner)]
+    return [*hints, "while True:", *(f"    {line}" for line in inner)]
 
 
 def told(hint: str, begun: str, side: str, write: str = "{0} = {1}") -> list[str]:

@@ -141,6 +141,16 @@ def test_a_start_at_rest_that_its_own_jump_drives(looped):
     assert state.tolist() == pytest.approx([4.0, 3.0], rel=1e-14)
 
 
+@BOTH
+def test_a_jump_sets_off_what_leaves_the_next_one(looped):
+    """x = 1 + t from a jump at 1, y'' = sign(x - 1) from a jump at 5, z' = sign(y - 5): all sides are those just after."""
+    y, w, z = sp.symbols("y w z", real=True)
+    equations = alone([X, y, w, z], [sp.S.One, w, sp.sign(X - 1), sp.sign(y - 5)])
+    state, steps = march(equations, 12, [1.0, 5.0, 0.0, 0.0], 2.0, 1e-10, looped=looped)
+    assert state.tolist() == pytest.approx([3.0, 7.0, 2.0, 2.0], rel=1e-14)
+    assert steps < 12
+
+
 def test_steps_of_whole_numbers_begin_on_one_on_the_way_down():
     """x = 3 - t with y' = floor x: 2, 1, 0 … from the first moment on."""
     state, steps = march(alone([X, V], [-sp.S.One, sp.floor(X)]), 12, [3.0, 0.0], 4.5, 1e-10)
@@ -240,10 +250,10 @@ def test_pieces_gaps_and_arcs_with_values_everywhere_are_taken(rate):
 
 
 def test_pieces_that_agree_on_one_side_of_a_product_alone_jump():
-    """1 - 2 a for a v > 0 and 1 elsewhere agree where a = 0, not where v = 0, along which motion slides."""
-    for gap in (X * V, V * X):
-        rate = sp.Piecewise((1 - 2 * X, gap > 0), (1, True))
-        assert jump(alone([X, V], [sp.S.Zero, rate])) == rate
+    """1 - 2 x for x v > 0 and 1 elsewhere agree where x = 0, not where v = 0, along which motion slides."""
+    for one, other in ((X, V), (V, X)):
+        rate = sp.Piecewise((1 - 2 * one, one * other > 0), (1, True))
+        assert jump(alone([one, other], [sp.S.Zero, rate])) == rate
 
 
 def test_links_that_pass_jumps_are_taken():
