@@ -23,7 +23,7 @@ from ..program.expressions import ONE, ZERO, Expression, Name, Negation, Number
 from ..program.lowering import lower
 from ..program.passes import Names
 from ..program.printers import LANES
-from .leaps import Leap, leaping, templates, unpassed
+from .leaps import Leap, changing, leaping, templates, unpassed
 from .series import (
     Brink,
     Choice,
@@ -95,24 +95,19 @@ def _obstacles(equations: Equations) -> dict[sp.Expr, str]:
         unpassed(equations), "along which motion may slide, or which a contact or a mass matrix feels"
     )
     for own, ends in templates(equations):
-        found |= dict.fromkeys(_unserial(own, _moving(ends)), "which has no series")
-        found |= dict.fromkeys(_guarding(own, _moving(ends)), "a part of which has a pole, or no value, somewhere")
+        found |= dict.fromkeys(_unserial(own, changing(ends)), "which has no series")
+        found |= dict.fromkeys(_guarding(own, changing(ends)), "a part of which has a pole, or no value, somewhere")
     return {part: found[part] for part in sorted(found, key=sp.default_sort_key)}
 
 
 def is_analytic(equations: Equations) -> bool:
     """True if no rate has a jump or a kink in the states or in time."""
     return not any(
-        part.free_symbols & _moving(ends) and type(part) not in STARTS
+        part.free_symbols & changing(ends) and type(part) not in STARTS
         for own, ends in templates(equations)
         for e in own
         for part in e.atoms(sp.Function, *KINKED)
     )
-
-
-def _moving(ends: Iterable[Iterable[sp.Symbol]]) -> set[sp.Symbol]:
-    """What moves within a step: time, and the states at each end."""
-    return {TIME, *(s for end in ends for s in end)}
 
 
 def is_linear(equations: Equations) -> bool:

@@ -11,8 +11,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.jumps import INEQUALITIES, JUMPING, jumps
 
-__all__ = ["Leap", "leaping", "templates", "unpassed"]
-
+__all__ = ["Leap", "changing", "leaping", "templates", "unpassed"]
 
 RISING, STRICT = (sp.StrictGreaterThan, sp.GreaterThan), (sp.StrictGreaterThan, sp.StrictLessThan)
 
@@ -32,26 +31,31 @@ def templates(equations: Equations) -> Iterator[tuple[Sequence[sp.Expr], tuple[t
         yield edge.expressions, (edge.here, edge.there)
 
 
+def changing(ends: Iterable[Iterable[sp.Symbol]]) -> set[sp.Symbol]:
+    """What moves within a step: time, and the states at each end."""
+    return {TIME, *(s for end in ends for s in end)}
+
+
 def unpassed(equations: Equations) -> Iterator[sp.Expr]:
     """Yield the parts of some equations with a jump that no Taylor step passes.
 
     Motion can slide along a jump that enters the rate of what it depends on: sign(v) in the rate of v, not in that of x.
     Contacts take the loads of bodies that stick as continuous, and the solution of a mass matrix jumps as a whole.
     """
-    known = list(templates(equations))
-    found = [(part, ends) for own, ends in known for part in jumps(own, {TIME, *(s for end in ends for s in end)})]
-    jumping = {c for own, ends in known for c in range(len(ends[0])) if jumps(own[c : c + 1], {TIME, *sum(ends, ())})}
-    for part, ends in found:
-        gaps = _gaps(part)
-        depends = {c for end in ends for c, s in enumerate(end) if any(gap.has(s) for gap in gaps)}
-        if not gaps or depends & jumping or equations.sticks or equations.inertial:
-            yield part
+    known = [(own, ends, jumps(own, changing(ends))) for own, ends in templates(equations)]
+    jumping = {c for own, ends, parts in known for c in range(len(ends[0])) if own[c].has(*parts)}
+    for _, ends, parts in known:
+        for part in parts:
+            gaps = _gaps(part)
+            depends = {c for end in ends for c, s in enumerate(end) if any(gap.has(s) for gap in gaps)}
+            if not gaps or depends & jumping or equations.sticks or equations.inertial:
+                yield part
 
 
 def leaping(expressions: Iterable[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:
     """Some expressions with their jumps as `Leap` or sp.floor, parts that no step passes as they are."""
     given = list(expressions)
-    parts = set(jumps(given, moving))
+    parts = {part for part in jumps(given, moving) if _gaps(part)}
     return [_leaping(e, parts) for e in given] if parts else given
 
 
@@ -59,12 +63,12 @@ def _leaping(e: sp.Basic, parts: Collection[sp.Expr]) -> sp.Basic:
     if not e.args:
         return e
     inner = [_leaping(a, parts) for a in e.args]
-    if e not in parts or not _gaps(e):
+    if e not in parts or isinstance(e, sp.floor):
         return e.func(*inner)
     if isinstance(e, Piecewise):
         return _choice(inner)
-    if isinstance(e, sp.floor | sp.ceiling):
-        return e.func(*inner) if isinstance(e, sp.floor) else -sp.floor(-inner[0])
+    if isinstance(e, sp.ceiling):
+        return -sp.floor(-inner[0])
     at, below = (sp.S.Zero, sp.S.NegativeOne) if isinstance(e, sp.sign) else (inner[1], sp.S.Zero)
     return Leap(inner[0], sp.S.One, at, below)
 

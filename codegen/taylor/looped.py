@@ -246,10 +246,9 @@ class Section:
     def sides(self, degree: int) -> list[str]:
         """The statements that take note of those that the coefficients tell."""
         found = []
-        for brink in self.graph.brinks:
+        for brink, hint in zip(self.graph.brinks, self.hints, strict=True):
             begun, side = (self.load(brink, k) for k in ("0", str(degree)))
-            write = f"store(dense, {self.slot(f'hint_{brink.base.name}', '0')}, {{1}})"
-            found += told(show(self.hint(brink.base)), begun, side, write)
+            found += told(show(self.hint(brink.base)), begun, side, f"store(dense, {self.slot(hint, '0')}, {{1}})")
         return self.run(found)
 
     def lengths(self, order: int) -> list[str]:

@@ -356,6 +356,10 @@ class Kink(Series):
 
     def begin(self, at: Start) -> Expression:
         self.size = at.keep(f"size_{self.name}", magnitude(at, self.base))
+        return self.side(at)
+
+    def side(self, at: Start) -> Expression:
+        """The side on which it begins."""
         return Call("side_of", (at.start(self.base), Name(f"ROUNDING*{self.size}")))
 
     def coefficient(self, at: Order) -> Expression:
@@ -396,8 +400,8 @@ class Brink(Kink):
     anew then.
     """
 
-    def begin(self, at: Start) -> Expression:
-        self.size = at.keep(f"size_{self.name}", magnitude(at, self.base))
+    def side(self, at: Start) -> Expression:
+        """The side on which it begins."""
         return Call("side_or", (at.start(self.base), at.hint(self.base)))
 
     def passages(self, side: str, stored: Stored) -> list[str]:
