@@ -13,10 +13,10 @@ from functools import partial
 
 import numpy as np
 
-from . import peers
+from . import peers, precision
 from .kit.cases import Case
 from .kit.clock import Point, best_time, curve
-from .kit.computed import computed_case, solved
+from .kit.computed import solved
 from .kit.own_program import full_width, prepare
 from .precision import COLUMNS, TOLERANCES, draw, notes, row, summary
 
@@ -31,7 +31,7 @@ def case_of(name: str, periods: int = PERIODS) -> Case:
     """Return a case with its reference at all readings; ValueError for an unknown name."""
     if name not in CASES:
         raise ValueError(f"unknown case {name!r}; known: {'; '.join(CASES)}")
-    case = computed_case(name)
+    case = precision.case_of(name)
     times = case.period * np.arange(1, READINGS * periods + 1) / READINGS
     return solved(Case(name, case.scene, times, np.empty((0, 0))))
 

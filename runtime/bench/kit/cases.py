@@ -2,8 +2,7 @@
 better than any row.
 
 The friction cases and the smooth one are reference runs in quadruple precision, kept as files in
-`data/` that say how they were made. The frictionless chain is linear and needs no run:
-`normal_modes` gives its states.
+`data/` that say how they were made. The linear chain needs no run: `normal_modes` gives its states.
 """
 
 from __future__ import annotations
@@ -11,9 +10,11 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
+from synchain.models.definitions.inline import Lagrangian
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 
@@ -26,13 +27,15 @@ CASES = {
     "friction, n = 2": "trajectory_n2",
     "friction, n = 4": "trajectory_n4",
     "smooth, n = 2": "trajectory_smooth",
-    "frictionless, n = 4": "",
+    "linear, driven, n = 4": "",
 }
 """Cases by name: the file of the reference, empty where the solution is exact."""
 
-FRICTIONLESS = {"mu_s": 0.0, "mu_k": 0.0, "sigma": 0.1, "omega": 1.15}
-PERIODS = 20
-"""Length of the frictionless case in drive periods."""
+LINEAR = Lagrangian(
+    "v**2/2", "x**2/2 - u*x*cos(omega*t)", coordinates={"x": "v"}, parameters={"u": 0.1, "omega": 1.15}, name="driven"
+)
+PERIODS = 200
+"""Length of the linear case in drive periods."""
 GOLDEN = 0.6180339887498949
 """Fraction of the golden section; spreads phases evenly."""
 
@@ -82,7 +85,7 @@ def read_case(name: str) -> Case:
     if name not in CASES:
         raise ValueError(f"unknown case {name!r}; known: {'; '.join(CASES)}")
     if not CASES[name]:
-        scene = _scene(4, FRICTIONLESS, {"x": (0.30, 0.28, 0.26, 0.24), "v": 0.0})
+        scene = _scene(4, {"sigma": 0.1}, {"x": (0.30, 0.28, 0.26, 0.24), "v": 0.0}, oscillator=LINEAR)
         times = _times(PERIODS, unit_of_time(scene))
         return Case(name, scene, times, normal_modes(scene, times))
     data = json.loads(
@@ -104,8 +107,9 @@ def normal_modes(scene: Scene, times: np.ndarray) -> np.ndarray:
     Source: Rayleigh, The Theory of Sound, vol. 1, ch. 4-5 (Macmillan, 1877).
     """
     values = scene.parameters
-    if values["mu_s"] != 0.0 or values["mu_k"] != 0.0:
-        raise ValueError(f"normal modes need mu_s = mu_k = 0, found {values['mu_s']:g} and {values['mu_k']:g}")
+    friction = [values.get(name, 0.0) for name in ("mu_s", "mu_k")]
+    if any(friction):
+        raise ValueError("normal modes need mu_s = mu_k = 0, found {:g} and {:g}".format(*friction))
     graph = np.array(scene.topology.matrix.tolist(), dtype=float)
     if not np.array_equal(graph, graph.T):
         raise ValueError(f"normal modes need links alike in both directions, found {scene.topology.name!r}")
@@ -134,8 +138,9 @@ def _driven(frequency: np.ndarray, omega: float, t: np.ndarray) -> tuple[np.ndar
     return scale * swing * np.sin(mean * t), scale * (swing_rate * np.sin(mean * t) + swing * mean * np.cos(mean * t))
 
 
-def _scene(n: int, parameters: dict[str, float], initial: dict[str, object]) -> Scene:
-    return Scene(topology=topology("chain", n), parameters=parameters, initial=initial, record=(), time_unit="time")
+def _scene(n: int, parameters: dict[str, float], initial: dict[str, object], **node: Any) -> Scene:
+    graph = topology("chain", n)
+    return Scene(topology=graph, parameters=parameters, initial=initial, record=(), time_unit="time", **node)
 
 
 def _times(periods: int, period: float) -> np.ndarray:

@@ -15,9 +15,11 @@ from .cases import Case
 __all__ = ["LONGEST", "SHORTEST", "Point", "best_time", "curve", "timed_periods"]
 
 SHORTEST = 0.2
-"""A timed run lasts at least this many seconds of CPU time, by repetition."""
+"""A timed run lasts at least this many seconds of CPU time, by more periods and by repetition."""
 LONGEST = 1.0
 """A slower run than this is shortened to fewer periods, down to FEWEST, and not repeated."""
+QUICK = 10
+"""Quick runs are this many times shorter."""
 FEWEST = 5
 MOST = 10_000
 """Periods of the longest timed run; more would not change the share of what one call costs."""
@@ -48,12 +50,13 @@ class Point:
 
 def best_time(run: Callable[[], object], quick: bool) -> float:
     """CPU seconds of one call: the best of three groups of repetitions of at least SHORTEST seconds
-    each, or one call where that takes LONGEST or more.
+    each, or one call where that takes LONGEST or more; QUICK times shorter with `quick`.
     """
+    parts = QUICK if quick else 1
     first = _seconds(run, 1)
-    if quick or first >= LONGEST:
+    if first >= LONGEST / parts:
         return first
-    repetitions = max(1, int(np.ceil(SHORTEST / max(first, 1e-9))))
+    repetitions = max(1, int(np.ceil(SHORTEST / parts / max(first, 1e-9))))
     return min(first, *(_seconds(run, repetitions) for _ in range(3)))
 
 
@@ -67,9 +70,10 @@ def timed_periods(cost: float, periods: int, quick: bool) -> int:
     periods : int
         The least length.
     quick : bool
-        Whether the least length will do.
+        Whether a run QUICK times shorter will do.
     """
-    return periods if quick else max(periods, min(MOST, int(np.ceil(SHORTEST / max(cost, 1e-9)))))
+    shortest = SHORTEST / QUICK if quick else SHORTEST
+    return max(periods, min(MOST, int(np.ceil(shortest / max(cost, 1e-9)))))
 
 
 def _seconds(run: Callable[[], object], repetitions: int) -> float:
@@ -120,7 +124,7 @@ def _measure(
     """Periods compared, error and CPU seconds a period; a timed run with one end is like the pilot,
     for which JAX compiled, and goes on beyond the reference if that is short.
     """
-    longest = 0.1 * LONGEST if quick else LONGEST
+    longest = LONGEST / QUICK if quick else LONGEST
     fewest = max(
         2 if quick else FEWEST, int(np.ceil(case.times[1] / case.period * (1.0 - 1e-12)))
     )  # two times at least

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from synchain.models.definitions.inline import Lagrangian
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 
@@ -24,9 +23,6 @@ __all__ = ["EXACT", "SMOOTH", "computed_case", "reading_times"]
 REFERENCE = (1e-14, 1e-15)
 
 
-_DRIVEN = Lagrangian(
-    "v**2/2", "x**2/2 - u*x*cos(omega*t)", coordinates={"x": "v"}, parameters={"u": 0.3, "omega": 1.0}, name="driven"
-)
 _LINKED = {"parameters": {"sigma": 0.1}}
 _SMOOTHED = {"kappa": 10.0, "sigma": 0.1}
 """The smoothed law has a kink, |w|; over the slow belt each oscillator passes it twice a period."""
@@ -34,7 +30,6 @@ _APART: dict[str, Any] = {"initial": {"x": (0.3, 0.4), "v": (0.0, 0.05)}}
 _SCALED: dict[str, Any] = {"coupling": "x->x", **_LINKED}
 
 SMOOTH: dict[str, tuple[str, int, dict[str, Any], int]] = {
-    "linear, driven, n = 4": ("chain", 4, {"oscillator": _DRIVEN, **_LINKED}, 200),
     "Duffing, n = 2": ("chain", 2, {"oscillator": "duffing", **_LINKED}, 20),
     "pendulum, n = 2": ("chain", 2, {"oscillator": "pendulum", **_LINKED}, 200),
     "FPUT ring, n = 8": ("ring", 8, {"oscillator": "mass", "coupling": "fput"}, 50),

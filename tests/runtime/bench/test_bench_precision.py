@@ -17,7 +17,7 @@ from synchain.runtime import bench
 from synchain.runtime.bench import dense, peers, precision
 from synchain.runtime.bench.kit import computed
 from synchain.runtime.bench.kit.cases import CASES, normal_modes, read_case
-from synchain.runtime.bench.kit.clock import MOST, SHORTEST, curve, timed_periods
+from synchain.runtime.bench.kit.clock import MOST, QUICK, SHORTEST, curve, timed_periods
 from synchain.runtime.bench.kit.compare import table, time_at
 from synchain.runtime.bench.peers import _numbalsoda
 from synchain.runtime.bench.peers._problem import Problem
@@ -37,9 +37,9 @@ def test_references_agree_with_a_tight_integration(name):
 def test_half_of_the_times_are_period_boundaries(name):
     case = read_case(name)
     whole = case.times / case.period
-    assert len(whole) == 40
+    assert len(whole) >= 40
     assert (np.diff(whole) > 0).all()
-    assert np.count_nonzero(np.abs(whole - np.round(whole)) < 1e-12) == 20
+    assert 2 * np.count_nonzero(np.abs(whole - np.round(whole)) < 1e-12) == len(whole)
 
 
 def test_unknown_cases_are_refused():
@@ -48,7 +48,7 @@ def test_unknown_cases_are_refused():
 
 
 def test_a_case_can_be_shortened():
-    part = read_case("frictionless, n = 4").within(3)
+    part = read_case("linear, driven, n = 4").within(3)
     assert part.periods == 3
     assert part.states.shape == (6, 8)
 
@@ -58,7 +58,7 @@ def test_normal_modes_solve_the_equations(omega):
     """x' = v and v' = rhs by central differences: off resonance, on it, and at the frequency of an
     undriven mode.
     """
-    scene = read_case("frictionless, n = 4").scene.replace(
+    scene = read_case("linear, driven, n = 4").scene.replace(
         omega=omega, initial={"x": (0.3, -0.1, 0.2, 0.7), "v": (0.4, -0.2, 0.1, 0.3)}
     )
     rhs, _ = Problem(scene).compiled()
@@ -110,7 +110,7 @@ def test_timed_runs_are_long_enough_that_a_call_does_not_count():
     assert timed_periods(cost=1e-3, periods=20, quick=False) == round(SHORTEST / 1e-3)
     assert timed_periods(cost=1e-9, periods=20, quick=False) == MOST
     assert timed_periods(cost=1.0, periods=20, quick=False) == 20
-    assert timed_periods(cost=1e-3, periods=20, quick=True) == 20
+    assert timed_periods(cost=1e-3, periods=5, quick=True) == round(SHORTEST / QUICK / 1e-3)
 
 
 @pytest.mark.long
