@@ -69,7 +69,7 @@ def exact(what: str, value: object, names: Mapping[str, sp.Symbol]) -> sp.Expr:
     if isinstance(value, bool) or not isinstance(value, int | float | Fraction | sp.Expr):
         kind = type(value).__name__
         raise TypeError(f"{what}: found {short_repr(value)} ({kind}); expected an expression")
-    given = sp.sympify(value)
+    given = sp.sympify(value).replace(sp.Heaviside, _unit_step)
     strange = sorted({s.name for s in given.free_symbols} - {*names})
     if strange:
         raise ValueError(f"{what}: {_undeclared(strange[0], names)}")
@@ -80,6 +80,15 @@ def exact(what: str, value: object, names: Mapping[str, sp.Symbol]) -> sp.Expr:
     except ValueError as error:
         raise ValueError(f"{what}: {error}") from None
     return read(what, text, names)
+
+
+def _unit_step(x: sp.Expr, at_zero: sp.Expr = sp.S.Half) -> sp.Expr:
+    """Heaviside's function as a sign or a choice, by its value at zero; as it is if that is another one than 0, 1/2 and 1."""
+    if at_zero == sp.S.Half:
+        return (1 + sp.sign(x)) / 2
+    if at_zero in (0, 1):
+        return sp.Piecewise((sp.S.One, x >= 0 if at_zero else x > 0), (sp.S.Zero, True))
+    return sp.Heaviside(x, at_zero)
 
 
 def _undeclared(name: str, names: Mapping[str, sp.Symbol]) -> str:

@@ -116,6 +116,13 @@ def test_decimals_are_what_they_say() -> None:
     assert Field({X: long * X}).model.rates[0].as_coeff_Mul()[0] == sp.Rational("0.12345678901234567890123")
 
 
+@pytest.mark.parametrize("at_zero", [0, sp.Rational(1, 2), 1])
+def test_steps_of_heaviside_keep_their_value_at_zero(at_zero: sp.Expr) -> None:
+    x = sp.Symbol("x", real=True)
+    (rate,) = Field({x: sp.Heaviside(x, at_zero)}).model.rates
+    assert [rate.subs(x, place) for place in (-2, 0, 3)] == [0, at_zero, 1]
+
+
 def test_defaults_are_numbers_with_ranges_of_assumptions() -> None:
     mass, load = sp.Symbol("m", positive=True), sp.Symbol("load", nonnegative=True)
     node = Lagrangian(mass * v**2 / 2, {"x": 1} and load * x, parameters={mass: 2, load: sp.Rational(1, 2)})
