@@ -5,6 +5,7 @@ beside them.
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from pathlib import Path
 
 from ..console.arguments import add_workers, folder
 from ..console.outcome import FINE, wrong_use
@@ -35,7 +36,7 @@ def execute(arguments: Namespace) -> int:
     matplotlib.use("Agg")
 
     from ..figures import load, names
-    from ..figures.make import make
+    from ..figures.make import written
     from ..support.files import output_folder
 
     with wrong_use():
@@ -44,6 +45,11 @@ def execute(arguments: Namespace) -> int:
         for name in wanted:
             load(name)
         target = output_folder(arguments.out)
-    for file in make(wanted, target, arguments.quick, arguments.workers, None):
-        print(file)
+    files: list[Path] = []
+    try:
+        for file in written(wanted, target, arguments.quick, arguments.workers, None):
+            files.append(file)
+    finally:  # at Ctrl-C too; not before, since a bar may stand on the terminal
+        for file in files:
+            print(file)
     return FINE

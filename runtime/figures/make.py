@@ -16,7 +16,7 @@ from .figure_runs import FULL, QUICK, FigureRuns
 from .style import context, new_figure, save
 from .tables import as_csv
 
-__all__ = ["make"]
+__all__ = ["make", "written"]
 
 AT_ONCE = 2
 """Figures that are computed at a time."""
@@ -60,14 +60,19 @@ def make(
     OSError
         If the folder cannot be written to. Checked before any computation.
     """
+    return [*written(names, out, quick, workers, show_progress)]
+
+
+def written(
+    names: Iterable[str] | None, out: str | PathLike[str], quick: bool, workers: int | None, show_progress: bool | None
+) -> Iterator[Path]:
+    """Yield the files of `make` as soon as they are whole."""
     wanted = [load(name) for name in dict.fromkeys(names or all_names())]
     folder = output_folder(out)
     runs = FigureRuns(QUICK if quick else FULL, workers=workers)
-    written: list[Path] = []
     with Reporter(len(wanted), show_progress, unit="figure") as reporter, _computed(wanted, runs) as computed:
         for drawing, data in zip(wanted, reporter.each(computed), strict=True):
-            written += produce(drawing, data, folder)
-    return written
+            yield from produce(drawing, data, folder)
 
 
 @contextmanager

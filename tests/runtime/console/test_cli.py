@@ -8,6 +8,7 @@ import math
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -484,10 +485,24 @@ def test_figures_are_made_by_their_names(
     from synchain.runtime.figures import make
 
     asked: list[Any] = []
-    monkeypatch.setattr(make, "make", lambda *words: asked.append(words) or [tmp_path / "out" / "figure_4b.png"])
+    monkeypatch.setattr(make, "written", lambda *words: asked.append(words) or [tmp_path / "out" / "figure_4b.png"])
     assert main(["figures", "--quick", "4b", "--out", str(tmp_path / "out"), "thresholds", "--workers", "1"]) == 0
     assert capsys.readouterr().out == f"{tmp_path / 'out' / 'figure_4b.png'}\n"
     assert asked == [(["figure_4b", "thresholds"], tmp_path / "out", True, 1, None)]
+
+
+def test_interrupted_figures_print_the_files_that_are_whole(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from synchain.runtime.figures import make
+
+    def written(*words: object) -> Iterator[Path]:
+        yield tmp_path / "figure_4a.png"
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(make, "written", written)
+    assert main(["figures", "4a", "4b", "--out", str(tmp_path)]) == 1
+    assert capsys.readouterr() == (f"{tmp_path / 'figure_4a.png'}\n", "synchain figures: interrupted\n")
 
 
 def test_benchmarks_print_a_table_each(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
