@@ -11,7 +11,7 @@ from .tables import markdown
 
 __all__ = ["TARGETS", "curves", "table", "time_at"]
 
-TARGETS = (1e-6, 1e-8, 1e-10)
+TARGETS = (1e-6, 1e-8, 1e-10, 1e-12)
 """Errors at which methods are compared."""
 
 Curve = list[tuple[float, float]]
