@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -11,6 +12,7 @@ import sympy as sp
 from sympy.core.relational import Relational
 
 from ..mechanics.components import TIME, Edge, Node
+from ..mechanics.jumps import JUMPING, KINKED
 from .equations import Equations
 
 __all__ = ["Drive", "angular_frequency", "as_function", "drive_of", "names_in", "period_of"]
@@ -32,12 +34,15 @@ class Drive:
         side has the period 2 pi over its absolute value; None if there is no such frequency.
     problem : str
         Why there is none, as a predicate of the oscillator.
+    gaps : tuple of Expr
+        Expressions of time and the parameters at whose zeros the drive jumps or has a kink.
     """
 
     waves: tuple[sp.Expr, ...] = ()
     frequency: sp.Expr | None = None
     problem: str = ""
     bends: tuple[sp.Expr, ...] = ()
+    gaps: tuple[sp.Expr, ...] = ()
 
     @property
     def paces(self) -> tuple[sp.Expr, ...]:
@@ -63,7 +68,8 @@ def drive_of(templates: tuple[Node | Edge, ...], varied: tuple[str, ...] = ()) -
     """
     if not any(template.forced for template in templates):
         return Drive(problem="is not driven")
-    return replace(_periodic(templates, varied), bends=tuple(sorted(_bends(templates), key=sp.default_sort_key)))
+    bends, gaps = (tuple(sorted(found(templates), key=sp.default_sort_key)) for found in (_bends, _gaps))
+    return replace(_periodic(templates, varied), bends=bends, gaps=gaps)
 
 
 def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Drive:
@@ -135,6 +141,28 @@ def _bent(part: sp.Basic) -> Iterator[tuple[sp.Expr, int]]:
             yield part.base, int(part.exp) if part.exp.is_positive else 1
     elif not isinstance(part, sp.sin | sp.cos | sp.log | sp.Piecewise):
         yield from ((a, 1) for a in part.args)
+
+
+def _gaps(templates: tuple[Node | Edge, ...]) -> set[sp.Expr]:
+    """What passes zero at the jumps and kinks of functions of time alone."""
+    found = set[sp.Expr]()
+    for template in templates:
+        for e in template.rhs:
+            for part in e.atoms(*KINKED, *JUMPING, Relational):
+                found |= {gap for gap in _sided(part) if gap.has(TIME) and not gap.free_symbols & _local(template)}
+    return found
+
+
+def _sided(part: sp.Basic) -> Iterator[sp.Expr]:
+    """What passes zero where a part jumps or has a kink."""
+    if isinstance(part, Relational):
+        yield part.lhs - part.rhs
+    elif isinstance(part, sp.Max | sp.Min):
+        yield from (a - b for a, b in itertools.combinations(part.args, 2))
+    elif isinstance(part, sp.floor | sp.ceiling):
+        yield sp.sin(sp.pi * part.args[0])
+    else:
+        yield part.args[0]
 
 
 def _paces(inner: sp.Expr, power: int, even: bool) -> Iterator[sp.Expr]:

@@ -12,11 +12,13 @@ import sympy as sp
 
 from synchain.codegen.driver.columns import Control, Span
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.periodicity import as_function, drive_of, names_in
+from synchain.models.dynamics.periodicity import Drive, as_function, drive_of, names_in
 from synchain.models.inputs.node_name import NodeName
+from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
 
 from .initial_modes import local_clock, with_modes
+from .stays import shortest_stay
 
 __all__ = [
     "Plan",
@@ -33,6 +35,9 @@ __all__ = [
 
 FIRST_STEP = 1e-4
 """Step tried first in every cell; the step control enlarges it sixfold at a time."""
+
+MOST = 12
+"""Values of a parameter of the drive's jumps and kinks at which these are looked at."""
 
 DIRECTIONS = {"falling": -1.0, "rising": 1.0, "both": 0.0}
 """The numbers that a kernel knows the directions of a section by."""
@@ -169,11 +174,16 @@ def periods(equations: Equations, numbers: np.ndarray) -> np.ndarray:
     """
     if len(numbers) == 0:
         return np.zeros(0)
-    frequency = drive_of((*equations.nodes, *equations.edges), equations.differing).frequency
-    if frequency is None:
-        return np.zeros(len(numbers))
+    drive = drive_of((*equations.nodes, *equations.edges), equations.differing)
+    return _periods(drive, dict(zip(equations.parameters, numbers.T, strict=True)), len(numbers))
+
+
+def _periods(drive: Drive, values: Mapping[str, np.ndarray], rows: int) -> np.ndarray:
+    """The period (rows,) of a drive; 0 if there is none."""
+    if drive.frequency is None:
+        return np.zeros(rows)
     with np.errstate(divide="ignore"):
-        found = 2.0 * math.pi / _sizes(frequency, dict(zip(equations.parameters, numbers.T, strict=True)), len(numbers))
+        found = 2.0 * math.pi / _sizes(drive.frequency, values, rows)
     return np.where(np.isfinite(found), found, 0.0)
 
 
@@ -188,30 +198,45 @@ def _sizes(frequency: sp.Expr, values: Mapping[str, np.ndarray], rows: int) -> n
     return np.asarray(np.abs(np.asarray(found, dtype=float)))
 
 
-def half_swing(equations: Equations, values: Mapping[str, np.ndarray]) -> float:
+def half_swing(equations: Equations, values: Mapping[str, np.ndarray], end: float = 1e3) -> float:
     """Return half the period of the fastest sine or cosine of time, or the length in which another
-    function of time can rise and fall again (`Drive.bends`), if shorter; inf without a drive.
+    function of time can rise and fall again (`Drive.bends`) or stays between two of its jumps and
+    kinks (`Drive.gaps`), if shorter; inf without a drive.
 
-    No step may be longer, so that none can miss a whole swing of the drive, or a pulse.
+    No step may be longer, so that none can miss a whole swing of the drive, or a pulse.  A drive
+    without a period is looked at up to the time `end`.
     """
     rows = max((len(column) for column in values.values()), default=1)
-    paces = drive_of((*equations.nodes, *equations.edges), equations.differing).paces
-    fastest = max((float(np.max(_sizes(pace, values, rows), initial=0.0)) for pace in paces), default=0.0)
-    return math.pi / fastest if fastest > 0.0 else math.inf
+    drive = drive_of((*equations.nodes, *equations.edges), equations.differing)
+    fastest = max((float(np.max(_sizes(pace, values, rows), initial=0.0)) for pace in drive.paces), default=0.0)
+    longest = math.pi / fastest if fastest > 0.0 else math.inf
+    return (
+        min(longest, shortest_stay(drive.gaps, values, _periods(drive, values, rows), end)) if drive.gaps else longest
+    )
 
 
 def longest_step(scene: Scene) -> float:
     """Return the half swing at the extremes of the drive's parameters over all nodes and axes of a
-    scene.
+    scene; those of its jumps and kinks take MOST values each.
     """
-    known = dict.fromkeys(name for pace in scene.drive.paces for name in names_in(pace))
-    ends = []
-    for names in (parameter_names(scene, name) for name in known):
-        values = [scene.parameters[name] for name in names]
-        values += [end(axis.values) for axis in (*scene.axes, *scene.drawn) if axis.name in names for end in (min, max)]
-        ends.append((min(values), max(values)))
-    corners = np.array(list(itertools.product(*ends)), dtype=float)
-    return half_swing(scene.equations, dict(zip(known, corners.T, strict=True)))
+    paced, sided = (
+        dict.fromkeys(name for e in found for name in names_in(e) if name != TIME.name)
+        for found in (scene.drive.paces, scene.drive.gaps)
+    )
+    known, picked = paced | sided, []
+    for name in known:
+        names = parameter_names(scene, name)
+        values = np.unique(
+            [
+                *(scene.parameters[own] for own in names),
+                *(value for axis in (*scene.axes, *scene.drawn) if axis.name in names for value in axis.values),
+            ]
+        )
+        most = min(len(values), MOST if name in sided else 2)
+        picked.append(values[np.linspace(0, len(values) - 1, most).round().astype(int)])
+    corners = np.array(list(itertools.product(*picked)), dtype=float)
+    rows = dict(zip(known, corners.T, strict=True))
+    return half_swing(scene.equations, rows, scene.transient + scene.window)
 
 
 def parameter_names(scene: Scene, name: str) -> tuple[str, ...]:

@@ -124,7 +124,7 @@ def test_the_fastest_wave_of_a_drive_limits_the_step(files: Path) -> None:
     ("drive", "longest"),
     [
         ("exp(-(t - 60)**2/4)", 2 * np.sqrt(np.pi)), ("exp(20*(cos(2*t) - 1))", np.sqrt(np.pi / 80)),
-        ("(1 - cos(t))**10", np.sqrt(np.pi / 10)), ("max(0, sin(t) - 0.9)", np.sqrt(np.pi)), ("1/cosh(3*t - 1)**2", np.pi / 3),
+        ("(1 - cos(t))**10", np.sqrt(np.pi / 10)), ("1/cosh(3*t - 1)**2", np.pi / 3),
         ("1/(1 + 25*(t - 3)**2)", np.sqrt(np.pi) / 5), ("cos(t)", np.pi), ("cos(t)**3", np.pi), ("tanh(30*t)", np.inf),
         ("exp(-1000*t)", np.inf), ("sqrt(1 + t**2)", np.inf), ("t**2", np.inf),
     ],
@@ -134,6 +134,29 @@ def test_no_step_is_longer_than_a_pulse_of_the_drive(drive: str, longest: float)
     for rate in (drive, f"({drive})*x"):
         driven = Scene(Field({"x": rate}), None, ALONE, transient=0.0, window=1.0, time_unit="time")
         assert longest_step(driven) == pytest.approx(longest)
+
+
+@pytest.mark.parametrize(
+    ("drive", "longest"),
+    [
+        ("max(0, sin(t) - 0.9)", 2 * np.arccos(0.9)),
+        ("sign(sin(3*t) - 0.9999)", 2 / 3 * np.arccos(0.9999)), ("abs(sin(t) - 0.99999999)", 2 * np.arccos(0.99999999)),
+        ("1 if sin(t) > 0.8 and sin(t) < 0.9 else 0", np.arcsin(0.9) - np.arcsin(0.8)), ("floor(4*t + 0.3)", 0.25),
+        ("1 if 4*t - floor(4*t) < 0.1 else 0", 0.025), ("min(1, abs(t - 0.5)*1000)", 0.001),
+        ("max(sin(t) - 1.5, 0)", np.sqrt(np.pi)), ("abs(sin(t) - 1)", np.sqrt(np.pi)), ("sign(t - 0.5)", np.inf),
+    ],
+)  # fmt: skip
+def test_no_step_is_longer_than_a_drive_stays_between_jumps_or_kinks(drive: str, longest: float) -> None:
+    driven = Scene(Field({"x": drive}), None, ALONE, transient=0.0, window=1.0, time_unit="time")
+    assert longest_step(driven) == pytest.approx(longest, rel=1e-3)
+
+
+def test_every_value_of_an_axis_is_looked_at_for_short_pulses() -> None:
+    """The pulse is shortest inside of the axis: at its end there is none."""
+    node = Field({"x": "1 if sin(w*t) > level else 0"}, parameters={"w": 2.0, "level": 0.0})
+    swept = Scene(node, None, ALONE, axes={"level": [0.0, 1.1]}, transient=0.0, window=1.0)
+    assert longest_step(swept) == pytest.approx(0.5 * np.sqrt(np.pi))
+    assert longest_step(swept.replace(axes={"level": [0.0, 0.99, 1.1]})) == pytest.approx(np.arccos(0.99), rel=1e-3)
 
 
 @pytest.mark.parametrize("integrator", ["taylor", "dop853", "rodas5p"])

@@ -1,0 +1,86 @@
+"""How long a drive that jumps, or has a kink, stays on one side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
+
+import numpy as np
+import sympy as sp
+
+from synchain.models.dynamics.periodicity import names_in
+from synchain.models.mechanics.components import TIME
+
+__all__ = ["shortest_stay"]
+
+POINTS = 1 << 14
+"""Points of a period at which a drive is looked at."""
+
+PERIODS = 16
+"""As many times more points a drive without a period is looked at."""
+
+RESOLVED = 2.0
+"""Points between two zeros that are told apart without a parabola."""
+
+TOUCH = 1e-9
+"""A stay that is a smaller part of a period than this is none: the drive touches zero to rounding."""
+
+
+def shortest_stay(gaps: Sequence[sp.Expr], values: Mapping[str, np.ndarray], periods: np.ndarray, end: float) -> float:
+    """Return the shortest time between two zeros of expressions of time; inf if none has two.
+
+    Parameters
+    ----------
+    gaps : sequence of Expr
+        Expressions of time and parameters.
+    values : mapping of str to ndarray, shape (rows,)
+        Values of the parameters; each row is looked at.
+    periods : ndarray, shape (rows,)
+        Common period of the expressions in each row; 0 if there is none.
+    end : float
+        Time up to which expressions without a period are looked at.
+
+    Notes
+    -----
+    Two zeros of one smooth expression are found however close they are, others if they are RESOLVED points apart.
+    """
+    shortest = math.inf
+    written, names = _written(tuple(gaps))
+    for row, period in enumerate(periods):
+        # of two periods, one whole stay of each kind at least
+        length, points = (2.0 * period, 2 * POINTS) if period else (end, PERIODS * POINTS)
+        times, pitch = np.linspace(0.0, length, points + 1, retstep=True)
+        with np.errstate(all="ignore"):
+            found = [np.broadcast_to(g, times.shape) for g in written(times, *(values[name][row] for name in names))]
+            passages, dips = [_passages(g) for g in found], [_dips(g) for g in found]
+        apart = np.concatenate([*map(np.diff, passages), np.diff(np.sort(np.concatenate(passages)))])
+        stays = np.concatenate([apart[apart > RESOLVED], *dips])
+        shortest = min(shortest, pitch * np.min(stays[stays * pitch > TOUCH * length], initial=math.inf))
+    return shortest
+
+
+def _passages(values: np.ndarray) -> np.ndarray:
+    """Where values change their sign, in points; a zero has none."""
+    places = np.flatnonzero(values)
+    old, new = values[places[:-1]], values[places[1:]]
+    passed = old * new < 0.0
+    share = old[passed] / (old[passed] - new[passed])
+    return np.asarray(places[:-1][passed] + share * np.diff(places)[passed])
+
+
+def _dips(values: np.ndarray) -> np.ndarray:
+    """The lengths, in points, for which parabolas through three values leave the side on which these begin and end."""
+    before, here, after = values[:-2], values[1:-1], values[2:]
+    slope, bend = 0.5 * (after - before), after - 2.0 * here + before
+    bottom = here - 0.5 * slope * slope / bend
+    sunk = (before * after > 0.0) & (np.abs(slope) <= np.abs(bend)) & (bottom * before < 0.0)
+    return np.asarray(2.0 * np.sqrt(-2.0 * bottom[sunk] / bend[sunk]))
+
+
+@lru_cache(maxsize=64)
+def _written(gaps: tuple[sp.Expr, ...]) -> tuple[Callable[..., Sequence[np.ndarray]], tuple[str, ...]]:
+    """The expressions as a function of times and of numbers in the order of the names."""
+    names = tuple(name for name in names_in(sp.Tuple(*gaps)) if name != TIME.name)
+    symbols = [sp.Symbol(name, real=True) for name in names]
+    return sp.lambdify([TIME, *symbols], list(gaps), ["scipy", "numpy"]), names
