@@ -96,4 +96,16 @@ def _settled(e: sp.Expr) -> sp.Expr:
         return e
     e = e.replace(lambda part: isinstance(part, sp.Derivative) and part.has(*jumps), lambda part: sp.S.Zero)
     e = e.replace(lambda part: isinstance(part, sp.Subs), lambda part: part.doit())
+    e = e.replace(lambda part: isinstance(part, sp.Mul), _without_steps)
     return e.replace(sp.Heaviside, lambda x, *_: sp.Piecewise((sp.S.One, x > 0), (sp.S.Zero, True)))
+
+
+def _without_steps(product: sp.Mul) -> sp.Expr:
+    """A product without steps beside what is zero below them: Max(0, x) Heaviside(x) is Max(0, x)."""
+    bases = {factor.as_base_exp()[0] for factor in product.args}
+    needless = [
+        factor
+        for factor in product.args
+        if isinstance(factor, sp.Heaviside) and bases & {sp.Max(0, factor.args[0]), sp.Min(0, -factor.args[0])}
+    ]
+    return product if not needless else sp.Mul(*(factor for factor in product.args if factor not in needless))

@@ -73,7 +73,18 @@ def _joins(choice: Piecewise, moving: Set[sp.Symbol]) -> bool:
 
 
 def _agree(one: sp.Expr, other: sp.Expr, gap: sp.Expr, moving: Set[sp.Symbol]) -> bool:
-    """True if two expressions are equal where `gap` is zero: it is solved for a symbol of which it is a multiple at all places."""
+    """True if two expressions are equal where `gap` is zero: it is solved for a symbol of which it is a multiple at all places.
+
+    A gap with kinks is looked at as on either side of each.
+    """
+    gap = gap.replace(sp.Max, _larger).replace(sp.Min, _smaller)
+    kink = min(
+        (part for part in gap.atoms(sp.Abs) if part.free_symbols & moving), key=sp.default_sort_key, default=None
+    )
+    if kink is not None:
+        (inner,) = kink.args
+        sides = ({kink: sign * inner, sp.sign(inner): sign} for sign in (sp.S.One, sp.S.NegativeOne))
+        return all(_agree(*(e.xreplace(side) for e in (one, other, gap)), moving) for side in sides)
     slopes = ((s, gap.diff(s)) for s in sorted(gap.free_symbols & moving, key=str))
     at = next((s for s, slope in slopes if slope != 0 and not slope.free_symbols & moving), None)
     return at is not None and bool(sp.simplify((one - other).subs(at, sp.solve(gap, at)[0])) == 0)

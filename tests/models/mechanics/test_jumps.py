@@ -7,7 +7,7 @@ import sympy as sp
 from sympy.functions.elementary.piecewise import Piecewise
 
 from synchain.models import Field, Rates, Scene, chain
-from synchain.models.dynamics.variational import mode, network_variation
+from synchain.models.dynamics.variational import Variation, mode, network_variation, with_volume
 from synchain.models.mechanics.jumps import discontinuity, rough_at
 from synchain.runtime import cluster_exponents, exponents, lyapunov_spectrum, msf, periodic_orbit, run
 
@@ -23,6 +23,7 @@ x, y, v, t, a = sp.symbols("x y v t a", real=True)
         (v * sp.sign(x) * x + sp.sign(v) * x, sp.sign(v)),
         (Piecewise((x, x > 1), (0, True)), Piecewise((x, x > 1), (0, True))),
         (sp.sign(x**2 - 1) * v, sp.sign(x**2 - 1)),
+        (Piecewise((x - 1, sp.Abs(x) > 1), (0, True)), Piecewise((x - 1, sp.Abs(x) > 1), (0, True))),
     ],
 )
 def test_what_jumps(e: sp.Expr, part: sp.Expr) -> None:
@@ -38,10 +39,20 @@ def test_what_jumps(e: sp.Expr, part: sp.Expr) -> None:
         Piecewise((x - 1, x > 1), (0, True)) * v,
         Piecewise((x, x > 1), (0, True)) * (x - 1),
         (x - y) * sp.Heaviside(x - y),
+        Piecewise((sp.Abs(x) - 1, sp.Abs(x) > 1), (0, True)) * sp.sign(x),
+        Piecewise((x**2 - 1, sp.Max(x, -x) > 1), (0, True)),
+        Piecewise((1, sp.Abs(x - y) > a), (0, True)) * sp.Max(0, sp.Abs(x - y) - a),
     ],
 )
 def test_what_is_continuous(e: sp.Expr) -> None:
     assert discontinuity([e], {x, y, v}) is None
+
+
+def test_a_volume_may_jump_on_which_nothing_depends() -> None:
+    """The divergence of Chua's rates jumps, these do not."""
+    network = network_variation(Scene(Field({"x": "y - abs(x)", "y": "-x - y/10 + cos(t)"})).equations)
+    extended = Variation(with_volume(network.orbit), network.size, network.matrix)
+    assert discontinuity(extended.orbit.node.rhs, {x}) == sp.sign(x)
 
 
 JUMPS = Field({"x": "v", "v": "-x + 2*sign(x) - d*v + A*cos(w*t)"}, parameters={"A": 0.8, "w": 0.85, "d": 0.1})

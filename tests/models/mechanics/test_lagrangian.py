@@ -24,6 +24,11 @@ def test_pendulum() -> None:
     assert sp.simplify(found[0] + g / length * sp.sin(x) + b * v / (m * length**2)) == 0
 
 
+def test_soft_walls_push_without_steps() -> None:
+    found = equations_of_motion(v**2 / 2, sp.Max(0, sp.Abs(x) - b) ** 2 + sp.Min(0, x - 2 * b) ** 3, [0], [x], [v])
+    assert found == (-2 * sp.sign(x) * sp.Max(0, sp.Abs(x) - b) - 3 * sp.Min(0, x - 2 * b) ** 2,)
+
+
 def test_growing_mass_brakes() -> None:
     found = equations_of_motion(sp.exp(TIME) * v**2 / 2, sp.S.Zero, [sp.S.Zero], [x], [v])
     assert sp.simplify(found[0] + v) == 0
