@@ -183,8 +183,13 @@ def set_valued(
         )
     hidden = sp.Dummy("f", real=True)
     plain = acceleration.xreplace({applied[0]: hidden})
-    if plain.diff(hidden).has(hidden) or plain.diff(hidden).has(velocity):
-        raise ValueError(f"set-valued contact: friction acts nonlinearly in {acceleration}")
+    load = plain.diff(hidden)
+    if load.has(hidden):
+        raise ValueError(f"set-valued contact: friction acts nonlinearly in {acceleration}; expected a multiple of it")
+    if load.has(velocity):
+        raise ValueError(
+            f"set-valued contact: found friction under the load {load}, which depends on the velocity {velocity}; expected a load of places and time"
+        )
     at_rest = plain.xreplace({velocity: speed})
     up, down = (at_rest.xreplace({hidden: sign * largest}) for sign in (1, -1))
     pushed, pulled = (at_rest.xreplace({hidden: sign * slow}) for sign in (1, -1))
