@@ -5,6 +5,9 @@ sliding velocity in the direction of slip; that of a sticking one is the distanc
 the limits of static friction.  A step that would make a gap negative is taken back and tried again
 with the length after which the gap has just passed zero, until the passage lies at its end to within
 rounding.  All contacts that have passed change together.
+
+A step ends at a jump or kink in time as well: a load that jumps there opens or closes gaps at once, and no
+error shows it to a step in stick.
 """
 
 from __future__ import annotations
@@ -44,6 +47,12 @@ def smallest_gap(t, y, p, out, network, dims, pushes):
     for i in range(dims.nodes):
         least = minimum(least, gap_of(i, p, out, dims))
     return least
+
+
+@njit(error_model="numpy", forceinline=True)
+def on_side(side, gap, out, dims):
+    """A gap as long as all jumps and kinks in time are on their side, a closed one behind the first of them."""
+    return select(load(out, 9 * dims.nodes, WIDTH) == side, gap, -1.0)
 
 
 @njit(error_model="numpy")
@@ -113,6 +122,7 @@ def first_passage(accept, t, h, y, y_new, dense, middle, out, network, dims, pus
     zero, span = broadcast(0.0, WIDTH), 1.0 / LOOKS
     low, high, f_low, f_high = zero, broadcast(2.0, WIDTH), zero, broadcast(-1.0, WIDTH)
     earlier, before, open_lanes = zero, smallest_gap(t, y, y, out, network, dims, pushes), accept
+    side = load(out, 9 * dims.nodes + 1, WIDTH)
     keep_gaps(0, y, out, dims)
     for k in range(1, LOOKS + 1):
         theta = broadcast(k * span, WIDTH)
@@ -120,6 +130,7 @@ def first_passage(accept, t, h, y, y_new, dense, middle, out, network, dims, pus
             gap = smallest_gap(t + h, y_new, y, out, network, dims, pushes)
         else:
             gap = gap_inside(theta, t, h, y, y_new, dense, middle, out, network, dims, pushes)
+        gap = on_side(side, gap, out, dims)
         keep_gaps(k, y, out, dims)
         hit = open_lanes & (gap < -PASSED)
         f_low, low = select(hit, maximum(before, 0.0), f_low), select(hit, theta - span, low)
@@ -134,11 +145,11 @@ def first_passage(accept, t, h, y, y_new, dense, middle, out, network, dims, pus
             f_high, high = select(sunk, least, f_high), select(sunk, place, high)
             hit = hit | sunk
         earlier, before, open_lanes = before, gap, open_lanes & ~hit
-    return narrowed(low, high, f_low, f_high, t, h, y, y_new, dense, middle, out, network, dims, pushes)
+    return narrowed(side, low, high, f_low, f_high, t, h, y, y_new, dense, middle, out, network, dims, pushes)
 
 
 @njit(error_model="numpy")
-def narrowed(low, high, f_low, f_high, t, h, y, y_new, dense, middle, out, network, dims, pushes):
+def narrowed(side, low, high, f_low, f_high, t, h, y, y_new, dense, middle, out, network, dims, pushes):
     """The end of the bracket `high` (2: no bracket) moved back until its gap is just below zero.
 
     Regula falsi with the weight of Anderson & Bjorck, BIT 13, 253 (1973), for the passage of a level just below zero.
@@ -154,7 +165,7 @@ def narrowed(low, high, f_low, f_high, t, h, y, y_new, dense, middle, out, netwo
             fit = (secant > low) & (secant < high)
             theta = 0.5 * (low + high) if k % 4 == 3 else select(fit, secant, 0.5 * (low + high))
             theta = select(active, theta, 0.0 * high)
-            gap = gap_inside(theta, t, h, y, y_new, dense, middle, out, network, dims, pushes)
+            gap = on_side(side, gap_inside(theta, t, h, y, y_new, dense, middle, out, network, dims, pushes), out, dims)
             below = active & (gap < level + 0.25 * PASSED)
             above = active & ~(gap < level + 0.25 * PASSED)
             # an end that stays a second time is weighed less, the less the other one has gained

@@ -240,11 +240,11 @@ def march(
     size, steering, slips = dims.dimension, address(control, 0), np.zeros(dims.nodes)
     orbit = CLOCK + 2 * size + dims.parameters + len(REPEATING)
     rows = dims.dense_rows * size + dims.workspace
-    block = aligned(orbit + 2 * size + rows + 9 * dims.nodes + dims.shared)
+    block = aligned(orbit + 2 * size + rows + 9 * dims.nodes + 2 + dims.shared)
     clock, y, y_new = address(block, 0), address(block, CLOCK), address(block, orbit)
     middle, dense = address(y_new, size), address(y_new, 2 * size)
     out = address(dense, rows)
-    shared = address(out, 9 * dims.nodes)
+    shared = address(out, 9 * dims.nodes + 2)
     columns, stride, groups = places.shape[1], registers * LANES, gains.shape[2] // LANES
     room = registers * (2 * parts + 2 + max(1, kinds) + columns * parts) + groups + parts * (1 + TILE * columns)
     deviations = aligned((room + registers * (4 + max(1, kinds))) * LANES)

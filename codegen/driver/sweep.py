@@ -253,7 +253,7 @@ def drive(
     size, rows = dims.dimension, dims.dense_rows * dims.dimension
     group = CLOCK + 2 * size + dims.parameters + len(REPEATING)
     groups = 3 if SWITCHING else 1
-    scratch = 9 * dims.nodes if CONTACTS else 0
+    scratch = 9 * dims.nodes + 2 if CONTACTS else 0
     watched = len(rule) * dims.observed
     crossed = (len(rule) + 1) * (dims.sections * (3 + max(0, dims.kept)) + 3 * dims.stops)
     block = aligned((2 * size + groups * (group + rows) + dims.workspace + scratch + watched + crossed) * WIDTH)

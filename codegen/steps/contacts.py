@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.periodicity import gaps
 from synchain.models.dynamics.saltation import Entry, Events
 from synchain.models.dynamics.variational import Variation
-from synchain.models.mechanics.components import TIME
+from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.mechanics.friction import Contact
 
 from ..program.expressions import ZERO, Compare, Expression, Load, Name, Number, Product, call, plus
@@ -26,9 +27,16 @@ __all__ = ["event_functions", "push_functions", "register"]
 FORCES = (2, 3, 4, 5)
 """The groups of `pushes` that the force of a link adds to."""
 
+SIDES = 9
+"""The group of `pushes` behind which it tells on which sides of zero the jumps and kinks in time are, now and soon."""
+
+SOON = sp.Rational(1, 10**13)
+"""The shortest step, as a part of the time: what is zero now has a side then."""
+
 
 def push_functions(equations: Equations, names: Names, looped: bool = False) -> list[Function]:
-    """The function `pushes`, if there are contacts: it writes six groups of NODES numbers, in the order that it tells.
+    """The function `pushes`, if there are contacts: it writes six groups of NODES numbers, in the order that it tells, and
+    two numbers behind nine groups if anything jumps or has a kink in time.
 
     Written out, it grows with the network; `looped` it runs over nodes and links, which it takes from `graph`.
     """
@@ -46,11 +54,26 @@ def _columns(contact: Contact) -> tuple[sp.Expr, ...]:
     return contact.sliding, contact.speed, contact.up, contact.down, contact.pushed, contact.pulled
 
 
+def _sides(found: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:
+    """A number that changes if one of some expressions of time passes zero, at this time and soon after; none without any."""
+    signs = [3 ** (k % 30) * sp.sign(gap) for k, gap in enumerate(dict.fromkeys(found))]
+    now = sp.Add(*signs)
+    return (now, now.xreplace({TIME: TIME + SOON * sp.Max(1, TIME)})) if signs else ()
+
+
+def _ordered(template: Node | Edge) -> list[sp.Expr]:
+    return sorted(gaps(template), key=sp.default_sort_key)
+
+
 def _written_out(equations: Equations, names: Names) -> list[Statement]:
     contacts = [found for i in range(equations.n) if (found := equations.contact_at(i)) is not None]
-    body = share([e for column in zip(*map(_columns, contacts), strict=True) for e in column], names.fresh("z"))
+    forces = [e for column in zip(*map(_columns, contacts), strict=True) for e in column]
+    found = [e.xreplace(equations.at_node(i)) for i in range(equations.n) for e in _ordered(equations.node_at(i))]
+    found += [e.xreplace(equations.at_link(link, edge)) for link, edge in equations.linked() for e in _ordered(edge)]
+    body = share([*forces, *_sides(found)], names.fresh("z"))
     states = [let(name, Load("y", Number(k))) for k, name in enumerate(equations.state) if real(name) in body.symbols]
-    stores = [store("out", k, lane(lower(e))) for k, e in enumerate(body.results)]
+    places = [*range(len(forces)), *(SIDES * equations.n + k for k in range(2))]
+    stores = [store("out", k, lane(lower(e))) for k, e in zip(places, body.results, strict=False)]
     return [*states, *_parameters(equations, body.symbols), *assigned(body), *stores]
 
 
@@ -63,8 +86,13 @@ def _looped(equations: Equations, names: Names) -> list[Statement]:
     fixed = Hoist(frozenset((*node.state, *varied)), names.fresh("fixed"), frozenset({TIME}))
     body = share([fixed.apply(e) for e in _columns(node.contact)], names.fresh("z"))
     force, link = _force(equations, node.contact)
-    used = body.symbols.union(*(e.free_symbols for e in (*fixed.table, *link)))
+    own_names = set(map(real, (*equations.varied, *equations.numbered)))
+    found = [e for template in (node, *equations.edges) for e in _ordered(template) if not e.free_symbols & own_names]
+    sides = share(_sides(found), names.fresh("side"))
+    used = body.symbols.union(sides.symbols, *(e.free_symbols for e in (*fixed.table, *link)))
     before = [*_parameters(equations, used), *(let(s.name, lane(lower(e))) for e, s in fixed.table.items())]
+    before += assigned(sides)
+    before += [store("out", SIDES * Name("NODES") + k, lane(lower(e))) for k, e in enumerate(sides.results)]
     at = places(equations)
     own: list[Statement] = [let(s.name, Load("y", at.place(k))) for k, s in enumerate(node.state) if s in used]
     own += [*at.own(body.symbols), *assigned(body)]

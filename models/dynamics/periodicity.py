@@ -15,7 +15,7 @@ from ..mechanics.components import TIME, Edge, Node
 from ..mechanics.jumps import JUMPING, KINKED
 from .equations import Equations
 
-__all__ = ["Drive", "angular_frequency", "as_function", "drive_of", "names_in", "period_of"]
+__all__ = ["Drive", "angular_frequency", "as_function", "drive_of", "gaps", "names_in", "period_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +68,9 @@ def drive_of(templates: tuple[Node | Edge, ...], varied: tuple[str, ...] = ()) -
     """
     if not any(template.forced for template in templates):
         return Drive(problem="is not driven")
-    bends, gaps = (tuple(sorted(found(templates), key=sp.default_sort_key)) for found in (_bends, _gaps))
-    return replace(_periodic(templates, varied), bends=bends, gaps=gaps)
+    sided = set[sp.Expr]().union(*map(gaps, templates))
+    bends, zeros = (tuple(sorted(found, key=sp.default_sort_key)) for found in (_bends(templates), sided))
+    return replace(_periodic(templates, varied), bends=bends, gaps=zeros)
 
 
 def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Drive:
@@ -143,14 +144,11 @@ def _bent(part: sp.Basic) -> Iterator[tuple[sp.Expr, int]]:
         yield from ((a, 1) for a in part.args)
 
 
-def _gaps(templates: tuple[Node | Edge, ...]) -> set[sp.Expr]:
-    """What passes zero at the jumps and kinks of functions of time alone."""
-    found = set[sp.Expr]()
-    for template in templates:
-        for e in template.rhs:
-            for part in e.atoms(*KINKED, *JUMPING, Relational):
-                found |= {gap for gap in _sided(part) if gap.has(TIME) and not gap.free_symbols & _local(template)}
-    return found
+def gaps(template: Node | Edge) -> set[sp.Expr]:
+    """What passes zero at the jumps and kinks of functions of time alone in the rates of a template."""
+    parts = {part for e in template.rhs for part in e.atoms(*KINKED, *JUMPING, Relational)}
+    found = {gap for part in parts for gap in _sided(part)}
+    return {gap for gap in found if gap.has(TIME) and not gap.free_symbols & _local(template)}
 
 
 def _sided(part: sp.Basic) -> Iterator[sp.Expr]:
