@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import sympy as sp
 
@@ -61,6 +61,11 @@ def _sides(found: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:
     return (now, now.xreplace({TIME: TIME + SOON * sp.Max(1, TIME)})) if signs else ()
 
 
+def _templates(equations: Equations) -> Iterator[Node | Edge]:
+    yield from equations.nodes
+    yield from equations.edges
+
+
 def _ordered(template: Node | Edge) -> list[sp.Expr]:
     return sorted(gaps(template), key=sp.default_sort_key)
 
@@ -68,9 +73,9 @@ def _ordered(template: Node | Edge) -> list[sp.Expr]:
 def _written_out(equations: Equations, names: Names) -> list[Statement]:
     contacts = [found for i in range(equations.n) if (found := equations.contact_at(i)) is not None]
     forces = [e for column in zip(*map(_columns, contacts), strict=True) for e in column]
-    found = [e.xreplace(equations.at_node(i)) for i in range(equations.n) for e in _ordered(equations.node_at(i))]
-    found += [e.xreplace(equations.at_link(link, edge)) for link, edge in equations.linked() for e in _ordered(edge)]
-    body = share([*forces, *_sides(found)], names.fresh("z"))
+    zeros = [e.xreplace(equations.at_node(i)) for i in range(equations.n) for e in _ordered(equations.node_at(i))]
+    zeros += [e.xreplace(equations.at_link(link, edge)) for link, edge in equations.linked() for e in _ordered(edge)]
+    body = share([*forces, *_sides(zeros)], names.fresh("z"))
     states = [let(name, Load("y", Number(k))) for k, name in enumerate(equations.state) if real(name) in body.symbols]
     places = [*range(len(forces)), *(SIDES * equations.n + k for k in range(2))]
     stores = [store("out", k, lane(lower(e))) for k, e in zip(places, body.results, strict=False)]
@@ -78,7 +83,10 @@ def _written_out(equations: Equations, names: Names) -> list[Statement]:
 
 
 def _looped(equations: Equations, names: Names) -> list[Statement]:
-    """One loop over the nodes with what is fixed for all of them before it, and one over the links."""
+    """One loop over the nodes with what is fixed for all of them before it, and one over the links.
+
+    Jumps in time with numbers that differ from node to node, or link to link, are left to step control.
+    """
     node, nodes = equations.node, span("i", "NODES")
     if node.contact is None:
         return []
@@ -86,9 +94,9 @@ def _looped(equations: Equations, names: Names) -> list[Statement]:
     fixed = Hoist(frozenset((*node.state, *varied)), names.fresh("fixed"), frozenset({TIME}))
     body = share([fixed.apply(e) for e in _columns(node.contact)], names.fresh("z"))
     force, link = _force(equations, node.contact)
-    own_names = set(map(real, (*equations.varied, *equations.numbered)))
-    found = [e for template in (node, *equations.edges) for e in _ordered(template) if not e.free_symbols & own_names]
-    sides = share(_sides(found), names.fresh("side"))
+    differing = set(map(real, (*equations.varied, *equations.numbered)))
+    zeros = [e for template in _templates(equations) for e in _ordered(template) if not e.free_symbols & differing]
+    sides = share(_sides(zeros), names.fresh("side"))
     used = body.symbols.union(sides.symbols, *(e.free_symbols for e in (*fixed.table, *link)))
     before = [*_parameters(equations, used), *(let(s.name, lane(lower(e))) for e, s in fixed.table.items())]
     before += assigned(sides)

@@ -84,7 +84,7 @@ def _agree(one: sp.Expr, other: sp.Expr, gap: sp.Expr, moving: Set[sp.Symbol]) -
     if kink is not None:
         (inner,) = kink.args
         sides = ({kink: sign * inner, sp.sign(inner): sign} for sign in (sp.S.One, sp.S.NegativeOne))
-        return all(_agree(*(e.xreplace(side) for e in (one, other, gap)), moving) for side in sides)
+        return all(_agree(one.xreplace(side), other.xreplace(side), gap.xreplace(side), moving) for side in sides)
     slopes = ((s, gap.diff(s)) for s in sorted(gap.free_symbols & moving, key=str))
     at = next((s for s, slope in slopes if slope != 0 and not slope.free_symbols & moving), None)
     return at is not None and bool(sp.simplify((one - other).subs(at, sp.solve(gap, at)[0])) == 0)
