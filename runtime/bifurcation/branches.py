@@ -1,6 +1,6 @@
 """Branches of periodic orbits along a parameter, and the bifurcations on them.
 
-A smooth bifurcation is a real multiplier that passes -1 or 1. A bifurcation of friction is a change
+A smooth bifurcation is a multiplier that passes the unit circle: at -1, at 1, or in a complex pair. A bifurcation of friction is a change
 of the phases of stick and slip. In grazing, a phase begins in the middle of another one, as its
 distance from it becomes zero. In stick loss, a body that landed in stick turns at once, as the load
 at the landing passes the limit of static friction.
@@ -10,6 +10,7 @@ at the landing passes the limit of static friction.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
@@ -32,10 +33,16 @@ from .phases import Phases
 
 __all__ = ["Branch", "checked_values", "follow", "others", "traced"]
 
-SHORTEST = 1.0 / 32.0
-"""Shortest piece of a step, relative to the step, before the branch ends.
+SHORT = 1.0 / 32.0
+"""Length of the pieces, relative to the step, from which on the end of the branch is looked for.
 
-A step is cut if Newton's method fails or leads far from the expected state.
+A step is cut if Newton's method fails, or leads far from the expected state, beyond a fold or to another branch.
+"""
+
+SHORTEST = 1.0 / 4096.0
+"""Shortest piece of a step, relative to the step, before the branch is lost.
+
+Where a branch nearly turns it is steep, and pieces must be short.
 """
 
 APART = 1.0 / 16.0
@@ -72,7 +79,8 @@ NAMES = frozenset(
 class Branch(Labelled):
     """Periodic orbits along a parameter.
 
-    The branch ends if no further orbit can be found, usually at a fold or a graze.
+    The branch ends if no further orbit can be found, usually at a fold or a graze. It is lost if neither an
+    orbit nor a bifurcation at which it ends is found.
 
     Parameters
     ----------
@@ -86,6 +94,8 @@ class Branch(Labelled):
         Bifurcations between the orbits and at the end.
     phases : tuple of Phases
         Phases of each orbit; empty for friction that is not set-valued.
+    lost : tuple of float
+        Values of the parameter at the ends where the branch is lost.
     """
 
     name: str
@@ -93,6 +103,7 @@ class Branch(Labelled):
     orbits: tuple[PeriodicOrbit, ...]
     bifurcations: tuple[Bifurcation, ...]
     phases: tuple[Phases, ...] = ()
+    lost: tuple[float, ...] = ()
 
     @property
     def data(self) -> xr.Dataset:
@@ -112,13 +123,14 @@ class Branch(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """Orbits, their stability and the bifurcations."""
+        """Orbits, their stability, the bifurcations, and where the branch is lost."""
         stable = sum(orbit.stable for orbit in self.orbits)
         turns = "; ".join(f"{turn.kind} at {turn.value:.8g}" for turn in self.bifurcations)
         return (
             ("orbits", f"{len(self.orbits)} of {self.orbits[0].periods} drive periods, {stable} stable"),
             (self.name, ends_of(self.values)),
             ("bifurcations", turns or "none"),
+            *((("lost", f"at {numbers(self.lost)}"),) if self.lost else ()),
         )
 
 
@@ -158,6 +170,11 @@ def follow(
     -------
     Branch
 
+    Warns
+    -----
+    RuntimeWarning
+        If the branch is lost: the orbits end without a bifurcation.
+
     Raises
     ------
     ValueError
@@ -175,7 +192,26 @@ def follow(
     wanted = checked_values(first.scene, name, values)
     scene = others(Given(follow, parameters, more, NEWTON), scene, name)
     with Execution(1, None, show_progress, progress).reporter(len(wanted), "value") as reporter:
-        return traced(scene, name, reporter.each(wanted), first)
+        branch = traced(scene, name, reporter.each(wanted), first)
+    warn_of_lost("follow", [branch])
+    return branch
+
+
+def warn_of_lost(function: str, branches: Sequence[Branch]) -> None:
+    """Warn the caller of a function in one line if branches are lost."""
+    lost = [value for branch in branches for value in branch.lost]
+    if lost:
+        warnings.warn(
+            f"{function}: found no orbit and no bifurcation beyond {branches[0].name} = {numbers(lost)}; expected the "
+            "branch to go on, or to end at a bifurcation; try values closer together there, or periodic_orbit beyond",
+            RuntimeWarning,
+            stacklevel=4,
+        )
+
+
+def numbers(values: Sequence[float]) -> str:
+    """Return numbers in words, with eight digits."""
+    return ", ".join(f"{value:.8g}" for value in values)
 
 
 def others(given: Given, scene: Scene, name: str) -> Scene:
@@ -211,6 +247,7 @@ def traced(scene: Scene, name: str, values: Iterable[float], first: PeriodicOrbi
         tuple(orbits.values()),
         tuple(tracer.bifurcations),
         tuple(each for each in phases if each is not None),
+        tracer.lost,
     )
 
 
@@ -260,6 +297,7 @@ class BranchTracer:
         self.bifurcations: list[Bifurcation] = []
         self.phases: dict[float, Phases | None] = {}
         self.least: int | None = None
+        self.lost: tuple[float, ...] = ()
 
     def take(self, value: float, orbit: PeriodicOrbit, phases: Phases | None) -> PeriodicOrbit:
         """Append an orbit, after the bifurcations on the way to it."""
@@ -293,11 +331,15 @@ class BranchTracer:
             phases = None if orbit is None else orbit.phases
             if orbit is not None and (abs(ahead[-1] - last) <= APART * step or not self._changes(phases)):
                 self.take(ahead.pop(), orbit, phases)
-            elif orbit is not None or abs(ahead[-1] - last) > SHORTEST * step:
-                ahead.append(0.5 * (last + ahead[-1]))
-            else:
-                self.bifurcations += bifurcations_at_end(self.arc, ahead[-1])
-                return None
+                continue
+            piece = abs(ahead[-1] - last)
+            if orbit is None and piece <= SHORT * step:
+                end = bifurcations_at_end(self.arc, ahead[-1])
+                if end or piece <= SHORTEST * step:
+                    self.bifurcations += end
+                    self.lost = () if end else (last,)
+                    return None
+            ahead.append(0.5 * (last + ahead[-1]))
         return self.arc.orbits[-1]
 
     def _changes(self, phases: Phases | None) -> bool:
@@ -315,4 +357,6 @@ class BranchTracer:
         near = FAR * float(np.abs(guess - last).max()) + KINK
         if len(self.arc.values) > 1 and not float(np.abs(orbit.state - guess).max()) < near:
             return None
-        return orbit if self.least in (None, orbit.least) else None
+        if self.least not in (None, orbit.least):
+            return None
+        return orbit if self._changes(orbit.phases) or self.arc.joins(value, orbit) else None
