@@ -50,6 +50,9 @@ SHORTEST = 1e-7
 """Shortest step, relative to the first; if a step must be shorter, the arc does not end at a turn.
 """
 
+BESIDE = 1e-2
+"""Distance from a branch point, relative to the step, of the points that lead to it."""
+
 NEUTRAL = 1e-6
 """Largest distance from 1 of the multiplier at a branch point; a kink has none so near."""
 
@@ -237,7 +240,7 @@ def find_turn(arc: Arc, beyond: float) -> tuple[BifurcationKind, float, Periodic
         if turned and not branched:
             return BifurcationKind.FOLD, *way.root(way.side, path)
         if branched and not turned:
-            value, orbit = way.root(chord.rate, path)
+            value, orbit = way.summit(chord.rate, path)
             near = np.abs(orbit.multipliers - 1.0).min() < NEUTRAL
             return (BifurcationKind.BRANCH_POINT, value, orbit) if near else None
         if not (beyond - there[-1]) * (there[-1] - way.start[-1]) > 0.0:  # past the end, or back without a turn
@@ -322,27 +325,50 @@ class ArclengthStep:
     def root(self, test: Callable[[np.ndarray], float], path: Sequence[np.ndarray]) -> tuple[float, PeriodicOrbit]:
         """Locate the zero of a function of the point between the last two points of a path along the arc.
 
-        Newton's method starts from a polynomial through points that are known: near a branch point it goes
-        astray from afar.
+        Raises
+        ------
+        ArithmeticError
+            If Newton's method loses the arc on the way.
+        """
+        known = self._known(path)
+        at = brentq(lambda at: test(self._between(known, at)), *[*known][-2:], xtol=1e-13, rtol=1e-13)
+        return self._place(self._between(known, float(at)))
+
+    def summit(self, test: Callable[[np.ndarray], float], path: Sequence[np.ndarray]) -> tuple[float, PeriodicOrbit]:
+        """Locate the turn at a branch point between the last two points of a path, where a function changes its sign.
+
+        At a branch point Newton's method has no direction to go; a cubic through four points beside it leads there.
 
         Raises
         ------
         ArithmeticError
             If Newton's method loses the arc on the way.
         """
+        known = self._known(path)
+        one, other = [*known][-2:]
+        length = abs(other - one)
+        at = float(brentq(lambda at: test(self._between(known, at)), one, other, xtol=BESIDE * length))
+        beside = BESIDE * length * np.array([-2.0, -1.0, 1.0, 2.0])
+        cubic = np.polyfit(beside, [self._between(known, at + each) for each in beside], 3)
+        turns = np.roots(cubic[:3, -1] * [3.0, 2.0, 1.0])
+        return self._place(np.array([np.polyval(each, turns[np.abs(turns).argmin()].real) for each in cubic.T]))
 
-        known = {float(self._unit @ (point - self.start)): point for point in path}
+    def _known(self, path: Sequence[np.ndarray]) -> dict[float, np.ndarray]:
+        """Points by their length."""
+        return {float(self._unit @ (point - self.start)): point for point in path}
 
-        def point(at: float) -> np.ndarray:
-            if at not in known:
-                found = self.point(at, _through([*known], [*known.values()], at))
-                if found is None:
-                    raise ArithmeticError("the arc of a branch is lost close to its turn")
-                known[at] = found
-            return known[at]
+    def _between(self, known: dict[float, np.ndarray], length: float) -> np.ndarray:
+        """Point at a length, kept among the known ones: Newton's method starts from a polynomial through them."""
+        if length not in known:
+            found = self.point(length, _through([*known], [*known.values()], length))
+            if found is None:
+                raise ArithmeticError("the arc of a branch is lost close to its turn")
+            known[length] = found
+        return known[length]
 
-        at = point(float(brentq(lambda at: test(point(at)), *[*known][-2:], xtol=1e-13, rtol=1e-13)))
-        return float(at[-1]), self.orbit(at)
+    def _place(self, point: np.ndarray) -> tuple[float, PeriodicOrbit]:
+        """Parameter and orbit at a point."""
+        return float(point[-1]), self.orbit(point)
 
     @property
     def _unit(self) -> np.ndarray:
