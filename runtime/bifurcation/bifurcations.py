@@ -139,7 +139,7 @@ def bifurcations_at_end(arc: Arc, beyond: float) -> list[Bifurcation]:
         turn = find_turn(arc, beyond)
     except ArithmeticError:
         turn = None
-    if turn is not None:
+    if turn is not None and (beyond - turn[1]) * (turn[1] - arc.values[-1]) >= 0.0:
         kind, at, orbit = turn
         return [Bifurcation(at, kind, _residual(orbit, kind), orbit)]
     if arc.phases[-1] is None:
