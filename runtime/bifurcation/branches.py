@@ -327,13 +327,12 @@ class BranchTracer:
         ahead = [value]
         while ahead:
             last = self.arc.values[-1]
-            orbit = self._orbit(ahead[-1])
-            phases = None if orbit is None else orbit.phases
-            if orbit is not None and (abs(ahead[-1] - last) <= APART * step or not self._changes(phases)):
-                self.take(ahead.pop(), orbit, phases)
-                continue
             piece = abs(ahead[-1] - last)
-            if orbit is None and piece <= SHORT * step:
+            found = self._found(ahead[-1])
+            if found is not None and (piece <= APART * step or not self._changes(found[1])):
+                self.take(ahead.pop(), *found)
+                continue
+            if found is None and piece <= SHORT * step:
                 end = bifurcations_at_end(self.arc, ahead[-1])
                 if end or piece <= SHORTEST * step:
                     self.bifurcations += end
@@ -347,8 +346,8 @@ class BranchTracer:
         last = self.arc.phases[-1]
         return phases is not None and last is not None and phases.slip_states != last.slip_states
 
-    def _orbit(self, value: float) -> PeriodicOrbit | None:
-        """Orbit at a value if Newton's method finds one close to the expected state, else None."""
+    def _found(self, value: float) -> tuple[PeriodicOrbit, Phases | None] | None:
+        """Orbit at a value and its phases if Newton's method finds one on the branch, else None."""
         try:
             orbit = self.arc.at(value)
         except ArithmeticError:
@@ -359,4 +358,5 @@ class BranchTracer:
             return None
         if self.least not in (None, orbit.least):
             return None
-        return orbit if self._changes(orbit.phases) or self.arc.joins(value, orbit) else None
+        phases = orbit.phases
+        return (orbit, phases) if self._changes(phases) or self.arc.joins(value, orbit) else None
