@@ -192,7 +192,16 @@ class Step:
     def root(self, test: Test) -> tuple[float, PeriodicOrbit]:
         """Locate the zero of a test function that changes its sign, and the orbit there."""
         known = dict(zip(self.values, map(test, self.orbits), strict=True))
-        return _root(lambda at: known[at] if at in known else test(self.arc.at(at)), self.arc, self.values)
+        arc = self.arc.copy()
+
+        def tested(at: float) -> float:
+            if at not in known:
+                orbit = arc.at(at)
+                arc.take(at, orbit, None)
+                known[at] = test(orbit)
+            return known[at]
+
+        return _root(tested, arc, self.values)
 
     def passes(self, k: int) -> bool:
         """Return whether the modulus of the k-th multiplier passes 1."""

@@ -36,7 +36,7 @@ __all__ = ["Branch", "checked_values", "follow", "others", "traced"]
 SHORT = 1.0 / 32.0
 """Length of the pieces, relative to the step, from which on the end of the branch is looked for.
 
-A step is cut if Newton's method fails, or leads far from the expected state, beyond a fold or to another branch.
+A step is cut if Newton's method fails, or leads beyond a fold or to another branch.
 """
 
 SHORTEST = 1.0 / 4096.0
@@ -52,11 +52,10 @@ Two changes in one piece count as one.
 """
 
 FAR = 0.3
-"""Largest distance from the expected state, relative to the step, of an orbit on the same branch.
-"""
+"""Largest distance from the expected state, relative to the step, of an orbit of other phases on the same branch."""
 
 KINK = 1e-2
-"""Distance from the expected state that is always allowed: changes of phases are kinks."""
+"""Distance from the expected state that such an orbit may always have: changes of phases are kinks."""
 
 NAMES = frozenset(
     {
@@ -325,6 +324,7 @@ class BranchTracer:
         """
         step = abs(value - self.arc.values[-1])
         ahead = [value]
+        sought: float | None = None
         while ahead:
             last = self.arc.values[-1]
             piece = abs(ahead[-1] - last)
@@ -332,8 +332,8 @@ class BranchTracer:
             if found is not None and (piece <= APART * step or not self._changes(found[1])):
                 self.take(ahead.pop(), *found)
                 continue
-            if found is None and piece <= SHORT * step:
-                end = bifurcations_at_end(self.arc, ahead[-1])
+            if found is None and (piece <= SHORTEST * step or (piece <= SHORT * step and sought != last)):
+                sought, end = last, bifurcations_at_end(self.arc, ahead[-1])
                 if end or piece <= SHORTEST * step:
                     self.bifurcations += end
                     self.lost = () if end else (last,)
@@ -352,11 +352,14 @@ class BranchTracer:
             orbit = self.arc.at(value)
         except ArithmeticError:
             return None
-        guess, last = self.arc.guess(value), self.arc.orbits[-1].state
-        near = FAR * float(np.abs(guess - last).max()) + KINK
-        if len(self.arc.values) > 1 and not float(np.abs(orbit.state - guess).max()) < near:
-            return None
         if self.least not in (None, orbit.least):
             return None
         phases = orbit.phases
-        return (orbit, phases) if self._changes(phases) or self.arc.joins(value, orbit) else None
+        joins = self._kinks if self._changes(phases) else self.arc.joins
+        return (orbit, phases) if joins(value, orbit) else None
+
+    def _kinks(self, value: float, orbit: PeriodicOrbit) -> bool:
+        """True if an orbit of other phases is close to the expected state."""
+        guess, last = self.arc.guess(value), self.arc.orbits[-1].state
+        near = FAR * float(np.abs(guess - last).max()) + KINK
+        return len(self.arc.values) == 1 or float(np.abs(orbit.state - guess).max()) < near
