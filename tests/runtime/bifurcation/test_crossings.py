@@ -10,8 +10,10 @@ import pytest
 from synchain.models import Field
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
+from synchain.runtime.bifurcation.bifurcations import Step
 from synchain.runtime.bifurcation.branches import Branch, follow
-from synchain.runtime.bifurcation.periodic import periodic_orbit
+from synchain.runtime.bifurcation.continuation import Arc
+from synchain.runtime.bifurcation.periodic import PeriodicOrbit, periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton
 from synchain.runtime.opening.open import open_result
 
@@ -63,6 +65,17 @@ def test_multipliers_that_leave_the_circle_at_one_are_found_by_the_determinant()
     assert found(branch) == [("branch point", pytest.approx(0.3, abs=1e-10))]
 
 
+def test_a_multiplier_on_the_circle_at_a_value_counts_once() -> None:
+    """The step that comes to 1 from inside has the crossing, and the next one does not."""
+    inside, on, outside = (
+        PeriodicOrbit(Scene("duffing"), 1, np.zeros(1), np.array([m]), 0.0, 1) for m in (0.5, 1.0, 1.5)
+    )
+    steps = ((inside, on), (on, outside), (outside, on), (on, inside))
+    arc = Arc(inside.scene, "u", 1)
+    changes = [Step(arc, (0.0, 1.0), each).changes(lambda orbit: abs(orbit.multipliers[0]) - 1.0) for each in steps]
+    assert changes == [True, False, False, True]
+
+
 @pytest.mark.parametrize("values", [[-0.1, 0.05], [-0.1, 0.0, 0.1]])
 def test_a_branch_that_goes_straight_on_has_a_branch_point(values: list[float]) -> None:
     """Transcritical bifurcation of x' = (a + cos t) x - x^2."""
@@ -105,8 +118,8 @@ def test_symmetric_and_other_orbits_of_duffing_meet_at_a_pitchfork() -> None:
 
 
 def test_steep_branches_are_followed_in_short_pieces() -> None:
-    """y of period one is proportional to tanh(30 j), which changes on a sixtieth of the step."""
-    branch = followed("j", [-1.0, 0.9], (0.0, -2.0), a=-0.2, b=-0.3, r=30.0)
+    """y of period one is proportional to tanh(300 j), which changes on a fiftieth of the step."""
+    branch = followed("j", [-0.2, 0.17], (0.0, -2.0), a=-0.2, b=-0.3, r=300.0)
     assert len(branch.orbits) == 2
     np.testing.assert_allclose(branch.orbits[1].state, -branch.orbits[0].state, atol=1e-9)
 
