@@ -34,7 +34,7 @@ from .phases import Phases
 __all__ = ["Branch", "checked_values", "follow", "others", "traced"]
 
 SHORT = 1.0 / 32.0
-"""Length of the pieces, relative to the step, from which on the end of the branch is looked for.
+"""Length of the pieces, relative to the step, at which the end of the branch is first looked for.
 
 A step is cut if Newton's method fails, or leads beyond a fold or to another branch.
 """
@@ -324,7 +324,7 @@ class BranchTracer:
         """
         step = abs(value - self.arc.values[-1])
         ahead = [value]
-        sought: float | None = None
+        sought = False
         while ahead:
             last = self.arc.values[-1]
             piece = abs(ahead[-1] - last)
@@ -332,8 +332,9 @@ class BranchTracer:
             if found is not None and (piece <= APART * step or not self._changes(found[1])):
                 self.take(ahead.pop(), *found)
                 continue
-            if found is None and (piece <= SHORTEST * step or (piece <= SHORT * step and sought != last)):
-                sought, end = last, bifurcations_at_end(self.arc, ahead[-1])
+            if found is None and (piece <= SHORTEST * step or (piece <= SHORT * step and not sought)):
+                # up to the value after the next: a piece that ends just before a fold is refused too
+                sought, end = True, bifurcations_at_end(self.arc, ahead[-2:][0])
                 if end or piece <= SHORTEST * step:
                     self.bifurcations += end
                     self.lost = () if end else (last,)
