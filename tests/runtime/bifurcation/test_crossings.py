@@ -119,9 +119,9 @@ def test_symmetric_and_other_orbits_of_duffing_meet_at_a_pitchfork() -> None:
 
 def test_steep_branches_are_followed_in_short_pieces() -> None:
     """y of period one is proportional to tanh(300 j), which changes on a three-hundredth of the step."""
-    branch = followed("j", [-1.0, 0.9], (0.0, -2.0), a=-0.2, b=-0.3, r=300.0)
-    assert len(branch.orbits) == 2
-    np.testing.assert_allclose(branch.orbits[1].state, -branch.orbits[0].state, atol=1e-9)
+    branch = followed("j", [-1.0, -0.9, 1.0], (0.0, -2.0), a=-0.2, b=-0.3, r=300.0)
+    assert len(branch.orbits) == 3
+    np.testing.assert_allclose(branch.orbits[-1].state, -branch.orbits[0].state, atol=1e-9)
 
 
 def test_a_branch_that_is_lost_says_so(tmp_path: object) -> None:
