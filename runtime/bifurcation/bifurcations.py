@@ -1,12 +1,16 @@
 """Bifurcations of periodic orbits between two neighbours on a branch, and at its end.
 
-A real multiplier m passes -1 or 1 if det(M + 1) or det(M - 1) of the monodromy matrix M changes
-sign. Stick is lost if the load at a landing passes the limit of static friction, a number of either
+Multipliers that leave or enter the unit circle are found by their moduli, sorted by size: those are
+continuous along a branch, each passes 1 where a multiplier passes the circle, and a saddle whose
+multipliers have the product 1 is none. Multipliers that change places in one step are found by the
+signs of det(M + 1) and det(M - 1) of the monodromy matrix M. At -1 the period doubles. At 1 the
+branch has a fold if it turns back in its parameter, and a branch point (transcritical, pitchfork) if it does not. A
+complex pair passes in a Neimark-Sacker bifurcation, also called a torus bifurcation. Stick is lost if the load at a landing passes the limit of static friction, a number of either
 sign. Grazing can be approached only from the side of fewer phases, where the closing gap is known:
 each orbit on the way has a sixteenth of the gap of the one before, and Newton's method starts from
 a polynomial through those, so that it does not leave this side.
 
-Sources: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapters 5
+Sources: Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed. (Springer, 2004), chapter 10; Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapters 5
 and 7; di Bernardo, Budd, Champneys & Kowalczyk, Piecewise-smooth Dynamical Systems (Springer,
 2008), chapters 7-8.
 """
@@ -16,16 +20,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import StrEnum
+from functools import partial
 
 import numpy as np
 from scipy.optimize import brentq
 
-from .continuation import Arc, find_fold
+from .continuation import Arc, det, find_turn, turns
+from .kinds import BifurcationKind
 from .periodic import PeriodicOrbit, periodic_orbit, strobe
 from .phases import Phases
 
 __all__ = ["Bifurcation", "BifurcationKind", "bifurcations_at_end", "bifurcations_between"]
+
+Test = Callable[[PeriodicOrbit], float]
+"""A test function of the orbit, zero at a bifurcation."""
 
 CLOSED = 1e-6
 """Largest gap that counts as closed: the branch ends by grazing."""
@@ -42,14 +50,14 @@ MOST_STEPS = 80
 LEAST_REACH = 1e-4
 """Shortest step towards a graze, relative to the distance to the other end."""
 
+NEUTRAL = 1e-9
+"""Distance from the unit circle that may be a rounding error, as all are of orbits without damping."""
 
-class BifurcationKind(StrEnum):
-    """Kind of a bifurcation of periodic orbits."""
+BESIDE = 1e-2
+"""Distance from a crossing, relative to the step, at which such a multiplier must have left the circle."""
 
-    PERIOD_DOUBLING = "period doubling"
-    FOLD = "fold"
-    GRAZING = "grazing"
-    STICK_LOSS = "stick loss"
+REAL = 1e-6
+"""Largest imaginary part of a multiplier that passes the circle at -1 or 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +71,7 @@ class Bifurcation:
     kind : BifurcationKind
         Kind of the bifurcation.
     residual : float
-        Distance of the multiplier from -1 or 1, or from the other phase, at `orbit`.
+        Distance of the multiplier from -1, from 1 or from the unit circle, or from the other phase, at `orbit`.
     orbit : PeriodicOrbit
         Nearest orbit that was found.
     """
@@ -95,22 +103,22 @@ def bifurcations_between(arc: Arc, value: float, orbit: PeriodicOrbit, phases: P
     """
     before = arc.phases[-1]
     if before is None or phases is None or before.slip_states == phases.slip_states:
-        last, there = arc.orbits[-1], (arc.values[-1], value)
-        return _crossings(arc.copy().take(value, orbit, phases), there, (last, orbit))
+        both = arc.copy().take(value, orbit, phases)
+        return _crossings(Step(both, (arc.values[-1], value), (arc.orbits[-1], orbit)))
     ahead = len(before.slip_states) <= len(phases.slip_states)
     known = arc.copy() if ahead else arc.empty().take(value, orbit, phases)
     far = value if ahead else arc.values[-1]
     change = _stick_loss(arc, value, orbit, before, phases) if _same_slips(before, phases) else None
     change = change or _graze(known, far)
     start = (known.values[0], known.orbits[0]) if not ahead else (arc.values[-1], arc.orbits[-1])
-    beside = _crossings(known, (start[0], change.value), (start[1], change.orbit))
+    beside = _crossings(Step(known, (start[0], change.value), (start[1], change.orbit)))
     return sorted([change, *beside], key=lambda bifurcation: bifurcation.value)
 
 
 def bifurcations_at_end(arc: Arc, beyond: float) -> list[Bifurcation]:
     """Locate the bifurcation at which a branch ends.
 
-    The branch may be born of one of half as many periods, or end at a fold or at a graze.
+    The branch may be born of one of half as many periods, or end at a fold, at a branch point or at a graze.
 
     Parameters
     ----------
@@ -127,10 +135,13 @@ def bifurcations_at_end(arc: Arc, beyond: float) -> list[Bifurcation]:
     birth = _birth(arc, beyond)
     if birth is not None:
         return [birth]
-    turn = find_fold(arc, beyond)
-    if turn is not None:
-        at, orbit = turn
-        return [Bifurcation(at, BifurcationKind.FOLD, float(np.abs(orbit.multipliers - 1.0).min()), orbit)]
+    try:
+        turn = find_turn(arc, beyond)
+    except ArithmeticError:
+        turn = None
+    if turn is not None and (beyond - turn[1]) * (turn[1] - arc.values[-1]) >= 0.0:
+        kind, at, orbit = turn
+        return [Bifurcation(at, kind, _residual(orbit, kind), orbit)]
     if arc.phases[-1] is None:
         return []
     last = _graze(arc.copy(), beyond)
@@ -149,25 +160,93 @@ def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
             orbit = periodic_orbit(arc.scene, half, middle, parameters={arc.name: value})
             middle = orbit.state
             single.take(value, orbit, orbit.phases)
-        crossings = _crossings(single, (single.values[0], beyond), (single.orbits[0], single.orbits[1]))
+        crossings = _crossings(Step(single, (single.values[0], beyond), (single.orbits[0], single.orbits[1])))
     except ArithmeticError:
         return None
     return next((each for each in crossings if each.kind is BifurcationKind.PERIOD_DOUBLING), None)
 
 
-def _crossings(arc: Arc, ends: tuple[float, float], orbits: tuple[PeriodicOrbit, PeriodicOrbit]) -> list[Bifurcation]:
-    """Crossings of a real multiplier through -1 or 1 between two orbits of the same phases."""
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Two orbits of the same phases on an arc, between which test functions of the orbit have zeros.
+
+    Parameters
+    ----------
+    arc : Arc
+        Arc of the orbits.
+    values : tuple of float
+        Values of the parameter.
+    orbits : tuple of PeriodicOrbit
+        Orbit at each value.
+    """
+
+    arc: Arc
+    values: tuple[float, float]
+    orbits: tuple[PeriodicOrbit, PeriodicOrbit]
+
+    def changes(self, test: Test) -> bool:
+        """Return whether a test function changes its sign; zero counts as positive."""
+        one, other = map(test, self.orbits)
+        return (one < 0.0) != (other < 0.0)
+
+    def root(self, test: Test) -> tuple[float, PeriodicOrbit]:
+        """Locate the zero of a test function that changes its sign, and the orbit there."""
+        known = dict(zip(self.values, map(test, self.orbits), strict=True))
+        arc = self.arc.copy()
+
+        def tested(at: float) -> float:
+            if at not in known:
+                orbit = arc.at(at)
+                arc.take(at, orbit, None)
+                known[at] = test(orbit)
+            return known[at]
+
+        return _root(tested, arc, self.values)
+
+    def passes(self, k: int) -> bool:
+        """Return whether the modulus of the k-th multiplier passes 1."""
+        test = partial(_outside, k=k)
+        near = [abs(test(orbit)) < NEUTRAL for orbit in self.orbits]
+        if not self.changes(test) or all(near):
+            return False
+        if not any(near):
+            return True
+        at, beside = self.root(test)[0], BESIDE * (self.values[1] - self.values[0])
+        try:
+            one, other = (test(self.arc.at(at + way)) for way in (-beside, beside))
+        except ArithmeticError:
+            return True
+        return one * other < 0.0 and min(abs(one), abs(other)) > NEUTRAL
+
+
+def _crossings(step: Step) -> list[Bifurcation]:
+    """Crossings of the unit circle by multipliers."""
+    at_one = BifurcationKind.FOLD if turns(step.arc, step.values, step.orbits) else BifurcationKind.BRANCH_POINT
+    kinds = {-1.0: BifurcationKind.PERIOD_DOUBLING, 1.0: at_one}
     crossings = []
-    for point, kind in ((-1.0, BifurcationKind.PERIOD_DOUBLING), (1.0, BifurcationKind.FOLD)):
-        if not _beyond(orbits[0], point) * _beyond(orbits[1], point) < 0.0:
-            continue
-
-        def distance(value: float, point: float = point) -> float:
-            return _beyond(orbits[ends.index(value)] if value in ends else arc.at(value), point)
-
-        value, orbit = _root(distance, arc, ends)
-        crossings.append(Bifurcation(value, kind, float(np.abs(orbit.multipliers - point).min()), orbit))
+    passing = filter(step.passes, range(len(step.orbits[0].multipliers)))
+    for k in passing:
+        value, orbit = step.root(partial(_outside, k=k))
+        multiplier = complex(orbit.multipliers[k])
+        kind = kinds[math.copysign(1.0, multiplier.real)]
+        if abs(multiplier.imag) > REAL:
+            kind = BifurcationKind.NEIMARK_SACKER
+            next(passing, None)  # the other multiplier of the pair
+        crossings.append(Bifurcation(value, kind, _residual(orbit, kind), orbit))
+    for point, kind in kinds.items():
+        test = partial(det, point=point)
+        if step.changes(test) and sum(each.kind is kind for each in crossings) % 2 == 0:
+            value, orbit = step.root(test)
+            crossings.append(Bifurcation(value, kind, _residual(orbit, kind), orbit))
     return crossings
+
+
+def _residual(orbit: PeriodicOrbit, kind: BifurcationKind) -> float:
+    """Least distance of a multiplier from -1, from 1 or, of a complex one, from the unit circle."""
+    if kind is BifurcationKind.NEIMARK_SACKER:
+        pairs = orbit.multipliers[np.abs(orbit.multipliers.imag) > REAL]
+        return float(np.abs(np.abs(pairs) - 1.0).min())
+    return float(np.abs(orbit.multipliers + (1.0 if kind is BifurcationKind.PERIOD_DOUBLING else -1.0)).min())
 
 
 def _root(test: Callable[[float], float], arc: Arc, ends: tuple[float, float]) -> tuple[float, PeriodicOrbit]:
@@ -183,9 +262,9 @@ def _root(test: Callable[[float], float], arc: Arc, ends: tuple[float, float]) -
         return value, arc.orbits[arc.values.index(value)]
 
 
-def _beyond(orbit: PeriodicOrbit, point: float) -> float:
-    """Product of the distances of all multipliers from a real number, det(M - point)."""
-    return float(np.prod(orbit.multipliers - point).real)
+def _outside(orbit: PeriodicOrbit, k: int) -> float:
+    """Distance by which the k-th multiplier, sorted by modulus, lies outside the unit circle."""
+    return float(np.abs(orbit.multipliers[k])) - 1.0
 
 
 def _same_slips(before: Phases, after: Phases) -> bool:

@@ -1,6 +1,6 @@
 """Branches of periodic orbits along a parameter, and the bifurcations on them.
 
-A smooth bifurcation is a real multiplier that passes -1 or 1. A bifurcation of friction is a change
+A smooth bifurcation is a multiplier that passes the unit circle: at -1, at 1, or in a complex pair. A bifurcation of friction is a change
 of the phases of stick and slip. In grazing, a phase begins in the middle of another one, as its
 distance from it becomes zero. In stick loss, a body that landed in stick turns at once, as the load
 at the landing passes the limit of static friction.
@@ -10,6 +10,7 @@ at the landing passes the limit of static friction.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
@@ -32,10 +33,16 @@ from .phases import Phases
 
 __all__ = ["Branch", "checked_values", "follow", "others", "traced"]
 
-SHORTEST = 1.0 / 32.0
-"""Shortest piece of a step, relative to the step, before the branch ends.
+SHORT = 1.0 / 32.0
+"""Length of the pieces, relative to the step, at which the end of the branch is first looked for.
 
-A step is cut if Newton's method fails or leads far from the expected state.
+A step is cut if Newton's method fails, or leads beyond a fold or to another branch.
+"""
+
+SHORTEST = 1.0 / 4096.0
+"""Shortest piece of a step, relative to the step, before the branch is lost.
+
+Where a branch nearly turns it is steep, and pieces must be short.
 """
 
 APART = 1.0 / 16.0
@@ -45,11 +52,10 @@ Two changes in one piece count as one.
 """
 
 FAR = 0.3
-"""Largest distance from the expected state, relative to the step, of an orbit on the same branch.
-"""
+"""Largest distance from the expected state, relative to the step, of an orbit of other phases on the same branch."""
 
 KINK = 1e-2
-"""Distance from the expected state that is always allowed: changes of phases are kinks."""
+"""Distance from the expected state that such an orbit may always have: changes of phases are kinks."""
 
 NAMES = frozenset(
     {
@@ -72,7 +78,8 @@ NAMES = frozenset(
 class Branch(Labelled):
     """Periodic orbits along a parameter.
 
-    The branch ends if no further orbit can be found, usually at a fold or a graze.
+    The branch ends if no further orbit can be found, usually at a fold or a graze. It is lost if neither an
+    orbit nor a bifurcation at which it ends is found.
 
     Parameters
     ----------
@@ -86,6 +93,8 @@ class Branch(Labelled):
         Bifurcations between the orbits and at the end.
     phases : tuple of Phases
         Phases of each orbit; empty for friction that is not set-valued.
+    lost : tuple of float
+        Values of the parameter at the ends where the branch is lost.
     """
 
     name: str
@@ -93,6 +102,7 @@ class Branch(Labelled):
     orbits: tuple[PeriodicOrbit, ...]
     bifurcations: tuple[Bifurcation, ...]
     phases: tuple[Phases, ...] = ()
+    lost: tuple[float, ...] = ()
 
     @property
     def data(self) -> xr.Dataset:
@@ -112,13 +122,14 @@ class Branch(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """Orbits, their stability and the bifurcations."""
+        """Orbits, their stability, the bifurcations, and where the branch is lost."""
         stable = sum(orbit.stable for orbit in self.orbits)
         turns = "; ".join(f"{turn.kind} at {turn.value:.8g}" for turn in self.bifurcations)
         return (
             ("orbits", f"{len(self.orbits)} of {self.orbits[0].periods} drive periods, {stable} stable"),
             (self.name, ends_of(self.values)),
             ("bifurcations", turns or "none"),
+            *((("lost", f"at {numbers(self.lost)}"),) if self.lost else ()),
         )
 
 
@@ -158,6 +169,11 @@ def follow(
     -------
     Branch
 
+    Warns
+    -----
+    RuntimeWarning
+        If the branch is lost: the orbits end without a bifurcation.
+
     Raises
     ------
     ValueError
@@ -175,7 +191,26 @@ def follow(
     wanted = checked_values(first.scene, name, values)
     scene = others(Given(follow, parameters, more, NEWTON), scene, name)
     with Execution(1, None, show_progress, progress).reporter(len(wanted), "value") as reporter:
-        return traced(scene, name, reporter.each(wanted), first)
+        branch = traced(scene, name, reporter.each(wanted), first)
+    warn_of_lost("follow", [branch])
+    return branch
+
+
+def warn_of_lost(function: str, branches: Sequence[Branch]) -> None:
+    """Warn the caller of a function in one line if branches are lost."""
+    lost = [value for branch in branches for value in branch.lost]
+    if lost:
+        warnings.warn(
+            f"{function}: found no orbit and no bifurcation beyond {branches[0].name} = {numbers(lost)}; expected the "
+            "branch to go on, or to end at a bifurcation; try values closer together there, or periodic_orbit beyond",
+            RuntimeWarning,
+            stacklevel=4,
+        )
+
+
+def numbers(values: Sequence[float]) -> str:
+    """Return numbers in words, with eight digits."""
+    return ", ".join(f"{value:.8g}" for value in values)
 
 
 def others(given: Given, scene: Scene, name: str) -> Scene:
@@ -211,6 +246,7 @@ def traced(scene: Scene, name: str, values: Iterable[float], first: PeriodicOrbi
         tuple(orbits.values()),
         tuple(tracer.bifurcations),
         tuple(each for each in phases if each is not None),
+        tracer.lost,
     )
 
 
@@ -260,6 +296,7 @@ class BranchTracer:
         self.bifurcations: list[Bifurcation] = []
         self.phases: dict[float, Phases | None] = {}
         self.least: int | None = None
+        self.lost: tuple[float, ...] = ()
 
     def take(self, value: float, orbit: PeriodicOrbit, phases: Phases | None) -> PeriodicOrbit:
         """Append an orbit, after the bifurcations on the way to it."""
@@ -287,17 +324,22 @@ class BranchTracer:
         """
         step = abs(value - self.arc.values[-1])
         ahead = [value]
+        sought = False
         while ahead:
             last = self.arc.values[-1]
-            orbit = self._orbit(ahead[-1])
-            phases = None if orbit is None else orbit.phases
-            if orbit is not None and (abs(ahead[-1] - last) <= APART * step or not self._changes(phases)):
-                self.take(ahead.pop(), orbit, phases)
-            elif orbit is not None or abs(ahead[-1] - last) > SHORTEST * step:
-                ahead.append(0.5 * (last + ahead[-1]))
-            else:
-                self.bifurcations += bifurcations_at_end(self.arc, ahead[-1])
-                return None
+            piece = abs(ahead[-1] - last)
+            found = self._found(ahead[-1])
+            if found is not None and (piece <= APART * step or not self._changes(found[1])):
+                self.take(ahead.pop(), *found)
+                continue
+            if found is None and (piece <= SHORTEST * step or (piece <= SHORT * step and not sought)):
+                # up to the value after the next: a piece that ends just before a fold is refused too
+                sought, end = True, bifurcations_at_end(self.arc, ahead[-2:][0])
+                if end or piece <= SHORTEST * step:
+                    self.bifurcations += end
+                    self.lost = () if end else (last,)
+                    return None
+            ahead.append(0.5 * (last + ahead[-1]))
         return self.arc.orbits[-1]
 
     def _changes(self, phases: Phases | None) -> bool:
@@ -305,14 +347,20 @@ class BranchTracer:
         last = self.arc.phases[-1]
         return phases is not None and last is not None and phases.slip_states != last.slip_states
 
-    def _orbit(self, value: float) -> PeriodicOrbit | None:
-        """Orbit at a value if Newton's method finds one close to the expected state, else None."""
+    def _found(self, value: float) -> tuple[PeriodicOrbit, Phases | None] | None:
+        """Orbit at a value and its phases if Newton's method finds one on the branch, else None."""
         try:
             orbit = self.arc.at(value)
         except ArithmeticError:
             return None
+        if self.least not in (None, orbit.least):
+            return None
+        phases = orbit.phases
+        joins = self._kinks if self._changes(phases) else self.arc.joins
+        return (orbit, phases) if joins(value, orbit) else None
+
+    def _kinks(self, value: float, orbit: PeriodicOrbit) -> bool:
+        """True if an orbit of other phases is close to the expected state."""
         guess, last = self.arc.guess(value), self.arc.orbits[-1].state
         near = FAR * float(np.abs(guess - last).max()) + KINK
-        if len(self.arc.values) > 1 and not float(np.abs(orbit.state - guess).max()) < near:
-            return None
-        return orbit if self.least in (None, orbit.least) else None
+        return len(self.arc.values) == 1 or float(np.abs(orbit.state - guess).max()) < near

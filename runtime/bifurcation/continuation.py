@@ -8,14 +8,22 @@ At a fold the branch turns back in its parameter and a multiplier is 1, so that 
 does not lead on. Pseudo-arclength continuation passes through it: state and parameter are unknowns
 together, and the length along the arc is prescribed.
 
+Two determinants tell folds from branch points: det(M - 1) of the monodromy matrix M, and that of
+M - 1 bordered by the derivative by the parameter and by the direction of the arc. Their ratio is the
+parameter's share of the tangent. At a fold the first alone changes sign. At a branch point both
+do if the arc goes straight on, and the second alone if it turns there, as one that is born in a
+pitchfork does.
+
 Sources: Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems, in Rabinowitz
 (ed.), Applications of Bifurcation Theory (Academic Press, 1977), pages 359-384; Seydel, Practical
-Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapter 4.
+Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapter 4; Kuznetsov, Elements of
+Applied Bifurcation Theory, 3rd ed. (Springer, 2004), chapter 10.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,21 +31,30 @@ from scipy.optimize import brentq
 
 from synchain.models.scenes.scene import Scene
 
-from .periodic import PeriodicOrbit, orbit_through, periodic_orbit, strobe
+from .kinds import BifurcationKind
+from .periodic import SAME, PeriodicOrbit, orbit_through, periodic_orbit, strobe
 from .phases import Phases
 
-__all__ = ["Arc", "find_fold"]
+__all__ = ["Arc", "det", "find_turn", "turns"]
 
 NEAR = 3
 """Number of orbits that the polynomial passes through."""
 
+FIT = 0.5
+"""Largest part of the change of the state on a step that its derivative at the end leaves unexplained."""
 
 MOST_STEPS = 24
-"""Most steps along the arc towards a fold, each at most twice as long as the one before."""
+"""Most steps along the arc towards a turn, each at most twice as long as the one before."""
 
 SHORTEST = 1e-7
-"""Shortest step, relative to the first; if a step must be shorter, the arc does not end at a fold.
+"""Shortest step, relative to the first; if a step must be shorter, the arc does not end at a turn.
 """
+
+BESIDE = 1e-2
+"""Distance from a branch point, relative to the step, of the points that lead to it."""
+
+NEUTRAL = 1e-6
+"""Largest distance from 1 of the multiplier at a branch point; a kink has none so near."""
 
 DIFFERENCE = 1e-6
 """Relative step of the difference quotient for the derivative by the parameter."""
@@ -97,12 +114,7 @@ class Arc:
 
     def guess(self, value: float) -> np.ndarray:
         """Extrapolate the state of the orbit, shape (components,), at a value of the parameter."""
-        order = np.argsort(np.abs(np.array(self.values) - value), kind="stable")[:NEAR].tolist()
-        state = np.zeros_like(self.orbits[-1].state)
-        for k in order:
-            share = math.prod((value - self.values[j]) / (self.values[k] - self.values[j]) for j in order if j != k)
-            state += share * self.orbits[k].state
-        return state
+        return _through(self.values, [orbit.state for orbit in self.orbits], value)
 
     def at(self, value: float) -> PeriodicOrbit:
         """Find the orbit at a value of the parameter.
@@ -114,28 +126,105 @@ class Arc:
         """
         return periodic_orbit(self.scene, self.periods, self.guess(value), parameters={self.name: value})
 
+    def image(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the state after the drive periods, and its derivative by the state.
 
-def find_fold(arc: Arc, beyond: float) -> tuple[float, PeriodicOrbit] | None:
-    """Find the fold at which an arc turns back before a value of its parameter.
+        Parameters
+        ----------
+        point : ndarray, shape (components + 1,)
+            State and parameter.
+
+        Returns
+        -------
+        image : ndarray, shape (components,)
+            State after the drive periods.
+        matrix : ndarray, shape (components, components)
+            Derivative of `image` by the state.
+        """
+        return strobe(self.scene, point[:-1], self.periods, {self.name: float(point[-1])})
+
+    def slope(self, point: np.ndarray) -> np.ndarray:
+        """Return the derivative of `image` by the parameter at a point, shape (components,)."""
+        step = np.zeros(len(point))
+        step[-1] = DIFFERENCE * max(1.0, abs(point[-1]))
+        return np.asarray((self.image(point + step)[0] - self.image(point - step)[0]) / (2.0 * step[-1]))
+
+    def joins(self, value: float, orbit: PeriodicOrbit) -> bool:
+        """Return whether the arc can go from its last orbit to another one of the same phases.
+
+        It cannot if it turns on the way, nor if the change of the state does not fit its derivative by
+        the parameter at the other orbit, as that of an orbit on another branch does not.
+
+        Parameters
+        ----------
+        value : float
+            Value of the parameter.
+        orbit : PeriodicOrbit
+            Orbit at the value.
+        """
+        point, change = np.append(orbit.state, value), orbit.state - self.orbits[-1].state
+        matrix = np.eye(len(change)) - self.image(point)[1]
+        expected = (value - self.values[-1]) * np.linalg.lstsq(matrix, self.slope(point), rcond=None)[0]
+        if not np.abs(change - expected).max() < FIT * np.abs(change).max() + SAME:
+            return False
+        return not turns(self, (self.values[-1], value), (self.orbits[-1], orbit))
+
+
+def _through(values: Sequence[float], places: Sequence[np.ndarray], value: float) -> np.ndarray:
+    """Polynomial through the places at the NEAR values that are nearest to another value."""
+    order = np.argsort(np.abs(np.array(values) - value), kind="stable")[:NEAR].tolist()
+    place = np.zeros_like(places[-1])
+    for k in order:
+        share = math.prod((value - values[j]) / (values[k] - values[j]) for j in order if j != k)
+        place += share * places[k]
+    return place
+
+
+def det(orbit: PeriodicOrbit, point: float) -> float:
+    """Return det(M - point) of an orbit's monodromy matrix M for a real number."""
+    return float(np.prod(orbit.multipliers - point).real)
+
+
+def turns(arc: Arc, values: tuple[float, float], orbits: tuple[PeriodicOrbit, PeriodicOrbit]) -> bool:
+    """Return whether an arc turns back in its parameter between two orbits.
+
+    Parameters
+    ----------
+    arc : Arc
+        Arc of the orbits.
+    values : tuple of float
+        Values of the parameter.
+    orbits : tuple of PeriodicOrbit
+        Orbit at each value.
+    """
+    if (det(orbits[0], 1.0) < 0.0) == (det(orbits[1], 1.0) < 0.0):
+        return False
+    start, end = (np.append(orbit.state, value) for value, orbit in zip(values, orbits, strict=True))
+    chord = ArclengthStep(arc, start, end - start)
+    return (chord.border(start) < 0.0) == (chord.border(end) < 0.0)
+
+
+def find_turn(arc: Arc, beyond: float) -> tuple[BifurcationKind, float, PeriodicOrbit] | None:
+    """Find the fold or the branch point at which an arc turns back before a value of its parameter.
 
     Parameters
     ----------
     arc : Arc
         Arc with at least two orbits.
     beyond : float
-        Value of the parameter past the fold.
+        Value of the parameter past the turn.
 
     Returns
     -------
-    tuple of (float, PeriodicOrbit) or None
-        Value of the parameter and orbit at the fold; None if the arc does not turn back.
+    tuple of (BifurcationKind, float, PeriodicOrbit) or None
+        Kind, value of the parameter and orbit; None if the arc does not turn back.
     """
     if len(arc.values) < 2:
         return None
     slip_states = None if arc.phases[-1] is None else arc.phases[-1].slip_states
     here, before = (np.append(arc.orbits[k].state, arc.values[k]) for k in (-1, -2))
-    way = ArclengthStep(arc, here, here - before)
-    length, side = float(np.linalg.norm(here - before)), way.side(here)
+    way, path = ArclengthStep(arc, here, here - before), [before, here]
+    length = float(np.linalg.norm(here - before))
     shortest = SHORTEST * length
     for _ in range(MOST_STEPS):
         there = way.point(length)
@@ -144,9 +233,17 @@ def find_fold(arc: Arc, beyond: float) -> tuple[float, PeriodicOrbit] | None:
             if length < shortest:
                 return None
             continue
-        if way.side(there) * side < 0.0:
-            return way.root(length)
-        if not (beyond - there[-1]) * (there[-1] - way.start[-1]) > 0.0:  # past the end, or back without a fold
+        path.append(there)
+        chord = ArclengthStep(arc, way.start, there - way.start)
+        turned = (way.side(way.start) < 0.0) != (way.side(there) < 0.0)
+        branched = (chord.border(way.start) < 0.0) != (chord.border(there) < 0.0)
+        if turned and not branched:
+            return BifurcationKind.FOLD, *way.root(way.side, path)
+        if branched and not turned:
+            value, orbit = way.summit(chord.rate, path)
+            near = np.abs(orbit.multipliers - 1.0).min() < NEUTRAL
+            return (BifurcationKind.BRANCH_POINT, value, orbit) if near else None
+        if not (beyond - there[-1]) * (there[-1] - way.start[-1]) > 0.0:  # past the end, or back without a turn
             return None
         way = ArclengthStep(arc, there, there - way.start)
         length *= 2.0
@@ -183,59 +280,101 @@ class ArclengthStep:
 
     def side(self, point: np.ndarray) -> float:
         """Return det(M - 1) of the monodromy matrix M at a point: zero at a fold."""
-        return float(np.prod(self.orbit(point).multipliers - 1.0).real)
+        return det(self.orbit(point), 1.0)
 
-    def point(self, length: float) -> np.ndarray | None:
+    def border(self, point: np.ndarray) -> float:
+        """Return the determinant of M - 1 with its border at a point: zero at a branch point."""
+        return float(np.linalg.det(self._bordered(self.arc.image(point)[1], self.arc.slope(point))))
+
+    def rate(self, point: np.ndarray) -> float:
+        """Return the parameter's share of the tangent at a point: zero where the arc turns."""
+        return self.side(point) / self.border(point)
+
+    def point(self, length: float, guess: np.ndarray | None = None) -> np.ndarray | None:
         """Find the point of the arc at a length from the start, measured along the direction.
 
         Parameters
         ----------
         length : float
             Length.
+        guess : ndarray, shape (components + 1,), optional
+            Start of Newton's method at this length; by default on the direction.
 
         Returns
         -------
         ndarray, shape (components + 1,), or None
             State and parameter; None if Newton's method does not converge.
         """
-        unit = self.along / np.linalg.norm(self.along)
-        guess = self.start + length * unit
-        slope = self._slope(guess)
+        unit = self._unit
+        guess = self.start + length * unit if guess is None else guess
+        slope = self.arc.slope(guess)
         point, best = guess, np.inf
         for _ in range(30):
-            image, matrix = self._image(point[:-1], float(point[-1]))
+            image, matrix = self.arc.image(point)
             rest = np.append(image - point[:-1], unit @ (point - guess))
             size = float(np.abs(rest).max())
             if not size < best:
                 break
             best, kept = size, point
-            rows = np.column_stack([matrix - np.eye(len(image)), slope])
             try:
-                point = point - np.linalg.solve(np.vstack([rows, unit]), rest)
+                point = point - np.linalg.solve(self._bordered(matrix, slope), rest)
             except np.linalg.LinAlgError:
                 return None
         return kept if best < 1e-11 else None
 
-    def root(self, length: float) -> tuple[float, PeriodicOrbit] | None:
-        """Locate the fold between the start and a length."""
+    def root(self, test: Callable[[np.ndarray], float], path: Sequence[np.ndarray]) -> tuple[float, PeriodicOrbit]:
+        """Locate the zero of a function of the point between the last two points of a path along the arc.
 
-        def side(at: float) -> float:
-            point = self.start if at == 0.0 else self.point(at)
-            if point is None:
-                raise ArithmeticError("the arc of a branch is lost close to its fold")
-            return self.side(point)
+        Raises
+        ------
+        ArithmeticError
+            If Newton's method loses the arc on the way.
+        """
+        known = self._known(path)
+        at = brentq(lambda at: test(self._between(known, at)), *[*known][-2:], xtol=1e-13, rtol=1e-13)
+        return self._place(self._between(known, float(at)))
 
-        at = float(brentq(side, 0.0, length, xtol=1e-13, rtol=1e-13))
-        point = self.point(at)
-        return None if point is None else (float(point[-1]), self.orbit(point))
+    def summit(self, test: Callable[[np.ndarray], float], path: Sequence[np.ndarray]) -> tuple[float, PeriodicOrbit]:
+        """Locate the turn at a branch point between the last two points of a path, where a function changes its sign.
 
-    def _image(self, state: np.ndarray, value: float) -> tuple[np.ndarray, np.ndarray]:
-        """The state some periods later, and its derivative by the state."""
-        image, matrix = strobe(self.arc.scene, state, self.arc.periods, {self.arc.name: value})
-        return image[: len(state)], matrix
+        At a branch point Newton's method has no direction to go; a cubic through four points beside it leads there.
 
-    def _slope(self, point: np.ndarray) -> np.ndarray:
-        """Derivative of the state some periods later by the parameter."""
-        step = DIFFERENCE * max(1.0, abs(point[-1]))
-        ends = [self._image(point[:-1], float(point[-1]) + sign * step)[0] for sign in (1.0, -1.0)]
-        return np.asarray((ends[0] - ends[1]) / (2.0 * step))
+        Raises
+        ------
+        ArithmeticError
+            If Newton's method loses the arc on the way.
+        """
+        known = self._known(path)
+        one, other = [*known][-2:]
+        length = abs(other - one)
+        at = float(brentq(lambda at: test(self._between(known, at)), one, other, xtol=BESIDE * length))
+        beside = BESIDE * length * np.array([-2.0, -1.0, 1.0, 2.0])
+        cubic = np.polyfit(beside, [self._between(known, at + each) for each in beside], 3)
+        turns = np.roots(cubic[:3, -1] * [3.0, 2.0, 1.0])
+        return self._place(np.array([np.polyval(each, turns[np.abs(turns).argmin()].real) for each in cubic.T]))
+
+    def _known(self, path: Sequence[np.ndarray]) -> dict[float, np.ndarray]:
+        """Points by their length."""
+        return {float(self._unit @ (point - self.start)): point for point in path}
+
+    def _between(self, known: dict[float, np.ndarray], length: float) -> np.ndarray:
+        """Point at a length, kept among the known ones: Newton's method starts from a polynomial through them."""
+        if length not in known:
+            found = self.point(length, _through([*known], [*known.values()], length))
+            if found is None:
+                raise ArithmeticError("the arc of a branch is lost close to its turn")
+            known[length] = found
+        return known[length]
+
+    def _place(self, point: np.ndarray) -> tuple[float, PeriodicOrbit]:
+        """Parameter and orbit at a point."""
+        return float(point[-1]), self.orbit(point)
+
+    @property
+    def _unit(self) -> np.ndarray:
+        """The direction, of length 1."""
+        return np.asarray(self.along / np.linalg.norm(self.along))
+
+    def _bordered(self, matrix: np.ndarray, slope: np.ndarray) -> np.ndarray:
+        """M - 1 with the derivative by the parameter as last column and the direction as last row."""
+        return np.vstack([np.column_stack([matrix - np.eye(len(matrix)), slope]), self._unit])

@@ -26,7 +26,7 @@ from ..stability.orbits import Orbits
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .bifurcations import BifurcationKind
-from .branches import Branch, checked_values, others, traced
+from .branches import Branch, checked_values, others, traced, warn_of_lost
 from .periodic import NEWTON, SAME, TOLERANCE, PeriodicOrbit, check_periods, periodic_orbit
 
 __all__ = ["Skeleton", "near_returns", "skeleton"]
@@ -181,6 +181,7 @@ def skeleton(
         for k in reporter.each(places):
             for orbit in near_returns(with_numbers(scene, {name: grid[k]}), periods, transient, seed):
                 take(k, orbit)
+    warn_of_lost("skeleton", branches)
     return Skeleton(tuple(sorted(branches, key=lambda branch: (branch.orbits[0].periods, branch.values[0]))))
 
 
@@ -266,6 +267,7 @@ def _both_ways(scene: Scene, name: str, grid: list[float], k: int, orbit: Period
         (*down.orbits[:0:-1], *up.orbits),
         (*down.bifurcations[::-1], *up.bifurcations),
         (*down.phases[:0:-1], *up.phases),
+        (*down.lost, *up.lost),
     )
 
 

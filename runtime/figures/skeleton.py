@@ -43,6 +43,8 @@ CROWDED, INSET = ((1.443, 1.484), (0.585, 0.611)), (0.11, 0.08, 0.36, 0.35)
 MARKERS = {
     BifurcationKind.PERIOD_DOUBLING: "o",
     BifurcationKind.FOLD: "s",
+    BifurcationKind.BRANCH_POINT: "D",
+    BifurcationKind.NEIMARK_SACKER: "p",
     BifurcationKind.GRAZING: "^",
     BifurcationKind.STICK_LOSS: "v",
 }

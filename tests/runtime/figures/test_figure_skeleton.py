@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from figure_samples import rows
 
+from synchain.runtime.bifurcation.kinds import BifurcationKind
 from synchain.runtime.cells import kernels
 from synchain.runtime.figures import load, names, skeleton, style
 from synchain.runtime.figures import make as maker
@@ -34,6 +35,11 @@ def narrow(monkeypatch: pytest.MonkeyPatch) -> None:
 def small() -> Skeleton:
     data: Skeleton = load("skeleton").compute(FigureRuns(SMALL, workers=1))
     return data
+
+
+def test_every_kind_of_bifurcation_has_a_mark_of_its_own() -> None:
+    assert set(skeleton.MARKERS) == set(BifurcationKind)
+    assert len(set(skeleton.MARKERS.values())) == len(BifurcationKind)
 
 
 def test_it_is_made_when_asked_for() -> None:

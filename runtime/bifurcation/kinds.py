@@ -1,0 +1,18 @@
+"""Kinds of bifurcations of periodic orbits."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+__all__ = ["BifurcationKind"]
+
+
+class BifurcationKind(StrEnum):
+    """Kind of a bifurcation of periodic orbits."""
+
+    PERIOD_DOUBLING = "period doubling"
+    FOLD = "fold"
+    BRANCH_POINT = "branch point"
+    NEIMARK_SACKER = "Neimark-Sacker"
+    GRAZING = "grazing"
+    STICK_LOSS = "stick loss"

@@ -1,0 +1,149 @@
+"""Multipliers that pass the unit circle, folds and branch points against closed forms, and branches that are lost."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+from synchain.models import Field
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.bifurcation.bifurcations import Step
+from synchain.runtime.bifurcation.branches import Branch, follow
+from synchain.runtime.bifurcation.continuation import Arc
+from synchain.runtime.bifurcation.periodic import PeriodicOrbit, periodic_orbit
+from synchain.runtime.bifurcation.skeleton import skeleton
+from synchain.runtime.opening.open import open_result
+
+# Without f and j the state zero is an orbit, of the multipliers exp(2 pi (a +- i w)) for b = 0, s = 1,
+# and exp(2 pi a), exp(2 pi b) for w = s = 0.
+NUMBERS = {"a": 0.0, "b": 0.0, "f": 0.0, "g": 0.0, "j": 0.0, "q": 0.0, "r": 0.0, "s": 0.0, "w": 0.0}
+NODE = Field(
+    {
+        "x": "f + (a + cos(t))*x - w*y - q*x**2 - g*x**3",
+        "y": "w*x + (s*a + b + cos(t))*y + tanh(r*j)",
+    },
+    parameters=NUMBERS,
+)
+
+
+def followed(name: str, values: list[float], start: tuple[float, float] = (0.0, 0.0), **more: float) -> Branch:
+    scene = Scene(NODE, topology=topology("chain", 1), parameters=more)
+    return follow(scene, name, values, periodic_orbit(scene, 1, start, parameters={name: values[0]}))
+
+
+def found(branch: Branch) -> list[tuple[str, float]]:
+    return [(str(each.kind), each.value) for each in branch.bifurcations]
+
+
+@pytest.mark.parametrize("values", [[-0.1, 0.05], [-0.1, 0.0, 0.1], [0.1, -0.05, -0.1]])
+def test_a_complex_pair_passes_the_circle(values: list[float]) -> None:
+    """The modulus exp(2 pi a) of the pair is 1 at a = 0."""
+    branch = followed("a", values, s=1.0, w=0.3)
+    assert found(branch) == [("Neimark-Sacker", pytest.approx(0.0, abs=1e-12))]
+    assert branch.bifurcations[0].residual < 1e-11
+    assert [orbit.stable for orbit in branch.orbits if orbit.scene.parameters["a"]] == [a < 0 for a in values if a]
+    assert branch.data.bifurcation_kind.values.tolist() == ["Neimark-Sacker"]
+    assert "Neimark-Sacker at" in repr(branch)
+
+
+def test_a_neutral_saddle_is_no_bifurcation() -> None:
+    """The real multipliers exp(2 pi a) and exp(-0.2 pi) have the product 1 at a = 0.1."""
+    assert found(followed("a", [0.05, 0.15], b=-0.1)) == []
+
+
+def test_multipliers_that_stay_on_the_circle_pass_it_nowhere() -> None:
+    """Without damping the moduli differ from 1 by rounding errors of either sign."""
+    assert found(followed("w", [0.2, 0.23, 0.26, 0.29, 0.32], s=1.0)) == []
+
+
+def test_multipliers_that_leave_the_circle_at_one_are_found_by_the_determinant() -> None:
+    """Of eigenvalues +-sqrt(a^2 - w^2), on the circle for a < w: its moduli have no sign there."""
+    branch = followed("a", [0.1, 0.2, 0.4], s=-1.0, w=0.3)
+    assert found(branch) == [("branch point", pytest.approx(0.3, abs=1e-10))]
+
+
+def test_a_multiplier_on_the_circle_at_a_value_counts_once() -> None:
+    """The step that comes to 1 from inside has the crossing, and the next one does not."""
+    inside, on, outside = (
+        PeriodicOrbit(Scene("duffing"), 1, np.zeros(1), np.array([m]), 0.0, 1) for m in (0.5, 1.0, 1.5)
+    )
+    steps = ((inside, on), (on, outside), (outside, on), (on, inside))
+    arc = Arc(inside.scene, "u", 1)
+    changes = [Step(arc, (0.0, 1.0), each).changes(lambda orbit: abs(orbit.multipliers[0]) - 1.0) for each in steps]
+    assert changes == [True, False, False, True]
+
+
+@pytest.mark.parametrize("values", [[-0.1, 0.05], [-0.1, 0.0, 0.1]])
+def test_a_branch_that_goes_straight_on_has_a_branch_point(values: list[float]) -> None:
+    """Transcritical bifurcation of x' = (a + cos t) x - x^2."""
+    branch = followed("a", values, q=1.0, b=-0.3)
+    assert found(branch) == [("branch point", pytest.approx(0.0, abs=1e-10))]
+    assert branch.bifurcations[0].residual < 1e-9
+    assert len(branch.orbits) == len(values)
+
+
+def test_a_branch_that_turns_has_a_fold() -> None:
+    """x' = f + cos(t) x - x^2 has two orbits for f > 0, and x = 0 alone for f = 0."""
+    branch = followed("f", [0.1, 0.04, -0.1], (0.3, 0.0), q=1.0, b=-0.3)
+    assert found(branch) == [("fold", pytest.approx(0.0, abs=1e-12))]
+    assert branch.bifurcations[0].residual < 1e-9
+    assert len(branch.orbits) == 2
+    assert branch.lost == ()
+
+
+def test_a_branch_born_in_a_pitchfork_ends_at_a_branch_point() -> None:
+    """x' = (a + cos t) x - x^3 has the orbits of either sign for a > 0."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        branch = followed("a", [0.1, 0.05, -0.05, -0.1], (0.3, 0.0), g=1.0, b=-0.3)
+    assert found(branch) == [("branch point", pytest.approx(0.0, abs=1e-10))]
+    assert branch.values.tolist() == [0.1, 0.05]
+
+
+def test_symmetric_and_other_orbits_of_duffing_meet_at_a_pitchfork() -> None:
+    """The symmetric orbit goes through it, the other ends there, for coarse values too."""
+    scene = Scene("duffing")
+    through = follow(scene, "u", [2.4, 2.6], periodic_orbit(scene, 1, u=2.4))
+    (kind, at), *none = found(through)
+    assert (kind, none) == ("branch point", [])
+    other = periodic_orbit(scene, 1, u=2.7)
+    assert abs(other.multipliers[0].imag) > 0.1  # that of the symmetric one is real
+    for values in ([2.7, 2.6, 2.5, 2.3], np.linspace(2.7, 2.4, 16)):
+        ending = follow(scene, "u", values, other)
+        assert found(ending) == [("branch point", pytest.approx(at, abs=1e-10))]
+        assert ending.values[-1] > at
+
+
+def test_steep_branches_are_followed_in_short_pieces() -> None:
+    """y of period one is proportional to tanh(300 j), which changes on a three-hundredth of the step."""
+    branch = followed("j", [-1.0, -0.9, 1.0], (0.0, -2.0), a=-0.2, b=-0.3, r=300.0)
+    assert len(branch.orbits) == 3
+    np.testing.assert_allclose(branch.orbits[-1].state, -branch.orbits[0].state, atol=1e-9)
+
+
+def test_a_branch_that_is_lost_says_so(tmp_path: object) -> None:
+    """A state that jumps with its parameter is on no branch."""
+    with pytest.warns(
+        RuntimeWarning, match=r"follow: found no orbit and no bifurcation beyond j = -.*try values closer"
+    ) as seen:
+        branch = followed("j", [-1.0, -0.5, 0.5, 1.0], (0.0, -2.0), a=-0.2, b=-0.3, r=1e9)
+    assert seen[0].filename == __file__
+    assert "\n" not in str(seen[0].message)
+    assert branch.values.tolist() == [-1.0, -0.5]
+    assert branch.bifurcations == ()
+    (at,) = branch.lost
+    assert -1e-3 < at < 0.0
+    assert dict(branch.summary)["lost"] == f"at {at:.8g}"
+    branch.save(f"{tmp_path}/lost.nc")
+    assert open_result(f"{tmp_path}/lost.nc").lost == branch.lost
+
+
+def test_a_skeleton_says_which_branches_are_lost() -> None:
+    scene = Scene(NODE, topology=topology("chain", 1), parameters={"a": -0.2, "b": -0.3, "r": 1e9})
+    with pytest.warns(RuntimeWarning, match="skeleton: found no orbit and no bifurcation beyond j = "):
+        found = skeleton(scene, "j", [-1.0, -0.5, 0.5, 1.0], (1,), 2)
+    assert [len(branch.lost) for branch in found] == [1, 1]
+    assert "lost at" in repr(found)
