@@ -13,17 +13,19 @@ from typing import TYPE_CHECKING, ClassVar, NoReturn, TypeVar
 from ..inputs.checks import short_repr
 from ..inputs.reader import Algebra, NoMeaning, parse
 from . import products
-from .families import family, topology
+from .families import TOPOLOGY, family, names, topology
 from .topology import Topology
 
 if TYPE_CHECKING:
     from .closed_forms import ClosedForm
 
-__all__ = ["is_composed", "read_form", "read_graph"]
+__all__ = ["check_name", "is_composed", "read_form", "read_graph"]
 
 V = TypeVar("V")
 
 LENGTH, DEPTH = 300, 8
+LARGEST = 1_000_000
+"""Most nodes of a graph whose name is read."""
 PAIRS, SIZED = ("cartesian", "kronecker", "union"), ("complement", "weighted")
 """Operations of two graphs, and of one: these have no closed form without sizes."""
 
@@ -56,6 +58,31 @@ def read_graph(text: str, largest: int | None = None, seeds: Iterator[int] | Non
         On anything else, on a graph of more than `largest` nodes, and on a seed beside `seeds`.
     """
     return _value(_Graphs(text, largest, seeds))
+
+
+def check_name(what: str, graph: Topology) -> None:
+    """Raise ValueError if a graph has the name of a family or of an operation on graphs, and not its links.
+
+    Parameters
+    ----------
+    what : str
+        The subject of the error.
+    graph : Topology
+        The graph; one with a rule has the name of its rule.  Families have the defaults of their options.
+    """
+    text = graph.name if is_composed(graph.name) else f"{graph.name}({graph.n})"
+    if graph.rule is not None or (text != graph.name and graph.name not in (*names(), *TOPOLOGY.also)):
+        return
+    try:
+        named = read_graph(text, LARGEST)
+        same = named.n == graph.n and named.links == graph.links
+    except (ValueError, TypeError):
+        same = text == graph.name  # a name of its own that has parentheses
+    if not same:
+        raise ValueError(
+            f"{what}: found the name {short_repr(graph.name)} and links other than those of {text}; expected a graph by "
+            "name and n, or links under a name of their own"
+        )
 
 
 def read_form(text: str) -> ClosedForm:
