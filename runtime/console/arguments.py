@@ -72,6 +72,22 @@ def above_zero(text: str) -> float:
     return value
 
 
+def at_least_zero(text: str) -> float:
+    """A finite number of at least 0."""
+    value = number(text)
+    if not value >= 0:
+        raise ArgumentTypeError(f"found {text}; expected a number of at least 0")
+    return value
+
+
+def periods(text: str) -> float:
+    """A whole number of periods above 0."""
+    value = above_zero(text)
+    if not value.is_integer():
+        raise ArgumentTypeError(f"found {text}; expected a whole number of periods")
+    return value
+
+
 def tolerance(text: str) -> float:
     """A relative tolerance, above 0 and at most 0.1."""
     value = number(text)
