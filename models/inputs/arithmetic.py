@@ -15,7 +15,7 @@ from typing import NoReturn
 
 from .reader import Algebra, NoMeaning, parse, stray_character
 
-__all__ = ["constant"]
+__all__ = ["MAGNITUDE", "constant"]
 
 LENGTH, DEPTH, EXPONENT, MAGNITUDE = 200, 24, 100.0, 1e100
 FUNCTIONS: dict[str, Callable[[float], float]] = {
