@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, NoReturn, TypeVar
 
 from ..inputs.checks import short_repr
-from ..inputs.reader import Algebra, NoMeaning, parse
+from ..inputs.reader import Algebra, NoMeaning, parse, unpaired
 from . import products
 from .families import TOPOLOGY, family, names, topology
 from .topology import Topology
@@ -108,7 +108,9 @@ class _Composed(Algebra[V]):
     @property
     def unreadable(self) -> ValueError:
         """The error for any other text."""
-        return ValueError(f"unreadable {self.what} {short_repr(self.text)}; expected {self.expected}")
+        return ValueError(
+            f"unreadable {self.what} {short_repr(self.text)}{unpaired(self.text)}; expected {self.expected}"
+        )
 
     def refuse(self, node: ast.expr, reason: str) -> NoReturn:
         raise self.unreadable
