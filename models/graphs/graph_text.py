@@ -19,7 +19,7 @@ from .topology import Topology
 if TYPE_CHECKING:
     from .closed_forms import ClosedForm
 
-__all__ = ["check_name", "is_composed", "read_form", "read_graph"]
+__all__ = ["checked_name", "is_composed", "read_form", "read_graph"]
 
 V = TypeVar("V")
 
@@ -60,8 +60,8 @@ def read_graph(text: str, largest: int | None = None, seeds: Iterator[int] | Non
     return _value(_Graphs(text, largest, seeds))
 
 
-def check_name(what: str, graph: Topology) -> None:
-    """Raise ValueError if a graph has the name of a family or of an operation on graphs, and not its links.
+def checked_name(what: str, graph: Topology) -> Topology:
+    """Return a graph; ValueError if it has the name of a family or of an operation on graphs, and not its links.
 
     Parameters
     ----------
@@ -70,19 +70,21 @@ def check_name(what: str, graph: Topology) -> None:
     graph : Topology
         The graph; one with a rule has the name of its rule.  Families have the defaults of their options.
     """
-    text = graph.name if is_composed(graph.name) else f"{graph.name}({graph.n})"
-    if graph.rule is not None or (text != graph.name and graph.name not in (*names(), *TOPOLOGY.also)):
-        return
+    composed = is_composed(graph.name)
+    if graph.rule is not None or not (composed or graph.name in (*names(), *TOPOLOGY.also)):
+        return graph
+    text = graph.name if composed else f"{graph.name}({graph.n})"
     try:
         named = read_graph(text, LARGEST)
         same = named.n == graph.n and named.links == graph.links
     except (ValueError, TypeError):
-        same = text == graph.name  # a name of its own that has parentheses
+        same = composed  # a name of its own that has parentheses
     if not same:
         raise ValueError(
             f"{what}: found the name {short_repr(graph.name)} and links other than those of {text}; expected a graph by "
             "name and n, or links under a name of their own"
         )
+    return graph
 
 
 def read_form(text: str) -> ClosedForm:

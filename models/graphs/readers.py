@@ -38,12 +38,9 @@ def as_topology(what: str, value: object) -> Topology:
     TypeError
         If the value is nothing of these.
     ValueError
-        On what `from_graph`, `from_sparse` and `from_matrix` refuse, and on the name of a family that makes other links.
+        On what `from_graph`, `from_sparse` and `from_matrix` refuse.
     """
     if isinstance(value, Topology):
-        from .graph_text import check_name  # which takes graphs itself
-
-        check_name(what, value)
         return value
     if is_graph(value):
         return from_graph(value)

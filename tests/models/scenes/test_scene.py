@@ -479,6 +479,8 @@ def test_a_matrix_under_the_name_of_another_graph_is_refused(name: str, rows: li
         Scene.from_dict({"topology": {"name": name, "matrix": rows, "n": 3}})
     with pytest.raises(ValueError, match=words):
         Scene(topology=from_matrix(rows, name=name))
+    with pytest.raises(ValueError, match=words.replace("topology", "draw topology")):
+        Scene(topology=from_matrix(rows), realisations=1, draws={"topology": [from_matrix(rows, name=name)]})
 
 
 @pytest.mark.parametrize(
