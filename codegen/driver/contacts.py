@@ -216,7 +216,7 @@ def change_modes(moved, t, y, out, network, dims, pushes):
         sticking = absolute(slip) < 0.5
         touch = moved & ~sticking & (slip * load(out, i, WIDTH) <= 0.0)
         leave = moved & sticking & (minimum(up, -down) <= 0.0)
-        lands = select(up < 0.0, 1.0, select(down > 0.0, -1.0, 0.0 * slip))
+        lands = select(up < 0.0, 1.0, select(down > 0.0, -1.0, broadcast(0.0, WIDTH)))
         leaves = select(up <= 0.0, 1.0, -1.0 + 0.0 * slip)
         store(y, dims.nodes + i, select(touch, load(out, dims.nodes + i, WIDTH), speed))
         store(y, 2 * dims.nodes + i, select(touch, lands, select(leave, leaves, slip)))

@@ -11,7 +11,7 @@ import sympy as sp
 
 from ..inputs.checks import check_text, short_repr
 from ..inputs.expressions import FUNCTIONS, Expressions
-from ..inputs.reader import Algebra, Expression, NoMeaning, parse
+from ..inputs.reader import Algebra, Expression, NoMeaning, parse, unpaired
 from .observable import Observable, Window, nodes, rate, real
 
 __all__ = ["as_observable", "as_value"]
@@ -72,26 +72,27 @@ def as_value(what: str, value: object) -> sp.Expr:
             text = sp.sstr(real(value), order="lex")
         except (TypeError, ValueError) as error:
             raise type(error)(f"{what}: {str(error).removeprefix('observable: ')}") from None
-    expression = _parsed(what, text)
-    if expression is None:
-        raise ValueError(f"{what}: unreadable expression {short_repr(text)}; expected such as 'x_1 - x_2'")
-    return _real(what, expression)
+    return _real(what, _parsed(what, text, "x_1 - x_2"))
 
 
 def _read(what: str, text: str) -> Observable:
-    expression = _parsed(what, text)
-    if expression is not None:
-        match expression.tree:
-            case ast.Call(func=ast.Name(id=name), args=[value], keywords=[]) if name in tuple(Window):
-                return Observable(Window(name), _real(what, Expression(expression.text, value)))
+    expression = _parsed(what, text, "mean(x_1 - x_2)")
+    match expression.tree:
+        case ast.Call(func=ast.Name(id=name), args=[value], keywords=[]) if name in tuple(Window):
+            return Observable(Window(name), _real(what, Expression(expression.text, value)))
     windows = ", ".join(Window)
     raise ValueError(f"{what}: found {short_repr(text)}; expected one of {windows} of an expression outermost")
 
 
-def _parsed(what: str, text: str) -> Expression | None:
+def _parsed(what: str, text: str, example: str) -> Expression:
+    """The expression that a text is; ValueError with an example for any other text."""
     if len(text) > LENGTH:
         raise ValueError(f"{what}: found {len(text)} characters; expected at most {LENGTH}; define parts of it")
-    return parse(text)
+    expression = parse(text)
+    if expression is None:
+        found = f"{short_repr(text)}{unpaired(text)}"
+        raise ValueError(f"{what}: unreadable expression {found}; expected such as {example!r}")
+    return expression
 
 
 def _real(what: str, expression: Expression) -> sp.Expr:

@@ -11,19 +11,21 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, NoReturn, TypeVar
 
 from ..inputs.checks import short_repr
-from ..inputs.reader import Algebra, NoMeaning, parse
+from ..inputs.reader import Algebra, NoMeaning, parse, unpaired
 from . import products
-from .families import family, topology
+from .families import TOPOLOGY, family, names, topology
 from .topology import Topology
 
 if TYPE_CHECKING:
     from .closed_forms import ClosedForm
 
-__all__ = ["is_composed", "read_form", "read_graph"]
+__all__ = ["checked_name", "is_composed", "read_form", "read_graph"]
 
 V = TypeVar("V")
 
 LENGTH, DEPTH = 300, 8
+LARGEST = 1_000_000
+"""Most nodes of a graph whose name is read."""
 PAIRS, SIZED = ("cartesian", "kronecker", "union"), ("complement", "weighted")
 """Operations of two graphs, and of one: these have no closed form without sizes."""
 
@@ -58,6 +60,33 @@ def read_graph(text: str, largest: int | None = None, seeds: Iterator[int] | Non
     return _value(_Graphs(text, largest, seeds))
 
 
+def checked_name(what: str, graph: Topology) -> Topology:
+    """Return a graph; ValueError if it has the name of a family or of an operation on graphs, and not its links.
+
+    Parameters
+    ----------
+    what : str
+        The subject of the error.
+    graph : Topology
+        The graph; one with a rule has the name of its rule.  Families have the defaults of their options.
+    """
+    composed = is_composed(graph.name)
+    if graph.rule is not None or not (composed or graph.name in (*names(), *TOPOLOGY.also)):
+        return graph
+    text = graph.name if composed else f"{graph.name}({graph.n})"
+    try:
+        named = read_graph(text, LARGEST)
+        same = named.n == graph.n and named.links == graph.links
+    except (ValueError, TypeError):
+        same = composed  # a name of its own that has parentheses
+    if not same:
+        raise ValueError(
+            f"{what}: found the name {short_repr(graph.name)} and links other than those of {text}; expected a graph by "
+            "name and n, or links under a name of their own"
+        )
+    return graph
+
+
 def read_form(text: str) -> ClosedForm:
     """Return the closed form of a text without sizes: cartesian, kronecker and union of families, options with letters.
 
@@ -81,7 +110,9 @@ class _Composed(Algebra[V]):
     @property
     def unreadable(self) -> ValueError:
         """The error for any other text."""
-        return ValueError(f"unreadable {self.what} {short_repr(self.text)}; expected {self.expected}")
+        return ValueError(
+            f"unreadable {self.what} {short_repr(self.text)}{unpaired(self.text)}; expected {self.expected}"
+        )
 
     def refuse(self, node: ast.expr, reason: str) -> NoReturn:
         raise self.unreadable

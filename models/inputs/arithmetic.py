@@ -13,9 +13,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NoReturn
 
-from .reader import Algebra, NoMeaning, parse, stray_character
+from .reader import Algebra, NoMeaning, parse, stray_character, unpaired
 
-__all__ = ["constant"]
+__all__ = ["MAGNITUDE", "constant"]
 
 LENGTH, DEPTH, EXPONENT, MAGNITUDE = 200, 24, 100.0, 1e100
 FUNCTIONS: dict[str, Callable[[float], float]] = {
@@ -55,7 +55,7 @@ def constant(text: str) -> float:
         raise ValueError(f"character {stray!r} in the number {text!r}; expected {GRAMMAR}{power}")
     expression = parse(text)
     if expression is None:
-        raise ValueError(f"unreadable number {text!r}; expected {GRAMMAR}, e.g. '2*pi/1.15'")
+        raise ValueError(f"unreadable number {text!r}{unpaired(text)}; expected {GRAMMAR}, e.g. '2*pi/1.15'")
     return expression.evaluate(_Floats(text))
 
 

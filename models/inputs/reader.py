@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, NoReturn, TypeVar, cast
 
-__all__ = ["Algebra", "Arithmetic", "Expression", "NoMeaning", "parse", "stray_character"]
+__all__ = ["Algebra", "Arithmetic", "Expression", "NoMeaning", "parse", "stray_character", "unpaired"]
 
 V = TypeVar("V")
 
@@ -22,6 +22,9 @@ _ARITHMETIC = re.compile(r"[0-9A-Za-z_.+\-*/() \t]*")
 
 
 _SIGNS: Mapping[type[ast.cmpop], str] = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="}
+
+
+_PARTNERS: Mapping[str, str] = {")": "(", "]": "["}
 
 
 class NoMeaning(Exception):
@@ -288,6 +291,17 @@ def parse(text: str) -> Expression | None:
             return Expression(stripped, ast.parse(stripped, mode="eval").body)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return None
+
+
+def unpaired(text: str) -> str:
+    """Return words on the first bracket of a text that has no partner, such as " with a ( that is not closed"; else ""."""
+    waiting: list[str] = []
+    for sign in text:
+        if sign in _PARTNERS.values():
+            waiting.append(sign)
+        elif sign in _PARTNERS and (not waiting or waiting.pop() != _PARTNERS[sign]):
+            return f" with a {sign} that nothing opens"
+    return f" with a {waiting[-1]} that is not closed" if waiting else ""
 
 
 def stray_character(text: str) -> str:

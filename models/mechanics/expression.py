@@ -16,7 +16,7 @@ from sympy.logic.boolalg import Boolean
 
 from ..inputs.checks import short_repr, suggestion
 from ..inputs.expressions import FUNCTIONS, Expressions
-from ..inputs.reader import NoMeaning, parse
+from ..inputs.reader import NoMeaning, parse, unpaired
 from .components import TIME
 from .oscillator import FRICTION
 
@@ -278,7 +278,8 @@ def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
         raise ValueError(f"{what}: found {len(text)} characters; expected at most {LENGTH}")
     expression = parse(text)
     if expression is None:
-        raise ValueError(f"{what}: unreadable expression {short_repr(text)}; expected such as '-k*x + u*cos(omega*t)'")
+        found = f"{short_repr(text)}{unpaired(text)}"
+        raise ValueError(f"{what}: unreadable expression {found}; expected such as '-k*x + u*cos(omega*t)'")
     found = _OfModels(what, names).read(expression)
     if found.has(sp.I):
         raise ValueError(f"{what}: found the complex {short_repr(found)}; expected a real value")

@@ -9,6 +9,7 @@ from ..definitions.loader import load_friction_law, load_oscillator, read_coupli
 from ..definitions.table import law_of_table, oscillator_of_table
 from ..graphs import readers
 from ..graphs.families import topology
+from ..graphs.graph_text import checked_name
 from ..graphs.topology import Topology
 from ..inputs.checks import check_integer, check_keys, check_table, short_repr
 from ..inputs.plugins import part
@@ -89,8 +90,8 @@ def as_coupling(value: object) -> Coupling | None:
 
 
 def as_topology(value: object) -> Topology:
-    """Return the graph that a value is or stands for, one node alone for None."""
-    return topology("chain", 1) if value is None else readers.as_topology("topology", value)
+    """Return the graph that a value is or stands for, one node alone for None; ValueError for the name of another graph."""
+    return topology("chain", 1) if value is None else checked_name("topology", readers.as_topology("topology", value))
 
 
 def as_layers(links: object, coupling: Coupling | None, graph: object) -> tuple[tuple[Coupling | None, Topology], ...]:

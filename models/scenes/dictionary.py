@@ -8,7 +8,7 @@ from typing import Any
 
 from ..definitions.table import as_name_or_table
 from ..graphs.families import family, names, topology
-from ..graphs.graph_text import is_composed, read_graph
+from ..graphs.graph_text import checked_name, is_composed, read_graph
 from ..graphs.topology import Topology, from_matrix, read_matrix
 from ..inputs.checks import check_integer, check_keys, check_table, check_text, short_repr
 from ..inputs.plugins import part
@@ -132,9 +132,10 @@ def _of_file(given: Mapping[object, Any], folder: Path | None) -> Topology:
 
 
 def _of_matrix(given: Mapping[object, Any]) -> Topology:
-    graph = from_matrix(given["matrix"], name=check_text("topology name", given.get("name", "matrix")))
+    name = check_text("topology name", given.get("name", "matrix"))
+    graph = checked_name("topology", from_matrix(given["matrix"], name))
     if "n" in given and check_integer("topology n", given["n"], 1, MOST_NODES) != graph.n:
-        raise ValueError(f"topology: n = {given['n']} but the matrix has {graph.n} rows; remove n")
+        raise ValueError(f"topology: n = {given['n']} but the matrix has {graph.n} row{'s' * (graph.n != 1)}; remove n")
     return graph
 
 

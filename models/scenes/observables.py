@@ -11,6 +11,7 @@ from ..dynamics.observable import ENERGY, AtNode, Observable, Rate, Reduction, n
 from ..dynamics.observable_text import as_observable, as_value
 from ..inputs.checks import check_table, check_text, short_repr, suggestion
 from ..inputs.frozen import Frozen
+from ..inputs.node_name import NodeName
 from ..inputs.result_names import ATTRIBUTES, expect_free
 from ..mechanics.components import TIME
 from ..networks.energy import energy_of
@@ -142,11 +143,13 @@ def _check_names(what: str, value: sp.Expr, model: Model, numbers: Mapping[str, 
     own = (*apart.components, *_of_nodes(model, numbers))
     partly = {name for name in own if apart.holders(name) != tuple(everywhere)}
     states = {*apart.components, *apart.state}
-    known = (*own, *apart.state, *(name for name in numbers), TIME.name, ENERGY.name)
+    known = (*own, *apart.state, *numbers, TIME.name)
     for name in sorted(s.name for s in value.free_symbols):
         if name in partly:
-            raise ValueError(f"{what}: some nodes have no {name!r}; expected what all nodes have, or {name}_1 of one")
-        if name not in known:
+            one = NodeName(name, apart.holders(name)[0])
+            raise ValueError(f"{what}: some nodes have no {name!r}; expected what all nodes have, or {one} of one")
+        if name not in known and name != ENERGY.name:
+            known = tuple(dict.fromkeys((*known, *_energy(model, numbers))))
             raise ValueError(f"{what}: unknown name {short_repr(name)}; known: {_few(known)}{suggestion(name, known)}")
     if value.has(ENERGY) and not has_own_energy(model):
         _check_energy(what, value, model, varied(numbers, model.parameters))
@@ -163,6 +166,15 @@ def _check_names(what: str, value: sp.Expr, model: Model, numbers: Mapping[str, 
 def has_own_energy(model: Model) -> bool:
     """True if a state or parameter is called energy, which observables mean then."""
     return ENERGY.name in {*model.parameters, *model.components}
+
+
+def _energy(model: Model, numbers: Mapping[str, float]) -> tuple[str, ...]:
+    """The name of the energy if the network has one."""
+    try:
+        energy_of(model, varied(numbers, model.parameters))
+    except ValueError:
+        return ()
+    return (ENERGY.name,)
 
 
 def _check_energy(what: str, value: sp.Expr, model: Model, own: tuple[str, ...]) -> None:

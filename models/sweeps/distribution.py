@@ -11,7 +11,7 @@ from typing import NoReturn
 
 from ..inputs.arithmetic import constant
 from ..inputs.checks import check_number, check_positive, check_text, short_repr
-from ..inputs.reader import Algebra, NoMeaning, parse
+from ..inputs.reader import Algebra, NoMeaning, parse, unpaired
 from ..inputs.words import Word
 
 __all__ = ["KNOWN", "Distribution", "Draw", "lorentzian", "normal", "read_draw", "uniform"]
@@ -102,7 +102,7 @@ def read_draw(what: str, text: str) -> Draw:
     """Return the distribution of a text such as "normal(0, 1)"; ValueError, with `what` in front, for any other."""
     expression = parse(check_text(what, text))
     if expression is None:
-        raise ValueError(f"{what}: found {short_repr(text)}; expected {KNOWN}")
+        raise ValueError(f"{what}: unreadable distribution {short_repr(text)}{unpaired(text)}; expected {KNOWN}")
     try:
         return expression.evaluate(_Distributions(what))
     except ValueError as error:

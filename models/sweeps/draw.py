@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TypeGuard
 
-from ..graphs.graph_text import read_graph
+from ..graphs.graph_text import checked_name, read_graph
 from ..graphs.readers import as_topology, is_graph
 from ..graphs.topology import Topology
 from ..inputs.checks import check_integer, check_number, check_table, check_text, first_of, short_repr
@@ -130,7 +130,7 @@ def _graphs(what: str, value: object, count: int) -> Graphs | RandomGraph:
     found, number = first_of(listed, count)
     if len(found) != count:
         raise ValueError(f"{what}: found {number} graphs; expected {count}, one for each realisation")
-    return Graphs(_bounded((as_topology(what, graph) for graph in found), count))
+    return Graphs(_bounded((checked_name(what, as_topology(what, graph)) for graph in found), count))
 
 
 @lru_cache(maxsize=8)

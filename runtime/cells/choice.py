@@ -264,8 +264,13 @@ def _named(equations: Equations, state: np.ndarray, numbers: np.ndarray, time: f
 
 
 def _eigenvalue_parts(blocks: Iterable[np.ndarray]) -> tuple[float, float]:
-    """The largest real and the largest imaginary part of the eigenvalues of some blocks; 0 where there are no numbers."""
-    blocks = [block for block in blocks if np.all(np.isfinite(block))]
+    """The largest real and the largest imaginary part of the eigenvalues of some blocks; 0 where there are no numbers.
+
+    A block with entries beyond the largest float is infinitely fast.
+    """
+    blocks = [block for block in blocks if not np.isnan(block).any()]
+    if any(np.isinf(block).any() for block in blocks):
+        return math.inf, 0.0
     rates = np.concatenate([np.linalg.eigvals(block) for block in blocks]) if blocks else np.zeros(0)
     return float(np.abs(rates.real).max(initial=0.0)), float(np.abs(rates.imag).max(initial=0.0))
 
@@ -276,7 +281,8 @@ def _blocks(equations: Equations, values: Mapping[str, float]) -> list[np.ndarra
     for link, edge, share in _links(equations):
         if link[0] < len(blocks):
             found = _value(edge.jacobian_here(), equations.at_link(link, edge), values)
-            blocks[link[0]] = blocks[link[0]] + 2.0 * share * found
+            with np.errstate(over="ignore", invalid="ignore"):
+                blocks[link[0]] = blocks[link[0]] + 2.0 * share * found
     return [_by_masses(equations, i, values, block) for i, block in enumerate(blocks)]
 
 
@@ -327,7 +333,9 @@ def _bends(equations: Equations, values: Mapping[str, float]) -> Iterator[np.nda
     for link, edge, share in _links(equations):
         at = equations.at_link(link, edge)
         for moved in _turned(edge.rhs, edge.here, at, values):
-            yield 2.0 * share * _by_masses(equations, link[0], moved, _value(edge.jacobian_here(), at, moved))
+            with np.errstate(over="ignore"):
+                added = 2.0 * share * _by_masses(equations, link[0], moved, _value(edge.jacobian_here(), at, moved))
+            yield added
 
 
 def _turned(

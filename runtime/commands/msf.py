@@ -9,7 +9,17 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from ..console.arguments import above_zero, add_scene, add_set, add_workers, folder, positive, settings, spaced
+from ..console.arguments import (
+    add_scene,
+    add_set,
+    add_workers,
+    at_least_zero,
+    folder,
+    periods,
+    positive,
+    settings,
+    spaced,
+)
 from ..console.network import add_network, named_network, scene_on
 from ..console.outcome import FINE, Failed, WrongUse, print_json, sentence, warn, wrong_use
 
@@ -53,10 +63,10 @@ def configure(parser: ArgumentParser) -> None:
         "parameters of the network",
     )
     parser.add_argument(
-        "--precision", metavar="P", type=above_zero, help="standard error to be reached (default: 0.001)"
+        "--precision", metavar="P", type=at_least_zero, help="standard error to be reached (default: 0.001)"
     )
     parser.add_argument(
-        "--periods", metavar="T", type=above_zero, help="drive periods (else units of 2 pi) at most (default: 5000)"
+        "--periods", metavar="T", type=periods, help="drive periods (else units of 2 pi) at most (default: 5000)"
     )
     parser.add_argument("--starts", metavar="K", type=positive, help="initial states (default: 4)")
     add_network(parser)

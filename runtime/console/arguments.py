@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 
-from synchain.models.inputs.arithmetic import constant
+from synchain.models.inputs.arithmetic import MAGNITUDE, constant
 from synchain.models.inputs.checks import short_repr
 from synchain.models.inputs.options import integer_option
 from synchain.models.sweeps.axis import LIMIT as AXIS_LIMIT
@@ -57,11 +57,13 @@ def folder(text: str) -> str:
 
 
 def number(text: str) -> float:
-    """A finite number, or a constant such as 2*pi/5."""
+    """A finite number, or a constant such as 2*pi/5, of at most MAGNITUDE in size."""
     try:
         return constant(text)
     except ValueError:
-        raise ArgumentTypeError(f"found {short_repr(text)}; expected a finite number, e.g. 1.15 or 2*pi/5") from None
+        raise ArgumentTypeError(
+            f"found {short_repr(text)}; expected a finite number of at most {MAGNITUDE:g} in size, e.g. 1.15 or 2*pi/5"
+        ) from None
 
 
 def above_zero(text: str) -> float:
@@ -69,6 +71,22 @@ def above_zero(text: str) -> float:
     value = number(text)
     if not value > 0:
         raise ArgumentTypeError(f"found {text}; expected a number above 0")
+    return value
+
+
+def at_least_zero(text: str) -> float:
+    """A finite number of at least 0."""
+    value = number(text)
+    if not value >= 0:
+        raise ArgumentTypeError(f"found {text}; expected a number of at least 0")
+    return value
+
+
+def periods(text: str) -> float:
+    """A whole number of periods above 0."""
+    value = above_zero(text)
+    if not value.is_integer():
+        raise ArgumentTypeError(f"found {text}; expected a whole number of periods")
     return value
 
 

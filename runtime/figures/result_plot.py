@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -204,20 +203,19 @@ def _map(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
 def _phase(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
     """Velocity over position in the first cell; for many oscillators colours over time."""
     data = data.isel({name: 0 for name in data.status.dims})
-    own = [_own(result, i) for i in range(result.scene.n)]
-    if len(own) > len(CYCLE):
-        values = np.array([_state(data.trajectory, str(names[0])).values for names in own])
+    first, second = (_own(data.trajectory, result, k) for k in (0, 1))
+    n = result.scene.n
+    if n > len(CYCLE):
         time = data.time.values
         painted = axes.pcolormesh(
-            time, np.arange(1, len(own) + 1), values, shading="nearest", cmap="cividis", rasterized=True
+            time, np.arange(1, n + 1), first.values.T, shading="nearest", cmap="cividis", rasterized=True
         )
         axes.set(xlabel="time", ylabel="oscillator")
-        axes.figure.colorbar(painted, ax=axes, label=_common(names[0] for names in own))
+        axes.figure.colorbar(painted, ax=axes, label=_common(first))
         return axes
-    for i, names in enumerate(own):
-        x, y = (_state(data.trajectory, str(name)) for name in names)
-        axes.plot(x, y, color=CYCLE[i % len(CYCLE)], linewidth=0.7, label="oscillator " * (i == 0) + str(i + 1))
-    axes.set(xlabel=_common(names[0] for names in own), ylabel=_common(names[1] for names in own))
+    for i, (x, y) in enumerate(zip(first.values.T, second.values.T, strict=True)):
+        axes.plot(x, y, color=CYCLE[i], linewidth=0.7, label="oscillator " * (i == 0) + str(i + 1))
+    axes.set(xlabel=_common(first), ylabel=_common(second))
     return _legend(axes, result)
 
 
@@ -228,31 +226,32 @@ def _state(values: xr.DataArray, name: str) -> xr.DataArray:
     return values.sel(component=parts.base, node=parts.index + 1)
 
 
-def _own(result: Result, i: int) -> tuple[NodeName, NodeName]:
-    """First two states of oscillator `i` (from 0); the first one twice if there is no other."""
+def _own(values: xr.DataArray, result: Result, k: int) -> xr.DataArray:
+    """First (`k` = 0) or second state of each oscillator; the first one if there is no other. Nodes are the last axis."""
     equations = result.scene.equations
-    names = [NodeName(name, i) for name in equations.components if i in equations.holders(name)]
-    return names[0], names[min(1, len(names) - 1)]
+    held = [{s.name for s in node.state} for node in equations.nodes]
+    names = [[name for name in equations.components if name in own] for own in held]
+    chosen = [names[kind][min(k, len(names[kind]) - 1)] for kind in equations.kind_of]
+    return values.sel(component=xr.DataArray(chosen, dims="node"), node=values.node).transpose(..., "node")
 
 
-def _common(states: Iterable[NodeName]) -> str:
+def _common(states: xr.DataArray) -> str:
     """Name of states of several oscillators without their numbers; several names with commas."""
-    return ", ".join(dict.fromkeys(symbol(state.base) for state in states))
+    return ", ".join(dict.fromkeys(symbol(str(name)) for name in states.component.values))
 
 
 def _end(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
     """Final states of every oscillator, over the axis if there is one."""
-    own = [_own(result, i) for i in range(result.scene.n)]
-    first, second = (_common(names[k] for names in own) for k in (0, 1))
+    first, second = (_own(data.end, result, k) for k in (0, 1))
     along = _along(data, result) if data.status.ndim else None
-    for i, names in enumerate(own, start=1):
-        end = _state(data.end, str(names[0]))
-        x = end if along is None else along[0]
-        y = _state(data.end, str(names[1])) if along is None else end
-        color = CYCLE[(i - 1) % len(CYCLE)]
-        axes.plot(x, y, linestyle="none", marker=".", color=color, label="oscillator " * (i == 1) + str(i))
+    x, y = (first, second) if along is None else (np.broadcast_to(along[0][:, None], first.shape), first)
+    for i, color in enumerate(CYCLE[: result.scene.n]):  # one line of each colour, as there may be many oscillators
+        across, up = (np.asarray(values)[..., i :: len(CYCLE)].ravel() for values in (x, y))
+        axes.plot(across, up, linestyle="none", marker=".", color=color, label="oscillator " * (i == 0) + str(i + 1))
     labels = (
-        (f"{first} at the end", f"{second} at the end") if along is None else (symbol(along[1]), f"{first} at the end")
+        (f"{_common(first)} at the end", f"{_common(second)} at the end")
+        if along is None
+        else (symbol(along[1]), f"{_common(first)} at the end")
     )
     axes.set(xlabel=labels[0], ylabel=labels[1])
     return _legend(_widen(axes), result)

@@ -73,9 +73,11 @@ class EnergyFunction:
         """Return E(t) - E(t_0) - (integral of the power) of a trajectory: states (samples,
         dimension) at times t (samples).
 
-        The integral is Simpson's rule on the samples, so its own error falls with the third power
-        of their distance, at every other sample with the fourth.  Raises ValueError for fewer than
-        three samples.
+        The integral is a quadrature, Simpson's rule on the samples.  Where the power is smooth, its
+        own error falls with the third power of their distance, at every other sample with the fourth;
+        where the power jumps, as with `sign` in a force, with the first alone.  The mean of the power
+        as an observable of the run is as exact as its `rtol` (docs/models.md).  Raises ValueError for
+        fewer than three samples.
         """
         if np.ndim(t) != 1 or len(t) < 3:
             raise ValueError(f"imbalance: found {np.size(t)} samples; expected at least three; raise samples")

@@ -45,7 +45,9 @@ def test_observables_and_their_texts(observable: object, text: str) -> None:
     ("text", "words"),
     [
         ("x", "expected one of mean, maximum, minimum, end, variance of an expression outermost"),
-        ("mean(x", "expected one of mean"),
+        ("mean(x", "unreadable expression 'mean(x' with a ( that is not closed; expected such as 'mean(x_1 - x_2)'"),
+        ("mean(nodes[2)(x))", "with a ) that nothing opens"),
+        ("mean x", "unreadable expression 'mean x'; expected"),
         ("2*mean(x)", "expected one of mean"),
         ("mean(x, y)", "expected one of mean"),
         ("mean(maximum(x))", "reduced once, outermost"),
@@ -119,6 +121,15 @@ def test_states_that_some_nodes_lack() -> None:
     with pytest.raises(ValueError, match=r"observe r: some nodes have no 'v'; expected .*, or v_1 of one"):
         scene.replace(observe={"r": "mean(v)"})
     assert scene.replace(observe={"r": "mean(v_1)"}).observe
+    with pytest.raises(ValueError, match=r"observe r: some nodes have no 'z'; expected .*, or z_2 of one"):
+        scene.replace(observe={"r": "mean(z)"})
+    assert scene.replace(observe={"r": "mean(z_2)"}).observe
+
+
+@pytest.mark.parametrize(("oscillator", "words"), [("rossler", "z_1, a, b, c, t$"), ("duffing", "omega, t, energy$")])
+def test_the_energy_is_known_where_there_is_one(oscillator: str, words: str) -> None:
+    with pytest.raises(ValueError, match=f"unknown name 'q'; known: .*{words}"):
+        Scene(oscillator, window=1, observe={"r": "mean(q)"})
 
 
 def test_scene_files_hold_observables() -> None:

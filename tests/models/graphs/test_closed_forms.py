@@ -236,6 +236,10 @@ def test_names_of_products_are_read_back(graph: Topology) -> None:
     ("text", "words"),
     [
         ("cartesian(chain(4))", "unreadable graph"),
+        (
+            "cartesian(ring(3), star(4)",
+            "unreadable graph 'cartesian(ring(3), star(4)' with a ( that is not closed; expected",
+        ),
         ("__import__('os')", "unreadable graph"),
         ("union(chain(2), open(3))", "open"),
         ("cartesian(chain(4), ring(n=5))", "unreadable graph"),

@@ -44,6 +44,7 @@ def test_value(text: str, value: float) -> None:
         ("", "unreadable"),
         ("1 +", "unreadable"),
         ("2 pi", "unreadable"),
+        ("2*(pi", "unreadable number '2*(pi' with a ( that is not closed"),
         ("(" * 100, "unreadable"),
         ("9**9**9", "exponent 3.8742e+08"),
         ("10**99*10**99", "1e+198"),

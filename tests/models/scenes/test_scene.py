@@ -20,8 +20,8 @@ import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synchain.models import Scene, chain, complete, ring, star
-from synchain.models.graphs.topology import from_matrix
+from synchain.models import Scene, cartesian, chain, complete, ring, star, weighted
+from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.inputs.frozen import Frozen
 from synchain.models.scenes.file import load_scene, scene_names
 from synchain.models.scenes.scene import KEYWORDS
@@ -464,6 +464,37 @@ def test_a_matrix_is_written_back() -> None:
     assert again == scene
     assert scene.as_dict()["topology"] == {"name": "odd", "matrix": [["-1/3", "1/3"], ["2", "-2"]]}
     assert scene.as_dict()["section"] == "x_2 both 0.1"
+
+
+K3 = [[-2, 1, 1], [1, -2, 1], [1, 1, -2]]
+
+
+@pytest.mark.parametrize(
+    ("name", "rows"),
+    [("ring", [[-1, 1, 0], [1, -2, 1], [0, 1, -1]]), ("ring", [[0]]), ("cycle", [[-1, 1], [1, -1]]), ("ring(4)", K3)],
+)
+def test_a_matrix_under_the_name_of_another_graph_is_refused(name: str, rows: list[list[int]]) -> None:
+    words = re.escape(f"topology: found the name {name!r} and links other than those of {name.split('(')[0]}(")
+    with pytest.raises(ValueError, match=words):
+        Scene.from_dict({"topology": {"name": name, "matrix": rows, "n": 3}})
+    with pytest.raises(ValueError, match=words):
+        Scene(topology=from_matrix(rows, name=name))
+    with pytest.raises(ValueError, match=words.replace("topology", "draw topology")):
+        Scene(topology=from_matrix(rows), realisations=1, draws={"topology": [from_matrix(rows, name=name)]})
+
+
+@pytest.mark.parametrize(
+    "graph", [from_matrix(K3, "ring"), from_matrix(K3, "K(3)"), cartesian(chain(2), weighted(chain(2), 2))]
+)
+def test_matrices_under_names_of_their_own_and_true_ones_are_kept(graph: Topology, tmp_path: Path) -> None:
+    scene = Scene(topology=graph)
+    scene.save(tmp_path / "scene.toml")
+    assert load_scene(tmp_path / "scene.toml") == scene
+
+
+def test_the_rows_of_a_matrix_are_counted() -> None:
+    with pytest.raises(ValueError, match="n = 3 but the matrix has 1 row; remove n"):
+        Scene.from_dict({"topology": {"matrix": [[0]], "n": 3}})
 
 
 FIGURES = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 
 import numpy as np
@@ -80,6 +81,14 @@ def test_the_layer_of_a_smoothed_jump_is_seen_from_a_start_outside():
     assert stiffness(scene) > STIFF > stiffness(scene.replace(parameters={"kappa": 10.0}))
     link = Scene(oscillator="duffing", coupling="friction_damper", topology=chain(2), initial={"v": (0.0, 1.0)})
     assert stiffness(link.replace(parameters={"sigma": 1e4})) > STIFF > stiffness(link)
+
+
+@pytest.mark.filterwarnings("error")
+def test_rates_beyond_the_largest_float_are_infinitely_fast():
+    link = Scene("van_der_pol", "x->x", chain(2), window=1.0, transient=0.0)
+    assert stiffness(link.replace(parameters={"sigma": 1e308})) == math.inf
+    damper = Scene(oscillator="duffing", coupling="friction_damper", topology=chain(2))
+    assert stiffness(damper.replace(parameters={"sigma": 1e308})) == math.inf
 
 
 def test_stiffness_is_that_of_the_extreme_cells():

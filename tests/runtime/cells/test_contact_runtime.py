@@ -100,3 +100,13 @@ def test_thresholds() -> None:
     ((low, high),) = found.direct.intervals
     assert low == 0.0
     assert high == pytest.approx(0.2325, abs=0.02)
+
+
+@pytest.mark.parametrize("start", [-0.1, 0.1])
+def test_the_mode_of_a_body_that_sticks_is_zero_without_a_sign(start: float) -> None:
+    still = {"theta_b": 0.0, "u": 0.0}
+    given = {"parameters": still, "initial": {"v": start}, "record": (), "transient": 0.0, "window": 3.0}
+    scene = Scene(contact="set-valued", integrator="taylor", **given)
+    end = run(scene, show_progress=False).end.sel(component="slip").values
+    assert not end.any()
+    assert not np.signbit(end).any()

@@ -231,6 +231,15 @@ def test_resuming_with_another_skip_is_refused():
         run(scene, resume=run(scene, width=1), reduce=False, width=1)
 
 
+def test_a_run_goes_on_with_another_skip_where_nothing_was_left_out():
+    scene = DUFFING.replace(axes={"sigma": [0.1, 0.2, 0.3]})
+    whole = run(scene, width=1)
+    assert whole.data.attrs["skipped"] == "nothing"
+    again = run(scene, width=1, resume=unfinished(whole), reduce=False)
+    assert float(again.sync_error[0]) == 42.0
+    np.testing.assert_array_equal(again.states("end"), whole.states("end"))
+
+
 def test_cells_that_did_not_run_have_no_synchronisation_error():
     scene = DUFFING.replace(initial={"x": 0.5}, axes={"sigma": [0.1, 0.3]})
     buffers = Buffers.empty(2, 2, 3, 7)

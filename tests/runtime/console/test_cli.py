@@ -567,6 +567,7 @@ WRONG = [
     ("run {scene} --out {folder}/o --workers 0", "expected at least 1"),
     ("run {scene} --out {folder}/o --set omega", "expected name=value"),
     ("run {scene} --out {folder}/o --set omega=inf", "expected a finite number"),
+    ("run {scene} --out {folder}/o --set omega=1e101", "found '1e101'; expected a finite number of at most 1e+100"),
     ("run {scene} --out {folder}/o --set omega=0", "omega"),
     ("run {scene} --out {folder}/o --set omga=1", "did you mean 'omega'?"),
     ("run {scene} --out {folder}/o --set x_3=1", "unknown initial state 'x_3'"),

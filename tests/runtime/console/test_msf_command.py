@@ -119,8 +119,11 @@ def test_report_of_a_chain(asked: list[dict[str, Any]], capsys: pytest.CaptureFi
     assert {"precision", "periods", "starts"}.isdisjoint(asked[0])
 
 
-def test_json_of_a_star_and_what_was_asked_for(asked: list[dict[str, Any]], capsys: pytest.CaptureFixture[str]) -> None:
-    effort = "--precision 0.01 --periods 99 --starts 2 --workers 1"
+@pytest.mark.parametrize("precision", [0.0, 0.01])
+def test_json_of_a_star_and_what_was_asked_for(
+    asked: list[dict[str, Any]], capsys: pytest.CaptureFixture[str], precision: float
+) -> None:
+    effort = f"--precision {precision} --periods 99 --starts 2 --workers 1"
     assert main(f"msf --omega 1.4 --topology star --n 5 --json --alpha 0:1.2:25 {effort}".split()) == 0
     captured = capsys.readouterr()
     found = json.loads(captured.out)
@@ -140,7 +143,7 @@ def test_json_of_a_star_and_what_was_asked_for(asked: list[dict[str, Any]], caps
         "fastest": "-5",
     }
     assert {k: asked[0][k] for k in ("precision", "periods", "starts", "workers")} == {
-        "precision": 0.01,
+        "precision": precision,
         "periods": 99.0,
         "starts": 2,
         "workers": 1,
@@ -468,8 +471,9 @@ WRONG = [
     ("figure_8 --beta 1:1:5", "LO below HI"),
     ("figure_8 --alpha 0:1:2000 --beta 0:1:2000", "coarser grids"),
     ("figure_8 --omega nan", "finite number"),
-    ("figure_8 --precision 0", "above 0"),
+    ("figure_8 --precision -1e-3", "found -1e-3; expected a number of at least 0"),
     ("figure_8 --periods -1", "above 0"),
+    ("figure_8 --periods 1.5", "argument --periods: found 1.5; expected a whole number of periods"),
     ("figure_8 --starts 0", "at least 1"),
     ("figure_8 --n 1", "no links"),
     ("--omega 1.4 --topology star", "expected its number of oscillators too"),

@@ -11,6 +11,7 @@ import pytest
 from figure_samples import pretend, words
 
 from synchain.models import chain
+from synchain.models.dynamics.equations import Equations
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.figures import result_plot, style
@@ -103,6 +104,29 @@ def test_many_oscillators_are_shown_over_time(pair: Callable[..., Result]) -> No
     (mesh,) = axes.collections
     assert mesh.get_array().shape == (9, 20)
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("time", "oscillator")
+
+
+def test_ends_of_many_oscillators_are_one_line_of_each_colour(pair: Callable[..., Result]) -> None:
+    result = pair(topology=chain(20), record=())
+    lines = result_plot.draw_result(result).lines
+    assert len(lines) == len(result_plot.CYCLE)
+    drawn = np.concatenate([line.get_xydata() for line in lines])
+    np.testing.assert_array_equal(drawn[drawn[:, 0].argsort()], result.end.transpose("node", "component"))
+    result = pair(topology=chain(20), record=(), axes=SWEPT["error"])
+    lines = result_plot.draw_result(result, kind="end").lines
+    np.testing.assert_array_equal(lines[5].get_ydata(), result.end.sel(component="x")[:, 5::6].values.ravel())
+    np.testing.assert_array_equal(lines[5].get_xdata(), np.repeat(SWEPT["error"]["sigma"], 3))
+
+
+@pytest.mark.parametrize("record", [(), ("trajectory",)])
+def test_nodes_are_not_searched_for_each_oscillator(
+    pair: Callable[..., Result], monkeypatch: pytest.MonkeyPatch, record: tuple[str, ...]
+) -> None:
+    result, searched = pair(topology=chain(20), record=record, samples=20), []
+    before = Equations.holders
+    monkeypatch.setattr(Equations, "holders", lambda self, name: searched.append(name) or before(self, name))
+    result_plot.draw_result(result)
+    assert len(searched) < 20
 
 
 def test_rounding_is_drawn_as_zero(pair: Callable[..., Result]) -> None:

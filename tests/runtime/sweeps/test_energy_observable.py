@@ -19,6 +19,7 @@ from synchain.models import (
     ends,
     energy,
     maximum,
+    mean,
     minimum,
     nodes,
     ring,
@@ -26,6 +27,7 @@ from synchain.models import (
 )
 from synchain.models.definitions.loader import load_oscillator
 from synchain.models.networks.energy import Energy
+from synchain.models.scenes.energy import energy as energy_of
 from synchain.runtime.cells.kernels import kernel_source
 from synchain.runtime.results.energy import energy_function
 from synchain.runtime.sweeps.run import run
@@ -139,3 +141,17 @@ def test_a_parameter_of_that_name_is_meant() -> None:
     node = Lagrangian(V**2 / 2, sp.Symbol("energy") * X**2 / 2, coordinates={X: V}, parameters={"energy": 3})
     found = run(Scene(node, observe={"e": "mean(energy + 0*x_1)"}, **EXACT), show_progress=False)
     assert float(found.e) == 3.0
+
+
+def test_the_work_of_a_force_that_jumps_is_exact_as_an_observable_and_a_quadrature_on_samples() -> None:
+    pushed = Lagrangian(V**2 / 2, X**2 / 2, coordinates={X: V}, Q={X: "0.3*sign(cos(1.3*t))"}, initial={X: 1})
+    alone = Scene(pushed, **{**EXACT, "window": 60, "record": ["trajectory"], "samples": 2})
+    scene = alone.replace(observe={"power": mean(energy_of(alone).whole()[1])})
+    function, errors = energy_function(scene), []
+    for samples in (301, 3001, 30001):
+        found = run(scene.replace(samples=samples), show_progress=False)
+        states, time = found.states("trajectory"), found.time.values
+        gained = np.diff(function(states)[[0, -1]])[0]
+        assert gained == pytest.approx(60 * float(found.power), abs=1e-10)
+        errors.append(np.abs(function.imbalance(time, states)).max())
+    assert 1e-4 < errors[2] / errors[0] < 0.1  # the first power of the distance; the third would be 1e-6

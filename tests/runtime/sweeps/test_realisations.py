@@ -118,6 +118,7 @@ def test_one_realisation_of_a_zipped_sweep() -> None:
         ({"realisations": 2, "draws": {"x": [[1.0, 2.0], [1.0]]}}, "rows of different lengths"),
         ({"realisations": 3, "draws": {"x": "gamma(1, 2)"}}, "draw x: found 'gamma(1, 2)'"),
         ({"realisations": 3, "draws": {"x": "normal(0, open('f'))"}}, "draw x"),
+        ({"realisations": 3, "draws": {"x": "normal(0, 1"}}, "unreadable distribution 'normal(0, 1' with a ( that is not"),
         ({"realisations": 3, "draws": {"delta": uniform(-1.0, -0.5)}}, "delta"),
         ({"realisations": 3, "draws": {"x": normal(0, 1), "x_1": normal(0, 1)}}, "x_1 is drawn twice"),
         ({"realisations": 3, "draws": {"x_1": normal(0, 1)}, "axes": {"x_1": [1.0]}}, "it is an axis as well"),
