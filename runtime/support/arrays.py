@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from synchain.models.inputs.arithmetic import MAGNITUDE
 from synchain.models.inputs.checks import short_repr
 
 __all__ = ["numbers", "row"]
+
+LARGEST = 1e300
+"""Largest size of a number in a row: sums, differences and multiples of them are finite."""
 
 
 def numbers(what: str, values: object, *, complex_too: bool = False) -> np.ndarray:
@@ -31,7 +33,7 @@ def numbers(what: str, values: object, *, complex_too: bool = False) -> np.ndarr
 
 
 def row(what: str, values: ArrayLike, least: int = 1, *, rising: bool = False, complex_too: bool = False) -> np.ndarray:
-    """Return the values as one row (m,) of floats or, if `complex_too`, of complex numbers, up to MAGNITUDE in size.
+    """Return the values as one row (m,) of floats or, if `complex_too`, of complex numbers, up to LARGEST in size.
 
     Parameters
     ----------
@@ -54,9 +56,9 @@ def row(what: str, values: ArrayLike, least: int = 1, *, rising: bool = False, c
     found = np.atleast_1d(numbers(what, values, complex_too=complex_too))
     if not np.all(np.isfinite(found)):
         raise ValueError(f"{what}: found {found[~np.isfinite(found)][0]}; expected finite numbers")
-    large = np.maximum(np.abs(found.real), np.abs(found.imag)) > MAGNITUDE
+    large = np.maximum(np.abs(found.real), np.abs(found.imag)) > LARGEST
     if large.any():
-        raise ValueError(f"{what}: found {found[large][0]:g}; expected numbers of at most {MAGNITUDE:g} in size")
+        raise ValueError(f"{what}: found {found[large][0]:g}; expected numbers of at most {LARGEST:g} in size")
     if found.ndim != 1 or len(found) < least:
         wanted = f"a row of at least {least} number{'s' * (least > 1)}"
         raise ValueError(
