@@ -284,10 +284,10 @@ def test_ratios_are_to_the_fastest_own_method_with_full_lanes():
         row("theirs", 8, math.nan, math.nan),
     ]
     lines = table(rows, own={"ours", "other"}).splitlines()[4:]
-    assert lines[0] == "| c | ours | 1 | 8 | 4 | 8 | 4 | 8 | 4 |"
-    assert lines[1] == "| c | ours | 8 | 2 | 1 | 2 | 1 | 2 | 1 |"
-    assert lines[2] == "| c | other | 8 | 4 | 2 | 4 | 2 | 4 | 2 |"
-    assert lines[3] == "| c | theirs | 8 | 1 | 0.5 | – | – | – | – |"
+    assert lines[0] == "| c | ours | 1 | 8 | 4 | 8 | 4 | 8 | 4 | 8 | 4 |"
+    assert lines[1] == "| c | ours | 8 | 2 | 1 | 2 | 1 | 2 | 1 | 2 | 1 |"
+    assert lines[2] == "| c | other | 8 | 4 | 2 | 4 | 2 | 4 | 2 | 4 | 2 |"
+    assert lines[3] == "| c | theirs | 8 | 1 | 0.5 | – | – | – | – | – | – |"
     assert table([], own=set()) == ""
 
 
