@@ -192,9 +192,8 @@ def take_back(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, 
     theta = first_passage(accept, t, h, y, y_new, dense, middle, out, network, dims, pushes)
     least = SHORTEST * maximum(t, 1.0)
     wanted = maximum(theta * h, least)
-    early = (
-        accept & (theta < 1.5) & (t + wanted < t + h) & (h > 2.0 * least)
-    )  # a load that jumps stays beyond its limit
+    # behind a jump a gap is closed to the end of the step, however near it is
+    early = accept & (theta < 1.5) & (t + wanted < t + h) & (h > 2.0 * least)
     # a gap that closes at once after it has opened may be an error of a long step: a shorter one will tell
     doubtful = early & (theta * h < least) & (h > 16.0 * least)
     store(clock, STEP, select(doubtful, 0.25 * h, load(clock, STEP, WIDTH)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 import sympy as sp
 
@@ -61,11 +61,6 @@ def _sides(found: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:
     return (now, now.xreplace({TIME: TIME + SOON * sp.Max(1, TIME)})) if signs else ()
 
 
-def _templates(equations: Equations) -> Iterator[Node | Edge]:
-    yield from equations.nodes
-    yield from equations.edges
-
-
 def _ordered(template: Node | Edge) -> list[sp.Expr]:
     return sorted(gaps(template), key=sp.default_sort_key)
 
@@ -95,7 +90,8 @@ def _looped(equations: Equations, names: Names) -> list[Statement]:
     body = share([fixed.apply(e) for e in _columns(node.contact)], names.fresh("z"))
     force, link = _force(equations, node.contact)
     differing = set(map(real, (*equations.varied, *equations.numbered)))
-    zeros = [e for template in _templates(equations) for e in _ordered(template) if not e.free_symbols & differing]
+    parts: tuple[Node | Edge, ...] = (node, *equations.edges)
+    zeros = [e for part in parts for e in _ordered(part) if not e.free_symbols & differing]
     sides = share(_sides(zeros), names.fresh("side"))
     used = body.symbols.union(sides.symbols, *(e.free_symbols for e in (*fixed.table, *link)))
     before = [*_parameters(equations, used), *(let(s.name, lane(lower(e))) for e, s in fixed.table.items())]

@@ -36,8 +36,8 @@ __all__ = [
 FIRST_STEP = 1e-4
 """Step tried first in every cell; the step control enlarges it sixfold at a time."""
 
-MOST = 12
-"""Values of a parameter of the drive's jumps and kinks at which these are looked at."""
+MOST = 144
+"""Rows of the parameters of the drive's jumps and kinks at which these are looked at."""
 
 DIRECTIONS = {"falling": -1.0, "rising": 1.0, "both": 0.0}
 """The numbers that a kernel knows the directions of a section by."""
@@ -217,26 +217,31 @@ def half_swing(equations: Equations, values: Mapping[str, np.ndarray], end: floa
 
 def longest_step(scene: Scene) -> float:
     """Return the half swing at the extremes of the drive's parameters over all nodes and axes of a
-    scene; those of its jumps and kinks take MOST values each.
+    scene; those of its jumps and kinks take MOST rows of values.
     """
     paced, sided = (
         dict.fromkeys(name for e in found for name in names_in(e) if name != TIME.name)
         for found in (scene.drive.paces, scene.drive.gaps)
     )
-    known, picked = paced | sided, []
-    for name in known:
-        names = parameter_names(scene, name)
-        values = np.unique(
-            [
-                *(scene.parameters[own] for own in names),
-                *(value for axis in (*scene.axes, *scene.drawn) if axis.name in names for value in axis.values),
-            ]
-        )
-        most = min(len(values), MOST if name in sided else 2)
-        picked.append(values[np.linspace(0, len(values) - 1, most).round().astype(int)])
+    known = {name: _values(scene, name) for name in paced | sided}
+    swept = sum(len(known[name]) > 1 for name in sided)
+    most = {name: int(MOST ** (1.0 / swept)) if swept and name in sided else 2 for name in known}
+    picked = [np.unique(values[_spread(len(values), most[name])]) for name, values in known.items()]
     corners = np.array(list(itertools.product(*picked)), dtype=float)
     rows = dict(zip(known, corners.T, strict=True))
     return half_swing(scene.equations, rows, scene.transient + scene.window)
+
+
+def _values(scene: Scene, name: str) -> np.ndarray:
+    """All values that a parameter has in the nodes and cells of a scene, rising."""
+    names = parameter_names(scene, name)
+    along = (axis.values for axis in (*scene.axes, *scene.drawn) if axis.name in names)
+    return np.unique([*(scene.parameters[own] for own in names), *itertools.chain(*along)])
+
+
+def _spread(count: int, most: int) -> np.ndarray:
+    """At most so many places of a row, the first and the last among them."""
+    return np.linspace(0, count - 1, max(2, most)).round().astype(int)
 
 
 def parameter_names(scene: Scene, name: str) -> tuple[str, ...]:
