@@ -15,14 +15,17 @@ from .cases import Case
 __all__ = ["LONGEST", "SHORTEST", "Point", "best_time", "curve", "timed_periods"]
 
 SHORTEST = 0.2
-"""A timed run lasts at least this many seconds of CPU time, by more periods and by repetition."""
+"""A timed run lasts at least this many seconds of CPU time, by repetition."""
 LONGEST = 1.0
 """A slower run than this is shortened to fewer periods, down to FEWEST, and not repeated."""
 QUICK = 10
 """Quick runs are this many times shorter."""
 FEWEST = 5
-MOST = 10_000
-"""Periods of the longest timed run; more would not change the share of what one call costs."""
+TIMED = 200
+"""Periods of a timed run of methods that are fast enough.
+
+A motion asks for other steps at its beginning than later.
+"""
 GIVE_UP = 2.0
 """A peer that needs more seconds of CPU time for one period is not tried at tighter tolerances."""
 
@@ -60,20 +63,20 @@ def best_time(run: Callable[[], object], quick: bool) -> float:
     return min(first, *(_seconds(run, repetitions) for _ in range(3)))
 
 
-def timed_periods(cost: float, periods: int, quick: bool) -> int:
-    """Return the length of a timed run: the work of SHORTEST seconds, so that calls do not count.
+def timed_periods(cost: float, least: int, quick: bool) -> int:
+    """Return the length of a timed run: TIMED periods, or as many as LONGEST seconds allow.
 
     Parameters
     ----------
     cost : float
         CPU seconds of one period.
-    periods : int
+    least : int
         The least length.
     quick : bool
-        Whether a run QUICK times shorter will do.
+        Whether slow runs are QUICK times shorter.
     """
-    shortest = SHORTEST / QUICK if quick else SHORTEST
-    return max(periods, min(MOST, int(np.ceil(shortest / max(cost, 1e-9)))))
+    longest = LONGEST / QUICK if quick else LONGEST
+    return max(least, min(TIMED, int(longest / max(cost, 1e-9))))
 
 
 def _seconds(run: Callable[[], object], repetitions: int) -> float:

@@ -98,7 +98,7 @@ class Own:
         states, _ = self.solve(rtol, atol, part.times)
         begin = time.process_time()
         self.solve(rtol, atol, np.full(self.cells, periods * case.period))
-        length = timed_periods((time.process_time() - begin) / periods, periods, quick)
+        length = timed_periods((time.process_time() - begin) / periods, periods, quick=False)
         ends = np.full(self.cells, length * case.period)
         _, counts = self.solve(rtol, atol, ends)
         seconds = best_time(lambda: self.solve(rtol, atol, ends), quick) / (length * self.cells)

@@ -20,7 +20,7 @@ CHOICE = ("rodas5p", 1, (1e-5, 1e-6, 1e-7))
 def least_lengths():
     """Timed runs are as long as the case, whatever the clock says."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("synchain.runtime.bench.kit.own_program.timed_periods", lambda cost, periods, quick: periods)
+        patch.setattr("synchain.runtime.bench.kit.own_program.timed_periods", lambda cost, least, quick: least)
         yield
 
 

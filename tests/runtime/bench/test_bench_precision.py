@@ -17,7 +17,7 @@ from synchain.runtime import bench
 from synchain.runtime.bench import dense, peers, precision
 from synchain.runtime.bench.kit import computed
 from synchain.runtime.bench.kit.cases import CASES, normal_modes, read_case
-from synchain.runtime.bench.kit.clock import MOST, QUICK, SHORTEST, curve, timed_periods
+from synchain.runtime.bench.kit.clock import LONGEST, QUICK, TIMED, curve, timed_periods
 from synchain.runtime.bench.kit.compare import table, time_at
 from synchain.runtime.bench.peers import _numbalsoda
 from synchain.runtime.bench.peers._problem import Problem
@@ -106,11 +106,11 @@ def test_peers_read_at_times_that_increase():
     assert all(0.0 < middle < end == length for length in lengths for middle, end in [computed.reading_times(length)])
 
 
-def test_timed_runs_are_long_enough_that_a_call_does_not_count():
-    assert timed_periods(cost=1e-3, periods=20, quick=False) == round(SHORTEST / 1e-3)
-    assert timed_periods(cost=1e-9, periods=20, quick=False) == MOST
-    assert timed_periods(cost=1.0, periods=20, quick=False) == 20
-    assert timed_periods(cost=1e-3, periods=5, quick=True) == round(SHORTEST / QUICK / 1e-3)
+def test_timed_runs_are_equally_long_but_for_slow_methods():
+    assert timed_periods(cost=1e-9, least=20, quick=True) == timed_periods(cost=1e-4, least=20, quick=True) == TIMED
+    assert timed_periods(cost=LONGEST / 50, least=20, quick=False) == 50
+    assert timed_periods(cost=LONGEST / 50, least=2, quick=True) == 50 // QUICK
+    assert timed_periods(cost=1.0, least=20, quick=False) == 20
 
 
 @pytest.mark.long
