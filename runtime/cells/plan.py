@@ -23,6 +23,7 @@ from .stays import shortest_stay
 __all__ = [
     "Plan",
     "Planner",
+    "by_node",
     "control_array",
     "control_of",
     "half_swing",
@@ -210,9 +211,15 @@ def half_swing(equations: Equations, values: Mapping[str, np.ndarray], end: floa
     drive = drive_of((*equations.nodes, *equations.edges), equations.differing)
     fastest = max((float(np.max(_sizes(pace, values, rows), initial=0.0)) for pace in drive.paces), default=0.0)
     longest = math.pi / fastest if fastest > 0.0 else math.inf
-    return (
-        min(longest, shortest_stay(drive.gaps, values, _periods(drive, values, rows), end)) if drive.gaps else longest
-    )
+    gaps = [gap for gap in drive.gaps if {*names_in(gap)} <= {*values, TIME.name}]
+    return min(longest, shortest_stay(gaps, values, _periods(drive, values, rows), end)) if gaps else longest
+
+
+def by_node(equations: Equations, numbers: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the parameters of cells (cells, parameters) by their names in a node, a row for each cell and node."""
+    columns = dict(zip(equations.parameters, numbers.T, strict=True))
+    own = {name: [columns[f"{name}_{i + 1}"] for i in range(equations.n)] for name in equations.varied}
+    return {name: np.concatenate(own.get(name) or [columns[name]] * equations.n) for name in (*columns, *own)}
 
 
 def longest_step(scene: Scene) -> float:

@@ -47,12 +47,13 @@ def shortest_stay(gaps: Sequence[sp.Expr], values: Mapping[str, np.ndarray], per
     """
     shortest = math.inf
     written, names = _written(tuple(gaps))
-    for row, period in enumerate(periods):
+    rows = np.column_stack([*(np.broadcast_to(values[name], periods.shape) for name in names), periods])
+    for *row, period in np.unique(rows, axis=0):
         # of two periods, one whole stay of each kind at least
         length, points = (2.0 * period, 2 * POINTS) if period else (end, PERIODS * POINTS)
         times, pitch = np.linspace(0.0, length, points + 1, retstep=True)
         with np.errstate(all="ignore"):
-            found = [np.broadcast_to(g, times.shape) for g in written(times, *(values[name][row] for name in names))]
+            found = [np.broadcast_to(g, times.shape) for g in written(times, *row)]
             passages, dips = [_passages(g) for g in found], [_dips(g) for g in found]
         apart = np.concatenate([*map(np.diff, passages), np.diff(np.sort(np.concatenate(passages)))])
         stays = np.concatenate([apart[apart > RESOLVED], *dips])

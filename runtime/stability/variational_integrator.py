@@ -25,7 +25,7 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.choice import chosen_for_modes, warn_of_stiff_modes
 from ..cells.initial_modes import local_clock
-from ..cells.plan import control_array, half_swing, periods, tolerances
+from ..cells.plan import by_node, control_array, half_swing, periods, tolerances
 from ..support.status import Status
 from ..support.threads import worker_count
 from .averages import SLACK, TRIED, error_of_steps
@@ -174,7 +174,7 @@ class VariationalIntegrator:
         where[order] = np.arange(count)
         rtol, atol = tolerances(scene, numbers)
         repeat = periods(kernel.equations, numbers)
-        longest = half_swing(kernel.equations, dict(zip(kernel.equations.parameters, numbers.T, strict=True)))
+        longest = half_swing(kernel.equations, by_node(kernel.equations, numbers))
         control = np.append(control_array(rtol, atol, longest, scene.max_steps, jumps=False), looseness)
         vectors = np.full((len(state), variation.size, padded), 1.0 / math.sqrt(variation.size))
         kept = np.ascontiguousarray(strengths[:, columns], dtype=float)

@@ -16,7 +16,7 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.bifurcation.branches import follow
 from synchain.runtime.bifurcation.periodic import periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton
-from synchain.runtime.cells.plan import longest_step, plan
+from synchain.runtime.cells.plan import by_node, half_swing, longest_step, plan
 from synchain.runtime.stability.clusters import cluster_exponents
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum
@@ -157,6 +157,16 @@ def test_every_value_of_an_axis_is_looked_at_for_short_pulses() -> None:
     swept = Scene(node, None, ALONE, axes={"level": [0.0, 1.1]}, transient=0.0, window=1.0)
     assert longest_step(swept) == pytest.approx(0.5 * np.sqrt(np.pi))
     assert longest_step(swept.replace(axes={"level": [0.0, 0.99, 1.1]})) == pytest.approx(np.arccos(0.99), rel=1e-3)
+
+
+def test_short_pulses_of_unequal_nodes_are_seen_by_sweeps_and_modes() -> None:
+    node = Field({"x": "-x + sign(sin(t) - level)"}, parameters={"level": 0.0})
+    made = Scene(
+        node, "x->x", topology("chain", 2), parameters={"level": [0.0, 0.99], "sigma": 0.1}, transient=0.0, window=1.0
+    )
+    assert longest_step(made) == pytest.approx(2 * np.arccos(0.99), rel=1e-3)
+    numbers = np.array([[made.parameters[name] for name in made.equations.parameters]])
+    assert half_swing(made.equations, by_node(made.equations, numbers)) == longest_step(made)
 
 
 @pytest.mark.parametrize("integrator", ["taylor", "dop853", "rodas5p"])
