@@ -119,7 +119,7 @@ class Quotient(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Power(Expression):
-    """A power with any exponent; only languages with a function for it have these."""
+    """A power; lanes have those with whole exponents."""
 
     base: Expression
     exponent: Expression
@@ -168,9 +168,9 @@ class Junction(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Not(Expression):
-    """The opposite of a condition that has a name."""
+    """The opposite of a condition."""
 
-    condition: Name
+    condition: Expression
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,6 +35,7 @@ from .statements import (
     If,
     Index,
     Loop,
+    Repeat,
     Return,
     Role,
     Statement,
@@ -46,6 +47,9 @@ __all__ = ["C99", "LANES", "MATH", "NUMPY", "Printer"]
 
 SUM, TERM, POWER, ATOM = range(4)
 """How tightly a piece of text holds together."""
+
+WIDEST = 110
+"""Columns of an assignment on one line."""
 
 OPTIONS = {Role.INLINED: ", forceinline=True", Role.CALLED: "", Role.ENTRY: ", cache=True"}
 """What Numba is told of a function."""
@@ -109,8 +113,8 @@ class Printer:
         match e:
             case Compare(sign, left, right):
                 return f"{self.text(left, TERM)} {sign} {self.text(right, TERM)}"
-            case Not(Name(text)):
-                return f"{self.words['not']}{text}"
+            case Not(condition):
+                return f"{self.words['not']}{self.text(condition, ATOM)}"
             case Junction(word, conditions):
                 named = ((isinstance(c, Name | Not), self.text(c)) for c in conditions)
                 return self.words[word].join(text if name else f"({text})" for name, text in named)
@@ -151,8 +155,8 @@ class Printer:
                 return [self.store(array, index, self.text(value))]
             case Accumulate(array, index, value):
                 return [self.accumulate(array, index, value)]
-            case Loop(index, start, stop, body):
-                return self.block(self.loop(index, start, stop), body)
+            case Loop() | Repeat():
+                return self.turns(s)
             case If(condition, body):
                 return self.block(f"if {self.text(condition)}", body)
             case Titled(title, body):
@@ -163,6 +167,12 @@ class Printer:
                 return [self.do(call)]
             case Return(values, remark):
                 return [f"return {', '.join(map(self.text, values))}{f'  # {remark}' if remark else ''}"]
+
+    def turns(self, s: Loop | Repeat) -> list[str]:
+        """Statements that run again and again."""
+        if isinstance(s, Loop):
+            return self.block(self.loop(s.index, s.start, s.stop, s.step), s.body)
+        return [*self.block("while True", s.body), f"    if not {self.text(s.condition)}:", "        break"]
 
     def array(self, name: str, size: str) -> str:
         """A new array."""
@@ -193,10 +203,10 @@ class Printer:
         """An addition to an element."""
         return f"{self.place(array, index)} += {self.text(value)}"
 
-    def loop(self, index: str, start: Expression, stop: Expression) -> str:
+    def loop(self, index: str, start: Expression, stop: Expression, step: int) -> str:
         """The head of a loop."""
-        begin = "" if start == Number(0) else f"{self.text(start)}, "
-        return f"for {index} in range({begin}{self.text(stop)})"
+        begin = "" if start == Number(0) and step == 1 else f"{self.text(start)}, "
+        return f"for {index} in range({begin}{self.text(stop)}{'' if step == 1 else f', {step}'})"
 
 
 class Lanes(Printer):
@@ -223,11 +233,30 @@ class Lanes(Printer):
             raise TypeError("arrays of lanes have one index; this is a mistake in the program")
         return self.store(array, index, self.text(plus(Load(array, index), value)))
 
+    def statement(self, s: Statement) -> list[str]:
+        """The lines of one statement; long sums and products are broken between words."""
+        lines = super().statement(s)
+        is_long = isinstance(s, Assign) and isinstance(s.value, Sum | Product) and len(lines[0]) > WIDEST
+        return broken(lines[0]) if is_long else lines
+
     def function(self, f: Function) -> str:
         """A function with its head."""
         options = "error_model='numpy'" + OPTIONS[f.role]
         head = [f"@njit({options})", f"def {f.name}({', '.join(f.arguments)}):", f'    """{f.about}"""']
         return "\n".join([*head, *(f"    {line}" for line in self.lines(f.body))])
+
+
+def broken(line: str) -> list[str]:
+    """An assignment on several lines."""
+    target, _, value = line.partition(" = ")
+    lines, row = [f"{target} = ("], "   "
+    for word in value.split(" "):
+        if len(row) + 1 + len(word) > WIDEST and word not in "+-":
+            sign = row[-2:] if row[-2:] in (" +", " -") else ""
+            lines.append(row.removesuffix(sign) if sign else row)
+            row = "   " + sign
+        row += f" {word}"
+    return [*lines, row, ")"]
 
 
 class NumPy(Printer):
@@ -288,9 +317,17 @@ class C(Printer):
         """An addition to an element."""
         return super().accumulate(array, index, value) + ";"
 
-    def loop(self, index: str, start: Expression, stop: Expression) -> str:
+    def loop(self, index: str, start: Expression, stop: Expression, step: int) -> str:
         """The head of a loop."""
-        return f"for (int {index} = {self.text(start)}; {index} < {self.text(stop)}; {index}++)"
+        sign, by = "<" if step > 0 else ">", "++" if step == 1 else f" += {step}"
+        return f"for (int {index} = {self.text(start)}; {index} {sign} {self.text(stop)}; {index}{by})"
+
+    def turns(self, s: Loop | Repeat) -> list[str]:
+        """Statements that run again and again."""
+        if isinstance(s, Loop):
+            return super().turns(s)
+        *lines, end = self.block("do", s.body)
+        return [*lines, f"{end} while ({self.text(s.condition)});"]
 
     def block(self, head: str, body: Iterable[Statement]) -> list[str]:
         """Statements in braces."""

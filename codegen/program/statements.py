@@ -20,6 +20,7 @@ __all__ = [
     "If",
     "Index",
     "Loop",
+    "Repeat",
     "Return",
     "Role",
     "Statement",
@@ -88,12 +89,21 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """Statements for each whole number from `start` up to `stop`."""
+    """Statements for each whole number from `start` up to `stop`, or down to it; `stop` is not one of them."""
 
     index: str
     start: Expression
     stop: Expression
     body: tuple[Statement, ...]
+    step: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Repeat:
+    """Statements that run once, and again as long as a condition holds behind them."""
+
+    body: tuple[Statement, ...]
+    condition: Expression
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +144,9 @@ class Return:
     remark: str = ""
 
 
-Statement: TypeAlias = Array | Identity | Assign | Store | Accumulate | Loop | If | Titled | Comment | Do | Return
+Statement: TypeAlias = (
+    Array | Identity | Assign | Store | Accumulate | Loop | Repeat | If | Titled | Comment | Do | Return
+)
 
 
 class Role(Enum):
@@ -180,7 +192,7 @@ def walk(statements: Iterable[Statement]) -> Iterator[Statement]:
     """Yield all statements, those of inner blocks too."""
     for statement in statements:
         yield statement
-        if isinstance(statement, Loop | If | Titled):
+        if isinstance(statement, Loop | Repeat | If | Titled):
             yield from walk(statement.body)
 
 

@@ -22,7 +22,7 @@ from synchain.models.mechanics.jumps import JUMPING, KINKED
 from ..program.expressions import ONE, ZERO, Expression, Name, Negation, Number
 from ..program.lowering import lower
 from ..program.passes import Names
-from ..program.printers import LANES
+from ..program.statements import Assign, let
 from .leaps import Leap, changing, leaping, templates, unpassed
 from .series import (
     Brink,
@@ -186,8 +186,8 @@ class Graph:
     watched : list of Series
         Those that can be small to all orders and large soon after, such as exp(-x**2) far from 0: no step is right behind
         the place where their terms stop falling, however small these are now.
-    constants : dict
-        The text of what depends on parameters alone, by the name under which it is computed once.
+    constants : list of Assign
+        What depends on parameters alone, computed once.
     """
 
     def __init__(self, names: Names) -> None:
@@ -195,7 +195,7 @@ class Graph:
         self.inline: set[Series] = set()
         self.inline_start: set[Series] = set()
         self.watched: list[Series] = []
-        self.constants: dict[str, str] = {}
+        self.constants: list[Assign] = []
         self.known: dict[tuple[object, ...], Series] = {}
         self.numbers: dict[Series, int] = {}
         self.fixed: dict[sp.Expr, Name] = {}
@@ -379,13 +379,14 @@ class Graph:
         number, rest = e.as_coeff_Mul()
         if number != 1:
             return times(self.constant(number), self.constant(rest))
-        return self.named(e, _text(e))
+        return self.named(e, lower(e))
 
-    def named(self, e: sp.Expr, text: str) -> Name:
+    def named(self, e: sp.Expr, value: Expression) -> Name:
         """The name of a constant, which is computed once."""
         if e not in self.fixed:
             name = self.fresh("p")
-            self.constants[name], self.fixed[e] = text, Name(name)
+            self.constants.append(let(name, value))
+            self.fixed[e] = Name(name)
         return self.fixed[e]
 
     def scaled(self, e: sp.Expr) -> tuple[Expression, Series]:
@@ -570,7 +571,3 @@ def _kinds(kind: type[Series]) -> Iterator[type[Series]]:
     for own in kind.__subclasses__():
         yield own
         yield from _kinds(own)
-
-
-def _text(e: sp.Expr) -> str:
-    return LANES.text(lower(e))

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..program.expressions import ZERO, Call, Expression, Name, Number
-from .terms import extreme, largest, statement, times
+from ..program.expressions import ZERO, Call, Expression, Name, Number, call
+from ..program.statements import Statement, let
+from .terms import absolute, extreme, largest, times
 
 __all__ = ["finished", "last_orders", "reach", "unseen"]
 
@@ -45,34 +46,36 @@ def reach(orders: Sequence[int]) -> Expression:
     return extreme("minimum", [times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))) for k in orders])
 
 
-def unseen(coefficients: Sequence[Expression]) -> list[str]:
+def unseen(coefficients: Sequence[Expression]) -> list[Statement]:
     """How much larger the high coefficients of a series are than its low ones, the largest so far."""
     half = len(coefficients) // 2
     low, high = (
-        [Call("absolute", (e,)) for k in places if (e := coefficients[k]) != ZERO]
+        [absolute(e) for k in places if (e := coefficients[k]) != ZERO]
         for places in ((*LOW, half - 1), range(half, len(coefficients)))
     )
     if not (low and high):
         return []
+    least = HIDDEN * Name("high") + LOST * Name("atol")
     return [
-        *statement("high", largest(high)),
-        *statement("low", largest(low)),
-        f"unseen = maximum(unseen, high/(low + ({HIDDEN!r}*high + {LOST!r}*atol)))",
+        let("high", largest(high)),
+        let("low", largest(low)),
+        let("unseen", call("maximum", "unseen", Name("high") / (Name("low") + least))),
     ]
 
 
-def finished(order: int, watched: bool, contacts: bool) -> list[str]:
+def finished(order: int, watched: bool, contacts: bool) -> list[Statement]:
     """The length of the step from the logarithm of its share of `scale`.
 
     No step goes on behind the place where the terms of a watched series stop falling.
     """
-    falling = ", ".join(f"{-1.0 / k!r}*log(unseen)" for k in (order - 2, order // 2))
+    falling = call("minimum", *(times(Number(-1.0 / k), call("log", "unseen")) for k in (order - 2, order // 2)))
     farthest = NEXT if watched and not contacts else FARTHEST
+    far = call("truncated", Name("scale") * call("exp", "reach"))
     return [
-        *([f"reach = minimum(reach, minimum({falling}))"] if watched else []),
+        *([let("reach", call("minimum", "reach", falling))] if watched else []),
         # weights are those of a step as long as `scale`; a shorter one changes the states less
-        f"reach = minimum(reach, {(order - 2) / (order - 4)!r}*reach)",
-        f"length = minimum(truncated(scale*exp(reach)), {farthest!r}*scale)",
-        "length = minimum(length, h)",
-        "ratio = length/scale",
+        let("reach", call("minimum", "reach", (order - 2) / (order - 4) * Name("reach"))),
+        let("length", call("minimum", far, farthest * Name("scale"))),
+        let("length", call("minimum", "length", "h")),
+        let("ratio", Name("length") / "scale"),
     ]

@@ -1,4 +1,4 @@
-"""The text of a Taylor step for a large network: loops over orders, nodes and links around the same recurrences.
+"""A Taylor step for a large network: loops over orders, nodes and links around the same recurrences.
 
 Behind the rows of the dense output stand the coefficients of the states, the rates of one order, and the coefficients of
 every series that a convolution reads: coefficient k of node i at `at_… + k*NODES + i`, of link e at `at_… + k*LINKS + e`, of
@@ -7,28 +7,28 @@ what depends on time alone at `at_… + k`.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Block, Edge, Node
 
-from ..program.expressions import ONE, ZERO, Expression, Name, Number
+from ..program.expressions import ONE, ZERO, Expression, Load, Name, Number, Product, call, factors_of, plus
 from ..program.passes import Hoist, Names, real
-from ..program.printers import LANES
-from ..program.statements import Assign
+from ..program.statements import Assign, Comment, If, Loop, Statement, Store, let, whole
 from ..steps.fields import MeanField, compensated, mean_fields
 from ..steps.names import NAMES
-from ..steps.places import Joint, Kind, Span, places
+from ..steps.places import Joint, Kind, Span, places, span
 from .graph import Graph, Template, check_jumps
 from .length import finished, last_orders, reach, unseen
 from .masses import moving, solved
-from .passage import Stored, closed, first_passage, functions, jumps, loose, settled, told
+from .passage import Stored, closed, first_passage, jumps, loose, settled, told
 from .series import Constant, Series, State, Time, magnitude
 from .step import TaylorStep, broken, called, returned
-from .terms import absolute, add, lane, largest, show, statement
+from .terms import absolute, add, lane, largest
 
 __all__ = ["write_looped"]
 
@@ -43,8 +43,14 @@ def convolution(dense, left, left_step, right, right_step, k, first, end):
 '''.strip()
 """Loops of its own in each sum would take most of the time of a compilation."""
 
-GAPS = ("i", "NODES + i")
+GAPS = (Name("i"), Name("NODES") + "i")
 """Where the two gaps of the contact of a node stand among those of one order."""
+
+START, ORDER = Number(0), Name("k")
+"""The order of the coefficients that a step begins with, and that of a loop over orders."""
+
+COUNTS = {"": Number(1), "i": Name("NODES"), "e": Name("LINKS")}
+"""How far the coefficients of a series of one order stand behind those of the last, by the loop that makes them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,29 +66,33 @@ class Hoisted:
 class Section:
     """What is done alike for all nodes of a kind, for all links of a joint, or once.
 
-    head, index, count: the loop, its variable and the number of its turns in the whole numbering; `setting` loads what the
-    turn needs at any order, `places` are the states that it reads, and where they stand, `lent` are series that other
-    sections need too, `gaps` those of contacts, or what links add to them, `mode` says whether these slip.
+    span, count: the loop and the number of its turns in the whole numbering; `setting` loads what the turn needs at any
+    order, `places` are the states that it reads, and where they stand, `rates` what it stores of those, `lent` are series
+    that other sections need too, `gaps` those of contacts, or what links add to them, `mode` says whether these slip.
     """
 
     graph: Graph
-    head: str = ""
-    index: str = ""
+    span: Span | None = None
     count: int = 1
-    setting: list[str] = field(default_factory=list)
-    places: dict[Series, str] = field(default_factory=dict)
-    rates: list[tuple[str, Series]] = field(default_factory=list)
-    lent: set[Series] = field(default_factory=set)
+    setting: list[Statement] = field(default_factory=list)
+    places: dict[Series, Expression] = field(default_factory=dict)
+    rates: list[tuple[Expression, Series]] = field(default_factory=list)
+    lent: list[Series] = field(default_factory=list)
     gaps: list[Series] = field(default_factory=list)
     mode: str = ""
     adds: bool = False
     waves: dict[Series, Section] = field(default_factory=dict)
     kept: list[str] = field(default_factory=list)
-    lines: list[str] = field(default_factory=list)
+    statements: list[Statement] = field(default_factory=list)
     values: dict[Series, Expression] = field(default_factory=dict)
     sums: int = 0
 
     # -- what a recurrence asks for -------------------------------------------------------------------------------
+
+    @property
+    def index(self) -> str:
+        """The variable of the loop, empty if there is none."""
+        return "" if self.span is None else self.span.index
 
     @property
     def inverse(self) -> Expression:
@@ -110,128 +120,126 @@ class Section:
 
     def before(self, series: Series) -> Expression:
         """Coefficient k - 1 of a series."""
-        return Name(self.load(series, "(k - 1)"))
+        return self.load(series, plus(ORDER, Number(-1)))
 
     def sum(self, left: Series, right: Series, first: int, last: int) -> Expression:
         """Sum of left_j * right_(k-j) for j = first … k + last."""
         total = f"s{self.sums}"
         self.sums += 1
-        end = {0: "k + 1", -1: "k"}[last]
-        ends = ", ".join(f"{self.where(s, '0')}, {self.stride(s)}" for s in (left, right))
-        self.lines.append(f"{total} = convolution(dense, {ends}, k, {first}, {end})")
+        ends = (part for s in (left, right) for part in (self.where(s, START), self.stride(s)))
+        end = ORDER + 1 if last == 0 else ORDER
+        self.put(let(total, call("convolution", "dense", *ends, ORDER, first, end)))
         return Name(total)
 
     def square(self, base: Series, first: int) -> Expression:
         """Sum of base_j * base_(k-j) for j = first … k - first."""
         return self.sum(base, base, first, -first)
 
-    def keep(self, what: str, value: Expression) -> str:
+    def keep(self, what: str, value: Expression) -> Name:
         """Compute something once; returns its name."""
         if what not in self.kept:
             self.kept.append(what)
-            self.lines += [*statement(what, value), f"store(dense, {self.slot(what, '0')}, {what} + 0.0*scale)"]
-        return what
+            self.put(let(what, value), Store("dense", self.slot(what, START), Name(what) + NOTHING))
+        return Name(what)
 
     def hint(self, series: Series) -> Expression:
         """The side of zero on which a series that begins at zero lies just after."""
-        return Name(f"load(dense, {self.slot(f'hint_{series.name}', '0')}, WIDTH)")
+        return Load("dense", self.slot(f"hint_{series.name}", START))
 
     # -- places ---------------------------------------------------------------------------------------------------
 
-    def slot(self, name: str, order: str) -> str:
+    def slot(self, name: str, order: Expression) -> Expression:
         """Where a coefficient of a series of this section stands."""
-        if not self.index:
-            return f"at_{name} + {order}"
-        size = "NODES" if self.index == "i" else "LINKS"
-        return f"at_{name} + {self.index}" if order == "0" else f"at_{name} + {order}*{size} + {self.index}"
+        if self.span is None:
+            return Name(f"at_{name}") + order
+        return at(name, order, COUNTS[self.index], Name(self.index))
 
-    def load(self, series: Series, order: str) -> str:
+    def load(self, series: Series, order: Expression) -> Expression:
         """A coefficient of a series from memory."""
-        return f"load(dense, {self.where(series, order)}, WIDTH)"
+        return Load("dense", self.where(series, order))
 
-    def where(self, series: Series, order: str) -> str:
+    def where(self, series: Series, order: Expression) -> Expression:
         """Where a coefficient of a series stands."""
         if series in self.places:
-            behind = "" if order == "0" else f"{order}*DIMENSION + "
-            return f"at_states + {behind}{self.places[series]}"
+            return at("states", order, Name("DIMENSION"), self.places[series])
         return self.waves.get(series, self).slot(series.name, order)
 
-    def stride(self, series: Series) -> str:
+    def stride(self, series: Series) -> Expression:
         """How far one coefficient of a series stands behind the last."""
-        if series in self.places:
-            return "DIMENSION"
-        return {"": "1", "i": "NODES", "e": "LINKS"}[self.waves.get(series, self).index]
+        return Name("DIMENSION") if series in self.places else COUNTS[self.waves.get(series, self).index]
 
     @property
     def remembered(self) -> set[Series]:
         """Series whose earlier coefficients are needed, or all that is made once for other sections."""
         used = {used for s in self.graph.series for used in s.convolved}
         used |= {*self.graph.watched, *self.graph.positive, *self.lent}
-        return (used - {*self.places, *self.waves}) | (set() if self.index else {s for _, s in self.rates})
+        return used - {*self.places, *self.waves}
 
-    # -- text -----------------------------------------------------------------------------------------------------
+    # -- statements -----------------------------------------------------------------------------------------------
 
-    def text(self, order: str) -> list[str]:
+    def put(self, *statements: Statement) -> None:
+        """Append statements."""
+        self.statements += statements
+
+    def coefficients(self, order: Expression) -> list[Statement]:
         """The statements for coefficients `order`: 0, or k for any later one."""
-        self.lines, first = list(self.setting), order == "0"
+        self.statements, first = list(self.setting), order == START
         outer = [*self.places, *self.waves]
         if not first:
-            self.lines += [f"{name} = load(dense, {self.slot(name, '0')}, WIDTH)" for name in self.kept]
-        self.lines += [f"{s.name} = {self.load(s, order)}" for s in outer]
+            self.put(*(let(name, Load("dense", self.slot(name, START))) for name in self.kept))
+        self.put(*(let(s.name, self.load(s, order)) for s in outer))
         self.values = {s: Name(s.name) for s in outer}
         remembered = self.remembered
         for s in self.graph.series:
             value = s.begin(self) if first else s.coefficient(self)
             inline = s in (self.graph.inline_start if first else self.graph.inline) and s not in remembered
             if not inline and not isinstance(value, Name | Number):
-                self.lines += statement(s.name, value)
+                self.put(let(s.name, value))
                 value = Name(s.name)
             self.values[s] = value
             if s in remembered:
-                self.lines.append(f"store(dense, {self.slot(s.name, order)}, {lane(value)})")
+                self.put(Store("dense", self.slot(s.name, order), lane(value)))
         self.finish(first)
-        return self.turns(self.lines)
+        return self.turns(self.statements)
 
     def finish(self, first: bool) -> None:
         """Append the statements that use coefficient 0, or k, of the rates."""
-        for place, rate in self.rates if self.index else ():
-            value = self.now(rate, first)
+        for place, rate in self.rates:
+            value, there = self.now(rate, first), plus(Name("at_rates"), place)
             if not self.adds:
-                text = f"{show(value)} + 0.0*scale" if isinstance(rate, Constant) else show(value)
-                self.lines.append(f"store(dense, at_rates + {place}, {text})")
+                self.put(Store("dense", there, value + NOTHING if isinstance(rate, Constant) else value))
             elif value != ZERO:
-                self.put(f"at_rates + {place}", value)
+                self.give(there, value)
         for place, gap in zip(GAPS, self.gaps, strict=False):
-            self.put(f"at_gaps + {place if first else f'k*2*NODES + {place}'}", self.now(gap, first))
+            self.give(of_gap(START if first else ORDER, place), self.now(gap, first))
             if first:
-                self.put(f"at_sizes + {place}", magnitude(self, gap))
+                self.give(plus(Name("at_sizes"), place), magnitude(self, gap))
 
-    def put(self, place: str, value: Expression) -> None:
+    def give(self, place: Expression, value: Expression) -> None:
         """Store a value, or add it to what other sections have stored."""
         if self.adds:
-            self.lines += statement("value", add(Name(f"load(dense, {place}, WIDTH)"), value))
-        self.lines.append(f"store(dense, {place}, {'value' if self.adds else lane(value)})")
+            self.put(let("value", add(Load("dense", place), value)), Store("dense", place, Name("value")))
+        else:
+            self.put(Store("dense", place, lane(value)))
 
-    def ends(self, order: int) -> list[str]:
+    def ends(self, order: int) -> list[Statement]:
         """The statements that make the step NaN where a series of this section has passed a zero that it cannot pass."""
-        found = []
+        found = list[Statement]()
         for s in self.graph.positive:
-            found += [f"value = {self.load(s, str(order - 1))}", f"for k in range({order - 2}, -1, -1):"]
-            found += [f"    value = value*ratio + {self.load(s, 'k')}", broken("value", self.load(s, "0"))]
+            found += polynomial("value", order - 1, partial(self.load, s))
+            found.append(broken(Name("value"), self.load(s, START)))
         return self.run(found)
 
-    def passages(self, degree: int, exact: bool) -> list[str]:
+    def passages(self, degree: int, exact: bool) -> list[Statement]:
         """The statements that end the step at the kinks and contacts of this section."""
-        found = []
+        found = list[Statement]()
         for kink in self.graph.kinks:
-            size = f"load(dense, {self.slot(kink.size, '0')}, WIDTH)"
-            stored = Stored(size, self.where(kink.base, "0"), self.stride(kink.base), degree)
-            found += kink.passages(self.load(kink, str(degree)), stored)
+            size = Load("dense", self.slot(kink.size.text, START))
+            stored = Stored(size, self.where(kink.base, START), self.stride(kink.base), degree)
+            found += kink.passages(self.load(kink, Number(degree)), stored)
         if self.mode:
-            sizes = [f"load(dense, at_sizes + {place}, WIDTH)" for place in GAPS]
-            places = [f"at_gaps + {place}" for place in GAPS]
-            found.append(f"stuck = 1.0 - {self.mode}*{self.mode}")
-            found += closed("stuck", exact, sizes, places, "2*NODES", "at_closing", degree)
+            gaps = [Stored(size_of_gap(place), of_gap(START, place), 2 * Name("NODES"), degree) for place in GAPS]
+            found += closed(self.mode, exact, gaps, "stuck", Name("at_closing"))
         return self.run(found)
 
     @property
@@ -239,60 +247,94 @@ class Section:
         """What the sides of series that begin on a jump are called."""
         return [f"hint_{brink.base.name}" for brink in self.graph.brinks]
 
-    def unknown(self) -> list[str]:
+    def unknown(self) -> list[Statement]:
         """The statements that forget these sides."""
-        return self.run([f"store(dense, {self.slot(hint, '0')}, 0.0*scale)" for hint in self.hints])
+        return self.run([Store("dense", self.slot(hint, START), NOTHING) for hint in self.hints])
 
-    def sides(self, degree: int) -> list[str]:
+    def sides(self, degree: int) -> list[Statement]:
         """The statements that take note of those that the coefficients tell."""
-        found = []
+        found = list[Statement]()
         for brink, hint in zip(self.graph.brinks, self.hints, strict=True):
-            begun, side = (self.load(brink, k) for k in ("0", str(degree)))
-            found += told(show(self.hint(brink.base)), begun, side, f"store(dense, {self.slot(hint, '0')}, {{1}})")
+            known = plus(self.hint(brink.base), Name("new"))
+            found += told(self.load(brink, START), self.load(brink, Number(degree)))
+            found.append(Store("dense", self.slot(hint, START), known))
         return self.run(found)
 
-    def lengths(self, order: int) -> list[str]:
+    def lengths(self, order: int) -> list[Statement]:
         """The statements that make the step no longer than the series of this section let it be."""
-        found = []
+        found = list[Statement]()
         for s in self.graph.gaps:
-            found += statement("largest", largest(absolute(Name(self.load(s, str(k)))) for k in range(3)))
-            found += weighed("rtol*largest", {k: self.load(s, str(k)) for k in last_orders(order)})
+            found.append(let("largest", largest(absolute(self.load(s, Number(k))) for k in range(3))))
+            found += weighed(Name("rtol") * "largest", order, partial(self.load, s))
         for place in GAPS if self.mode else ():
-            last = {k: f"load(dense, at_gaps + {k}*2*NODES + {place}, WIDTH)" for k in last_orders(order)}
-            found += weighed(f"loose*load(dense, at_sizes + {place}, WIDTH)", last)
+            found += weighed(Name("loose") * size_of_gap(place), order, partial(gap_at, place))
         for s in self.graph.watched:
-            found += unseen([Name(self.load(s, str(k))) for k in range(order)])
+            found += unseen([self.load(s, Number(k)) for k in range(order)])
         return self.run(found)
 
-    def run(self, lines: list[str]) -> list[str]:
+    def run(self, statements: list[Statement]) -> list[Statement]:
         """Statements, if there are any, that are run through behind what a turn needs."""
-        return self.turns([*self.setting, *lines]) if lines else []
+        return self.turns([*self.setting, *statements]) if statements else []
 
-    def turns(self, lines: list[str]) -> list[str]:
+    def turns(self, statements: list[Statement]) -> list[Statement]:
         """Statements that are run through in the section's loop."""
-        return [self.head, *(f"    {line}" for line in lines)] if self.index else lines
+        return statements if self.span is None else [self.span.over(statements)]
 
 
 @dataclass(slots=True)
 class Totals(Section):
-    """The sums over all nodes of some series, by their names in `rates`."""
+    """The sums over all nodes of some series, by their names."""
 
-    def text(self, order: str) -> list[str]:
+    totals: list[tuple[str, Series]] = field(default_factory=list)
+
+    def coefficients(self, order: Expression) -> list[Statement]:
         """The statements for coefficients `order`, with the sums before and behind the loop."""
-        names = [name for name, _ in self.rates]
-        before = [f"{name}{rest} = 0.0*scale" for name in names for rest in ("", "_rest")]
+        names = [name for name, _ in self.totals]
+        before = [let(f"{name}{rest}", NOTHING) for name in names for rest in ("", "_rest")]
+        behind = [Store("dense", Name(f"at_{name}") + order, Name(name)) for name in names]
         # a class with slots has no cell for super()
-        return [*before, *Section.text(self, order), *(f"store(dense, at_{name} + {order}, {name})" for name in names)]
+        return [*before, *Section.coefficients(self, order), *behind]
 
     def finish(self, first: bool) -> None:
         """Add the coefficients to the sums; those of a constant beyond the first are zero."""
-        for name, rate in self.rates:
+        for name, rate in self.totals:
             value = self.now(rate, first)
             if value != ZERO:
-                self.lines += [
-                    *statement(f"{name}_value", value),
-                    *LANES.lines(compensated(name, f"{name}_value")),
-                ]
+                self.put(let(f"{name}_value", value), *compensated(name, f"{name}_value"))
+
+
+NOTHING = 0.0 * Name("scale")
+"""Zeros in all lanes."""
+
+
+def at(name: str, order: Expression, stride: Expression, place: Expression) -> Expression:
+    """Where a coefficient of something stands in the workspace."""
+    behind = [] if order == START else [Product((order, *factors_of(stride)))]
+    return plus(Name(f"at_{name}"), *behind, place)
+
+
+def of_gap(order: Expression, place: Expression) -> Expression:
+    """Where a coefficient of the gap of a contact stands."""
+    return at("gaps", order, 2 * Name("NODES"), place)
+
+
+def gap_at(place: Expression, order: Expression) -> Expression:
+    """A coefficient of the gap of a contact."""
+    return Load("dense", of_gap(order, place))
+
+
+def size_of_gap(place: Expression) -> Expression:
+    """The size of the terms that the gap of a contact begins with."""
+    return Load("dense", plus(Name("at_sizes"), place))
+
+
+def polynomial(name: str, degree: int, coefficient: Callable[[Expression], Expression]) -> list[Statement]:
+    """The statements for the value of a polynomial in `ratio`."""
+    further = let(name, Name(name) * "ratio" + coefficient(ORDER))
+    return [
+        let(name, coefficient(Number(degree))),
+        Loop(ORDER.text, Number(degree - 1), Number(-1), (further,), step=-1),
+    ]
 
 
 def with_gaps(node: Node) -> list[sp.Expr]:
@@ -312,20 +354,17 @@ def with_pushes(joint: Joint) -> list[sp.Expr]:
     return [*edge.rhs, push, -push]
 
 
-def weighed(error: str, last: Mapping[int, str]) -> list[str]:
+def weighed(error: Expression, order: int, coefficient: Callable[[Expression], Expression]) -> list[Statement]:
     """Statements that let the last coefficients of something count, in units of the error that it may have."""
-    sizes = (f"size_{k} = maximum(size_{k}, absolute({value})*weight)" for k, value in last.items())
-    return [f"weight = 1.0/(atol + {error})", *sizes]
+    found: list[Statement] = [let("weight", 1.0 / (Name("atol") + error))]
+    for k in last_orders(order):
+        found.append(let(f"size_{k}", call("maximum", f"size_{k}", absolute(coefficient(Number(k))) * "weight")))
+    return found
 
 
 def theirs(edge: Edge) -> dict[sp.Symbol, sp.Symbol]:
     """What the parameters are called that a link takes of its source."""
     return {s: real(f"{own.name}_there") for s, own in edge.theirs}
-
-
-def head_of(span: Span) -> str:
-    """The head of the loop over a part of a numbering."""
-    return LANES.loop(span.index, span.start, span.stop) + ":"
 
 
 class LoopWriter:
@@ -348,8 +387,8 @@ class LoopWriter:
         nodes = [self.hoisted(with_gaps(kind.node), [*kind.node.state, *self.varied]) for kind in kinds]
         links = [self.of_links(joint.edge, with_pushes(joint)) for joint in joints]
         fields = [self.of_field(field) for field in self.fields]
-        self.waves.graph.settle([s for _, s in self.waves.rates])
-        if self.waves.rates:
+        self.waves.graph.settle(self.waves.lent)
+        if self.waves.lent:
             self.waves.waves[self.time] = self.waves
         self.sections = [self.waves, *map(self.node, kinds, nodes), *map(self.link, joints, links)]
         for mean, parts in zip(self.fields, fields, strict=True):
@@ -366,7 +405,7 @@ class LoopWriter:
 
     def node(self, kind: Kind, found: Hoisted) -> Section:
         """The rates of the nodes of a kind."""
-        node, section = kind.node, Section(Graph(self.names), head_of(kind.span), "i", self.equations.n)
+        node, section = kind.node, Section(Graph(self.names), kind.span, self.equations.n)
         moving, fixed = self.end(section, node.state, node, ("", "i"), node.state)
         used = {s for e in (*found.rates, *(e for row in node.inertia for e in row)) for s in e.free_symbols}
         section.setting += self.loaded(self.places.own(used))
@@ -394,8 +433,9 @@ class LoopWriter:
     def link(self, joint: Joint, found: Hoisted) -> Section:
         """What the links of a joint add."""
         edge, used = joint.edge, {s for e in found.rates for s in e.free_symbols}
-        section = Section(Graph(self.names), head_of(joint.span), "e", self.links, adds=True)
-        section.setting += ["i, j_there = target[e], source[e]", f"{self.called[edge.weight.name]} = weights[e]"]
+        section = Section(Graph(self.names), joint.span, self.links, adds=True)
+        i, j, weight = (Load(array, Name("e"), None) for array in ("target", "source", "weights"))
+        section.setting += [whole("i", i), whole("j_there", j), let(self.called[edge.weight.name], weight)]
         moving, fixed = self.end(section, edge.here, joint.target, ("_here", "i"), used)
         others, more = self.end(section, edge.there, joint.source, ("_there", "j_there"), used)
         section.setting += self.loaded(self.places.of_link(edge, used, "j_there"))
@@ -433,7 +473,7 @@ class LoopWriter:
                 section.places[moving[s]] = self.place(c, index)
             else:
                 fixed[s] = real(name)
-                section.setting.append(f"{name} = load(y, {self.place(c, index)}, WIDTH)")
+                section.setting.append(let(name, Load("y", self.place(c, index))))
         return moving, fixed
 
     def field(self, field: MeanField, sums: Hoisted, shared: Hoisted, rates: Hoisted) -> Iterator[Section]:
@@ -441,22 +481,22 @@ class LoopWriter:
 
         Source functions that are functions of the target too are series once.
         """
-        nodes = head_of(self.places.kinds[0].span)
-        totals = Totals(Graph(self.names), nodes, "i", self.equations.n)
+        nodes = self.places.kinds[0].span
+        totals = Totals(Graph(self.names), nodes, self.equations.n)
         used = {s for e in sums.rates for s in e.free_symbols}
         moving, fixed = self.field_end(totals, field, "_there", used)
         totals.setting += self.loaded(self.places.of_source(field.edge, used, "i"))
         moving |= self.seen(totals, self.waves, sums.waves)
         found = self.read(totals, sums.rates, moving, {**sums.constants, **fixed, **theirs(field.edge)})
-        totals.rates = [(s.name, series) for s, series in zip(field.sums, found, strict=True)]
+        totals.totals = [(s.name, series) for s, series in zip(field.sums, found, strict=True)]
         yield totals
         combined = Section(Graph(self.names))
         moving = self.seen(combined, self.waves, shared.waves)
         moving |= self.seen(combined, combined, {s: State(name=s.name) for s in field.sums})
         common = dict(zip(field.shared, self.read(combined, shared.rates, moving, shared.constants), strict=True))
-        combined.rates = [("", series) for series in common.values() if not isinstance(series, Constant)]
+        combined.lent += [series for series in common.values() if not isinstance(series, Constant)]
         yield combined
-        target = Section(Graph(self.names), nodes, "i", self.equations.n, adds=True)
+        target = Section(Graph(self.names), nodes, self.equations.n, adds=True)
         made = dict(zip(field.sums, found, strict=True))
         lent = {e: made[s] for s, e in field.alike.items() if made[s] in totals.graph.series}
         borrowed = {e: real(series.name) for e, series in lent.items()}
@@ -465,7 +505,7 @@ class LoopWriter:
         moving, fixed = self.field_end(target, field, "_here", used)
         target.setting += self.loaded(self.places.own(used))
         lent = {e: series for e, series in lent.items() if borrowed[e] in used}
-        totals.lent |= set(lent.values())
+        totals.lent += lent.values()
         moving |= self.seen(target, totals, {borrowed[e]: series for e, series in lent.items()})
         moving |= self.seen(target, combined, common) | self.seen(target, self.waves, rates.waves)
         self.store(target, field.node, self.read(target, wanted, moving, {**rates.constants, **fixed}))
@@ -491,18 +531,18 @@ class LoopWriter:
         section.waves |= dict.fromkeys(found.values(), other)
         return fixed | found
 
-    def place(self, c: int, index: str = "i") -> str:
+    def place(self, c: int, index: str = "i") -> Expression:
         """Where state c of a node stands."""
-        return LANES.text(self.places.place(c, index))
+        return self.places.place(c, index)
 
     def moves(self, node: Node) -> list[bool]:
         """Which states of a node move: one at rest, such as the mode of a contact, is a constant of the step."""
         edges = [joint.edge for joint in self.places.joints if joint.target == node]
         return moving(node, [*edges, *(field.edge for field in self.fields)])
 
-    def loaded(self, loads: Sequence[Assign]) -> list[str]:
-        """Lines that load parameters."""
-        return [f"{self.called.get(s.targets[0], s.targets[0])} = {LANES.text(s.value)}" for s in loads]
+    def loaded(self, loads: Sequence[Assign]) -> list[Statement]:
+        """Statements that load parameters."""
+        return [let(self.called.get(name, name), s.value) for s in loads for name in s.targets]
 
     def hoisted(self, given: Sequence[sp.Expr], moving: Sequence[sp.Symbol]) -> Hoisted:
         """Some rates with names for what depends on time and parameters, series for what depends on time, and the rest,
@@ -518,7 +558,7 @@ class LoopWriter:
                 continue
             template = Template.of([e], [TIME], self.names.fresh("shared_"))
             (waves[symbol],) = self.waves.graph.read(template, {TIME: self.time}, self.swap)
-            self.waves.rates.append(("", waves[symbol]))
+            self.waves.lent.append(waves[symbol])
         return Hoisted(rates, waves, constants)
 
     def read(
@@ -537,41 +577,50 @@ class LoopWriter:
         found, masses = found[:size], {divmod(k, size): e for k, e in enumerate(found[size:])}
         found = list((solved(graph, masses, dict(enumerate(found))) if masses else dict(enumerate(found))).values())
         graph.settle(found)
-        section.setting += [f"{name} = {text}" for name, text in graph.constants.items()]
+        section.setting += graph.constants
         return found
 
-    # -- text -------------------------------------------------------------------------------------------------
+    # -- statements -------------------------------------------------------------------------------------------
 
     def step(self) -> TaylorStep:
         """The step, which takes the graph and the weights of its links."""
-        eq = self.equations
-        orders, later = ([line for section in self.sections for line in section.text(k)] for k in "0k")
+        orders, later = ([s for section in self.sections for s in section.coefficients(k)] for k in (START, ORDER))
         bases, size = self.bases()
-        lines = [*bases, f"{', '.join(NAMES)} = graph", "LINKS = target.size"]
-        for slot, name in enumerate(eq.parameters, start=eq.dimension):
-            if name not in eq.single:
-                lines.append(f"{self.called[name]} = load(p, {slot}, WIDTH)")
-        lines += [f"{name} = {text}" for name, text in self.waves.graph.constants.items()]
-        head, lines = lines, ["# order 0", *self.states("store(dense, at_states + {0}, load(y, {0}, WIDTH))")]
-        if self.waves.rates:
-            lines += ["store(dense, at_t, t)", "store(dense, at_t + 1, scale)", f"for k in range(2, {self.order + 1}):"]
-            lines += ["    store(dense, at_t + k, 0.0*scale)"]
-        lines += [*orders, "# all further orders", f"for k in range(1, {self.orders}):"]
-        turn = ("number = 1.0*k", "inverse = 1.0/k", *self.next_states("inverse*scale", "k"), *later)
-        lines += [f"    {line}" for line in turn]
+        found: list[Statement] = [Comment("order 0"), *self.states(begun), *self.times(), *orders]
+        next_states = self.next_states(Name("inverse") * "scale", ORDER)
+        turn = [let("number", 1.0 * ORDER), let("inverse", 1.0 / ORDER), *next_states, *later]
+        found += [Comment("all further orders"), span("k", self.orders, 1).over(turn)]
         if not self.ends:
-            lines += self.next_states(f"{1.0 / self.order!r}*scale", str(self.order))
-        unknown = [line for section in self.sections for line in section.unknown()]
-        sides = [line for section in self.sections for line in section.sides(self.order)]
-        lines = [*head, *settled(unknown, lines, sides), *self.closing()]
-        before = [*functions(lines), CONVOLUTION]
-        return TaylorStep.of(lines, self.order, size, ", graph, weights", before)
+            found += self.next_states(1.0 / self.order * Name("scale"), Number(self.order))
+        unknown = [s for section in self.sections for s in section.unknown()]
+        sides = [s for section in self.sections for s in section.sides(self.order)]
+        body = [*bases, *self.opening(), *settled(unknown, found, sides), *self.closing()]
+        return TaylorStep.of(body, self.order, size, ("graph", "weights"), [CONVOLUTION])
 
-    def bases(self) -> tuple[list[str], int]:
+    def opening(self) -> list[Statement]:
+        """Load the graph and what is a parameter of the whole network."""
+        eq = self.equations
+        numbers = [(slot, name) for slot, name in enumerate(eq.parameters, start=eq.dimension) if name not in eq.single]
+        return [
+            Assign(NAMES, Name("graph"), whole=True),
+            whole("LINKS", Name("target.size")),
+            *(let(self.called[name], Load("p", Number(slot))) for slot, name in numbers),
+            *self.waves.graph.constants,
+        ]
+
+    def times(self) -> list[Statement]:
+        """The coefficients of time, if any function of time has a series."""
+        if not self.waves.lent:
+            return []
+        zeros = Store("dense", Name("at_t") + ORDER, NOTHING)
+        known = [Store("dense", Name("at_t"), Name("t")), Store("dense", Name("at_t") + 1, Name("scale"))]
+        return [*known, span("k", self.order + 1, 2).over([zeros])]
+
+    def bases(self) -> tuple[list[Statement], int]:
         """Where everything stands in the workspace, and how much it takes."""
         eq, p = self.equations, self.order
         sizes = {"states": (p + 1) * eq.dimension, "rates": eq.dimension}
-        if self.waves.rates:
+        if self.waves.lent:
             sizes["t"] = p + 1
         if eq.sticks:
             sizes |= {"gaps": (p + 1) * 2 * eq.n, "sizes": 2 * eq.n, "closing": p + 1}
@@ -580,59 +629,72 @@ class LoopWriter:
             sizes |= {name: self.orders * section.count for name in sorted(kept - {"t", ""})}
             sizes |= {name: section.count for name in (*section.kept, *section.hints)}
             if isinstance(section, Totals):
-                sizes |= {name: self.orders for name, _ in section.rates}
-        lines, size = [], 0
+                sizes |= {name: self.orders for name, _ in section.totals}
+        found, size = list[Statement](), 0
         for name, groups in sizes.items():
-            lines.append(f"at_{name} = DENSE_ROWS*DIMENSION + {size}")
+            found.append(whole(f"at_{name}", Name("DENSE_ROWS") * "DIMENSION" + size))
             size += groups
-        return lines, size
+        return found, size
 
-    def states(self, *lines: str) -> list[str]:
-        """Loops over all states; {0} is the place of one."""
-        return [
-            text
-            for span, place in self.places.rows
-            for text in (head_of(span), *(f"    {line.format(LANES.text(place))}" for line in lines))
-        ]
+    def states(self, body: Callable[[Expression], Iterable[Statement]]) -> list[Statement]:
+        """Loops over all states: what is done with the place of one."""
+        return [span.over(body(place)) for span, place in self.places.rows]
 
-    def next_states(self, factor: str, order: str) -> list[str]:
+    def next_states(self, factor: Expression, order: Expression) -> list[Statement]:
         """Coefficients of the states from those of the rates."""
+        scale = Name("slope_scale")
         return [
-            f"slope_scale = {factor}",
+            let(scale.text, factor),
             *self.states(
-                f"store(dense, at_states + {order}*DIMENSION + {{0}}, slope_scale*load(dense, at_rates + {{0}}, WIDTH))"
+                lambda p: [Store("dense", of_state(order, p), scale * Load("dense", plus(Name("at_rates"), p)))]
             ),
         ]
 
-    def closing(self) -> list[str]:
+    def closing(self) -> list[Statement]:
         """Step length, new state and dense output."""
-        p = self.order
-        at = "load(dense, at_states + {k}*DIMENSION + {{0}}, WIDTH)"
-        sections, contacts = self.sections, self.equations.sticks
-        watching, orders = any(section.graph.watched for section in sections), last_orders(p)
-        lines = ["# step length", *(f"size_{k} = 0.0*scale" for k in orders)]
-        largest = "absolute(load(y, {0}, WIDTH))"
-        for k in (1, 2):
-            largest = f"maximum({largest}, absolute({at.format(k=k)}))"
-        lines += self.states(*weighed(f"rtol*{largest}", {k: at.format(k=k) for k in orders}))
-        lines += ["unseen = 0.0*scale"] if watching else []
-        lines += [loose(self.exact)] if contacts else []
-        lines += [line for section in sections for line in section.lengths(p)]
-        lines += [f"reach = {show(reach(orders))}", *finished(p, watching, contacts)]
-        lines += first_passage([line for section in sections for line in section.passages(p, self.exact)])
-        lines += ["# new state", "total = 0.0*scale"]
-        lines += self.states(
-            f"new = {at.format(k=p)}",
-            f"for k in range({p - 1}, -1, -1):",
-            f"    new = new*ratio + {at.format(k='k')}",
-            "store(y_new, {0}, new)",
-            "total = total + new",
+        p, sections, contacts = self.order, self.sections, self.equations.sticks
+        watching = any(section.graph.watched for section in sections)
+        found: list[Statement] = [Comment("step length"), *(let(f"size_{k}", NOTHING) for k in last_orders(p))]
+        found += self.states(self.size)
+        found += [let("unseen", NOTHING)] if watching else []
+        found += [loose(self.exact)] if contacts else []
+        found += [s for section in sections for s in section.lengths(p)]
+        found += [let("reach", reach(last_orders(p))), *finished(p, watching, contacts)]
+        found += first_passage([s for section in sections for s in section.passages(p, self.exact)])
+        found += [Comment("new state"), let("total", NOTHING), *self.states(self.end_of)]
+        found += [s for section in sections for s in section.ends(p)]
+        rows = self.states(
+            lambda p: [Store("dense", plus((ORDER - 1) * Name("DIMENSION"), p), Name("raised") * state(ORDER, p))]
         )
-        lines += [line for section in sections for line in section.ends(p)]
-        lines += ["if DENSE:", "    raised = ratio", f"    for k in range(1, {p + 1}):"]
-        inner = self.states(f"store(dense, (k - 1)*DIMENSION + {{0}}, raised*{at.format(k='k')})")
-        lines += [f"        {line}" for line in (*inner, "raised = raised*ratio")]
-        return [*lines, returned(self.ends)]
+        raised = span("k", p + 1, 1).over([*rows, let("raised", Name("raised") * "ratio")])
+        return [*found, If(Name("DENSE"), (let("raised", "ratio"), raised)), returned(self.ends)]
+
+    def size(self, place: Expression) -> list[Statement]:
+        """Let the last coefficients of a state count, in units of its tolerance."""
+        largest: Expression = absolute(Load("y", place))
+        for k in (1, 2):
+            largest = call("maximum", largest, absolute(state(Number(k), place)))
+        return weighed(Name("rtol") * largest, self.order, lambda k: state(k, place))
+
+    def end_of(self, place: Expression) -> list[Statement]:
+        """The new value of a state."""
+        found = polynomial("new", self.order, lambda k: state(k, place))
+        return [*found, Store("y_new", place, Name("new")), let("total", Name("total") + "new")]
+
+
+def begun(place: Expression) -> list[Statement]:
+    """Coefficient 0 of a state."""
+    return [Store("dense", of_state(START, place), Load("y", place))]
+
+
+def of_state(order: Expression, place: Expression) -> Expression:
+    """Where a coefficient of a state stands."""
+    return at("states", order, Name("DIMENSION"), place)
+
+
+def state(order: Expression, place: Expression) -> Expression:
+    """A coefficient of a state."""
+    return Load("dense", of_state(order, place))
 
 
 def write_looped(equations: Equations, order: int) -> TaylorStep:

@@ -12,6 +12,10 @@ from typing import NamedTuple
 
 from synchain.models.dynamics.equations import Equations
 
+from ..program.expressions import ONE, Choice, Compare, Expression, Name, Negation, Number, Value, call, plus
+from ..program.statements import Comment, Repeat, Statement, called, let, mentioned
+from .terms import absolute
+
 __all__ = ["Stored", "closed", "first_passage", "functions", "jumps", "leapt", "loose", "passed", "settled", "told"]
 
 PASSAGE = '''
@@ -93,10 +97,13 @@ def found_side(begun, side):
     return select((absolute(begun) < 0.5) & (absolute(side) > 0.5), side, 0.0*side)
 '''.strip()
 
+FUNCTIONS = {PASSAGE: {"side_of", "passage", "closing"}, CLOSING: {"closing"}, SIDES: {"side_or", "found_side"}}
+"""What a step calls that needs some functions."""
+
 LATE = 1e-10
 """How late a body may be set free, as a part of the way that its load goes in a step, if slip begins without a jump."""
 
-SOONEST = "nearest = 1e-13*maximum(t, 1.0)/scale"
+SOONEST = let("nearest", 1e-13 * call("maximum", "t", 1.0) / "scale")
 """How soon a step may end at a contact or a jump."""
 
 
@@ -105,80 +112,84 @@ def jumps(equations: Equations) -> bool:
     return any(node.contact is not None and node.contact.jumps for node in equations.nodes)
 
 
-def loose(exact: bool) -> str:
+def loose(exact: bool) -> Statement:
     """The tolerance of loads.
 
     One that is wrong by some part sets a body free too early or late, with less than the power 3/2 of it as velocity, unless
     friction falls at once.
     """
-    return "loose = rtol" if exact else "loose = math.sqrt(rtol*math.sqrt(rtol))"
+    return let("loose", "rtol" if exact else call("math.sqrt", Name("rtol") * call("math.sqrt", "rtol")))
 
 
-def closed(
-    stuck: str, exact: bool, sizes: Sequence[str], places: Sequence[str], stride: str, room: str, order: int
-) -> list[str]:
-    """The statements that end a step where one of the two gaps of a contact closes, whose coefficients stand in memory."""
-    late = "0.0*t" if exact else f"{LATE!r}*{stuck}"
-    return [
-        f"passed = closing({side}, {late}, {size}, nearest, dense, {first}, {stride}, {room}, {order}, passed)"
-        for side, size, first in zip(("1.0 + 0.0*t", stuck), sizes, places, strict=True)
-    ]
+def closed(mode: str, exact: bool, gaps: Sequence[Stored], stuck: str, room: Expression) -> list[Statement]:
+    """The statements that end a step where one of the two gaps of a contact closes.
+
+    `stuck` is what they call 1 in stick, 0 in slip; `room` is memory for the coefficients of a gap.
+    """
+    late = 0.0 * Name("t") if exact else LATE * Name(stuck)
+    found: list[Statement] = [let(stuck, plus(ONE, Negation(Name(mode) * Name(mode))))]
+    for side, gap in zip((ONE + 0.0 * Name("t"), Name(stuck)), gaps, strict=True):
+        where = ("dense", gap.first, gap.stride, room, gap.order, "passed")
+        found.append(let("passed", call("closing", side, late, gap.size, "nearest", *where)))
+    return found
 
 
 class Stored(NamedTuple):
     """A series whose coefficients stand in memory: the size of the terms that it begins with, where, and how far apart."""
 
-    size: str
-    first: str
-    stride: str
+    size: Expression
+    first: Expression
+    stride: Expression
     order: int
 
-    @property
-    def arguments(self) -> str:
-        """The last arguments of the functions that find where it passes zero."""
-        return f"dense, {self.first}, {self.stride}, {self.order}, passed"
+    def passage(self, side: Expression, size: Expression, part: Value, nearest: Expression) -> Statement:
+        """The statement that ends a step where it passes zero."""
+        where = ("dense", self.first, self.stride, self.order, "passed")
+        return let("passed", call("passage", side, size, part, nearest, *where))
 
 
-def passed(side: str, series: Stored) -> str:
+def passed(side: Expression, series: Stored) -> list[Statement]:
     """The statement that ends a step where the series of a kink passes zero."""
-    return f"passed = passage({side}, {series.size}, PASSED, NEAREST*passed, {series.arguments})"
+    return [series.passage(side, series.size, "PASSED", Name("NEAREST") * "passed")]
 
 
-def leapt(side: str, series: Stored) -> list[str]:
+def leapt(side: Expression, series: Stored) -> list[Statement]:
     """The statements that end a step where a series passes a jump.
 
     A passage is as exact as rounding lets it be, of the way until there, not of that of a step without it.
     """
-    return 2 * [f"passed = passage({side}, 1e4*{series.size}, 2e-15, 0.01*nearest, {series.arguments})"]
+    return 2 * [series.passage(side, 1e4 * series.size, 2e-15, 0.01 * Name("nearest"))]
 
 
-def settled(hints: Sequence[str], coefficients: Sequence[str], sides: Sequence[str]) -> list[str]:
+def settled(
+    hints: Sequence[Statement], coefficients: Sequence[Statement], sides: Sequence[Statement]
+) -> list[Statement]:
     """The statements that make coefficients anew as long as they tell on which sides series lie that begin on a jump.
 
     Each turn tells one more side at least: what one jump sets off may leave the next one.
     """
     if not hints:
         return [*coefficients]
-    inner = [*coefficients, "# sides of jumps", "news = 0.0*t", *sides, "if not any_lane(news > 0.5):", "    break"]
-    return [*hints, "while True:", *(f"    {line}" for line in inner)]
+    inner = (*coefficients, Comment("sides of jumps"), let("news", 0.0 * Name("t")), *sides)
+    return [*hints, Repeat(inner, call("any_lane", Compare(">", Name("news"), Number(0.5))))]
 
 
-def told(hint: str, begun: str, side: str, write: str = "{0} = {1}") -> list[str]:
-    """The statements that take note of a side that the coefficients tell."""
-    return [f"new = found_side({begun}, {side})", "news = news + absolute(new)", write.format(hint, f"{hint} + new")]
+def told(begun: Expression, side: Expression) -> list[Statement]:
+    """The statements that find the side that the coefficients tell, `new`, and take note that there is one."""
+    return [let("new", call("found_side", begun, side)), let("news", Name("news") + absolute(Name("new")))]
 
 
-def first_passage(found: Sequence[str]) -> list[str]:
+def first_passage(found: Sequence[Statement]) -> list[Statement]:
     """The statements that end a step at the first of the passages that are `found` one after another."""
     if not found:
         return []
-    soonest = any("nearest" in line for line in found)
-    begun = ["# first passage", "passed = ratio", *([SOONEST] if soonest else [])]
-    return [*begun, *found, "until = select(passed < ratio, passed*scale, length)", "ratio = passed"]
+    until = Choice(Compare("<", Name("passed"), Name("ratio")), Name("passed") * "scale", Name("length"))
+    soonest = [SOONEST] if "nearest" in mentioned(found) else []
+    begun: list[Statement] = [Comment("first passage"), let("passed", "ratio"), *soonest]
+    return [*begun, *found, let("until", until), let("ratio", "passed")]
 
 
-def functions(statements: Sequence[str]) -> list[str]:
+def functions(statements: Sequence[Statement]) -> list[str]:
     """The functions that statements call which end a step."""
-    called = "\n".join(statements)
-    texts = {"passed = ": PASSAGE, "closing(": CLOSING, "found_side(": SIDES}
-    return [text for word, text in texts.items() if word in called]
+    names = called(statements)
+    return [text for text, those in FUNCTIONS.items() if names & those]

@@ -16,9 +16,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from ..program.expressions import ONE, ZERO, Call, Expression, Name, Number
+from ..program import expressions
+from ..program.expressions import ONE, ZERO, Call, Compare, Expression, Name, Number
+from ..program.statements import Statement
 from .passage import Stored, leapt, passed
-from .terms import absolute, add, over, show, times
+from .terms import absolute, add, over, times
 
 __all__ = ["Brink", "Choice", "Constant", "Fraction", "Integral", "Kink", "Leaping", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
            "Row", "Series", "Slope", "Square", "SquareRoot", "State", "Time", "Unknown",
@@ -58,7 +60,7 @@ class Start(Protocol):
     def start(self, series: Series) -> Expression:
         """Coefficient 0 of a series."""
 
-    def keep(self, what: str, value: Expression) -> str:
+    def keep(self, what: str, value: Expression) -> Name:
         """Compute something once; returns its name."""
 
     def hint(self, series: Series) -> Expression:
@@ -177,7 +179,7 @@ class SquareRoot(Series):
     """u = sqrt(a) from u u = a."""
 
     base: Series
-    inverse: str = ""
+    inverse: Expression = ONE
 
     @property
     def linear(self) -> tuple[Series, ...]:
@@ -193,7 +195,7 @@ class SquareRoot(Series):
         return root
 
     def coefficient(self, at: Order) -> Expression:
-        return times(add(at.of(self.base), times(Number(-1.0), at.square(self, 1))), Name(self.inverse))
+        return times(add(at.of(self.base), times(Number(-1.0), at.square(self, 1))), self.inverse)
 
 
 @dataclass(eq=False, slots=True)
@@ -202,7 +204,7 @@ class Ratio(Series):
 
     above: Series
     below: Series
-    inverse: str = ""
+    inverse: Expression = ONE
 
     @property
     def linear(self) -> tuple[Series, ...]:
@@ -214,11 +216,11 @@ class Ratio(Series):
 
     def begin(self, at: Start) -> Expression:
         self.inverse = at.keep(f"i_{self.below.name}", over(ONE, at.start(self.below)))
-        return times(at.start(self.above), Name(self.inverse))
+        return times(at.start(self.above), self.inverse)
 
     def coefficient(self, at: Order) -> Expression:
         known = at.sum(self.below, self, 1, 0)
-        return times(add(at.of(self.above), times(Number(-1.0), known)), Name(self.inverse))
+        return times(add(at.of(self.above), times(Number(-1.0), known)), self.inverse)
 
 
 @dataclass(eq=False, slots=True)
@@ -280,7 +282,7 @@ class SquaredSecant(Integral):
     """
 
     def begin(self, at: Start) -> Expression:
-        secant = Name(at.keep(f"i_{self.name}", over(ONE, Call("cosh", (at.start(self.argument),)))))
+        secant = at.keep(f"i_{self.name}", over(ONE, Call("cosh", (at.start(self.argument),))))
         return Call("maximum", (times(secant, secant), Number(FAINT)))
 
 
@@ -293,7 +295,7 @@ class QuotientIntegral(Series):
     divisor: Series
     sign: float
     slope: Slope | None = None
-    inverse: str = ""
+    inverse: Expression = ONE
 
     @property
     def linear(self) -> tuple[Series, ...]:
@@ -311,7 +313,7 @@ class QuotientIntegral(Series):
         if self.slope is None:
             raise RuntimeError(f"{self.name} has no slope yet; this is a mistake in the program")
         known = times(Number(-1.0), at.inverse, at.sum(self.slope, self.divisor, 1, -1))
-        return times(add(times(Number(self.sign), at.of(self.argument)), known), Name(self.inverse))
+        return times(add(times(Number(self.sign), at.of(self.argument)), known), self.inverse)
 
 
 @dataclass(eq=False, slots=True)
@@ -321,8 +323,8 @@ class Power(Series):
     base: Series
     slope: Slope
     exponent: Expression
-    inverse: str = ""
-    beyond: str = ""
+    inverse: Expression = ONE
+    beyond: Expression = ONE
 
     @property
     def convolved(self) -> tuple[Series, ...]:
@@ -335,8 +337,12 @@ class Power(Series):
         return Call("power", (base, self.exponent))
 
     def coefficient(self, at: Order) -> Expression:
-        grown = times(at.inverse, Name(self.beyond), at.sum(self.slope, self, 1, 0))
-        return times(add(grown, times(Number(-1.0), at.sum(self.base, self, 1, 0))), Name(self.inverse))
+        grown = times(at.inverse, self.beyond, at.sum(self.slope, self, 1, 0))
+        return times(add(grown, times(Number(-1.0), at.sum(self.base, self, 1, 0))), self.inverse)
+
+
+UNNAMED = Name("")
+"""What is not computed yet."""
 
 
 @dataclass(eq=False, slots=True)
@@ -348,7 +354,7 @@ class Kink(Series):
     """
 
     base: Series
-    size: str = ""
+    size: Name = UNNAMED
 
     @property
     def convolved(self) -> tuple[Series, ...]:
@@ -360,17 +366,18 @@ class Kink(Series):
 
     def side(self, at: Start) -> Expression:
         """The side on which it begins."""
-        return Call("side_of", (at.start(self.base), Name(f"ROUNDING*{self.size}")))
+        return Call("side_of", (at.start(self.base), Name("ROUNDING") * self.size))
 
     def coefficient(self, at: Order) -> Expression:
         side, value = at.before(self), at.of(self.base)
         if value == ZERO:
             return side
-        return Call("select", (Name(f"absolute({show(side)}) > 0.5"), side, Call("side_of", (value, ZERO))))
+        known = Compare(">", absolute(side), Number(0.5))
+        return expressions.Choice(known, side, Call("side_of", (value, ZERO)))
 
-    def passages(self, side: str, stored: Stored) -> list[str]:
+    def passages(self, side: Expression, stored: Stored) -> list[Statement]:
         """The statements that end a step where the series leaves its side (`passed`)."""
-        return [passed(side, stored)]
+        return passed(side, stored)
 
 
 @dataclass(eq=False, slots=True)
@@ -404,7 +411,7 @@ class Brink(Kink):
         """The side on which it begins."""
         return Call("side_or", (at.start(self.base), at.hint(self.base)))
 
-    def passages(self, side: str, stored: Stored) -> list[str]:
+    def passages(self, side: Expression, stored: Stored) -> list[Statement]:
         """The statements that end a step where the series leaves its side (`leapt`)."""
         return leapt(side, stored)
 
@@ -494,7 +501,7 @@ def _chosen(side: Expression, above: Expression, below: Expression) -> Expressio
         return above
     if above == times(Number(-1.0), below):
         return times(side, above)
-    return Call("select", (Name(f"{show(side)} > 0.0"), above, below))
+    return expressions.Choice(Compare(">", side, ZERO), above, below)
 
 
 def _one(side: Expression, above: Expression, middle: Expression, below: Expression) -> Expression:
@@ -502,7 +509,7 @@ def _one(side: Expression, above: Expression, middle: Expression, below: Express
         return _chosen(side, above, below) if middle == below else _chosen(times(Number(-1.0), side), below, above)
     if middle == ZERO and above == times(Number(-1.0), below):
         return times(side, above)
-    return Call("select", (Name(f"{show(side)} < 0.0"), below, _chosen(side, above, middle)))
+    return expressions.Choice(Compare("<", side, ZERO), below, _chosen(side, above, middle))
 
 
 @dataclass(eq=False, slots=True)
@@ -558,12 +565,12 @@ class Row(Series):
             left = other.upper.get(i, ZERO) if self.symmetric else left
             if left == ZERO:
                 continue
-            self.lower[k] = Name(at.keep(f"l_{self.name}_{k}", times(left, other.inverse)))
+            self.lower[k] = at.keep(f"l_{self.name}_{k}", times(left, other.inverse))
             for c, e in other.upper.items():
                 if c >= i or not self.symmetric:
                     row[c] = add(row.get(c, ZERO), times(Number(-1.0), self.lower[k], e))
-        self.inverse = Name(at.keep(f"i_{self.name}", over(ONE, row.pop(i))))
-        self.upper = {c: Name(at.keep(f"u_{self.name}_{c}", e)) for c, e in row.items() if e != ZERO}
+        self.inverse = at.keep(f"i_{self.name}", over(ONE, row.pop(i)))
+        self.upper = {c: at.keep(f"u_{self.name}_{c}", e) for c, e in row.items() if e != ZERO}
 
 
 @dataclass(eq=False, slots=True)

@@ -1,4 +1,4 @@
-"""The text of a Taylor step, written out for a small network."""
+"""A Taylor step, written out for a small network."""
 
 from __future__ import annotations
 
@@ -13,14 +13,16 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Edge, Node
 
-from ..program.expressions import ONE, ZERO, Expression, Name, Number
+from ..program.expressions import ONE, ZERO, Expression, Load, Name, Negation, Number, call, plus
 from ..program.passes import Names, real
+from ..program.printers import LANES
+from ..program.statements import Comment, Function, If, Return, Role, Statement, let, operations, store
 from .graph import STARTS, Graph, Template, check_jumps
 from .length import finished, last_orders, reach, unseen
 from .masses import moving, solved
 from .passage import Stored, closed, first_passage, functions, jumps, loose, settled, told
 from .series import Constant, Series, State, Time, magnitude
-from .terms import absolute, add, lane, largest, show, statement, times
+from .terms import absolute, add, lane, largest, over, times
 
 __all__ = [
     "LineWriter",
@@ -43,46 +45,57 @@ PREFIXES = ("positive_", "i_", "e_", "half_", "w_", "n_", "size_", "odd_", "stuc
 
 COUNTED = re.compile(r"[rs]\d+$")
 
+SQUARE = let("square", Name("ratio") * "ratio")
+
+ARGUMENTS = ("t", "h", "scale", "y", "p", "y_new", "dense", "rtol", "atol")
+
 
 @dataclass(frozen=True, slots=True)
 class TaylorStep:
-    """The text of the function `step` and what a kernel must know of it.
+    """The function `step` and what a kernel must know of it.
 
     order: that of the series, and the number of rows of the dense output; workspace: the groups of memory that it needs
-    behind the dense output.
+    behind the dense output; called: the text of functions that it calls.
     """
 
-    text: str
+    function: Function
     order: int
-    workspace: int = 0
-
-    @property
-    def operations(self) -> int:
-        """The number of additions, multiplications and divisions in the text."""
-        body = self.text.split('"""')[-1]
-        return sum(body.count(sign) for sign in (" + ", " - ", "*", "/"))
+    workspace: int
+    called: tuple[str, ...] = ()
 
     @classmethod
     def of(
         cls,
-        lines: Sequence[str],
+        body: Sequence[Statement],
         order: int,
-        workspace: int = 0,
-        more: str = "",
-        before: Sequence[str] = (),
+        workspace: int,
+        more: Sequence[str] = (),
+        called: Sequence[str] = (),
     ) -> TaylorStep:
-        """The step of some statements, behind functions that they call."""
-        head = [
-            *(line for text in before for line in (text, "", "")),
-            "@njit(error_model='numpy', cache=True)",
-            f"def step(t, h, scale, y, p, y_new, dense, rtol, atol{more}):",
-            '    """One step from (t, y): writes y_new and the dense output, returns its length and how far its series reach."""',
-        ]
-        return cls("\n".join([*head, *(f"    {line}" for line in lines)]), order, workspace)
+        """The step of some statements, which takes `more` arguments."""
+        about = (
+            "One step from (t, y): writes y_new and the dense output, returns its length and how far its series reach."
+        )
+        return cls(
+            Function("step", (*ARGUMENTS, *more), about, tuple(body), Role.ENTRY),
+            order,
+            workspace,
+            (*functions(body), *called),
+        )
+
+    @property
+    def text(self) -> str:
+        """The step and what it calls, as a kernel has them."""
+        return "\n\n\n".join([*self.called, LANES.function(self.function)])
+
+    @property
+    def operations(self) -> int:
+        """The number of additions, multiplications and divisions of the step."""
+        return operations(self.function.body)
 
 
 class LineWriter:
-    """Writes the coefficients of series as straight lines; it is the `Order` and the `Start` of their recurrences.
+    """Writes the coefficients of series one after another; it is the `Order` and the `Start` of their recurrences.
 
     Attributes
     ----------
@@ -92,8 +105,8 @@ class LineWriter:
         What is looked at for a zero, beside kinks.
     values : dict
         The coefficients so far, as names and numbers, by series and order.
-    lines : list of str
-        The statements so far.
+    statements : list of Statement
+        Those so far.
     """
 
     def __init__(self, graph: Graph, order: int) -> None:
@@ -102,7 +115,7 @@ class LineWriter:
         self.gaps: list[Series] = []
         self.values: dict[tuple[Series, int], Expression] = {}
         self.kept: set[str] = set()
-        self.lines: list[str] = []
+        self.statements: list[Statement] = []
 
     # -- what a recurrence asks for -------------------------------------------------------------------------------
 
@@ -153,40 +166,40 @@ class LineWriter:
         middle = self.at(base, k // 2) if k % 2 == 0 and k // 2 >= first else ZERO
         return add(times(middle, middle), times(Number(2.0), half))
 
-    def keep(self, what: str, value: Expression) -> str:
+    def keep(self, what: str, value: Expression) -> Name:
         """Compute something once; returns its name."""
         if what not in self.kept:
             self.kept.add(what)
-            self.put(*statement(what, value))
-        return what
+            self.put(let(what, value))
+        return Name(what)
 
-    def hint(self, series: Series) -> Expression:
+    def hint(self, series: Series) -> Name:
         """The side of zero on which a series that begins at zero lies just after."""
         return Name(f"hint_{series.name}")
 
     # -- statements -----------------------------------------------------------------------------------------------
 
-    def put(self, *lines: str) -> None:
-        """Append lines of text."""
-        self.lines += lines
+    def put(self, *statements: Statement) -> None:
+        """Append statements."""
+        self.statements += statements
 
     def name(self, series: Series, value: Expression, inlined: Collection[Series] = ()) -> None:
         """Name coefficient k of a series, unless it is a name or a number or is written where it is used."""
         if series not in inlined and not isinstance(value, Name | Number):
             name = f"{series.name}_{self.k}"
-            self.put(*statement(name, value))
+            self.put(let(name, value))
             value = Name(name)
         self.values[series, self.k] = value
 
     def opening(self) -> None:
         """Compute the first coefficients of all series from those of the states."""
-        self.put("# order 0")
+        self.put(Comment("order 0"))
         for s in self.graph.series:
             self.name(s, s.begin(self), self.graph.inline_start)
 
     def coefficients(self, k: int) -> None:
         """Compute coefficients k of the states and of all series; in the last order of those alone that end steps."""
-        self.put(f"# order {k}", f"r{k} = {show(times(Number(1.0 / k), Name('scale')))}")
+        self.put(Comment(f"order {k}"), let(f"r{k}", times(Number(1.0 / k), Name("scale"))))
         slopes = [self.at(rate, k - 1) for rate in self.rates.values()]
         self.k = k
         for state, slope in zip(self.rates, slopes, strict=True):
@@ -208,15 +221,14 @@ class Gaps:
         """What the sizes of the terms that they begin with are called."""
         return [f"size_{self.mode}_{word}" for word in ("rise", "fall")]
 
-    def closings(self, at: LineWriter, order: int, first: int, exact: bool) -> list[str]:
+    def closings(self, at: LineWriter, order: int, first: int, exact: bool) -> list[Statement]:
         """End the step where one of them closes."""
-        stuck, rows, size = f"stuck_{self.mode}", range(order + 1), order + 1
-        stored = [lane(at.at(series, k)) for series in self.series for k in rows]
-        places = [str(first), str(first + size)]
+        stored = [lane(at.at(series, k)) for series in self.series for k in range(order + 1)]
+        places = [Number(first + k * (order + 1)) for k in range(3)]
+        gaps = [Stored(Name(size), at, Number(1), order) for size, at in zip(self.sizes, places, strict=False)]
         return [
-            f"{stuck} = 1.0 - {self.mode}*{self.mode}",
-            *(f"store(dense, {first + k}, {value})" for k, value in enumerate(stored)),
-            *closed(stuck, exact, self.sizes, places, "1", str(first + 2 * size), order),
+            *(store("dense", first + k, value) for k, value in enumerate(stored)),
+            *closed(self.mode, exact, gaps, f"stuck_{self.mode}", places[-1]),
         ]
 
 
@@ -315,7 +327,7 @@ class StepWriter(LineWriter):
 
     # -- statements -----------------------------------------------------------------------------------------------
 
-    def step(self, more: str = "") -> TaylorStep:
+    def step(self, *more: str) -> TaylorStep:
         """The step, which takes `more` arguments."""
         self.opening()
         for k in range(1, self.order + 1):
@@ -326,16 +338,15 @@ class StepWriter(LineWriter):
         self.put(*passages)
         self.closing(bool(passages))
         room = 3 * (self.order + 1) if self.gaps else self.order + 1 if passages else 0
-        before = functions(self.lines)
-        return TaylorStep.of(self.lines, self.order, room, more, before)
+        return TaylorStep.of(self.statements, self.order, room, more)
 
     def opening(self) -> None:
         """Load states and parameters, compute constants and first coefficients."""
         eq = self.equations
-        self.put(*(f"{self.called[name]} = load(y, {slot}, WIDTH)" for slot, name in enumerate(eq.state)))
+        self.put(*(let(self.called[name], Load("y", Number(slot))) for slot, name in enumerate(eq.state)))
         for slot, name in enumerate(eq.parameters, start=eq.dimension):
-            self.put(f"{self.called[name]} = load(p, {slot}, WIDTH)")
-        self.put(*(f"{name} = {text}" for name, text in self.graph.constants.items()))
+            self.put(let(self.called[name], Load("p", Number(slot))))
+        self.put(*self.graph.constants)
         for slot, state in self.states.items():
             self.values[state, 0] = Name(self.called[eq.state[slot]])
         super().opening()
@@ -345,10 +356,12 @@ class StepWriter(LineWriter):
 
     def settle(self) -> None:
         """Let the coefficients tell on which sides series lie that begin on a jump."""
-        hints = {brink: show(self.hint(brink.base)) for brink in self.graph.brinks}
-        sides = [told(hint, *(show(self.at(brink, k)) for k in (0, self.order))) for brink, hint in hints.items()]
-        zeros = [f"{hint} = 0.0*t" for hint in hints.values()]
-        self.lines = settled(zeros, self.lines, [line for lines in sides for line in lines])
+        zeros, sides = list[Statement](), list[Statement]()
+        for brink in self.graph.brinks:
+            hint = self.hint(brink.base)
+            zeros.append(let(hint.text, 0.0 * Name("t")))
+            sides += [*told(self.at(brink, 0), self.at(brink, self.order)), let(hint.text, hint + "new")]
+        self.statements = settled(zeros, self.statements, sides)
 
     def state_at(self, slot: int, k: int) -> Expression:
         """Coefficient k of a state."""
@@ -359,38 +372,38 @@ class StepWriter(LineWriter):
     def length(self) -> None:
         """The length of the step."""
         sizes: dict[int, list[Expression]] = {k: [] for k in last_orders(self.order)}
-        self.put("# step length")
+        self.put(Comment("step length"))
         for series in (*self.states.values(), *self.graph.gaps):
             if any(self.at(series, k) != ZERO for k in sizes):
                 low = largest(absolute(e) for k in range(3) if (e := self.at(series, k)) != ZERO)
-                self.weigh(sizes, series, f"w_{series.name}", f"rtol*{show(low)}")
+                self.weigh(sizes, series, f"w_{series.name}", Name("rtol") * low)
         self.put(*([loose(self.exact)] if self.contacts else []))
         for gaps in self.contacts:
             for series, size in zip(gaps.series, gaps.sizes, strict=True):
-                self.weigh(sizes, series, f"w_{size}", f"loose*{size}")
+                self.weigh(sizes, series, f"w_{size}", Name("loose") * size)
         for k, found in sizes.items():
-            self.put(*(statement(f"size_{k}", largest(found)) if found else []))
+            self.put(*([let(f"size_{k}", largest(found))] if found else []))
         known = [k for k, found in sizes.items() if found]
-        self.put(*statement("reach", reach(known) if known else Name("-log(0.0*scale)")))
+        self.put(let("reach", reach(known) if known else Negation(call("log", 0.0 * Name("scale")))))
         if self.graph.watched:
-            self.put("unseen = 0.0*scale")
+            self.put(let("unseen", 0.0 * Name("scale")))
             for s in self.graph.watched:
                 self.put(*unseen([self.at(s, k) for k in range(self.order)]))
         self.put(*finished(self.order, bool(self.graph.watched), self.equations.sticks))
 
-    def weigh(self, sizes: Mapping[int, list[Expression]], series: Series, weight: str, error: str) -> None:
+    def weigh(self, sizes: Mapping[int, list[Expression]], series: Series, weight: str, error: Expression) -> None:
         """Append how large the last coefficients of a series are, in units of the error that it may have."""
-        self.put(f"{weight} = 1.0/(atol + {error})")
+        self.put(let(weight, 1.0 / (Name("atol") + error)))
         for k, found in sizes.items():
             if (e := self.at(series, k)) != ZERO:
                 found.append(times(absolute(e), Name(weight)))
 
-    def passages(self) -> list[str]:
+    def passages(self) -> list[Statement]:
         """The statements that end the step where a series passes a kink or closes a contact."""
-        first, p, found = self.order * self.equations.dimension, self.order, list[str]()
+        first, p, found = self.order * self.equations.dimension, self.order, list[Statement]()
         for kink in self.graph.kinks:
-            found += (f"store(dense, {first + k}, {lane(self.at(kink.base, k))})" for k in range(p + 1))
-            found += kink.passages(show(self.at(kink, p)), Stored(kink.size, str(first), "1", p))
+            found += (store("dense", first + k, lane(self.at(kink.base, k))) for k in range(p + 1))
+            found += kink.passages(self.at(kink, p), Stored(kink.size, Number(first), Number(1), p))
         for gaps in self.contacts:
             found += gaps.closings(self, p, first, self.exact)
         return found
@@ -398,48 +411,47 @@ class StepWriter(LineWriter):
     def closing(self, ends: bool) -> None:
         """The new state, the dense output, and the length of a step that may have come to an end."""
         p, eq = self.order, self.equations
-        self.put("# new state", "square = ratio*ratio")
+        self.put(Comment("new state"), SQUARE)
         for slot, name in enumerate(self.names):
-            self.put(
-                *polynomial(name, [self.state_at(slot, k) for k in range(p + 1)]), f"store(y_new, {slot}, n_{name})"
-            )
-        self.put(f"total = {' + '.join(f'n_{name}' for name in self.names)}")
+            self.put(*polynomial(name, [self.state_at(slot, k) for k in range(p + 1)]))
+            self.put(store("y_new", slot, f"n_{name}"))
+        self.put(let("total", plus(*(Name(f"n_{name}") for name in self.names))))
         for which, s in enumerate(self.graph.positive):
             self.put(*polynomial(f"positive_{which}", [self.at(s, k) for k in range(p)]))
-            self.put(broken(f"n_positive_{which}", show(times(ONE, self.at(s, 0)))))
-        self.put("if DENSE:")
+            self.put(broken(Name(f"n_positive_{which}"), times(ONE, self.at(s, 0))))
+        rows = list[Statement]()
         for k in range(1, p + 1):
-            self.put(f"    raised = {'ratio' if k == 1 else 'raised*ratio'}")
+            rows.append(let("raised", "ratio" if k == 1 else Name("raised") * "ratio"))
             for slot in range(eq.dimension):
-                e = self.state_at(slot, k)
-                value = "0.0*raised" if e == ZERO else show(times(e, Name("raised")))
-                self.put(f"    store(dense, {(k - 1) * eq.dimension + slot}, {value})")
-        self.put(returned(ends))
+                e, place = self.state_at(slot, k), (k - 1) * eq.dimension + slot
+                value = e * Name("raised") if e == ZERO else times(e, Name("raised"))
+                rows.append(store("dense", place, value))
+        self.put(If(Name("DENSE"), tuple(rows)), returned(ends))
 
 
-def broken(end: str, start: str) -> str:
-    """The text that makes a step NaN if a series that cannot pass zero has done so: a root of a polynomial may be one."""
-    return f"total = total + 0.0*log({end}/({start}))"
+def broken(end: Expression, start: Expression) -> Statement:
+    """The statement that makes a step NaN if a series that cannot pass zero has done so: a root of a polynomial may be one."""
+    return let("total", Name("total") + 0.0 * call("log", over(end, start)))
 
 
-def polynomial(name: str, coefficients: Sequence[Expression]) -> list[str]:
-    """The lines for n_<name>, a polynomial in `ratio`: two in ratio**2 of half the degree are ready sooner than one."""
+def polynomial(name: str, coefficients: Sequence[Expression]) -> list[Statement]:
+    """The statements for n_<name>, a polynomial in `ratio`: two in ratio**2 of half the degree are ready sooner than one."""
     start, *known = coefficients
-    lines: list[str] = []
-    odd, even = _horner(lines, f"odd_{name}", known[::2]), _horner(lines, f"n_{name}", known[1::2])
+    found = list[Statement]()
+    odd, even = _horner(found, f"odd_{name}", known[::2]), _horner(found, f"n_{name}", known[1::2])
     slope = add(times(even, Name("ratio")), odd)
-    return [*lines, f"n_{name} = {show(add(times(slope, Name('ratio')), start))}"]
+    return [*found, let(f"n_{name}", add(times(slope, Name("ratio")), start))]
 
 
-def _horner(lines: list[str], name: str, coefficients: Sequence[Expression]) -> Expression:
-    """A polynomial in ratio**2, its lines appended."""
+def _horner(found: list[Statement], name: str, coefficients: Sequence[Expression]) -> Expression:
+    """A polynomial in ratio**2, its statements appended."""
     known = list(coefficients)
     while known and known[-1] == ZERO:
         known.pop()
     if not known:
         return ZERO
-    lines.append(f"{name} = {show(known.pop())}")
-    lines += [f"{name} = {show(add(times(Name(name), Name('square')), e))}" for e in reversed(known)]
+    found.append(let(name, known.pop()))
+    found += [let(name, add(times(Name(name), Name("square")), e)) for e in reversed(known)]
     return Name(name)
 
 
@@ -469,9 +481,10 @@ def check_order(order: int) -> None:
         raise ValueError(f"taylor: found order {order}; expected at least 6")
 
 
-def returned(ends: bool) -> str:
+def returned(ends: bool) -> Statement:
     """What a step returns; one that ends where a series passes zero goes `until` there."""
-    return f"return {'until' if ends else 'length'}, length + 0.0*total  # NaN where any coefficient is infinite or NaN"
+    reach = Name("length") + 0.0 * Name("total")
+    return Return((Name("until" if ends else "length"), reach), "NaN where any coefficient is infinite or NaN")
 
 
 def called(words: Collection[str]) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""The text of a Taylor step of an orbit and of the deviations along it.
+"""A Taylor step of an orbit and of the deviations along it.
 
 The tangent of a Taylor step is the Taylor step of orbit and deviation together. Of d' = A d the coefficients are
 d_(k+1) = scale/(k+1) sum_j A_j d_(k-j), and the series of A belongs to the orbit: a step of the orbit leaves it in a short
@@ -16,14 +16,16 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation
 
-from ..program.expressions import ZERO, Expression, Name, Number
+from ..program.expressions import ZERO, Compare, Expression, Junction, Load, Name, Not, Number, Power, call, plus
 from ..program.lowering import lower
 from ..program.passes import Names
+from ..program.printers import LANES
+from ..program.statements import Comment, Function, If, Return, Role, let, store
 from .graph import Graph, Template, is_analytic
 from .length import last_orders, reach
 from .series import Series, State
-from .step import LineWriter, StepWriter, TaylorStep, check_order, polynomial
-from .terms import absolute, add, largest, show, times
+from .step import SQUARE, LineWriter, StepWriter, TaylorStep, check_order, polynomial
+from .terms import absolute, add, largest, times
 
 __all__ = ["TangentStep", "write_tangent"]
 
@@ -54,11 +56,8 @@ def carry(shared, strengths, old, new, registers, tolerance):
 '''.strip()
 
 
-HEADING = (
-    "@njit(error_model='numpy')",
-    "def mode_step(shared, strengths, old, new, which, longest, tolerance):",
-    '    """Step the modes in one register by at most `longest`; returns the length, which may be shorter."""',
-)
+LEAST = 2.2250738585072014e-308
+"""The smallest number of full precision."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +107,7 @@ class OrbitWriter(StepWriter):
     def opening(self) -> None:
         """Compute the first coefficients of all series."""
         super().opening()
-        self.put("store(shared, 0, scale)")
+        self.put(store("shared", 0, "scale"))
         self.leave()
 
     def coefficients(self, k: int) -> None:
@@ -123,7 +122,7 @@ class OrbitWriter(StepWriter):
             name, value = f"a{which}_{self.k}", self.of(series)
             if not isinstance(value, Number):
                 self.places[name] = HEAD + len(self.places)
-                self.put(f"store(shared, {self.places[name]}, {show(value)})")
+                self.put(store("shared", self.places[name], value))
                 value = Name(name)
             self.left[f"a{which}", self.k] = value
 
@@ -136,10 +135,10 @@ class ModeWriter(LineWriter):
         self.size, self.called_so, strengths = variation.size, orbit.called_so, variation.parameters
         self.outer = {name: State(name=name) for name in orbit.called_so.values()}
         self.values |= {(self.outer[name], k): value for (name, k), value in orbit.left.items()}
-        self.put(f"scale = {_shared(0)}")
-        self.put(*(f"{s.name} = load(strengths, {_place(len(strengths), k)}, LANES)" for k, s in enumerate(strengths)))
-        self.put(*(f"d{c}_0 = load(old, {_place(self.size, c)}, LANES)" for c in range(self.size)))
-        self.put(*(f"{name} = {_shared(place)}" for name, place in orbit.places.items()))
+        self.put(let("scale", _shared(0)))
+        self.put(*(let(s.name, _of_modes("strengths", len(strengths), k)) for k, s in enumerate(strengths)))
+        self.put(*(let(f"d{c}_0", _of_modes("old", self.size, c)) for c in range(self.size)))
+        self.put(*(let(name, _shared(place)) for name, place in orbit.places.items()))
         deviations = [State(name=f"d{c}") for c in range(self.size)]
         self.values |= {(d, 0): Name(f"{d.name}_0") for d in deviations}
         self.rates = {d: self.rate(variation, row, deviations) for row, d in enumerate(deviations)}
@@ -159,7 +158,7 @@ class ModeWriter(LineWriter):
                 else:
                     fixed = add(fixed, times(factor, self.start(series)))
             if not isinstance(fixed, Number | Name):  # what each order multiplies by is made once
-                self.put(f"g{r}_{c} = {show(fixed)}")
+                self.put(let(f"g{r}_{c}", fixed))
                 fixed = Name(f"g{r}_{c}")
             if fixed != ZERO:
                 terms.append((fixed, deviations[c]))
@@ -169,36 +168,45 @@ class ModeWriter(LineWriter):
         """True if any later coefficient of a series is not zero."""
         return any(self.at(series, k) != ZERO for k in range(1, self.order))
 
-    def write(self) -> str:
+    def write(self) -> Function:
         """The function `mode_step`."""
         self.opening()
         for k in range(1, self.order + 1):
             self.coefficients(k)
         self.length()
-        self.put("# new deviation", "square = ratio*ratio")
+        self.put(Comment("new deviation"), SQUARE)
         for c, d in enumerate(self.rates):
             self.put(*polynomial(d.name, [self.at(d, k) for k in range(self.order + 1)]))
-            self.put(f"store(new, {_place(self.size, c)}, n_{d.name})")
-        self.put(f"total = {' + '.join(f'absolute(n_{d.name})' for d in self.rates)}")
-        self.put("return math.nan if any_lane(~(total < math.inf)) else length")
-        return "\n".join([*HEADING, *(f"    {line}" for line in self.lines)])
+            self.put(store("new", _place(self.size, c), f"n_{d.name}"))
+        self.put(let("total", plus(*(absolute(Name(f"n_{d.name}")) for d in self.rates))))
+        broken = Not(Compare("<", Name("total"), Name("math.inf")))
+        self.put(If(call("any_lane", broken), (Return((Name("math.nan"),)),)), Return((Name("length"),)))
+        return Function(
+            "mode_step",
+            ("shared", "strengths", "old", "new", "which", "longest", "tolerance"),
+            "Step the modes in one register by at most `longest`; returns the length, which may be shorter.",
+            tuple(self.statements),
+            Role.CALLED,
+        )
 
     def length(self) -> None:
         """The length of the step: the last three coefficients are small beside the deviation at its beginning."""
-        self.put("# step length", f"size = {show(largest(absolute(self.at(d, 0)) for d in self.rates))}")
-        self.put("weight = 1.0/(tolerance*size + 2.2250738585072014e-308)")
+        self.put(Comment("step length"), let("size", largest(absolute(self.at(d, 0)) for d in self.rates)))
+        self.put(let("weight", 1.0 / (Name("tolerance") * "size" + LEAST)))
         found = {k: [absolute(e) for d in self.rates if (e := self.at(d, k)) != ZERO] for k in last_orders(self.order)}
         known = [k for k, last in found.items() if last]
-        self.put(*(f"size_{k} = {show(times(largest(found[k]), Name('weight')))}" for k in known))
-        self.put("ratio = longest/scale", "length = longest")
+        self.put(*(let(f"size_{k}", times(largest(found[k]), Name("weight"))) for k in known))
+        self.put(let("ratio", Name("longest") / "scale"), let("length", "longest"))
         if known:
-            fits = (f"({show(times(Name(f'size_{k}'), Name(f'ratio**{k}')))} <= 1.0)" for k in known)
-            self.put(
-                f"if any_lane(~({' & '.join(fits)})):  # not all of them go so far",
-                f"    lengths = truncated(scale*exp({show(reach(known))}))",
-                f"    length = common_length(lengths, longest, new, {_place(self.size, 0)})",
-                "    ratio = length/scale",
+            sizes = (Name(f"size_{k}") * Power(Name("ratio"), Number(k)) for k in known)
+            far = Not(Junction("and", tuple(Compare("<=", size, Number(1.0)) for size in sizes)))
+            shorter = (
+                Comment("not all of them go so far"),
+                let("lengths", call("truncated", Name("scale") * call("exp", reach(known)))),
+                let("length", call("common_length", "lengths", "longest", "new", _place(self.size, 0))),
+                let("ratio", Name("length") / "scale"),
             )
+            self.put(If(call("any_lane", far), shorter))
 
 
 def write_tangent(variation: Variation, order: int) -> TangentStep:
@@ -225,15 +233,20 @@ def write_tangent(variation: Variation, order: int) -> TangentStep:
     wanted = dict.fromkeys(c for _, e in variation.matrix for c, _ in variation.parts(e))
     check_order(order)
     orbit = OrbitWriter(variation.orbit, order, list(wanted))
-    step = orbit.step(", shared")
-    return TangentStep(step, (COMMON, ModeWriter(variation, orbit).write(), CARRY), HEAD + len(orbit.places))
+    step = orbit.step("shared")
+    modes = LANES.function(ModeWriter(variation, orbit).write())
+    return TangentStep(step, (COMMON, modes, CARRY), HEAD + len(orbit.places))
 
 
-def _place(size: int, k: int) -> str:
+def _place(size: int, k: int) -> Expression:
     """Number k of the registers of one group of modes, which fill `size` registers of an array."""
-    group = "which" if size == 1 else f"{size}*which"
-    return f"{group} + {k}" if k else group
+    group = Name("which") if size == 1 else size * Name("which")
+    return group + k if k else group
 
 
-def _shared(place: int) -> str:
-    return f"shared[{place}]"
+def _of_modes(array: str, size: int, k: int) -> Expression:
+    return Load(array, _place(size, k), "LANES")
+
+
+def _shared(place: int) -> Expression:
+    return Load("shared", Number(place), None)

@@ -1,4 +1,4 @@
-"""Sums, products and quotients that are folded where they are made, and the text of their statements.
+"""Sums, products and quotients that are folded where they are made.
 
 Recurrences are built of them, and are never rearranged: a step of order 24 has thousands.
 """
@@ -12,6 +12,7 @@ from ..program.expressions import (
     ZERO,
     Call,
     Expression,
+    Name,
     Negation,
     Number,
     Quotient,
@@ -21,12 +22,8 @@ from ..program.expressions import (
     product,
     terms_of,
 )
-from ..program.printers import LANES
 
-__all__ = ["absolute", "add", "extreme", "lane", "largest", "over", "show", "statement", "times"]
-
-WIDEST = 110
-"""Columns of a statement on one line."""
+__all__ = ["absolute", "add", "extreme", "lane", "largest", "over", "times"]
 
 
 def add(*terms: Expression) -> Expression:
@@ -70,19 +67,14 @@ def over(above: Expression, below: Expression) -> Expression:
     return Quotient(above, below)
 
 
-show = LANES.text
-
-
 def absolute(e: Expression) -> Expression:
     """The absolute value."""
     return Call("absolute", (e,))
 
 
-def lane(value: Expression) -> str:
-    """The text of a value that is stored: numbers become lanes."""
-    if isinstance(value, Number):
-        return f"broadcast({show(value)}, WIDTH)"
-    return show(value)
+def lane(value: Expression) -> Expression:
+    """A value that is stored: numbers become lanes."""
+    return Call("broadcast", (value, Name("WIDTH"))) if isinstance(value, Number) else value
 
 
 def largest(values: Iterable[Expression]) -> Expression:
@@ -96,19 +88,3 @@ def extreme(function: str, values: Sequence[Expression]) -> Expression:
         return values[0]
     half = len(values) // 2
     return Call(function, (extreme(function, values[:half]), extreme(function, values[half:])))
-
-
-def statement(target: str, value: Expression) -> list[str]:
-    """The lines of an assignment; a long sum is broken between terms."""
-    line = f"{target} = {show(value)}"
-    if len(line) <= WIDEST:
-        return [line]
-    words = show(value).split(" ")
-    lines, row = [f"{target} = ("], "   "
-    for word in words:
-        if len(row) + 1 + len(word) > WIDEST and word not in "+-":
-            sign = row[-2:] if row[-2:] in (" +", " -") else ""
-            lines.append(row.removesuffix(sign) if sign else row)
-            row = "   " + sign
-        row += f" {word}"
-    return [*lines, row, ")"]

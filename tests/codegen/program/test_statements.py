@@ -23,6 +23,7 @@ from synchain.codegen.program.expressions import (
     Load,
     Name,
     Negation,
+    Not,
     Number,
     Power,
     Product,
@@ -47,12 +48,14 @@ from synchain.codegen.program.statements import (
     Identity,
     If,
     Loop,
+    Repeat,
     Return,
     Role,
     Titled,
     accumulate,
     called,
     let,
+    mentioned,
     operations,
     store,
     used,
@@ -85,6 +88,13 @@ def test_functions_and_names_are_found_at_any_depth() -> None:
     assert called(BODY) == {"sin", "solve", "maximum"}
     assert used(BODY) == {"y", "NODES", "k", "a", "b", "c", "out", "dense"}
     assert used([Accumulate("rates", Name("i"), Load("state", Name("j"), None))]) == {"rates", "state", "j"}
+
+
+def test_what_is_repeated_is_read_off_too() -> None:
+    repeated = Repeat((let("a", A * B), Do(call("tell", C))), call("any_lane", Compare(">", A, Number(0.5))))
+    assert operations([repeated]) == 1
+    assert called([repeated]) == {"tell"}
+    assert mentioned([repeated]) == {"a", "b", "c"}
 
 
 # -- expressions ---------------------------------------------------------------------------------------------
@@ -150,6 +160,20 @@ def test_signs_are_folded() -> None:
     assert negative(negative(A)) == A
     assert negative(Number(2.0)) == Number(-2.0)
     assert negative(negative(ONE)) == ONE
+
+
+def test_a_long_sum_of_lanes_is_broken_and_keeps_its_value() -> None:
+    """A long call stands on one line."""
+    terms = [Name(f"coefficient{k}") * B for k in range(9)]
+    lines = LANES.lines([let("a", plus(*terms, Negation(C)))])
+    numbers = {"b": 0.7, "c": 0.1} | {f"coefficient{k}": 1.0 / (k + 3.0) for k in range(9)}
+    found = dict(numbers)
+    exec("\n".join(lines), found)
+    assert len(lines) > 3
+    assert max(map(len, lines)) <= 114
+    assert found["a"] == value(plus(*terms, Negation(C)), numbers)
+    assert len(LANES.lines([let("a", call("maximum", plus(*terms), C))])) == 1
+    assert len(NUMPY.lines([let("a", plus(*terms))])) == 1
 
 
 # -- languages -----------------------------------------------------------------------------------------------
@@ -267,3 +291,53 @@ def test_what_no_language_says_is_our_own_mistake() -> None:
     with pytest.raises(TypeError, match="one index"):
         LANES.lines([Accumulate("a", (A, B), C)])
     assert LANES.lines([Assign(("a", "b"), call("f", C))]) == ["a, b = f(c)"]
+
+
+DOWN = (
+    Loop("i", Number(3), Number(-1), (store("v", Name("i"), Name("x")),), step=-1),
+    Loop("i", Number(0), Number(4), (store("v", Name("i"), Name("x")),), step=2),
+    Repeat((Do(call("turn", "v")),), Compare("<", Load("v", Number(0), None), ONE)),
+)
+
+
+@pytest.mark.parametrize(
+    ("language", "lines"),
+    [
+        (
+            "math",
+            [
+                "for i in range(3, -1, -1):",
+                "    v[i] = x",
+                "for i in range(0, 4, 2):",
+                "    v[i] = x",
+                "while True:",
+                "    turn(v)",
+                "    if not v[0] < 1.0:",
+                "        break",
+            ],
+        ),
+        (
+            "c",
+            [
+                "for (int i = 3; i > -1; i += -1) {",
+                "    v[i] = x;",
+                "}",
+                "for (int i = 0; i < 4; i += 2) {",
+                "    v[i] = x;",
+                "}",
+                "do {",
+                "    turn(v);",
+                "} while (v[0] < 1.0);",
+            ],
+        ),
+    ],
+)
+def test_loops_run_down_and_until_a_condition_fails(language: str, lines: list[str]) -> None:
+    assert LANGUAGES[language].lines(DOWN) == lines
+
+
+def test_the_opposite_of_a_condition() -> None:
+    both = Junction("and", (Compare("<", A, B), Compare("<", B, C)))
+    assert LANES.text(Not(both)) == "~((a < b) & (b < c))"
+    assert LANES.text(Not(A)) == "~a"
+    assert MATH.text(Not(call("open", A))) == "not open(a)"

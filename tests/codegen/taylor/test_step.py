@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import functools
 import math
 
@@ -297,3 +298,17 @@ def test_golden_steps(golden):
     """The text of a slipping pair; of a looped ring of pendula."""
     golden("taylor_slip_6.txt", step_of(friction_pair(), 6).text + "\n")
     golden("taylor_looped_8.txt", write_looped(tidy(pendula()), 8).text + "\n")
+
+
+def test_operations_are_those_of_the_text():
+    """A written-out step has no indices to be computed; signs of numbers and arguments are no operations."""
+    made = step_of(alone([X, V], [V, A - sp.sin(X) - V**2 / 3], [A]), 8)
+    tree = ast.parse(made.text.split("@njit")[-1].partition("\n")[2])
+    assert made.operations == sum(isinstance(node, ast.BinOp) for node in ast.walk(tree)) > 100
+
+
+def test_a_step_brings_the_functions_that_it_calls():
+    kinked = alone([X, V], [V, -sp.Abs(X) - X + A], [A])
+    smooth, bent, slips = (step_of(e, 8).text for e in (alone([X], [-X], []), kinked, friction_pair()))
+    assert ["def passage" in text for text in (smooth, bent, slips)] == [False, True, True]
+    assert ["def closing" in text for text in (smooth, bent, slips)] == [False, False, True]
