@@ -33,7 +33,6 @@ from .observed import UNWATCHED, Watched, rule_of
 
 __all__ = [
     "KernelSource",
-    "default_width",
     "describe",
     "emit",
     "free_names",
@@ -180,12 +179,12 @@ def emit(
     method = AUTO if method == "auto" else method
     method = integrator(method) if isinstance(method, str) else method
     _check_records(equations, records, section, watched, multiplicity)
-    width = default_width(equations, method) if width is None else width
     ordered = tuple(r for r in Record if r in records)
     equations, method, elimination = _planned(equations, method, unroll, fill)
     plain, looped = tidy(equations), elimination is not None
     names = free_names(plain)
     functions, scratch, count = (_series if method.series else _stages)(plain, method, names, elimination)
+    width = _suited(equations, method, count) if width is None else width
     chosen = Driver(KernelKind.SWEEP, width, looped, method.smooth is not None, plain.sticks, method.series)
     cut = _cut(equations, section) if section is not None and "section" in ordered else UNWATCHED
     events = [
@@ -252,14 +251,21 @@ def _check_records(
         raise ValueError(f"multiplicity has {len(multiplicity)} entries; expected one for each of {equations.n} nodes")
 
 
-def default_width(equations: Equations, method: Integrator) -> int:
+MOST_DECODED = 2200
+"""Operations of a step of which two registers take as many instructions as the processor keeps decoded, some 6000.
+
+`synchain bench methods` times both: a longer step is up to a seventh faster in one register.
+"""
+
+
+def _suited(equations: Equations, method: Integrator, count: int) -> int:
     """Lanes that suit the processor; a small system does not keep its pipelines busy with one register and gets two.
 
     The steps of implicit methods are chains that use all registers earlier: two lanes slow them down beyond two states.
     """
     most = 2 if method.implicit else 6
     moving = sum(len(equations.nodes[kind].continuous) for kind in equations.kind_of[: most + 1])
-    return lanes.native_width(2 if moving <= most else 1)
+    return lanes.native_width(2 if moving <= most and count <= MOST_DECODED else 1)
 
 
 def _planned(

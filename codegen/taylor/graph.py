@@ -309,11 +309,6 @@ class Graph:
         return [s for s in self.series if isinstance(s, Kink)]
 
     @property
-    def brinks(self) -> list[Brink]:
-        """Those of them at which something jumps."""
-        return [kink for kink in self.kinks if isinstance(kink, Brink)]
-
-    @property
     def gaps(self) -> list[Series]:
         """The series in which kinks are looked for, less those that are as right as the states."""
         return list(dict.fromkeys(kink.base for kink in self.kinks if not _is_affine(kink.base)))

@@ -25,7 +25,7 @@ from ..steps.places import Joint, Kind, Span, places, span
 from .graph import Graph, Template, check_jumps
 from .length import finished, last_orders, reach, unseen
 from .masses import moving, solved
-from .passage import Stored, closed, first_passage, jumps, loose, settled, told
+from .passage import Stored, closed, first_passage, further, jumps, loose, settled, told
 from .series import Constant, Series, State, Time, magnitude
 from .step import TaylorStep, broken, called, returned
 from .terms import absolute, add, lane, largest
@@ -117,10 +117,6 @@ class Section:
     def now(self, series: Series, first: bool) -> Expression:
         """Coefficient 0 of a series, or k."""
         return self.start(series) if first else self.of(series)
-
-    def before(self, series: Series) -> Expression:
-        """Coefficient k - 1 of a series."""
-        return self.load(series, plus(ORDER, Number(-1)))
 
     def sum(self, left: Series, right: Series, first: int, last: int) -> Expression:
         """Sum of left_j * right_(k-j) for j = first … k + last."""
@@ -236,7 +232,7 @@ class Section:
         for kink in self.graph.kinks:
             size = Load("dense", self.slot(kink.size.text, START))
             stored = Stored(size, self.where(kink.base, START), self.stride(kink.base), degree)
-            found += kink.passages(self.load(kink, Number(degree)), stored)
+            found += kink.passages(Load("dense", self.slot(kink.name, START)), stored)
         if self.mode:
             gaps = [Stored(size_of_gap(place), of_gap(START, place), 2 * Name("NODES"), degree) for place in GAPS]
             found += closed(self.mode, exact, gaps, "stuck", Name("at_closing"))
@@ -244,8 +240,8 @@ class Section:
 
     @property
     def hints(self) -> list[str]:
-        """What the sides of series that begin on a jump are called."""
-        return [f"hint_{brink.base.name}" for brink in self.graph.brinks]
+        """What the sides of series that begin at zero are called."""
+        return list(dict.fromkeys(f"hint_{kink.base.name}" for kink in self.graph.kinks))
 
     def unknown(self) -> list[Statement]:
         """The statements that forget these sides."""
@@ -254,10 +250,10 @@ class Section:
     def sides(self, degree: int) -> list[Statement]:
         """The statements that take note of those that the coefficients tell."""
         found = list[Statement]()
-        for brink, hint in zip(self.graph.brinks, self.hints, strict=True):
-            known = plus(self.hint(brink.base), Name("new"))
-            found += told(self.load(brink, START), self.load(brink, Number(degree)))
-            found.append(Store("dense", self.slot(hint, START), known))
+        for kink in self.graph.kinks:
+            begun, hint = (self.slot(name, START) for name in (kink.name, f"hint_{kink.base.name}"))
+            known = span("k", degree + 1, 1).over([further(self.load(kink.base, ORDER))])
+            found.append(told(Load("dense", begun), [known], partial(noted, hint)))
         return self.run(found)
 
     def lengths(self, order: int) -> list[Statement]:
@@ -305,6 +301,11 @@ class Totals(Section):
 
 NOTHING = 0.0 * Name("scale")
 """Zeros in all lanes."""
+
+
+def noted(hint: Expression, new: Expression) -> Statement:
+    """Take note of the side of a series that begins at zero."""
+    return Store("dense", hint, call("side_or", Load("dense", hint), new))
 
 
 def at(name: str, order: Expression, stride: Expression, place: Expression) -> Expression:

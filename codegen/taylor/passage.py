@@ -7,16 +7,28 @@ slips, and while it sticks the distances of its load from the limits of static f
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from synchain.models.dynamics.equations import Equations
 
-from ..program.expressions import ONE, Choice, Compare, Expression, Name, Negation, Number, Value, call, plus
-from ..program.statements import Comment, Repeat, Statement, called, let, mentioned
-from .terms import absolute
+from ..program.expressions import ONE, ZERO, Choice, Compare, Expression, Name, Negation, Number, Value, call, plus
+from ..program.statements import Comment, If, Repeat, Statement, called, let, mentioned
+from .terms import absolute, add, times
 
-__all__ = ["Stored", "closed", "first_passage", "functions", "jumps", "leapt", "loose", "passed", "settled", "told"]
+__all__ = [
+    "Stored",
+    "closed",
+    "first_passage",
+    "functions",
+    "further",
+    "jumps",
+    "leapt",
+    "loose",
+    "passed",
+    "settled",
+    "told",
+]
 
 PASSAGE = '''
 PASSED, ROUNDING, NEAREST = 1e-10, 1e-15, 1e-8
@@ -43,10 +55,13 @@ def passage(side, size, part, nearest, dense, first, stride, degree, ratio):
         term = absolute(load(dense, first + k*stride, WIDTH))
         bend, spread = fma(bend, ratio, k*(k - 1.0)*term), fma(spread, ratio, term)
     spread = fma(spread, ratio, absolute(load(dense, first + stride, WIDTH)))*ratio
+    start = load(dense, first, WIDTH)
+    active = (absolute(side) > 0.5) & (side*start <= 1.0001*spread)  # no other series comes as far as zero
+    if not any_lane(active):
+        return ratio
     unit = side/maximum(fma(0.0*ratio + 1e-4, size, spread), 1e-300)
     bend = absolute(unit)*bend
-    value, slope = fma(unit, load(dense, first, WIDTH), 0.75*part), unit*load(dense, first + stride, WIDTH)
-    active = (absolute(side) > 0.5) & (value <= 1.0)  # the way that a series goes in the step is less than 1
+    value, slope = fma(unit, start, 0.75*part), unit*load(dense, first + stride, WIDTH)
     place, active = select(active, 0.0, ratio), active & (value > 0.25*part)
     for _ in range(60):
         if not any_lane(active):
@@ -59,7 +74,7 @@ def passage(side, size, part, nearest, dense, first, stride, degree, ratio):
         for k in range(degree, 0, -1):
             term = load(dense, first + k*stride, WIDTH)
             value, slope = fma(value, place, term), fma(slope, place, 1.0*k*term)
-        value, slope = fma(unit, fma(value, place, load(dense, first, WIDTH)), 0.75*part), unit*slope
+        value, slope = fma(unit, fma(value, place, start), 0.75*part), unit*slope
         active = active & (value > 0.25*part)
     return minimum(maximum(place, nearest), ratio)
 '''.strip()
@@ -148,6 +163,18 @@ class Stored(NamedTuple):
         return let("passed", call("passage", side, size, part, nearest, *where))
 
 
+def approached(coefficients: Sequence[Expression], ends: Sequence[Statement]) -> list[Statement]:
+    """The statements that end a step at a kink, if any lane of the series goes as far as zero; `way` bounds how far."""
+    start, *further = (absolute(e) if e != ZERO else e for e in coefficients)
+    while further and further[-1] == ZERO:
+        further.pop()
+    way, found = Name("way"), list[Statement]()
+    for e in reversed(further):
+        found.append(let(way.text, add(e, times(way, Name("ratio"))) if found else e))
+    near = Compare("<=", start, 1.0001 * way * Name("ratio"))
+    return [*found, If(call("any_lane", near), tuple(ends))]
+
+
 def passed(side: Expression, series: Stored) -> list[Statement]:
     """The statement that ends a step where the series of a kink passes zero."""
     return [series.passage(side, series.size, "PASSED", Name("NEAREST") * "passed")]
@@ -164,19 +191,26 @@ def leapt(side: Expression, series: Stored) -> list[Statement]:
 def settled(
     hints: Sequence[Statement], coefficients: Sequence[Statement], sides: Sequence[Statement]
 ) -> list[Statement]:
-    """The statements that make coefficients anew as long as they tell on which sides series lie that begin on a jump.
+    """The statements that make coefficients anew as long as they tell on which sides series lie that begin at zero.
 
     Each turn tells one more side at least: what one jump sets off may leave the next one.
     """
     if not hints:
         return [*coefficients]
-    inner = (*coefficients, Comment("sides of jumps"), let("news", 0.0 * Name("t")), *sides)
+    inner = (*coefficients, Comment("sides of what begins at zero"), let("news", 0.0 * Name("t")), *sides)
     return [*hints, Repeat(inner, call("any_lane", Compare(">", Name("news"), Number(0.5))))]
 
 
-def told(begun: Expression, side: Expression) -> list[Statement]:
-    """The statements that find the side that the coefficients tell, `new`, and take note that there is one."""
-    return [let("new", call("found_side", begun, side)), let("news", Name("news") + absolute(Name("new")))]
+def told(begun: Expression, sides: Sequence[Statement], note: Callable[[Expression], Statement]) -> Statement:
+    """The statement that takes note of the `side` that the coefficients of a series tell if it begins at zero."""
+    new, begins = Name("new"), Compare("<", absolute(begun), Number(0.5))
+    found = [let("new", call("found_side", begun, "side")), let("news", Name("news") + absolute(new)), note(new)]
+    return If(call("any_lane", begins), (let("side", 0.0 * Name("t")), *sides, *found))
+
+
+def further(coefficient: Expression) -> Statement:
+    """The statement that finds the `side` of zero on which a series lies by the first coefficient that is not zero."""
+    return let("side", call("side_or", "side", call("side_of", coefficient, 0.0)))
 
 
 def first_passage(found: Sequence[Statement]) -> list[Statement]:

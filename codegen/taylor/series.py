@@ -44,9 +44,6 @@ class Order(Protocol):
     def start(self, series: Series) -> Expression:
         """Coefficient 0 of a series."""
 
-    def before(self, series: Series) -> Expression:
-        """Coefficient k - 1 of a series."""
-
     def sum(self, left: Series, right: Series, first: int, last: int) -> Expression:
         """Sum of left_j * right_(k-j) for j = first … k + last."""
 
@@ -349,31 +346,31 @@ UNNAMED = Name("")
 class Kink(Series):
     """The side of zero on which a series lies just after the start, 1 or -1; 0 while nothing but zeros is known of it.
 
-    It is no series itself: its coefficient k is what the coefficients 0 … k of `base` say, the first of them that is not
-    zero.  Coefficient 0 counts as zero up to rounding, a small part of the terms that it is the sum of.
+    It is no series itself, it is the same to all orders.  A series that begins at zero, up to rounding, a small part of the
+    terms that it is the sum of, has the side that its coefficients tell, all of which are made anew then.
     """
 
     base: Series
     size: Name = UNNAMED
+    side: Name = UNNAMED
 
     @property
     def convolved(self) -> tuple[Series, ...]:
-        return self.base, self
+        return (self.base,)
 
     def begin(self, at: Start) -> Expression:
         self.size = at.keep(f"size_{self.name}", magnitude(at, self.base))
-        return self.side(at)
+        start = Call("side_of", (at.start(self.base), self.least))
+        self.side = at.keep(self.name, Call("side_or", (start, at.hint(self.base))))
+        return self.side
 
-    def side(self, at: Start) -> Expression:
-        """The side on which it begins."""
-        return Call("side_of", (at.start(self.base), Name("ROUNDING") * self.size))
+    @property
+    def least(self) -> Expression:
+        """How far from zero it begins if it does not begin there."""
+        return Name("ROUNDING") * self.size
 
     def coefficient(self, at: Order) -> Expression:
-        side, value = at.before(self), at.of(self.base)
-        if value == ZERO:
-            return side
-        known = Compare(">", absolute(side), Number(0.5))
-        return expressions.Choice(known, side, Call("side_of", (value, ZERO)))
+        return self.side
 
     def passages(self, side: Expression, stored: Stored) -> list[Statement]:
         """The statements that end a step where the series leaves its side (`passed`)."""
@@ -401,15 +398,11 @@ class Choice(Series):
 
 @dataclass(eq=False, slots=True)
 class Brink(Kink):
-    """The side of zero on which a series lies where another one jumps.
+    """The side of zero on which a series lies where another one jumps; it begins at zero at zero itself alone."""
 
-    At zero itself it is 0 as long as the series is zero to all orders, and else what the coefficients say, which are made
-    anew then.
-    """
-
-    def side(self, at: Start) -> Expression:
-        """The side on which it begins."""
-        return Call("side_or", (at.start(self.base), at.hint(self.base)))
+    @property
+    def least(self) -> Expression:
+        return ZERO
 
     def passages(self, side: Expression, stored: Stored) -> list[Statement]:
         """The statements that end a step where the series leaves its side (`leapt`)."""

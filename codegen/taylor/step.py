@@ -6,6 +6,7 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import compress
 
 import sympy as sp
@@ -20,7 +21,7 @@ from ..program.statements import Comment, Function, If, Return, Role, Statement,
 from .graph import STARTS, Graph, Template, check_jumps
 from .length import finished, last_orders, reach, unseen
 from .masses import moving, solved
-from .passage import Stored, closed, first_passage, functions, jumps, loose, settled, told
+from .passage import Stored, approached, closed, first_passage, functions, further, jumps, loose, settled, told
 from .series import Constant, Series, State, Time, magnitude
 from .terms import absolute, add, lane, largest, over, times
 
@@ -145,10 +146,6 @@ class LineWriter:
     def start(self, series: Series) -> Expression:
         """Coefficient 0 of a series."""
         return self.at(series, 0)
-
-    def before(self, series: Series) -> Expression:
-        """Coefficient k - 1 of a series."""
-        return self.at(series, self.k - 1)
 
     def sum(self, left: Series, right: Series, first: int, last: int) -> Expression:
         """Sum of left_j * right_(k-j) for j = first … k + last.
@@ -355,12 +352,13 @@ class StepWriter(LineWriter):
                 self.keep(name, magnitude(self, series))
 
     def settle(self) -> None:
-        """Let the coefficients tell on which sides series lie that begin on a jump."""
-        zeros, sides = list[Statement](), list[Statement]()
-        for brink in self.graph.brinks:
-            hint = self.hint(brink.base)
-            zeros.append(let(hint.text, 0.0 * Name("t")))
-            sides += [*told(self.at(brink, 0), self.at(brink, self.order)), let(hint.text, hint + "new")]
+        """Let the coefficients tell on which sides series lie that begin at zero."""
+        hints = {kink: self.hint(kink.base).text for kink in self.graph.kinks}
+        zeros = [let(hint, 0.0 * Name("t")) for hint in dict.fromkeys(hints.values())]
+        sides = list[Statement]()
+        for kink, hint in hints.items():
+            known = [further(e) for k in range(1, self.order + 1) if (e := self.at(kink.base, k)) != ZERO]
+            sides.append(told(kink.side, known, partial(noted, hint)))
         self.statements = settled(zeros, self.statements, sides)
 
     def state_at(self, slot: int, k: int) -> Expression:
@@ -402,8 +400,10 @@ class StepWriter(LineWriter):
         """The statements that end the step where a series passes a kink or closes a contact."""
         first, p, found = self.order * self.equations.dimension, self.order, list[Statement]()
         for kink in self.graph.kinks:
-            found += (store("dense", first + k, lane(self.at(kink.base, k))) for k in range(p + 1))
-            found += kink.passages(self.at(kink, p), Stored(kink.size, Number(first), Number(1), p))
+            known = [self.at(kink.base, k) for k in range(p + 1)]
+            stored = (store("dense", first + k, lane(e)) for k, e in enumerate(known))
+            ends = (*stored, *kink.passages(kink.side, Stored(kink.size, Number(first), Number(1), p)))
+            found += approached(known, ends)
         for gaps in self.contacts:
             found += gaps.closings(self, p, first, self.exact)
         return found
@@ -427,6 +427,11 @@ class StepWriter(LineWriter):
                 value = e * Name("raised") if e == ZERO else times(e, Name("raised"))
                 rows.append(store("dense", place, value))
         self.put(If(Name("DENSE"), tuple(rows)), returned(ends))
+
+
+def noted(hint: str, new: Expression) -> Statement:
+    """Take note of the side of a series that begins at zero."""
+    return let(hint, call("side_or", hint, new))
 
 
 def broken(end: Expression, start: Expression) -> Statement:

@@ -51,10 +51,10 @@ def measure(quick: bool = False) -> list[tuple[object, ...]]:
 def own_points(case: Case, quick: bool) -> Iterator[Point]:
     """Yield this program's points of a case."""
     for method in METHODS:
-        lanes = full_width(case, method)
-        solve = prepare(case, method, lanes, readings=len(case.times) + 1)
-        ends = np.full(lanes, case.times[-1])
+        solve = prepare(case, method, None, readings=len(case.times) + 1)
         for rtol, atol in TOLERANCES[::4] if quick else TOLERANCES:
+            lanes = full_width(case, method, rtol, atol)
+            ends = np.full(lanes, case.times[-1])
             states, counts = solve(rtol, atol, ends)
             seconds = best_time(partial(solve, rtol, atol, ends), quick)
             error = float(np.abs(states[0, 1:] - case.states).max())

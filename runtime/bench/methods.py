@@ -1,10 +1,10 @@
 """Which integrator, and how many lanes: time per drive period and core against the error, all in
 the same driver.
 
-The cases are the friction oscillators of `precision`. Every lane works through eight cells, so that
-what a scheduler loses at the end counts as it does in a sweep. The last column is the time that the
-same error costs on the log-log line through the rows of rodas5p in one register, over the time of
-the row: above 1 the row is the better choice at its error.
+The cases are those of `precision`. Every lane works through eight cells, so that what a scheduler
+loses at the end counts as it does in a sweep. The last column is the time that the same error costs
+on the log-log line through the rows of the first choice, rodas5p or taylor in one register, over
+the time of the row: above 1 the row is the better choice at its error.
 """
 
 from __future__ import annotations
@@ -15,14 +15,17 @@ import numpy as np
 
 from synchain.codegen.simd.lane_types import native_width
 
-from .kit.cases import Case, read_case
+from .kit.cases import Case
 from .kit.own_program import REFILLS, Own
+from .precision import case_of
 
-__all__ = ["CASES", "CHOICES", "COLUMNS", "measure"]
+__all__ = ["CASES", "COLUMNS", "measure"]
 
 COLUMNS = ("case", "method", "lanes", "rtol", "error", "microseconds per period", "steps per period", "gain")
-CASES = ("friction, n = 1", "friction, n = 2", "friction, n = 4")
-CHOICES: tuple[tuple[str, int, tuple[float, ...]], ...] = (
+Choice = tuple[str, int, tuple[float, ...]]
+"""Integrator, registers that the lanes fill, and relative tolerances."""
+
+STIFF: tuple[Choice, ...] = (
     ("rodas5p", 1, (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)),
     ("rodas5p", 2, (1e-6, 1e-8, 1e-10)),
     ("switching", 1, (1e-6, 1e-7, 1e-8, 1e-9, 1e-10)),
@@ -30,17 +33,21 @@ CHOICES: tuple[tuple[str, int, tuple[float, ...]], ...] = (
     ("rodas6p", 1, (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)),
     ("ros34pw2", 1, (1e-4, 1e-5, 1e-6)),
 )
-"""Integrator, registers that the lanes fill, and relative tolerances; the first is what the others
-are compared with.
-"""
+SMOOTH: tuple[Choice, ...] = tuple(
+    (name, registers, (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)) for name in ("taylor", "dop853") for registers in (1, 2)
+)
+CASES = dict.fromkeys(("friction, n = 2", "friction, n = 1", "friction, n = 4"), STIFF) | dict.fromkeys(
+    ("smooth, n = 2", "exact law, n = 1", "exact law, n = 2"), SMOOTH
+)
+"""The choices of each case; the first is what the others are compared with."""
 
 
 def measure(quick: bool = False) -> list[tuple[object, ...]]:
     """Return the rows of the table, in the order of COLUMNS."""
     rows: list[tuple[object, ...]] = []
-    for name in CASES[1:2] if quick else CASES:
-        case = read_case(name)
-        found = [point for choice in CHOICES for point in points(case, *choice, quick)]
+    for name, choices in list(CASES.items())[: 1 if quick else None]:
+        case = case_of(name)
+        found = [point for choice in choices for point in points(case, *choice, quick)]
         first = [point for point in found if point[:2] == found[0][:2]]
         rows += [(name, *point, gain(point, first)) for point in found]
     return rows

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from tqdm import tqdm
 
+from synchain.codegen.simd.lane_types import native_width
 from synchain.codegen.taylor import jump
 
 from . import peers
@@ -26,7 +27,7 @@ from .kit.cases import CASES as STORED
 from .kit.cases import Case, read_case
 from .kit.clock import Point, curve
 from .kit.computed import EXACT, SMOOTH, computed_case
-from .kit.own_program import REFILLS, Own, full_width, prepare
+from .kit.own_program import REFILLS, Own, prepare
 
 __all__ = [
     "CASES",
@@ -75,10 +76,6 @@ class Method:
     full: bool
     tolerances: tuple[tuple[float, float], ...]
     longest: int = 100
-
-    def width(self, case: Case) -> int:
-        """Number of lanes on this processor: that of a sweep, or one."""
-        return full_width(case, self.integrator) if self.full else 1
 
     def suits(self, case: Case) -> bool:
         """False where the method is not to the point.
@@ -132,8 +129,8 @@ def own_points(case: Case, quick: bool) -> Iterator[Point]:
     for method in METHODS:
         if not method.suits(case):
             continue
-        lanes, periods = method.width(case), min(case.periods, method.longest)
-        own = Own.compiled(case, method.integrator, lanes, REFILLS * lanes if method.full else 1, periods)
+        lanes, cells = (None, REFILLS * native_width(2)) if method.full else (1, 1)
+        own = Own.compiled(case, method.integrator, lanes, cells, min(case.periods, method.longest))
         for rtol, atol in method.tolerances[::3] if quick else method.tolerances:
             yield own.point(rtol, atol, quick)
 

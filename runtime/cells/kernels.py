@@ -10,7 +10,7 @@ import sympy as sp
 from synchain.codegen.integrators import Integrator
 from synchain.codegen.kernels.compile import Kernel, load
 from synchain.codegen.kernels.observed import Watched
-from synchain.codegen.kernels.sweep import KernelSource, default_width, emit
+from synchain.codegen.kernels.sweep import KernelSource, emit
 from synchain.codegen.simd.lane_types import WIDTHS
 from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.checks import check_integer
@@ -62,7 +62,6 @@ def write_kernel(reduction: Reduction, width: int | None = None) -> KernelSource
     if "section" in scene.record:
         section = sp.Symbol(reduction.section_variable(), real=True) - sp.Rational(repr(scene.section.level))
     method = chosen_integrator(reduction)
-    width = default_width(reduction.equations, method) if width is None else width
     recorded = (reduction.records, section, width, reduction.multiplicity)
     return _emitted(reduction.equations, method, recorded, reduction.watched)
 
@@ -71,7 +70,7 @@ def write_kernel(reduction: Reduction, width: int | None = None) -> KernelSource
 def _emitted(
     equations: Equations,
     method: Integrator,
-    recorded: tuple[tuple[str, ...], sp.Expr | None, int, tuple[int, ...] | None],
+    recorded: tuple[tuple[str, ...], sp.Expr | None, int | None, tuple[int, ...] | None],
     watched: Watched,
 ) -> KernelSource:
     """The text of a kernel; runs that differ in numbers alone share it."""

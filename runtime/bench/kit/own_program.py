@@ -10,14 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from synchain.codegen.integrators import integrator as method_of
 from synchain.codegen.kernels.compile import Kernel
-from synchain.codegen.kernels.sweep import default_width
+from synchain.codegen.kernels.sweep import emit
 
 from ...cells.buffers import Buffers
+from ...cells.choice import chosen_integrator
 from ...cells.initial_modes import with_modes
 from ...cells.kernels import kernel
 from ...cells.plan import control_array, longest_step
+from ...cells.reduce import as_reduction
 from .cases import Case
 from .clock import Point, best_time, timed_periods
 
@@ -33,13 +34,16 @@ in a sweep.
 """
 
 
-def full_width(case: Case, integrator: str) -> int:
+def full_width(case: Case, integrator: str, rtol: float, atol: float) -> int:
     """Return the lanes in which a sweep of the case runs on this processor."""
-    return default_width(case.scene.equations, method_of(integrator))
+    reduction = as_reduction(case.scene.replace(integrator=integrator, rtol=rtol, atol=atol), False)
+    return emit(reduction.equations, chosen_integrator(reduction)).driver.width
 
 
-def prepare(case: Case, integrator: str, width: int, readings: int = 0) -> Integrate:
+def prepare(case: Case, integrator: str, width: int | None, readings: int = 0) -> Integrate:
     """Compile or load the kernel of a case; returns solve(rtol, atol, ends) -> (states, counts).
+
+    A width of None is that of a sweep.
 
     `solve` integrates one cell to each of the end times and raises RuntimeError where a cell did
     not reach its end; its states are those at the ends (m, dimension), or at evenly spaced times
@@ -58,7 +62,8 @@ def prepare(case: Case, integrator: str, width: int, readings: int = 0) -> Integ
             np.stack([np.zeros(cells), ends, np.full(cells, case.period), np.zeros(cells)], axis=1)
         )
         if (rtol, atol) not in made:  # the order of a Taylor step follows the tolerance
-            made[rtol, atol] = kernel(chosen.replace(rtol=rtol, atol=atol), width, reduce=False)
+            lanes = full_width(case, integrator, rtol, atol) if width is None else width
+            made[rtol, atol] = kernel(chosen.replace(rtol=rtol, atol=atol), lanes, reduce=False)
         compiled = made[rtol, atol]
         control = control_array(rtol, atol, longest, 1e12, jumps=False)
         buffers = Buffers.empty(cells, len(y0), room=0, samples=readings)
@@ -73,19 +78,19 @@ def prepare(case: Case, integrator: str, width: int, readings: int = 0) -> Integ
 @dataclass(frozen=True, slots=True)
 class Own:
     """An integrator with its kernel for a case: `cells` in `lanes` run over `periods` of the drive
-    when they are timed.
+    when they are timed; lanes of None are those of a sweep.
     """
 
     case: Case
     integrator: str
-    lanes: int
+    lanes: int | None
     cells: int
     periods: int
     compile: float
     solve: Integrate
 
     @classmethod
-    def compiled(cls, case: Case, integrator: str, lanes: int, cells: int, periods: int) -> Own:
+    def compiled(cls, case: Case, integrator: str, lanes: int | None, cells: int, periods: int) -> Own:
         """Compile or load the kernel and note the seconds that takes."""
         begin = time.perf_counter()
         solve = prepare(case, integrator, lanes)
@@ -104,4 +109,5 @@ class Own:
         seconds = best_time(lambda: self.solve(rtol, atol, ends), quick) / (length * self.cells)
         error, steps = float(np.abs(states - part.states).max()), float(counts[0, 1] + counts[0, 2]) / length
         remark = "" if periods == case.periods else f"{periods} of {case.periods} periods"
-        return Point(self.integrator, self.lanes, rtol, atol, error, seconds, periods, self.compile, steps, remark)
+        lanes = full_width(case, self.integrator, rtol, atol) if self.lanes is None else self.lanes
+        return Point(self.integrator, lanes, rtol, atol, error, seconds, periods, self.compile, steps, remark)

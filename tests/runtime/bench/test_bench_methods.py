@@ -52,7 +52,7 @@ def test_time_is_per_period_and_cell(monkeypatch):
 
 
 def test_the_table_compares_every_choice_with_the_first(monkeypatch, rows):
-    monkeypatch.setattr(methods, "CHOICES", (CHOICE,))
+    monkeypatch.setattr(methods, "CASES", {"friction, n = 2": (CHOICE,)})
     monkeypatch.setattr(methods, "points", lambda *given: rows)
     made = methods.measure(quick=True)
     assert {row[0] for row in made} == {"friction, n = 2"}

@@ -10,7 +10,6 @@ import pytest
 from figure_samples import rows
 
 from synchain.runtime.bifurcation.kinds import BifurcationKind
-from synchain.runtime.cells import kernels
 from synchain.runtime.figures import load, names, skeleton, style
 from synchain.runtime.figures import make as maker
 from synchain.runtime.figures.figure_runs import FigureRuns, Quality
@@ -28,7 +27,7 @@ def narrow(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(skeleton, "LOW", 1.2)
     monkeypatch.setattr(skeleton, "HIGH", 1.24)
     monkeypatch.setattr(skeleton, "PERIODS", (2,))
-    monkeypatch.setattr(kernels, "default_width", lambda *_: 1)
+    monkeypatch.setattr("synchain.codegen.kernels.sweep._suited", lambda *_: 1)
 
 
 @cache
