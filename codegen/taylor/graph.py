@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import reduce
-from typing import TypeVar, cast
+from typing import TypeGuard, TypeVar, cast
 
 import sympy as sp
 from sympy.functions.elementary.piecewise import Piecewise
@@ -268,12 +268,17 @@ class Graph:
         return self.numbers.setdefault(series, len(self.numbers))
 
     def product(self, left: Series, right: Series) -> Series:
-        """left * right, constant factors in front."""
+        """left * right, constant factors in front; a sum of a constant and one scaled series is multiplied out."""
         if isinstance(left, Constant):
             return self.sum([(left.value, right)])
         if isinstance(right, Constant):
             return self.sum([(right.value, left)])
         (a, left), (b, right) = split(left), split(right)
+        for one, other in ((left, right), (right, left)):
+            if left is not right and _is_scaled(one):
+                ((factor, moving),) = one.terms
+                parts = [(one.constant, other), (factor, self.product(moving, other))]
+                return self.sum([(times(a, b, weight), part) for weight, part in parts])
         inner = self.put(Square, left) if left is right else self.put(Product, left, right)
         return self.sum([(times(a, b), inner)])
 
@@ -551,6 +556,17 @@ def _is_divisor(e: sp.Expr) -> bool:
 
 def _sorted(factors: Iterable[sp.Expr]) -> list[sp.Expr]:
     return sorted(factors, key=sp.default_sort_key)
+
+
+def _is_scaled(series: Series) -> TypeGuard[Linear]:
+    """True for c + f*s that nothing but a product needs: c*x + f*(s*x) has one series less, and the same rounding.
+
+    A difference from a state or from time can be exact, and stays whole.
+    """
+    if not isinstance(series, Linear) or len(series.terms) > 1 or series.constant == ZERO:
+        return False
+    ((factor, moving),) = series.terms
+    return factor not in (ONE, Number(-1.0)) and not isinstance(moving, State | Time | Linear)
 
 
 def _negative(e: Expression) -> bool:

@@ -312,3 +312,13 @@ def test_a_step_brings_the_functions_that_it_calls():
     smooth, bent, slips = (step_of(e, 8).text for e in (alone([X], [-X], []), kinked, friction_pair()))
     assert ["def passage" in text for text in (smooth, bent, slips)] == [False, True, True]
     assert ["def closing" in text for text in (smooth, bent, slips)] == [False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("factor", "whole"), [(A + 2 * sp.exp(X), False), (A + sp.exp(X), True), (X - 1, True), (3 * X - 1, True)]
+)
+def test_what_is_scaled_and_shifted_is_multiplied_out(factor, whole):
+    """Differences from a state stay whole: they may be exact where a product of each part is not."""
+    text = step_of(alone([X], [factor * sp.sin(X)], [A]), 8).text
+    assert ("linear0_0 = " in text) == whole
+    assert text.count("product0_3 = ") == 1
