@@ -33,16 +33,22 @@ def time_at(points: Sequence[tuple[float, float]], target: float) -> float:
     return min(found, default=math.nan)
 
 
-def curves(rows: Iterable[Mapping[str, Any]]) -> dict[str, dict[tuple[str, int], Curve]]:
+def curves(rows: Iterable[Mapping[str, Any]]) -> dict[str, dict[tuple[str, str], Curve]]:
     """Points (error, microseconds) by case and (method, lanes), in the order of the rows; rows
     without are left out.
+
+    Lanes are "1", or all numbers that the rows of a method have: they may follow the tolerance.
     """
-    found: dict[str, dict[tuple[str, int], Curve]] = {}
+    points: dict[tuple[str, str, bool], tuple[Curve, set[int]]] = {}
     for row in rows:
         error, cost = row.get("error", math.nan), row.get("microseconds per period", math.nan)
         if math.isfinite(error) and math.isfinite(cost):
-            methods = found.setdefault(row["case"], {})
-            methods.setdefault((row["method"], row["lanes"]), []).append((error, cost))
+            curve, lanes = points.setdefault((row["case"], row["method"], row["lanes"] > 1), ([], set()))
+            curve.append((error, cost))
+            lanes.add(row["lanes"])
+    found: dict[str, dict[tuple[str, str], Curve]] = {}
+    for (case, method, _), (curve, lanes) in points.items():
+        found.setdefault(case, {})[method, ", ".join(map(str, sorted(lanes)))] = curve
     return found
 
 
@@ -58,9 +64,9 @@ def table(rows: Iterable[Mapping[str, Any]], own: set[str]) -> str:
     ]
     lines: list[tuple[object, ...]] = []
     for case, methods in curves(rows).items():
-        widest = max((lanes for name, lanes in methods if name in own), default=1)
+        full = any(name in own and lanes != "1" for name, lanes in methods)
         times = {key: [time_at(points, target) for target in TARGETS] for key, points in methods.items()}
-        ours = [values for (name, lanes), values in times.items() if name in own and lanes == widest]
+        ours = [values for (name, lanes), values in times.items() if name in own and (lanes != "1") == full]
         least = [min((values[i] for values in ours if values[i] > 0.0), default=math.nan) for i in range(len(TARGETS))]
         for (name, lanes), values in times.items():
             pairs = zip(values, least, strict=True)

@@ -41,17 +41,17 @@ def figure(rows: Iterable[Mapping[str, object]], own: set[str]) -> Figure:
 
 
 def _looks(
-    cases: Mapping[str, Mapping[tuple[str, int], object]], own: set[str]
-) -> dict[tuple[str, int], dict[str, object]]:
+    cases: Mapping[str, Mapping[tuple[str, str], object]], own: set[str]
+) -> dict[tuple[str, str], dict[str, object]]:
     """How each curve is drawn, the same in all panels."""
     keys = list(dict.fromkeys(key for methods in cases.values() for key in methods))
     peers = [key for key in keys if key[0] not in own]
     integrators = list(dict.fromkeys(name for name, _ in keys if name in own))
-    looks: dict[tuple[str, int], dict[str, object]] = {}
+    looks: dict[tuple[str, str], dict[str, object]] = {}
     for name, lanes in keys:
-        label = f"{name}, {lanes} lanes" if lanes > 1 else name
+        label = f"{name}, {lanes} lanes" if lanes != "1" else name
         if name in own:
-            style, marker = ("-" if lanes > 1 else "--"), OWN[integrators.index(name) % len(OWN)]
+            style, marker = ("-" if lanes != "1" else "--"), OWN[integrators.index(name) % len(OWN)]
             looks[name, lanes] = {"color": BLUE, "linestyle": style, "marker": marker, "label": f"synchain {label}"}
         else:
             place = peers.index((name, lanes))

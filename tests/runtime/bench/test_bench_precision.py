@@ -307,3 +307,13 @@ def test_every_case_runs_and_its_table_and_figure_are_written(monkeypatch, tmp_p
     lines = files[0].read_text().splitlines()
     assert len(lines) == 1 + len(rows)
     assert "at the same error" in files[1].read_text()
+
+
+def test_lanes_that_follow_the_tolerance_are_one_curve_in_its_order():
+    def row(lanes, error, cost):
+        return {"case": "c", "method": "ours", "lanes": lanes, "error": error, "microseconds per period": cost}
+
+    rows = [row(8, 1e-5, 1.0), row(16, 1e-7, 4.0), row(8, 1e-13, 64.0), row(1, 1e-12, 90.0)]
+    first, alone = table(rows, own={"ours"}).splitlines()[4:]
+    assert first == "| c | ours | 8, 16 | 2 | 1 | 6.35 | 1 | 16 | 1 | 40.3 | 1 |"
+    assert alone.startswith("| c | ours | 1 | 90 | 45 |")
