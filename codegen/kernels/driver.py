@@ -117,12 +117,15 @@ def _module(title: str, constants: Mapping[str, int | bool], pieces: Sequence[st
 
 
 def common_drivers() -> list[Driver | Recorder]:
-    """Return the drivers and records that most scenes need: of written-out steps at the processor's width."""
-    width = native_width()
+    """Return the drivers and records that most scenes need: of written-out steps in one register and in two."""
     ways = ((False, False), (False, True), (True, True))  # contacts, series
-    sweeps = [Driver(KernelKind.SWEEP, width, contacts=c, series=s) for c, s in ways]
-    modes = [Driver(KernelKind.MODES, width, contacts=c, series=s) for c, s in ways]
-    return [*sweeps, *modes, *(d.recorder(name) for name in ("observe", "cut", "sample") for d in sweeps[:2])]
+    modes = [Driver(KernelKind.MODES, native_width(), contacts=c, series=s) for c, s in ways]
+    sweeps = [
+        Driver(KernelKind.SWEEP, native_width(registers), contacts=c, series=s) for registers in (2, 1) for c, s in ways
+    ]
+    plain = [driver for driver in sweeps if not driver.contacts]
+    found = [*sweeps, *modes, *(driver.recorder(name) for name in ("observe", "cut", "sample") for driver in plain)]
+    return list(dict.fromkeys(found))
 
 
 WORDS = re.compile(r'"""(?:.|\n)*?"""|"[^"\n]*"|\'[^\'\n]*\'|#[^\n]*|(?<![\w.])([A-Za-z_]\w*)')

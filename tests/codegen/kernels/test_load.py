@@ -423,13 +423,16 @@ def test_a_cache_that_cannot_be_filled_is_an_error(tmp_path, monkeypatch, capsys
 
 
 def test_the_common_drivers_are_those_of_common_scenes():
-    common = driver.common_drivers()
-    assert len({made.text for made in common}) == len(common) == 12
-    width, speed = lanes.native_width(), real("v_1")[0]
+    """Of small networks, which take two registers, and of larger ones."""
+    common, speed = driver.common_drivers(), real("v_1")[0]
+    assert len({made.text for made in common}) == len(common) == 21
+    used = set()
     for records in ((), ("sync_error",), ("section",), ("trajectory",), ("sync_error", "section")):
-        for method in ("rodas5p", "taylor"):
-            equations = friction_chain(3) if method == "rodas5p" else harmonic_chain(3)
-            assert {*emit(equations, method, records, speed, width).shared} <= {*common}
+        for method, network in (("rodas5p", friction_chain), ("taylor", harmonic_chain)):
+            for n in (1, 4):
+                used |= {*emit(network(n), method, records if n > 1 else (), speed).shared}
+    assert used <= {*common}
+    assert {made.width for made in used} == {lanes.native_width(), lanes.native_width(2)}
     assert emit_modes(network_variation(friction_chain(2))).driver in common
     assert emit_modes(network_variation(harmonic_chain(2)), "taylor").driver in common
 
@@ -439,8 +442,8 @@ def test_the_common_drivers_compile(folder, capsys):
     for word in ("compiled", "was there"):
         loading.forget()
         assert main(["cache", "warm"]) == 0
-        assert [line.startswith(word) for line in capsys.readouterr().out.splitlines()] == [True] * 12
-    assert cache.describe()["drivers"] == 12
+        assert [line.startswith(word) for line in capsys.readouterr().out.splitlines()] == [True] * 21
+    assert cache.describe()["drivers"] == 21
 
 
 # -- damage --------------------------------------------------------------------------------------------------
