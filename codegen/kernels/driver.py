@@ -124,7 +124,11 @@ def common_drivers() -> list[Driver | Recorder]:
         Driver(KernelKind.SWEEP, native_width(registers), contacts=c, series=s) for registers in (2, 1) for c, s in ways
     ]
     plain = [driver for driver in sweeps if not driver.contacts]
-    found = [*sweeps, *modes, *(driver.recorder(name) for name in ("observe", "cut", "sample") for driver in plain)]
+    found: list[Driver | Recorder] = [
+        *sweeps,
+        *modes,
+        *(driver.recorder(name) for name in ("observe", "cut", "sample") for driver in plain),
+    ]
     return list(dict.fromkeys(found))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import functools
 import math
+import re
 
 import mpmath
 import numpy as np
@@ -15,9 +16,11 @@ from plain import Text, march
 from samples import numbers, path, spring
 from scipy.integrate import solve_ivp
 
+from synchain.codegen.program.statements import walk
 from synchain.codegen.steps.names import tidy
-from synchain.codegen.taylor import order_for, write_looped
-from synchain.models import Scene, chain
+from synchain.codegen.taylor import order_for, write_looped, write_step
+from synchain.codegen.taylor.step import called
+from synchain.models import Scene, chain, complete
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME as T
 from synchain.models.mechanics.components import Edge, Node
@@ -305,6 +308,40 @@ def test_operations_are_those_of_the_text():
     made = step_of(alone([X, V], [V, A - sp.sin(X) - V**2 / 3], [A]), 8)
     tree = ast.parse(made.text.split("@njit")[-1].partition("\n")[2])
     assert made.operations == sum(isinstance(node, ast.BinOp) for node in ast.walk(tree)) > 100
+
+
+OWN_WORDS = {
+    "slip": friction_pair(),
+    "pendula": tidy(pendula()),
+    "kinks": alone([X, V], [V, -sp.Abs(X) - X**3 + sp.Abs(sp.cos(T)) + A], [A]),
+    "jumps": alone([X, V], [V, -X - sp.floor(3 * X) + sp.sign(sp.cos(T)) + A], [A]),
+    "hidden": alone([X, V], [V, -sp.exp(-(X**2)) + sp.sqrt(1 + V**2)], []),
+    "mean field": Scene("pendulum", "torsion", complete(30)).equations,
+}
+
+
+@pytest.mark.parametrize("looped", [False, True], ids=["lines", "loops"])
+@pytest.mark.parametrize("name", OWN_WORDS)
+def test_no_symbol_of_a_user_is_called_like_a_name_of_the_step(name, looped):
+    """What is assigned is a symbol of the equations, a numbered name of a series, or kept for the step."""
+    equations = tidy(OWN_WORDS[name])
+    body = (write_looped if looped else write_step)(equations, 8).function.body
+    assigned = {name for s in walk(body) for name in getattr(s, "targets", ())}
+    nodes, edges = equations.nodes, equations.edges
+    symbols = {s.name for node in nodes for s in (*node.state, *node.parameters)} | {*equations.parameters}
+    symbols |= {s.name for edge in edges for s in (edge.weight, *edge.parameters)} | {*equations.state}
+    symbols |= {*called(symbols).values()}
+    symbols |= {f"{symbol}{end}" for symbol in symbols for end in ("_here", "_there", "_first")}
+    own = {
+        word
+        for word in assigned - symbols - {"t"}
+        if not re.fullmatch(r"[a-z_]+\d+(_\d+|_rest|_value)?|.+_\d+_\d+", word)
+    }
+    assert own
+    for word in own:
+        parameter = sp.Symbol(word, real=True)
+        (renamed,) = tidy(alone([X], [parameter], [parameter])).node.parameters
+        assert called([renamed.name])[renamed.name] != word, word
 
 
 def test_a_step_brings_the_functions_that_it_calls():
