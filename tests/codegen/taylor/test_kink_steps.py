@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from march import Lanes, alone, compiled, step_of
-from plain import march
+from plain import Text, march
 from samples import path, spring
 
 from synchain.codegen.steps.names import tidy
@@ -315,3 +315,14 @@ def test_the_pair_of_springs_is_that_of_runge_and_kutta():
 
     found = solve_ivp(rhs, (0.0, 6.0), [0.5, -0.3, 0.0, 0.2], "DOP853", rtol=1e-13, atol=1e-15, max_step=0.02)
     assert np.abs(state - found.y[:, -1]).max() < 1e-11
+
+
+@pytest.mark.parametrize("looped", [False, True], ids=["lines", "loops"])
+def test_a_start_within_rounding_of_a_kink_is_on_it(looped):
+    """0.1 + 0.2 - 0.3 is 5.6e-17: the side is that on which the series goes on, and no step is lost on the way there."""
+    gap = X + sp.Symbol("c", real=True) + sp.Symbol("d", real=True)
+    equations = alone([X], [sp.Abs(gap) - 1], [sp.Symbol("c", real=True), sp.Symbol("d", real=True)])
+    text = Text(equations, 8, looped)
+    length, _ = text.step(np.array([0.1, 0.2, -0.3]), 0.0, 1.0, 0.25, 1e-6, 1e-7)
+    assert length > 0.1
+    assert text.state[0] + 0.2 - 0.3 == pytest.approx(np.exp(-length) - 1.0, abs=1e-6)
