@@ -14,7 +14,7 @@ from synchain.models.dynamics.equations import Equations
 
 from ..program.expressions import Expression, Load, Name, Number, plus
 from ..program.passes import real
-from ..program.statements import Accumulate, Identity, Loop, Statement, Store, Titled, let, whole
+from ..program.statements import Accumulate, Identity, Loop, Statement, Store, Titled, let, mentioned, whole
 from .body import (
     Body,
     Linked,
@@ -40,69 +40,30 @@ Places: TypeAlias = Callable[[int], Expression]
 
 def rhs_statements(equations: Equations, reads: bool = True) -> list[Statement]:
     """The statements that write the right-hand side of the whole network to `rates`; `reads` parameters from `numbers`."""
-    found = _parameters(equations, False) if reads else []
-    if is_unrolled(equations):
-        for i, title in enumerate(_nodes(equations)):
-            at = _literal(equations.places[i])
-            body = node_body(equations, i=i).statements(_loads(equations, i, at, reads), _to("rates", Store, at))
-            found.append(Titled(title, tuple(body)))
-        return found + list(_of_links(equations, link_body, lambda at, _: _to("rates", Accumulate, at), reads))
-    here = _indexed("i_")
-    nodes = node_body(equations).statements(_loads(equations, None, here, reads), _to("rates", Store, here))
-    found.append(_loop("i_", "NODES", nodes))
-    if equations.links:
-        pair = _pair(equations, here, _indexed("j_"))
-        links = link_body(equations).statements(pair, _to("rates", Accumulate, here))
-        found.append(_loop("link_", "LINKS", [*_ends(equations, False), *links]))
-    return found
+    return [
+        *(_parameters(equations, False) if reads else []),
+        *_of_nodes(equations, lambda i: node_body(equations, i=i), lambda at: _to("rates", Store, at), reads),
+        *_of_links(equations, lambda e: link_body(equations, e), lambda at, _: _to("rates", Accumulate, at), reads),
+    ]
 
 
 def jacobian_statements(equations: Equations, reads: bool = True) -> list[Statement]:
     """The statements that write the Jacobian: dense to `matrix`, or for many nodes entry by entry to `values`."""
-    found = _parameters(equations, True) if reads else []
-    if is_unrolled(equations):
-        for i, title in enumerate(_nodes(equations)):
-            at = _literal(equations.places[i])
-            loads = _loads(equations, i, at, reads)
-            storing = _entry("matrix", Store, at, at)
-            found.append(Titled(title, tuple(node_body(equations, True, i).statements(loads, storing))))
-
-        def link_jacobian(equations: Equations, link: Linked) -> Body:
-            return link_body(equations, link, True)
-
-        return found + list(_of_links(equations, link_jacobian, _either_end("matrix"), reads))
-    own, here = list(node_places(equations)), _indexed("i_")
-
-    def store_own(place: Any, value: Expression) -> Statement:
-        return Store("values", place_of(own.index(place), "NODES", "i_"), value)
-
-    body = node_body(equations, True).statements(_loads(equations, None, here, reads), store_own)
-    found.append(_loop("i_", "NODES", body))
-    if equations.links:
-        slots = list(link_places(equations))
-
-        def store_link(place: Any, value: Expression) -> Statement:
-            slot = place_of(slots.index(place), "LINKS", "link_")
-            return Store("values", plus(len(own) * Name("NODES"), slot) if own else slot, value)
-
-        pair = _pair(equations, here, _indexed("j_"))
-        links = link_body(equations, None, True).statements(pair, store_link)
-        found.append(_loop("link_", "LINKS", [*_ends(equations, True), *links]))
-    return found
+    of_node, of_link = (_own("matrix"), _either_end("matrix")) if is_unrolled(equations) else _listed(equations)
+    return [
+        *(_parameters(equations, True) if reads else []),
+        *_of_nodes(equations, lambda i: node_body(equations, True, i), of_node, reads),
+        *_of_links(equations, lambda link: link_body(equations, link, True), of_link, reads),
+    ]
 
 
 def mass_statements(equations: Equations, reads: bool = True) -> list[Statement]:
     """The statements that build the mass matrix, for networks that are written out."""
-    blocks = [*_of_nodes(equations, reads), *_of_links(equations, mass_body, _either_end("mass_"), reads)]
+    blocks = [
+        *_of_nodes(equations, lambda i: node_mass_body(equations, i), _own("mass_"), reads),
+        *_of_links(equations, lambda link: mass_body(equations, link), _either_end("mass_"), reads),
+    ]
     return [Identity("mass_", Name("DIMENSION")), *(block for block in blocks if block.body)]
-
-
-def _of_nodes(equations: Equations, reads: bool) -> Iterator[Titled]:
-    """The mass matrix of each node."""
-    for i, title in enumerate(_nodes(equations)):
-        at = _literal(equations.places[i])
-        storing = _entry("mass_", Store, at, at)
-        yield Titled(title, tuple(node_mass_body(equations, i).statements(_loads(equations, i, at, reads), storing)))
 
 
 def place_of(block: int, size: str, index: str) -> Expression:
@@ -110,19 +71,36 @@ def place_of(block: int, size: str, index: str) -> Expression:
     return Name(index) if block == 0 else (Name(size) if block == 1 else block * Name(size)) + index
 
 
+def _of_nodes(
+    equations: Equations, body_of: Callable[[int], Body], storing: Callable[[Places], Storing], reads: bool
+) -> Iterator[Titled | Loop]:
+    """One block for each node, or one loop over them; `storing` is made of the places of a node."""
+    if not is_unrolled(equations):
+        here = _indexed("i_")
+        yield _loop("i_", "NODES", body_of(0).statements(_loads(equations, None, here, reads), storing(here)))
+        return
+    for i in range(equations.n):
+        at = _literal(equations.places[i])
+        body = body_of(i).statements(_loads(equations, i, at, reads), storing(at))
+        yield Titled(f"oscillator {i + 1}", tuple(body))
+
+
 def _of_links(
     equations: Equations,
-    body_of: Callable[[Equations, Linked], Body],
+    body_of: Callable[[Linked | None], Body],
     storing: Callable[[Places, Places], Storing],
     reads: bool,
-) -> Iterator[Titled]:
-    """One block for each link; `storing` is made of the places of its target and of its source."""
-    places = equations.places
-    for link in equations.linked():
+) -> Iterator[Titled | Loop]:
+    """One block for each link, or one loop over them; `storing` is made of the places of its target and of its source."""
+    if not is_unrolled(equations) and equations.links:
+        here, there, body = _indexed("i_"), _indexed("j_"), body_of(None)
+        statements = body.statements(_pair(equations, here, there), storing(here, there))
+        yield _loop("link_", "LINKS", [*_ends(equations, body, statements), *statements])
+    for link in equations.linked() if is_unrolled(equations) else ():
         target, source, _ = link[0]
-        at, other = _literal(places[target]), _literal(places[source])
-        body = body_of(equations, link).statements(_pair(equations, at, other, link, reads), storing(at, other))
-        yield Titled(f"oscillator {target + 1} feels oscillator {source + 1}", tuple(body))
+        at, other = _literal(equations.places[target]), _literal(equations.places[source])
+        found = body_of(link).statements(_pair(equations, at, other, link, reads), storing(at, other))
+        yield Titled(f"oscillator {target + 1} feels oscillator {source + 1}", tuple(found))
 
 
 def _to(array: str, statement: type[Store] | type[Accumulate], at: Places) -> Storing:
@@ -133,6 +111,11 @@ def _entry(array: str, statement: type[Store] | type[Accumulate], row: Places, c
     return lambda place, value: statement(array, (row(place[0]), column(place[1])), value)
 
 
+def _own(array: str) -> Callable[[Places], Storing]:
+    """Stores entries in the rows and columns of a node."""
+    return lambda at: _entry(array, Store, at, at)
+
+
 def _either_end(array: str) -> Callable[[Places, Places], Storing]:
     """Adds to entries in the rows of the target and, as each place tells, the columns of the target or of the source."""
 
@@ -140,6 +123,20 @@ def _either_end(array: str) -> Callable[[Places, Places], Storing]:
         return lambda place, value: _entry(array, Accumulate, at, other if place[0] else at)(place[1], value)
 
     return made
+
+
+def _listed(equations: Equations) -> tuple[Callable[[Places], Storing], Callable[[Places, Places], Storing]]:
+    """Store the entries of all nodes, and those of all links, place by place behind each other."""
+    own, slots = list(node_places(equations)), list(link_places(equations))
+
+    def of_node(place: Any, value: Expression) -> Statement:
+        return Store("values", place_of(own.index(place), "NODES", "i_"), value)
+
+    def of_link(place: Any, value: Expression) -> Statement:
+        slot = place_of(slots.index(place), "LINKS", "link_")
+        return Store("values", plus(len(own) * Name("NODES"), slot) if own else slot, value)
+
+    return lambda at: of_node, lambda at, other: of_link
 
 
 def _parameters(equations: Equations, jacobian: bool) -> list[Statement]:
@@ -200,23 +197,13 @@ def _indexed(name: str) -> Places:
     return lambda c: place_of(c, "NODES", name)
 
 
-def _nodes(equations: Equations) -> list[str]:
-    return [f"oscillator {i + 1}" for i in range(equations.n)]
-
-
-def _ends(equations: Equations, jacobian: bool) -> list[Statement]:
+def _ends(equations: Equations, body: Body, statements: list[Statement]) -> list[Statement]:
     """The two ends and the weight of a link, those that are used."""
-    edge, body = equations.edge, link_body(equations, None, jacobian)
+    edge, link, names = equations.edge, Name("link_"), mentioned(statements)
     if edge is None:
         return []
-    found, link = list[Statement](), Name("link_")
-    if not jacobian or body.uses(edge.here):
-        found.append(whole("i_", _at("TARGET", link)))
-    if body.uses(edge.there):
-        found.append(whole("j_", _at("SOURCE", link)))
-    if body.uses([edge.weight]):
-        found.append(let(edge.weight.name, _at("WEIGHT", link)))
-    return found
+    ends = [whole(name, _at(array, link)) for name, array in (("i_", "TARGET"), ("j_", "SOURCE")) if name in names]
+    return [*ends, *(let(s.name, _at("WEIGHT", link)) for s in body.uses([edge.weight]))]
 
 
 def _loop(index: str, end: str, body: list[Statement]) -> Loop:
