@@ -38,7 +38,7 @@ from .fields import mean_fields
 from .mass import added_masses, momentum_slopes, turned_masses
 from .names import NAMES
 from .places import Joint, Kind, link_ends, named, places, span
-from .program import Program
+from .program import Program, block_pattern
 from .step import NOW, Step, lane, linearised
 
 __all__ = ["Looped"]
@@ -140,7 +140,7 @@ class Looped(Step):
     def link(self, joint: Joint, base: str, used: tuple[sp.Expr, ...], states: bool = True) -> list[Statement]:
         """The ends of a link, its weight, the parameters that `used` uses, and the states of both ends."""
         read, symbols = self.places.read, {s for e in used for s in e.free_symbols}
-        found = [*link_ends(joint.edge), *self.places.of_link(joint.edge, symbols)]
+        found = [*link_ends(joint.edge.weight.name), *self.places.of_link(joint.edge, symbols)]
         if states:
             found += read(joint.target, base, "_here", "i") + read(joint.source, base, "_there", "j")
         return found
@@ -168,10 +168,8 @@ class Looped(Step):
     ) -> list[Statement]:
         """Statements that subtract the entries of a block from the matrix, or add what another `change` makes of them."""
         return [
-            self.add(matrix, self.places.entry(slot, a, b), change(lower(e.xreplace(swap))))
-            for a, row in enumerate(block)
-            for b, e in enumerate(row)
-            if e != 0
+            self.add(matrix, self.places.entry(slot, a, b), change(lower(block[a][b].xreplace(swap))))
+            for a, b in block_pattern(block)
         ]
 
     # -- linearisation ----------------------------------------------------------------------------------------
@@ -334,16 +332,22 @@ class LoopMass:
         """M at a state."""
         w = self.writer
         w.put(*filled(matrix, 1.0 + 0.0 * Name("h")))
+
+        def added(block: Block, end: int | None, swap: dict[sp.Symbol, sp.Symbol]) -> list[Statement]:
+            return w.entries(block, "node_slot" if end is None else SLOTS[end], swap, lambda e: e, matrix)
+
+        self.blocks(base, added)
+
+    def blocks(
+        self, base: str, made: Callable[[Block, int | None, dict[sp.Symbol, sp.Symbol]], list[Statement]]
+    ) -> None:
+        """What is `made` of the blocks of M - 1: those of nodes, and those of links by either end, 0 or 1."""
         for kind in self.heavy:
             added = added_masses(kind.node)
-            w.put(
-                kind.span.over([*self.node(kind, added, base), *w.entries(added, "node_slot", {}, lambda e: e, matrix)])
-            )
+            self.writer.put(kind.span.over([*self.node(kind, added, base), *made(added, None, {})]))
         for joint in self.joints:
-            found = self.link(joint, base)
-            for block, slot in zip(joint.edge.inertia, SLOTS, strict=True):
-                found += w.entries(block, slot, named(joint), lambda e: e, matrix)
-            w.put(joint.span.over(found))
+            ends = [s for end, block in enumerate(joint.edge.inertia) for s in made(block, end, named(joint))]
+            self.writer.put(joint.span.over([*self.link(joint, base), *ends]))
 
     def link(self, joint: Joint, base: str) -> list[Statement]:
         """What the inertia of a link is made of."""
@@ -442,26 +446,17 @@ class LoopMass:
 
     def carried(self, i: int) -> None:
         """Add (M - 1) s to stage i, s what `known` has left in STATE, times the rate where that is a sum of stages."""
-        w, out = self.writer, f"K{i + 1}"
-        for kind in self.heavy:
-            added = added_masses(kind.node)
-            w.put(kind.span.over([*self.node(kind, added, "y"), *self.pushed(added, {}, "i", out)]))
-        for joint in self.joints:
-            found = self.link(joint, "y")
-            for block, index in zip(joint.edge.inertia, "ij", strict=True):
-                found += self.pushed(block, named(joint), index, out)
-            w.put(joint.span.over(found))
+        places, rate = self.writer.places, [Name("rate")] if self.constant else []
 
-    def pushed(self, block: Block, swap: dict[sp.Symbol, sp.Symbol], index: str, out: str) -> list[Statement]:
-        """Statements that add the product of a block and what stands in STATE, times the rate where M is constant."""
-        w, rate = self.writer, [Name("rate")] if self.constant else []
-        found = []
-        for a, row in enumerate(block):
-            for b, e in enumerate(row):
-                if e != 0:
-                    load = Load("dense", plus(Name("STATE"), w.places.place(b, index)))
-                    found.append(w.add(out, w.places.place(a), Product((*rate, lower(e.xreplace(swap)), load))))
-        return found
+        def pushed(block: Block, end: int | None, swap: dict[sp.Symbol, sp.Symbol]) -> list[Statement]:
+            found = []
+            for a, b in block_pattern(block):
+                load = Load("dense", plus(Name("STATE"), places.place(b, "j" if end else "i")))
+                value = Product((*rate, lower(block[a][b].xreplace(swap)), load))
+                found.append(self.writer.add(f"K{i + 1}", places.place(a), value))
+            return found
+
+        self.blocks("y", pushed)
 
 
 def filled(matrix: str, diagonal: Expression) -> list[Statement]:

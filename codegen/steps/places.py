@@ -37,6 +37,7 @@ __all__ = [
     "places",
     "span",
     "table",
+    "theirs",
 ]
 
 
@@ -178,10 +179,10 @@ def places(equations: Equations) -> Places:
     return (MixedPlaces if equations.mixed else Places)(equations)
 
 
-def link_ends(edge: Edge) -> list[Statement]:
-    """The two ends of a link and its weight."""
-    i, j, weight = (Load(array, Name("e"), None) for array in ("target", "source", "weights"))
-    return [whole("i", i), whole("j", j), let(edge.weight.name, weight)]
+def link_ends(weight: str, source: str = "j") -> list[Statement]:
+    """The two ends of a link and its weight, by what they are called."""
+    i, j, w = (Load(array, Name("e"), None) for array in ("target", "source", "weights"))
+    return [whole("i", i), whole(source, j), let(weight, w)]
 
 
 def named(joint: Joint) -> dict[sp.Symbol, sp.Symbol]:
@@ -192,7 +193,12 @@ def named(joint: Joint) -> dict[sp.Symbol, sp.Symbol]:
         for symbols, node, suffix in ends
         for s, own in zip(symbols, node.state, strict=True)
     }
-    return states | {s: real(f"{own.name}_there") for s, own in joint.edge.theirs}
+    return states | theirs(joint.edge)
+
+
+def theirs(edge: Edge) -> dict[sp.Symbol, sp.Symbol]:
+    """Return what the parameters are called that a link takes of its source."""
+    return {s: real(f"{own.name}_there") for s, own in edge.theirs}
 
 
 def joint_numbers(equations: Equations) -> list[int]:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 import sympy as sp
 
-from synchain.models.dynamics.equations import Equations
-
-from ..integrators import Integrator
 from ..program.expressions import ZERO, Call, Expression, Load, Name, Number, Product, call, linear, plus
 from ..program.lowering import lower
 from ..program.passes import real
@@ -24,11 +22,10 @@ __all__ = ["Unrolled", "stage_state"]
 class Unrolled(Step):
     """Names its vectors by prefixes: x_1 at the start, u_x_1 in a stage, f_x_1 the slope, k2_x_1 of stage 2, n_x_1 new."""
 
-    def __init__(
-        self, equations: Equations, kinds: Sequence[NodeBlocks], method: Integrator, bounded: bool = False
-    ) -> None:
-        super().__init__(equations, kinds, method, bounded)
-        self.mass = Mass(self)
+    @cached_property
+    def mass(self) -> Mass:
+        """What is written about M."""
+        return Mass(self)
 
     def of(self, i: int) -> NodeBlocks:
         """The blocks of node i."""
