@@ -238,10 +238,13 @@ class Graph:
     def put(self, kind: type[S], *parts: object) -> S:
         """The series of this kind with these parts."""
         key = (kind, *parts)
-        if key not in self.known:
-            self.known[key] = kind(*parts)
-            self.series.append(self.known[key])
-        return cast("S", self.known[key])
+        return cast("S", self.known[key]) if key in self.known else self.enter(key, kind(*parts))
+
+    def enter(self, key: tuple[object, ...], series: S) -> S:
+        """Take up a series that is new."""
+        self.known[key] = series
+        self.series.append(series)
+        return series
 
     def sum(self, terms: Sequence[tuple[Expression, Series]], constant: Expression = ZERO) -> Series:
         """constant + sum of factor * series; a difference and its negative share a series."""
@@ -456,24 +459,20 @@ class Graph:
         value = float(number.evalf(30))
         if _is_divisor(derivative):
             divisor = self.inside(1 / derivative, place, argument)
-            quotient = QuotientIntegral(name, argument, divisor, value, name=self.fresh(name))
-            self.known[key] = quotient
-            self.series.append(quotient)
+            quotient = self.enter(key, QuotientIntegral(name, argument, divisor, value, name=self.fresh(name)))
             quotient.slope = self.put(Slope, quotient)
             return quotient
-        integral = Integral(name, argument, self.put(Slope, argument), value, name=self.fresh(name))
-        self.known[key] = integral
-        self.series.append(integral)
+        slope = self.put(Slope, argument)
+        integral = self.enter(key, Integral(name, argument, slope, value, name=self.fresh(name)))
         integral.factor = self.inside(derivative, place, argument)
         return integral
 
     def saturating(self, argument: Series) -> Series:
         """tanh of a series; its slope is a series of its own, because 1 - tanh**2 has no digits where tanh is nearly 1."""
         slope = self.put(Slope, argument)
-        found = Integral("tanh", argument, slope, name=self.fresh("tanh"))
+        found = self.enter((sp.tanh, argument), Integral("tanh", argument, slope, name=self.fresh("tanh")))
         bell = SquaredSecant("cosh", argument, slope, -2.0, name=self.fresh("squaredsecant"))
-        self.known[sp.tanh, argument] = found
-        self.series += [found, bell]
+        self.series.append(bell)
         found.factor, bell.factor = bell, self.product(found, bell)
         return found
 
