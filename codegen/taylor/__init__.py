@@ -5,8 +5,9 @@ from __future__ import annotations
 from .graph import is_analytic, is_linear, jump
 from .looped import write_looped
 from .order import order_for
-from .step import TaylorStep, write_step
+from .step import TaylorStep
 from .tangent import TangentStep, write_tangent
+from .unrolled import write_step
 
 __all__ = [
     "TangentStep",

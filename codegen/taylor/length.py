@@ -12,7 +12,7 @@ from ..program.expressions import ZERO, Call, Expression, Name, Number, call
 from ..program.statements import Statement, let
 from .terms import absolute, extreme, largest, times
 
-__all__ = ["finished", "last_orders", "reach", "unseen"]
+__all__ = ["SEEN", "finished", "last_orders", "reach", "unseen"]
 
 FARTHEST = 16.0
 """How many times longer than `scale` a step may be."""
@@ -34,6 +34,10 @@ HIDDEN, LOST = 1e-9, 1e-110
 
 The first is for zeros of the low ones alone, the second for zeros of high order, which no step would reach otherwise.
 """
+
+
+SEEN = let("unseen", 0.0 * Name("scale"))
+"""What `unseen` begins with."""
 
 
 def last_orders(order: int) -> tuple[int, int, int]:

@@ -8,8 +8,9 @@ what depends on time alone at `at_… + k`.
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import NamedTuple
 
 import sympy as sp
 
@@ -18,17 +19,19 @@ from synchain.models.mechanics.components import TIME, Block, Edge, Node
 
 from ..program.expressions import ONE, ZERO, Expression, Load, Name, Number, Product, call, factors_of, plus
 from ..program.passes import Hoist, Names, real
-from ..program.statements import Assign, Comment, If, Loop, Statement, Store, let, whole
+from ..program.statements import Assign, Comment, Loop, Statement, Store, let, whole
 from ..steps.fields import MeanField, compensated, mean_fields
 from ..steps.names import NAMES
-from ..steps.places import Joint, Kind, Span, places, span
+from ..steps.places import Joint, Kind, Span, link_ends, places, span, theirs
+from ..steps.step import lane
 from .graph import Graph, Template, check_jumps
-from .length import finished, last_orders, reach, unseen
+from .length import SEEN, last_orders
 from .masses import moving, solved
-from .passage import Stored, closed, first_passage, further, jumps, loose, settled, told
-from .series import Constant, Series, State, Time, magnitude
-from .step import TaylorStep, broken, called, returned
-from .terms import absolute, add, lane, largest
+from .part import Gaps, Part
+from .passage import Stored, further
+from .series import Constant, Series, State, magnitude
+from .step import StepWriter, TaylorStep
+from .terms import absolute, add, times
 
 __all__ = ["write_looped"]
 
@@ -49,6 +52,9 @@ GAPS = (Name("i"), Name("NODES") + "i")
 START, ORDER = Number(0), Name("k")
 """The order of the coefficients that a step begins with, and that of a loop over orders."""
 
+NOTHING = 0.0 * Name("scale")
+"""Zeros in all lanes."""
+
 COUNTS = {"": Number(1), "i": Name("NODES"), "e": Name("LINKS")}
 """How far the coefficients of a series of one order stand behind those of the last, by the loop that makes them."""
 
@@ -62,30 +68,60 @@ class Hoisted:
     constants: dict[sp.Symbol, sp.Expr] = field(default_factory=dict)
 
 
-@dataclass(slots=True)
-class Section:
-    """What is done alike for all nodes of a kind, for all links of a joint, or once.
+class Track(NamedTuple):
+    """Where the coefficients of a series stand in the workspace: in a part of it, by order and place."""
+
+    name: str
+    stride: Expression
+    place: Expression | None
+
+    def at(self, order: Expression) -> Expression:
+        """Where that of some order stands."""
+        if self.place is None:
+            return Name(f"at_{self.name}") + order
+        behind = [] if order == START else [Product((order, *factors_of(self.stride)))]
+        return plus(Name(f"at_{self.name}"), *behind, self.place)
+
+    def load(self, order: Expression) -> Expression:
+        """The coefficient of some order."""
+        return Load("dense", self.at(order))
+
+    def store(self, order: Expression, value: Expression) -> Store:
+        """The statement that stores it."""
+        return Store("dense", self.at(order), value)
+
+
+@dataclass(eq=False, slots=True)
+class Outer(State):
+    """A state, or a series of another section, and where its coefficients stand."""
+
+    track: Track
+
+
+@dataclass(eq=False)
+class Section(Part):
+    """What is done alike for all nodes of a kind, for all links of a joint, or once, its coefficients in memory.
 
     span, count: the loop and the number of its turns in the whole numbering; `setting` loads what the turn needs at any
-    order, `places` are the states that it reads, and where they stand, `rates` what it stores of those, `lent` are series
-    that other sections need too, `gaps` those of contacts, or what links add to them, `mode` says whether these slip.
+    order, `moving` are the symbols that stand for series, `fixed` those for names, `outer` the series that it reads and does
+    not make, `rates` what it stores of those of states, `lent` are series that other sections need too, `gaps` those of
+    contacts, or what links add to them; k: the order that is written, 0 or that of a loop.
     """
 
-    graph: Graph
     span: Span | None = None
     count: int = 1
+    adds: bool = False
     setting: list[Statement] = field(default_factory=list)
-    places: dict[Series, Expression] = field(default_factory=dict)
+    moving: dict[sp.Symbol, Series] = field(default_factory=dict)
+    fixed: dict[sp.Symbol, sp.Expr] = field(default_factory=dict)
+    outer: list[Series] = field(default_factory=list)
     rates: list[tuple[Expression, Series]] = field(default_factory=list)
     lent: list[Series] = field(default_factory=list)
     gaps: list[Series] = field(default_factory=list)
-    mode: str = ""
-    adds: bool = False
-    waves: dict[Series, Section] = field(default_factory=dict)
-    kept: list[str] = field(default_factory=list)
-    statements: list[Statement] = field(default_factory=list)
     values: dict[Series, Expression] = field(default_factory=dict)
+    k: Expression = START
     sums: int = 0
+    zeros, inverse, number = NOTHING, Name("inverse"), Name("number")
 
     # -- what a recurrence asks for -------------------------------------------------------------------------------
 
@@ -94,121 +130,109 @@ class Section:
         """The variable of the loop, empty if there is none."""
         return "" if self.span is None else self.span.index
 
-    @property
-    def inverse(self) -> Expression:
-        """1/k."""
-        return Name("inverse")
-
-    @property
-    def number(self) -> Expression:
-        """k."""
-        return Name("number")
-
     def of(self, series: Series) -> Expression:
-        """Coefficient k of a series."""
         if isinstance(series, Constant):
-            return ZERO
+            return series.value if self.k == START else ZERO
         return self.values[series]
 
-    def start(self, series: Series) -> Expression:
-        """Coefficient 0 of a series."""
-        return series.value if isinstance(series, Constant) else self.values[series]
-
-    def now(self, series: Series, first: bool) -> Expression:
-        """Coefficient 0 of a series, or k."""
-        return self.start(series) if first else self.of(series)
-
     def sum(self, left: Series, right: Series, first: int, last: int) -> Expression:
-        """Sum of left_j * right_(k-j) for j = first … k + last."""
+        if self.k == START:
+            return ZERO if first else times(self.of(left), self.of(right))
         total = f"s{self.sums}"
         self.sums += 1
-        ends = (part for s in (left, right) for part in (self.where(s, START), self.stride(s)))
+        ends = (part for s in (left, right) for part in (self.track(s).at(START), self.track(s).stride))
         end = ORDER + 1 if last == 0 else ORDER
         self.put(let(total, call("convolution", "dense", *ends, ORDER, first, end)))
         return Name(total)
 
     def square(self, base: Series, first: int) -> Expression:
-        """Sum of base_j * base_(k-j) for j = first … k - first."""
         return self.sum(base, base, first, -first)
 
     def keep(self, what: str, value: Expression) -> Name:
-        """Compute something once; returns its name."""
         if what not in self.kept:
-            self.kept.append(what)
-            self.put(let(what, value), Store("dense", self.slot(what, START), Name(what) + NOTHING))
+            self.kept[what] = None
+            self.put(let(what, value), self.note(what, Name(what) + NOTHING))
         return Name(what)
 
-    def hint(self, series: Series) -> Expression:
-        """The side of zero on which a series that begins at zero lies just after."""
-        return Load("dense", self.slot(f"hint_{series.name}", START))
+    # -- where coefficients are -----------------------------------------------------------------------------------
 
-    # -- places ---------------------------------------------------------------------------------------------------
+    def reads(self, track: Track, name: str) -> Series:
+        """A series that this section reads."""
+        self.outer.append(Outer(track, name=name))
+        return self.outer[-1]
 
-    def slot(self, name: str, order: Expression) -> Expression:
-        """Where a coefficient of a series of this section stands."""
-        if self.span is None:
-            return Name(f"at_{name}") + order
-        return at(name, order, COUNTS[self.index], Name(self.index))
+    def own(self, name: str) -> Track:
+        """Where something of this section stands."""
+        return Track(name, COUNTS[self.index], Name(self.index) if self.index else None)
 
-    def load(self, series: Series, order: Expression) -> Expression:
-        """A coefficient of a series from memory."""
-        return Load("dense", self.where(series, order))
+    def track(self, series: Series) -> Track:
+        """Where the coefficients of a series stand."""
+        return series.track if isinstance(series, Outer) else self.own(series.name)
 
-    def where(self, series: Series, order: Expression) -> Expression:
-        """Where a coefficient of a series stands."""
-        if series in self.places:
-            return at("states", order, Name("DIMENSION"), self.places[series])
-        return self.waves.get(series, self).slot(series.name, order)
+    def at(self, series: Series, k: int | Expression) -> Expression:
+        return self.track(series).load(k if isinstance(k, Expression) else Number(k))
 
-    def stride(self, series: Series) -> Expression:
-        """How far one coefficient of a series stands behind the last."""
-        return Name("DIMENSION") if series in self.places else COUNTS[self.waves.get(series, self).index]
+    def hold(self, series: Series, value: Expression, inline: bool) -> None:
+        kept = series in self.remembered
+        self.values[series] = value if inline and not kept else self.named(series.name, value)
+        if kept:
+            self.put(self.track(series).store(self.k, lane(self.values[series])))
 
-    @property
+    @cached_property
     def remembered(self) -> set[Series]:
         """Series whose earlier coefficients are needed, or all that is made once for other sections."""
         used = {used for s in self.graph.series for used in s.convolved}
-        used |= {*self.graph.watched, *self.graph.positive, *self.lent}
-        return used - {*self.places, *self.waves}
+        return {*used, *self.graph.watched, *self.graph.positive, *self.lent} - {*self.outer}
+
+    def recall(self, what: str) -> Expression:
+        return self.own(what).load(START)
+
+    def note(self, what: str, value: Expression) -> Statement:
+        return self.own(what).store(START, value)
+
+    def signs(self, series: Series) -> list[Statement]:
+        return [span("k", self.order + 1, 1).over([further(self.at(series, ORDER))])]
+
+    def weight(self, what: str) -> Name:
+        return Name("weight")
+
+    def enlarge(self, k: int, size: Expression) -> list[Statement]:
+        return [let(f"size_{k}", call("maximum", f"size_{k}", size))]
+
+    def counted(self, series: Series) -> list[Statement]:
+        return [let("largest", self.low(series)), *self.weighed(series, "", Name("rtol") * "largest")]
+
+    def end_of(self, series: Series, what: str) -> tuple[list[Statement], Expression]:
+        return polynomial("value", self.order - 1, partial(self.at, series)), Name("value")
+
+    def stored(self, series: Sequence[Series], sizes: Sequence[Expression]) -> tuple[list[Statement], list[Stored]]:
+        tracks = zip(sizes, map(self.track, series), strict=True)
+        return [], [Stored(size, track.at(START), track.stride, self.order) for size, track in tracks]
 
     # -- statements -----------------------------------------------------------------------------------------------
 
-    def put(self, *statements: Statement) -> None:
-        """Append statements."""
-        self.statements += statements
-
     def coefficients(self, order: Expression) -> list[Statement]:
         """The statements for coefficients `order`: 0, or k for any later one."""
-        self.statements, first = list(self.setting), order == START
-        outer = [*self.places, *self.waves]
+        self.statements, self.k, first = list(self.setting), order, order == START
         if not first:
-            self.put(*(let(name, Load("dense", self.slot(name, START))) for name in self.kept))
-        self.put(*(let(s.name, self.load(s, order)) for s in outer))
-        self.values = {s: Name(s.name) for s in outer}
-        remembered = self.remembered
-        for s in self.graph.series:
-            value = s.begin(self) if first else s.coefficient(self)
-            inline = s in (self.graph.inline_start if first else self.graph.inline) and s not in remembered
-            if not inline and not isinstance(value, Name | Number):
-                self.put(let(s.name, value))
-                value = Name(s.name)
-            self.values[s] = value
-            if s in remembered:
-                self.put(Store("dense", self.slot(s.name, order), lane(value)))
-        self.finish(first)
+            self.put(*(let(name, self.recall(name)) for name in self.kept))
+        self.put(*(let(s.name, self.at(s, order)) for s in self.outer))
+        self.values = {s: Name(s.name) for s in self.outer}
+        self.make(self.graph.series, first)
+        self.finish()
         return self.turns(self.statements)
 
-    def finish(self, first: bool) -> None:
+    def finish(self) -> None:
         """Append the statements that use coefficient 0, or k, of the rates."""
         for place, rate in self.rates:
-            value, there = self.now(rate, first), plus(Name("at_rates"), place)
+            value, there = self.of(rate), plus(Name("at_rates"), place)
             if not self.adds:
                 self.put(Store("dense", there, value + NOTHING if isinstance(rate, Constant) else value))
             elif value != ZERO:
                 self.give(there, value)
         for place, gap in zip(GAPS, self.gaps, strict=False):
-            self.give(of_gap(START if first else ORDER, place), self.now(gap, first))
-            if first:
+            self.give(of_gap(place).at(self.k), self.of(gap))
+            if self.k == START:
                 self.give(plus(Name("at_sizes"), place), magnitude(self, gap))
 
     def give(self, place: Expression, value: Expression) -> None:
@@ -218,58 +242,10 @@ class Section:
         else:
             self.put(Store("dense", place, lane(value)))
 
-    def ends(self, order: int) -> list[Statement]:
-        """The statements that make the step NaN where a series of this section has passed a zero that it cannot pass."""
-        found = list[Statement]()
-        for s in self.graph.positive:
-            found += polynomial("value", order - 1, partial(self.load, s))
-            found.append(broken(Name("value"), self.load(s, START)))
-        return self.run(found)
-
-    def passages(self, degree: int, exact: bool) -> list[Statement]:
-        """The statements that end the step at the kinks and contacts of this section."""
-        found = list[Statement]()
-        for kink in self.graph.kinks:
-            size = Load("dense", self.slot(kink.size.text, START))
-            stored = Stored(size, self.where(kink.base, START), self.stride(kink.base), degree)
-            found += kink.passages(Load("dense", self.slot(kink.name, START)), stored)
-        if self.mode:
-            gaps = [Stored(size_of_gap(place), of_gap(START, place), 2 * Name("NODES"), degree) for place in GAPS]
-            found += closed(self.mode, exact, gaps, "stuck", Name("at_closing"))
-        return self.run(found)
-
-    @property
-    def hints(self) -> list[str]:
-        """What the sides of series that begin at zero are called."""
-        return list(dict.fromkeys(f"hint_{kink.base.name}" for kink in self.graph.kinks))
-
-    def unknown(self) -> list[Statement]:
-        """The statements that forget these sides."""
-        return self.run([Store("dense", self.slot(hint, START), NOTHING) for hint in self.hints])
-
-    def sides(self, degree: int) -> list[Statement]:
-        """The statements that take note of those that the coefficients tell."""
-        found = list[Statement]()
-        for kink in self.graph.kinks:
-            begun, hint = (self.slot(name, START) for name in (kink.name, f"hint_{kink.base.name}"))
-            known = span("k", degree + 1, 1).over([further(self.load(kink.base, ORDER))])
-            found.append(told(Load("dense", begun), [known], partial(noted, hint)))
-        return self.run(found)
-
-    def lengths(self, order: int) -> list[Statement]:
-        """The statements that make the step no longer than the series of this section let it be."""
-        found = list[Statement]()
-        for s in self.graph.gaps:
-            found.append(let("largest", largest(absolute(self.load(s, Number(k))) for k in range(3))))
-            found += weighed(Name("rtol") * "largest", order, partial(self.load, s))
-        for place in GAPS if self.mode else ():
-            found += weighed(Name("loose") * size_of_gap(place), order, partial(gap_at, place))
-        for s in self.graph.watched:
-            found += unseen([self.load(s, Number(k)) for k in range(order)])
-        return self.run(found)
+    def lengths(self) -> list[Statement]:
+        return self.run([*super().lengths(), *self.watches()])
 
     def run(self, statements: list[Statement]) -> list[Statement]:
-        """Statements, if there are any, that are run through behind what a turn needs."""
         return self.turns([*self.setting, *statements]) if statements else []
 
     def turns(self, statements: list[Statement]) -> list[Statement]:
@@ -277,7 +253,7 @@ class Section:
         return statements if self.span is None else [self.span.over(statements)]
 
 
-@dataclass(slots=True)
+@dataclass(eq=False)
 class Totals(Section):
     """The sums over all nodes of some series, by their names."""
 
@@ -288,45 +264,31 @@ class Totals(Section):
         names = [name for name, _ in self.totals]
         before = [let(f"{name}{rest}", NOTHING) for name in names for rest in ("", "_rest")]
         behind = [Store("dense", Name(f"at_{name}") + order, Name(name)) for name in names]
-        # a class with slots has no cell for super()
-        return [*before, *Section.coefficients(self, order), *behind]
+        return [*before, *super().coefficients(order), *behind]
 
-    def finish(self, first: bool) -> None:
+    def finish(self) -> None:
         """Add the coefficients to the sums; those of a constant beyond the first are zero."""
         for name, rate in self.totals:
-            value = self.now(rate, first)
+            value = self.of(rate)
             if value != ZERO:
                 self.put(let(f"{name}_value", value), *compensated(name, f"{name}_value"))
 
 
-NOTHING = 0.0 * Name("scale")
-"""Zeros in all lanes."""
+def of_state(place: Expression) -> Track:
+    """Where the coefficients of a state stand."""
+    return Track("states", Name("DIMENSION"), place)
 
 
-def noted(hint: Expression, new: Expression) -> Statement:
-    """Take note of the side of a series that begins at zero."""
-    return Store("dense", hint, call("side_or", Load("dense", hint), new))
+def of_gap(place: Expression) -> Track:
+    """Where the coefficients of the gap of a contact stand."""
+    return Track("gaps", 2 * Name("NODES"), place)
 
 
-def at(name: str, order: Expression, stride: Expression, place: Expression) -> Expression:
-    """Where a coefficient of something stands in the workspace."""
-    behind = [] if order == START else [Product((order, *factors_of(stride)))]
-    return plus(Name(f"at_{name}"), *behind, place)
-
-
-def of_gap(order: Expression, place: Expression) -> Expression:
-    """Where a coefficient of the gap of a contact stands."""
-    return at("gaps", order, 2 * Name("NODES"), place)
-
-
-def gap_at(place: Expression, order: Expression) -> Expression:
-    """A coefficient of the gap of a contact."""
-    return Load("dense", of_gap(order, place))
-
-
-def size_of_gap(place: Expression) -> Expression:
-    """The size of the terms that the gap of a contact begins with."""
-    return Load("dense", plus(Name("at_sizes"), place))
+def gaps_of(mode: str) -> Gaps:
+    """The gaps of the contact of a node with some mode."""
+    rise, fall = (Outer(of_gap(place)) for place in GAPS)
+    up, down = (Load("dense", plus(Name("at_sizes"), place)) for place in GAPS)
+    return Gaps(mode, "stuck", (rise, fall), ("rise", "fall"), (up, down), Name("at_closing"))
 
 
 def polynomial(name: str, degree: int, coefficient: Callable[[Expression], Expression]) -> list[Statement]:
@@ -355,100 +317,76 @@ def with_pushes(joint: Joint) -> list[sp.Expr]:
     return [*edge.rhs, push, -push]
 
 
-def weighed(error: Expression, order: int, coefficient: Callable[[Expression], Expression]) -> list[Statement]:
-    """Statements that let the last coefficients of something count, in units of the error that it may have."""
-    found: list[Statement] = [let("weight", 1.0 / (Name("atol") + error))]
-    for k in last_orders(order):
-        found.append(let(f"size_{k}", call("maximum", f"size_{k}", absolute(coefficient(Number(k))) * "weight")))
-    return found
+class Looped(StepWriter):
+    """Writes loops around the recurrences, with a part for what each of them makes."""
 
-
-def theirs(edge: Edge) -> dict[sp.Symbol, sp.Symbol]:
-    """What the parameters are called that a link takes of its source."""
-    return {s: real(f"{own.name}_there") for s, own in edge.theirs}
-
-
-class LoopWriter:
-    """Writes the looped step of some order for tidy equations."""
+    functions = (CONVOLUTION,)
 
     def __init__(self, equations: Equations, order: int) -> None:
-        self.equations, self.order, self.places = equations, order, places(equations)
-        self.fields, self.exact = mean_fields(equations), jumps(equations)
-        self.links = sum(len(layer.links) for layer in equations.listed)
         eq = equations
         named = {s for node in eq.nodes for s in (*node.state, *node.parameters)}
         named |= {s for edge in eq.edges for s in (edge.weight, *edge.parameters)}
-        words = sorted({s.name for s in named} | set(eq.parameters))
-        self.called = called(words)
-        self.swap = {real(old): real(new) for old, new in self.called.items()}
+        words = {*(s.name for s in named), *eq.parameters}
+        super().__init__(equations, order, words)
+        self.places, self.fields = places(equations), mean_fields(equations)
         self.names = Names([*words, *self.called.values(), *(s + end for s in words for end in ("_here", "_there"))])
-        self.time = Time(name="t")
-        self.waves = Section(Graph(self.names))
+        self.varied = [real(name) for name in eq.differing]
+        self.waves = Section(Graph(self.names), order)
         kinds, joints = self.places.kinds, self.places.joints
         nodes = [self.hoisted(with_gaps(kind.node), [*kind.node.state, *self.varied]) for kind in kinds]
         links = [self.of_links(joint.edge, with_pushes(joint)) for joint in joints]
-        fields = [self.of_field(field) for field in self.fields]
+        fields = [
+            [self.of_links(f.edge, e, (*f.sums, *f.shared)) for e in (f.sums.values(), f.shared.values(), f.rates)]
+            for f in self.fields
+        ]
         self.waves.graph.settle(self.waves.lent)
         if self.waves.lent:
-            self.waves.waves[self.time] = self.waves
-        self.sections = [self.waves, *map(self.node, kinds, nodes), *map(self.link, joints, links)]
+            self.waves.outer.append(self.time)
+        self.parts: list[Section] = [self.waves, *map(self.node, kinds, nodes), *map(self.link, joints, links)]
         for mean, parts in zip(self.fields, fields, strict=True):
-            self.sections += self.field(mean, *parts)
-        self.ends = eq.sticks or any(section.graph.kinks for section in self.sections)
+            self.parts += self.field(mean, *parts)
+        self.ends = eq.sticks or any(section.graph.kinks for section in self.parts)
         self.orders = order + 1 if self.ends else order
 
     # -- sections ---------------------------------------------------------------------------------------------
 
-    @property
-    def varied(self) -> list[sp.Symbol]:
-        """Parameters that have a value for each node or link."""
-        return [real(name) for name in self.equations.differing]
-
     def node(self, kind: Kind, found: Hoisted) -> Section:
         """The rates of the nodes of a kind."""
-        node, section = kind.node, Section(Graph(self.names), kind.span, self.equations.n)
-        moving, fixed = self.end(section, node.state, node, ("", "i"), node.state)
+        node, section = kind.node, Section(Graph(self.names), self.order, span=kind.span, count=self.equations.n)
+        self.end(section, node.state, node, ("", "i"), node.state)
         used = {s for e in (*found.rates, *(e for row in node.inertia for e in row)) for s in e.free_symbols}
         section.setting += self.loaded(self.places.own(used))
-        moving |= self.seen(section, self.waves, found.waves)
-        swap = {**found.constants, **fixed}
-        self.store(section, node, self.read(section, found.rates, moving, swap, node.inertia))
+        self.store(section, node, self.read(section, found, node.inertia))
         if node.contact is not None:
-            section.mode = self.called[node.state[2].name]
+            section.contacts.append(gaps_of(self.called[node.state[2].name]))
         return section
 
-    def of_links(self, edge: Edge, rates: Sequence[sp.Expr], more: Iterable[sp.Symbol] = ()) -> Hoisted:
+    def of_links(self, edge: Edge, rates: Iterable[sp.Expr], more: Iterable[sp.Symbol] = ()) -> Hoisted:
         """Rates by links, and of `more` symbols that move, parted like those of nodes if time enters them."""
         if not edge.forced:
             return Hoisted(list(rates))
         own = (edge.weight, *edge.here, *edge.there, *(s for s, _ in edge.theirs), *self.varied, *more)
         return self.hoisted(rates, own)
 
-    def of_field(self, field: MeanField) -> tuple[Hoisted, Hoisted, Hoisted]:
-        """What a mean field sums, what all nodes make of that, and what it adds, parted like the rates of links."""
-        sums, shared = list(field.sums.values()), list(field.shared.values())
-        more = (*field.sums, *field.shared)
-        first, second, third = (self.of_links(field.edge, e, more) for e in (sums, shared, field.rates))
-        return first, second, third
-
     def link(self, joint: Joint, found: Hoisted) -> Section:
         """What the links of a joint add."""
         edge, used = joint.edge, {s for e in found.rates for s in e.free_symbols}
-        section = Section(Graph(self.names), joint.span, self.links, adds=True)
-        i, j, weight = (Load(array, Name("e"), None) for array in ("target", "source", "weights"))
-        section.setting += [whole("i", i), whole("j_there", j), let(self.called[edge.weight.name], weight)]
-        moving, fixed = self.end(section, edge.here, joint.target, ("_here", "i"), used)
-        others, more = self.end(section, edge.there, joint.source, ("_there", "j_there"), used)
+        section = Section(Graph(self.names), self.order, span=joint.span, count=self.places.links, adds=True)
+        section.setting += link_ends(self.called[edge.weight.name], "j_there")
+        self.end(section, edge.here, joint.target, ("_here", "i"), used)
+        self.end(section, edge.there, joint.source, ("_there", "j_there"), used)
         section.setting += self.loaded(self.places.of_link(edge, used, "j_there"))
-        moving |= others | self.seen(section, self.waves, found.waves)
-        swap = {**found.constants, **fixed, **more, **theirs(edge)}
-        self.store(section, joint.target, self.read(section, found.rates, moving, swap))
+        section.fixed |= theirs(edge)
+        self.store(section, joint.target, self.read(section, found))
         return section
 
     def store(self, section: Section, node: Node, found: Sequence[Series]) -> None:
         """Let a section store what was read for a node: its rates at their places, and behind them its gaps."""
         size = len(node.state)
-        section.rates, section.gaps = [(self.place(c), rate) for c, rate in enumerate(found[:size])], list(found[size:])
+        section.rates, section.gaps = (
+            [(self.places.place(c), rate) for c, rate in enumerate(found[:size])],
+            list(found[size:]),
+        )
 
     def end(
         self,
@@ -457,25 +395,19 @@ class LoopWriter:
         node: Node,
         at: tuple[str, str],
         used: Container[sp.Symbol],
-    ) -> tuple[dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]]:
-        """The states of a node, or of one end of a link, that are used: series of those that move, names of those at rest.
+    ) -> None:
+        """Let a section read the states of a node, or of one end of a link, that are used.
 
-        `at` is what stands behind their names, and the number of the node there.
+        Those that move are series, those at rest names.  `at` is what stands behind their names, and the number of the node.
         """
-        moving: dict[sp.Symbol, Series] = {}
-        fixed: dict[sp.Symbol, sp.Expr] = {}
         suffix, index = at
         for c, (s, own, moves) in enumerate(zip(symbols, node.state, self.moves(node), strict=True)):
-            name = f"{self.called[own.name]}{suffix}"
-            if s not in used:
-                continue
-            if moves:
-                moving[s] = State(name=name)
-                section.places[moving[s]] = self.place(c, index)
-            else:
-                fixed[s] = real(name)
-                section.setting.append(let(name, Load("y", self.place(c, index))))
-        return moving, fixed
+            name, place = f"{self.called[own.name]}{suffix}", self.places.place(c, index)
+            if s in used and moves:
+                section.moving[s] = section.reads(of_state(place), name)
+            elif s in used:
+                section.fixed[s] = real(name)
+                section.setting.append(let(name, Load("y", place)))
 
     def field(self, field: MeanField, sums: Hoisted, shared: Hoisted, rates: Hoisted) -> Iterator[Section]:
         """The sums over the nodes, what all nodes make of them, and what is added to the rates.
@@ -483,58 +415,49 @@ class LoopWriter:
         Source functions that are functions of the target too are series once.
         """
         nodes = self.places.kinds[0].span
-        totals = Totals(Graph(self.names), nodes, self.equations.n)
+        totals = Totals(Graph(self.names), self.order, span=nodes, count=self.equations.n)
         used = {s for e in sums.rates for s in e.free_symbols}
-        moving, fixed = self.field_end(totals, field, "_there", used)
+        self.field_end(totals, field, "_there", used)
         totals.setting += self.loaded(self.places.of_source(field.edge, used, "i"))
-        moving |= self.seen(totals, self.waves, sums.waves)
-        found = self.read(totals, sums.rates, moving, {**sums.constants, **fixed, **theirs(field.edge)})
+        totals.fixed |= theirs(field.edge)
+        found = self.read(totals, sums)
         totals.totals = [(s.name, series) for s, series in zip(field.sums, found, strict=True)]
         yield totals
-        combined = Section(Graph(self.names))
-        moving = self.seen(combined, self.waves, shared.waves)
-        moving |= self.seen(combined, combined, {s: State(name=s.name) for s in field.sums})
-        common = dict(zip(field.shared, self.read(combined, shared.rates, moving, shared.constants), strict=True))
+        combined = Section(Graph(self.names), self.order)
+        self.see(combined, self.waves, shared.waves)
+        self.see(combined, combined, {s: State(name=s.name) for s in field.sums})
+        common = dict(zip(field.shared, self.read(combined, replace(shared, waves={})), strict=True))
         combined.lent += [series for series in common.values() if not isinstance(series, Constant)]
         yield combined
-        target = Section(Graph(self.names), nodes, self.equations.n, adds=True)
+        target = Section(Graph(self.names), self.order, span=nodes, count=self.equations.n, adds=True)
         made = dict(zip(field.sums, found, strict=True))
         lent = {e: made[s] for s, e in field.alike.items() if made[s] in totals.graph.series}
         borrowed = {e: real(series.name) for e, series in lent.items()}
         wanted = [e.xreplace(borrowed) for e in rates.rates]
         used = {s for e in wanted for s in e.free_symbols}
-        moving, fixed = self.field_end(target, field, "_here", used)
+        self.field_end(target, field, "_here", used)
         target.setting += self.loaded(self.places.own(used))
         lent = {e: series for e, series in lent.items() if borrowed[e] in used}
         totals.lent += lent.values()
-        moving |= self.seen(target, totals, {borrowed[e]: series for e, series in lent.items()})
-        moving |= self.seen(target, combined, common) | self.seen(target, self.waves, rates.waves)
-        self.store(target, field.node, self.read(target, wanted, moving, {**rates.constants, **fixed}))
+        self.see(target, totals, {borrowed[e]: series for e, series in lent.items()})
+        self.see(target, combined, common)
+        self.store(target, field.node, self.read(target, replace(rates, rates=wanted)))
         yield target
 
-    def field_end(
-        self, section: Section, field: MeanField, suffix: str, used: Container[sp.Symbol]
-    ) -> tuple[dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]]:
-        """The states of a node in a mean field; those of which differences alone matter are counted from the first node's."""
+    def field_end(self, section: Section, field: MeanField, suffix: str, used: Container[sp.Symbol]) -> None:
+        """Let a section read a node of a mean field; states of which differences alone matter count from the first node's."""
         symbols = field.edge.there if suffix == "_there" else field.edge.here
-        moving, fixed = self.end(section, symbols, field.node, (suffix, "i"), used)
+        self.end(section, symbols, field.node, (suffix, "i"), used)
         for k in field.shifted:
-            if (state := moving.get(symbols[k])) is not None:
-                first = State(name=f"{self.called[field.node.state[k].name]}_first")
-                section.places[first] = self.place(k, "0")
-                moving[symbols[k]] = section.graph.sum([(ONE, state), (Number(-1.0), first)])
-        return moving, fixed
+            if (state := section.moving.get(symbols[k])) is not None:
+                name = f"{self.called[field.node.state[k].name]}_first"
+                first = section.reads(of_state(self.places.place(k, "0")), name)
+                section.moving[symbols[k]] = section.graph.sum([(ONE, state), (Number(-1.0), first)])
 
-    def seen(self, section: Section, other: Section, series: Mapping[sp.Symbol, Series]) -> dict[sp.Symbol, Series]:
-        """The series of another section as this one reads them; constants are no different."""
-        fixed: dict[sp.Symbol, Series] = {symbol: s for symbol, s in series.items() if isinstance(s, Constant)}
-        found: dict[sp.Symbol, Series] = {s: State(name=own.name) for s, own in series.items() if s not in fixed}
-        section.waves |= dict.fromkeys(found.values(), other)
-        return fixed | found
-
-    def place(self, c: int, index: str = "i") -> Expression:
-        """Where state c of a node stands."""
-        return self.places.place(c, index)
+    def see(self, section: Section, other: Section, series: Mapping[sp.Symbol, Series]) -> None:
+        """Let a section read the series of another one; constants are no different."""
+        for symbol, s in series.items():
+            section.moving[symbol] = s if isinstance(s, Constant) else section.reads(other.own(s.name), s.name)
 
     def moves(self, node: Node) -> list[bool]:
         """Which states of a node move: one at rest, such as the mode of a contact, is a constant of the step."""
@@ -545,7 +468,7 @@ class LoopWriter:
         """Statements that load parameters."""
         return [let(self.called.get(name, name), s.value) for s in loads for name in s.targets]
 
-    def hoisted(self, given: Sequence[sp.Expr], moving: Sequence[sp.Symbol]) -> Hoisted:
+    def hoisted(self, given: Iterable[sp.Expr], moving: Sequence[sp.Symbol]) -> Hoisted:
         """Some rates with names for what depends on time and parameters, series for what depends on time, and the rest,
         which depends on parameters alone.
         """
@@ -562,52 +485,45 @@ class LoopWriter:
             self.waves.lent.append(waves[symbol])
         return Hoisted(rates, waves, constants)
 
-    def read(
-        self,
-        section: Section,
-        rates: Sequence[sp.Expr],
-        moving: Mapping[sp.Symbol, Series],
-        swap: Mapping[sp.Symbol, sp.Expr],
-        inertia: Block = (),
-    ) -> list[Series]:
+    def read(self, section: Section, given: Hoisted, inertia: Block = ()) -> list[Series]:
         """The series of a section, and the constants that each of its turns computes."""
-        graph = section.graph
-        template = Template.of([*rates, *(e for row in inertia for e in row)], moving, self.names.fresh("shared_"))
-        found = graph.read(template, moving, {**self.swap, **swap})
-        size = len(rates)
-        found, masses = found[:size], {divmod(k, size): e for k, e in enumerate(found[size:])}
-        found = list((solved(graph, masses, dict(enumerate(found))) if masses else dict(enumerate(found))).values())
+        self.see(section, self.waves, given.waves)
+        graph, size, masses = section.graph, len(given.rates), (e for row in inertia for e in row)
+        template = Template.of([*given.rates, *masses], section.moving, self.names.fresh("shared_"))
+        found = graph.read(template, section.moving, {**self.swap, **given.constants, **section.fixed})
+        entries, right = {divmod(k, size): e for k, e in enumerate(found[size:])}, dict(enumerate(found[:size]))
+        found = list((solved(graph, entries, right) if entries else right).values())
         graph.settle(found)
         section.setting += graph.constants
         return found
 
     # -- statements -------------------------------------------------------------------------------------------
 
-    def step(self) -> TaylorStep:
-        """The step, which takes the graph and the weights of its links."""
-        orders, later = ([s for section in self.sections for s in section.coefficients(k)] for k in (START, ORDER))
-        bases, size = self.bases()
-        found: list[Statement] = [Comment("order 0"), *self.states(begun), *self.times(), *orders]
-        next_states = self.next_states(Name("inverse") * "scale", ORDER)
-        turn = [let("number", 1.0 * ORDER), let("inverse", 1.0 / ORDER), *next_states, *later]
-        found += [Comment("all further orders"), span("k", self.orders, 1).over(turn)]
-        if not self.ends:
-            found += self.next_states(1.0 / self.order * Name("scale"), Number(self.order))
-        unknown = [s for section in self.sections for s in section.unknown()]
-        sides = [s for section in self.sections for s in section.sides(self.order)]
-        body = [*bases, *self.opening(), *settled(unknown, found, sides), *self.closing()]
-        return TaylorStep.of(body, self.order, size, ("graph", "weights"), [CONVOLUTION])
+    @property
+    def workspace(self) -> int:
+        return self.bases()[1]
 
     def opening(self) -> list[Statement]:
-        """Load the graph and what is a parameter of the whole network."""
+        """Name the parts of the workspace, load the graph and what is a parameter of the whole network."""
         eq = self.equations
         numbers = [(slot, name) for slot, name in enumerate(eq.parameters, start=eq.dimension) if name not in eq.single]
         return [
+            *self.bases()[0],
             Assign(NAMES, Name("graph"), whole=True),
             whole("LINKS", Name("target.size")),
             *(let(self.called[name], Load("p", Number(slot))) for slot, name in numbers),
             *self.waves.graph.constants,
         ]
+
+    def coefficients(self) -> list[Statement]:
+        begun = self.states(lambda p: [of_state(p).store(START, Load("y", p))])
+        found: list[Statement] = [Comment("order 0"), *begun, *self.times()]
+        found += [s for section in self.parts for s in section.coefficients(START)]
+        turn: list[Statement] = [let("number", 1.0 * ORDER), let("inverse", 1.0 / ORDER)]
+        turn += self.next_states(Name("inverse") * "scale", ORDER)
+        turn += [s for section in self.parts for s in section.coefficients(ORDER)]
+        found += [Comment("all further orders"), span("k", self.orders, 1).over(turn)]
+        return found if self.ends else [*found, *self.next_states(1.0 / self.order * Name("scale"), Number(self.order))]
 
     def times(self) -> list[Statement]:
         """The coefficients of time, if any function of time has a series."""
@@ -625,7 +541,7 @@ class LoopWriter:
             sizes["t"] = p + 1
         if eq.sticks:
             sizes |= {"gaps": (p + 1) * 2 * eq.n, "sizes": 2 * eq.n, "closing": p + 1}
-        for section in self.sections:
+        for section in self.parts:
             kept = {s.name for s in section.remembered}
             sizes |= {name: self.orders * section.count for name in sorted(kept - {"t", ""})}
             sizes |= {name: section.count for name in (*section.kept, *section.hints)}
@@ -643,59 +559,38 @@ class LoopWriter:
 
     def next_states(self, factor: Expression, order: Expression) -> list[Statement]:
         """Coefficients of the states from those of the rates."""
-        scale = Name("slope_scale")
-        return [
-            let(scale.text, factor),
-            *self.states(
-                lambda p: [Store("dense", of_state(order, p), scale * Load("dense", plus(Name("at_rates"), p)))]
-            ),
-        ]
-
-    def closing(self) -> list[Statement]:
-        """Step length, new state and dense output."""
-        p, sections, contacts = self.order, self.sections, self.equations.sticks
-        watching = any(section.graph.watched for section in sections)
-        found: list[Statement] = [Comment("step length"), *(let(f"size_{k}", NOTHING) for k in last_orders(p))]
-        found += self.states(self.size)
-        found += [let("unseen", NOTHING)] if watching else []
-        found += [loose(self.exact)] if contacts else []
-        found += [s for section in sections for s in section.lengths(p)]
-        found += [let("reach", reach(last_orders(p))), *finished(p, watching, contacts)]
-        found += first_passage([s for section in sections for s in section.passages(p, self.exact)])
-        found += [Comment("new state"), let("total", NOTHING), *self.states(self.end_of)]
-        found += [s for section in sections for s in section.ends(p)]
-        rows = self.states(
-            lambda p: [Store("dense", plus((ORDER - 1) * Name("DIMENSION"), p), Name("raised") * state(ORDER, p))]
+        slopes = self.states(
+            lambda p: [of_state(p).store(order, Name("slope_scale") * Load("dense", plus(Name("at_rates"), p)))]
         )
-        raised = span("k", p + 1, 1).over([*rows, let("raised", Name("raised") * "ratio")])
-        return [*found, If(Name("DENSE"), (let("raised", "ratio"), raised)), returned(self.ends)]
+        return [let("slope_scale", factor), *slopes]
+
+    def sizes(self) -> list[Statement]:
+        begun = [let(f"size_{k}", NOTHING) for k in last_orders(self.order)]
+        return [*begun, *self.states(self.size), *([SEEN] if self.watching else [])]
 
     def size(self, place: Expression) -> list[Statement]:
         """Let the last coefficients of a state count, in units of its tolerance."""
         largest: Expression = absolute(Load("y", place))
         for k in (1, 2):
-            largest = call("maximum", largest, absolute(state(Number(k), place)))
-        return weighed(Name("rtol") * largest, self.order, lambda k: state(k, place))
+            largest = call("maximum", largest, absolute(of_state(place).load(Number(k))))
+        return self.waves.weighed(Outer(of_state(place)), "", Name("rtol") * largest)
+
+    def new_state(self) -> list[Statement]:
+        return [let("total", NOTHING), *self.states(self.end_of)]
 
     def end_of(self, place: Expression) -> list[Statement]:
         """The new value of a state."""
-        found = polynomial("new", self.order, lambda k: state(k, place))
+        found = polynomial("new", self.order, of_state(place).load)
         return [*found, Store("y_new", place, Name("new")), let("total", Name("total") + "new")]
 
-
-def begun(place: Expression) -> list[Statement]:
-    """Coefficient 0 of a state."""
-    return [Store("dense", of_state(START, place), Load("y", place))]
-
-
-def of_state(order: Expression, place: Expression) -> Expression:
-    """Where a coefficient of a state stands."""
-    return at("states", order, Name("DIMENSION"), place)
-
-
-def state(order: Expression, place: Expression) -> Expression:
-    """A coefficient of a state."""
-    return Load("dense", of_state(order, place))
+    def rows(self) -> list[Statement]:
+        rows = self.states(
+            lambda p: [
+                Store("dense", plus((ORDER - 1) * Name("DIMENSION"), p), Name("raised") * of_state(p).load(ORDER))
+            ]
+        )
+        turn = [*rows, let("raised", Name("raised") * "ratio")]
+        return [let("raised", "ratio"), span("k", self.order + 1, 1).over(turn)]
 
 
 def write_looped(equations: Equations, order: int) -> TaylorStep:
@@ -710,4 +605,4 @@ def write_looped(equations: Equations, order: int) -> TaylorStep:
         found = "links with inertia" if equations.inertial_links else "links of nodes with a mass matrix"
         raise ValueError(f"taylor: found {found} in a network that is stepped in loops; use dop853 or rodas5p")
     check_jumps(equations)
-    return LoopWriter(equations, order).step()
+    return Looped(equations, order).step("graph", "weights")

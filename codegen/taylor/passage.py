@@ -7,7 +7,7 @@ slips, and while it sticks the distances of its load from the limits of static f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from synchain.models.dynamics.equations import Equations
@@ -23,9 +23,7 @@ __all__ = [
     "functions",
     "further",
     "jumps",
-    "leapt",
     "loose",
-    "passed",
     "settled",
     "told",
 ]
@@ -175,19 +173,6 @@ def approached(coefficients: Sequence[Expression], ends: Sequence[Statement]) ->
     return [*found, If(call("any_lane", near), tuple(ends))]
 
 
-def passed(side: Expression, series: Stored) -> list[Statement]:
-    """The statement that ends a step where the series of a kink passes zero."""
-    return [series.passage(side, series.size, "PASSED", Name("NEAREST") * "passed")]
-
-
-def leapt(side: Expression, series: Stored) -> list[Statement]:
-    """The statements that end a step where a series passes a jump.
-
-    A passage is as exact as rounding lets it be, of the way until there, not of that of a step without it.
-    """
-    return 2 * [series.passage(side, 1e4 * series.size, 2e-15, 0.01 * Name("nearest"))]
-
-
 def settled(
     hints: Sequence[Statement], coefficients: Sequence[Statement], sides: Sequence[Statement]
 ) -> list[Statement]:
@@ -201,10 +186,10 @@ def settled(
     return [*hints, Repeat(inner, call("any_lane", Compare(">", Name("news"), Number(0.5))))]
 
 
-def told(begun: Expression, sides: Sequence[Statement], note: Callable[[Expression], Statement]) -> Statement:
-    """The statement that takes note of the `side` that the coefficients of a series tell if it begins at zero."""
-    new, begins = Name("new"), Compare("<", absolute(begun), Number(0.5))
-    found = [let("new", call("found_side", begun, "side")), let("news", Name("news") + absolute(new)), note(new)]
+def told(begun: Expression, sides: Sequence[Statement], note: Statement) -> Statement:
+    """The statement that takes note of the `new` side that the coefficients of a series tell if it begins at zero."""
+    begins = Compare("<", absolute(begun), Number(0.5))
+    found = [let("new", call("found_side", begun, "side")), let("news", Name("news") + absolute(Name("new"))), note]
     return If(call("any_lane", begins), (let("side", 0.0 * Name("t")), *sides, *found))
 
 

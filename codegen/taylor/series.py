@@ -3,8 +3,8 @@
 Coefficient k of a series is that of ((t' - t)/scale)**k, t' the time within the step.  Every recurrence below is
 homogeneous in `scale`, so that only the states and time itself know it.
 
-A recurrence is written once.  It asks an `Order` for coefficients and convolutions: the straight-line writer answers with
-sums of names at a certain k, the looped one with loops over orders.
+A recurrence is written once.  It asks an `Order` for coefficients and convolutions: the part of a step that is written out
+answers with sums of names at a certain k, that of one in loops with loops over orders.
 
 Sources: R. E. Moore, Methods and Applications of Interval Analysis (SIAM, 1979), section 3.4; A. Griewank & A. Walther,
 Evaluating Derivatives (2nd ed., SIAM, 2008), section 13.2.
@@ -12,14 +12,13 @@ Evaluating Derivatives (2nd ed., SIAM, 2008), section 13.2.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
 from ..program import expressions
 from ..program.expressions import ONE, ZERO, Call, Compare, Expression, Name, Number
 from ..program.statements import Statement
-from .passage import Stored, leapt, passed
+from .passage import Stored
 from .terms import absolute, add, over, times
 
 __all__ = ["Brink", "Choice", "Constant", "Fraction", "Integral", "Kink", "Leaping", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
@@ -28,21 +27,18 @@ __all__ = ["Brink", "Choice", "Constant", "Fraction", "Integral", "Kink", "Leapi
 
 
 class Order(Protocol):
-    """What a recurrence can ask for while coefficient k > 0 is made."""
+    """What a recurrence can ask for while coefficient k is made."""
 
     @property
     def inverse(self) -> Expression:
-        """1/k."""
+        """1/k, for k > 0."""
 
     @property
     def number(self) -> Expression:
-        """k."""
+        """k > 0."""
 
     def of(self, series: Series) -> Expression:
         """Coefficient k of a series."""
-
-    def start(self, series: Series) -> Expression:
-        """Coefficient 0 of a series."""
 
     def sum(self, left: Series, right: Series, first: int, last: int) -> Expression:
         """Sum of left_j * right_(k-j) for j = first … k + last."""
@@ -50,15 +46,8 @@ class Order(Protocol):
     def square(self, base: Series, first: int) -> Expression:
         """Sum of base_j * base_(k-j) for j = first … k - first."""
 
-
-class Start(Protocol):
-    """What a series can ask for while coefficient 0 is made."""
-
-    def start(self, series: Series) -> Expression:
-        """Coefficient 0 of a series."""
-
     def keep(self, what: str, value: Expression) -> Name:
-        """Compute something once; returns its name."""
+        """Compute something once, with coefficient 0; returns its name."""
 
     def hint(self, series: Series) -> Expression:
         """The side of zero on which a series that begins at zero lies just after, 1 or -1; 0 while that is not known."""
@@ -86,9 +75,9 @@ class Series:
     def started(self) -> tuple[Series, ...]:
         return ()
 
-    def begin(self, at: Start) -> Expression:
-        """Coefficient 0."""
-        raise NotImplementedError
+    def begin(self, at: Order) -> Expression:
+        """Coefficient 0, unless it is like the others."""
+        return self.coefficient(at)
 
     def coefficient(self, at: Order) -> Expression:
         """Coefficient k > 0."""
@@ -101,7 +90,7 @@ class Constant(Series):
 
     value: Expression
 
-    def begin(self, at: Start) -> Expression:
+    def begin(self, at: Order) -> Expression:
         return self.value
 
     def coefficient(self, at: Order) -> Expression:
@@ -129,8 +118,8 @@ class Linear(Series):
     def linear(self) -> tuple[Series, ...]:
         return tuple(series for _, series in self.terms)
 
-    def begin(self, at: Start) -> Expression:
-        return add(*(times(factor, at.start(series)) for factor, series in self.terms), self.constant)
+    def begin(self, at: Order) -> Expression:
+        return add(*(times(factor, at.of(series)) for factor, series in self.terms), self.constant)
 
     def coefficient(self, at: Order) -> Expression:
         return add(*(times(factor, at.of(series)) for factor, series in self.terms))
@@ -147,9 +136,6 @@ class Product(Series):
     def convolved(self) -> tuple[Series, ...]:
         return self.left, self.right
 
-    def begin(self, at: Start) -> Expression:
-        return times(at.start(self.left), at.start(self.right))
-
     def coefficient(self, at: Order) -> Expression:
         return at.sum(self.left, self.right, 0, 0)
 
@@ -163,9 +149,6 @@ class Square(Series):
     @property
     def convolved(self) -> tuple[Series, ...]:
         return (self.base,)
-
-    def begin(self, at: Start) -> Expression:
-        return times(at.start(self.base), at.start(self.base))
 
     def coefficient(self, at: Order) -> Expression:
         return at.square(self.base, 0)
@@ -186,8 +169,8 @@ class SquareRoot(Series):
     def convolved(self) -> tuple[Series, ...]:
         return (self,)
 
-    def begin(self, at: Start) -> Expression:
-        root = Call("sqrt", (at.start(self.base),))
+    def begin(self, at: Order) -> Expression:
+        root = Call("sqrt", (at.of(self.base),))
         self.inverse = at.keep(f"half_{self.name}", over(Number(0.5), root))
         return root
 
@@ -211,9 +194,9 @@ class Ratio(Series):
     def convolved(self) -> tuple[Series, ...]:
         return self, self.below
 
-    def begin(self, at: Start) -> Expression:
-        self.inverse = at.keep(f"i_{self.below.name}", over(ONE, at.start(self.below)))
-        return times(at.start(self.above), self.inverse)
+    def begin(self, at: Order) -> Expression:
+        self.inverse = at.keep(f"i_{self.below.name}", over(ONE, at.of(self.below)))
+        return times(at.of(self.above), self.inverse)
 
     def coefficient(self, at: Order) -> Expression:
         known = at.sum(self.below, self, 1, 0)
@@ -230,7 +213,7 @@ class Slope(Series):
     def linear(self) -> tuple[Series, ...]:
         return (self.of,)
 
-    def begin(self, at: Start) -> Expression:
+    def begin(self, at: Order) -> Expression:
         return ZERO
 
     def coefficient(self, at: Order) -> Expression:
@@ -262,8 +245,8 @@ class Integral(Series):
     def started(self) -> tuple[Series, ...]:
         return (self.argument,)
 
-    def begin(self, at: Start) -> Expression:
-        return Call(self.function, (at.start(self.argument),))
+    def begin(self, at: Order) -> Expression:
+        return Call(self.function, (at.of(self.argument),))
 
     def coefficient(self, at: Order) -> Expression:
         if self.factor is None:
@@ -278,8 +261,8 @@ class SquaredSecant(Integral):
     Where tanh(a) is 1 to the last digit u is small and not zero, so that the series tell how far away the layer is.
     """
 
-    def begin(self, at: Start) -> Expression:
-        secant = at.keep(f"i_{self.name}", over(ONE, Call("cosh", (at.start(self.argument),))))
+    def begin(self, at: Order) -> Expression:
+        secant = at.keep(f"i_{self.name}", over(ONE, Call("cosh", (at.of(self.argument),))))
         return Call("maximum", (times(secant, secant), Number(FAINT)))
 
 
@@ -302,9 +285,9 @@ class QuotientIntegral(Series):
     def convolved(self) -> tuple[Series, ...]:
         return (self.divisor,) if self.slope is None else (self.slope, self.divisor)
 
-    def begin(self, at: Start) -> Expression:
-        self.inverse = at.keep(f"i_{self.divisor.name}", over(ONE, at.start(self.divisor)))
-        return Call(self.function, (at.start(self.argument),))
+    def begin(self, at: Order) -> Expression:
+        self.inverse = at.keep(f"i_{self.divisor.name}", over(ONE, at.of(self.divisor)))
+        return Call(self.function, (at.of(self.argument),))
 
     def coefficient(self, at: Order) -> Expression:
         if self.slope is None:
@@ -327,8 +310,8 @@ class Power(Series):
     def convolved(self) -> tuple[Series, ...]:
         return self, self.slope, self.base
 
-    def begin(self, at: Start) -> Expression:
-        base = at.start(self.base)
+    def begin(self, at: Order) -> Expression:
+        base = at.of(self.base)
         self.inverse = at.keep(f"i_{self.base.name}", over(ONE, base))
         self.beyond = at.keep(f"e_{self.name}", add(self.exponent, ONE))
         return Call("power", (base, self.exponent))
@@ -336,10 +319,6 @@ class Power(Series):
     def coefficient(self, at: Order) -> Expression:
         grown = times(at.inverse, self.beyond, at.sum(self.slope, self, 1, 0))
         return times(add(grown, times(Number(-1.0), at.sum(self.base, self, 1, 0))), self.inverse)
-
-
-UNNAMED = Name("")
-"""What is not computed yet."""
 
 
 @dataclass(eq=False, slots=True)
@@ -351,30 +330,26 @@ class Kink(Series):
     """
 
     base: Series
-    size: Name = UNNAMED
-    side: Name = UNNAMED
 
     @property
     def convolved(self) -> tuple[Series, ...]:
         return (self.base,)
 
-    def begin(self, at: Start) -> Expression:
-        self.size = at.keep(f"size_{self.name}", magnitude(at, self.base))
-        start = Call("side_of", (at.start(self.base), self.least))
-        self.side = at.keep(self.name, Call("side_or", (start, at.hint(self.base))))
-        return self.side
+    def begin(self, at: Order) -> Expression:
+        size = at.keep(f"size_{self.name}", magnitude(at, self.base))
+        start = Call("side_of", (at.of(self.base), self.least(size)))
+        return at.keep(self.name, Call("side_or", (start, at.hint(self.base))))
 
-    @property
-    def least(self) -> Expression:
-        """How far from zero it begins if it does not begin there."""
-        return Name("ROUNDING") * self.size
+    def least(self, size: Name) -> Expression:
+        """How far from zero it begins if it does not begin there, by the size of its terms."""
+        return Name("ROUNDING") * size
 
     def coefficient(self, at: Order) -> Expression:
-        return self.side
+        return Name(self.name)
 
     def passages(self, side: Expression, stored: Stored) -> list[Statement]:
-        """The statements that end a step where the series leaves its side (`passed`)."""
-        return passed(side, stored)
+        """The statements that end a step where the series leaves its side."""
+        return [stored.passage(side, stored.size, "PASSED", Name("NEAREST") * "passed")]
 
 
 @dataclass(eq=False, slots=True)
@@ -389,9 +364,6 @@ class Choice(Series):
     def linear(self) -> tuple[Series, ...]:
         return self.kink, self.above, self.below
 
-    def begin(self, at: Start) -> Expression:
-        return _chosen(at.start(self.kink), at.start(self.above), at.start(self.below))
-
     def coefficient(self, at: Order) -> Expression:
         return _chosen(at.of(self.kink), at.of(self.above), at.of(self.below))
 
@@ -400,13 +372,15 @@ class Choice(Series):
 class Brink(Kink):
     """The side of zero on which a series lies where another one jumps; it begins at zero at zero itself alone."""
 
-    @property
-    def least(self) -> Expression:
+    def least(self, size: Name) -> Expression:
         return ZERO
 
     def passages(self, side: Expression, stored: Stored) -> list[Statement]:
-        """The statements that end a step where the series leaves its side (`leapt`)."""
-        return leapt(side, stored)
+        """The statements that end a step where the series leaves its side.
+
+        A passage is as exact as rounding lets it be, of the way until there, not of that of a step without it.
+        """
+        return 2 * [stored.passage(side, 1e4 * stored.size, 2e-15, 0.01 * Name("nearest"))]
 
 
 @dataclass(eq=False, slots=True)
@@ -421,9 +395,6 @@ class Leaping(Series):
     @property
     def linear(self) -> tuple[Series, ...]:
         return self.brink, self.above, self.at, self.below
-
-    def begin(self, at: Start) -> Expression:
-        return _one(at.start(self.brink), at.start(self.above), at.start(self.at), at.start(self.below))
 
     def coefficient(self, at: Order) -> Expression:
         return _one(at.of(self.brink), at.of(self.above), at.of(self.at), at.of(self.below))
@@ -440,8 +411,8 @@ class Fraction(Series):
     def linear(self) -> tuple[Series, ...]:
         return (self.base,)
 
-    def begin(self, at: Start) -> Expression:
-        return add(at.start(self.base), times(Number(-1.0), below(at, self.base, self)))
+    def begin(self, at: Order) -> Expression:
+        return add(at.of(self.base), times(Number(-1.0), below(at, self.base, self)))
 
     def coefficient(self, at: Order) -> Expression:
         return at.of(self.base)
@@ -463,26 +434,26 @@ class Whole(Series):
     def started(self) -> tuple[Series, ...]:
         return (self.base,)
 
-    def begin(self, at: Start) -> Expression:
+    def begin(self, at: Order) -> Expression:
         return below(at, self.base, self.lower.base)
 
     def coefficient(self, at: Order) -> Expression:
         return ZERO
 
 
-def below(at: Start, series: Series, part: Series) -> Expression:
+def below(at: Order, series: Series, part: Series) -> Expression:
     """The whole number below a series just after its start; `part` is what lies above."""
-    return add(Call("floor", (at.start(series),)), Call("minimum", (at.hint(part), ZERO)))
+    return add(Call("floor", (at.of(series),)), Call("minimum", (at.hint(part), ZERO)))
 
 
-def magnitude(at: Start, series: Series) -> Expression:
+def magnitude(at: Order, series: Series) -> Expression:
     """The sum of the sizes of the terms that a series begins with: rounding is a small part of it."""
     if isinstance(series, Fraction):
         return magnitude(at, series.turned)
-    parts = [at.start(series)]
+    parts = [at.of(series)]
     if isinstance(series, Linear):
         parts = [
-            times(factor, magnitude(at, inner) if isinstance(inner, Fraction) else at.start(inner))
+            times(factor, magnitude(at, inner) if isinstance(inner, Fraction) else at.of(inner))
             for factor, inner in series.terms
         ]
         parts += [] if series.constant == ZERO else [series.constant]
@@ -537,22 +508,19 @@ class Row(Series):
     def convolved(self) -> tuple[Series, ...]:
         return tuple(s for _, series, unknown in self.moving for s in (series, unknown))
 
-    def begin(self, at: Start) -> Expression:
+    def begin(self, at: Order) -> Expression:
         self.factorise(at)
-        return add(at.start(self.right), *self.known(at.start))
+        return self.coefficient(at)
 
     def coefficient(self, at: Order) -> Expression:
         pushed = (times(Number(-1.0), factor, at.sum(series, a, 1, 0)) for factor, series, a in self.moving)
-        return add(at.of(self.right), *pushed, *self.known(at.of))
+        known = (times(Number(-1.0), e, at.of(self.before[k])) for k, e in self.lower.items())
+        return add(at.of(self.right), *pushed, *known)
 
-    def known(self, value: Callable[[Series], Expression]) -> list[Expression]:
-        """What earlier rows take off."""
-        return [times(Number(-1.0), e, value(self.before[k])) for k, e in self.lower.items()]
-
-    def factorise(self, at: Start) -> None:
+    def factorise(self, at: Order) -> None:
         """Compute the row of L, that of U, and the inverse of its pivot."""
         i = len(self.before)
-        row = {c: times(factor, at.start(series)) for c, (factor, series) in self.entries.items()}
+        row = {c: times(factor, at.of(series)) for c, (factor, series) in self.entries.items()}
         for k, other in enumerate(self.before):
             left = row.pop(k, ZERO)
             left = other.upper.get(i, ZERO) if self.symmetric else left
@@ -577,13 +545,6 @@ class Unknown(Series):
     def linear(self) -> tuple[Series, ...]:
         return self.row, *self.after.values()
 
-    def begin(self, at: Start) -> Expression:
-        return self.value(at.start)
-
     def coefficient(self, at: Order) -> Expression:
-        return self.value(at.of)
-
-    def value(self, of: Callable[[Series], Expression]) -> Expression:
-        """One coefficient, from those of the others."""
-        known = (times(Number(-1.0), e, of(self.after[c])) for c, e in self.row.upper.items())
-        return times(add(of(self.row), *known), self.row.inverse)
+        known = (times(Number(-1.0), e, at.of(self.after[c])) for c, e in self.row.upper.items())
+        return times(add(at.of(self.row), *known), self.row.inverse)

@@ -24,8 +24,9 @@ from ..program.statements import Comment, Function, If, Return, Role, let, store
 from .graph import Graph, Template, is_analytic
 from .length import last_orders, reach
 from .series import Series, State
-from .step import SQUARE, LineWriter, StepWriter, TaylorStep, check_order, polynomial
+from .step import TaylorStep, check_order
 from .terms import absolute, add, largest, times
+from .unrolled import SQUARE, Lines, Unrolled, polynomial
 
 __all__ = ["TangentStep", "write_tangent"]
 
@@ -72,7 +73,7 @@ class TangentStep:
     shared: int
 
 
-class OrbitWriter(StepWriter):
+class OrbitWriter(Unrolled):
     """Writes the step of an orbit, which leaves the series of some coefficients.
 
     Attributes
@@ -104,30 +105,21 @@ class OrbitWriter(StepWriter):
         self.called_so = {e: f"a{self.noted.index(series)}" for e, series in zip(self.wanted, found, strict=True)}
         return rates
 
-    def opening(self) -> None:
-        """Compute the first coefficients of all series."""
-        super().opening()
-        self.put(store("shared", 0, "scale"))
-        self.leave()
-
-    def coefficients(self, k: int) -> None:
-        """Compute coefficients k of the states, and of all series but in the last order."""
-        super().coefficients(k)
-        if k < self.order:
-            self.leave()
-
-    def leave(self) -> None:
-        """Leave coefficients k of what is wanted."""
-        for which, series in enumerate(self.noted):
-            name, value = f"a{which}_{self.k}", self.of(series)
+    def make(self, k: int) -> None:
+        """Write coefficients k of all series, and leave those of what is wanted, but in the last order."""
+        super().make(k)
+        if k == 0:
+            self.lines.put(store("shared", 0, "scale"))
+        for which, series in enumerate(self.noted if k < self.order else ()):
+            name, value = f"a{which}_{k}", self.lines.of(series)
             if not isinstance(value, Number):
                 self.places[name] = HEAD + len(self.places)
-                self.put(store("shared", self.places[name], value))
+                self.lines.put(store("shared", self.places[name], value))
                 value = Name(name)
-            self.left[f"a{which}", self.k] = value
+            self.left[f"a{which}", k] = value
 
 
-class ModeWriter(LineWriter):
+class ModeWriter(Lines):
     """Writes the step of the modes in one register, from what an orbit leaves."""
 
     def __init__(self, variation: Variation, orbit: OrbitWriter) -> None:
@@ -156,7 +148,7 @@ class ModeWriter(LineWriter):
                 if self.moves(series):
                     terms.append((factor, self.graph.product(series, deviations[c])))
                 else:
-                    fixed = add(fixed, times(factor, self.start(series)))
+                    fixed = add(fixed, times(factor, self.of(series)))
             if not isinstance(fixed, Number | Name):  # what each order multiplies by is made once
                 self.put(let(f"g{r}_{c}", fixed))
                 fixed = Name(f"g{r}_{c}")
@@ -170,8 +162,7 @@ class ModeWriter(LineWriter):
 
     def write(self) -> Function:
         """The function `mode_step`."""
-        self.opening()
-        for k in range(1, self.order + 1):
+        for k in range(self.order + 1):
             self.coefficients(k)
         self.length()
         self.put(Comment("new deviation"), SQUARE)

@@ -12,7 +12,6 @@ from ..program.expressions import (
     ZERO,
     Call,
     Expression,
-    Name,
     Negation,
     Number,
     Quotient,
@@ -23,7 +22,7 @@ from ..program.expressions import (
     terms_of,
 )
 
-__all__ = ["absolute", "add", "extreme", "lane", "largest", "over", "times"]
+__all__ = ["absolute", "add", "extreme", "largest", "over", "times"]
 
 
 def add(*terms: Expression) -> Expression:
@@ -70,11 +69,6 @@ def over(above: Expression, below: Expression) -> Expression:
 def absolute(e: Expression) -> Expression:
     """The absolute value."""
     return Call("absolute", (e,))
-
-
-def lane(value: Expression) -> Expression:
-    """A value that is stored: numbers become lanes."""
-    return Call("broadcast", (value, Name("WIDTH"))) if isinstance(value, Number) else value
 
 
 def largest(values: Iterable[Expression]) -> Expression:
