@@ -176,6 +176,10 @@ def turn_over(which, cell, spans, control, clock, y, dims):
     if dims.repeats:
         if clock[DUE * WIDTH + which] > 0.0:
             approach(which, clock, y, control, dims)
+        elif disturbed(which, clock):
+            put(clock, CYCLE, which, 0.0)
+            put(clock, POWER, which, 1.0)
+            save(which, clock, y, dims)
         elif clock[CYCLE * WIDTH + which] == 0.0:
             compare(which, clock, y, dims)
         if clock[CYCLE * WIDTH + which] > 0.0 and control[NO_JUMPS] == 0.0:
@@ -216,6 +220,17 @@ def approach(which, clock, y, control, dims):
     near = gap <= max(NEAR, JITTER * control[RTOL]) * size
     put(clock, DUE, which, 0.0 if near else clock[PERIODS * WIDTH + which] + PROBE)
     save(which, clock, y, dims)
+
+
+@njit(error_model="numpy")
+def disturbed(which, clock):
+    """Whether the window began within a period after the saved one: a step ended there, as none does in other periods.
+
+    What repeated itself before need not do so behind it: the state is another one, by as much as the tolerance allows.
+    """
+    period, start = clock[PERIOD * WIDTH + which], clock[FROM * WIDTH + which]
+    begun = clock[SAVED_AT * WIDTH + which] * period < start < clock[PERIODS * WIDTH + which] * period
+    return begun and math.floor(start / period + 0.5) * period != start
 
 
 @njit(error_model="numpy")
