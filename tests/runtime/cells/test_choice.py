@@ -167,10 +167,10 @@ def test_stiffness_that_appears_is_said_of_explicit_steps_too():
     with pytest.warns(
         RuntimeWarning, match=r"stiff equations: found a rate of .* dop853 steps.*integrator = 'rodas5p'"
     ):
-        run(scene, s=[1.0, 100.0], show_progress=False)
+        run(scene, s=[1.0, 100.0], width=8, show_progress=False)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        run(scene.replace(window=1), s=[1.0, 100.0], show_progress=False)  # 25 steps
+        run(scene.replace(window=1), s=[1.0, 100.0], width=8, show_progress=False)  # 25 steps
 
 
 def test_stiffness_that_comes_with_time_is_said() -> None:

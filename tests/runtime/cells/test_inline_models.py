@@ -100,7 +100,7 @@ def test_an_inline_model_has_the_bits_of_the_plug_in_file(name: str) -> None:
 
 
 def test_a_result_carries_its_expressions(tmp_path: Path) -> None:
-    scene = PAIRS["duffing"][0].replace(sigma=0.1)
+    scene = PAIRS["duffing"][0].replace(axes={"sigma": [0.1, 0.2]})  # the kernel of the test above
     sc.run(scene).save(tmp_path / "a.nc")
     found = sc.open_result(tmp_path / "a.nc")
     assert found.scene == scene

@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from synchain.models import Section, mean, nodes, ring
+from synchain.models import Section, chain, mean, nodes, ring
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.opening.open import open_result
@@ -21,8 +21,8 @@ from synchain.runtime.sweeps.stream import stream
 x, v, x_1, x_2 = sp.symbols("x v x_1 x_2")
 TIMES = {"transient": 2.0, "window": 20.0, "time_unit": "time"}
 SCENE = Scene(
-    oscillator="duffing", topology=ring(3), record=(), rtol=1e-12, integrator="dop853", **TIMES,
-    initial={"x": [0.1, 0.5, 0.9]}, axes={"sigma": [0.1, 0.2]}, observe={"speed": mean(nodes.mean(v))},
+    oscillator="duffing", topology=chain(2), record=(), rtol=1e-12, integrator="dop853", **TIMES,
+    initial={"x": [0.1, 0.5]}, axes={"sigma": [0.1, 0.2]}, observe={"speed": mean(nodes.mean(v))},
     sections={
         "gap": Section(x_1 - x_2, "both", keep=(v, "nodes.mean(x)*sigma")),
         "turn": Section("v_1", "falling"),
@@ -48,7 +48,7 @@ def test_times_are_those_of_scipy(found: Result) -> None:
     rates = sp.lambdify([TIME, *symbols], equations.rhs())
     for cell, sigma in enumerate((0.1, 0.2)):
         numbers = [{**SCENE.parameters, "sigma": sigma}[name] for name in equations.parameters]
-        events = [lambda t, y: y[0] - y[1], lambda t, y: y[3]]
+        events = [lambda t, y: y[0] - y[1], lambda t, y: y[2]]
         events[1].direction = -1.0
         known = solve_ivp(
             lambda t, y, p=tuple(numbers): rates(t, *y, *p), (0.0, 22.0), SCENE.y0, "DOP853", events=events,
@@ -60,11 +60,11 @@ def test_times_are_those_of_scipy(found: Result) -> None:
             np.testing.assert_allclose(points(found, name, cell), times[inside], rtol=0, atol=1e-9)
             kept = found.data[name].values[cell, : inside.sum()]
             if name == "gap":
-                np.testing.assert_allclose(kept[:, :3], states[inside, 3:], rtol=0, atol=1e-9)
-                np.testing.assert_allclose(kept[:, 3], states[inside, :3].mean(axis=1) * sigma, rtol=0, atol=1e-9)
+                np.testing.assert_allclose(kept[:, :2], states[inside, 2:], rtol=0, atol=1e-9)
+                np.testing.assert_allclose(kept[:, 2], states[inside, :2].mean(axis=1) * sigma, rtol=0, atol=1e-9)
             else:
                 np.testing.assert_allclose(kept, states[inside], rtol=0, atol=1e-9)
-    assert found.gap_kept.values.tolist() == ["v_1", "v_2", "v_3", "sigma*nodes.mean(x)"]
+    assert found.gap_kept.values.tolist() == ["v_1", "v_2", "sigma*nodes.mean(x)"]
     assert found.turn_kept.values.tolist() == list(equations.state)
     assert "wave" not in found.data
 

@@ -174,7 +174,7 @@ ROTORS = Scene(
 
 @pytest.fixture(scope="module")
 def rotors() -> Result:
-    return run(ROTORS, show_progress=False)
+    return run(ROTORS, show_progress=False, width=4)
 
 
 def test_order_parameter_and_frequencies_of_rotors(rotors: Result) -> None:
@@ -221,7 +221,7 @@ def test_files_hold_observables(rotors: Result, tmp_path: Path) -> None:
     opened = open_result(tmp_path / "whole.nc")
     assert opened.scene == ROTORS
     assert opened.frequency.attrs["long_name"] == "mean(rate(x))"
-    streamed = stream(ROTORS, tmp_path / "streamed.nc", show_progress=False)
+    streamed = stream(ROTORS, tmp_path / "streamed.nc", show_progress=False, width=4)
     assert streamed.success
     assert (tmp_path / "streamed.nc").read_bytes() == (tmp_path / "whole.nc").read_bytes()
 
@@ -232,7 +232,7 @@ def test_a_resumed_run_keeps_what_was_observed(rotors: Result) -> None:
     data["status"][1] = Status.NOT_RUN
     data["frequency"][1] = np.nan
     data["r"][0] += 1.0
-    found = run(ROTORS, resume=Result(data, ROTORS), show_progress=False)
+    found = run(ROTORS, resume=Result(data, ROTORS), show_progress=False, width=4)
     assert float(found.r[0]) == float(rotors.r[0]) + 1.0
     np.testing.assert_array_equal(found.frequency, rotors.frequency)
 

@@ -84,11 +84,7 @@ def test_states_in_a_row_and_tables_are_starts(first: Result) -> None:
     ("start", "error", "words"),
     [
         (lambda: ran(DRIVEN, sigma=[0.05, 0.1]), ValueError, r"several cells, along sigma \(2\); .*\.isel\(sigma=-1\)"),
-        (
-            lambda: ran(DRIVEN.replace(topology=topology("chain", 2), initial=None)),
-            ValueError,
-            "nodes 1, 2; expected 1, 2, 3",
-        ),
+        (lambda: ran(FREE), ValueError, "nodes 1, 2; expected 1, 2, 3"),
         (lambda: ran(DRIVEN).end.sel(component=["x"]), ValueError, "components x; expected x, v, those of the scene"),
         (lambda: ran(DRIVEN).end.isel(node=0), ValueError, "nodes none; expected 1, 2, 3"),
         (lambda: ran(DRIVEN.replace(window=4.3)), ValueError, "is 0.300000 into a period at t = 39.88"),
