@@ -21,8 +21,8 @@ from ..program.statements import Statement
 from .passage import Stored
 from .terms import absolute, add, over, times
 
-__all__ = ["Brink", "Choice", "Constant", "Fraction", "Integral", "Kink", "Leaping", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
-           "Row", "Series", "Slope", "Square", "SquareRoot", "State", "Time", "Unknown",
+__all__ = ["Bell", "Brink", "Choice", "Constant", "Edged", "Fraction", "Integral", "Kink", "Leaping", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
+           "Row", "Series", "Slope", "Square", "SquareRoot", "SquaredSecant", "State", "Time", "Unknown",
            "Whole"]  # fmt: skip
 
 
@@ -264,6 +264,41 @@ class SquaredSecant(Integral):
     def begin(self, at: Order) -> Expression:
         secant = at.keep(f"i_{self.name}", over(ONE, Call("cosh", (at.of(self.argument),))))
         return Call("maximum", (times(secant, secant), Number(FAINT)))
+
+
+@dataclass(eq=False, slots=True)
+class Bell(Integral):
+    """u = exp(-a**2) from u' = -2 a u a', the first a no larger than EDGE; small and not zero far away, as `SquaredSecant`."""
+
+    def begin(self, at: Order) -> Expression:
+        argument = at.of(self.argument)
+        power = times(Number(-1.0), times(argument, argument))
+        return Call("maximum", (Call("exp", (power,)), Number(FAINT)))
+
+
+EDGE = 15.0
+"""Where exp(-a**2) is 1e-98: behind it no digit of anything depends on it, and it may fall as slowly as there."""
+
+
+@dataclass(eq=False, slots=True)
+class Edged(Series):
+    """A series that begins within EDGE of zero, or else EDGE itself with its sign."""
+
+    base: Series
+    inside: Expression = ONE
+
+    @property
+    def linear(self) -> tuple[Series, ...]:
+        return (self.base,)
+
+    def begin(self, at: Order) -> Expression:
+        start = at.of(self.base)
+        near = Compare("<=", absolute(start), Number(EDGE))
+        self.inside = at.keep(f"n_{self.name}", expressions.Choice(near, ONE, ZERO))
+        return Call("maximum", (Call("minimum", (start, Number(EDGE))), Number(-EDGE)))
+
+    def coefficient(self, at: Order) -> Expression:
+        return times(self.inside, at.of(self.base))
 
 
 @dataclass(eq=False, slots=True)

@@ -93,6 +93,21 @@ def test_a_kink_of_a_function_that_hides(looped):
     assert end[1] == pytest.approx(inner + outer, abs=1e-8)
 
 
+@pytest.mark.parametrize("looped", [False, True], ids=["lines", "loops"])
+def test_the_slope_of_erf_is_seen_from_far_away(looped):
+    """A phase a' = 1 from 0, x' = erf(50 (a - 10)): exp(-a**2) is zero to every digit at the start, and up to a = 9.46."""
+    equations = alone([A, X], [sp.S.One, sp.erf(50 * (A - 10))])
+    end, _ = march(equations, 16, [0.0, 0.0], 19.0, 1e-10, looped=looped)
+    assert end[1] == pytest.approx(-1.0, abs=1e-9)
+
+
+def test_a_choice_by_what_rests_passes_nothing():
+    """The third state does not move: it is a constant of the step, as a parameter is."""
+    chosen = sp.Piecewise((sp.sin(A), V > 0), (sp.cos(A), True))
+    found = run(alone([A, X, V], [sp.S.One, chosen, sp.S.Zero]), [0.0, 0.0, 2.0], 1.0, 1e-10)
+    assert found[1] == pytest.approx(1.0 - math.cos(1.0), abs=1e-9)
+
+
 def test_a_kink_of_a_wave_is_found_where_the_state_rests():
     """x' = max(0, sin a - 9/10) from x = 0: nothing moves x until the kink, which the polynomial of sin a must find."""
     end = run(alone([A, X], [sp.S.One, sp.Max(0, sp.sin(A) - sp.Rational(9, 10))]), [0.0, 0.0], 10 * math.pi, 1e-10)
