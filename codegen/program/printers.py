@@ -21,6 +21,7 @@ from .expressions import (
     Quotient,
     Slice,
     Sum,
+    call,
     negative,
     plus,
 )
@@ -214,6 +215,12 @@ class Lanes(Printer):
 
     functions = functions.LANES
     words: Mapping[str, str] = {"and": " & ", "or": " | ", "not": "~"}
+
+    def piece(self, e: Expression) -> tuple[str, int]:
+        """The text of an expression; both arguments of atan2 are registers."""
+        if isinstance(e, Call) and e.function == "atan2" and any(isinstance(a, Number) for a in e.arguments):
+            e = call("atan2", *(call("broadcast", a, "WIDTH") if isinstance(a, Number) else a for a in e.arguments))
+        return super().piece(e)
 
     def choice(self, condition: str, yes: str, no: str) -> str:
         """Both values are computed, each lane takes its own."""

@@ -116,7 +116,7 @@ def _force(equations: Equations, contact: Contact) -> tuple[list[Statement], tup
     edge, swap = joint.edge, named(joint)
     velocity, mode = edge.here[1], edge.here[2]
     force = edge.rhs[1].xreplace({mode: sp.S.One, velocity: contact.speed})
-    found = [*link_ends(edge.weight.name), *at.of_link(edge, force.free_symbols)]
+    found = [*link_ends(edge, edge.weight.name), *at.of_link(edge, force.free_symbols)]
     for place, states in (("i", edge.here), ("j", edge.there)):
         found += [let(swap[s].name, Load("y", at.place(k, place))) for k, s in enumerate(states) if force.has(s)]
     found.append(let("f_link", lower(force.xreplace(swap))))

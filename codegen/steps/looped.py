@@ -140,7 +140,7 @@ class Looped(Step):
     def link(self, joint: Joint, base: str, used: tuple[sp.Expr, ...], states: bool = True) -> list[Statement]:
         """The ends of a link, its weight, the parameters that `used` uses, and the states of both ends."""
         read, symbols = self.places.read, {s for e in used for s in e.free_symbols}
-        found = [*link_ends(joint.edge.weight.name), *self.places.of_link(joint.edge, symbols)]
+        found = [*link_ends(joint.edge, joint.edge.weight.name), *self.places.of_link(joint.edge, symbols)]
         if states:
             found += read(joint.target, base, "_here", "i") + read(joint.source, base, "_there", "j")
         return found

@@ -20,7 +20,7 @@ from synchain.models.dynamics.equations import Equations, Layer
 from synchain.models.graphs.links import Link
 from synchain.models.mechanics.components import Edge, Node
 
-from ..program.expressions import Expression, Load, Name, Number, Value, as_expression, plus
+from ..program.expressions import Expression, Load, Name, Number, Value, as_expression, call, plus
 from ..program.passes import real
 from ..program.statements import Assign, Loop, Statement, let, whole
 
@@ -179,10 +179,12 @@ def places(equations: Equations) -> Places:
     return (MixedPlaces if equations.mixed else Places)(equations)
 
 
-def link_ends(weight: str, source: str = "j") -> list[Statement]:
-    """The two ends of a link and its weight, by what they are called."""
+def link_ends(edge: Edge, weight: str, source: str = "j") -> list[Statement]:
+    """The two ends of a link and its weight, by what they are called; a function of the weight alone needs a register."""
     i, j, w = (Load(array, Name("e"), None) for array in ("target", "source", "weights"))
-    return [whole("i", i), whole(source, j), let(weight, w)]
+    parts = (part for e in edge.expressions for part in e.atoms(sp.Function, sp.Pow))
+    alone = any(part.args[0].free_symbols == {edge.weight} for part in parts)
+    return [whole("i", i), whole(source, j), let(weight, call("broadcast", w, "WIDTH") if alone else w)]
 
 
 def named(joint: Joint) -> dict[sp.Symbol, sp.Symbol]:

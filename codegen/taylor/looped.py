@@ -372,7 +372,7 @@ class Looped(StepWriter):
         """What the links of a joint add."""
         edge, used = joint.edge, {s for e in found.rates for s in e.free_symbols}
         section = Section(Graph(self.names), self.order, span=joint.span, count=self.places.links, adds=True)
-        section.setting += link_ends(self.called[edge.weight.name], "j_there")
+        section.setting += link_ends(edge, self.called[edge.weight.name], "j_there")
         self.end(section, edge.here, joint.target, ("_here", "i"), used)
         self.end(section, edge.there, joint.source, ("_there", "j_there"), used)
         section.setting += self.loaded(self.places.of_link(edge, used, "j_there"))

@@ -42,6 +42,14 @@ def test_all_functions_of_models_run(text: str) -> None:
     np.testing.assert_allclose(found.end.values.ravel(), exact, rtol=0.0, atol=1e-8)
 
 
+def test_angles_of_numbers_run() -> None:
+    field = sc.Field({"x": "atan2(1, x) + atan2(0, x) + atan2(x, 0)"}, initial={"x": 0.4})
+    settings = {"transient": 0.0, "window": 1.0, "time_unit": "time", "rtol": 1e-10, "integrator": "dop853"}
+    found = sc.run(sc.Scene(field, **settings), show_progress=False)
+    exact = solve_ivp(lambda _, x: np.arctan2(1, x) + np.pi / 2, (0.0, 1.0), [0.4], rtol=1e-12, atol=1e-13).y[:, -1]
+    np.testing.assert_allclose(found.end.values.ravel(), exact, rtol=0.0, atol=1e-8)
+
+
 def test_no_function_is_left_out() -> None:
     called = set(re.findall(r"([a-z0-9]+)\(", f"{SMOOTH} {KINKED} {ROUGH}"))
     assert called == set(FUNCTIONS)

@@ -152,3 +152,23 @@ def test_time_in_links_costs_a_rosenbrock_method_no_steps(n: int) -> None:
     told = scene.replace(**given, initial=start, parameters={"p": list(np.linspace(-0.5, 0.5, n))})
     steps = [int(run(made.replace(integrator="rodas5p", rtol=1e-9)).data.steps) for made in (scene, told)]
     assert abs(steps[0] - steps[1]) <= 1
+
+
+def test_functions_of_the_weight_alone_run_in_loops() -> None:
+    """Weights of a loop are numbers, what functions take are registers; a power of it and a sine, on unequal weights."""
+    i, j, weight = ends(PHASE)
+    link = Rates({i.theta: K * (sp.sin(weight) + weight**LAG) * sp.sin(j.theta - i.theta)}, {K: 0.3, LAG: 0.5})
+    n = 10
+    weights = np.diag(np.arange(1.0, n), 1) / n + np.diag(np.arange(1.0, n), -1) / 7
+    start = np.linspace(0.0, 3.0, n)
+    scene = Scene(
+        PHASE, link, weights - np.diag(weights.sum(axis=1)), record=(),
+        transient=0.0, window=2.0, time_unit="time", rtol=1e-10, initial={"theta": start},
+    )  # fmt: skip
+
+    def rates(_: float, theta: np.ndarray) -> np.ndarray:
+        factors = 0.3 * np.where(weights > 0.0, np.sin(weights) + np.sqrt(weights), 0.0)
+        return 0.3 + (factors * np.sin(theta[None, :] - theta[:, None])).sum(axis=1)
+
+    expected = solve_ivp(rates, (0.0, 2.0), start, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    np.testing.assert_allclose(run(scene, show_progress=False).end.values.ravel(), expected, rtol=0.0, atol=1e-8)
