@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -35,7 +35,7 @@ class Drive:
     problem : str
         Why there is none, as a predicate of the oscillator.
     gaps : tuple of Expr
-        Expressions of time and the parameters at whose zeros the drive jumps or has a kink.
+        Expressions of time and the parameters at whose zeros the drive jumps, has a kink or rises once, as tanh.
     """
 
     waves: tuple[sp.Expr, ...] = ()
@@ -68,7 +68,7 @@ def drive_of(templates: tuple[Node | Edge, ...], varied: tuple[str, ...] = ()) -
     """
     if not any(template.forced for template in templates):
         return Drive(problem="is not driven")
-    sided = set[sp.Expr]().union(*map(gaps, templates))
+    sided = set[sp.Expr]().union(*map(gaps, templates), *map(rises, templates))
     bends, zeros = (tuple(sorted(found, key=sp.default_sort_key)) for found in (_bends(templates), sided))
     return replace(_periodic(templates, varied), bends=bends, gaps=zeros)
 
@@ -147,8 +147,31 @@ def _bent(part: sp.Basic) -> Iterator[tuple[sp.Expr, int]]:
 def gaps(template: Node | Edge) -> set[sp.Expr]:
     """What passes zero at the jumps and kinks of functions of time alone in the rates of a template."""
     parts = {part for e in template.rhs for part in e.atoms(*KINKED, *JUMPING, Relational)}
-    found = {gap for part in parts for gap in _sided(part)}
+    return _of_time(template, (gap for part in parts for gap in _sided(part)))
+
+
+def rises(template: Node | Edge) -> set[sp.Expr]:
+    """What passes zero where functions of time alone rise once and stay; two of them make a window."""
+    parts = {part for e in template.rhs for part in e.atoms(sp.tanh, sp.erf, sp.Pow)}
+    return _of_time(template, (gap for part in parts for gap in _risen(part)))
+
+
+def _of_time(template: Node | Edge, found: Iterable[sp.Expr]) -> set[sp.Expr]:
+    """Those of some expressions that time moves, and no state of a template."""
     return {gap for gap in found if gap.has(TIME) and not gap.free_symbols & _local(template)}
+
+
+def _risen(part: sp.Expr) -> Iterator[sp.Expr]:
+    """The argument of tanh and erf, and that of 1/(c + d exp) from where both terms are equal."""
+    if not isinstance(part, sp.Pow):
+        yield part.args[0]
+        return
+    waves = [a for a in sp.Add.make_args(part.base) if isinstance(a.as_coeff_Mul()[1], sp.exp)]
+    if part.exp.is_negative and len(waves) == 1:
+        factor, wave = waves[0].as_coeff_Mul()
+        rest = part.base - waves[0]
+        if factor.is_positive and rest.is_number and rest.is_positive:
+            yield wave.args[0] - sp.log(rest / factor)
 
 
 def _sided(part: sp.Basic) -> Iterator[sp.Expr]:

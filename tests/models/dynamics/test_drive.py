@@ -144,9 +144,11 @@ def test_no_step_is_longer_than_a_pulse_of_the_drive(drive: str, longest: float)
         ("1 if sin(t) > 0.8 and sin(t) < 0.9 else 0", np.arcsin(0.9) - np.arcsin(0.8)), ("floor(4*t + 0.3)", 0.25),
         ("1 if 4*t - floor(4*t) < 0.1 else 0", 0.025), ("min(1, abs(t - 0.5)*1000)", 0.001),
         ("max(sin(t) - 1.5, 0)", np.sqrt(np.pi)), ("abs(sin(t) - 1)", np.sqrt(np.pi)), ("sign(t - 0.5)", np.inf),
+        ("tanh(900*(t - 0.5)) - tanh(900*(t - 0.51))", 0.01), ("erf(90*(t - 0.5))*erf(90*(0.6 - t))", 0.1),
+        ("1/(1 + exp(60 - 200*t))/(2 + 3*exp(200*t - 70))", 0.05 + np.log(2 / 3) / 200), ("erf(t - 0.5)", np.inf),
     ],
 )  # fmt: skip
-def test_no_step_is_longer_than_a_drive_stays_between_jumps_or_kinks(drive: str, longest: float) -> None:
+def test_no_step_is_longer_than_a_drive_stays_between_jumps_kinks_or_rises(drive: str, longest: float) -> None:
     driven = Scene(Field({"x": drive}), None, ALONE, transient=0.0, window=1.0, time_unit="time")
     assert longest_step(driven) == pytest.approx(longest, rel=1e-3)
 
