@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import sympy as sp
 
 from synchain.codegen.driver.columns import Control, Span
+from synchain.codegen.integrators import Integrator
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.periodicity import Drive, as_function, drive_of, names_in
 from synchain.models.inputs.node_name import NodeName
@@ -18,6 +19,7 @@ from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
 
 from .initial_modes import local_clock, with_modes
+from .rates import Rates, rates
 from .stays import shortest_stay
 
 __all__ = [
@@ -26,6 +28,7 @@ __all__ = [
     "by_node",
     "control_array",
     "control_of",
+    "first_step",
     "half_swing",
     "longest_step",
     "parameter_names",
@@ -34,8 +37,9 @@ __all__ = [
     "tolerances",
 ]
 
-FIRST_STEP = 1e-4
-"""Step tried first in every cell; the step control enlarges it sixfold at a time."""
+FIRST_STEP, SHORT = 1e-4, 0.1
+"""Step tried first in every cell, and as a part of the time in which what grows fastest does so by a factor e; the step
+control enlarges it sixfold at a time."""
 
 MOST = 144
 """Rows of the parameters of the drive's jumps and kinks at which these are looked at."""
@@ -303,13 +307,26 @@ def control_array(
     return control
 
 
-def control_of(planner: Planner, jumps: bool) -> np.ndarray:
-    """Return the control array of a scene's sweep; `jumps` as for `control_array`."""
-    scene = planner.scene
-    rtol, atol = tolerances(scene, planner.extremes().numbers)
+def control_of(planner: Planner, jumps: bool, method: Integrator) -> np.ndarray:
+    """Return the control array of a scene's sweep by some method; `jumps` as for `control_array`."""
+    scene, extremes = planner.scene, planner.extremes()
+    rtol, atol = tolerances(scene, extremes.numbers)
     directions = [DIRECTIONS[section.direction] for section in scene.sections.values() or (scene.section,)]
     control = control_array(rtol, atol, longest_step(scene), scene.max_steps, directions[0], jumps)
+    if method.implicit:
+        cells = zip(extremes.start, extremes.numbers, strict=True)
+        control[Control.FIRST_STEP] = first_step(rates(scene.equations, *cell) for cell in cells)
     return np.concatenate([control, directions[1:]])
+
+
+def first_step(found: Iterable[Rates]) -> float:
+    """Return the length of the first step of a Rosenbrock method, by how fast motions grow where it begins.
+
+    Such a method damps fast growth as it does fast decay, and its estimate of the error with it, if a step is much longer:
+    it would stay at an equilibrium that repels. Steps that grow with the solution see it.
+    """
+    growth = max((at.growth for at in found if math.isfinite(at.growth)), default=0.0)
+    return min(FIRST_STEP, SHORT / max(growth, SHORT))
 
 
 def tolerances(scene: Scene, numbers: np.ndarray) -> tuple[float, float]:

@@ -177,7 +177,7 @@ class SweepJob:
 
     def __post_init__(self) -> None:
         self.planner = Planner(self.reduction.scene)
-        self.control = control_of(self.planner, self.reduction.jumps)
+        self.control = control_of(self.planner, self.reduction.jumps, self.kernel.origin.method)
 
     def cancel(self) -> None:
         """End all cells that run in this process."""
