@@ -1,9 +1,9 @@
 """One orbit after the other, each with all its modes: the driver of the kernels that carry deviations along an orbit.
 
 A deviation grows or shrinks by any factor, so it is scaled by a power of two every few steps, which is
-exact; the powers are counted.  Step sizes follow the errors of the orbit and of the modes in the
-first and the last register: callers sort modes by the size of their strength, so that the fastest
-modes are watched.  Taylor steps follow the series of the orbit and of all modes.
+exact; the powers are counted.  Step sizes follow the errors of the orbit and of all modes.  Callers
+sort modes by the size of their strength: the last register is stepped first, and if its error is too
+large, no other one is.  Taylor steps follow the series of the orbit and of all modes.
 """
 
 # ruff: noqa: I001  (the long lists of names stay short)
@@ -15,16 +15,13 @@ import numpy as np
 from numba import njit
 
 from ..simd.addresses import address
-from ..simd.lanes import absolute
 from ..simd.lanes import any_lane
 from ..simd.lanes import broadcast
 from ..simd.lanes import lane_bits
 from ..simd.lanes import load
 from ..simd.lanes import maximum
 from ..simd.lanes import minimum
-from ..simd.lanes import scale_binary
 from ..simd.lanes import select
-from ..simd.lanes import split_binary
 from ..simd.lanes import store
 from .cells import REPEATING
 from .cells import aligned
@@ -67,19 +64,17 @@ from .names import CONTACTS
 from .names import LANES
 from .names import SERIES
 from .names import WIDTH
-from .propagators import NODE
-from .propagators import PANEL
-from .propagators import POINTS
+from .landings import begin_leg
+from .landings import begin_products
+from .landings import bring
+from .landings import land
 from .propagators import TILE
-from .propagators import EXTRAS
-from .propagators import join
+from .propagators import TO
+from .propagators import apply
 from .propagators import larger
-from .propagators import level
-from .propagators import misfit
-from .propagators import part
+from .propagators import scale
 from .propagators import settle
 from .propagators import tabulate
-from .propagators import transport
 
 # --- kernel text below ---
 # Steps between two scalings: a step's growth is bounded by its error, that of so many stays far from overflow.
@@ -88,34 +83,8 @@ BETWEEN_SCALINGS = 8
 LENGTH = 1
 # Entry of `control`: how many times the tolerance of the orbit the modes are allowed.
 LOOSENESS = 8
-
-
-@njit(error_model="numpy")
-def watched(shared, strengths, old, new, which, rtol, carry):
-    """Step the modes of one register and return the largest of their errors, in units of the tolerance of each."""
-    error, size = carry(shared, strengths, old, new, which, which + 1)
-    ratios = np.empty(LANES)
-    store(ratios, 0, error / (rtol * size + 2.2250738585072014e-308))
-    worst = 0.0
-    for lane in range(LANES):
-        if not ratios[lane] <= worst:  # NaN too
-            worst = ratios[lane]
-    return worst
-
-
-@njit(error_model="numpy")
-def scale(modes, powers, registers, parts):
-    """Scale every deviation by a power of two to a size between 1 and 2; a deviation of zero stays zero."""
-    for which in range(registers):
-        size = absolute(load(modes, parts * which, LANES))
-        for c in range(1, parts):
-            size = maximum(size, absolute(load(modes, parts * which + c, LANES)))
-        normal = (size > 1e-290) & (size < 1e290)
-        _, power = split_binary(select(normal, size, 1.0), 1.0)
-        for c in range(parts):
-            value = load(modes, parts * which + c, LANES)
-            store(modes, parts * which + c, value * scale_binary(broadcast(1.0, LANES), 6755399441055744.0 - power))
-        store(powers, which, load(powers, which, LANES) + power)
+# Deviations of bodies that stick are moved as a whole after a leg of this part of a block.
+LONGEST_LEG = 0.5
 
 
 @njit(error_model="numpy")
@@ -193,15 +162,13 @@ def attempt(
     h = aim(clock, steering)
     error = functions.step(t, h, y, y, y_new, dense, steering[RTOL], steering[ATOL], shared)
     if any_lane(error <= 1.0) and registers > 0:
-        worst = watched(shared, strengths, old, new, registers - 1, tolerance, functions.carry)
+        worst = functions.carry(shared, strengths, old, new, registers - 1, registers, tolerance)
         if worst <= 1.0 and registers > 1:
-            worst = max(worst, watched(shared, strengths, old, new, 0, tolerance, functions.carry))
+            worst = larger(worst, functions.carry(shared, strengths, old, new, 0, registers - 1, tolerance))
         error = maximum(error, broadcast(worst, WIDTH))
     accept = judge(clock, h, error, 1.0 / (dims.error_order + 1.0))
     if CONTACTS:
         accept = take_back(accept, t, h, clock, y, y_new, dense, middle, out, (), dims, functions.pushes)
-    if any_lane(accept):
-        functions.carry(shared, strengths, old, new, 1, registers - 1)
     return h, accept
 
 
@@ -218,7 +185,7 @@ def renew(cell, spans, control, clock):
 @njit(error_model="numpy", nogil=True, cache=True)
 def march(
     functions, dims, owners, first, last, start, numbers, spans, control, strengths, vectors, growth, end, sums, counts,
-    batches, places, panels, weights, travellers, gains, misfits,
+    batches, places, panels, weights, travellers, gains, misfits, legs, shares, where, tracks,
 ):  # fmt: skip
     """Run the cells first … last-1, each an orbit with all modes.
 
@@ -235,6 +202,12 @@ def march(
     and panels as in `propagators`.  travellers (cells, registers of strengths * mode * LANES) are deviations of unit
     length that the propagators move from block to block; gains (cells, batches, strengths) are filled with the logarithm
     of their growth over each batch, misfits (cells) with the largest error of the interpolation.
+
+    legs, shares (any): of bodies that stick, panels and weights that give the nodes of `panels` from the nodes that are
+    integrated; where (nodes of panels): their places in registers.  Deviations are cut at landings then, not at the ends of
+    blocks; every block of time they are moved to all strengths.
+
+    tracks (cells, batches, any), or none: filled with the state and the deviations at the beginning of each batch.
     """
     registers, parts, kinds = growth.shape[1] // LANES, owners.size, dims.strengths
     size, steering, slips = dims.dimension, address(control, 0), np.zeros(dims.nodes)
@@ -246,22 +219,28 @@ def march(
     out = address(dense, rows)
     shared = address(out, 9 * dims.nodes + 2)
     columns, stride, groups = places.shape[1], registers * LANES, gains.shape[2] // LANES
-    room = registers * (2 * parts + 2 + max(1, kinds) + columns * parts) + groups + parts * (1 + TILE * columns)
-    deviations = aligned((room + registers * (4 + max(1, kinds))) * LANES)
+    sticks, room = legs.shape[0] > 0, int(legs[legs.shape[0] - 1, TO]) * LANES if legs.shape[0] else 0
+    held = registers * (2 * parts + 3 + 2 * max(1, kinds) + columns * parts) + 3 * groups
+    deviations = aligned((held + parts * (1 + TILE * columns)) * LANES + 9 * room)
     old, new = address(deviations, 0), address(deviations, registers * parts * LANES)
     powers = address(new, registers * parts * LANES)
     strong = address(powers, registers * LANES)
-    exponents = address(strong, registers * max(1, kinds) * LANES)
+    alone = address(strong, registers * max(1, kinds) * LANES)  # strengths, of one deviation for each node
+    exponents = address(alone, registers * max(1, kinds) * LANES)
     table = address(exponents, registers * LANES)
-    lifts = address(table, columns * parts * stride)
-    found = address(lifts, groups * LANES)
-    heads = address(found, parts * (1 + TILE * columns) * LANES)
-    head_powers = address(heads, stride)
-    alone = address(head_powers, stride)  # strengths, of one deviation for each node
+    singles = address(table, columns * parts * stride)
+    lifts = address(singles, registers * LANES)
+    kept, kept_powers = address(lifts, groups * LANES), address(lifts, 2 * groups * LANES)
+    found = address(lifts, 3 * groups * LANES)
+    share = address(found, parts * (1 + TILE * columns) * LANES)
+    share_powers, fine = address(share, room), address(share, 2 * room)
+    heights, work = address(share, 6 * room), address(share, 7 * room)
+    ways = (legs, address(shares, 0), where)
+    products = (share, share_powers, fine, heights, work, kept, kept_powers)
     nodes, spots, given = places.shape[0], address(places, 0), address(weights, 0)
     few, left = (nodes + LANES - 1) // LANES, 1 if owners[0] >= 0 else 0
-    narrow = panels.shape[0] > 0 and columns == 2 and parts == 2
     for node in range(nodes):
+        singles[node] = float(node)
         for k in range(kinds):
             alone[(kinds * (node // LANES) + k) * LANES + node % LANES] = strengths[k, int(places[node, 0])]
     for which in range(registers):
@@ -272,30 +251,56 @@ def march(
     for cell in range(first, last):
         fill(0, cell, start, numbers, spans, control, clock, y, dims)
         status, begun, moved = FINISHED, False, address(travellers, cell * groups * parts * LANES)
+        parted, fresh, landed, cut_at, handed_at = False, True, False, 0.0, 0.0
         for batch in range(batches.size):
+            if tracks.shape[1]:
+                for c in range(size):
+                    tracks[cell, batch, c] = y[c]
+                for k in range(groups * parts * LANES):
+                    tracks[cell, batch, size + k] = moved[k]
             for _ in range(batches[batch]):
                 if status != FINISHED:
                     break
                 if begun:
                     renew(cell, spans, control, clock)
-                begun = True
-                take_in(vectors[cell], old, registers, parts)
-                for k in range(registers * LANES):
-                    powers[k] = 0.0
-                active, carried, landed, parted = registers, strong, False, False
-                if CONTACTS:
-                    for i in range(dims.nodes):
-                        if y[2 * dims.nodes + i] == 0.0:
-                            brake(
-                                i, 0.0, old, registers, owners
-                            )  # a velocity beside that of the ground is lost at once
-                            landed = True
-                status, taken = outcome(0, clock, y, control, dims), 0
-                while status == 0:
+                begun, taken, status = True, 0, outcome(0, clock, y, control, dims)
+                while True:
+                    if fresh:
+                        take_in(vectors[cell], old, registers, parts)
+                        for k in range(registers * LANES):
+                            powers[k] = 0.0
+                        active, carried, parted, fresh = registers, strong, False, False
+                        if CONTACTS:
+                            for i in range(dims.nodes):
+                                if y[2 * dims.nodes + i] == 0.0:  # a velocity beside that of the ground is lost at once
+                                    brake(i, 0.0, old, registers, owners)
+                                    landed = True
                     if CONTACTS:  # noqa: SIM102  (Numba leaves out what a constant excludes)
-                        if narrow and landed and not parted:
-                            part(old, powers, spots, nodes, left, heads, head_powers, new, few)
-                            old, new, active, carried, parted = new, old, few, alone, True
+                        if sticks:
+                            now, error = clock[BASE] + clock[TIME], 0.0
+                            long = now - cut_at > LONGEST_LEG * spans[cell, 1] and y[2 * dims.nodes] != 0.0
+                            if landed and parted:
+                                due = now - handed_at >= spans[cell, 1]
+                                handed_at = now if due else handed_at
+                                tabulate(old, powers, singles, nodes, 1, table, exponents, 2, stride)
+                                error = land(due, table, exponents, stride, left, panels, given, ways, products, groups)
+                            elif landed or long:
+                                error = bring(
+                                    parted, old, powers, spots, singles, nodes, table, exponents, stride, panels, given,
+                                    ways, products, moved, lifts, found, groups,
+                                )  # fmt: skip
+                                handed_at, fresh, parted = now, not landed, False
+                            if landed:
+                                if not parted:
+                                    begin_products(moved, lifts, left, legs, products, groups)
+                                begin_leg(old, powers, nodes, left)
+                                parted, active, carried = True, few, alone
+                            if landed or long:
+                                misfits[cell], cut_at, landed = larger(misfits[cell], error), now, False
+                    if status != 0:
+                        break
+                    if fresh:
+                        continue
                     still = parted and y[2 * dims.nodes] == 0.0  # a place that sticks stays
                     moving, t = 0 if still else active, load(clock, TIME, WIDTH)
                     h, accept = attempt(
@@ -329,25 +334,26 @@ def march(
                             status = outcome(0, clock, y, control, dims)
                 counts[cell, N_ACCEPTED] += int(clock[ACCEPTED])
                 counts[cell, N_REJECTED] += int(clock[REJECTED])
-                if panels.shape[0]:
-                    if CONTACTS:  # noqa: SIM102
-                        if parted:
-                            join(old, powers, spots, nodes, heads, head_powers, new)
-                            old, new = new, old
-                    scale(old, powers, registers, parts)
-                    tabulate(old, powers, spots, nodes, columns, table, exponents, parts, stride)
-                    for k in range(panels.shape[0]):
-                        panel = address(panels, len(PANEL) * k)
-                        points = int(panel[POINTS])
-                        if points:
-                            level(
-                                int(panel[NODE]), points + int(panel[EXTRAS]), table, exponents, columns * parts, stride
-                            )  # fmt: skip
-                            misfits[cell] = larger(misfits[cell], misfit(panel, given, table, columns, parts, stride))
-                        transport(panel, given, table, exponents, moved, lifts, found, columns, parts, stride)
-                    scale(moved, lifts, groups, parts)
+                if not sticks:
+                    fresh = True
+                    if panels.shape[0]:
+                        scale(old, powers, registers, parts)
+                        tabulate(old, powers, spots, nodes, columns, table, exponents, parts, stride)
+                        error = apply(panels, given, table, exponents, moved, lifts, found, columns, parts, stride)
+                        misfits[cell] = larger(misfits[cell], error)
+                        scale(moved, lifts, groups, parts)
+                elapsed = clock[BASE] + clock[TIME]
+                cut_at, handed_at = cut_at - elapsed, handed_at - elapsed
             if panels.shape[0]:
-                settle(moved, lifts, groups, address(gains, (cell * batches.size + batch) * groups * LANES), parts)
+                if CONTACTS:  # noqa: SIM102
+                    if sticks and not fresh:
+                        error = bring(
+                            parted, old, powers, spots, singles, nodes, table, exponents, stride, panels, given, ways,
+                            products, moved, lifts, found, groups,
+                        )  # fmt: skip
+                        misfits[cell], fresh = larger(misfits[cell], error), not parted
+                at = address(gains, (cell * batches.size + batch) * groups * LANES)
+                settle(moved, lifts, groups, at, parts, kept, kept_powers, parted)
         if not panels.shape[0]:
             hand_back(old, powers, registers, vectors[cell], growth[cell], parts)
         for c in range(dims.dimension):

@@ -14,10 +14,14 @@ from numba import njit
 
 from ..simd.addresses import address
 from ..simd.elementary import log
+from ..simd.lanes import absolute
 from ..simd.lanes import broadcast
 from ..simd.lanes import fma
 from ..simd.lanes import load
+from ..simd.lanes import maximum
+from ..simd.lanes import scale_binary
 from ..simd.lanes import select
+from ..simd.lanes import split_binary
 from ..simd.lanes import sqrt
 from ..simd.lanes import store
 from .names import LANES
@@ -29,6 +33,21 @@ FROM, TO, NODE, POINTS, EXTRAS, WEIGHTS, CHECKS = PANEL = 0, 1, 2, 3, 4, 5, 6
 # Registers of strengths whose propagators are interpolated together: a number of a node is loaded once for all of them, and
 # a weight once for several entries.
 TILE = 2
+
+
+@njit(error_model="numpy")
+def scale(modes, powers, registers, parts):
+    """Scale every deviation by a power of two to a size between 1 and 2; a deviation of zero stays zero."""
+    for which in range(registers):
+        size = absolute(load(modes, parts * which, LANES))
+        for c in range(1, parts):
+            size = maximum(size, absolute(load(modes, parts * which + c, LANES)))
+        normal = (size > 1e-290) & (size < 1e290)
+        _, power = split_binary(select(normal, size, 1.0), 1.0)
+        for c in range(parts):
+            value = load(modes, parts * which + c, LANES)
+            store(modes, parts * which + c, value * scale_binary(broadcast(1.0, LANES), 6755399441055744.0 - power))
+        store(powers, which, load(powers, which, LANES) + power)
 
 
 @njit(error_model="numpy")
@@ -56,39 +75,9 @@ def tabulate(modes, powers, places, nodes, columns, table, exponents, parts, str
 
 
 @njit(error_model="numpy")
-def part(modes, powers, places, nodes, left, heads, head_powers, single, registers):
-    """Part propagators of two components, of which a landing has left one, into this row and one deviation for each node.
-
-    What becomes of this deviation, which begins with 1 in the component that is left, is what becomes of both columns.
-    heads, head_powers: the row, by mode.  single: the deviation of each node, in so many registers.
-    """
-    for j in range(2 * nodes):
-        k = int(places[j])
-        heads[k], head_powers[k] = modes[(2 * (k // LANES) + left) * LANES + k % LANES], powers[k]
-    for k in range(registers * LANES):
-        first = 2 * (k // LANES) * LANES + k % LANES
-        single[first + left * LANES] = 1.0 if k < nodes else 0.0
-        single[first + (1 - left) * LANES] = 0.0
-    for k in range(registers * LANES):
-        powers[k] = 0.0
-
-
-@njit(error_model="numpy")
-def join(single, powers, places, nodes, heads, head_powers, modes):
-    """Write the columns of the propagators that `part` has parted."""
-    for j in range(2 * nodes):
-        k, node = int(places[j]), j // 2
-        first = 2 * (node // LANES) * LANES + node % LANES
-        head_powers[k] += powers[node]
-        for r in range(2):
-            modes[(2 * (k // LANES) + r) * LANES + k % LANES] = heads[k] * single[first + r * LANES]
-    for j in range(2 * nodes):
-        powers[int(places[j])] = head_powers[int(places[j])]
-
-
-@njit(error_model="numpy")
-def level(node, count, table, exponents, entries, stride):
-    """Scale the propagators of some nodes by the same power of two, the largest of theirs."""
+def even(panel, table, exponents, entries, stride):
+    """Scale the propagators of the nodes of a panel by the same power of two, the largest of theirs."""
+    node, count = int(panel[NODE]), int(panel[POINTS]) + int(panel[EXTRAS])
     largest = exponents[node]
     for j in range(node, node + count):
         largest = max(largest, exponents[j])
@@ -107,15 +96,18 @@ def larger(known, other):
 
 
 @njit(error_model="numpy")
-def misfit(panel, weights, table, columns, parts, stride):
-    """The largest difference of interpolated from integrated propagators, relative to the size of the propagator."""
-    node, points, kinds, worst = int(panel[NODE]), int(panel[POINTS]), parts // columns, 0.0
+def misfit(panel, weights, table, columns, rows, kinds, stride):
+    """The largest difference of interpolated from integrated propagators, relative to the size of the propagator.
+
+    kinds: 2 for complex numbers, else 1.
+    """
+    node, points, worst = int(panel[NODE]), int(panel[POINTS]), 0.0
     for extra in range(int(panel[EXTRAS])):
         size, gap = 1e-300, 0.0
         for c in range(columns):
-            for r in range(columns):
-                at = (parts * c + r) * stride + node
-                beside = at + columns * stride if kinds == 2 else at
+            for r in range(rows):
+                at = (kinds * rows * c + r) * stride + node
+                beside = at + rows * stride if kinds == 2 else at
                 real, imaginary = table[at + points + extra], table[beside + points + extra] if kinds == 2 else 0.0
                 size = max(size, math.hypot(real, imaginary) if kinds == 2 else abs(real))
                 for j in range(points):
@@ -206,6 +198,17 @@ def product(first, k, travellers, found, columns, parts):
 
 
 @njit(error_model="numpy")
+def lift(panel, exponents, powers):
+    """Add the powers of two of the factors of a panel to those of its numbers."""
+    for k in range(int(panel[TO]) - int(panel[FROM])):
+        power = broadcast(exponents[int(panel[NODE])], LANES)
+        if int(panel[POINTS]) == 0:
+            power = load(exponents, int(panel[NODE]) // LANES + k, LANES)
+        at = int(panel[FROM]) + k
+        store(powers, at, load(powers, at, LANES) + power)
+
+
+@njit(error_model="numpy")
 def transport(panel, weights, table, exponents, travellers, lifts, found, columns, parts, stride):
     """Apply the propagators of one panel to the deviations of its strengths; powers of two are counted in `lifts`.
 
@@ -222,23 +225,75 @@ def transport(panel, weights, table, exponents, travellers, lifts, found, column
         for k in range(min(TILE, count - which)):
             s = int(panel[FROM]) + which + k
             product(parts * s, k, travellers, found, columns, parts)
-            lift = broadcast(exponents[int(panel[NODE])], LANES)
-            if int(panel[POINTS]) == 0:
-                lift = load(exponents, int(panel[NODE]) // LANES + which + k, LANES)
-            store(lifts, s, load(lifts, s, LANES) + lift)
+    lift(panel, exponents, lifts)
 
 
 @njit(error_model="numpy")
-def settle(travellers, lifts, registers, gains, parts):
-    """Give all deviations unit length, and write the logarithms of how much they have grown; zeros stay zeros."""
+def largest_misfit(panels, weights, table, exponents, columns, rows, kinds, stride):
+    """Scale the propagators of each panel alike, and return the largest error of their interpolation."""
+    worst = 0.0
+    for k in range(panels.shape[0]):
+        panel = address(panels, len(PANEL) * k)
+        if int(panel[POINTS]):
+            even(panel, table, exponents, kinds * rows * columns, stride)
+            worst = larger(worst, misfit(panel, weights, table, columns, rows, kinds, stride))
+    return worst
+
+
+@njit(error_model="numpy")
+def apply(panels, weights, table, exponents, travellers, lifts, found, columns, parts, stride):
+    """Apply the propagators of all panels to the deviations; returns the largest error of the interpolation."""
+    worst = largest_misfit(panels, weights, table, exponents, columns, columns, parts // columns, stride)
+    for k in range(panels.shape[0]):
+        panel = address(panels, len(PANEL) * k)
+        transport(panel, weights, table, exponents, travellers, lifts, found, columns, parts, stride)
+    return worst
+
+
+@njit(error_model="numpy")
+def multiply(panel, weights, factors, numbers):
+    """Multiply each number of a panel by a factor that is interpolated from those of the nodes.
+
+    numbers: in registers, as the panel has them.  factors: of all nodes.
+    """
+    points, first, count = int(panel[POINTS]), int(panel[FROM]), int(panel[TO]) - int(panel[FROM])
+    if points == 0:
+        for k in range(count):
+            factor = load(factors, int(panel[NODE]) // LANES + k, LANES)
+            store(numbers, first + k, load(numbers, first + k, LANES) * factor)
+        return
+    for which in range(0, count, 4):
+        second, third, fourth = min(which + 1, count - 1), min(which + 2, count - 1), min(which + 3, count - 1)
+        begin, zero = int(panel[WEIGHTS]), broadcast(0.0, LANES)
+        a, b, c, d = begin + points * which, begin + points * second, begin + points * third, begin + points * fourth
+        p, q, r, s = zero, zero, zero, zero
+        for j in range(points):
+            factor = broadcast(factors[int(panel[NODE]) + j], LANES)
+            p, q = fma(load(weights, a + j, LANES), factor, p), fma(load(weights, b + j, LANES), factor, q)
+            r, s = fma(load(weights, c + j, LANES), factor, r), fma(load(weights, d + j, LANES), factor, s)
+        p, q = p * load(numbers, first + which, LANES), q * load(numbers, first + second, LANES)
+        r, s = r * load(numbers, first + third, LANES), s * load(numbers, first + fourth, LANES)
+        for at, number in ((which, p), (second, q), (third, r), (fourth, s)):
+            store(numbers, first + at, number)
+
+
+@njit(error_model="numpy")
+def settle(travellers, lifts, registers, gains, parts, kept, kept_powers, follow):
+    """Give all deviations unit length, and write the logarithms of how much they have grown; zeros stay zeros.
+
+    If `follow`, the numbers that they were made of follow suit.
+    """
     for s in range(registers):
         square = broadcast(0.0, LANES)
         for r in range(parts):
             value = load(travellers, parts * s + r, LANES)
             square = fma(value, value, square)
-        length = sqrt(square)
-        store(gains, s, load(lifts, s, LANES) * 0.6931471805599453 + log(length))
+        length, power = sqrt(square), load(lifts, s, LANES)
+        store(gains, s, power * 0.6931471805599453 + log(length))
         store(lifts, s, broadcast(0.0, LANES))
         scaled = 1.0 / select(length > 0.0, length, 1.0)
         for r in range(parts):
             store(travellers, parts * s + r, scaled * load(travellers, parts * s + r, LANES))
+        if follow:
+            store(kept, s, scaled * load(kept, s, LANES))
+            store(kept_powers, s, load(kept_powers, s, LANES) - power)

@@ -86,18 +86,19 @@ def signatures(driver: Driver) -> dict[str, Any]:
     """Return the types of the functions that a driver takes, and that of its own entry, by name."""
     more = _graph if driver.looped else ()
     if driver.kind is KernelKind.MODES:
-        one, lane = Lane(1), Lane(driver.width)
+        one = Lane(1)
         times = (one, one, one) if driver.series else (one, one)
         orbit = types.UniTuple(one, 2) if driver.series else one
-        stages = types.UniTuple(lane, 2)(*[ADDRESS] * 4, types.int64, types.int64)
+        registers = [types.int64] * (1 if driver.series else 2)
         known = {
             "step": orbit(*times, *[ADDRESS] * 4, types.float64, types.float64, ADDRESS),
-            "carry": types.float64(*[ADDRESS] * 4, types.int64, types.float64) if driver.series else stages,
+            "carry": types.float64(*[ADDRESS] * 4, *registers, types.float64),
             "pushes": types.void(one, *[ADDRESS] * 3),
             "release": types.void(types.int64, *[types.float64] * 2, *[ADDRESS] * 3, types.int64),
         }
         arrays = (*[_input] * 3, _vector, _input, _cube, _matrix, _matrix, _matrix, _counts)
         arrays += (types.int64[::1], _matrix, _matrix, _vector, _matrix, _cube, _vector)
+        arrays += (_matrix, _vector, _vector, _cube)
         own: tuple[Any, ...] = (_sizes(ModeDimensions), types.int64[::1])
     else:
         lane = Lane(driver.width)

@@ -99,7 +99,8 @@ class Driver:
             "SERIES": self.series,
         }
         contacts = ["contacts"] if self.contacts else []
-        last = ["propagators", "modes"] if modes else ["spread", "sweep"]
+        landings = ["landings"] if self.contacts else []
+        last = ["propagators", *landings, "modes"] if modes else ["spread", "sweep"]
         pieces = [f"driver.{name}" for name in ("dense", "cells", "control", *contacts, *last)]
         return _module(str(self), constants, pieces)
 

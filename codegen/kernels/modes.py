@@ -43,12 +43,19 @@ HEAD = 3
 
 CARRY = '''
 @njit(error_model='numpy', cache=True)
-def carry(shared, strengths, old, new, first, last):
-    """The same step of the modes in the registers first … last-1; returns error and size of the last of them."""
-    error, size = broadcast(0.0, LANES), broadcast(0.0, LANES)
+def carry(shared, strengths, old, new, first, last, tolerance):
+    """The same step of the modes in registers first … last-1; returns the largest of their errors, in units of the tolerance."""
+    worst, broken, ratios = broadcast(0.0, LANES), broadcast(0.0, LANES), np.empty(LANES)
     for which in range(first, last):
         error, size = mode_step(shared, strengths, old, new, which)
-    return error, size
+        ratio = error/(tolerance*size + 2.2250738585072014e-308)
+        worst, broken = maximum(worst, ratio), broken + 0.0*ratio
+    store(ratios, 0, worst + broken)
+    largest = 0.0
+    for lane in range(LANES):
+        if not ratios[lane] <= largest:  # NaN too
+            largest = ratios[lane]
+    return largest
 '''.strip()
 
 Place = tuple[int, int]

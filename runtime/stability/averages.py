@@ -99,7 +99,9 @@ def check_whole(what: str, periods: float) -> float:
     return periods
 
 
-def error_of_steps(usual: Sequence[np.ndarray], looser: Sequence[np.ndarray], length: float) -> np.ndarray:
+def error_of_steps(
+    usual: Sequence[np.ndarray] | np.ndarray, looser: Sequence[np.ndarray] | np.ndarray, length: float
+) -> np.ndarray:
     """Return the error of growth rates that is due to the steps: their change at SLACK times the tolerance.
 
     It is the mean change over single blocks, each from the same state and deviations as the other, with its own standard
@@ -223,6 +225,22 @@ class Batches:
         self.blocks += blocks
         self.due = self.blocks % self.per_batch == 0 and self.blocks >= BATCHES and self.count % CHECKED == 0
 
+    def extend(self, growths: np.ndarray, parts: np.ndarray) -> None:
+        """Add the growth over further batches, as many blocks in each as `ahead` has said.
+
+        Parameters
+        ----------
+        growths : ndarray, shape (b, starts, m)
+            Logarithm of the growth of each deviation over each batch.
+        parts : ndarray of int64, shape (b,)
+            Blocks of each batch.
+        """
+        self.add(growths[0], int(parts[0]))
+        if len(parts) > 1:
+            self.sums[self.count : self.count + len(parts) - 2] = growths[1:-1]
+            self.count, self.blocks = self.count + len(parts) - 2, self.blocks + int(parts[1:-1].sum())
+            self.add(growths[-1], int(parts[-1]))
+
     def mean(self) -> np.ndarray:
         """Return the growth per unit of time, an ndarray of shape (starts, m)."""
         return np.asarray(np.sum(self.sums[: self.count], axis=0) / self.time)
@@ -241,11 +259,13 @@ class Batches:
             The estimates; inf if the average has fewer than FEWEST degrees of freedom; 45 periods have them.
         """
         whole, freedom = self.blocks // self.per_batch, self.freedom
-        rates = self.sums[:whole, :, strengths] / (self.per_batch * self.block * self.unit)
+        sums = self.sums[:whole, :, strengths]
         if freedom < FEWEST:
-            return np.full(rates.shape[1:], np.inf)
-        parts = np.tensordot(_waves(freedom, whole), rates, axes=(0, 0))
-        return np.asarray(stdtrit(freedom, ndtr(2.0)) / 2.0 * np.sqrt((parts**2).mean(axis=0) / whole))
+            return np.full(sums.shape[1:], np.inf)
+        parts = _waves(freedom, whole) @ sums.reshape(whole, -1)
+        length = self.per_batch * self.block * self.unit
+        spread = np.sqrt(np.einsum("ij,ij->j", parts, parts) / (freedom * whole))
+        return np.asarray(_wide(freedom) / length * spread.reshape(sums.shape[1:]))
 
     def error(self, strengths: slice = ALL) -> np.ndarray:
         """Return the standard errors (strengths,) of the mean over the starts, as `error_by_start`."""
@@ -266,8 +286,14 @@ class Batches:
         return float(error[self.worst])
 
 
+@lru_cache(maxsize=MOST)
+def _wide(freedom: int) -> float:
+    """Half of Student's quantile by which a mean lies within two errors of the truth as often as a normal variable."""
+    return float(stdtrit(freedom, ndtr(2.0)) / 2.0)
+
+
 @lru_cache(maxsize=8)
 def _waves(count: int, batches: int) -> np.ndarray:
-    """The lowest terms (batches, count) of the orthonormal cosine transform of some batches, but the mean."""
-    angles = np.outer(np.arange(batches) + 0.5, np.arange(1, count + 1)) * (math.pi / batches)
+    """The lowest terms (count, batches) of the orthonormal cosine transform of some batches, but the mean."""
+    angles = np.outer(np.arange(1, count + 1), np.arange(batches) + 0.5) * (math.pi / batches)
     return math.sqrt(2.0 / batches) * np.cos(angles)

@@ -481,6 +481,5 @@ def average(orbits: Orbits, averaging: Averaging, reporter: Reporter) -> tuple[n
         else:
             parts = batches.ahead(left)
             growths = orbits.growths(parts)
-        for growth, blocks in zip(growths, parts, strict=True):
-            batches.add(growth, int(blocks))
+        batches.extend(growths, parts)
     return batches.mean(), np.hypot(batches.error_by_start(), steps), batches.time

@@ -143,6 +143,10 @@ class Registers:
     room: int
     lanes: int
 
+    def of_strengths(self, values: np.ndarray) -> np.ndarray:
+        """Return what belongs to each strength, from values (..., room) in registers."""
+        return values[..., : len(self.where)] if len(self.panels) == 1 else values.take(self.where, axis=-1)
+
 
 def exact_interpolation(strengths: np.ndarray) -> Interpolation:
     """Return the trivial map: every strength is integrated."""

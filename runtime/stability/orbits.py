@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -22,7 +23,7 @@ from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import with_modes
 from .averages import BATCHES, SLACK, TRIED, error_of_steps
 from .interpolation import Interpolation, exact_interpolation, lines_of, strength_interpolation
-from .variational_integrator import Travellers, VariationalIntegrator
+from .variational_integrator import NO_TRACKS, Travellers, VariationalIntegrator
 
 __all__ = ["Orbits", "unit_of_time"]
 
@@ -40,6 +41,9 @@ BESIDE = 42
 
 FAR = 300.0
 """Logarithm of the size beyond which a factor of a propagator is kept apart; numbers end at 745."""
+
+LANDING = 5_000
+"""Multiplications that take as long as a landing."""
 
 TRIAL = 8
 """Blocks on which an interpolation is tried."""
@@ -144,6 +148,11 @@ class Orbits:
         return self.variation.orbit.forced
 
     @property
+    def lands(self) -> bool:
+        """True if a landing leaves one of the two components that a deviation has."""
+        return self.variation.events is not None and self.variation.size == self.components == 2
+
+    @property
     def linear(self) -> bool:
         """True if no state occurs in the variational equation: it is the same along every orbit, bounded or not."""
         states = {sp.Symbol(name, real=True) for name in self.variation.orbit.state}
@@ -212,22 +221,31 @@ class Orbits:
         most = max(4.0, periods / BATCHES)
         blocks = [b for b in BLOCKS if b <= most and periods % b == 0.0] if self.forced else FREE_BLOCKS
         lines = 1 if self.strengths.ndim == 1 else len(lines_of(self.strengths)[1])
-        for block, nodes, parts in _choices(blocks, lines * taken, len(self.strengths) * self.components**2):
-            chosen = strength_interpolation(self.strengths, nodes, parts)
-            if chosen.is_exact or self._misfit(chosen, block) < limit:
+        choices = _choices(blocks, lines * taken, len(self.strengths) * self.components**2)
+        if self.lands and lines == 1:
+            long = [b for b in BLOCKS if b <= most and periods % b == 0.0]
+            choices = sorted(
+                [*choices, *_choices_of_legs(long, taken, len(self.strengths))], key=lambda choice: choice.cost
+            )
+        for choice in choices:
+            outer = strength_interpolation(self.strengths, choice.nodes, choice.parts)
+            legs = strength_interpolation(outer.nodes, choice.of_legs, choice.parts) if choice.of_legs else None
+            _, travellers = self.start(outer, choice.block, legs=legs)
+            if outer.is_exact and legs is None:
+                return
+            self.growths(np.full(1, TRIAL))
+            if travellers.error < limit:
                 break
         else:
-            chosen = exact_interpolation(self.strengths)
-        self.start(chosen, block)
-
-    def _misfit(self, interpolation: Interpolation, block: float) -> float:
-        """Error of an interpolation over the next blocks."""
-        integrator, travellers = self.start(interpolation, block)
-        integrator.follow(block * self.unit, np.full(1, TRIAL), travellers)
-        return travellers.error
+            outer, legs = exact_interpolation(self.strengths), None
+        self.start(outer, choice.block, legs=legs)
 
     def start(
-        self, interpolation: Interpolation, block: float, looseness: float = LOOSENESS
+        self,
+        interpolation: Interpolation,
+        block: float,
+        looseness: float = LOOSENESS,
+        legs: Interpolation | None = None,
     ) -> tuple[VariationalIntegrator, Travellers]:
         """Start deviations of all strengths along the orbits from their settled states.
 
@@ -239,6 +257,9 @@ class Orbits:
             Units of time between two products.
         looseness : float
             Ratio of the tolerance of the propagators to that of the orbit.
+        legs : Interpolation, optional
+            Of a body that sticks: which propagators are integrated from landing to landing, and how those of the nodes
+            follow from them; by default the nodes themselves.
 
         Returns
         -------
@@ -247,10 +268,18 @@ class Orbits:
         travellers : Travellers
             The deviations.
         """
-        integrator = self.integrator_of(interpolation.nodes, looseness)
+        if self.lands:
+            legs = legs or exact_interpolation(interpolation.nodes)
+        integrator = self.integrator_of((legs or interpolation).nodes, looseness)
         integrator.set_deviations(self._basis(integrator))
-        registers = interpolation.registers(integrator.kernel.origin.width)
-        travellers = Travellers.make(registers, len(self.state), self.components, self.variation.size)
+        width = integrator.kernel.origin.width
+        travellers = Travellers.make(
+            interpolation.registers(width),
+            len(self.state),
+            self.components,
+            self.variation.size,
+            None if legs is None else legs.registers(width),
+        )
         self.interpolation, self.block, self.integrator, self.travellers = interpolation, block, integrator, travellers
         return integrator, travellers
 
@@ -281,20 +310,22 @@ class Orbits:
             columns = columns[:, :p] + 1j * columns[:, p:]
         return np.asarray(columns.reshape(len(self.state), p, -1, p).transpose(0, 2, 1, 3)), logarithms
 
-    def growths(self, batches: np.ndarray) -> np.ndarray:
+    def growths(self, batches: np.ndarray, tracks: np.ndarray = NO_TRACKS) -> np.ndarray:
         """Advance orbits and deviations by batches of blocks.
 
         Parameters
         ----------
         batches : ndarray of int64, shape (b,)
             Blocks of each batch.
+        tracks : ndarray, shape (starts, b, any), optional
+            Is filled with the states and deviations that each batch begins with.
 
         Returns
         -------
         ndarray, shape (b, starts, m)
             Logarithm of the growth of each deviation over each batch.
         """
-        return self.integrator.follow(self.block * self.unit, batches, self.travellers)
+        return self.integrator.follow(self.block * self.unit, batches, self.travellers, tracks)
 
     def tried(self, most: int) -> tuple[np.ndarray, np.ndarray]:
         """Advance by TRIED blocks, or by fewer.
@@ -311,16 +342,15 @@ class Orbits:
         error : ndarray, shape (starts, m)
             The error of growth rates that is due to the steps (`averages.error_of_steps`).
         """
-        usual, states, vectors, one = [], [], [], np.ones(1, dtype=np.int64)
-        for _ in range(min(most, TRIED)):
-            states.append(self.integrator.state)
-            vectors.append(self.travellers.vectors.copy())
-            usual.append(self.growths(one)[0])
-        beside = self.integrator.beside(np.concatenate(states), SLACK)
-        travellers = replace(self.travellers, vectors=np.concatenate(vectors))
+        count, (starts, size), vectors = min(most, TRIED), self.state.shape, self.travellers.vectors
+        tracks = np.empty((starts, count, size + vectors.shape[1]))
+        usual = self.growths(np.ones(count, dtype=np.int64), tracks)
+        begun = tracks.swapaxes(0, 1).reshape(count * starts, -1)
+        beside = self.integrator.beside(np.ascontiguousarray(begun[:, :size]), SLACK)
+        travellers = replace(self.travellers, vectors=np.ascontiguousarray(begun[:, size:]))
         length = self.block * self.unit
-        looser = beside.follow(length, one, travellers)[0].reshape(-1, *usual[0].shape)
-        return np.array(usual), error_of_steps(usual, looser, length)
+        looser = beside.follow(length, np.ones(1, dtype=np.int64), travellers)[0].reshape(usual.shape)
+        return usual, error_of_steps(usual, looser, length)
 
 
 def _joined(scene: Scene, strengths: np.ndarray) -> Scene:
@@ -380,17 +410,41 @@ def unit_of_time(scene: Scene) -> float:
     return scene.period or 2.0 * math.pi
 
 
-def _choices(blocks: Sequence[float], taken: float, numbers: int) -> list[tuple[float, int, int]]:
-    """Blocks, nodes of a panel and panels on each side, the cheapest first.
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """How propagators may be interpolated, and what it costs in multiplications for each unit of time.
+
+    nodes, parts: of a panel, and panels on each side; of_legs: nodes that are integrated from landing to landing, 0 if all
+    nodes are, from the beginning of a block to its end.
+    """
+
+    cost: float
+    block: float
+    nodes: int
+    parts: int
+    of_legs: int = 0
+
+
+def _choices(blocks: Sequence[float], taken: float, numbers: int) -> list[Choice]:
+    """Blocks, nodes and panels, the cheapest first.
 
     `taken`: multiplications that integrate a node of each line over a unit of time; `numbers`: those of all propagators.
     """
+    choices = [
+        Choice(nodes * parts * taken + (numbers * (nodes + BESIDE) + BLOCK) / block, block, nodes, parts)
+        for block in blocks
+        for nodes in NODES
+        for parts in PARTS
+    ]
+    return sorted(choices, key=lambda choice: choice.cost)
 
-    def cost(block: float, nodes: int, parts: int) -> float:
-        return nodes * parts * taken + (numbers * (nodes + BESIDE) + BLOCK) / block
 
-    choices = [(block, nodes, parts) for block in blocks for nodes in NODES for parts in PARTS]
-    return sorted(choices, key=lambda choice: cost(*choice))
+def _choices_of_legs(blocks: Sequence[float], taken: float, numbers: int) -> Iterator[Choice]:
+    """Yield choices for a body that sticks: one column of each propagator is integrated, one number of it interpolated."""
+    for block, of_legs, nodes, parts in itertools.product(blocks, NODES, NODES, PARTS):
+        if of_legs < nodes:
+            cost = of_legs * parts * (0.5 * taken + nodes) + LANDING + numbers * (nodes + BESIDE / 4) / block
+            yield Choice(cost, block, nodes, parts, of_legs)
 
 
 def _stretches(periods: int) -> list[int]:

@@ -25,13 +25,14 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.choice import chosen_for_modes, warn_of_stiff_modes
 from ..cells.initial_modes import local_clock
-from ..cells.plan import by_node, control_array, half_swing, periods, tolerances
+from ..cells.plan import by_node, control_array, first_step, half_swing, periods, tolerances
+from ..cells.rates import mode_rates
 from ..support.status import Status
 from ..support.threads import worker_count
 from .averages import SLACK, TRIED, error_of_steps
 from .interpolation import Registers, on_a_cache_line
 
-__all__ = ["Travellers", "VariationalIntegrator"]
+__all__ = ["NO_TRACKS", "Travellers", "VariationalIntegrator"]
 
 
 NO_PANELS = (
@@ -42,8 +43,16 @@ NO_PANELS = (
     np.zeros((0, 0)),
     np.zeros((0, 0, 0)),
     np.zeros(0),
+    np.zeros((0, 7)),
+    np.zeros(0),
+    np.zeros(0),
+    np.zeros((0, 0, 0)),
 )
 """The last arguments of a kernel that carries deviations over one block, and moves no others."""
+
+NO_LEGS, NO_TRACKS = NO_PANELS[-4:-1], NO_PANELS[-1]
+"""What the last ones are for propagators that are integrated from the beginning of a block to its end, and if what a
+batch begins with is not asked for."""
 
 
 @dataclass(slots=True)
@@ -58,6 +67,8 @@ class Travellers:
         Components of a deviation, real or complex.
     vectors : ndarray, shape (cells, any)
         The deviations at unit length, in registers.
+    legs : Registers or None
+        How the propagators of the nodes follow from those that are integrated, of bodies that stick.
     error : float
         Largest error of the interpolation so far, relative to the size of a propagator.
     """
@@ -65,10 +76,13 @@ class Travellers:
     registers: Registers
     columns: int
     vectors: np.ndarray
+    legs: Registers | None = None
     error: float = 0.0
 
     @classmethod
-    def make(cls, registers: Registers, cells: int, columns: int, parts: int) -> Travellers:
+    def make(
+        cls, registers: Registers, cells: int, columns: int, parts: int, legs: Registers | None = None
+    ) -> Travellers:
         """Return deviations along (1, 1, …).
 
         Parameters
@@ -79,11 +93,18 @@ class Travellers:
             Numbers of orbits and of components.
         parts : int
             Real numbers of a deviation.
+        legs : Registers, optional
+            As the attribute.
         """
         lanes = registers.lanes
         start = np.zeros((cells, registers.room // lanes, parts, lanes))
         start[:, :, :columns] = 1.0 / math.sqrt(columns)
-        return cls(registers, columns, on_a_cache_line(start.reshape(-1)).reshape(cells, -1))
+        return cls(registers, columns, on_a_cache_line(start.reshape(-1)).reshape(cells, -1), legs)
+
+    @property
+    def ways(self) -> tuple[np.ndarray, ...]:
+        """What a kernel is told of legs."""
+        return NO_LEGS if self.legs is None else (self.legs.panels, self.legs.weights, self.legs.where.astype(float))
 
 
 @dataclass(slots=True)
@@ -176,6 +197,8 @@ class VariationalIntegrator:
         repeat = periods(kernel.equations, numbers)
         longest = half_swing(kernel.equations, by_node(kernel.equations, numbers))
         control = np.append(control_array(rtol, atol, longest, scene.max_steps, jumps=False), looseness)
+        if method.implicit:
+            control[Control.FIRST_STEP] = first_step(mode_rates(variation, state, numbers, strengths))
         vectors = np.full((len(state), variation.size, padded), 1.0 / math.sqrt(variation.size))
         kept = np.ascontiguousarray(strengths[:, columns], dtype=float)
         kept = kept if len(kept) else np.zeros((1, padded))
@@ -237,7 +260,9 @@ class VariationalIntegrator:
         self._run(length, NO_PANELS, self.vectors, growth)
         return growth[:, self.order]
 
-    def follow(self, length: float, batches: np.ndarray, travellers: Travellers) -> np.ndarray:
+    def follow(
+        self, length: float, batches: np.ndarray, travellers: Travellers, tracks: np.ndarray = NO_TRACKS
+    ) -> np.ndarray:
         """Integrate over blocks of time that follow each other, and move deviations by their propagators.
 
         Every block begins with the deviations that were set, p for each node, which stay as they are.
@@ -250,6 +275,8 @@ class VariationalIntegrator:
             Numbers of blocks.
         travellers : Travellers
             The deviations of all strengths, which are moved.
+        tracks : ndarray, shape (cells, b, any), optional
+            Is filled with the states and deviations that each batch begins with, behind each other.
 
         Returns
         -------
@@ -266,10 +293,11 @@ class VariationalIntegrator:
         places, room = self.order.reshape(-1, travellers.columns).astype(float), travellers.registers.room
         gains, misfits = np.empty((len(self.state), len(batches), room)), np.zeros(len(self.state))
         registers = travellers.registers
-        panels = (batches, places, registers.panels, registers.weights, travellers.vectors, gains, misfits)
+        own = (registers.panels, registers.weights, travellers.vectors, gains, misfits)
+        panels = (batches, places, *own, *travellers.ways, tracks)
         self._run(length, panels, self.vectors, np.empty((len(self.state), self.strengths.shape[1])))
         travellers.error = float(np.maximum(travellers.error, misfits.max()))  # NaN too
-        return gains.transpose(1, 0, 2).take(registers.where, axis=2)
+        return registers.of_strengths(gains.transpose(1, 0, 2))
 
     def loosen(self, ratio: float) -> None:
         """Multiply the tolerances.

@@ -370,3 +370,16 @@ def test_ranges_that_end_with_the_grid_are_marked() -> None:
     alpha = np.linspace(0.0, 1.0, 5)
     inside = replace(found, alpha=alpha, fine=replace(found.fine, alpha=alpha, exponent=alpha - 0.6, stderr=0 * alpha))
     assert "..." not in "".join(dict(inside.summary).values())
+
+
+def test_steps_follow_the_errors_of_all_modes() -> None:
+    """One that grows between one that does not and many that shrink fast: the largest and the smallest strengths are no measure."""
+    alpha = [0.0] * 8 + [-200.0] + [5000.0] * 15
+    found = exponents(scene("duffing", "x->x"), alpha, rtol=1e-3, periods=64, transient=20, starts=1)
+    assert found.exponent[8] == pytest.approx(200.0, abs=0.1)
+
+
+def test_a_mode_that_grows_too_fast_for_its_steps_is_no_slow_one() -> None:
+    """Its growth was damped in the first step, and the exponent was that of the other directions, 0.2."""
+    with pytest.raises(FloatingPointError, match="cannot be integrated"):
+        exponents(scene("rossler", "x->x").replace(max_steps=2000), [-1e12], transient=20, periods=16, starts=1)

@@ -92,6 +92,64 @@ def test_coarse_nodes_are_seen_by_the_strengths_for_comparison() -> None:
     assert 1e-9 < found[13] < 1e-5
 
 
+LEGS = {
+    "landings in every period": (1.15, 4.0),
+    "legs longer than a block": (1.4, 0.5),
+    "legs of up to four periods": (1.55, 4.0),
+    "no landings": (3.0, 4.0),
+}
+"""Frequencies of the drive, and blocks in periods."""
+
+
+@pytest.mark.parametrize("case", LEGS)
+def test_growth_from_landing_to_landing_is_that_of_products_of_propagators(case: str) -> None:
+    omega, block = LEGS[case]
+    sliding = {"oscillator": "friction", "contact": "set-valued", "parameters": {"omega": omega}}
+    if case == "no landings":  # a belt so fast that the body never sticks
+        sliding["parameters"] = {"omega": omega, "theta_b": 20.0}
+    orbits = settled(LINE, starts=2, **sliding)
+    wanted = expected(orbits, block, 6)
+    nodes = strength_interpolation(LINE, 29)
+    legs = strength_interpolation(nodes.nodes, 13)
+    assert len(legs.nodes) < len(nodes.nodes) < len(LINE)
+    orbits.start(nodes, block, 1.0, legs)
+    close = np.abs(orbits.growths(np.array([1, 3, 2])).sum(axis=0) - wanted)
+    assert np.median(close) < 1e-9
+    assert close.max() < 1e-5  # where a multiplier passes zero
+    assert orbits.travellers.error < 1e-9
+
+
+def test_legs_multiply_modes_of_very_different_growth() -> None:
+    """Beside one that grows by e^1000 in each block, products of others stay in the range of numbers."""
+    strengths = np.array([-4000.0, -1.0, 0.0, 0.5])
+    orbits = settled(strengths, rtol=1e-9, contact="set-valued", parameters={"omega": 1.15})
+    wanted = expected(orbits, 1.0, 16)
+    orbits.start(exact_interpolation(strengths), 8.0, 1.0)
+    found = orbits.growths(np.array([2]))[0]
+    assert found[0, 0] > 2000.0
+    np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-6)
+
+
+def test_a_leg_on_too_few_nodes_is_seen_by_the_strengths_for_comparison() -> None:
+    orbits = settled(LINE, contact="set-valued", parameters={"omega": 1.4})
+    nodes = strength_interpolation(LINE, 29)
+    found = {}
+    for few in (5, 13):
+        orbits.start(nodes, 4.0, 1.0, strength_interpolation(nodes.nodes, few))
+        orbits.growths(np.array([4]))
+        found[few] = orbits.travellers.error
+    assert found[5] > 1e-3
+    assert found[13] < 1e-9
+
+
+def test_bodies_that_stick_have_few_nodes_integrated() -> None:
+    """The two columns of a dozen and a half propagators, where 24 are multiplied over a block."""
+    orbits = settled(np.linspace(0.0, 1.2, 1000), rtol=1e-6, contact="set-valued", parameters={"omega": 1.4})
+    orbits.prepare(1000)
+    assert len(orbits.interpolation.nodes) == 24
+    assert len(orbits.integrator.order) == 2 * 16
+
+
 @pytest.mark.parametrize("place", [-1, -13, -26, -39])
 def test_a_number_that_is_none_is_seen_in_the_error(place: int) -> None:
     """The last of the weights are those of the strengths for comparison, 13 for each."""
