@@ -37,8 +37,9 @@ _MESSAGES = {
     Status.FINISHED: "reached the end of the window",
     Status.STEP_BUDGET: "used up max_steps before the end; raise max_steps or loosen rtol and atol, unless the motion slides "
     "along a jump, such as sign(v) in the rate of v",
-    Status.STEP_UNDERFLOW: "the step size fell below rounding; the equations may be singular here, or the tolerance "
-    "tighter than double precision allows",
+    Status.STEP_UNDERFLOW: "the step size fell below rounding; the equations may be singular here, the tolerance tighter "
+    "than double precision allows, or a part of them beyond 1e308, such as exp(710): write 1/(1 + exp(-x)) as "
+    "(1 + tanh(x/2))/2",
     Status.DIVERGED: "the state grew without bound, beyond 2^53 or with steps that shrink so that max_steps will not do, or "
     "became undefined; begin on a bounded motion, such as an equilibrium, or shorten the time",
     Status.CHATTERING: "a contact changed between stick and slip hundreds of times while no time passed; "
