@@ -527,6 +527,7 @@ def _hiding(roots: Iterable[Series]) -> set[Series]:
             case Product() | Square() | Ratio() | SquareRoot() | Power():
                 parts = {*s.linear, *s.convolved} - {s}
                 open_ends += [part for factor in parts for part in factor.linear if isinstance(factor, Linear)]
+                open_ends += [part for part in _needed(parts) if isinstance(part, Integral | QuotientIntegral)]
         if (
             isinstance(s, Integral | QuotientIntegral | Product | Square | Ratio | SquareRoot | Power)
             and _degree(s) > PLAIN

@@ -276,13 +276,16 @@ class Bell(Integral):
         return Call("maximum", (Call("exp", (power,)), Number(FAINT)))
 
 
-EDGE = 15.0
-"""Where exp(-a**2) is 1e-98: behind it no digit of anything depends on it, and it may fall as slowly as there."""
+EDGE, ROOM = 15.0, 6.0
+"""Where exp(-a**2) is 1e-98, and a good place before it: behind the edge no digit of anything depends on how it falls."""
 
 
 @dataclass(eq=False, slots=True)
 class Edged(Series):
-    """A series that begins within EDGE of zero, or else EDGE itself with its sign."""
+    """A series that begins within EDGE of zero; else a constant, the smaller the further away.
+
+    A step so goes a part of the way to the edge, however far it is.
+    """
 
     base: Series
     inside: Expression = ONE
@@ -295,7 +298,10 @@ class Edged(Series):
         start = at.of(self.base)
         near = Compare("<=", absolute(start), Number(EDGE))
         self.inside = at.keep(f"n_{self.name}", expressions.Choice(near, ONE, ZERO))
-        return Call("maximum", (Call("minimum", (start, Number(EDGE))), Number(-EDGE)))
+        slower = over(
+            times(Number(EDGE * (EDGE - ROOM)), start), times(absolute(start), add(absolute(start), Number(-ROOM)))
+        )
+        return expressions.Choice(near, start, slower)
 
     def coefficient(self, at: Order) -> Expression:
         return times(self.inside, at.of(self.base))

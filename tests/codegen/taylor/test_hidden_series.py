@@ -14,6 +14,7 @@ import sympy as sp
 from march import alone, step_of
 from plain import Text, march
 from scipy import special
+from scipy.integrate import solve_ivp
 
 from synchain.codegen.taylor import order_for
 from synchain.models.dynamics.equations import Equations
@@ -99,6 +100,26 @@ def test_the_slope_of_erf_is_seen_from_far_away(looped):
     equations = alone([A, X], [sp.S.One, sp.erf(50 * (A - 10))])
     end, _ = march(equations, 16, [0.0, 0.0], 19.0, 1e-10, looped=looped)
     assert end[1] == pytest.approx(-1.0, abs=1e-9)
+
+
+BESIDE = {
+    "tanh(30 x) v": -X - sp.Rational(3, 10) * sp.tanh(30 * X) * V,
+    "erf(5 x) v": -X - sp.Rational(3, 10) * sp.erf(5 * X) * V,
+    "erf(30 x - 5) x": -X * (1 + sp.Rational(3, 10) * sp.erf(30 * X - 5)) - V / 10,
+    "sqrt of erf": -X * sp.sqrt(sp.Rational(3, 2) + sp.erf(20 * X - 2)) - V / 10,
+    "erf of erf": -X - sp.erf(30 * sp.erf(10 * X)) * V / 5,
+    "tanh(60 x)**2 v": -X - sp.tanh(60 * X) ** 2 * V,
+}
+"""Rates of v, in which a step lies between a function that is constant there and one that hides it."""
+
+
+@pytest.mark.parametrize("looped", [False, True], ids=["lines", "loops"])
+@pytest.mark.parametrize("case", BESIDE)
+def test_a_step_beside_a_factor_is_seen(case, looped):
+    field = sp.lambdify([X, V], [V, BESIDE[case]], ["scipy", "numpy"])
+    exact = solve_ivp(lambda _, y: field(*y), (0.0, 12.0), [0.37, 0.1], "DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
+    end, _ = march(alone([X, V], [V, BESIDE[case]]), 16, [0.37, 0.1], 12.0, 1e-8, looped=looped)
+    assert np.asarray(end)[:2] == pytest.approx(exact, abs=1e-6)
 
 
 def test_a_choice_by_what_rests_passes_nothing():
