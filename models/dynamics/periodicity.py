@@ -35,7 +35,9 @@ class Drive:
     problem : str
         Why there is none, as a predicate of the oscillator.
     gaps : tuple of Expr
-        Expressions of time and the parameters at whose zeros the drive jumps, has a kink or rises once, as tanh.
+        Expressions of time and the parameters at whose zeros the drive jumps or has a kink.
+    rises : tuple of Expr
+        Those at whose zeros a part of the drive rises once, as tanh, within the time in which they change by about one.
     """
 
     waves: tuple[sp.Expr, ...] = ()
@@ -43,6 +45,7 @@ class Drive:
     problem: str = ""
     bends: tuple[sp.Expr, ...] = ()
     gaps: tuple[sp.Expr, ...] = ()
+    rises: tuple[sp.Expr, ...] = ()
 
     @property
     def paces(self) -> tuple[sp.Expr, ...]:
@@ -68,9 +71,10 @@ def drive_of(templates: tuple[Node | Edge, ...], varied: tuple[str, ...] = ()) -
     """
     if not any(template.forced for template in templates):
         return Drive(problem="is not driven")
-    sided = set[sp.Expr]().union(*map(gaps, templates), *map(rises, templates))
-    bends, zeros = (tuple(sorted(found, key=sp.default_sort_key)) for found in (_bends(templates), sided))
-    return replace(_periodic(templates, varied), bends=bends, gaps=zeros)
+    sided, risen = (set[sp.Expr]().union(*map(of, templates)) for of in (gaps, rises))
+    found = {"bends": _bends(templates), "gaps": sided, "rises": risen}
+    parts = {name: tuple(sorted(those, key=sp.default_sort_key)) for name, those in found.items()}
+    return replace(_periodic(templates, varied), **parts)
 
 
 def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Drive:

@@ -41,6 +41,9 @@ FIRST_STEP, SHORT = 1e-4, 0.1
 """Step tried first in every cell, and as a part of the time in which what grows fastest does so by a factor e; the step
 control enlarges it sixfold at a time."""
 
+LOOKED_AT = 200
+"""Nodes of all cells at whose growth is looked."""
+
 MOST = 144
 """Rows of the parameters of the drive's jumps and kinks at which these are looked at."""
 
@@ -167,6 +170,10 @@ class Planner:
             return self.rows(np.arange(1))
         return self.rows(np.unique([np.ravel_multi_index(cell, self.scene.shape) for cell in cells]))
 
+    def sample(self, count: int) -> Plan:
+        """Return the rows of so many cells, evenly spread over the sweep, or of all."""
+        return self.rows(np.unique(_spread(math.prod(self.scene.shape), count)))
+
 
 def _ends(values: np.ndarray) -> tuple[int, int, int]:
     """Where values are smallest, largest and nearest to 0."""
@@ -205,8 +212,8 @@ def _sizes(frequency: sp.Expr, values: Mapping[str, np.ndarray], rows: int) -> n
 
 def half_swing(equations: Equations, values: Mapping[str, np.ndarray], end: float = 1e3) -> float:
     """Return half the period of the fastest sine or cosine of time, or the length in which another
-    function of time can rise and fall again (`Drive.bends`) or stays between two of its jumps and
-    kinks (`Drive.gaps`), if shorter; inf without a drive.
+    function of time can rise and fall again (`Drive.bends`) or stays between two of its jumps,
+    kinks (`Drive.gaps`) and rises (`Drive.rises`), if shorter; inf without a drive.
 
     No step may be longer, so that none can miss a whole swing of the drive, or a pulse.  A drive
     without a period is looked at up to the time `end`.
@@ -215,8 +222,10 @@ def half_swing(equations: Equations, values: Mapping[str, np.ndarray], end: floa
     drive = drive_of((*equations.nodes, *equations.edges), equations.differing)
     fastest = max((float(np.max(_sizes(pace, values, rows), initial=0.0)) for pace in drive.paces), default=0.0)
     longest = math.pi / fastest if fastest > 0.0 else math.inf
-    gaps = [gap for gap in drive.gaps if {*names_in(gap)} <= {*values, TIME.name}]
-    return min(longest, shortest_stay(gaps, values, _periods(drive, values, rows), end)) if gaps else longest
+    gaps, rises = ([e for e in own if {*names_in(e)} <= {*values, TIME.name}] for own in (drive.gaps, drive.rises))
+    if not (gaps or rises):
+        return longest
+    return min(longest, shortest_stay(gaps, rises, values, _periods(drive, values, rows), end))
 
 
 def by_node(equations: Equations, numbers: np.ndarray) -> dict[str, np.ndarray]:
@@ -232,7 +241,7 @@ def longest_step(scene: Scene) -> float:
     """
     paced, sided = (
         dict.fromkeys(name for e in found for name in names_in(e) if name != TIME.name)
-        for found in (scene.drive.paces, scene.drive.gaps)
+        for found in (scene.drive.paces, (*scene.drive.gaps, *scene.drive.rises))
     )
     known = {name: _values(scene, name) for name in paced | sided}
     swept = sum(len(known[name]) > 1 for name in sided)
@@ -314,7 +323,8 @@ def control_of(planner: Planner, jumps: bool, method: Integrator) -> np.ndarray:
     directions = [DIRECTIONS[section.direction] for section in scene.sections.values() or (scene.section,)]
     control = control_array(rtol, atol, longest_step(scene), scene.max_steps, directions[0], jumps)
     if method.implicit:
-        cells = zip(extremes.start, extremes.numbers, strict=True)
+        looked_at = (extremes, planner.sample(max(2, LOOKED_AT // scene.equations.n)))
+        cells = (cell for rows in looked_at for cell in zip(rows.start, rows.numbers, strict=True))
         control[Control.FIRST_STEP] = first_step(rates(scene.equations, *cell) for cell in cells)
     return np.concatenate([control, directions[1:]])
 

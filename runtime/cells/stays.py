@@ -23,17 +23,26 @@ PERIODS = 16
 RESOLVED = 2.0
 """Points between two zeros that are told apart without a parabola."""
 
+WIDTH = 2.0
+"""What tanh changes by while its argument does by so much is three quarters of its height."""
+
 TOUCH = 1e-9
 """A stay that is a smaller part of a period than this is none: the drive touches zero to rounding."""
 
 
-def shortest_stay(gaps: Sequence[sp.Expr], values: Mapping[str, np.ndarray], periods: np.ndarray, end: float) -> float:
-    """Return the shortest time between two zeros of expressions of time; inf if none has two.
+def shortest_stay(
+    gaps: Sequence[sp.Expr],
+    rises: Sequence[sp.Expr],
+    values: Mapping[str, np.ndarray],
+    periods: np.ndarray,
+    end: float,
+) -> float:
+    """Return the shortest time between two zeros of expressions of time; inf if there are no two.
 
     Parameters
     ----------
-    gaps : sequence of Expr
-        Expressions of time and parameters.
+    gaps, rises : sequence of Expr
+        Expressions of time and parameters.  Rises take WIDTH over their slope, and are no nearer to each other than that.
     values : mapping of str to ndarray, shape (rows,)
         Values of the parameters; each row is looked at.
     periods : ndarray, shape (rows,)
@@ -45,8 +54,8 @@ def shortest_stay(gaps: Sequence[sp.Expr], values: Mapping[str, np.ndarray], per
     -----
     Two zeros of one smooth expression are found however close they are, others if they are RESOLVED points apart.
     """
-    shortest = math.inf
-    written, names = _written(tuple(gaps))
+    shortest, sharp = math.inf, len(gaps)
+    written, names = _written((*gaps, *rises))
     rows = np.column_stack([*(np.broadcast_to(values[name], periods.shape) for name in names), periods])
     for *row, period in np.unique(rows, axis=0):
         # of two periods, one whole stay of each kind at least
@@ -54,20 +63,26 @@ def shortest_stay(gaps: Sequence[sp.Expr], values: Mapping[str, np.ndarray], per
         times, pitch = np.linspace(0.0, length, points + 1, retstep=True)
         with np.errstate(all="ignore"):
             found = [np.broadcast_to(g, times.shape) for g in written(times, *row)]
-            passages, dips = [_passages(g) for g in found], [_dips(g) for g in found]
-        apart = np.concatenate([*map(np.diff, passages), np.diff(np.sort(np.concatenate(passages)))])
+            passages, dips = [_passages(g, k >= sharp) for k, g in enumerate(found)], [_dips(g) for g in found[:sharp]]
+        apart = np.concatenate([_apart(own) for own in (*passages, np.concatenate(passages, axis=1))])
         stays = np.concatenate([apart[apart > RESOLVED], *dips])
         shortest = min(shortest, pitch * np.min(stays[stays * pitch > TOUCH * length], initial=math.inf))
     return shortest
 
 
-def _passages(values: np.ndarray) -> np.ndarray:
-    """Where values change their sign, in points; a zero has none."""
+def _passages(values: np.ndarray, rises: bool) -> np.ndarray:
+    """Where values change their sign, and how long they take to rise, 0 if they jump: (2, passages) in points."""
     places = np.flatnonzero(values)
     old, new = values[places[:-1]], values[places[1:]]
     passed = old * new < 0.0
-    share = old[passed] / (old[passed] - new[passed])
-    return np.asarray(places[:-1][passed] + share * np.diff(places)[passed])
+    gone, length = (new - old)[passed], np.diff(places)[passed]
+    return np.stack([places[:-1][passed] - old[passed] / gone * length, rises * WIDTH * length / np.abs(gone)])
+
+
+def _apart(passages: np.ndarray) -> np.ndarray:
+    """How far neighbours are apart, or how long the slower one of both takes, if that is longer."""
+    places, widths = passages[:, np.argsort(passages[0])]
+    return np.maximum(np.diff(places), np.maximum(widths[1:], widths[:-1]))
 
 
 def _dips(values: np.ndarray) -> np.ndarray:
