@@ -83,8 +83,6 @@ BETWEEN_SCALINGS = 8
 LENGTH = 1
 # Entry of `control`: how many times the tolerance of the orbit the modes are allowed.
 LOOSENESS = 8
-# Deviations of bodies that stick are moved as a whole after a leg of this part of a block.
-LONGEST_LEG = 0.5
 
 
 @njit(error_model="numpy")
@@ -165,7 +163,7 @@ def attempt(
         worst = functions.carry(shared, strengths, old, new, registers - 1, registers, tolerance)
         if worst <= 1.0 and registers > 1:
             worst = larger(worst, functions.carry(shared, strengths, old, new, 0, registers - 1, tolerance))
-        error = maximum(error, broadcast(worst, WIDTH))
+        error = maximum(error, broadcast(worst if worst < 1e30 else 1e30, WIDTH))  # NaN is the largest
     accept = judge(clock, h, error, 1.0 / (dims.error_order + 1.0))
     if CONTACTS:
         accept = take_back(accept, t, h, clock, y, y_new, dense, middle, out, (), dims, functions.pushes)
@@ -278,7 +276,7 @@ def march(
                     if CONTACTS:  # noqa: SIM102  (Numba leaves out what a constant excludes)
                         if sticks:
                             now, error = clock[BASE] + clock[TIME], 0.0
-                            long = now - cut_at > LONGEST_LEG * spans[cell, 1] and y[2 * dims.nodes] != 0.0
+                            long = now - cut_at > spans[cell, 1] and y[2 * dims.nodes] != 0.0
                             if landed and parted:
                                 due = now - handed_at >= spans[cell, 1]
                                 handed_at = now if due else handed_at

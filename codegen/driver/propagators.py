@@ -99,7 +99,7 @@ def larger(known, other):
 def misfit(panel, weights, table, columns, rows, kinds, stride):
     """The largest difference of interpolated from integrated propagators, relative to the size of the propagator.
 
-    kinds: 2 for complex numbers, else 1.
+    A single number may pass zero, and is compared with what it is interpolated from.  kinds: 2 for complex numbers, else 1.
     """
     node, points, worst = int(panel[NODE]), int(panel[POINTS]), 0.0
     for extra in range(int(panel[EXTRAS])):
@@ -112,6 +112,8 @@ def misfit(panel, weights, table, columns, rows, kinds, stride):
                 size = max(size, math.hypot(real, imaginary) if kinds == 2 else abs(real))
                 for j in range(points):
                     k = int(panel[CHECKS]) + kinds * (extra * points + j)
+                    if columns == 1:
+                        size = max(size, abs(weights[k] * table[at + j]))
                     real -= weights[k] * table[at + j]
                     if kinds == 2:
                         real += weights[k + 1] * table[beside + j]

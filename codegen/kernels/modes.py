@@ -53,7 +53,7 @@ def carry(shared, strengths, old, new, first, last, tolerance):
     store(ratios, 0, worst + broken)
     largest = 0.0
     for lane in range(LANES):
-        if not ratios[lane] <= largest:  # NaN too
+        if ratios[lane] > largest or ratios[lane] != ratios[lane]:  # NaN stays
             largest = ratios[lane]
     return largest
 '''.strip()

@@ -178,7 +178,7 @@ def orbit_rows(contact: str, quick: bool) -> list[Row]:
     for k, (orbits, values) in enumerate(zip(ready, chosen, strict=True), 1):
         plane = np.iscomplexobj(values)
         given = ("0 … 1.2, beta 0 … 0.6", f"{SIDE} x {SIDE}") if plane else (_span(values), len(values))
-        integrated = len(orbits.interpolation.nodes) if orbits.interpolation else 0
+        integrated = len(orbits.integrator.order) // orbits.components
         off = difference(contact, values, reviewed)
         cost = (steps[k], 1e6 * best[k], best[k] / best[0], *off, periods, nan, nan, nan)
         rows.append((*what, *given, integrated, *cost))

@@ -42,8 +42,11 @@ BESIDE = 42
 FAR = 300.0
 """Logarithm of the size beyond which a factor of a propagator is kept apart; numbers end at 745."""
 
-LANDING = 5_000
-"""Multiplications that take as long as a landing."""
+HOPELESS, FURTHER = 0.1, 1.45
+"""An error that so many times more nodes do not mend."""
+
+LEG, LANDINGS = 4.0, 5_000
+"""Shortest block in units that is longer than most legs, and multiplications that take as long as the landings of a unit."""
 
 TRIAL = 8
 """Blocks on which an interpolation is tried."""
@@ -223,19 +226,23 @@ class Orbits:
         lines = 1 if self.strengths.ndim == 1 else len(lines_of(self.strengths)[1])
         choices = _choices(blocks, lines * taken, len(self.strengths) * self.components**2)
         if self.lands and lines == 1:
-            long = [b for b in BLOCKS if b <= most and periods % b == 0.0]
-            choices = sorted(
-                [*choices, *_choices_of_legs(long, taken, len(self.strengths))], key=lambda choice: choice.cost
-            )
+            long = [b for b in BLOCKS if LEG <= b <= most and periods % b == 0.0]
+            of_legs = _choices_of_legs(long, taken, len(self.strengths))
+            choices = sorted(of_legs, key=lambda choice: choice.cost) or choices
+        failed: list[Choice] = []
         for choice in choices:
+            if any(choice.is_coarser(other) for other in failed):
+                continue
             outer = strength_interpolation(self.strengths, choice.nodes, choice.parts)
             legs = strength_interpolation(outer.nodes, choice.of_legs, choice.parts) if choice.of_legs else None
             _, travellers = self.start(outer, choice.block, legs=legs)
-            if outer.is_exact and legs is None:
+            if outer.is_exact and (legs is None or legs.is_exact):
                 return
             self.growths(np.full(1, TRIAL))
             if travellers.error < limit:
                 break
+            far = FURTHER if travellers.error > HOPELESS else 1.0
+            failed.append(replace(choice, nodes=int(far * choice.nodes), of_legs=int(far * choice.of_legs)))
         else:
             outer, legs = exact_interpolation(self.strengths), None
         self.start(outer, choice.block, legs=legs)
@@ -424,6 +431,14 @@ class Choice:
     parts: int
     of_legs: int = 0
 
+    def is_coarser(self, other: Choice) -> bool:
+        """True if another choice has shorter blocks and more nodes, in each panel and in all, or as many.
+
+        Of as many nodes in all, those of few panels interpolate better.
+        """
+        own, theirs = ((c.nodes, c.of_legs, c.nodes * c.parts, c.of_legs * c.parts) for c in (self, other))
+        return self.block >= other.block and all(a <= b for a, b in zip(own, theirs, strict=True))
+
 
 def _choices(blocks: Sequence[float], taken: float, numbers: int) -> list[Choice]:
     """Blocks, nodes and panels, the cheapest first.
@@ -440,10 +455,13 @@ def _choices(blocks: Sequence[float], taken: float, numbers: int) -> list[Choice
 
 
 def _choices_of_legs(blocks: Sequence[float], taken: float, numbers: int) -> Iterator[Choice]:
-    """Yield choices for a body that sticks: one column of each propagator is integrated, one number of it interpolated."""
+    """Yield choices for a body that sticks; the arguments are those of `_choices`, with the number of strengths.
+
+    One column of two is integrated, and one number of four is interpolated.
+    """
     for block, of_legs, nodes, parts in itertools.product(blocks, NODES, NODES, PARTS):
         if of_legs < nodes:
-            cost = of_legs * parts * (0.5 * taken + nodes) + LANDING + numbers * (nodes + BESIDE / 4) / block
+            cost = of_legs * parts * (taken / 2 + nodes) + LANDINGS + numbers * (nodes + BESIDE / 4) / block
             yield Choice(cost, block, nodes, parts, of_legs)
 
 

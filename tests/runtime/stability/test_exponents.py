@@ -10,9 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import sympy as sp
 from scipy.integrate import solve_ivp
 
-from synchain.models import Field
+from synchain.models import Field, Rates, ends
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability.averages import Batches
@@ -22,6 +23,7 @@ from synchain.runtime.stability.lyapunov import lyapunov_spectrum
 from synchain.runtime.stability.msf import classify, msf, plane
 
 PAIR = topology("chain", 2)
+DRIVEN = Field({"x": "v", "v": "-x - 0.1*v + 0.3*cos(t) - 0.2*x**3"}, initial={"x": 0.5, "v": 0.1})
 
 
 def scene(name: str, coupling: str, **parameters: float) -> Scene:
@@ -377,6 +379,16 @@ def test_steps_follow_the_errors_of_all_modes() -> None:
     alpha = [0.0] * 8 + [-200.0] + [5000.0] * 15
     found = exponents(scene("duffing", "x->x"), alpha, rtol=1e-3, periods=64, transient=20, starts=1)
     assert found.exponent[8] == pytest.approx(200.0, abs=0.1)
+
+
+def test_deviations_that_are_no_numbers_are_refused() -> None:
+    """exp(1500 x) overflows where x is 0.48: the strength times its slope is infinite, and NaN beside others."""
+    i, j, weight = ends(DRIVEN)
+    k = sp.Symbol("k")
+    link = Rates({i.v: weight * k * (sp.exp(1500 * j.x) - sp.exp(1500 * i.x))}, {k: 1e-300})
+    pair = Scene(DRIVEN, link, PAIR, integrator="rodas5p", record=())
+    with pytest.raises(FloatingPointError, match="cannot be integrated"):
+        exponents(pair, [0.0, 1.0], periods=16, transient=0, starts=1)
 
 
 def test_a_mode_that_grows_too_fast_for_its_steps_is_no_slow_one() -> None:
