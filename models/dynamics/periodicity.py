@@ -72,9 +72,8 @@ def drive_of(templates: tuple[Node | Edge, ...], varied: tuple[str, ...] = ()) -
     if not any(template.forced for template in templates):
         return Drive(problem="is not driven")
     sided, risen = (set[sp.Expr]().union(*map(of, templates)) for of in (gaps, rises))
-    found = {"bends": _bends(templates), "gaps": sided, "rises": risen}
-    parts = {name: tuple(sorted(those, key=sp.default_sort_key)) for name, those in found.items()}
-    return replace(_periodic(templates, varied), **parts)
+    bends, zeros, turns = (tuple(sorted(e, key=sp.default_sort_key)) for e in (_bends(templates), sided, risen))
+    return replace(_periodic(templates, varied), bends=bends, gaps=zeros, rises=turns)
 
 
 def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Drive:
