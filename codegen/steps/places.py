@@ -15,6 +15,7 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 import sympy as sp
+from sympy.core.relational import Relational
 
 from synchain.models.dynamics.equations import Equations, Layer
 from synchain.models.graphs.links import Link
@@ -183,7 +184,8 @@ def link_ends(edge: Edge, weight: str, source: str = "j") -> list[Statement]:
     """The two ends of a link and its weight, by what they are called; a function of the weight alone needs a register."""
     i, j, w = (Load(array, Name("e"), None) for array in ("target", "source", "weights"))
     parts = (part for e in edge.expressions for part in e.atoms(sp.Function, sp.Pow))
-    alone = any(part.args[0].free_symbols == {edge.weight} for part in parts)
+    taken = [part.args[0] for part in parts] + [c.lhs - c.rhs for e in edge.expressions for c in e.atoms(Relational)]
+    alone = any(argument.free_symbols == {edge.weight} for argument in taken)
     return [whole("i", i), whole(source, j), let(weight, call("broadcast", w, "WIDTH") if alone else w)]
 
 

@@ -292,6 +292,14 @@ class Graph:
 
         Two values agree where the series is zero.
         """
+        if isinstance(gap, Constant) and isinstance(gap.value, Number):
+            return (
+                values[0]
+                if gap.value.value > 0.0
+                else values[-1]
+                if gap.value.value < 0.0
+                else values[len(values) // 2]
+            )
         factor, inner = split(gap)
         side, kind = (Kink, Choice) if len(values) == 2 else (Brink, Leaping)
         if not isinstance(factor, Number):
@@ -315,8 +323,8 @@ class Graph:
 
     @property
     def kinks(self) -> list[Kink]:
-        """The kinks of all series."""
-        return [s for s in self.series if isinstance(s, Kink)]
+        """The kinks of all series; what does not move has none."""
+        return [s for s in self.series if isinstance(s, Kink) and not isinstance(s.base, Constant)]
 
     @property
     def gaps(self) -> list[Series]:

@@ -166,8 +166,6 @@ def approached(coefficients: Sequence[Expression], ends: Sequence[Statement]) ->
     start, *further = (absolute(e) if e != ZERO else e for e in coefficients)
     while further and further[-1] == ZERO:
         further.pop()
-    if not further:  # what does not move passes nothing
-        return []
     way, found = Name("way"), list[Statement]()
     for e in reversed(further):
         found.append(let(way.text, add(e, times(way, Name("ratio"))) if found else e))

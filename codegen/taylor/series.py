@@ -379,7 +379,8 @@ class Kink(Series):
     def begin(self, at: Order) -> Expression:
         size = at.keep(f"size_{self.name}", magnitude(at, self.base))
         start = Call("side_of", (at.of(self.base), self.least(size)))
-        return at.keep(self.name, Call("side_or", (start, at.hint(self.base))))
+        hint = 0.0 * Name("scale") if isinstance(self.base, Constant) else at.hint(self.base)
+        return at.keep(self.name, Call("side_or", (start, hint)))
 
     def least(self, size: Name) -> Expression:
         """How far from zero it begins if it does not begin there, by the size of its terms."""

@@ -154,9 +154,22 @@ def gaps(template: Node | Edge) -> set[sp.Expr]:
 
 
 def rises(template: Node | Edge) -> set[sp.Expr]:
-    """What passes zero where functions of time alone rise once and stay; two of them make a window."""
-    parts = {part for e in template.rhs for part in e.atoms(sp.tanh, sp.erf, sp.Pow)}
-    return _of_time(template, (gap for part in parts for gap in _risen(part)))
+    """What passes zero where functions of time alone rise once and stay; two of them make a window.
+
+    A function that rises and falls again at one place, such as tanh**2, tanh tanh or exp(-|t|), counts as two.
+    """
+    found: set[sp.Expr] = set()
+    for e in template.rhs:
+        single = {part: set(_risen(part)) for part in e.atoms(*RISING)}
+        found |= set().union(*single.values())
+        bent = {p.base for p in e.atoms(sp.Pow) if p.exp.is_number and p.exp > 1}
+        bent |= {
+            f for product in e.atoms(sp.Mul) for f in product.args if sum(g.has(*RISING) for g in product.args) > 1
+        }
+        for part, own in single.items():
+            if part.has(sp.Abs) or any(b == part or b.has(part) for b in bent):
+                found |= {gap + 2 for gap in own}
+    return _of_time(template, found)
 
 
 def _of_time(template: Node | Edge, found: Iterable[sp.Expr]) -> set[sp.Expr]:
@@ -164,17 +177,21 @@ def _of_time(template: Node | Edge, found: Iterable[sp.Expr]) -> set[sp.Expr]:
     return {gap for gap in found if gap.has(TIME) and not gap.free_symbols & _local(template)}
 
 
+RISING = (sp.tanh, sp.erf, sp.exp, sp.Pow)
+"""What rises once: exp counts within 1/(c + d exp), and of a size."""
+
+
 def _risen(part: sp.Expr) -> Iterator[sp.Expr]:
-    """The argument of tanh and erf, and that of 1/(c + d exp) from where both terms are equal."""
-    if not isinstance(part, sp.Pow):
-        yield part.args[0]
-        return
-    waves = [a for a in sp.Add.make_args(part.base) if isinstance(a.as_coeff_Mul()[1], sp.exp)]
-    if part.exp.is_negative and len(waves) == 1:
-        factor, wave = waves[0].as_coeff_Mul()
-        rest = part.base - waves[0]
-        if factor.is_positive and rest.is_number and rest.is_positive:
-            yield wave.args[0] - sp.log(rest / factor)
+    """The argument of tanh and erf, that of 1/(c + d exp) from where both terms are equal; sizes without their turn."""
+    if isinstance(part, sp.Pow):
+        waves = [a for a in sp.Add.make_args(part.base) if isinstance(a.as_coeff_Mul()[1], sp.exp)]
+        if part.exp.is_negative and len(waves) == 1:
+            factor, wave = waves[0].as_coeff_Mul()
+            rest = part.base - waves[0]
+            if factor.is_positive and rest.is_number and rest.is_positive:
+                yield wave.args[0] - sp.log(rest / factor)
+    elif not isinstance(part, sp.exp) or part.has(sp.Abs):
+        yield part.args[0].replace(sp.Abs, lambda size: size)
 
 
 def _sided(part: sp.Basic) -> Iterator[sp.Expr]:

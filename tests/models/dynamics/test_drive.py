@@ -147,7 +147,9 @@ def test_no_step_is_longer_than_a_pulse_of_the_drive(drive: str, longest: float)
         ("tanh(900*(t - 0.5)) - tanh(900*(t - 0.51))", 0.01), ("erf(90*(t - 0.5))*erf(90*(0.6 - t))", 0.1),
         ("1/(1 + exp(60 - 200*t))/(2 + 3*exp(200*t - 70))", 0.05 + np.log(2 / 3) / 200), ("erf(t - 0.5)", np.inf),
         ("tanh(90*(t - 0.5)) - tanh(80*(t - 0.501))", 2 / 80), ("tanh(2*sin(t)) + tanh(2*sin(t + 0.001))", 1.0),
-        ("sign(t - 0.5) - tanh(80*(t - 0.501))", 2 / 80),
+        ("sign(t - 0.5) - tanh(80*(t - 0.501))", 2 / 80), ("1 - tanh(20*(t - 0.5))**2", 2 / 20),
+        ("exp(-40*abs(t - 0.5))", 2 / 40), ("exp(-40*abs(sin(t)))", np.arcsin(2 / 40)), ("1 - erf(90*abs(t - 0.5))", 2 / 90),
+        ("(1 - 1/(1 + exp(30 - 60*t)))/(1 + exp(30 - 60*t))", 2 / 60), ("3*tanh(30*t - 9)*exp(-t)", np.inf),
     ],
 )  # fmt: skip
 def test_no_step_is_longer_than_a_drive_stays_between_jumps_kinks_or_rises(drive: str, longest: float) -> None:

@@ -172,3 +172,24 @@ def test_functions_of_the_weight_alone_run_in_loops() -> None:
 
     expected = solve_ivp(rates, (0.0, 2.0), start, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
     np.testing.assert_allclose(run(scene, show_progress=False).end.values.ravel(), expected, rtol=0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize("n", [3, 10])
+def test_choices_by_the_weight_run(n: int) -> None:
+    """Links of weight 2 act on one phase's sine, those of weight 1 on its cosine; written out and in loops."""
+    i, j, weight = ends(PHASE)
+    gap = j.theta - i.theta
+    link = Rates({i.theta: K * sp.Piecewise((sp.sin(gap), weight > 1), (sp.cos(gap) - 1, True))}, {K: 0.3})
+    weights = np.diag(1.0 + np.arange(n - 1) % 2, 1) + np.diag(1.0 + np.arange(1, n) % 2, -1)
+    start = np.linspace(0.0, 2.0, n)
+    scene = Scene(
+        PHASE, link, weights - np.diag(weights.sum(axis=1)), record=(), transient=0.0, window=2.0, time_unit="time",
+        rtol=1e-10, integrator="taylor", initial={"theta": start},
+    )  # fmt: skip
+
+    def rates(_: float, theta: np.ndarray) -> np.ndarray:
+        gaps = theta[None, :] - theta[:, None]
+        return 0.3 + 0.3 * np.where(weights > 1.0, np.sin(gaps), np.where(weights > 0, np.cos(gaps) - 1, 0)).sum(axis=1)
+
+    expected = solve_ivp(rates, (0.0, 2.0), start, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    np.testing.assert_allclose(run(scene, show_progress=False).end.values.ravel(), expected, rtol=0.0, atol=1e-8)
