@@ -160,15 +160,13 @@ def rises(template: Node | Edge) -> set[sp.Expr]:
     """
     found: set[sp.Expr] = set()
     for e in template.rhs:
-        single = {part: set(_risen(part)) for part in e.atoms(*RISING)}
-        found |= set().union(*single.values())
-        bent = {p.base for p in e.atoms(sp.Pow) if p.exp.is_number and p.exp > 1}
-        bent |= {
-            f for product in e.atoms(sp.Mul) for f in product.args if sum(g.has(*RISING) for g in product.args) > 1
-        }
-        for part, own in single.items():
-            if part.has(sp.Abs) or any(b == part or b.has(part) for b in bent):
-                found |= {gap + 2 for gap in own}
+        powers = [p.base for p in e.atoms(sp.Pow) if p.exp.is_number and p.exp > 1]
+        for part in e.atoms(*RISING):
+            own = set(_risen(part))
+            squared = any(base.has(part) for base in powers)
+            met = own and any(sum(f.has(part) for f in product.args) > 1 for product in e.atoms(sp.Mul))
+            turned = {gap + 2 for gap in own} if part.has(sp.Abs) or squared or met else set()
+            found |= own | turned
     return _of_time(template, found)
 
 
