@@ -119,8 +119,8 @@ def _without_synchrony(model: Model, varied: tuple[str, ...]) -> str:
             f"coupling {' and '.join(names)} does not vanish between oscillators in equal states: {problem}; expected a "
             "function of differences, or one sum of weights at all nodes"
         )
-    except ValueError:  # a node with a mass matrix: nobody knows
-        return ""
+    except ValueError:  # of a node with a mass matrix it is not known
+        pass
     return ""
 
 

@@ -218,19 +218,8 @@ class Orbits:
             scatter says its error.
         """
         limit = max(0.01 * self.scene.rtol, 1e-12)  # later blocks of a chaotic orbit are up to ten times worse
-        one = self.integrator_of(self.strengths[:1], LOOSENESS)
-        one.advance(self.unit)
-        taken = STEP * self.components * one.steps / len(self.state)
-        most = max(4.0, periods / BATCHES)
-        blocks = [b for b in BLOCKS if b <= most and periods % b == 0.0] if self.forced else FREE_BLOCKS
-        lines = 1 if self.strengths.ndim == 1 else len(lines_of(self.strengths)[1])
-        choices = _choices(blocks, lines * taken, len(self.strengths) * self.components**2)
-        if self.lands and lines == 1:
-            long = [b for b in BLOCKS if LEG <= b <= most and periods % b == 0.0]
-            of_legs = _choices_of_legs(long, taken, len(self.strengths))
-            choices = sorted(of_legs, key=lambda choice: choice.cost) or choices
         failed: list[Choice] = []
-        for choice in choices:
+        for choice in self._choices(periods):
             if any(choice.is_coarser(other) for other in failed):
                 continue
             outer = strength_interpolation(self.strengths, choice.nodes, choice.parts)
@@ -246,6 +235,21 @@ class Orbits:
         else:
             outer, legs = exact_interpolation(self.strengths), None
         self.start(outer, choice.block, legs=legs)
+
+    def _choices(self, periods: float) -> list[Choice]:
+        """What may suit an average of some length, the cheapest first, by the steps that one mode takes in a unit."""
+        one = self.integrator_of(self.strengths[:1], LOOSENESS)
+        one.advance(self.unit)
+        taken = STEP * self.components * one.steps / len(self.state)
+        whole = [b for b in BLOCKS if b <= max(4.0, periods / BATCHES) and periods % b == 0.0]
+        lines = 1 if self.strengths.ndim == 1 else len(lines_of(self.strengths)[1])
+        found: list[Choice] = []
+        if self.lands and lines == 1:
+            found += _choices_of_legs([b for b in whole if b >= LEG], taken, len(self.strengths))
+        if not found:
+            numbers = len(self.strengths) * self.components**2
+            found += _choices_of_blocks(whole if self.forced else FREE_BLOCKS, lines * taken, numbers)
+        return sorted(found, key=lambda choice: choice.cost)
 
     def start(
         self,
@@ -440,22 +444,17 @@ class Choice:
         return self.block >= other.block and all(a <= b for a, b in zip(own, theirs, strict=True))
 
 
-def _choices(blocks: Sequence[float], taken: float, numbers: int) -> list[Choice]:
-    """Blocks, nodes and panels, the cheapest first.
+def _choices_of_blocks(blocks: Sequence[float], taken: float, numbers: int) -> Iterator[Choice]:
+    """Yield choices of blocks, nodes and panels.
 
     `taken`: multiplications that integrate a node of each line over a unit of time; `numbers`: those of all propagators.
     """
-    choices = [
-        Choice(nodes * parts * taken + (numbers * (nodes + BESIDE) + BLOCK) / block, block, nodes, parts)
-        for block in blocks
-        for nodes in NODES
-        for parts in PARTS
-    ]
-    return sorted(choices, key=lambda choice: choice.cost)
+    for block, nodes, parts in itertools.product(blocks, NODES, PARTS):
+        yield Choice(nodes * parts * taken + (numbers * (nodes + BESIDE) + BLOCK) / block, block, nodes, parts)
 
 
 def _choices_of_legs(blocks: Sequence[float], taken: float, numbers: int) -> Iterator[Choice]:
-    """Yield choices for a body that sticks; the arguments are those of `_choices`, with the number of strengths.
+    """Yield choices for a body that sticks; the arguments are those of `_choices_of_blocks`, with the number of strengths.
 
     One column of two is integrated, and one number of four is interpolated.
     """
