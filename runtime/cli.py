@@ -148,6 +148,12 @@ def _examples(lines: Sequence[str]) -> str:
     return "\n".join([f"example{'s' * (len(lines) > 1)}:", *(f"  {line}" for line in lines)])
 
 
+def _after_ctrl_c(problem: BaseException) -> bool:
+    """True if an error came after Ctrl-C: pressed again, it may cut the end of a lock short."""
+    earlier = problem.__context__
+    return earlier is not None and (isinstance(earlier, KeyboardInterrupt) or _after_ctrl_c(earlier))
+
+
 def _report(name: str, problem: BaseException) -> int:
     """Write one or two lines about an error to stderr and return the exit code."""
     if os.environ.get("SYNCHAIN_DEBUG", "") not in ("", "0"):
@@ -159,7 +165,7 @@ def _report(name: str, problem: BaseException) -> int:
         words, code = str(problem), WRONG_USE
     elif isinstance(problem, Failed):
         words = str(problem)
-    elif isinstance(problem, KeyboardInterrupt):
+    elif isinstance(problem, KeyboardInterrupt) or (isinstance(problem, RuntimeError) and _after_ctrl_c(problem)):
         words = "interrupted"
     elif isinstance(problem, MemoryError):
         words = "not enough memory; use a smaller network, fewer cells or a shorter record"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from synchain.models.scenes.scene import Scene
 from ..support.status import Status
 from .buffers import Buffers
 from .plan import Plan, Planner
-from .rates import bends, mode_rates, rates
+from .rates import Rates, bends, mode_rates, rates
 from .reduce import Reduction
 
 __all__ = [
@@ -44,7 +44,7 @@ LAYER = 0.1
 def chosen_integrator(reduction: Reduction) -> Integrator:
     """Return the integrator of a scene, the fastest at equal error where the scene says "auto".
 
-    Where the equations are not stiff in the extreme cells of the sweep, and between the events of set-valued friction:
+    Where the equations are not stiff in the extreme cells of the sweep and in a sample of the others, and between the events of set-valued friction:
     power series if all functions are analytic between kinks, and between jumps along which no motion slides, explicit steps
     otherwise. Nodes or links with a mass matrix take explicit steps too: the recurrences of a dense matrix take longer to
     compile than most runs. Elsewhere Rosenbrock steps, or a switching pair of methods for two oscillators at a tight
@@ -71,7 +71,7 @@ def chosen_for_rows(scene: Scene, equations: Equations, rows: Plan) -> Integrato
     rows : Plan
         The extreme cells.
     """
-    return _chosen(scene, equations, lambda: _stiffness(equations, rows))
+    return _chosen(scene, equations, lambda: _stiffness(equations, rows, rows))
 
 
 def _chosen(scene: Scene, equations: Equations, stiffness_of: Callable[[], float]) -> Integrator:
@@ -121,20 +121,24 @@ def _taylor(scene: Scene, equations: Equations) -> Integrator:
 
 
 def stiffness(scene: Scene) -> float:
-    """Return how much faster motions decay or grow at the start than they turn, the largest of the extreme cells.
+    """Return how much faster motions decay or grow at the start than they turn, the largest of the cells looked at.
 
     The rate is the real part of an eigenvalue of a node's own block of the Jacobian, with twice what
     its links add, which bounds that of a network of springs; it is compared with the imaginary
-    parts and one.  The layers of smoothed jumps are looked at too, although the start lies outside.
+    parts and one.  In the extreme cells the layers of smoothed jumps are looked at too, although the start lies
+    outside.
     """
-    return _stiffness(scene.equations, Planner(scene).extremes())
+    planner = Planner(scene)
+    return _stiffness(scene.equations, planner.sample(), planner.extremes())
 
 
-def _stiffness(equations: Equations, rows: Plan) -> float:
-    cells = list(zip(rows.start, rows.numbers, strict=True))
-    layers = [bends(equations, *cell) for cell in cells]
-    found = [(at.fastest, at.turning) for at in (rates(equations, *cell) for cell in cells)]
-    return _stiffest(found + [(LAYER * at.fastest, LAYER * at.turning) for at in layers])
+def _stiffness(equations: Equations, sample: Plan, extremes: Plan) -> float:
+    found = [(at.fastest, at.turning) for at in _each(rates, equations, sample)]
+    return _stiffest(found + [(LAYER * at.fastest, LAYER * at.turning) for at in _each(bends, equations, extremes)])
+
+
+def _each(function: Callable[..., Rates], equations: Equations, rows: Plan) -> Iterator[Rates]:
+    return (function(equations, *cell) for cell in zip(rows.start, rows.numbers, strict=True))
 
 
 def mode_stiffness(variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray) -> float:

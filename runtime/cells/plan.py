@@ -159,6 +159,14 @@ class Planner:
         """Return the rows of a few cells in which every axis takes its smallest, its largest and
         its value nearest to 0.
         """
+        return self.rows(self._extremes())
+
+    def sample(self) -> Plan:
+        """Return the rows of the extreme cells and of others, evenly spread over the sweep: of LOOKED_AT nodes or two cells."""
+        spread = _spread(math.prod(self.scene.shape), LOOKED_AT // self.equations.n)
+        return self.rows(np.union1d(self._extremes(), spread))
+
+    def _extremes(self) -> np.ndarray:
         ends = [_ends(values) for values in self.values.values()]
         cells = [(place,) for place in np.unique(ends)] if self.scene.zipped else [*zip(*ends, strict=True)]
         cells = cells or [()]
@@ -167,12 +175,8 @@ class Planner:
             places = np.unique(drawn) if drawn else np.zeros(1, int)
             cells = [(*cell, place) for cell in cells for place in places]
         if not self.scene.shape:
-            return self.rows(np.arange(1))
-        return self.rows(np.unique([np.ravel_multi_index(cell, self.scene.shape) for cell in cells]))
-
-    def sample(self, count: int) -> Plan:
-        """Return the rows of so many cells, evenly spread over the sweep, or of all."""
-        return self.rows(np.unique(_spread(math.prod(self.scene.shape), count)))
+            return np.arange(1)
+        return np.unique([np.ravel_multi_index(cell, self.scene.shape) for cell in cells])
 
 
 def _ends(values: np.ndarray) -> tuple[int, int, int]:
@@ -323,8 +327,8 @@ def control_of(planner: Planner, jumps: bool, method: Integrator) -> np.ndarray:
     directions = [DIRECTIONS[section.direction] for section in scene.sections.values() or (scene.section,)]
     control = control_array(rtol, atol, longest_step(scene), scene.max_steps, directions[0], jumps)
     if method.implicit:
-        looked_at = (extremes, planner.sample(max(2, LOOKED_AT // scene.equations.n)))
-        cells = (cell for rows in looked_at for cell in zip(rows.start, rows.numbers, strict=True))
+        sample = planner.sample()
+        cells = zip(sample.start, sample.numbers, strict=True)
         control[Control.FIRST_STEP] = first_step(rates(scene.equations, *cell) for cell in cells)
     return np.concatenate([control, directions[1:]])
 

@@ -91,6 +91,15 @@ def test_rates_beyond_the_largest_float_are_infinitely_fast():
     assert stiffness(damper.replace(parameters={"sigma": 1e308})) == math.inf
 
 
+def test_stiffness_in_the_middle_of_an_axis_is_seen():
+    bump = Scene(
+        Field({"x": "v", "v": "-x - 1000*exp(-(a - 4)**2)*v"}, parameters={"a": 0.0}),
+        axes={"a": np.linspace(-10.0, 10.0, 101)},
+    )
+    calm = bump.replace(axes={"a": np.linspace(8.0, 10.0, 101)})
+    assert (method(bump)[0], method(calm)[0]) == ("rodas5p", "taylor")
+
+
 def test_stiffness_is_that_of_the_extreme_cells():
     scene = Scene(oscillator="van_der_pol", topology=chain(2))
     assert stiffness(scene.replace(parameters={"mu": 1.0})) < STIFF

@@ -661,9 +661,18 @@ class Planted(ModuleType):
         raise self.problem
 
 
+def behind_ctrl_c() -> RuntimeError:
+    """The error of a lock whose end a second Ctrl-C has cut short."""
+    problem = RuntimeError("cannot release un-acquired lock")
+    problem.__context__ = ValueError("between")
+    problem.__context__.__context__ = KeyboardInterrupt()
+    return problem
+
+
 @pytest.mark.parametrize(
     ("problem", "code", "expected"),
     [
+        (behind_ctrl_c(), 1, "synchain cache: interrupted"),
         (TypeError("planted"), 1, "internal error, a bug in synchain: TypeError: planted"),
         (ValueError("planted"), 1, "a bug in synchain"),
         (OSError(28, "No space left on device", "file.nc"), 1, "file.nc: No space left on device"),
