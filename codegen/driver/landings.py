@@ -12,9 +12,13 @@ from __future__ import annotations
 from numba import njit
 
 from ..simd.addresses import address
+from ..simd.elementary import log
+from ..simd.lanes import absolute
 from ..simd.lanes import broadcast
 from ..simd.lanes import fma
 from ..simd.lanes import load
+from ..simd.lanes import maximum
+from ..simd.lanes import select
 from ..simd.lanes import store
 from .names import LANES
 from .propagators import FROM
@@ -55,6 +59,17 @@ def gather(numbers, where, out):
 
 
 @njit(error_model="numpy")
+def lay_out(modes, powers, registers, table, exponents, stride):
+    """As `tabulate`, of a single deviation of each node."""
+    for which in range(registers):
+        x, y = load(modes, 2 * which, LANES), load(modes, 2 * which + 1, LANES)
+        store(table, which, x)
+        store(address(table, stride), which, y)
+        some = maximum(absolute(x), absolute(y)) > 0.0
+        store(exponents, which, select(some, load(powers, which, LANES), 0.0))
+
+
+@njit(error_model="numpy")
 def multiply_all(panels, weights, factors, exponents, numbers, powers):
     """Multiply numbers by factors that are interpolated from those of nodes; powers of two are counted."""
     for k in range(panels.shape[0]):
@@ -80,9 +95,9 @@ def refine(table, exponents, stride, ways, products):
 
 
 @njit(error_model="numpy")
-def begin_leg(modes, powers, nodes, left):
+def begin_leg(modes, powers, registers, left):
     """Let the deviation of every node be 1 in the component that a landing leaves."""
-    for which in range((nodes + LANES - 1) // LANES):
+    for which in range(registers):
         store(modes, 2 * which + left, broadcast(1.0, LANES))
         store(modes, 2 * which + 1 - left, broadcast(0.0, LANES))
         store(powers, which, broadcast(0.0, LANES))
@@ -108,21 +123,39 @@ def renew_products(legs, products, groups):
 
 
 @njit(error_model="numpy")
-def land(due, table, exponents, stride, left, panels, weights, ways, products, groups):
-    """End a leg; returns the error.  If `due`, the products of earlier legs are moved to all strengths before.
+def hand_over(panels, weights, ways, products, groups):
+    """Move the products of earlier legs to all strengths; returns the error."""
+    legs, _, where = ways
+    share, share_powers, fine, heights, _, kept, kept_powers = products
+    gather(share, where, fine)
+    gather(share_powers, where, heights)
+    worst = largest_misfit(panels, weights, fine, heights, 1, 1, 1, int(legs[legs.shape[0] - 1, TO]) * LANES)
+    multiply_all(panels, weights, fine, heights, kept, kept_powers)
+    renew_products(legs, products, groups)
+    return worst
+
+
+@njit(error_model="numpy")
+def close_batch(groups, products, gains):
+    """Write the logarithms of how much what landings leave has grown, and give it unit size; zeros stay zeros."""
+    _, _, _, _, _, kept, kept_powers = products
+    for s in range(groups):
+        value = load(kept, s, LANES)
+        store(gains, s, load(kept_powers, s, LANES) * 0.6931471805599453 + log(absolute(value)))
+        store(kept, s, select(value > 0.0, 1.0, select(value < 0.0, -1.0, value)))
+        store(kept_powers, s, broadcast(0.0, LANES))
+
+
+@njit(error_model="numpy")
+def land(table, exponents, stride, left, ways, products):
+    """End a leg; returns the error.
 
     Powers of two of each leg are counted, and what is left of its factors leaves the products within range.
     """
-    legs, shares, where = ways
-    share, share_powers, fine, heights, _, kept, kept_powers = products
-    registers, numbers, worst = int(legs[legs.shape[0] - 1, TO]), address(table, left * stride), 0.0
-    if due:
-        gather(share, where, fine)
-        gather(share_powers, where, heights)
-        worst = largest_misfit(panels, weights, fine, heights, 1, 1, 1, registers * LANES)
-        multiply_all(panels, weights, fine, heights, kept, kept_powers)
-        renew_products(legs, products, groups)
-    worst = larger(worst, largest_misfit(legs, shares, numbers, exponents, 1, 1, 1, stride))
+    legs, shares, _ = ways
+    share, share_powers, _, _, _, _, _ = products
+    numbers = address(table, left * stride)
+    worst = largest_misfit(legs, shares, numbers, exponents, 1, 1, 1, stride)
     multiply_all(legs, shares, numbers, exponents, share, share_powers)
     return worst
 
@@ -175,15 +208,15 @@ def compose(table, exponents, stride, panels, weights, ways, products, moved, li
 
 @njit(error_model="numpy")
 def bring(
-    parted, modes, powers, spots, singles, nodes, table, exponents, stride, panels, weights, ways, products, moved, lifts,
-    found, groups,
+    parted, modes, powers, spots, few, nodes, table, exponents, stride, panels, weights, ways, products, moved, lifts, found,
+    groups,
 ):  # fmt: skip
     """Write the deviations of all strengths as they are now; returns the error.
 
     They come from what a landing has left of them, if `parted`, else from what they were when propagators were begun.
     """
     if parted:
-        tabulate(modes, powers, singles, nodes, 1, table, exponents, 2, stride)
+        lay_out(modes, powers, few, table, exponents, stride)
         worst = compose(table, exponents, stride, panels, weights, ways, products, moved, lifts, groups)
     else:
         tabulate(modes, powers, spots, nodes, 2, table, exponents, 2, stride)

@@ -67,7 +67,10 @@ from .names import WIDTH
 from .landings import begin_leg
 from .landings import begin_products
 from .landings import bring
+from .landings import close_batch
+from .landings import hand_over
 from .landings import land
+from .landings import lay_out
 from .propagators import TILE
 from .propagators import TO
 from .propagators import apply
@@ -218,7 +221,7 @@ def march(
     shared = address(out, 9 * dims.nodes + 2)
     columns, stride, groups = places.shape[1], registers * LANES, gains.shape[2] // LANES
     sticks, room = legs.shape[0] > 0, int(legs[legs.shape[0] - 1, TO]) * LANES if legs.shape[0] else 0
-    held = registers * (2 * parts + 3 + 2 * max(1, kinds) + columns * parts) + 3 * groups
+    held = registers * (2 * parts + 2 + 2 * max(1, kinds) + columns * parts) + 3 * groups
     deviations = aligned((held + parts * (1 + TILE * columns)) * LANES + 9 * room)
     old, new = address(deviations, 0), address(deviations, registers * parts * LANES)
     powers = address(new, registers * parts * LANES)
@@ -226,8 +229,7 @@ def march(
     alone = address(strong, registers * max(1, kinds) * LANES)  # strengths, of one deviation for each node
     exponents = address(alone, registers * max(1, kinds) * LANES)
     table = address(exponents, registers * LANES)
-    singles = address(table, columns * parts * stride)
-    lifts = address(singles, registers * LANES)
+    lifts = address(table, columns * parts * stride)
     kept, kept_powers = address(lifts, groups * LANES), address(lifts, 2 * groups * LANES)
     found = address(lifts, 3 * groups * LANES)
     share = address(found, parts * (1 + TILE * columns) * LANES)
@@ -238,7 +240,6 @@ def march(
     nodes, spots, given = places.shape[0], address(places, 0), address(weights, 0)
     few, left = (nodes + LANES - 1) // LANES, 1 if owners[0] >= 0 else 0
     for node in range(nodes):
-        singles[node] = float(node)
         for k in range(kinds):
             alone[(kinds * (node // LANES) + k) * LANES + node % LANES] = strengths[k, int(places[node, 0])]
     for which in range(registers):
@@ -249,7 +250,7 @@ def march(
     for cell in range(first, last):
         fill(0, cell, start, numbers, spans, control, clock, y, dims)
         status, begun, moved = FINISHED, False, address(travellers, cell * groups * parts * LANES)
-        parted, fresh, landed, cut_at, handed_at = False, True, False, 0.0, 0.0
+        parted, fresh, landed, cut_at = False, True, False, 0.0
         for batch in range(batches.size):
             if tracks.shape[1]:
                 for c in range(size):
@@ -278,20 +279,18 @@ def march(
                             now, error = clock[BASE] + clock[TIME], 0.0
                             long = now - cut_at > spans[cell, 1] and y[2 * dims.nodes] != 0.0
                             if landed and parted:
-                                due = now - handed_at >= spans[cell, 1]
-                                handed_at = now if due else handed_at
-                                tabulate(old, powers, singles, nodes, 1, table, exponents, 2, stride)
-                                error = land(due, table, exponents, stride, left, panels, given, ways, products, groups)
+                                lay_out(old, powers, few, table, exponents, stride)
+                                error = land(table, exponents, stride, left, ways, products)
                             elif landed or long:
                                 error = bring(
-                                    parted, old, powers, spots, singles, nodes, table, exponents, stride, panels, given,
+                                    parted, old, powers, spots, few, nodes, table, exponents, stride, panels, given,
                                     ways, products, moved, lifts, found, groups,
                                 )  # fmt: skip
-                                handed_at, fresh, parted = now, not landed, False
+                                fresh, parted = not landed, False
                             if landed:
                                 if not parted:
                                     begin_products(moved, lifts, left, legs, products, groups)
-                                begin_leg(old, powers, nodes, left)
+                                begin_leg(old, powers, few, left)
                                 parted, active, carried = True, few, alone
                             if landed or long:
                                 misfits[cell], cut_at, landed = larger(misfits[cell], error), now, False
@@ -340,17 +339,22 @@ def march(
                         error = apply(panels, given, table, exponents, moved, lifts, found, columns, parts, stride)
                         misfits[cell] = larger(misfits[cell], error)
                         scale(moved, lifts, groups, parts)
-                elapsed = clock[BASE] + clock[TIME]
-                cut_at, handed_at = cut_at - elapsed, handed_at - elapsed
-            if panels.shape[0]:
                 if CONTACTS:  # noqa: SIM102
+                    if parted:
+                        misfits[cell] = larger(misfits[cell], hand_over(panels, given, ways, products, groups))
+                cut_at -= clock[BASE] + clock[TIME]
+            if panels.shape[0]:
+                at = address(gains, (cell * batches.size + batch) * groups * LANES)
+                if CONTACTS:
+                    if sticks and parted and batch < batches.size - 1 and not tracks.shape[1]:
+                        close_batch(groups, products, at)
+                        continue
                     if sticks and not fresh:
                         error = bring(
-                            parted, old, powers, spots, singles, nodes, table, exponents, stride, panels, given, ways,
+                            parted, old, powers, spots, few, nodes, table, exponents, stride, panels, given, ways,
                             products, moved, lifts, found, groups,
                         )  # fmt: skip
                         misfits[cell], fresh = larger(misfits[cell], error), not parted
-                at = address(gains, (cell * batches.size + batch) * groups * LANES)
                 settle(moved, lifts, groups, at, parts, kept, kept_powers, parted)
         if not panels.shape[0]:
             hand_back(old, powers, registers, vectors[cell], growth[cell], parts)

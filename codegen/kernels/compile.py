@@ -167,7 +167,7 @@ class Kernel:
     driver: Compiled = field(repr=False)
     own: tuple[Any, ...] = field(repr=False)
 
-    @property
+    @functools.cached_property
     def entry(self) -> EntryPoint:
         """The function of the driver that runs cells."""
         function: EntryPoint = self.driver.functions[self.origin.driver.entry]

@@ -13,6 +13,7 @@ The circular functions subtract three parts of pi: their error is below 1.5 unit
 
 from __future__ import annotations
 
+from math import inf, nan
 from typing import Any
 
 from numba.extending import intrinsic
@@ -149,9 +150,9 @@ def log(x):
     tail = 2.0 * z * (0.3333333333333333 + z * fma(even, z, odd))
     square = 0.5 * f * f
     result = k * LN2_SHORT - ((square - fma(s, square + tail, k * LN2_REST)) - f)
-    result = select(x == 0.0, -1.0 / (x * x), result)
+    result = select(x == 0.0, -inf, result)
     result = select(x > 1.7976931348623157e308, x, result)
-    return select(x >= 0.0, result, (x - x) / (x - x))
+    return select(x >= 0.0, result, nan)
 
 
 @lane_function

@@ -6,6 +6,7 @@ beside each stands its error.
 
 from __future__ import annotations
 
+from math import inf, nan
 from typing import Any
 
 from numba.extending import intrinsic
@@ -104,7 +105,7 @@ def acosh(x):
     low = minimum(over, 1e9)
     value = _log_of_more(low + sqrt(low * (low + 2.0)))
     value = select(over > 1e9, log(x) + 0.6931471805599453, value)
-    return select(over >= 0.0, value, (x - x) / (x - x))
+    return select(over >= 0.0, value, nan)
 
 
 @lane_function
@@ -112,8 +113,8 @@ def atanh(x):
     """Inverse hyperbolic tangent; infinite at -1 and 1, NaN beyond."""
     size = absolute(x)
     value = 0.5 * _log_of_more(2.0 * size / (1.0 - size))
-    value = select(size == 1.0, 1.0 / (1.0 - size), value)
-    return select(size <= 1.0, copysign(value, x), (x - x) / (x - x))
+    value = select(size == 1.0, inf, value)
+    return select(size <= 1.0, copysign(value, x), nan)
 
 
 @lane_function

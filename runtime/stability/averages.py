@@ -20,7 +20,7 @@ __all__ = ["SLACK", "TRIED", "Averaging", "Batches", "check_whole", "error_of_st
 BATCHES = 64
 """Most batches that are kept."""
 CHECKED = 8
-"""Batches between two checks of the error."""
+"""Fewest batches between two checks of the error."""
 FEWEST, MOST = 3, 16
 """Fewest degrees of freedom of an error that is known, and most that are used."""
 NARROW = 0.2
@@ -80,7 +80,7 @@ class Averaging:
         batches : Batches
             The average.
         error : callable
-            Returns the standard errors that must become small, or the largest.
+            Returns the standard errors that must become small, or the largest, or another one that is too large.
         reporter : Reporter
             Counts the periods.
         """
@@ -88,8 +88,11 @@ class Averaging:
             before = batches.blocks
             yield math.ceil(self.periods / batches.block) - before
             reporter.advance(batches.block * (batches.blocks - before))
-            if batches.due and np.all(error() <= self.precision):
-                return
+            if batches.due:
+                worst = float(np.max(error(), initial=0.0))
+                if worst <= self.precision:
+                    return
+                batches.defer(worst / self.precision if self.precision else math.inf)
 
 
 def check_whole(what: str, periods: float) -> float:
@@ -114,9 +117,9 @@ def error_of_steps(
     length : float
         Length of a block in units of non-dimensional time.
     """
-    found, other = np.array(usual), np.array(looser)
-    known = np.isfinite(found) & np.isfinite(other)
-    change = np.where(known, found, 0.0) - np.where(known, other, 0.0)
+    with np.errstate(invalid="ignore"):
+        change = np.subtract(usual, looser)
+    change[~np.isfinite(change)] = 0.0
     return np.asarray(np.sqrt(change.mean(axis=0) ** 2 + change.var(axis=0) / len(change)) / length)
 
 
@@ -147,8 +150,8 @@ class Batches:
         Growth over each batch; behind the first `count` nothing that counts.
     count : int
         Number of batches, the last of which may be incomplete.
-    due : bool
-        True if enough new batches are complete for another check of the error.
+    enough : int
+        Blocks before the next check of the error.
     worst : int
         The strength with the largest error when all were looked at.
 
@@ -165,7 +168,7 @@ class Batches:
     per_batch: int = 1
     sums: np.ndarray = field(default_factory=lambda: np.zeros((BATCHES, 0, 0)))
     count: int = 0
-    due: bool = False
+    enough: int = BATCHES
     worst: int = 0
 
     @property
@@ -183,6 +186,24 @@ class Batches:
         """Degrees of freedom of the standard errors: NARROW n^(2/3) after n periods, within what the batches allow."""
         return min(round(NARROW * self.periods ** (2.0 / 3.0)), MOST, self.blocks // self.per_batch - 1)
 
+    @property
+    def due(self) -> bool:
+        """True if enough new batches are complete for another check of the error."""
+        return self._due(self.blocks, self.count, self.per_batch)
+
+    def _due(self, blocks: int, count: int, per_batch: int) -> bool:
+        return blocks >= self.enough and blocks % per_batch == 0 and count % CHECKED == 0
+
+    def defer(self, ratio: float) -> None:
+        """Put off the next check of the error until a quarter of the time is done that it asks for, or twice the present one.
+
+        Parameters
+        ----------
+        ratio : float
+            The largest error over the one that is asked for.
+        """
+        self.enough = math.ceil(self.blocks * min(2.0, max(1.0, 0.25 * ratio**2)))
+
     def ahead(self, most: int) -> np.ndarray:
         """Return the blocks of the batches until the error is due.
 
@@ -196,34 +217,27 @@ class Batches:
         ndarray of int64, shape (batches,)
             The last batch may stay incomplete.
         """
-        full = self.count == BATCHES
-        length, known = (2 * self.per_batch, BATCHES // 2) if full else (self.per_batch, self.count)
-        count = BATCHES - known if self.blocks < BATCHES else CHECKED - known % CHECKED
-        whole, rest = divmod(min(most, count * length), length)
-        return np.array([length] * whole + ([rest] if rest else []), dtype=np.int64)
+        blocks, count, per_batch, parts = self.blocks, self.count, self.per_batch, list[int]()
+        while most > 0 and not (parts and self._due(blocks, count, per_batch)):
+            if count == BATCHES:
+                count, per_batch = BATCHES // 2, 2 * per_batch
+            parts.append(min(per_batch, most))
+            blocks, count, most = blocks + parts[-1], count + 1, most - parts[-1]
+        return np.array(parts, dtype=np.int64)
 
-    def add(self, growth: np.ndarray, blocks: int = 1) -> None:
-        """Add the growth over further blocks of the same batch.
+    def add(self, growth: np.ndarray) -> None:
+        """Add the growth over a further block.
 
         Parameters
         ----------
         growth : ndarray, shape (starts, m)
-            Logarithm of the growth of each deviation over the blocks.
-        blocks : int
-            Their number.
+            Logarithm of the growth of each deviation.
         """
-        if self.blocks == 0:
-            self.sums = np.empty((BATCHES, *growth.shape))
-        if self.blocks % self.per_batch == 0:
-            if self.count == BATCHES:
-                self.count, self.per_batch = BATCHES // 2, 2 * self.per_batch
-                self.sums[: self.count] = self.sums[::2] + self.sums[1::2]
-            self.sums[self.count] = growth
-            self.count += 1
-        else:
+        if self.blocks % self.per_batch:
             self.sums[self.count - 1] += growth
-        self.blocks += blocks
-        self.due = self.blocks % self.per_batch == 0 and self.blocks >= BATCHES and self.count % CHECKED == 0
+            self.blocks += 1
+        else:
+            self.extend(growth[None], np.ones(1, dtype=np.int64))
 
     def extend(self, growths: np.ndarray, parts: np.ndarray) -> None:
         """Add the growth over further batches, as many blocks in each as `ahead` has said.
@@ -235,11 +249,17 @@ class Batches:
         parts : ndarray of int64, shape (b,)
             Blocks of each batch.
         """
-        self.add(growths[0], int(parts[0]))
-        if len(parts) > 1:
-            self.sums[self.count : self.count + len(parts) - 2] = growths[1:-1]
-            self.count, self.blocks = self.count + len(parts) - 2, self.blocks + int(parts[1:-1].sum())
-            self.add(growths[-1], int(parts[-1]))
+        if self.blocks == 0:
+            self.sums = np.empty((BATCHES, *growths.shape[1:]))
+        while len(growths):
+            if self.count == BATCHES:
+                self.count, self.per_batch = BATCHES // 2, 2 * self.per_batch
+                self.sums[: self.count] = self.sums[::2] + self.sums[1::2]
+            new = min(BATCHES - self.count, len(growths))
+            self.sums[self.count : self.count + new] = growths[:new]
+            self.count += new
+            growths = growths[new:]
+        self.blocks += int(parts.sum())
 
     def mean(self) -> np.ndarray:
         """Return the growth per unit of time, an ndarray of shape (starts, m)."""

@@ -55,6 +55,10 @@ NO_LEGS, NO_TRACKS = NO_PANELS[-4:-1], NO_PANELS[-1]
 batch begins with is not asked for."""
 
 
+FINISHED = int(Status.FINISHED)
+"""Status of an orbit that can be integrated, as kernels write it."""
+
+
 @dataclass(slots=True)
 class Travellers:
     """Deviations of all strengths, which propagators move.
@@ -372,15 +376,15 @@ class VariationalIntegrator:
             self.kernel.drive(0, cells, *rest)
         else:
             self._share(np.linspace(0, cells, min(cells, self.workers) + 1).astype(int), rest)
-        bad = np.flatnonzero(counts[:, 0] != Status.FINISHED)
-        if len(bad):
-            status = Status(int(counts[bad[0], 0]))
+        bad = counts[:, 0] != FINISHED
+        if bad.any():
+            status = Status(int(counts[bad.argmax(), 0]))
             largest = np.hypot.reduce(self.strengths).max()
             modes = f" of strengths up to {largest:g}" if largest else ""
             raise FloatingPointError(f"the orbit with its deviations{modes} cannot be integrated: {status.message}")
-        taken, blocks = int(counts[:, 1:3].sum()), int(panels[0].sum())
+        taken = int(counts[:, 1:3].sum())
         if self.kernel.origin.method.series and taken:
-            step = blocks * float(np.broadcast_to(length, cells).sum()) / taken
+            step = float(panels[0].sum()) * float(spans[:, 1].sum()) / taken
             self.control[Control.FIRST_STEP] = step  # any scale finds its length, only the first few steps gain
             self.warned = self.warned or warn_of_stiff_modes(self.variation, end, self.numbers, self.strengths, step)
         self.state = end

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+import math
+
 import numpy as np
 import pytest
 
@@ -194,22 +197,28 @@ def test_a_deviation_that_has_vanished_stays_so() -> None:
     assert np.all(orbits.travellers.vectors == 0.0)
 
 
-def test_batches_ahead_are_those_of_single_blocks() -> None:
-    growth = np.random.default_rng(0).normal(size=(5 * BATCHES, 2, 3))
-    one, many, place = Batches(1.0), Batches(1.0), 0
+@pytest.mark.parametrize("ratio", [1.0, 2.5, math.inf])
+def test_batches_ahead_are_those_of_single_blocks(ratio: float) -> None:
+    growth = np.random.default_rng(0).normal(size=(5 * BATCHES + 3, 2, 3))
+    one, many, checks, place = Batches(1.0), Batches(1.0), [], 0
     while place < len(growth):
         parts = many.ahead(len(growth) - place)
-        for k, blocks in enumerate(parts):
-            assert not (many.due and k)
-            many.add(growth[place : place + blocks].sum(axis=0), int(blocks))
-            for row in growth[place : place + blocks]:
-                assert not (one.due and one.blocks % BATCHES and k)
-                one.add(row)
-            place += blocks
+        ends = place + np.cumsum(parts)
+        many.extend(np.array([growth[a:b].sum(axis=0) for a, b in itertools.pairwise([place, *ends])]), parts)
+        for row in growth[place : ends[-1]]:
+            assert not (one.due and one.blocks > place)
+            one.add(row)
+        place = int(ends[-1])
         assert (one.blocks, one.count, one.per_batch, one.due) == (many.blocks, many.count, many.per_batch, many.due)
         np.testing.assert_allclose(one.error(), many.error(), rtol=1e-12)
         assert many.due or place == len(growth)
-    assert many.ahead(3).tolist() == [3]
+        checks += [place] if many.due else []
+        one.defer(ratio)
+        many.defer(ratio)
+    steps = np.diff(checks) / checks[:-1]
+    assert checks[0] == BATCHES
+    assert np.all(steps <= {1.0: 0.25, 2.5: 0.75, math.inf: 1.0}[ratio])
+    assert steps.max() >= {1.0: 0.25, 2.5: 0.6, math.inf: 1.0}[ratio]
 
 
 def test_the_largest_error_is_the_largest_or_too_large() -> None:
