@@ -286,7 +286,9 @@ def drive(
 def run_cells(compiled: Kernel, scene: Scene) -> Outcome:
     """All cells of a scene by a kernel of its equations, as `run` has them but without reductions and early ends."""
     cells = plan(scene)
-    control = control_array(*tolerances(scene, cells.numbers), longest_step(scene), scene.max_steps, jumps=False)
+    control = control_array(
+        *tolerances(scene, scene.equations, cells.numbers), longest_step(scene), scene.max_steps, jumps=False
+    )
     outcome = blank(*cells.start.shape)
     compiled.drive(0, scene.cells, cells.start, cells.numbers, cells.spans, control, *outcome.arrays)
     return outcome

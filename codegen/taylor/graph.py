@@ -30,6 +30,7 @@ from .series import (
     Choice,
     Constant,
     Edged,
+    Exponential,
     Fraction,
     Integral,
     Kink,
@@ -472,8 +473,8 @@ class Graph:
             quotient = self.enter(key, QuotientIntegral(name, argument, divisor, value, name=self.fresh(name)))
             quotient.slope = self.put(Slope, quotient)
             return quotient
-        slope = self.put(Slope, argument)
-        integral = self.enter(key, Integral(name, argument, slope, value, name=self.fresh(name)))
+        slope, kind = self.put(Slope, argument), Exponential if function is sp.exp else Integral
+        integral = self.enter(key, kind(name, argument, slope, value, name=self.fresh(name)))
         integral.factor = self.inside(derivative, place, argument)
         return integral
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..program.expressions import ZERO, Call, Expression, Name, Number, call
-from ..program.statements import Statement, let
-from .terms import absolute, extreme, largest, times
+from ..program.expressions import ZERO, Call, Choice, Compare, Expression, Junction, Name, Negation, Number, call
+from ..program.statements import If, Statement, let
+from .terms import absolute, add, extreme, largest, times
 
-__all__ = ["SEEN", "finished", "last_orders", "reach", "unseen"]
+__all__ = ["SEEN", "bounded", "distant", "finished", "last_orders", "reach", "unseen"]
 
 FARTHEST = 16.0
 """How many times longer than `scale` a step may be."""
@@ -35,6 +35,9 @@ HIDDEN, LOST = 1e-9, 1e-110
 The first is for zeros of the low ones alone, the second for zeros of high order, which no step would reach otherwise.
 """
 
+
+REMOTE, NEARER = 230.0, 100.0
+"""Below minus the first, exponentials are not seen in any coefficient; least that an exponent may rise by from there."""
 
 SEEN = let("unseen", 0.0 * Name("scale"))
 """What `unseen` begins with."""
@@ -65,6 +68,47 @@ def unseen(coefficients: Sequence[Expression]) -> list[Statement]:
         let("low", largest(low)),
         let("unseen", call("maximum", "unseen", Name("high") / (Name("low") + least))),
     ]
+
+
+def bounded(coefficients: Sequence[Expression]) -> list[Statement]:
+    """The statements for `way`: it times the share of `scale` that a step goes bounds the change of a series within it.
+
+    `coefficients` are those of the series but the first.
+    """
+    further = [absolute(e) if e != ZERO else e for e in coefficients]
+    while further and further[-1] == ZERO:
+        further.pop()
+    way, found = Name("way"), list[Statement]()
+    for e in reversed(further):
+        found.append(let(way.text, add(e, times(way, Name("ratio"))) if found else e))
+    return found
+
+
+def distant(start: Expression, slopes: Sequence[Expression]) -> list[Statement]:
+    """Shorten a step that might go on to where an exponential is seen that is not, because it is far too small.
+
+    Zero to every digit, with all its coefficients, it says nothing of where it rises; its exponent does.
+
+    Parameters
+    ----------
+    start : Expression
+        The exponent at the beginning of the step.
+    slopes : sequence of Expression
+        Its coefficients k > 0, k times each.
+    """
+    bound = bounded([times(Number(1.0 / k), e) if e != ZERO else e for k, e in enumerate(slopes, 1)])
+    if not bound:
+        return []
+    remote, far = Compare("<", start, Number(-REMOTE)), Compare(">", Name("way"), Name("room"))
+    shorter = call("truncated", Name("length") * (Name("room") / "way"))
+    inner = (
+        *bound,
+        let("way", Name("way") * "ratio"),
+        let("room", call("maximum", Number(-REMOTE) + Negation(start), Number(NEARER))),
+        let("length", Choice(Junction("and", (remote, far)), shorter, Name("length"))),
+        let("ratio", Name("length") / "scale"),
+    )
+    return [If(call("any_lane", remote), inner)]
 
 
 def finished(order: int, watched: bool, contacts: bool) -> list[Statement]:

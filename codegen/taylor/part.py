@@ -10,9 +10,9 @@ from typing import ClassVar
 from ..program.expressions import ONE, ZERO, Expression, Name, Number, call
 from ..program.statements import Statement, let
 from .graph import Graph
-from .length import last_orders, unseen
+from .length import distant, last_orders, unseen
 from .passage import Stored, closed, told
-from .series import Order, Series
+from .series import Exponential, Order, Series
 from .terms import absolute, largest, over, times
 
 __all__ = ["Gaps", "Part"]
@@ -149,6 +149,14 @@ class Part(Order):
     def watches(self) -> list[Statement]:
         """The statements that make it no longer than the watched series let it be."""
         return [s for w in self.graph.watched for s in unseen([self.at(w, k) for k in range(self.order)])]
+
+    def distances(self) -> list[Statement]:
+        """The statements that make it no longer than the way to where exponentials are seen that are too small now."""
+        found = list[Statement]()
+        for s in self.graph.watched:
+            if isinstance(s, Exponential):
+                found += distant(self.recall(s.exponent), [self.at(s.slope, k) for k in range(1, self.order)])
+        return self.run(found)
 
     def counted(self, series: Series) -> list[Statement]:
         """Let the last coefficients of a series count, in units of the error that it may have beside its low ones."""

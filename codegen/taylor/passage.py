@@ -14,7 +14,8 @@ from synchain.models.dynamics.equations import Equations
 
 from ..program.expressions import ONE, ZERO, Choice, Compare, Expression, Name, Negation, Number, Value, call, plus
 from ..program.statements import Comment, If, Repeat, Statement, called, let, mentioned
-from .terms import absolute, add, times
+from .length import bounded
+from .terms import absolute
 
 __all__ = [
     "Stored",
@@ -163,13 +164,9 @@ class Stored(NamedTuple):
 
 def approached(coefficients: Sequence[Expression], ends: Sequence[Statement]) -> list[Statement]:
     """The statements that end a step at a kink, if any lane of the series goes as far as zero; `way` bounds how far."""
-    start, *further = (absolute(e) if e != ZERO else e for e in coefficients)
-    while further and further[-1] == ZERO:
-        further.pop()
-    way, found = Name("way"), list[Statement]()
-    for e in reversed(further):
-        found.append(let(way.text, add(e, times(way, Name("ratio"))) if found else e))
-    near = Compare("<=", start, 1.0001 * way * Name("ratio"))
+    found = bounded(coefficients[1:])
+    start = absolute(coefficients[0]) if coefficients[0] != ZERO else ZERO
+    near = Compare("<=", start, 1.0001 * Name("way") * Name("ratio"))
     return [*found, If(call("any_lane", near), tuple(ends))]
 
 

@@ -21,7 +21,7 @@ from ..program.statements import Statement
 from .passage import Stored
 from .terms import absolute, add, over, times
 
-__all__ = ["Bell", "Brink", "Choice", "Constant", "Edged", "Fraction", "Integral", "Kink", "Leaping", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
+__all__ = ["Bell", "Brink", "Choice", "Constant", "Edged", "Exponential", "Fraction", "Integral", "Kink", "Leaping", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
            "Row", "Series", "Slope", "Square", "SquareRoot", "SquaredSecant", "State", "Time", "Unknown",
            "Whole"]  # fmt: skip
 
@@ -252,6 +252,19 @@ class Integral(Series):
         if self.factor is None:
             raise RuntimeError(f"{self.name} has no derivative yet; this is a mistake in the program")
         return times(Number(self.number), at.inverse, at.sum(self.slope, self.factor, 1, 0))
+
+
+@dataclass(eq=False, slots=True)
+class Exponential(Integral):
+    """u = exp(a) from u' = u a'; where a begins is kept for the length of the step."""
+
+    def begin(self, at: Order) -> Expression:
+        return Call(self.function, (at.keep(self.exponent, at.of(self.argument)),))
+
+    @property
+    def exponent(self) -> str:
+        """What is called as a is at the beginning."""
+        return f"n_{self.name}"
 
 
 @dataclass(eq=False, slots=True)

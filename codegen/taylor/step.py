@@ -25,7 +25,7 @@ __all__ = ["StepWriter", "TaylorStep", "called", "check_order"]
 
 WORDS = frozenset(
     {"unseen", "high", "low", "largest", "scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "j_there",
-     "slope_scale", "convolution", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", "nearest", "loose", "closing", "side_or", "found_side", "news", "new", "floor", "value", "stuck", "side", "way", *STARTS.values()}
+     "slope_scale", "convolution", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", "nearest", "loose", "closing", "side_or", "found_side", "news", "new", "floor", "value", "stuck", "side", "way", "room", *STARTS.values()}
 )  # fmt: skip
 PREFIXES = ("positive_", "i_", "e_", "half_", "w_", "n_", "size_", "odd_", "stuck_", "hint_")
 """Names of the step; a user's symbol of that name is called otherwise within the step."""
@@ -100,6 +100,7 @@ class StepWriter(ABC):
             *(s for part in self.parts for s in part.lengths()),
             *self.reach(),
             *finished(self.order, self.watching, self.equations.sticks),
+            *(s for part in self.parts for s in part.distances()),
             *passages,
             Comment("new state"),
             *self.new_state(),

@@ -323,7 +323,7 @@ def control_array(
 def control_of(planner: Planner, jumps: bool, method: Integrator) -> np.ndarray:
     """Return the control array of a scene's sweep by some method; `jumps` as for `control_array`."""
     scene, extremes = planner.scene, planner.extremes()
-    rtol, atol = tolerances(scene, extremes.numbers)
+    rtol, atol = tolerances(scene, scene.equations, extremes.numbers)
     directions = [DIRECTIONS[section.direction] for section in scene.sections.values() or (scene.section,)]
     control = control_array(rtol, atol, longest_step(scene), scene.max_steps, directions[0], jumps)
     if method.implicit:
@@ -343,8 +343,8 @@ def first_step(found: Iterable[Rates]) -> float:
     return min(FIRST_STEP, SHORT / max(growth, SHORT))
 
 
-def tolerances(scene: Scene, numbers: np.ndarray) -> tuple[float, float]:
-    """Return (rtol, atol) as integrated with.
+def tolerances(scene: Scene, equations: Equations, numbers: np.ndarray) -> tuple[float, float]:
+    """Return (rtol, atol) as integrated with; `numbers` (cells, parameters) are those of the equations.
 
     A smoothed jump of friction is 1/kappa wide in velocity; a step control that does not see this
     width lets oscillators slip through it unnoticed.  With contact "atan" rtol is therefore at most
@@ -352,7 +352,7 @@ def tolerances(scene: Scene, numbers: np.ndarray) -> tuple[float, float]:
     """
     rtol, atol = scene.rtol, scene.atol
     names = parameter_names(scene, "kappa")
-    columns = [k for k, name in enumerate(scene.equations.parameters) if name in names]
+    columns = [k for k, name in enumerate(equations.parameters) if name in names]
     if scene.contact == "atan" and columns:
         steepest = numbers[:, columns].max() if numbers.size else max(scene.parameters[name] for name in names)
         width = 1.0 / max(float(steepest), 1e-300)

@@ -197,7 +197,7 @@ class VariationalIntegrator:
         columns = np.concatenate([order, np.full(padded - count, order[-1])])
         where = np.empty(count, dtype=np.int64)
         where[order] = np.arange(count)
-        rtol, atol = tolerances(scene, numbers)
+        rtol, atol = tolerances(scene, variation.orbit, numbers)
         repeat = periods(kernel.equations, numbers)
         longest = half_swing(kernel.equations, by_node(kernel.equations, numbers))
         control = np.append(control_array(rtol, atol, longest, scene.max_steps, jumps=False), looseness)

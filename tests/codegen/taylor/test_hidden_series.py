@@ -102,6 +102,33 @@ def test_the_slope_of_erf_is_seen_from_far_away(looped):
     assert end[1] == pytest.approx(-1.0, abs=1e-9)
 
 
+FAR = {
+    "1/(1 + exp)": (1 / (1 + sp.exp(30 * (A - 30))), 30.0, 8),
+    "soft maximum": (sp.log(1 + sp.exp(30 * (A - 30))), 30.0 * 50.0 + math.pi**2 / 180.0, 6),
+    "exp of exp": (sp.exp(-sp.exp(30 * (A - 30))), 30.0 - float(mpmath.euler) / 30.0, 8),
+    "power": (1 / (1 + sp.Integer(2) ** (40 * (A - 30))), 30.0, 8),
+    "pulse": (sp.exp(-400 * (A - 30) ** 2), math.sqrt(math.pi) / 20.0, 8),
+}
+"""What underflows at the start, what comes of it up to 40, and digits that it is right to."""
+
+
+@pytest.mark.parametrize("looped", [False, True], ids=["lines", "loops"])
+@pytest.mark.parametrize("case", FAR)
+def test_an_exponential_that_underflows_is_seen_from_far_away(case, looped):
+    """A phase a' = 1 from 0, x' = 1/(1 + exp(30 (a - 30))) and the like: exp(-900) is zero, with all that follows from it."""
+    rate, right, digits = FAR[case]
+    end, steps = march(alone([A, X], [sp.S.One, rate]), 16, [0.0, 0.0], 40.0, 1e-10, looped=looped)
+    assert end[1] == pytest.approx(right, abs=10.0**-digits)
+    assert steps < 700
+
+
+def test_the_way_to_an_exponential_is_gone_in_parts_of_it():
+    """From exp(-4e7) on: steps that see an exponential are no longer than 0.1."""
+    end, steps = march(alone([A, X], [sp.S.One, 1 / (1 + sp.exp(400 * (A - 10**5)))]), 16, [0.0, 0.0], 1e5 + 1.0, 1e-10)
+    assert end[1] == pytest.approx(1e5, abs=1e-4)
+    assert steps < 300
+
+
 BESIDE = {
     "tanh(30 x) v": -X - sp.Rational(3, 10) * sp.tanh(30 * X) * V,
     "erf(5 x) v": -X - sp.Rational(3, 10) * sp.erf(5 * X) * V,

@@ -23,7 +23,7 @@ DIGITS = 60
 FUNCTIONS: dict[str, Any] = {
     **{n: getattr(mpmath, n) for n in ("exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "atan", "asin", "acos")},
     **{n: getattr(mpmath, n) for n in ("asinh", "acosh", "atanh")},
-    "erf": mpmath.erf, "sqrt": mpmath.sqrt, "power": mpmath.power, "absolute": abs, "maximum": max, "minimum": min,
+    "erf": mpmath.erf, "sqrt": mpmath.sqrt, "power": mpmath.power, "absolute": abs, "any_lane": bool, "maximum": max, "minimum": min,
     "select": lambda which, yes, no: yes if which else no,
     "truncated": lambda x: x, "njit": lambda **options: lambda f: f, "load": lambda a, slot, width: a[slot],
     "store": lambda a, slot, value: a.__setitem__(slot, value), "WIDTH": 1, "DENSE": True,

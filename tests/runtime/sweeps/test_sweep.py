@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 
 from synchain.models import chain
+from synchain.models.dynamics.reduction import without_drive
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.kernels import kernel
 from synchain.runtime.cells.plan import plan, tolerances
@@ -215,19 +216,28 @@ def test_resuming_another_scene_is_refused():
 @pytest.mark.parametrize(("kappa", "rtol", "expected"), [(1e5, 1e-3, 1e-5), (1e5, 1e-8, 1e-8), (10.0, 1e-3, 1e-3)])
 def test_tolerance_sees_the_width_of_the_smoothed_jump(kappa, rtol, expected):
     scene = PAIR.replace(rtol=rtol, kappa=kappa)
-    limits = tolerances(scene, plan(scene).numbers)
+    limits = tolerances(scene, scene.equations, plan(scene).numbers)
     assert limits == pytest.approx((expected, expected / 10))
 
 
 def test_steepest_jump_of_a_sweep_sets_the_tolerance():
     scene = PAIR.replace(rtol=1e-3, axes={"kappa": [10.0, 1e6]})
-    assert tolerances(scene, plan(scene).numbers)[0] == pytest.approx(1e-6)
+    assert tolerances(scene, scene.equations, plan(scene).numbers)[0] == pytest.approx(1e-6)
 
 
 @pytest.mark.parametrize("kappas", [[10.0, 1e6], [1e6, 10.0]])
 def test_steepest_jump_of_unequal_nodes_sets_the_tolerance(kappas):
     scene = PAIR.replace(rtol=1e-3, parameters={"kappa": kappas})
-    assert tolerances(scene, plan(scene).numbers)[0] == pytest.approx(1e-6)
+    assert tolerances(scene, scene.equations, plan(scene).numbers)[0] == pytest.approx(1e-6)
+
+
+@pytest.mark.parametrize("off", [{"u": 0.0}, {"omega": 0.0}])
+def test_the_jump_is_looked_up_in_the_equations_that_the_numbers_belong_to(off):
+    scene = PAIR.replace(rtol=1e-3, kappa=1e6, **off)
+    calm = without_drive(scene.equations, scene.parameters)
+    assert len(calm.parameters) < len(scene.equations.parameters)
+    numbers = np.array([[scene.parameters[name] for name in calm.parameters]])
+    assert tolerances(scene, calm, numbers) == pytest.approx((1e-6, 1e-7))
 
 
 def test_loose_tolerance_is_not_silently_wrong():
