@@ -177,8 +177,12 @@ def _stiffest(rates: Iterable[tuple[float, float]]) -> float:
 FEW = 100
 """Steps of a cell that are no crawling, however short."""
 
+CRAWLING, LIMITED = 10_000, 4.0
+"""Steps of a cell that are too many for a motion that has come to rest, and their lengths by its fastest rate, which limits
+explicit steps then."""
+
 BLOWN = 1e6
-"""Growth of a state from which on its fast rates are those of a solution without bound."""
+"""Growth of a state from which on what grows as fast as anything is a solution without bound."""
 
 
 def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[[np.ndarray], Plan]) -> None:
@@ -204,12 +208,14 @@ def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[
         if not math.isfinite(lengths[cell]) or not np.isfinite(buffers.end[cell]).all():
             continue
         size = np.abs(buffers.end[cell]).max()
-        blown = size > BLOWN * max(1.0, np.abs(start).max())
-        if steps[cell] < FEW and not blown:
+        grown = size > BLOWN * max(1.0, np.abs(start).max())
+        if steps[cell] < FEW and not grown:
             continue
-        fastest, turning, _ = rates(source.equations, buffers.end[cell], numbers, times[cell])
-        if fastest * lengths[cell] > 1.0 and fastest > STIFF * max(1.0, turning):
-            if blown:
+        fastest, turning, growth = rates(source.equations, buffers.end[cell], numbers, times[cell])
+        resting = steps[cell] > CRAWLING and fastest * lengths[cell] > LIMITED and not source.equations.forced
+        slow = max(turning, 0.0 if resting else 1.0)
+        if fastest * lengths[cell] > 1.0 and fastest > STIFF * slow:
+            if grown and growth >= 0.5 * fastest:
                 warnings.warn(
                     f"a state grew to {size:.3g} in {steps[cell]} {kind} steps of a cell; expected a bounded motion; "
                     "check the signs and the size of the parameters",

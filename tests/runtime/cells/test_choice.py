@@ -190,6 +190,34 @@ def test_stiffness_that_comes_with_time_is_said() -> None:
         run(scene, show_progress=False)
 
 
+def test_steps_that_crawl_at_rest_are_said():
+    """A flame: x stays near 1e-5 for as many units of time, and at 1 for as many, where it returns at a rate of 1."""
+    flame = Scene(
+        Field({"x": "x**2 - x**3"}), record=(), transient=0, window=2e5, time_unit="time", initial={"x": 1e-5}, atol=1e-12
+    )  # fmt: skip
+    with pytest.warns(
+        RuntimeWarning, match=r"stiff equations: found a rate of 1 beside slow motion, and 1\d{4} Taylor"
+    ):
+        run(flame, show_progress=False)
+    damped = Scene(
+        Field({"x": "cos(t) + cos((t + 1)**1.1) - 2*x"}), record=(), transient=0, window=1e5, time_unit="time", initial={"x": 1.0}, rtol=1e-3
+    )  # fmt: skip
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = run(damped, show_progress=False)
+    assert found.steps > 20_000
+
+
+def test_fast_decay_beside_growth_is_stiff():
+    """The rate k of the decay grows to 1e6; nothing that decays grows without bound."""
+    scene = Scene(
+        Field({"x": "k*(cos(t) - x)", "k": "k"}), record=(), transient=0, window=14, time_unit="time",
+        initial={"x": 0.3, "k": 1.0},
+    )  # fmt: skip
+    with pytest.warns(RuntimeWarning, match=r"^stiff equations: found a rate of 1\.2e\+06"):
+        run(scene, show_progress=False)
+
+
 def test_a_slope_without_bound_at_the_start_ends_no_run():
     """The rate of sign(v) |v|^(1/2) is finite at rest, its slope is not."""
     scene = Scene(
