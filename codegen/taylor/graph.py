@@ -29,6 +29,7 @@ from .series import (
     Brink,
     Choice,
     Constant,
+    Crest,
     Edged,
     Exponential,
     Fraction,
@@ -40,7 +41,9 @@ from .series import (
     Product,
     QuotientIntegral,
     Ratio,
+    Secant,
     Series,
+    Sigmoid,
     Slope,
     Square,
     SquaredSecant,
@@ -64,6 +67,15 @@ The others follow from the derivative that SymPy knows.
 """
 
 S = TypeVar("S", bound=Series)
+
+
+class InverseSum(sp.Function):
+    """InverseSum(c, d, a): 1/(c + d exp(a))."""
+
+
+class InverseCosh(sp.Function):
+    """InverseCosh(a): 1/cosh(a)."""
+
 
 ODD = (sp.sin, sp.tan, sp.sinh, sp.tanh, sp.atan, sp.asin, sp.asinh, sp.atanh, sp.erf)
 EVEN = (sp.cos, sp.cosh)
@@ -382,6 +394,10 @@ class Graph:
             return self.choice(*map(self.of, e.args))
         if isinstance(e, sp.floor):
             return self.whole(self.of(e.args[0]))
+        if isinstance(e, InverseSum):
+            return self.sigmoid(self.of(e.args[2]), (float(e.args[0]), float(e.args[1])))
+        if isinstance(e, InverseCosh):
+            return self.secant(self.of(e.args[0]))
         return self.function(e)
 
     def constant(self, e: sp.Expr) -> Expression:
@@ -425,6 +441,8 @@ class Graph:
             inner = self.of(base)
             return self.put(Power, inner, self.put(Slope, inner), self.constant(exponent.xreplace(self.swap)))
         if exponent.is_negative:
+            if (inverse := _inverse(base)) is not None and exponent.is_Integer:
+                return self.of(inverse**-exponent)
             return self.put(Ratio, Constant(ONE), self.of(base**-exponent))
         if exponent == sp.S.Half:
             return self.put(SquareRoot, self.of(base))
@@ -493,6 +511,27 @@ class Graph:
         self.series.append(bell)
         found.factor, bell.factor = bell, self.product(tilt, bell)
         return found
+
+    def sigmoid(self, argument: Series, ends: tuple[float, float]) -> Series:
+        """1/(c + d exp(a)) of a series, which neither the overflow nor the underflow of exp(a) spoils."""
+        key = (Sigmoid, argument, ends)
+        if key not in self.known:
+            slope = self.put(Slope, argument)
+            found = self.enter(key, Sigmoid("exp", argument, slope, -1.0, ends=ends, name=self.fresh("sigmoid")))
+            crest = Crest("exp", argument, slope, ends=ends, name=self.fresh("crest"))
+            self.series.append(crest)
+            found.factor = crest
+            crest.factor = self.product(self.sum([(Number(2.0 * ends[0]), found)], Number(-1.0)), crest)
+        return self.known[key]
+
+    def secant(self, argument: Series) -> Series:
+        """1/cosh(a) of a series, as `sigmoid`."""
+        key = (Secant, argument)
+        if key not in self.known:
+            slope, tilt = self.put(Slope, argument), self.solved(sp.tanh, argument)
+            found = self.enter(key, Secant("cosh", argument, slope, -1.0, name=self.fresh("secant")))
+            found.factor = self.product(tilt, found)
+        return self.known[key]
 
     def inside(self, e: sp.Expr, place: sp.Symbol, argument: Series) -> Series:
         """The series of an expression in one symbol that stands for a series."""
@@ -569,7 +608,21 @@ def split(series: Series) -> tuple[Expression, Series]:
 
 
 def _is_divisor(e: sp.Expr) -> bool:
-    return bool(e.is_Pow and e.exp.is_number and e.exp.is_negative and (2 * e.exp).is_Integer)
+    if not (e.is_Pow and e.exp.is_number and e.exp.is_negative and (2 * e.exp).is_Integer):
+        return False
+    return not e.exp.is_Integer or _inverse(e.base) is None
+
+
+def _inverse(e: sp.Expr) -> sp.Expr | None:
+    """1/e of c + d exp(a), c and d positive numbers, or of cosh(a); None of others."""
+    if isinstance(e, sp.cosh):
+        return InverseCosh(e.args[0])
+    if e.is_Add and len(e.args) == 2:
+        constant, moving = e.as_coeff_Add()
+        factor, function = moving.as_coeff_Mul()
+        if isinstance(function, sp.exp) and constant.is_positive and factor.is_positive:
+            return InverseSum(constant, factor, function.args[0])
+    return None
 
 
 def _sorted(factors: Iterable[sp.Expr]) -> list[sp.Expr]:

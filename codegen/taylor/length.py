@@ -84,7 +84,7 @@ def bounded(coefficients: Sequence[Expression]) -> list[Statement]:
     return found
 
 
-def distant(start: Expression, slopes: Sequence[Expression]) -> list[Statement]:
+def distant(start: Expression, further: Sequence[Expression]) -> list[Statement]:
     """Shorten a step that might go on to where an exponential is seen that is not, because it is far too small.
 
     Zero to every digit, with all its coefficients, it says nothing of where it rises; its exponent does.
@@ -93,10 +93,10 @@ def distant(start: Expression, slopes: Sequence[Expression]) -> list[Statement]:
     ----------
     start : Expression
         The exponent at the beginning of the step.
-    slopes : sequence of Expression
-        Its coefficients k > 0, k times each.
+    further : sequence of Expression
+        Its other coefficients.
     """
-    bound = bounded([times(Number(1.0 / k), e) if e != ZERO else e for k, e in enumerate(slopes, 1)])
+    bound = bounded(further)
     if not bound:
         return []
     remote, far = Compare("<", start, Number(-REMOTE)), Compare(">", Name("way"), Name("room"))

@@ -153,9 +153,10 @@ class Part(Order):
     def distances(self) -> list[Statement]:
         """The statements that make it no longer than the way to where exponentials are seen that are too small now."""
         found = list[Statement]()
-        for s in self.graph.watched:
+        for s in self.graph.series:
             if isinstance(s, Exponential):
-                found += distant(self.recall(s.exponent), [self.at(s.slope, k) for k in range(1, self.order)])
+                slopes = [times(Number(s.steepness / k), self.at(s.slope, k)) for k in range(1, self.order)]
+                found += distant(self.recall(s.exponent), slopes)
         return self.run(found)
 
     def counted(self, series: Series) -> list[Statement]:

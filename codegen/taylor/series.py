@@ -13,7 +13,7 @@ Evaluating Derivatives (2nd ed., SIAM, 2008), section 13.2.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from ..program import expressions
 from ..program.expressions import ONE, ZERO, Call, Compare, Expression, Name, Number
@@ -21,8 +21,8 @@ from ..program.statements import Statement
 from .passage import Stored
 from .terms import absolute, add, over, times
 
-__all__ = ["Bell", "Brink", "Choice", "Constant", "Edged", "Exponential", "Fraction", "Integral", "Kink", "Leaping", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
-           "Row", "Series", "Slope", "Square", "SquareRoot", "SquaredSecant", "State", "Time", "Unknown",
+__all__ = ["Bell", "Brink", "Choice", "Constant", "Crest", "Edged", "Exponential", "Fraction", "Integral", "Kink", "Leaping", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
+           "Row", "Secant", "Series", "Sigmoid", "Slope", "Square", "SquareRoot", "SquaredSecant", "State", "Time", "Unknown",
            "Whole"]  # fmt: skip
 
 
@@ -256,32 +256,81 @@ class Integral(Series):
 
 @dataclass(eq=False, slots=True)
 class Exponential(Integral):
-    """u = exp(a) from u' = u a'; where a begins is kept for the length of the step."""
+    """u = exp(a) from u' = u a'; where the exponent begins is kept for the length of the step.
+
+    steepness: of the exponent, as a multiple of a.
+    """
+
+    steepness: ClassVar[float] = 1.0
 
     def begin(self, at: Order) -> Expression:
         return Call(self.function, (at.keep(self.exponent, at.of(self.argument)),))
 
     @property
     def exponent(self) -> str:
-        """What is called as a is at the beginning."""
+        """What the exponent at the beginning is called."""
         return f"n_{self.name}"
 
 
 @dataclass(eq=False, slots=True)
-class SquaredSecant(Integral):
-    """u = 1/cosh(a)**2 from u' = -2 u tanh(a) a'.
+class Sigmoid(Integral):
+    """u = 1/(c + d exp(a)), c and d positive numbers, from u' = -w a', w the `Crest` of the same; exp(a) may overflow."""
 
-    Where tanh(a) is 1 to the last digit u is small and not zero, so that the series tell how far away the layer is.
-    """
+    ends: tuple[float, float] = (1.0, 1.0)
 
     def begin(self, at: Order) -> Expression:
-        secant = at.keep(f"i_{self.name}", over(ONE, Call("cosh", (at.of(self.argument),))))
-        return Call("maximum", (times(secant, secant), Number(FAINT)))
+        c, d = map(Number, self.ends)
+        return over(ONE, add(c, times(d, Call("exp", (at.of(self.argument),)))))
+
+
+@dataclass(eq=False, slots=True)
+class Peak(Exponential):
+    """A function of a that falls like an exponential on either side of 0."""
+
+    def begin(self, at: Order) -> Expression:
+        start = at.of(self.argument)
+        at.keep(self.exponent, times(Number(-self.steepness), absolute(start)))
+        return self.at(start)
+
+    def at(self, start: Expression) -> Expression:
+        """Its value where a is `start`."""
+        raise NotImplementedError
+
+
+@dataclass(eq=False, slots=True)
+class Crest(Peak):
+    """w = d exp(a) u**2, u the `Sigmoid`, from w' = (2 c u - 1) w a'; the smaller one of two exponentials makes its digits."""
+
+    ends: tuple[float, float] = (1.0, 1.0)
+
+    def at(self, start: Expression) -> Expression:
+        c, d = map(Number, self.ends)
+        rising, falling = Call("exp", (start,)), Call("exp", (times(Number(-1.0), start),))
+        return over(d, times(add(c, times(d, rising)), add(d, times(c, falling))))
+
+
+@dataclass(eq=False, slots=True)
+class Secant(Peak):
+    """u = 1/cosh(a) from u' = -u tanh(a) a'; cosh(a) may overflow."""
+
+    def at(self, start: Expression) -> Expression:
+        return over(ONE, Call("cosh", (start,)))
+
+
+@dataclass(eq=False, slots=True)
+class SquaredSecant(Peak):
+    """u = 1/cosh(a)**2 from u' = -2 u tanh(a) a', which has digits where tanh(a) is 1 to the last one."""
+
+    steepness = 2.0
+
+    def at(self, start: Expression) -> Expression:
+        secant = over(ONE, Call("cosh", (start,)))
+        return times(secant, secant)
 
 
 @dataclass(eq=False, slots=True)
 class Bell(Integral):
-    """u = exp(-a**2) from u' = -2 a u a', the first a no larger than EDGE; small and not zero far away, as `SquaredSecant`."""
+    """u = exp(-a**2) from u' = -2 a u a', the first a no larger than EDGE; small and not zero far away."""
 
     def begin(self, at: Order) -> Expression:
         argument = at.of(self.argument)

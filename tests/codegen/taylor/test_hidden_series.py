@@ -108,13 +108,18 @@ FAR = {
     "exp of exp": (sp.exp(-sp.exp(30 * (A - 30))), 30.0 - float(mpmath.euler) / 30.0, 8),
     "power": (1 / (1 + sp.Integer(2) ** (40 * (A - 30))), 30.0, 8),
     "pulse": (sp.exp(-400 * (A - 30) ** 2), math.sqrt(math.pi) / 20.0, 8),
+    "1/(2 + 3 exp)": (1 / (2 + 3 * sp.exp(50 * (A - 30))), 15.0 - math.log(1.5) / 100.0, 8),
+    "overflow": (1 / (1 + sp.exp(-400 * (A - 30))), 10.0, 8),
+    "overflow behind": (A / (1 + sp.exp(400 * (A - 30))), 450.0 + math.pi**2 / 6.0 / 160000.0, 6),
+    "1/cosh": (1 / sp.cosh(500 * (A - 30)), math.pi / 500.0, 10),
+    "1/cosh**2": (sp.cosh(500 * (A - 30)) ** -2, 2.0 / 500.0, 10),
 }
-"""What underflows at the start, what comes of it up to 40, and digits that it is right to."""
+"""What underflows or overflows at the start or later, what comes of it up to 40, and digits that it is right to."""
 
 
 @pytest.mark.parametrize("looped", [False, True], ids=["lines", "loops"])
 @pytest.mark.parametrize("case", FAR)
-def test_an_exponential_that_underflows_is_seen_from_far_away(case, looped):
+def test_an_exponential_that_has_no_digits_is_seen_from_far_away(case, looped):
     """A phase a' = 1 from 0, x' = 1/(1 + exp(30 (a - 30))) and the like: exp(-900) is zero, with all that follows from it."""
     rate, right, digits = FAR[case]
     end, steps = march(alone([A, X], [sp.S.One, rate]), 16, [0.0, 0.0], 40.0, 1e-10, looped=looped)
