@@ -25,12 +25,10 @@ from ..program.passes import Names
 from ..program.statements import Assign, let
 from .leaps import Leap, changing, leaping, templates, unpassed
 from .series import (
-    Bell,
     Brink,
     Choice,
     Constant,
     Crest,
-    Edged,
     Exponential,
     Fraction,
     Integral,
@@ -479,8 +477,8 @@ class Graph:
         name, key = STARTS[function], (function, argument)
         if key in self.known:
             return self.known[key]
-        if function in (sp.tanh, sp.erf):
-            return self.saturating(function, argument)
+        if function is sp.tanh:
+            return self.tanh(argument)
         place = sp.Dummy("a", real=True)
         derivative = function(place).diff(place)
         number = sp.Mul(*(f for f in sp.Mul.make_args(derivative) if f.is_number))
@@ -496,20 +494,13 @@ class Graph:
         integral.factor = self.inside(derivative, place, argument)
         return integral
 
-    def saturating(self, function: type[sp.Expr], argument: Series) -> Series:
-        """tanh or erf of a series; the slope is a series of its own, which has digits where 1 - tanh**2 and exp have none."""
+    def tanh(self, argument: Series) -> Series:
+        """tanh of a series; the slope is a series of its own, which has digits where 1 - tanh**2 has none."""
         slope = self.put(Slope, argument)
-        name = STARTS[function]
-        found = self.enter((function, argument), Integral(name, argument, slope, name=self.fresh(name)))
-        if function is sp.tanh:
-            bell: Integral = SquaredSecant("cosh", argument, slope, -2.0, name=self.fresh("squaredsecant"))
-            tilt: Series = found
-        else:
-            found.number = 2.0 / math.sqrt(math.pi)
-            bell = Bell("exp", argument, slope, -2.0, name=self.fresh("bell"))
-            tilt = self.put(Edged, argument)
+        found = self.enter((sp.tanh, argument), Integral("tanh", argument, slope, name=self.fresh("tanh")))
+        bell = SquaredSecant("cosh", argument, slope, -2.0, name=self.fresh("squaredsecant"))
         self.series.append(bell)
-        found.factor, bell.factor = bell, self.product(tilt, bell)
+        found.factor, bell.factor = bell, self.product(found, bell)
         return found
 
     def sigmoid(self, argument: Series, ends: tuple[float, float]) -> Series:

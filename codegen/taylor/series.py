@@ -21,7 +21,7 @@ from ..program.statements import Statement
 from .passage import Stored
 from .terms import absolute, add, over, times
 
-__all__ = ["Bell", "Brink", "Choice", "Constant", "Crest", "Edged", "Exponential", "Fraction", "Integral", "Kink", "Leaping", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
+__all__ = ["Brink", "Choice", "Constant", "Crest", "Exponential", "Fraction", "Integral", "Kink", "Leaping", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
            "Row", "Secant", "Series", "Sigmoid", "Slope", "Square", "SquareRoot", "SquaredSecant", "State", "Time", "Unknown",
            "Whole"]  # fmt: skip
 
@@ -220,10 +220,6 @@ class Slope(Series):
         return times(at.number, at.of(self.of))
 
 
-FAINT = 1e-100
-"""Least that the slope of a saturated function is taken for; no digit of anything depends on it, but the length of a step."""
-
-
 @dataclass(eq=False, slots=True)
 class Integral(Series):
     """u = f(a) from u' = c g a' with f'(a) = c g, c a number: exp, sin, tan, sinh, tanh, erf and the like.
@@ -326,47 +322,6 @@ class SquaredSecant(Peak):
     def at(self, start: Expression) -> Expression:
         secant = over(ONE, Call("cosh", (start,)))
         return times(secant, secant)
-
-
-@dataclass(eq=False, slots=True)
-class Bell(Integral):
-    """u = exp(-a**2) from u' = -2 a u a', the first a no larger than EDGE; small and not zero far away."""
-
-    def begin(self, at: Order) -> Expression:
-        argument = at.of(self.argument)
-        power = times(Number(-1.0), times(argument, argument))
-        return Call("maximum", (Call("exp", (power,)), Number(FAINT)))
-
-
-EDGE, ROOM = 15.0, 6.0
-"""Where exp(-a**2) is 1e-98, and a good place before it: behind the edge no digit of anything depends on how it falls."""
-
-
-@dataclass(eq=False, slots=True)
-class Edged(Series):
-    """A series that begins within EDGE of zero; else a constant, the smaller the further away.
-
-    A step so goes a part of the way to the edge, however far it is.
-    """
-
-    base: Series
-    inside: Expression = ONE
-
-    @property
-    def linear(self) -> tuple[Series, ...]:
-        return (self.base,)
-
-    def begin(self, at: Order) -> Expression:
-        start = at.of(self.base)
-        near = Compare("<=", absolute(start), Number(EDGE))
-        self.inside = at.keep(f"n_{self.name}", expressions.Choice(near, ONE, ZERO))
-        slower = over(
-            times(Number(EDGE * (EDGE - ROOM)), start), times(absolute(start), add(absolute(start), Number(-ROOM)))
-        )
-        return expressions.Choice(near, start, slower)
-
-    def coefficient(self, at: Order) -> Expression:
-        return times(self.inside, at.of(self.base))
 
 
 @dataclass(eq=False, slots=True)
