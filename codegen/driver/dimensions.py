@@ -27,6 +27,10 @@ class Dimensions(NamedTuple):
     """1 if the right-hand side is periodic in time, so that a computation can repeat itself, else 0."""
     observed: int
     """Values that are observed."""
+    gaps: int
+    """What passes zero where an observed value jumps or has a kink."""
+    depths: int
+    """How many e-folds a part of an observed value lies below or above the size one."""
     sections: int
     """Sections of which points are taken."""
     kept: int

@@ -254,7 +254,7 @@ def drive(
     group = CLOCK + 2 * size + dims.parameters + len(REPEATING)
     groups = 3 if SWITCHING else 1
     scratch = 9 * dims.nodes + 2 if CONTACTS else 0
-    watched = len(rule) * dims.observed
+    watched = len(rule) * (dims.observed + dims.gaps + dims.depths)
     crossed = (len(rule) + 1) * (dims.sections * (3 + max(0, dims.kept)) + 3 * dims.stops)
     block = aligned((2 * size + groups * (group + rows) + dims.workspace + scratch + watched + crossed) * WIDTH)
     y_new, middle, out = address(block, 0), address(block, size * WIDTH), address(block, 2 * size * WIDTH)

@@ -31,9 +31,10 @@ from ..program.expressions import Expression, Load, Name, Number, call, plus
 from ..program.lowering import lower
 from ..program.passes import real
 from ..program.statements import Function, Loop, Role, Statement, let, store
+from .between import depths_in, gaps_in, settled
 from .rounding import magnitude
 
-__all__ = ["UNWATCHED", "Watched", "rule_of", "with_rows"]
+__all__ = ["UNWATCHED", "Watched", "count_of", "rule_of", "with_rows"]
 
 LARGEST = 1.7976931348623157e308
 BEGINS = {NodeSum: 0.0, NodeMean: 0.0, NodeMaximum: -LARGEST, NodeMinimum: LARGEST}
@@ -72,6 +73,11 @@ def with_rows(equations: Equations, value: sp.Expr) -> bool:
     """True if an expression has one value for each node, False if it has one for the network."""
     own = {*equations.components, *equations.varied}
     return any(s.name in own for s in node_symbols(value))
+
+
+def count_of(equations: Equations, values: Sequence[sp.Expr]) -> int:
+    """Return how many numbers some expressions are."""
+    return sum(equations.n if with_rows(equations, value) else 1 for value in values)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +119,16 @@ class Watched:
         return (*first, *(e for row in rows for e in row), *last, *terms)
 
     @property
+    def gaps(self) -> tuple[sp.Expr, ...]:
+        """What passes zero where an observed value jumps or has a kink, 0 where it is rounding of its terms."""
+        return tuple(map(settled, gaps_in(self.observed)))
+
+    @property
+    def depths(self) -> tuple[sp.Expr, ...]:
+        """How many e-folds parts of the observed values lie below or above the size one."""
+        return depths_in(self.observed)
+
+    @property
     def has_rates(self) -> bool:
         """True if a rate of a state occurs."""
         return any(e.has(Rate) for e in (*self.observed, *self.events))
@@ -120,21 +136,18 @@ class Watched:
     def __bool__(self) -> bool:
         return bool(self.observed or self.events)
 
-    def count(self, equations: Equations) -> int:
-        """Return how many numbers the observed values are."""
-        return sum(equations.n if with_rows(equations, value) else 1 for value in self.observed)
-
     def words(self, equations: Equations) -> tuple[str, ...]:
         """Return what is watched, in words."""
-        found = [(self.count(equations), "observed values"), (len(self.sections), "sections")]
+        found = [(count_of(equations, self.observed), "observed values"), (len(self.sections), "sections")]
         stop = () if self.stop is None else ("a stop",)
         return (*(f"{number} {what}" for number, what in found if number), *stop)
 
     def functions(self, equations: Equations, plain: Equations) -> list[Function]:
         """Return the functions that compute what is watched inside a step, in the names of `plain`."""
         what = "The section functions at the fraction theta of the step, what their points keep, and what ends a cell."
+        seen = "The observed values at the fraction theta of the step, and what tells where they change quickly."
         parts = (
-            ("values", self.observed, "The observed values at the fraction theta of the step."),
+            ("values", (*self.observed, *self.gaps, *self.depths), seen),
             ("section", self.events, what),
         )
         return [_function(self, equations, plain, values, name, about) for name, values, about in parts if values]

@@ -29,7 +29,7 @@ from ..steps.step import PAIR, SCALED, Step, function_name, node_function
 from ..steps.unrolled import Unrolled
 from ..taylor import write_looped, write_step
 from .driver import RECORDERS, Driver, KernelKind, Recorder, imports
-from .observed import UNWATCHED, Watched, rule_of
+from .observed import UNWATCHED, Watched, count_of, rule_of
 
 __all__ = [
     "KernelSource",
@@ -209,7 +209,9 @@ def emit(
         chosen,
         _dimensions(plain, method, scratch)._replace(
             components=len(plain.compared) if "sync_error" in ordered else 0,
-            observed=watched.count(equations),
+            observed=count_of(equations, watched.observed),
+            gaps=count_of(equations, watched.gaps),
+            depths=count_of(equations, watched.depths),
             sections=len(cut.sections or watched.sections),
             kept=-1 if cut else watched.kept,
             sampled=int("trajectory" in ordered),
@@ -335,6 +337,8 @@ def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimension
         smooth_error_order=0 if method.smooth is None else method.smooth.error_order,
         repeats=int(angular_frequency(plain) is not None),
         observed=0,
+        gaps=0,
+        depths=0,
         sections=0,
         kept=0,
         sampled=0,

@@ -1,28 +1,23 @@
 """The zeros of functions of the state inside a step.
 
-A step is one panel at first.  All functions are computed at the points of the rule of a panel, and the polynomial through
-them is written in the Bernstein basis, whose coefficients bound it.  A panel is halved until each function passes zero in
-it at most once, as far as its last Legendre coefficients tell what the polynomial misses.
+A step is one panel at first.  All functions are computed at the points of the rule of a panel, which is halved until each
+of them passes zero in it at most once.
 """
 
 from __future__ import annotations
 
 from numba import njit
 
-from ..driver.clock import ATOL, RTOL
 from ..driver.names import WIDTH
 from ..simd.addresses import address
 from ..simd.lanes import absolute, any_lane, broadcast, load, maximum, select, store
-from .panels import POINT, TOP
+from .panels import POINT, simple
 
 # --- kernel text below ---
 # No panel of a step is shorter than 2^-DEEPEST.
 DEEPEST = 12
-# What a polynomial misses is taken to be less than MARGIN times the sum of the upper half of its Legendre coefficients.
-MARGIN = 32.0
-# Rounding of the coefficients in the Bernstein basis, as a part of the largest value, and that of a function, as a part of
-# the size of its terms.
-ROUNDING, NOISE = 1e-13, 1.5e-14
+# Rounding of a function, as a part of the size of its terms.
+NOISE = 1.5e-14
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -78,42 +73,6 @@ def look(place, width, t, h, y, y_new, dense, found, rule, dims, section):
 
 
 @njit(error_model="numpy")
-def simple(k, found, rule, control, dims):
-    """Where function k passes zero at most once in a panel, or where it has no value at all.
-
-    It does so where all Bernstein coefficients lie on one side of zero; where all of their differences do, so that the
-    function is monotonic; and where they change sides once and what the polynomial misses is within the tolerances.
-    """
-    zero = broadcast(0.0, WIDTH)
-    matrix = rule.shape[1] - len(rule)
-    missed, size, known = zero, zero, zero > 0.0
-    for column in range(TOP, matrix):
-        coefficient = zero
-        for point in range(len(rule)):
-            coefficient = coefficient + rule[point, column] * at_point(k, point, found, rule, dims)
-        missed = missed + MARGIN * absolute(coefficient)  # NaN if the function has no value at some point
-    for point in range(len(rule)):
-        value = at_point(k, point, found, rule, dims)
-        size, known = maximum(size, absolute(value)), known | (value == value)
-    small = max(control[RTOL], ROUNDING) * size + control[ATOL]
-    least, slack = maximum(missed, small), missed + ROUNDING * size
-    side, changes, before = zero, zero, zero
-    clear, rising, falling = zero == 0.0, zero == 0.0, zero == 0.0
-    for row in range(len(rule)):
-        coefficient = zero
-        for point in range(len(rule)):
-            coefficient = coefficient + rule[row, matrix + point] * at_point(k, point, found, rule, dims)
-        here = select(coefficient > least, 1.0, select(coefficient < -least, -1.0, zero))
-        changes = changes + select(here * side < 0.0, 1.0, zero)
-        clear, side = clear & ~(here == 0.0), select(here == 0.0, side, here)
-        if row > 0:
-            rising, falling = rising & (coefficient - before > slack), falling & (before - coefficient > slack)
-        before = coefficient
-    resolved = (missed <= small) & (changes < 1.5)
-    return (clear & (changes == 0.0)) | rising | falling | resolved | ~known
-
-
-@njit(error_model="numpy")
 def ready(k, level, found, rule, control, dims):
     """The lanes that need not halve a panel of some level for function k, and whether others do.
 
@@ -124,7 +83,7 @@ def ready(k, level, found, rule, control, dims):
     wanted = depth >= 1.0 * level
     done = wanted
     if level < DEEPEST:
-        done = wanted & simple(k, found, rule, control, dims)
+        done = wanted & simple(memory(k, rule, dims) + 1, 1, found, rule, control)
     halved = wanted & ~done
     store(found, place, select(halved, level + 1.0, select(done, 1.0 * level, depth)))
     return done, any_lane(halved)

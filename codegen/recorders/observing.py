@@ -10,8 +10,8 @@ from numba import njit
 from ..driver.clock import ATOL, OBSERVED, RTOL
 from ..driver.names import WIDTH
 from ..simd.addresses import address
-from ..simd.lanes import broadcast, load, store
-from .panels import NEXT, POINT, TOP, WEIGHT, following
+from ..simd.lanes import broadcast, lane_bits, load, store
+from .panels import NEXT, POINT, TOP, WEIGHT, following, gentle, simple
 
 # --- kernel text below ---
 # Columns of `sums` behind the time that was observed: seven for each value.
@@ -21,8 +21,31 @@ FIRST, SUM, SQUARES, LARGEST, LEAST, LATEST, SIZE = 0, 1, 2, 3, 4, 5, 6
 NARROW = 0.000244140625
 # No panel of a step is shorter than 2^-DEEPEST.
 DEEPEST = 40
+# What stands between the points of a panel is looked for in panels longer than 2^-SOUGHT of a step.
+SOUGHT = 20
 # Most parabolas for an extreme between the points of a panel.
 CLIMBS = 8
+
+
+@njit(error_model="numpy", forceinline=True)
+def computed(dims):
+    """How many numbers are computed at a point: observed values, and what tells where the rule may not see them."""
+    return dims.observed + dims.gaps + dims.depths
+
+
+@njit(error_model="numpy")
+def hidden(seen, rule, control, dims):
+    """The lanes in which kinks, jumps, peaks or pits of an observed value may stand between the points of a panel.
+
+    Where none do, none do in its halves.
+    """
+    count = computed(dims)
+    good = broadcast(0.0, WIDTH) == 0.0
+    for k in range(dims.observed, dims.observed + dims.gaps):
+        good = good & simple(k, count, seen, rule, control)
+    for k in range(dims.observed + dims.gaps, count):
+        good = good & gentle(k, count, seen, rule)
+    return lane_bits(~good)
 
 
 @njit(error_model="numpy")
@@ -38,7 +61,7 @@ def rough(which, i, width, seen, sums, rule, control, dims):
     for k in range(dims.observed):
         top = following = size = 0.0
         for point in range(len(rule)):
-            value = seen[(point * dims.observed + k) * WIDTH + which]
+            value = seen[(point * computed(dims) + k) * WIDTH + which]
             top += rule[point, TOP] * value
             following += rule[point, NEXT] * value
             size = max(size, abs(value))
@@ -62,7 +85,7 @@ def add(which, i, length, seen, sums, rule, dims):
     for point in range(len(rule)):
         share, begins = length * rule[point, WEIGHT], point == 0 and sums[i, OBSERVED] == 0.0
         for k in range(dims.observed):
-            value, at = seen[(point * dims.observed + k) * WIDTH + which], TALLIES + TALLY * k
+            value, at = seen[(point * computed(dims) + k) * WIDTH + which], TALLIES + TALLY * k
             if begins:
                 sums[i, at + FIRST] = sums[i, at + LARGEST] = sums[i, at + LEAST] = value
             gap = value - sums[i, at + FIRST]
@@ -95,9 +118,9 @@ def bracket(which, k, sign, best, seen, rule, ends, dims):
     for point in range(last + 1):
         low, high, centre = max(point - 1, 0), min(point + 1, last), min(max(point, 1), last - 1)
         at_low, at_point, at_high = (
-            sign * seen[(low * dims.observed + k) * WIDTH + which],
-            sign * seen[(point * dims.observed + k) * WIDTH + which],
-            sign * seen[(high * dims.observed + k) * WIDTH + which],
+            sign * seen[(low * computed(dims) + k) * WIDTH + which],
+            sign * seen[(point * computed(dims) + k) * WIDTH + which],
+            sign * seen[(high * computed(dims) + k) * WIDTH + which],
         )
         if at_low > at_point or at_high > at_point:
             continue
@@ -105,9 +128,9 @@ def bracket(which, k, sign, best, seen, rule, ends, dims):
             rule[centre - 1, POINT],
             rule[centre, POINT],
             rule[centre + 1, POINT],
-            sign * seen[((centre - 1) * dims.observed + k) * WIDTH + which],
-            sign * seen[(centre * dims.observed + k) * WIDTH + which],
-            sign * seen[((centre + 1) * dims.observed + k) * WIDTH + which],
+            sign * seen[((centre - 1) * computed(dims) + k) * WIDTH + which],
+            sign * seen[(centre * computed(dims) + k) * WIDTH + which],
+            sign * seen[((centre + 1) * computed(dims) + k) * WIDTH + which],
         )
         if height > best and rule[low, POINT] < place < rule[high, POINT]:
             found, best, guess = True, height, place
@@ -122,7 +145,7 @@ def climb(added, begin, width, t, h, y, y_new, dense, seen, cell, sums, control,
 
     Only an extreme beyond those that are known is looked for, and no closer than the tolerances.
     """
-    ends, there, at = np.empty((WIDTH, 6)), np.empty(WIDTH), np.empty(dims.observed * WIDTH)
+    ends, there, at = np.empty((WIDTH, 6)), np.empty(WIDTH), np.empty(computed(dims) * WIDTH)
     for k in range(dims.observed):
         for column in (LARGEST, LEAST):
             sign, place, open_lanes = 1.0 if column == LARGEST else -1.0, TALLIES + TALLY * k + column, 0
@@ -160,16 +183,20 @@ def tally(counted, t, h, y, y_new, dense, seen, cell, sums, control, rule, dims,
     """Add the step of the lanes in `counted` to what is observed; each lane halves the panels that it needs."""
     points, lengths = len(rule), np.empty(WIDTH)
     store(lengths, 0, h)
-    open_lanes = np.zeros(DEEPEST + 1, np.int64)
-    open_lanes[0], level, k = counted, 0, 0
+    open_lanes, sought = np.zeros(DEEPEST + 1, np.int64), np.zeros(DEEPEST + 1, np.int64)
+    open_lanes[0], sought[0], level, k = counted, counted, 0, 0
     while True:
         width, halved, added = 1.0 / (1 << level), 0, 0
         for point in range(points):
             theta = broadcast((k + rule[point, POINT]) * width, WIDTH)
-            values(theta, t, h, y, y_new, dense, address(seen, point * dims.observed * WIDTH), dims[:2])
+            values(theta, t, h, y, y_new, dense, address(seen, point * computed(dims) * WIDTH), dims[:2])
+        unseen = sought[level]
+        if unseen != 0:
+            unseen &= hidden(seen, rule, control, dims) if level < SOUGHT else 0
         for which in range(WIDTH):
             if (open_lanes[level] >> which) & 1:
-                if rough(which, cell[which], width, seen, sums, rule, control, dims) and level < DEEPEST:
+                bad = rough(which, cell[which], width, seen, sums, rule, control, dims) | ((unseen >> which) & 1 != 0)
+                if bad and level < DEEPEST:
                     halved |= 1 << which
                 else:
                     add(which, cell[which], width * lengths[which], seen, sums, rule, dims)
@@ -179,4 +206,4 @@ def tally(counted, t, h, y, y_new, dense, seen, cell, sums, control, rule, dims,
         if level == 0:
             break
         if halved != 0:
-            open_lanes[level] = halved
+            open_lanes[level], sought[level] = halved, unseen

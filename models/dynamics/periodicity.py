@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -12,7 +11,7 @@ import sympy as sp
 from sympy.core.relational import Relational
 
 from ..mechanics.components import TIME, Edge, Node
-from ..mechanics.jumps import JUMPING, KINKED
+from ..mechanics.jumps import JUMPING, KINKED, gaps_of
 from .equations import Equations
 
 __all__ = ["Drive", "angular_frequency", "as_function", "drive_of", "gaps", "names_in", "period_of"]
@@ -150,7 +149,7 @@ def _bent(part: sp.Basic) -> Iterator[tuple[sp.Expr, int]]:
 def gaps(template: Node | Edge) -> set[sp.Expr]:
     """What passes zero at the jumps and kinks of functions of time alone in the rates of a template."""
     parts = {part for e in template.rhs for part in e.atoms(*KINKED, *JUMPING, Relational)}
-    return _of_time(template, (gap for part in parts for gap in _sided(part)))
+    return _of_time(template, (gap for part in parts for gap in gaps_of(part)))
 
 
 def rises(template: Node | Edge) -> set[sp.Expr]:
@@ -190,18 +189,6 @@ def _risen(part: sp.Expr) -> Iterator[sp.Expr]:
                 yield wave.args[0] - sp.log(rest / factor)
     elif not isinstance(part, sp.exp) or part.has(sp.Abs):
         yield part.args[0].replace(sp.Abs, lambda size: size)
-
-
-def _sided(part: sp.Basic) -> Iterator[sp.Expr]:
-    """What passes zero where a part jumps or has a kink."""
-    if isinstance(part, Relational):
-        yield part.lhs - part.rhs
-    elif isinstance(part, sp.Max | sp.Min):
-        yield from (a - b for a, b in itertools.combinations(part.args, 2))
-    elif isinstance(part, sp.floor | sp.ceiling):
-        yield sp.sin(sp.pi * part.args[0])
-    else:
-        yield part.args[0]
 
 
 def _paces(inner: sp.Expr, power: int, even: bool) -> Iterator[sp.Expr]:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Set
+import itertools
+from collections.abc import Iterable, Iterator, Mapping, Set
 from functools import reduce
 
 import sympy as sp
+from sympy.core.relational import Relational
 from sympy.functions.elementary.piecewise import Piecewise
 
 from .calculus import derivative
 
-__all__ = ["JUMPING", "KINKED", "discontinuity", "jumps", "rough_at"]
+__all__ = ["JUMPING", "KINKED", "discontinuity", "gaps_of", "jumps", "rough_at"]
 
 JUMPING = (sp.sign, sp.floor, sp.ceiling, sp.Heaviside)
 """Functions that jump."""
@@ -23,6 +25,18 @@ INEQUALITIES = (sp.StrictGreaterThan, sp.GreaterThan, sp.StrictLessThan, sp.Less
 
 SIDES = {sp.sign: (sp.S.One, sp.S.NegativeOne), sp.Heaviside: (sp.S.One, sp.S.Zero)}
 """The values of a function above and below the zero of its argument."""
+
+
+def gaps_of(part: sp.Basic) -> Iterator[sp.Expr]:
+    """Yield what passes zero where a part jumps or has a kink."""
+    if isinstance(part, Relational):
+        yield part.lhs - part.rhs
+    elif isinstance(part, sp.Max | sp.Min):
+        yield from (a - b for a, b in itertools.combinations(part.args, 2))
+    elif isinstance(part, sp.floor | sp.ceiling):
+        yield sp.sin(sp.pi * part.args[0])
+    else:
+        yield part.args[0]
 
 
 def jumps(expressions: Iterable[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
+from scipy.special import ive
 
-from synchain.models import chain, complete, end, maximum, mean, minimum, nodes, rate, ring, variance
+from synchain.models import Field, chain, complete, end, maximum, mean, minimum, nodes, rate, ring, variance
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.reduce import as_reduction
@@ -132,6 +134,73 @@ def test_jumps_and_singular_places_are_integrated_or_said(integrator: str) -> No
     loose = run(scene.replace(rtol=1e-6), show_progress=False)
     exact = math.gamma(0.25) / (math.gamma(0.75) * math.sqrt(math.pi))
     assert float(loose.o5.squeeze()) == pytest.approx(exact, rel=1e-4)
+
+
+EDGED = {
+    "sign(x - 0.999)": lambda x: np.sign(x - 0.999),
+    "max(0, x - 0.999)": lambda x: np.maximum(0, x - 0.999),
+    "floor(x + 1e-3)": lambda x: np.floor(x + 1e-3),
+    "abs(abs(x) - 0.999)": lambda x: abs(abs(x) - 0.999),
+}
+SMOOTH = {
+    "exp(200*(x - 1))": lambda x: np.exp(200 * (x - 1)),
+    "exp(-1e6*(x - 0.3)**2)": lambda x: np.exp(-1e6 * (x - 0.3) ** 2),
+    "tanh(500*(x - 0.999))": lambda x: np.tanh(500 * (x - 0.999)),
+    "1 - tanh(500*(x + 0.2))**2": lambda x: 1 - np.tanh(500 * (x + 0.2)) ** 2,
+    "1/(1 + exp(-500*(x - 0.999)))": lambda x: (1 + np.tanh(250 * (x - 0.999))) / 2,
+}
+"""Functions of x that are constant to rounding but for a short time of each turn of x = cos t, with corners and without."""
+
+TURNING = Scene(
+    "harmonic", topology=chain(2), initial={"x": 1.0, "v": 0.0}, transient=0.0, window=8 * math.pi, time_unit="time",
+    record=(), rtol=1e-12, parameters={"sigma": 0.0},
+)  # fmt: skip
+
+
+@functools.cache
+def means(*texts: str) -> dict[str, np.ndarray]:
+    """Means of functions of x = cos t, which one scene of long steps observes."""
+    observe = {f"o{k}": f"mean({text})" for k, text in enumerate(texts)}
+    data = run(TURNING.replace(observe=observe), show_progress=False, reduce=False).data
+    return {text: data[f"o{k}"].values for k, text in enumerate(texts)}
+
+
+@pytest.mark.parametrize(("group", "text"), [(group, text) for group in (EDGED, SMOOTH) for text in group])
+def test_short_excursions_inside_long_steps_are_seen(group: dict[str, Callable], text: str) -> None:
+    """Between two points of the rule, where all of its values are those of a constant."""
+    turn = np.linspace(0.0, math.pi, 4_000_001)
+    values = group[text](np.cos((turn[1:] + turn[:-1]) / 2))
+    np.testing.assert_allclose(means(text)[text], float(np.mean(values)), rtol=1e-6, atol=1e-9)
+
+
+def test_short_excursions_inside_reductions_are_seen() -> None:
+    whole = means("nodes.sum(max(0, x - 0.999))")["nodes.sum(max(0, x - 0.999))"]
+    np.testing.assert_allclose(whole, 2 * means("max(0, x - 0.999)")["max(0, x - 0.999)"][0], rtol=1e-7)
+
+
+@pytest.mark.parametrize(("group", "text"), [(EDGED, "sign(x - 0.999)"), (SMOOTH, "exp(200*(x - 1))")])
+def test_an_observable_does_not_depend_on_those_beside_it(group: dict[str, Callable], text: str) -> None:
+    np.testing.assert_allclose(means(text)[text], means(*group)[text], rtol=1e-9)
+
+
+EDGE = math.acos(0.99)
+PULSES = {
+    "exp(200*(cos(a) - 1))": float(ive(0, 200)),
+    "max(0, cos(a) - 0.99)": (math.sin(EDGE) - 0.99 * EDGE) / math.pi,
+    "exp(-1000*(a - 77)**2)": math.sqrt(math.pi / 1000) / (32 * math.pi),
+}
+"""Functions of a phase, and their means over 16 turns."""
+
+
+@pytest.mark.parametrize("text", PULSES)
+def test_short_pulses_of_a_phase_are_seen(text: str) -> None:
+    """In steps of many turns."""
+    scene = Scene(
+        Field({"a": "om"}, parameters={"om": 1.0}), initial={"a": 0.3}, transient=0, window=32 * math.pi,
+        time_unit="time", record=(), observe={"pulse": f"mean({text})"},
+    )  # fmt: skip
+    found = run(scene, show_progress=False)
+    assert float(found.pulse.squeeze()) == pytest.approx(PULSES[text], rel=1e-6)
 
 
 @pytest.mark.parametrize("integrator", ["taylor", "rodas5p", pytest.param("dop853", marks=pytest.mark.long)])
