@@ -298,7 +298,8 @@ def unbounded(which, clock, control):
 
     Looks when the number of steps has doubled.  If doublings take equal times, the work grows exponentially; bounded
     motions have work in proportion to time, and an angle that turns ever faster has a power of it: their doublings take
-    longer and longer.  Even if growth ended here, the steps that are left would not do.
+    longer and longer.  Those of a jump between slow motions take ever shorter.  Even if growth ended here, the steps
+    that are left would not do.
     """
     steps = clock[ACCEPTED * WIDTH + which] + clock[REJECTED * WIDTH + which]
     if steps < clock[MARK * WIDTH + which]:
@@ -306,7 +307,7 @@ def unbounded(which, clock, control):
     t, size, before = clock[TIME * WIDTH + which], clock[HIGH * WIDTH + which], clock[LAPSE * WIDTH + which]
     now = clock[BASE * WIDTH + which] + t
     lapse = now - clock[MARKED_AT * WIDTH + which]
-    if size < CLIMB * clock[RECORD * WIDTH + which] or lapse > PACE * before:
+    if size < CLIMB * clock[RECORD * WIDTH + which] or max(lapse, before) > PACE * min(lapse, before):
         put(clock, ORIGIN, which, size)
     put(clock, MARK, which, min(2.0 * steps, control[MAX_STEPS]))
     put(clock, MARKED_AT, which, now)

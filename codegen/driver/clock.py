@@ -24,8 +24,9 @@ STATUS, N_ACCEPTED, N_REJECTED, N_POINTS, N_SKIPPED, N_SMOOTH = 0, 1, 2, 3, 4, 5
 LONGEST_RUSH = 200.0
 # A state of this size, 2^53, has diverged: its neighbours are further apart than anything that happens at size one.
 FAR = 9007199254740992.0
-# Growth is looked at after so many steps, and each time that their number has doubled.  A doubling counts if it takes no
-# more than PACE times the time of the last one while the state grows by CLIMB; together they must have raised it by TOWER.
+# Growth is looked at after so many steps, and each time that their number has doubled.  A doubling counts if its time
+# and that of the last one are within a factor of PACE while the state grows by CLIMB; together they must have raised it
+# by TOWER.
 FIRST_MARK, PACE, CLIMB, TOWER = 256.0, 1.1, 1.4142135623730951, 256.0
 # The two ways to step.
 STIFF, SMOOTH = 0, 1

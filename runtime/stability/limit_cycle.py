@@ -9,19 +9,25 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from itertools import islice
+from typing import NamedTuple
 
 import numpy as np
 import sympy as sp
+from scipy.optimize import brentq
 
 from .orbits import Orbits
+from .variational_integrator import VariationalIntegrator
 
 __all__ = ["limit_cycle", "rates_of", "rests"]
 
 SAMPLES = 4096
-"""States in which a return is looked for."""
+"""Steps from state to state in which a return is looked for."""
 
-SHARE = 64
-"""Samples of a turn around the origin."""
+SHARE = 8
+"""Least number of steps from one end of a component to the other."""
+
+FIRST = 1e-6
+"""Shortest step, relative to the time in which the first speed covers the size of the state."""
 
 NEAR = 1e-3
 """Largest distance of a return from which Newton's method begins, relative to the extent of the motion."""
@@ -30,14 +36,35 @@ RETURNS = 32
 """Most returns that are tried."""
 
 MOST_STEPS = 12
-REFINED = 4
-"""Corrections of the time of a return."""
 
 APART = 10.0
 """How many times sqrt(rtol) the other multipliers are from the unit circle.
 
 Conservative orbits have the multiplier 1 twice, which errors of size rtol split into 1 ± sqrt(rtol).
 """
+
+Rates = Callable[[np.ndarray], np.ndarray]
+
+
+class Cycle(NamedTuple):
+    """A closed orbit.
+
+    Parameters
+    ----------
+    state : ndarray, shape (p,)
+        A state on it.
+    period : float
+        The time after which the state is back.
+    matrix : ndarray, shape (p, p)
+        Derivative of the state a period later by the state.
+    steps : int
+        Steps of Newton's method.
+    """
+
+    state: np.ndarray
+    period: float
+    matrix: np.ndarray
+    steps: int
 
 
 def limit_cycle(orbit: Orbits, closed: float) -> tuple[float, int]:
@@ -53,7 +80,7 @@ def limit_cycle(orbit: Orbits, closed: float) -> tuple[float, int]:
     Returns
     -------
     period : float
-        In units of non-dimensional time; 0 if no such cycle is found.
+        The least one, in units of non-dimensional time; 0 if no such cycle is found.
     steps : int
         Steps of Newton's method.
     """
@@ -69,50 +96,116 @@ def limit_cycle(orbit: Orbits, closed: float) -> tuple[float, int]:
     rates, start = rates_of(orbit), orbit.state[0].copy()
     if rests(rates, start, closed):
         return 0.0, 0
-    for guess, extent in islice(_returns(alone, rates, start), RETURNS):
-        state, period = start, _on_plane(alone, rates, start, guess)
-        for steps in range(MOST_STEPS):
-            image, matrix = _flow(alone, state, period)
-            gap = image - state
-            if not np.abs(gap).max() < NEAR * extent:
-                break
-            if np.abs(gap).max() < closed * max(1e-3, float(np.abs(image).max())):
-                orbit.state = image[None]
-                return period if _attracts(matrix, orbit.scene.rtol) else 0.0, steps
-            change = _correction(matrix, gap, rates(state), rates(image))
-            state, period = state + change[:-1], period + float(change[-1])
-            if not (period > 0.0 and np.abs(state - start).max() < 10.0 * NEAR * extent):
-                break
+    for time, extent in islice(_returns(alone, rates, start, closed), RETURNS):
+        found = _newton(alone, rates, start, time, extent, closed)
+        if found is not None:
+            state, period, matrix, steps = _least(alone, rates, found, extent, closed)
+            orbit.state = state[None]
+            return period if _attracts(matrix, orbit.scene.rtol) else 0.0, steps
     return 0.0, 0
 
 
-def _returns(
-    orbit: Orbits, rates: Callable[[np.ndarray], np.ndarray], start: np.ndarray
-) -> Iterator[tuple[float, float]]:
-    """Yield the times at which the orbit comes back through the plane normal to its motion, and its extent until then."""
-    speed = rates(start)
-    step = 2.0 * np.pi / SHARE * float(np.linalg.norm(start) / np.linalg.norm(speed))
-    orbit.state = start[None]
-    integrator, extent, time, last = orbit.integrator_of(orbit.strengths), 0.0, 0.0, 0.0
+def _returns(orbit: Orbits, rates: Rates, start: np.ndarray, closed: float) -> Iterator[tuple[float, np.ndarray]]:
+    """Yield the times at which the orbit comes back through the plane normal to its motion.
+
+    With each comes the extent (p,) of the motion until then.
+    """
+    normal = rates(start)
+    orbit.state, time = start[None], 0.0
+    integrator = orbit.integrator_of(orbit.strengths)
+    shortest = FIRST * max(1e-3, float(np.linalg.norm(start))) / float(np.linalg.norm(normal))
+
+    def side(state: np.ndarray) -> float:
+        return float(normal @ (state[0] - start))
+
+    for before, step, extent in _path(integrator, shortest, _slack(start, closed)):
+        if side(before) < 0.0 <= side(integrator.state):
+            yield time + _passage(integrator, before, step, side), extent
+        time += step
+
+
+def _path(
+    integrator: VariationalIntegrator, shortest: float, least: float
+) -> Iterator[tuple[np.ndarray, float, np.ndarray]]:
+    """Advance by steps in which no component moves by more than a share of its extent, or of the least one.
+
+    Yield, after each step, the state before it, its length and the extent (p,) so far.  Steps of the shortest length may
+    move by more, as the first ones do.
+    """
+    step, low, high = shortest, integrator.state[0] - least, integrator.state[0] + least
     for _ in range(SAMPLES):
+        before = integrator.state
         integrator.advance(step)
-        away = integrator.state[0] - start
-        side, extent, time = float(speed @ away), max(extent, float(np.abs(away).max())), time + step
-        if last < 0.0 <= side:
-            yield time - step * side / (side - last), extent
-        last = side
+        after = integrator.state[0]
+        lower, higher = np.minimum(low, after), np.maximum(high, after)
+        moved, extent = SHARE * np.abs(after - before[0]), higher - lower
+        if step > shortest and np.any(moved > extent):
+            integrator.state, step = before, max(shortest, 0.5 * step)
+            continue
+        low, high = lower, higher
+        yield before, step, extent
+        step *= 1.5 if np.all(2.0 * moved <= extent) else 1.0
 
 
-def _on_plane(orbit: Orbits, rates: Callable[[np.ndarray], np.ndarray], start: np.ndarray, time: float) -> float:
-    """The time of a return, by Newton's method."""
-    speed = rates(start)
-    for _ in range(REFINED):
-        image, _ = _flow(orbit, start, time)
-        late = float(speed @ (image - start) / (speed @ rates(image)))
-        if not abs(late) < 0.5 * time:
-            break
-        time -= late
+def _passage(
+    integrator: VariationalIntegrator, before: np.ndarray, step: float, side: Callable[[np.ndarray], float]
+) -> float:
+    """The time within the last step at which the orbit changed sides of a plane."""
+    after = integrator.state
+    known = {0.0: side(before), step: side(after)}
+
+    def side_after(time: float) -> float:
+        if time in known:
+            return known[time]
+        integrator.state = before
+        integrator.advance(time)
+        return side(integrator.state)
+
+    time = float(brentq(side_after, 0.0, step, xtol=1e-12 * step))
+    integrator.state = after
     return time
+
+
+def _newton(
+    orbit: Orbits, rates: Rates, start: np.ndarray, time: float, extent: np.ndarray, closed: float
+) -> Cycle | None:
+    """The cycle near a state that is back after about some time; None if Newton's method leads elsewhere."""
+    state, period, near = start, time, NEAR * extent + _slack(start, closed)
+    for steps in range(MOST_STEPS):
+        try:
+            image, matrix = _flow(orbit, state, period)
+        except FloatingPointError:  # a correction that led far away
+            return None
+        gap = image - state
+        if not np.all(np.abs(gap) <= near):
+            return None
+        if np.abs(gap).max() < _slack(image, closed):
+            return Cycle(image, period, matrix, steps)
+        change = _correction(matrix, gap, rates(state), rates(image))
+        state, period = state + change[:-1], period + float(change[-1])
+        if not (abs(period - time) < 0.5 * time and np.all(np.abs(state - start) <= 10.0 * near)):
+            return None
+    return None
+
+
+def _least(orbit: Orbits, rates: Rates, cycle: Cycle, extent: np.ndarray, closed: float) -> Cycle:
+    """The cycle with its least period: one integration looks whether the state is back after a part of the period."""
+    orbit.state, time = cycle.state[None], 0.0
+    integrator = orbit.integrator_of(orbit.strengths)
+    near = math.sqrt(closed) * extent + _slack(cycle.state, closed)
+    for parts in range(RETURNS, 1, -1):
+        integrator.advance(cycle.period / parts - time)
+        time = cycle.period / parts
+        if np.all(np.abs(integrator.state[0] - cycle.state) <= near):
+            part = _newton(orbit, rates, cycle.state, time, extent, closed)
+            if part is not None and abs(part.period - time) < NEAR * time:
+                return part
+    return cycle
+
+
+def _slack(state: np.ndarray, closed: float) -> float:
+    """Largest distance from a state at which an orbit is closed."""
+    return closed * max(1e-3, float(np.abs(state).max()))
 
 
 def _flow(orbit: Orbits, state: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
@@ -138,12 +231,12 @@ def _attracts(matrix: np.ndarray, rtol: float) -> bool:
     return bool(np.all(np.abs(others) < 1.0 - APART * math.sqrt(rtol)))
 
 
-def rests(rates: Callable[[np.ndarray], np.ndarray], state: np.ndarray, closed: float) -> bool:
+def rests(rates: Rates, state: np.ndarray, closed: float) -> bool:
     """Return whether the rates at a state are zero, within a part `closed` of the state."""
     return bool(np.abs(rates(state)).max() < closed * max(1.0, float(np.abs(state).max())))
 
 
-def rates_of(orbit: Orbits) -> Callable[[np.ndarray], np.ndarray]:
+def rates_of(orbit: Orbits) -> Rates:
     """Return the rates of an undriven orbit as a function of its state."""
     equations = orbit.variation.orbit
     names = [sp.Symbol(name, real=True) for name in (*equations.state, *equations.parameters)]

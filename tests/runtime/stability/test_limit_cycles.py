@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -13,6 +14,7 @@ from scipy.integrate import solve_ivp
 
 from synchain.models import Field, Scene, chain
 from synchain.runtime import exponents, follow, msf, open_result, periodic_orbit
+from synchain.runtime.stability import limit_cycle
 
 VAN_DER_POL = Field({"x": "v", "v": "mu*(1 - x**2)*v - x"}, parameters={"mu": 1.0})
 
@@ -69,11 +71,15 @@ def test_a_drive_of_amplitude_zero_is_none() -> None:
         periodic_orbit(shipped, u=0.01)
 
 
-@pytest.mark.parametrize("omega", [0.02, 2.0, 1e3])
-def test_any_unit_of_time(omega: float) -> None:
+@pytest.mark.parametrize(("omega", "centre"), [(0.02, 0.0), (2.0, 0.0), (1e3, 0.0), (1.0, 1e3)])
+def test_any_unit_of_time_and_any_place(omega: float, centre: float) -> None:
     """z' = omega (1 + 2 i - |z|^2) z with both parts coupled: -alpha, beside the 0 of the motion itself."""
-    node = Field({"x": "o*(x - 2*y - (x**2 + y**2)*x)", "y": "o*(2*x + y - (x**2 + y**2)*y)"}, parameters={"o": omega})
-    scene = Scene(node, "x->x, y->y", chain(2), initial={"x": 0.5, "y": 0.1})
+    x = "(x - c)"
+    node = Field(
+        {"x": f"o*({x} - 2*y - ({x}**2 + y**2)*{x})", "y": f"o*(2*{x} + y - ({x}**2 + y**2)*y)"},
+        parameters={"o": omega, "c": centre},
+    )
+    scene = Scene(node, "x->x, y->y", chain(2), initial={"x": centre + 0.5, "y": 0.1})
     found = exponents(scene, np.array([0.0, 0.3]) * omega, transient=round(max(20.0, 10.0 / omega)), starts=2)
     np.testing.assert_allclose(found.attractors[0].cycle, np.pi / omega, rtol=1e-6)
     np.testing.assert_allclose(found.exponent, [0.0, -0.3 * omega], atol=2e-6 * omega)
@@ -122,6 +128,33 @@ def test_periodic_orbits_of_undriven_oscillators(tmp_path: Path) -> None:
     assert "period " in str(again)
     with pytest.raises(ValueError, match="first: found the limit cycle of an oscillator without a drive"):
         follow(pair(1.0), "mu", [1.0, 1.2], orbit)
+
+
+@pytest.mark.parametrize(("mu", "steps"), [(37.0, "auto"), (42.0, "auto"), (300.0, "rodas5p"), (4000.0, "rodas5p")])
+def test_relaxation_oscillations_have_their_least_period(mu: float, steps: str) -> None:
+    """The period by Dorodnitsyn's series. Jumps are missed by an even clock, and were taken for growth without bound."""
+    scene = pair(mu, integrator=steps)
+    period = (3.0 - 2.0 * math.log(2.0)) * mu + 7.01432 * mu ** (-1 / 3) - 22.0 / 9.0 * math.log(mu) / mu
+    orbit = periodic_orbit(scene)
+    assert orbit.period == pytest.approx(period, rel=3e-3)
+    assert orbit.residual < 1e-9
+    assert exponents(scene, [0.0], starts=1).attractors[0].cycle == pytest.approx(orbit.period, rel=1e-5)
+
+
+def test_a_return_that_fails_leads_to_the_next_and_to_the_least_period(monkeypatch: pytest.MonkeyPatch) -> None:
+    flow = limit_cycle._flow
+    failed: list[float] = []
+
+    def fails_twice(orbit: Any, state: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
+        if len(failed) < 2:
+            failed.append(period)
+            raise FloatingPointError("the state grew without bound")
+        return flow(orbit, state, period)
+
+    expected = periodic_orbit(pair(1.0)).period
+    monkeypatch.setattr(limit_cycle, "_flow", fails_twice)
+    assert periodic_orbit(pair(1.0)).period == pytest.approx(expected, rel=1e-10)
+    np.testing.assert_allclose(failed, [expected, 2.0 * expected], rtol=1e-6)
 
 
 @pytest.mark.parametrize(
