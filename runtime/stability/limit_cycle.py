@@ -110,9 +110,7 @@ def _returns(orbit: Orbits, rates: Rates, start: np.ndarray, closed: float) -> I
 
     With each comes the extent (p,) of the motion until then.
     """
-    normal = rates(start)
-    orbit.state, time = start[None], 0.0
-    integrator = orbit.integrator_of(orbit.strengths)
+    normal, integrator, time = rates(start), _integrator(orbit, start), 0.0
     shortest = FIRST * max(1e-3, float(np.linalg.norm(start))) / float(np.linalg.norm(normal))
 
     def side(state: np.ndarray) -> float:
@@ -122,6 +120,14 @@ def _returns(orbit: Orbits, rates: Rates, start: np.ndarray, closed: float) -> I
         if side(before) < 0.0 <= side(integrator.state):
             yield time + _passage(integrator, before, step, side), extent
         time += step
+
+
+def _integrator(orbit: Orbits, state: np.ndarray) -> VariationalIntegrator:
+    """An integrator from a state, which does not warn of short steps: its stretches are too short to have a mean."""
+    orbit.state = state[None]
+    integrator = orbit.integrator_of(orbit.strengths)
+    integrator.warned = True
+    return integrator
 
 
 def _path(
@@ -190,8 +196,7 @@ def _newton(
 
 def _least(orbit: Orbits, rates: Rates, cycle: Cycle, extent: np.ndarray, closed: float) -> Cycle:
     """The cycle with its least period: one integration looks whether the state is back after a part of the period."""
-    orbit.state, time = cycle.state[None], 0.0
-    integrator = orbit.integrator_of(orbit.strengths)
+    integrator, time = _integrator(orbit, cycle.state), 0.0
     near = math.sqrt(closed) * extent + _slack(cycle.state, closed)
     for parts in range(RETURNS, 1, -1):
         integrator.advance(cycle.period / parts - time)

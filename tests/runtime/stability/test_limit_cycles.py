@@ -130,6 +130,7 @@ def test_periodic_orbits_of_undriven_oscillators(tmp_path: Path) -> None:
         follow(pair(1.0), "mu", [1.0, 1.2], orbit)
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(("mu", "steps"), [(37.0, "auto"), (42.0, "auto"), (300.0, "rodas5p"), (4000.0, "rodas5p")])
 def test_relaxation_oscillations_have_their_least_period(mu: float, steps: str) -> None:
     """The period by Dorodnitsyn's series. Jumps are missed by an even clock, and were taken for growth without bound."""
