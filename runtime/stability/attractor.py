@@ -28,6 +28,9 @@ RETURN = 1e-9
 SLACK = 10.0
 """How many times the tolerance a cycle is compared with."""
 
+ALIKE = 1e-5
+"""How far exponents of one attractor lie apart, relative to the rates of its linearised equations."""
+
 
 class Motion(StrEnum):
     """Kind of motion on an attractor; of linear equations every motion, bounded or not, has the same exponents."""
@@ -95,6 +98,19 @@ class Attractor:
         with np.errstate(invalid="ignore"):
             apart = np.where(exponents == exponents[1], 0.0, np.abs(exponents - exponents[1]))
         return exponents[1], apart.max(axis=0)
+
+    def resolution(self) -> np.ndarray:
+        """Return how far apart the exponents (m,) of two starts on this attractor may lie: by their errors, and by where the starts end.
+
+        Raises
+        ------
+        ValueError
+            If the motion is aperiodic.
+        """
+        _, error = self.exponents()
+        if self.propagators is None or self.cycle:
+            return error + ALIKE / self.cycle
+        return error + ALIKE * np.abs(self.propagators[1]).max(axis=(-2, -1))
 
 
 def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:

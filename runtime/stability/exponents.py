@@ -426,7 +426,7 @@ def group_by_attractor(attractors: Sequence[Attractor], by_start: np.ndarray) ->
     """Group the starts by attractor.
 
     Two attractors are the same if they are of one kind and, for exponents from eigenvalues, if
-    their exponents agree.
+    their exponents agree, to their errors (`Attractor.resolution`).
 
     Parameters
     ----------
@@ -445,7 +445,7 @@ def group_by_attractor(attractors: Sequence[Attractor], by_start: np.ndarray) ->
         for others in groups:
             alike = attractors[others[0]].kind == attractor.kind
             if alike and attractor.propagators is not None:
-                alike = np.allclose(by_start[others[0]], by_start[row], rtol=1e-3, atol=1e-4)
+                alike = np.allclose(by_start[others[0]], by_start[row], rtol=1e-3, atol=attractor.resolution())
             if alike:
                 others.append(row)
                 break

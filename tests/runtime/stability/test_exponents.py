@@ -281,6 +281,16 @@ def test_a_grid_that_begins_inside_a_stable_range_shows_no_zero() -> None:
     assert classify([(0.3, 1.0)], 1.0, 0.3) == "stable everywhere"
 
 
+def test_two_fixed_points_with_small_exponents_are_not_averaged() -> None:
+    """x = 1 has the exponent -6e-5, x = -1 has 2e-5."""
+    node = Field({"x": "x - x**3", "z": "-2e-5*z*(1 + 2*x)"}, initial={"x": 0.05, "z": 0.0})
+    found = exponents(Scene(node, "x->x", PAIR), [0.0, 0.5], transient=20, seed=3)
+    assert {a.kind for a in found.attractors} == {"fixed point"}
+    assert sorted(set(found.by_start[:, 0].round(9))) == [-6e-5, 2e-5]
+    assert len(found.groups) == 2
+    assert abs(found.exponent[0]) == pytest.approx(6e-5 if found.exponent[0] < 0 else 2e-5)
+
+
 def test_two_periodic_attractors_are_not_averaged() -> None:
     """omega = 1.07: two motions of period two, one transversally stable at alpha = 0.1, the other not."""
     found = exponents(scene("friction", "spring", omega=1.07), [0.1], starts=8)
