@@ -102,7 +102,7 @@ def _check_phase(scene: Scene, end: xr.DataArray, time: float) -> None:
     if not scene.forced or time == 0.0:
         return
     phase = float(end.coords[DRIVE_PHASE]) if DRIVE_PHASE in end.coords else np.nan
-    if not abs(phase - round(phase)) < WHOLE:
+    if not abs(phase - np.rint(phase)) < WHOLE:
         where = "has no period" if math.isnan(phase) else f"is {phase:.6f} into a period"
         raise ValueError(
             f"start: the drive {where} at t = {time:.10g}; expected the beginning of one, where a run begins; "

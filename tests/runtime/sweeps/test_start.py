@@ -10,6 +10,7 @@ import xarray as xr
 
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
+from synchain.runtime.results.labels import DRIVE_PHASE
 from synchain.runtime.results.result import Result
 from synchain.runtime.sweeps.run import run
 
@@ -88,6 +89,7 @@ def test_states_in_a_row_and_tables_are_starts(first: Result) -> None:
         (lambda: ran(DRIVEN).end.sel(component=["x"]), ValueError, "components x; expected x, v, those of the scene"),
         (lambda: ran(DRIVEN).end.isel(node=0), ValueError, "nodes none; expected 1, 2, 3"),
         (lambda: ran(DRIVEN.replace(window=4.3)), ValueError, "is 0.300000 into a period at t = 39.88"),
+        (lambda: ran(DRIVEN).end.assign_coords({DRIVE_PHASE: np.nan}), ValueError, "the drive has no period at t = "),
         (lambda: ran(DRIVEN.replace(max_steps=3)), ValueError, "a result with 1 cell: used up max_steps"),
         (lambda: ran(DRIVEN).end * np.nan, ValueError, "a state that is not finite"),
         (lambda: "end", TypeError, r"found 'end' \(str\); expected a Result of one cell"),
