@@ -39,7 +39,7 @@ MOST_STEPS, HALVINGS = 100, 40
 """Most steps of Newton's method, and how often one is halved until the residual falls."""
 
 CLOSED = 1e-11
-"""Largest rate at an equilibrium, relative to the size of states and rates."""
+"""Largest rate at an equilibrium, relative to its scale."""
 
 DENSE = 2000
 """Most states of which all eigenvalues are computed."""
@@ -51,14 +51,17 @@ ASIDE = 1e-6
 """Distance from zero, relative to the largest entry of the Jacobian, of the place around which few eigenvalues are computed."""
 
 EVEN = 1e-15
-"""Speed that is rounding, relative to the size of states and rates."""
+"""Speed that is rounding, relative to the largest scale of a rate."""
 
 ZERO = 1e-7
 """Size of an eigenvalue that counts as zero, relative to the largest: at a fold two solutions merge, and rounding of
 1e-16 moves the eigenvalue by its root."""
 
 LEAST = 1e-12
-"""Size of an eigenvalue that counts as zero even if there is no larger one."""
+"""Size of an eigenvalue that is rounding, relative to the slopes of the rates."""
+
+BESIDE = 0.1
+"""How far aside, relative to the state, the slopes of rates are looked at: at a fold those at the state itself may be zero."""
 
 SHIFT = 0.7
 """Distance of a shift that must not change the rates."""
@@ -176,7 +179,7 @@ class Equilibrium(Labelled):
     @property
     def _zero(self) -> float:
         """Largest real part that counts as zero."""
-        return max(LEAST, ZERO * float(np.abs(self.eigenvalues).max(initial=0.0)))
+        return ZERO * float(np.abs(self.eigenvalues).max(initial=0.0))
 
 
 def equilibrium(
@@ -236,9 +239,12 @@ def equilibrium(
     wanted = None if count is None else check_integer("count", count, 1)
     if wanted is not None and wanted > size:
         raise ValueError(f"count = {count}; expected at most {size}, the states of the network")
-    names, shifts = _shifts(scene, network, state)
-    state, speeds, residual, steps = _newton(network, state, shifts)
-    return Equilibrium(scene, state, _eigenvalues(network, state, wanted), names, speeds, residual, steps)
+    slopes = _slopes(network, state)
+    names, shifts = _shifts(scene, network, state, slopes)
+    state, speeds, residual, steps = _newton(network, state, shifts, slopes)
+    found = _eigenvalues(network, state, wanted)
+    found[np.abs(found) <= LEAST * _fastest(network, state, slopes)] = 0.0
+    return Equilibrium(scene, state, _in_order(found), names, speeds, residual, steps)
 
 
 def _at_rest(scene: Scene) -> Equations:
@@ -257,10 +263,24 @@ def _at_rest(scene: Scene) -> Equations:
     return equations
 
 
-def _shifts(scene: Scene, network: Linearised, state: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
+def _slopes(network: Linearised, state: np.ndarray) -> np.ndarray:
+    """The sums of the sizes of each row of the Jacobian, the larger of those at a state and beside it."""
+    here, beside = (abs(network.jacobian(at)).sum(axis=1) for at in (state, (1.0 + BESIDE) * state))
+    return np.fmax(here, np.where(np.isfinite(beside), beside, 0.0))
+
+
+def _fastest(network: Linearised, state: np.ndarray, slopes: np.ndarray) -> float:
+    """The size of eigenvalues of M^-1 J, from the slopes at the start of the search and at its end."""
+    mass = network.mass(state)
+    heavy = 1.0 if mass is None else float(abs(mass).max())
+    return float(max(slopes.max(), _slopes(network, state).max())) / heavy
+
+
+def _shifts(
+    scene: Scene, network: Linearised, state: np.ndarray, slopes: np.ndarray
+) -> tuple[tuple[str, ...], np.ndarray]:
     """Components whose shift at all nodes changes no rate, and the vectors of ones (states, shifts) along them."""
-    equations, jacobian = scene.equations, network.jacobian(state)
-    scale = max(1.0, float(abs(jacobian).max()))
+    equations, jacobian, rates = scene.equations, network.jacobian(state), network.rates(state)
     names, rows = [], []
     first = 0
     for name in equations.components:
@@ -268,20 +288,21 @@ def _shifts(scene: Scene, network: Linearised, state: np.ndarray) -> tuple[tuple
         along = np.zeros(len(state))
         along[first : first + nodes] = 1.0
         first += nodes
-        still = np.abs(jacobian @ along).max() <= 1e-12 * scale
-        if still and np.allclose(
-            network.rates(state + SHIFT * along), network.rates(state), rtol=0, atol=1e-10 * scale
-        ):
+        still = np.all(np.abs(jacobian @ along) <= 1e-12 * slopes)
+        change = np.abs(network.rates(state + SHIFT * along) - rates)
+        if still and np.all(change <= 1e-10 * (slopes + np.abs(rates))):
             names.append(name)
             rows.append(along)
     return tuple(names), np.array(rows).reshape(-1, len(state)).T
 
 
-def _newton(network: Linearised, state: np.ndarray, shifts: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, int]:
+def _newton(
+    network: Linearised, state: np.ndarray, shifts: np.ndarray, slopes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float, int]:
     """State, speeds along the shifts, residual and number of steps."""
-    border = sparse.csc_array(shifts)
-    speeds, steps = _speeds(network.rates(state), shifts), 0
-    gap = network.rates(state) - shifts @ speeds
+    border, start, first = sparse.csc_array(shifts), state, network.rates(state)
+    speeds, steps = _speeds(first, shifts), 0
+    gap = first - shifts @ speeds
     while steps < MOST_STEPS and np.abs(gap).max() > 0.0:
         try:
             matrix = sparse.block_array([[network.jacobian(state), -border], [border.T, None]], format="csc")
@@ -302,14 +323,15 @@ def _newton(network: Linearised, state: np.ndarray, shifts: np.ndarray) -> tuple
         else:
             break
         state, speeds, gap, steps = tried, moved, left, steps + 1
+    size = max(np.abs(start).max(), np.abs(state).max())
+    scales = np.fmax(np.fmax(slopes, _slopes(network, state)) * size, np.fmax(np.abs(first), np.abs(shifts @ speeds)))
     residual = float(np.abs(gap).max())
-    scale = max(1.0, float(np.abs(state).max()) * float(abs(network.jacobian(state)).max()))
-    if not residual <= CLOSED * scale:
+    if not np.all(np.abs(gap) <= CLOSED * scales):
         raise ArithmeticError(
             f"no equilibrium near the start: Newton's method left rates of {residual:.2g}; start elsewhere, "
             "or there is none"
         )
-    return state, np.where(np.abs(speeds) > EVEN * scale, speeds, 0.0), residual, steps
+    return state, np.where(np.abs(speeds) > EVEN * scales.max(), speeds, 0.0), residual, steps
 
 
 def _speeds(rates: np.ndarray, shifts: np.ndarray) -> np.ndarray:
@@ -318,7 +340,7 @@ def _speeds(rates: np.ndarray, shifts: np.ndarray) -> np.ndarray:
 
 
 def _eigenvalues(network: Linearised, state: np.ndarray, count: int | None) -> np.ndarray:
-    """Eigenvalues of M^-1 J, the largest real part first."""
+    """Eigenvalues of M^-1 J, in any order."""
     jacobian, mass, size = network.jacobian(state), network.mass(state), len(state)
     if count is None and size > DENSE:
         count = FEW
@@ -336,4 +358,9 @@ def _eigenvalues(network: Linearised, state: np.ndarray, count: int | None) -> n
                 f"eigenvalues: the {count} nearest to zero of {size} did not converge; ask for another count"
             ) from None
         found = aside + 1.0 / found
-    return np.asarray(found[np.lexsort((-found.imag, -found.real))])
+    return np.asarray(found)
+
+
+def _in_order(eigenvalues: np.ndarray) -> np.ndarray:
+    """Eigenvalues, the largest real part first."""
+    return np.asarray(eigenvalues[np.lexsort((-eigenvalues.imag, -eigenvalues.real))])

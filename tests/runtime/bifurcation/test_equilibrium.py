@@ -202,3 +202,26 @@ def test_a_motion_that_comes_to_rest_is_no_periodic_orbit() -> None:
     with pytest.raises(ArithmeticError, match=r"comes to rest at x = 1, v = .*`equilibrium` finds such states"):
         sc.periodic_orbit(scene)
     np.testing.assert_allclose(sc.equilibrium(scene).state, [1.0, 0.0], atol=1e-14)
+
+
+@pytest.mark.parametrize("unit", [1e-14, 1e-9, 1.0, 1e9])
+def test_units_of_time_and_state_change_nothing(unit: float) -> None:
+    """x' = -unit (x^3 - size^3)/size^2; x' = unit (x^2 + size^2)/size has no equilibrium; at x = pi/2 is a fold."""
+    for size in (1e-6, 1.0, 1e6):
+        known = {"parameters": {"k": unit, "a": size}, "initial": {"x": 2.0 * size}}
+        found = sc.equilibrium(sc.Scene(sc.Field({"x": "-k*(x**3 - a**3)/a**2"}, **known), None))
+        assert found.state == pytest.approx([size], rel=1e-12)
+        assert (found.shifts, found.verdict) == ((), "stable")
+        with pytest.raises(ArithmeticError, match="no equilibrium near the start"):
+            sc.equilibrium(sc.Scene(sc.Field({"x": "k*(x**2 + a**2)/a"}, **known), None))
+    fold = sc.Field({"x": "k*(1 - sin(x))"}, parameters={"k": unit}, initial={"x": np.pi / 2})
+    assert sc.equilibrium(sc.Scene(fold, None)).verdict == "neutral, 1 on the imaginary axis"
+
+
+@pytest.mark.parametrize("unit", [1e-14, 1.0, 1e9])
+def test_identical_phases_at_zero_lock_at_their_lagging_speed_in_any_unit_of_time(unit: float) -> None:
+    """All rates are 0.3 unit + 2 unit sin(-0.1) but for rounding, and no state has a size."""
+    lagging = sc.Rates({"theta": "K*W*sin(theta_j - theta_i - 1/10)"}, {"K": unit})
+    found = sc.equilibrium(sc.Scene(PHASE, lagging, sc.cycle(5), parameters={"w": 0.3 * unit}, initial={"theta": 0.0}))
+    assert found.speeds / unit == pytest.approx([0.3 - 2.0 * np.sin(0.1)], rel=1e-14)
+    assert found.stable
