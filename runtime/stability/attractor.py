@@ -23,7 +23,13 @@ LONGEST = 32
 """Longest cycle that is looked for, in periods of the drive."""
 
 RETURN = 1e-9
-"""Largest distance of a closed cycle, relative to the size of the state; at least 0.1 rtol."""
+"""Largest distance of a closed cycle in each component, relative to what it moves; at least 0.1 rtol."""
+
+CLOSE = 1e-3
+"""Largest distance of a state that returns, relative to its size, and the least part of its size that a component moves."""
+
+LOOKS = 8
+"""States of a period from which it is seen what each component moves."""
 
 SLACK = 10.0
 """How many times the tolerance a cycle is compared with."""
@@ -143,12 +149,13 @@ def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
         for _ in range(LONGEST):
             integrator.advance(orbit.unit)
             states.append(integrator.state[0])
-        gaps = [_distance(state, states[-1]) for state in states[-2::-1]]
-        cycle = next((k + 1 for k, gap in enumerate(gaps) if gap < closed), 0)
         orbits.state[row] = orbit.state[0] = states[-1]
+        gaps, sizes = np.abs(np.array(states[-2::-1]) - states[-1]), np.abs(states[-1])
+        moves = np.maximum(np.ptp([*states, *_within(orbit)], axis=0), CLOSE * np.maximum(1.0, sizes))
+        cycle = next((k + 1 for k, gap in enumerate(gaps) if np.all(gap < closed * moves)), 0)
         if cycle:
             return _periodic(orbit, Motion.PERIODIC, cycle)
-        if min(gaps) > 1e-3:
+        if not np.any(np.all(gaps <= CLOSE * np.maximum(sizes, moves), axis=1)):
             break
         integrator.advance(max(1, round(patience)) * orbit.unit)
     return Attractor(Motion.APERIODIC, 0.0)
@@ -165,9 +172,11 @@ def _periodic(orbit: Orbits, motion: Motion, cycle: int, unit: float | None = No
     return Attractor(motion, cycle * unit, propagators, cycle, logarithms)
 
 
-def _distance(a: np.ndarray, b: np.ndarray) -> float:
-    """Largest difference of two states, relative to the second."""
-    return float(np.abs(a - b).max() / max(1e-3, np.abs(b).max()))
+def _within(orbit: Orbits) -> np.ndarray:
+    """States (LOOKS, components) of a driven orbit within its next period; stretches of time begin with that of the drive."""
+    integrator = orbit.part([0] * LOOKS).integrator_of(orbit.strengths[:1])
+    integrator.advance(orbit.unit * np.arange(1, LOOKS + 1) / LOOKS)
+    return integrator.state
 
 
 def cycle_propagators(

@@ -281,6 +281,18 @@ def test_a_grid_that_begins_inside_a_stable_range_shows_no_zero() -> None:
     assert classify([(0.3, 1.0)], 1.0, 0.3) == "stable everywhere"
 
 
+@pytest.mark.parametrize(("force", "kind"), [("x**3 - x", "aperiodic"), ("x**3 + x", "periodic")])
+def test_a_large_constant_beside_a_motion_does_not_hide_it(force: str, kind: str) -> None:
+    node = Field(
+        {"x": "v", "v": f"-({force}) - 0.15*v + 0.3*cos(t)", "z": "Z - z"},
+        parameters={"Z": 1.0},
+    )
+    scenes = (Scene(node, "x->v", PAIR, initial={"x": 0.5, "z": z}, parameters={"Z": z}) for z in (1.0, 1e8))
+    found = [exponents(each, [0.0], starts=1, transient=50, periods=50) for each in scenes]
+    assert [a.kind for each in found for a in each.attractors] == [kind] * 2
+    assert found[0].exponent == pytest.approx(found[1].exponent, abs=1e-6)
+
+
 def test_two_fixed_points_with_small_exponents_are_not_averaged() -> None:
     """x = 1 has the exponent -6e-5, x = -1 has 2e-5."""
     node = Field({"x": "x - x**3", "z": "-2e-5*z*(1 + 2*x)"}, initial={"x": 0.05, "z": 0.0})
