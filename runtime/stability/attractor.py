@@ -219,7 +219,7 @@ def cycle_propagators(
 
 def _free(orbit: Orbits, closed: float) -> Attractor:
     """Return the fixed point or the limit cycle of an undriven orbit, else aperiodic motion."""
-    if rests(rates_of(orbit), orbit.state[0], RETURN):
+    if rests(rates_of(orbit), orbit.state[0], closed):
         return _steady(orbit, Motion.FIXED_POINT)
     period = 0.0 if orbit.variation.events else limit_cycle(orbit, closed)[0]
     return _periodic(orbit, Motion.PERIODIC, 1, period) if period else Attractor(Motion.APERIODIC, 0.0)

@@ -34,6 +34,7 @@ from .attractor import Attractor, find_attractor
 from .averages import Averaging, Batches
 from .network import unused_axes
 from .orbits import Orbits
+from .slowness import warn_of_slow_motion
 
 __all__ = [
     "Exponents",
@@ -342,6 +343,7 @@ def _by_start(
         aperiodic = orbits.part(rest)
         aperiodic.prepare(averaging.periods)
         exponent[rest], error[rest], length = average(aperiodic, averaging, reporter)
+        warn_of_slow_motion(aperiodic.variation.orbit, aperiodic.state, aperiodic.numbers, length)
     return exponent, error, length
 
 

@@ -37,6 +37,9 @@ RETURNS = 32
 
 MOST_STEPS = 12
 
+ASIDE = 1e-6
+"""How far aside, relative to a component, rates are looked at."""
+
 APART = 10.0
 """How many times sqrt(rtol) the other multipliers are from the unit circle.
 
@@ -237,8 +240,14 @@ def _attracts(matrix: np.ndarray, rtol: float) -> bool:
 
 
 def rests(rates: Rates, state: np.ndarray, closed: float) -> bool:
-    """Return whether the rates at a state are zero, within a part `closed` of the state."""
-    return bool(np.abs(rates(state)).max() < closed * max(1.0, float(np.abs(state).max())))
+    """Return whether the rates at a state are zero, within what they change if each component moves by a part `closed` of its size.
+
+    Components smaller than 1 count as 1.  Units of time do not matter, nor the size of a component that moves no other.
+    """
+    here, moves = rates(state), ASIDE * np.maximum(1.0, np.abs(state))
+    with np.errstate(all="ignore"):
+        changes = np.abs([rates(state + move) - here for move in np.diag(moves)]).sum(axis=0)
+    return bool(np.all(np.abs(here) <= closed / ASIDE * changes))
 
 
 def rates_of(orbit: Orbits) -> Rates:

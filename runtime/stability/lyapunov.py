@@ -37,6 +37,7 @@ from ..support.progress import Hook
 from .averages import SLACK, TRIED, Averaging, Batches, error_of_steps
 from .exponents import single_cell
 from .orbits import unit_of_time
+from .slowness import warn_of_slow_motion
 from .variational_integrator import VariationalIntegrator
 
 __all__ = ["Lyapunov", "lyapunov_spectrum"]
@@ -243,6 +244,8 @@ def lyapunov_spectrum(
             np.logical_or(lost, gone, out=lost)
             batches.add(growth[None])
         steps = frame.error_of_steps()
+    orbit = frame.integrator
+    warn_of_slow_motion(frame.variation.orbit, orbit.state, orbit.numbers[0], batches.time)
     return _report(frame, batches, lost, steps)
 
 

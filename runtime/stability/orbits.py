@@ -146,6 +146,11 @@ class Orbits:
         return len(self.variation.orbit.node.continuous)
 
     @property
+    def numbers(self) -> np.ndarray:
+        """Values (parameters,) of the parameters of the orbit."""
+        return np.array([self.scene.parameters[name] for name in self.variation.orbit.parameters])
+
+    @property
     def forced(self) -> bool:
         """True if a drive acts."""
         return self.variation.orbit.forced
@@ -183,8 +188,7 @@ class Orbits:
         """
         repeated = np.repeat(strengths, self.components, axis=0)
         rows = _rows(repeated.astype(self.strengths.dtype))
-        names = self.variation.orbit.parameters
-        numbers = np.tile([self.scene.parameters[name] for name in names], (len(self.state), 1))
+        numbers = np.tile(self.numbers, (len(self.state), 1))
         integrator = VariationalIntegrator.make(
             self.scene, self.variation, self.state, numbers, rows, self.workers, looseness, self.method
         )

@@ -1,0 +1,45 @@
+"""Undriven motion that is too slow for transients and averages, which are counted in units of 2 pi."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+
+from synchain.models.dynamics.equations import Equations
+
+from ..cells.rates import rates
+
+__all__ = ["warn_of_slow_motion"]
+
+TURN = 2.0 * math.pi
+"""Fewest times the inverse of the fastest rate in which motion turns, or settles."""
+
+
+def warn_of_slow_motion(equations: Equations, states: np.ndarray, numbers: np.ndarray, averaged: float) -> None:
+    """Warn if an average ends before undriven motion turns or settles.
+
+    Its batches agree, because nothing has happened, and their error is small for no reason.
+
+    Parameters
+    ----------
+    equations : Equations
+        Equations of the orbit.
+    states : ndarray, shape (any, states)
+        States along the orbit.
+    numbers : ndarray, shape (parameters,)
+        Values of the parameters.
+    averaged : float
+        Length of the average in units of non-dimensional time.
+    """
+    if equations.forced:
+        return
+    fastest = max(max(rates(equations, state, numbers)[:2]) for state in states)
+    if 0.0 < fastest * averaged < TURN:
+        warnings.warn(
+            f"found an orbit that has neither turned nor settled in the average of {averaged:.3g} units of time, its fastest rate is "
+            f"{fastest:.1g}; expected {TURN / fastest:.1g} units at least; lower precision, raise transient and periods, or take faster units",
+            RuntimeWarning,
+            stacklevel=3,
+        )
