@@ -68,7 +68,8 @@ class Integrator:
         y_new = y + sum b_i k_i
 
     An explicit method has k_i = f(t + c_i h, y + h sum a_ij k_j) and y_new = y + h sum b_i k_i.  The
-    error is sum e_i k_i (times h); two rows of e are combined as |e1|^2 / sqrt(|e1|^2 + 0.01 |e2|^2).
+    error is sum e_i k_i (times h); two rows of e are combined as |e1|^2 / sqrt(|e1|^2 + 0.01 |e2|^2), in units
+    of the tolerance.
     The dense output is y(theta) = (1-theta) y + theta (y_new + (1-theta) (D_1 + theta (D_2 + …))) with
     D_j = sum dense_ji k_i (times h).
 

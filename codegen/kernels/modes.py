@@ -30,7 +30,7 @@ from ..steps.blocks import analyse
 from ..steps.contacts import event_functions, register
 from ..steps.elimination import plan, write_factors, write_solve
 from ..steps.names import renamed, tidy
-from ..steps.step import SCALED, Step, node_function
+from ..steps.step import Step, node_function, scaling
 from ..steps.unrolled import Unrolled, stage_state
 from ..taylor import write_tangent
 from .driver import Driver, KernelKind
@@ -140,7 +140,11 @@ def _stages(variation: Variation, method: Integrator, names: Names) -> tuple[lis
         tuple(_mode_step(variation, parts, method)),
     )
     made = map(LANES.function, [*node_functions([writer], blocks), *functions.values()])
-    return [*made, SCALED, LANES.function(orbit), LANES.function(modes), CARRY], (parts.size, 0), operations(orbit.body)
+    return (
+        [*made, scaling(method), LANES.function(orbit), LANES.function(modes), CARRY],
+        (parts.size, 0),
+        operations(orbit.body),
+    )
 
 
 def _renamed(variation: Variation, plain: Equations) -> Variation:

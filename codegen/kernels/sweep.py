@@ -25,7 +25,7 @@ from ..steps.contacts import push_functions
 from ..steps.looped import Looped
 from ..steps.names import renamed, tidy
 from ..steps.program import FILL_LIMIT, Program, program, workspace
-from ..steps.step import PAIR, SCALED, Step, function_name, node_function
+from ..steps.step import Step, function_name, node_function, scaling
 from ..steps.unrolled import Unrolled
 from ..taylor import write_looped, write_step
 from .driver import RECORDERS, Driver, KernelKind, Recorder, imports
@@ -318,7 +318,7 @@ def _stages(
     functions = [f for k in range(len(blocks)) for f in node_functions(list(steps.values()), blocks[k], k)]
     functions += dict.fromkeys(f for writer in steps.values() for f in writer.functions)
     stepping = [_step(name, writer, looped) for name, writer in steps.items()]
-    made = [*map(LANES.function, functions), SCALED, *([PAIR] if looped and len(method.e) > 1 else [])]
+    made = [*map(LANES.function, functions), *dict.fromkeys(scaling(writer.method) for writer in steps.values())]
     made += [driver.text("driver.sparse")] if looped and steps["step"].solves else []
     scratch = workspace(steps["step"], elimination) if elimination is not None else 0
     return [*made, *map(LANES.function, stepping)], scratch, sum(operations(f.body) for f in stepping)

@@ -257,17 +257,15 @@ class Looped(Step):
             self.put(If(Name("DENSE"), tuple(stages)))
         self.note("new state, error and dense output")
         self.put(let("error", 0.0 * Name("h")), let("total", 0.0 * Name("h")))
-        error = self.increment(m.e[0], values)
-        if len(m.e) > 1:
-            error = call("pair", *(linear(row, values) for row in m.e), "h")
         if m.dense_error and self.equations.inertial:
             with self.apart() as masses:
                 self.mass.gather("y", "MASS")
             self.put(If(Name("DENSE"), tuple(masses)))
         found = [*self.load_stages(PLACE, [1.0] * m.stages), let("old", Load("y", PLACE))]
         found += [let("new", Name("old") + self.increment(m.b, values)), store("y_new", PLACE, "new")]
-        found += [let("e", error), *self.stiff_errors(values)]
-        found += [let("e", call("scaled", "e", "old", "new", "rtol", "atol"))]
+        if len(m.e) == 1:
+            found += [let("e", self.increment(m.e[0], values)), *self.stiff_errors(values)]
+        found += [*self.embedded(values), let("e", self.scaled_error("e", "old", "new"))]
         found += [let("total", Name("total") + "e"), let("error", call("maximum", "error", "e"))]
         dense: list[Statement] = self.load_stages(PLACE, [0.0] * m.stages + [1.0] * late)
         for j, row in enumerate(m.dense):

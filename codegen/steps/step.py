@@ -20,8 +20,6 @@ from .blocks import NodeBlocks
 
 __all__ = [
     "NOW",
-    "PAIR",
-    "SCALED",
     "Step",
     "entry",
     "function_name",
@@ -30,6 +28,7 @@ __all__ = [
     "linearised",
     "node_function",
     "prefix",
+    "scaling",
 ]
 
 LARGEST_INLINED = 400
@@ -38,19 +37,26 @@ LARGEST_INLINED = 400
 NOW = {TIME: real("now")}
 """What the time of a stage is called in the expressions of links."""
 
-PAIR = '''
-@njit(error_model="numpy", forceinline=True)
-def pair(e5, e3, h):
-    """One error estimate out of two embedded ones."""
-    return h*e5*absolute(e5)/sqrt(e5*e5 + 0.01*(e3*e3) + 2.2250738585072014e-308)
-'''.strip()
-
 SCALED = '''
 @njit(error_model="numpy", forceinline=True)
 def scaled(error, old, new, rtol, atol):
     """The error estimate of one state variable in units of its tolerance."""
     return absolute(error)/(atol + rtol*maximum(absolute(old), absolute(new)))
 '''.strip()
+
+PAIR = '''
+@njit(error_model="numpy", forceinline=True)
+def pair(e5, e3, h, old, new, rtol, atol):
+    """One error estimate out of two embedded ones, in units of the tolerance, so that no square of tiny errors is lost."""
+    unit = 1.0/(atol + rtol*maximum(absolute(old), absolute(new)))
+    a, b = e5*unit, e3*unit
+    return h*(a*a)/sqrt(a*a + 0.01*(b*b) + 2.2250738585072014e-308)
+'''.strip()
+
+
+def scaling(method: Integrator) -> str:
+    """The text of the function that measures errors of a method by the tolerance."""
+    return SCALED if len(method.e) == 1 else PAIR
 
 
 def function_name(name: str, kind: int) -> str:
@@ -191,6 +197,16 @@ class Step(ABC):
         """What a row of coefficients adds to the state at the start: stages of explicit methods are rates."""
         total = linear(row, values)
         return total if self.method.implicit else Product((Name("h"), total))
+
+    def embedded(self, values: Sequence[str]) -> list[Statement]:
+        """The two estimates of the error of a state, if there are two."""
+        rows = self.method.e if len(self.method.e) > 1 else ()
+        return [let(name, linear(row, values)) for name, row in zip(("e5", "e3"), rows, strict=False)]
+
+    def scaled_error(self, error: Value, old: Value, new: Value) -> Expression:
+        """The error of a state in units of its tolerance: the one estimate, or the two of `embedded` as one."""
+        scaling = ("scaled", error) if len(self.method.e) == 1 else ("pair", "e5", "e3", "h")
+        return call(*scaling, old, new, "rtol", "atol")
 
     def dense_value(self, row: Sequence[float], values: Sequence[str]) -> Expression:
         """What a row of the dense output holds of a state: stages of explicit methods are rates."""

@@ -258,3 +258,22 @@ def test_a_window_of_whole_periods_has_its_last_sample(periods: int) -> None:
         result = run(scene.replace(window=float(window)), reduce=False, width=1)
         assert np.isfinite(result.states("trajectory")).all(), window
         np.testing.assert_allclose(result.states("trajectory")[-1], result.states("end"), rtol=1e-11)
+
+
+@pytest.mark.parametrize("n", [2, 9])
+@pytest.mark.parametrize("size", [1e-280, 1e-160, 1.0])
+def test_errors_of_tiny_states_are_not_lost_in_their_squares(size: float, n: int) -> None:
+    """Two estimates of dop853 are made one: their squares, 1e-320 and less, were zero beside a tolerance of 1e-176."""
+    given = {"transient": 0, "window": 10, "time_unit": "time", "rtol": 1e-8, "atol": 1e-16 * size}
+    start = {"x": size, "v": 0.0}
+    scene = Scene(
+        oscillator="harmonic",
+        coupling="spring",
+        topology=chain(n),
+        initial=start,
+        integrator="dop853",
+        **given,
+    )
+    ends = run(scene, show_progress=False).states("end") / size
+    expected = np.repeat([np.cos(10.0), -np.sin(10.0)], n).reshape(ends.shape)
+    np.testing.assert_allclose(ends, expected, rtol=0, atol=1e-8)
