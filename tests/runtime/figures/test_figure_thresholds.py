@@ -126,15 +126,14 @@ def test_table_of_thresholds(simulation: Simulation, tmp_path: Path) -> None:
 
 
 def test_exponents_are_right_where_the_quick_probe_is_not() -> None:
-    """At n = 4, omega = 1.40 the quick probe finds [0.178, 0.179]."""
+    """At n = 4, omega = 1.40 the quick probe finds [0.178, 0.179]; averages of 320 000 periods 0.1515 ± 0.0007, 0.1772 ± 0.0001."""
     runs = FigureRuns(QUICK)
     scene = tables_of_thresholds.scene_of(4, 1.4, runs)
     found = tables_of_thresholds.windows_of(scene, runs)
     ((low, high),), ((low_error, high_error),) = found.intervals, found.errors
-    assert (low, high) == pytest.approx((0.153, 0.177), abs=0.006)
-    assert 0.0 < high_error < low_error < 0.01
-    assert abs(low - 0.153) < 2 * low_error
-    assert abs(high - 0.177) < 2 * high_error
+    assert 0.0 < high_error < low_error < 0.005
+    assert abs(low - 0.1515) < 2 * low_error
+    assert abs(high - 0.1772) < 2 * high_error
 
 
 def test_the_table_has_the_windows_of_the_exponents(simulation: Simulation, tmp_path: Path) -> None:
