@@ -10,7 +10,7 @@ from synchain.models.mechanics.jumps import JUMPING, KINKED, gaps_of
 
 from .rounding import magnitude
 
-__all__ = ["depths_in", "gaps_in", "settled"]
+__all__ = ["calmed", "depths_in", "gaps_in", "settled"]
 
 NOISE = sp.Rational(3, 2) / 10**14
 """Rounding of a value, as a part of the size of its terms (codegen/recorders/crossings.py)."""
@@ -45,6 +45,11 @@ def _depths(e: sp.Expr) -> Iterator[sp.Expr]:
 def _once(found: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:
     """Those of some expressions that are no numbers, each once, in a fixed order."""
     return tuple(sorted({e for e in found if not e.is_number}, key=sp.default_sort_key))
+
+
+def calmed(e: sp.Expr) -> sp.Expr:
+    """Return a value whose jumps do not see rounding: the sign of x_1 - x_2 is 0 of oscillators that move as one."""
+    return e.replace(sp.sign, lambda argument: sp.sign(settled(argument)))
 
 
 def settled(e: sp.Expr) -> sp.Expr:

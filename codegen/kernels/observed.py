@@ -31,7 +31,7 @@ from ..program.expressions import Expression, Load, Name, Number, call, plus
 from ..program.lowering import lower
 from ..program.passes import real
 from ..program.statements import Function, Loop, Role, Statement, let, store
-from .between import depths_in, gaps_in, settled
+from .between import calmed, depths_in, gaps_in, settled
 from .rounding import magnitude
 
 __all__ = ["UNWATCHED", "Watched", "count_of", "rule_of", "with_rows"]
@@ -147,7 +147,7 @@ class Watched:
         what = "The section functions at the fraction theta of the step, what their points keep, and what ends a cell."
         seen = "The observed values at the fraction theta of the step, and what tells where they change quickly."
         parts = (
-            ("values", (*self.observed, *self.gaps, *self.depths), seen),
+            ("values", (*map(calmed, self.observed), *self.gaps, *self.depths), seen),
             ("section", self.events, what),
         )
         return [_function(self, equations, plain, values, name, about) for name, values, about in parts if values]

@@ -370,3 +370,9 @@ def test_a_cell_that_ends_early_says_what_it_saw() -> None:
     early = run(scene.replace(max_steps=3), show_progress=False)
     assert int(early.status) == Status.STEP_BUDGET
     assert np.isnan(early.speed.values).all()
+
+
+def test_oscillators_that_move_as_one_have_no_sign_of_rounding():
+    seen = {"sign": "mean(sign(10*(x_1 - x_2)))"}
+    pair = Scene("duffing", "x->x", chain(2), parameters={"sigma": 5.0}, transient=200, window=1, observe=seen)
+    assert float(run(pair, show_progress=False).data["sign"]) == 0.0
