@@ -20,7 +20,6 @@ import shutil
 import sys
 import tempfile
 import threading
-import warnings
 from collections import ChainMap
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -36,6 +35,7 @@ from numba import types
 from numba.core.serialize import dumps
 
 from synchain.models.dynamics.equations import Equations
+from synchain.models.inputs.keywords import warn
 
 from ..driver import dimensions
 from ..driver.dimensions import Dimensions, ModeDimensions
@@ -293,7 +293,7 @@ def _load(source: KernelSource) -> Kernel:
     if kernel is None:
         kernel = _held[source] = _kernel(source)
         if problem := kernel.compiled.problem or kernel.driver.problem:
-            warnings.warn(f"kernels are not kept on disk: {problem}", RuntimeWarning, stacklevel=3)
+            warn(f"kernels are not kept on disk: {problem}")
     return kernel
 
 

@@ -1,16 +1,33 @@
-"""Arguments of public functions, classes and methods: what does not fit is refused with what would."""
+"""Calls of public functions, classes and methods: what does not fit is refused with what would, and warnings stand at the call."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cache, wraps
-from inspect import Parameter, isfunction, signature
+from inspect import Parameter, currentframe, isfunction, signature
 from typing import Any
 
 from .checks import suggestion
 
-__all__ = ["check_methods", "public"]
+__all__ = ["check_methods", "public", "warn"]
+
+
+def warn(message: str, kind: type[Warning] = RuntimeWarning) -> None:
+    """Warn at the line that called this package, through however many of its functions.
+
+    Parameters
+    ----------
+    message : str
+        What was found, and what was expected.
+    kind : type
+        The category of the warning.
+    """
+    package, level, frame = __name__.partition(".")[0], 1, currentframe()
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == package:
+        level, frame = level + 1, frame.f_back
+    warnings.warn(message, kind, stacklevel=level)
 
 
 def public(value: Any, package: str) -> Any:

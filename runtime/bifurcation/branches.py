@@ -10,7 +10,6 @@ at the landing passes the limit of static friction.
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
@@ -19,6 +18,7 @@ import numpy as np
 import xarray as xr
 
 from synchain.models.inputs.checks import check_instance, short_repr
+from synchain.models.inputs.keywords import warn
 from synchain.models.inputs.result_names import expect_free
 from synchain.models.scenes.scene import Scene
 
@@ -200,11 +200,9 @@ def warn_of_lost(function: str, branches: Sequence[Branch]) -> None:
     """Warn the caller of a function in one line if branches are lost."""
     lost = [value for branch in branches for value in branch.lost]
     if lost:
-        warnings.warn(
+        warn(
             f"{function}: found no orbit and no bifurcation beyond {branches[0].name} = {numbers(lost)}; expected the "
-            "branch to go on, or to end at a bifurcation; try values closer together there, or periodic_orbit beyond",
-            RuntimeWarning,
-            stacklevel=4,
+            "branch to go on, or to end at a bifurcation; try values closer together there, or periodic_orbit beyond"
         )
 
 

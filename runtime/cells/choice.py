@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
@@ -15,6 +14,7 @@ from synchain.codegen.taylor import is_analytic, is_linear, jump, order_for
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation
 from synchain.models.graphs.links import LINK_LIMIT
+from synchain.models.inputs.keywords import warn
 from synchain.models.scenes.scene import Scene
 
 from ..support.status import Status
@@ -160,11 +160,9 @@ def warn_of_stiff_modes(
         return False
     for fastest, turning, _ in mode_rates(variation, state, numbers, strengths):
         if fastest * step > 1.0 and fastest > STIFF * max(1.0, turning):
-            warnings.warn(
+            warn(
                 f"stiff modes: found a rate of {fastest:.3g} beside slow motion, and Taylor steps of {step:.2g}; "
-                "expected longer ones; integrator = 'rodas5p' takes them",
-                RuntimeWarning,
-                stacklevel=4,
+                "expected longer ones; integrator = 'rodas5p' takes them"
             )
             return True
     return False
@@ -216,17 +214,13 @@ def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[
         slow = max(turning, 0.0 if resting else 1.0)
         if fastest * lengths[cell] > 1.0 and fastest > STIFF * slow:
             if grown and growth >= 0.5 * fastest:
-                warnings.warn(
+                warn(
                     f"a state grew to {size:.3g} in {steps[cell]} {kind} steps of a cell; expected a bounded motion; "
-                    "check the signs and the size of the parameters",
-                    RuntimeWarning,
-                    stacklevel=4,
+                    "check the signs and the size of the parameters"
                 )
                 return
-            warnings.warn(
+            warn(
                 f"stiff equations: found a rate of {fastest:.3g} beside slow motion, and {steps[cell]} {kind} steps in a cell; "
-                "expected few; the result may be worse than rtol says; integrator = 'rodas5p' takes longer steps",
-                RuntimeWarning,
-                stacklevel=4,
+                "expected few; the result may be worse than rtol says; integrator = 'rodas5p' takes longer steps"
             )
             return

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from functools import lru_cache
 
 import sympy as sp
@@ -14,6 +13,7 @@ from synchain.codegen.kernels.sweep import KernelSource, emit
 from synchain.codegen.simd.lane_types import WIDTHS
 from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.checks import check_integer
+from synchain.models.inputs.keywords import warn
 from synchain.models.scenes.scene import Scene
 
 from .choice import chosen_integrator
@@ -84,9 +84,7 @@ def warn_of_chords(source: KernelSource) -> None:
     words = {"sample": "trajectory", "cut": "sections", "tally": "observables"}
     between = [words[r.entry] for r in reversed(source.recorders) if r.entry in words]
     if between and source.method.dense_order < 2:
-        warnings.warn(
+        warn(
             f"{source.integrator} draws straight lines between its steps, so errors of {' and '.join(between)} are not bounded "
-            "by rtol; take another integrator for these records, e.g. rodas5p",
-            RuntimeWarning,
-            stacklevel=4,
+            "by rtol; take another integrator for these records, e.g. rodas5p"
         )

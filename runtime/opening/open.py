@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import warnings
 from functools import cache
 from pathlib import Path
 
 import xarray as xr
 
 from synchain.models.inputs.checks import check_path
+from synchain.models.inputs.keywords import warn
 
 from ..results.block_log import is_block_log
 from ..results.codec import decode
@@ -105,10 +105,9 @@ def _value(data: xr.Dataset, path: Path) -> Labelled:
 def _as_it_was(result: Result, path: Path) -> Result:
     """The result, after a warning if the code of its model has changed."""
     if changed(result.data.attrs, result.scene):
-        warnings.warn(
+        warn(
             f"{path}: the code of its model has changed since it was written: its numbers are those of the former "
             "model, its scene has the equations of the present one; restore the code, or run it again",
             UserWarning,
-            stacklevel=3,
         )
     return result

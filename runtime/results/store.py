@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ import numpy as np
 import xarray as xr
 
 from synchain.models.inputs.checks import check_path
+from synchain.models.inputs.keywords import warn
 from synchain.models.inputs.regular_file import open_regular
 
 from ..support.files import check_replaceable, synced, whole_file, whole_folder
@@ -172,11 +172,7 @@ def read_data(path: Path) -> xr.Dataset:
 def attributes_of(attributes: dict[str, object], path: Path) -> dict[str, object]:
     """The attributes of a file without its digest; a RuntimeWarning says if there is none."""
     if "scene" in attributes and DIGEST not in attributes:
-        warnings.warn(
-            f"{path} has no digest, so damage of its numbers cannot be seen; open it and save it with Result.save",
-            RuntimeWarning,
-            stacklevel=4,
-        )
+        warn(f"{path} has no digest, so damage of its numbers cannot be seen; open it and save it with Result.save")
     return {str(name): value for name, value in attributes.items() if name != DIGEST}
 
 

@@ -8,7 +8,6 @@ Source: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -17,6 +16,7 @@ import numpy as np
 import xarray as xr
 
 from synchain.models.dynamics.variational import Variation, clustered
+from synchain.models.inputs.keywords import warn
 from synchain.models.scenes.scene import Scene
 from synchain.models.symmetries.clusters import Clusters, clusters
 
@@ -249,11 +249,9 @@ def cluster_exponents(
     apart = np.max(gaps[dropped:], axis=0)
     approaching = _pairs(_falls(np.array(gaps[dropped // 2 :])) & (apart >= MERGED))
     if approaching:
-        warnings.warn(
+        warn(
             f"cluster_exponents: found clusters that approach each other, {_words(approaching)}; expected settled ones, "
-            f"the exponents may be those of fewer clusters; raise transient = {averaging.transient:g}",
-            RuntimeWarning,
-            stacklevel=2,
+            f"the exponents may be those of fewer clusters; raise transient = {averaging.transient:g}"
         )
     mean, error, time = batches.mean()[0], np.hypot(batches.error_by_start(), steps)[0], batches.time
     return ClusterExponents(partition, mean[1:], error[1:], float(mean[0]), float(error[0]), apart, time, approaching)

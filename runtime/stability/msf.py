@@ -8,7 +8,6 @@ Sources: classes by the zeros of the function on alpha > 0, Huang, Chen, Lai & P
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -20,6 +19,7 @@ import xarray as xr
 from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.dynamics.variational import mode
 from synchain.models.inputs.checks import check_integer
+from synchain.models.inputs.keywords import warn
 from synchain.models.inputs.result_names import expect_free
 from synchain.models.scenes.scene import Scene, a_scene
 
@@ -440,10 +440,10 @@ def plane(
     rows, given = whole.parted()
     strengths = {name: values for name, values in zip(STRENGTHS, (alpha, beta), strict=True) if values is not None}
     if beta is not None and "beta" not in whole.values and a_scene(scene).takes("beta"):
-        warnings.warn(
+        warn(
             "plane: found beta, the imaginary part of strengths, and a parameter of that name; "
             "write parameters={'beta': …} for the parameter",
-            stacklevel=2,
+            UserWarning,
         )
     if both := strengths.keys() & rows.keys():
         raise ValueError(

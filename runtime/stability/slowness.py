@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import warnings
 
 import numpy as np
 
 from synchain.models.dynamics.equations import Equations
+from synchain.models.inputs.keywords import warn
 
 from ..cells.rates import rates
 
@@ -37,9 +37,7 @@ def warn_of_slow_motion(equations: Equations, states: np.ndarray, numbers: np.nd
         return
     fastest = max(max(rates(equations, state, numbers)[:2]) for state in states)
     if 0.0 < fastest * averaged < TURN:
-        warnings.warn(
+        warn(
             f"found an orbit that has neither turned nor settled in the average of {averaged:.3g} units of time, its fastest rate is "
-            f"{fastest:.1g}; expected {TURN / fastest:.1g} units at least; lower precision, raise transient and periods, or take faster units",
-            RuntimeWarning,
-            stacklevel=3,
+            f"{fastest:.1g}; expected {TURN / fastest:.1g} units at least; lower precision, raise transient and periods, or take faster units"
         )
