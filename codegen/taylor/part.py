@@ -155,9 +155,13 @@ class Part(Order):
         found = list[Statement]()
         for s in self.graph.series:
             if isinstance(s, Exponential):
-                slopes = [times(Number(s.steepness / k), self.at(s.slope, k)) for k in range(1, self.order)]
-                found += distant(self.recall(s.exponent), slopes)
+                further = [times(Number(s.steepness), self.further(s, k)) for k in range(1, self.order)]
+                found += distant(self.recall(s.exponent), further)
         return self.run(found)
+
+    def further(self, series: Exponential, k: int) -> Expression:
+        """Coefficient k > 0 of what a series is an exponential of."""
+        return times(Number(1.0 / k), self.at(series.slope, k))
 
     def counted(self, series: Series) -> list[Statement]:
         """Let the last coefficients of a series count, in units of the error that it may have beside its low ones."""

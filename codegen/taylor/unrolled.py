@@ -21,7 +21,7 @@ from .length import SEEN, last_orders, reach
 from .masses import moving, solved
 from .part import Gaps, Part
 from .passage import Stored, approached, further
-from .series import Constant, Series, State, Time, magnitude
+from .series import Constant, Exponential, Series, State, Time, magnitude
 from .step import StepWriter, TaylorStep, check_order
 from .terms import add, largest, times
 
@@ -123,6 +123,9 @@ class Lines(Part):
         stores: list[Statement] = [Store("dense", place, e) for place, e in zip(places, known, strict=True)]
         firsts = places[:: self.order + 1]
         return stores, [Stored(size, first, Number(1), self.order) for size, first in zip(sizes, firsts, strict=True)]
+
+    def further(self, series: Exponential, k: int) -> Expression:
+        return self.at(series.argument, k)
 
     def near(self, series: Series, ends: Sequence[Statement]) -> list[Statement]:
         return approached(self.known(series), ends)
