@@ -205,8 +205,8 @@ class Step(ABC):
 
     def scaled_error(self, error: Value, old: Value, new: Value) -> Expression:
         """The error of a state in units of its tolerance: the one estimate, or the two of `embedded` as one."""
-        scaling = ("scaled", error) if len(self.method.e) == 1 else ("pair", "e5", "e3", "h")
-        return call(*scaling, old, new, "rtol", "atol")
+        own = ("scaled", error) if len(self.method.e) == 1 else ("pair", "e5", "e3", "h")
+        return call(*own, old, new, "rtol", "atol")
 
     def dense_value(self, row: Sequence[float], values: Sequence[str]) -> Expression:
         """What a row of the dense output holds of a state: stages of explicit methods are rates."""

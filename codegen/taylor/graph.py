@@ -304,13 +304,8 @@ class Graph:
         Two values agree where the series is zero.
         """
         if isinstance(gap, Constant) and isinstance(gap.value, Number):
-            return (
-                values[0]
-                if gap.value.value > 0.0
-                else values[-1]
-                if gap.value.value < 0.0
-                else values[len(values) // 2]
-            )
+            size, middle = gap.value.value, values[len(values) // 2]
+            return values[0] if size > 0.0 else values[-1] if size < 0.0 else middle
         factor, inner = split(gap)
         side, kind = (Kink, Choice) if len(values) == 2 else (Brink, Leaping)
         if not isinstance(factor, Number):

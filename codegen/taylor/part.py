@@ -155,11 +155,11 @@ class Part(Order):
         found = list[Statement]()
         for s in self.graph.series:
             if isinstance(s, Exponential):
-                further = [times(Number(s.steepness), self.further(s, k)) for k in range(1, self.order)]
+                further = [times(Number(s.steepness), self.of_exponent(s, k)) for k in range(1, self.order)]
                 found += distant(self.recall(s.exponent), further)
         return self.run(found)
 
-    def further(self, series: Exponential, k: int) -> Expression:
+    def of_exponent(self, series: Exponential, k: int) -> Expression:
         """Coefficient k > 0 of what a series is an exponential of."""
         return times(Number(1.0 / k), self.at(series.slope, k))
 

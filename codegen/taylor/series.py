@@ -286,9 +286,9 @@ class Peak(Exponential):
     def begin(self, at: Order) -> Expression:
         start = at.of(self.argument)
         at.keep(self.exponent, times(Number(-self.steepness), absolute(start)))
-        return self.at(start)
+        return self.value(start)
 
-    def at(self, start: Expression) -> Expression:
+    def value(self, start: Expression) -> Expression:
         """Its value where a is `start`."""
         raise NotImplementedError
 
@@ -299,7 +299,7 @@ class Crest(Peak):
 
     ends: tuple[float, float] = (1.0, 1.0)
 
-    def at(self, start: Expression) -> Expression:
+    def value(self, start: Expression) -> Expression:
         c, d = map(Number, self.ends)
         rising, falling = Call("exp", (start,)), Call("exp", (times(Number(-1.0), start),))
         return over(d, times(add(c, times(d, rising)), add(d, times(c, falling))))
@@ -309,7 +309,7 @@ class Crest(Peak):
 class Secant(Peak):
     """u = 1/cosh(a) from u' = -u tanh(a) a'; cosh(a) may overflow."""
 
-    def at(self, start: Expression) -> Expression:
+    def value(self, start: Expression) -> Expression:
         return over(ONE, Call("cosh", (start,)))
 
 
@@ -319,7 +319,7 @@ class SquaredSecant(Peak):
 
     steepness = 2.0
 
-    def at(self, start: Expression) -> Expression:
+    def value(self, start: Expression) -> Expression:
         secant = over(ONE, Call("cosh", (start,)))
         return times(secant, secant)
 

@@ -124,7 +124,7 @@ class Lines(Part):
         firsts = places[:: self.order + 1]
         return stores, [Stored(size, first, Number(1), self.order) for size, first in zip(sizes, firsts, strict=True)]
 
-    def further(self, series: Exponential, k: int) -> Expression:
+    def of_exponent(self, series: Exponential, k: int) -> Expression:
         return self.at(series.argument, k)
 
     def near(self, series: Series, ends: Sequence[Statement]) -> list[Statement]:

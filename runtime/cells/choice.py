@@ -44,8 +44,8 @@ LAYER = 0.1
 def chosen_integrator(reduction: Reduction) -> Integrator:
     """Return the integrator of a scene, the fastest at equal error where the scene says "auto".
 
-    Where the equations are not stiff in the extreme cells of the sweep and in a sample of the others, and between the events of set-valued friction:
-    power series if all functions are analytic between kinks, and between jumps along which no motion slides, explicit steps
+    Where the equations are not stiff in the extreme cells of the sweep and in a sample of the others, and between the
+    events of set-valued friction: power series if all functions are analytic between kinks, and between jumps along which no motion slides, explicit steps
     otherwise. Nodes or links with a mass matrix take explicit steps too: the recurrences of a dense matrix take longer to
     compile than most runs. Elsewhere Rosenbrock steps, or a switching pair of methods for two oscillators at a tight
     tolerance. A mean field of more nodes than Rosenbrock steps can take, whose Jacobian has an entry for each pair, takes

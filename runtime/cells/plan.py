@@ -42,7 +42,7 @@ FIRST_STEP, SHORT = 1e-4, 0.1
 control enlarges it sixfold at a time."""
 
 LOOKED_AT = 200
-"""Nodes of all cells at whose growth is looked."""
+"""Nodes of all cells at whose rates is looked."""
 
 MOST = 144
 """Rows of the parameters of the drive's jumps and kinks at which these are looked at."""

@@ -55,10 +55,6 @@ NO_LEGS, NO_TRACKS = NO_PANELS[-4:-1], NO_PANELS[-1]
 batch begins with is not asked for."""
 
 
-FINISHED = int(Status.FINISHED)
-"""Status of an orbit that can be integrated, as kernels write it."""
-
-
 @dataclass(slots=True)
 class Travellers:
     """Deviations of all strengths, which propagators move.
@@ -376,7 +372,7 @@ class VariationalIntegrator:
             self.kernel.drive(0, cells, *rest)
         else:
             self._share(np.linspace(0, cells, min(cells, self.workers) + 1).astype(int), rest)
-        bad = counts[:, 0] != FINISHED
+        bad = counts[:, 0] != Status.FINISHED
         if bad.any():
             status = Status(int(counts[bad.argmax(), 0]))
             largest = np.hypot.reduce(self.strengths).max()
