@@ -8,6 +8,7 @@ the versions of Python, Numba and llvmlite, and the processor.
 
 from __future__ import annotations
 
+import ast
 import atexit
 import functools
 import gc
@@ -39,7 +40,7 @@ from synchain.models.inputs.keywords import warn
 
 from ..driver import dimensions
 from ..driver.dimensions import Dimensions, ModeDimensions
-from ..simd import addresses, decorator, elementary, lane_types, lanes, special
+from ..simd import addresses, decorator, elementary, lane_types, lanes, special, syntax
 from ..simd.addresses import ADDRESS
 from ..simd.lane_types import Lane, Mask
 from ..steps.names import NAMES
@@ -425,7 +426,9 @@ def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) 
     elsewhere, numba.config.CACHE_DIR = numba.config.CACHE_DIR, ""  # nothing is made in a folder of Numba's own
     sys.modules[path.stem] = module  # Numba looks its functions up there
     try:
-        exec(compile(text, str(path), "exec"), module.__dict__)
+        tree = ast.parse(text, str(path))
+        setattr(module, decorator.SYNTAX, {part.name: part for part in tree.body if isinstance(part, ast.FunctionDef)})
+        exec(compile(tree, str(path), "exec"), module.__dict__)
         functions = {name: getattr(module, name) for name in wanted}
         for name, function in functions.items():
             function._cache._cache_file = code
@@ -447,6 +450,7 @@ def _surroundings() -> str:
         Path(m.__file__).read_text(encoding="utf-8")
         for m in (
             decorator,
+            syntax,
             addresses,
             lane_types,
             lanes,

@@ -11,15 +11,35 @@ from typing import Any
 import numba
 from llvmlite.binding.newpassmanagers import ModulePassManager
 from numba import types
-from numba.core import base, codegen, errors, interpreter, ir, lowering, postproc, transforms, typeinfer, utils
+from numba.core import (
+    base,
+    bytecode,
+    codegen,
+    errors,
+    interpreter,
+    ir,
+    lowering,
+    postproc,
+    transforms,
+    typeinfer,
+    utils,
+)
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_machinery import PassManager, register_pass
-from numba.core.typed_passes import AnnotateTypes, InlineOverloads, NativeLowering, NopythonRewrites
+from numba.core.compiler_machinery import FunctionPass, PassManager, register_pass
+from numba.core.typed_passes import AnnotateTypes, InlineOverloads, NativeLowering, NoPythonBackend, NopythonRewrites
 from numba.core.typing.context import BaseContext
-from numba.core.untyped_passes import InlineClosureLikes, InlineInlinables, WithLifting
+from numba.core.untyped_passes import (
+    ExtractByteCode,
+    InlineClosureLikes,
+    InlineInlinables,
+    TranslateByteCode,
+    WithLifting,
+)
 
-__all__ = ["njit", "without_repetition"]
+from . import syntax
+
+__all__ = ["SYNTAX", "njit", "without_repetition"]
 
 
 class _Linked(JITCodeLibrary):
@@ -48,9 +68,68 @@ class _Linked(JITCodeLibrary):
         """Do nothing; only machine code has a place for objects of Python."""
 
 
+class _Read(ir.FunctionIR):
+    """What Numba asks of a function that was read from its syntax tree."""
+
+    def __init__(self, identity: Any, program: syntax.Program) -> None:
+        place = ir.Loc(identity.filename, identity.firstlineno)
+        blocks = {0: ir.Block(ir.Scope(None, place), place)}
+        super().__init__(blocks, False, identity, place, {}, identity.arg_count, identity.arg_names)
+        self.program = program
+
+
+class _Lower(lowering.Lower):
+    """Numba's lowering, and that of functions that were read."""
+
+    def lower_normal_function(self, fndesc: Any) -> None:
+        if isinstance(self.func_ir, _Read):
+            self.setup_function(fndesc)
+            self.func_ir.program.write(self, self.extract_function_arguments())
+        else:
+            super().lower_normal_function(fndesc)
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
-class _LinkedLowering(NativeLowering):
-    """Lowering into a `_Linked` library."""
+class _Reading(FunctionPass):
+    """Reads a function from its syntax tree, if its module has one."""
+
+    _name = "reading"
+
+    def __init__(self) -> None:
+        super().__init__()
+
+    def run_pass(self, state: Any) -> bool:
+        function, identity = state.func_id.func, state.func_id
+        tree = function.__globals__.get(SYNTAX, {}).get(function.__name__)
+        if tree is None:
+            raise syntax.UnreadError
+        program = syntax.read(state.typingctx, tree, function.__globals__, state.args, state.return_type)
+        state.func_ir, state.calltypes, state.return_type = _Read(identity, program), {}, program.result
+        state.typemap = {f"arg.{name}": kind for name, kind in zip(identity.arg_names, state.args, strict=True)}
+        return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Translation(TranslateByteCode):
+    """Numba's translation, with the bytecode that it begins with."""
+
+    def run_pass(self, state: Any) -> bool:
+        state.status.fail_reason = None  # that the function was not read is no error
+        ExtractByteCode().run_pass(state)
+        return bool(super().run_pass(state))
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Lowering(NativeLowering):
+    """Lowering by `_Lower`."""
+
+    _name = "lowering"
+    lowering_class = _Lower
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _LinkedLowering(_Lowering):
+    """The same into a `_Linked` library."""
 
     _name = "linked_lowering"
 
@@ -60,31 +139,45 @@ class _LinkedLowering(NativeLowering):
 
 
 class _Compiler(CompilerBase):
-    """Numba's compiler without the passes for what kernels have none of, or nobody reads."""
+    """Compiles a function from its syntax tree, or as Numba does.
 
+    Numba's way goes without the passes for what kernels have none of, or nobody reads.
+    """
+
+    lowering: type = _Lowering
     unused = (AnnotateTypes, InlineClosureLikes, InlineInlinables, InlineOverloads, NopythonRewrites, WithLifting)
     """The listing with types, closures, functions that are inlined by Numba, expressions of whole arrays, `with`."""
 
-    def define_pipelines(self) -> list[PassManager]:
-        manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        manager.passes = [(self.instead(p), why) for p, why in manager.passes if p not in self.unused]
-        manager.finalize()
-        return [manager]
+    def compile_extra(self, func: Any) -> Any:
+        self.state.func_id, self.state.lifted = bytecode.FunctionIdentity.from_function(func), ()
+        return self._compile_bytecode()
 
-    @staticmethod
-    def instead(one: type) -> type:
-        """Return the pass that stands in the place of one of Numba's."""
-        return one
+    def define_pipelines(self) -> list[PassManager]:
+        lower = [(self.lowering, "lower"), (NoPythonBackend, "backend")]
+        whole = DefaultPassBuilder.define_nopython_pipeline(self.state).passes
+        before = whole[: [one for one, _ in whole].index(NativeLowering)]
+        kept = [
+            (_Translation if one is TranslateByteCode else one, why) for one, why in before if one not in self.unused
+        ]
+        return [_manager("syntax", [(_Reading, "read"), *lower]), _manager("bytecode", [*kept, *lower])]
+
+
+def _manager(name: str, passes: list[tuple[type, str]]) -> PassManager:
+    """Passes that follow each other; if one has an error of Numba, the next ones of a compiler are tried."""
+    manager = PassManager(name)
+    manager.passes = passes
+    manager.finalize()
+    return manager
 
 
 class _LinkedCompiler(_Compiler):
-    """The compiler with that lowering."""
+    """The compiler of functions that others link."""
 
-    @staticmethod
-    def instead(one: type) -> type:
-        return _LinkedLowering if one is NativeLowering else one
+    lowering = _LinkedLowering
 
 
+SYNTAX = "__syntax__"
+"""What a module calls the syntax trees of its functions, by their names."""
 ENTRY = {"pipeline_class": _Compiler}
 INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": _LinkedCompiler}
 

@@ -1,0 +1,178 @@
+"""Functions that are read from their syntax tree: they have the bits that Numba's own way gives them."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import types
+from numba.core import errors
+
+from synchain.codegen.kernels.compile import _compile, _MachineCode
+from synchain.codegen.simd import syntax
+
+HEAD = """import math
+import numpy as np
+from synchain.codegen.simd import absolute, any_lane, broadcast, load, maximum, minimum, njit, select, sqrt, store
+SIX, YES, NO = 6, True, False
+
+@njit(error_model="numpy")
+def both(x, y):
+    return x + y, x * y
+
+"""
+VECTOR = types.float64[::1]
+ARGUMENTS = (VECTOR, VECTOR, types.int64, types.UniTuple(types.float64, 2))
+
+
+def _in_both_ways(bodies: dict[str, str], folder: Path) -> tuple[dict[str, tuple[Any, Any]], list[str]]:
+    """Functions of these bodies compiled from their syntax and by Numba's own way, by name, and the names of those read."""
+    names = [f"f{k}" for k in range(len(bodies))]
+    text = HEAD
+    for name, body in zip(names, bodies.values(), strict=True):
+        lines = "\n".join("    " + line for line in body.splitlines())
+        text += f'\n\n@njit(error_model="numpy", cache=True)\ndef {name}(x, out, n, pair):\n{lines}\n'
+    path, found, reader = folder / "text.py", list[str](), syntax.read
+    path.write_text(text)
+
+    def told(context: Any, tree: Any, *more: Any) -> Any:
+        program = reader(context, tree, *more)
+        found.append(tree.name)
+        return program
+
+    def refuse(*_: Any) -> Any:
+        raise syntax.UnreadError
+
+    compiled = []
+    for way in (told, refuse):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(syntax, "read", way)
+            wanted = dict.fromkeys(names, types.void(*ARGUMENTS))
+            compiled.append(_compile(text, path, wanted, _MachineCode()).functions)
+    pairs = {body: (compiled[0][name], compiled[1][name]) for name, body in zip(names, bodies, strict=True)}
+    return pairs, [body for name, body in zip(names, bodies, strict=True) if name in found]
+
+
+def _filled(function: Any, seed: int, n: int) -> bytes:
+    """What a function makes of some numbers, to the bit."""
+    draw = np.random.default_rng(seed)
+    x, out = draw.normal(size=64), np.zeros(64)
+    function(x, out, n, (0.3, -1.7))
+    return out.tobytes()
+
+
+READ = {
+    "sums and products": "a, b = load(x, 0, 4), load(x, 1, 4)\nc = a*b\nstore(out, 0, c + b)\nstore(out, 1, -c - 2*a)",
+    "a product of another block": "a = load(x, 0, 4)\nc = a*a\nif n > 2:\n    store(out, 0, c + a)\nstore(out, 1, a - c)",
+    "a choice that is known": "a = x[0]*x[1]\nif YES:\n    b = a + 1.0\nelse:\n    b = nothing\nout[0] = a - b",
+    "loops": "s = 0.0\nfor k in range(n):\n    for j in range(k, 0, -1):\n        s += x[k]*x[j] - j\n    out[k] = s",
+    "loops in steps": "for k in range(1, n, 2):\n    out[k] = k*k\nfor k in range(n, 0, -3):\n    out[k + 9] = x[k]",
+    "a loop that ends": "k = 0\nwhile True:\n    k = k + 1\n    if x[k] > 0.5:\n        continue\n    if k > n:\n        break\n    out[k] = k",
+    "a condition": "k = n\nwhile k > 0 and x[k] < 0.9 or k == 5:\n    k -= 1\n    out[k] = 1.0 if x[k] > 0.0 else k",
+    "masks": "a = load(x, 1, 4)\nm = (a > 0.0) & ~(a >= 1.0)\nif any_lane(m):\n    store(out, 1, select(m, a, 0.0))",
+    "tuples": "a, b = both(x[0], x[1])\na, b = b, a\nout[0] = a\nout[1] = b - pair[1]",
+    "numbers": "k = n % 4\nj = n // 3\nout[k] = (k << 2) | (j >> 1)\nout[j + 8] = -SIX + n**2 + x[0]**3 + math.pi",
+    "the larger": "out[0] = max(x[0], 0.25, x[1])\nout[1] = min(n, 3) + x.shape[0] + len(out)",
+    "a variable of two types": "a = 1\na = 2.5*a\nout[0] = a",
+    "negations": "if not n == 3:\n    out[0] = -x[0]\nif n:\n    out[1] = ~n",
+    "an early end": "if n > 4:\n    out[0] = 1.0\n    return\nout[0] = 2.0",
+    "values from the end": "out[n - 10] = x[-1] + x[n - 12]",
+}  # fmt: skip
+
+
+def test_what_is_read_has_the_bits_of_numbas_own_way(tmp_path: Path) -> None:
+    pairs, names = _in_both_ways(READ, tmp_path)
+    assert names == [*READ]
+    for name, (read, numbas) in pairs.items():
+        assert any(_filled(read, n, n).strip(b"\0") for n in range(9)), name
+        for n in range(9):
+            assert _filled(read, n, n) == _filled(numbas, n, n), name
+
+
+LEFT = {
+    "memory that is allocated": "a = np.empty(3)\na[0] = x[n]\nout[0] = a[0]",
+    "a part of an array": "a = x[1:4]\nout[0] = a[1]",
+    "an argument by name": "a, b = both(y=x[0], x=x[1])\nout[0] = a",
+    "two conditions in a row": "out[0] = 1.0 if 0 < n < 4 else 2.0",
+    "one value for two": "a = b = x[0]\nout[0] = a + b",
+    "a loop over values": "for a in (1.0, 2.5):\n    out[0] += a",
+    "an element that is added to": "out[n] += 2.0",
+    "a type for each block": "a = 1\nif n > 2:\n    a = 2.5\nout[0] = a",
+    "a tuple's unknown part": "out[0] = pair[n % 2]",
+    "a step that is not known": "for k in range(0, 6, n + 1):\n    out[k] = x[k]",
+    "a loop with another end": "for k in range(n):\n    if x[k] > 9.0:\n        break\nelse:\n    out[0] = 1.0",
+}
+
+
+def test_what_is_not_read_is_left_to_numba(tmp_path: Path) -> None:
+    pairs, names = _in_both_ways(LEFT, tmp_path)
+    assert names == []
+    for name, (left, numbas) in pairs.items():
+        for n in range(9):
+            assert _filled(left, n, n) == _filled(numbas, n, n), name
+
+
+def test_an_error_is_that_of_numba(tmp_path: Path) -> None:
+    with pytest.raises(errors.TypingError, match="Unknown attribute 'nothing'"):
+        _in_both_ways({"an unknown attribute": "out[0] = x.nothing"}, tmp_path)
+
+
+class _Author:
+    """Writes random functions: assignments, choices and loops over lanes, numbers and integers."""
+
+    def __init__(self, seed: int) -> None:
+        self.random = random.Random(seed)
+
+    def lane(self, depth: int = 3) -> str:
+        pick = self.random.choice
+        if depth == 0 or self.random.random() < 0.15:
+            return pick(["a", "b", "c", "s", "2.0", "0.3", "pair[0]", "load(x, n % 3, 4)"])
+        one, two = self.lane(depth - 1), self.lane(depth - 1)
+        forms = ["{} + {}", "{} - {}", "{}*{}", "{}*{}", "maximum({}, b*{})", "select(a > {}, b, c*{})", "-{} - {}"]
+        return "(" + pick(forms).format(one, two) + ")"
+
+    def number(self) -> str:
+        return self.random.choice(
+            ["s", "x[k]", "0.5*s + x[n]", "s*x[k] - pair[1]", "max(s, x[2])", "s if k > 3 else x[1]"]
+        )
+
+    def statements(self, depth: int) -> list[str]:
+        found = []
+        for _ in range(self.random.randint(2, 5)):
+            kind = self.random.random()
+            if depth and kind < 0.2:
+                test = self.random.choice(["n > 3", "k < 2 or s > 0.0", "any_lane(a > b)", "not k == n", "YES", "NO"])
+                found += [f"if {test}:", *self.inner(depth), "else:", *self.inner(depth)]
+            elif depth and kind < 0.35:
+                bounds = self.random.choice(["k % 4", "1, 5", "5, 0, -2"])
+                index = "ij"[depth % 2]
+                found += [f"for {index} in range({bounds}):", *self.inner(depth), f"    out[40 + {index}] = s"]
+            elif kind < 0.5:
+                found.append(f"s = {self.number()}")
+            elif kind < 0.6:
+                found.append(self.random.choice(["k = (k + 3) % 7", "k += 1", "k = min(k, n)"]))
+            elif kind < 0.7:
+                found.append("a, b = b*c + a, a")
+            else:
+                found.append(f"{self.random.choice('abc')} = {self.lane()} + 0.0*a")
+        return found
+
+    def inner(self, depth: int) -> list[str]:
+        return ["    " + line for line in self.statements(depth - 1)]
+
+    def body(self) -> str:
+        first = ["a, b, c = load(x, 0, 4), load(x, 1, 4), load(x, 2, 4)", "s, k = x[5], n", "k = k % 7"]
+        last = ["store(out, 0, a)", "store(out, 1, b)", "store(out, 2, c)", "out[30] = s", "out[31] = k"]
+        return "\n".join([*first, *self.statements(3), *last])
+
+
+def test_random_functions_have_the_bits_of_numbas_own_way(tmp_path: Path) -> None:
+    bodies = {str(seed): _Author(seed).body() for seed in range(8)}
+    pairs, names = _in_both_ways(bodies, tmp_path)
+    assert names == [*bodies]
+    for seed, (read, numbas) in pairs.items():
+        for n in range(7):
+            assert _filled(read, n, n) == _filled(numbas, n, n), bodies[seed]
