@@ -8,7 +8,6 @@ the versions of Python, Numba and llvmlite, and the processor.
 
 from __future__ import annotations
 
-import ast
 import atexit
 import functools
 import gc
@@ -426,9 +425,7 @@ def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) 
     elsewhere, numba.config.CACHE_DIR = numba.config.CACHE_DIR, ""  # nothing is made in a folder of Numba's own
     sys.modules[path.stem] = module  # Numba looks its functions up there
     try:
-        tree = ast.parse(text, str(path))
-        setattr(module, decorator.SYNTAX, {part.name: part for part in tree.body if isinstance(part, ast.FunctionDef)})
-        exec(compile(tree, str(path), "exec"), module.__dict__)
+        decorator.execute(text, str(path), module.__dict__)
         functions = {name: getattr(module, name) for name in wanted}
         for name, function in functions.items():
             function._cache._cache_file = code

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import functools
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
@@ -39,7 +40,7 @@ from numba.core.untyped_passes import (
 
 from . import syntax
 
-__all__ = ["SYNTAX", "njit", "without_repetition"]
+__all__ = ["execute", "njit", "without_repetition"]
 
 
 class _Linked(JITCodeLibrary):
@@ -178,6 +179,13 @@ class _LinkedCompiler(_Compiler):
 
 SYNTAX = "__syntax__"
 """What a module calls the syntax trees of its functions, by their names."""
+
+
+def execute(text: str, path: str, space: dict[str, Any]) -> None:
+    """Run the text of a module in a namespace, with the syntax from which its functions are compiled."""
+    tree = ast.parse(text, path)
+    space[SYNTAX] = {part.name: part for part in tree.body if isinstance(part, ast.FunctionDef)}
+    exec(compile(tree, path, "exec"), space)
 ENTRY = {"pipeline_class": _Compiler}
 INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": _LinkedCompiler}
 

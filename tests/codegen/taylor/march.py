@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit as numba_njit
 
 from synchain.codegen import simd
-from synchain.codegen.simd.decorator import without_repetition
+from synchain.codegen.simd.decorator import execute, without_repetition
 from synchain.codegen.steps.names import tidy
 from synchain.codegen.steps.program import program
 from synchain.codegen.taylor import TaylorStep, write_looped, write_step
@@ -88,7 +88,7 @@ def compiled(equations: Equations, order: int, width: int = 1, dense: bool = Fal
     written = write_looped(tidy(equations), order) if looped else step_of(equations, order)
     space = {**SPACE, "WIDTH": width, "DIMENSION": equations.dimension, "NODES": equations.n, "DENSE": dense}
     space["DENSE_ROWS"] = order
-    exec(written.text, space)
+    execute(written.text, "<step>", space)
     if looped:
         graph, weights, inner = plan.arrays, plan.weights, space["step"]
         space["step"] = numba_njit(error_model="numpy")(
