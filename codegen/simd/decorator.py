@@ -186,6 +186,8 @@ def execute(text: str, path: str, space: dict[str, Any]) -> None:
     tree = ast.parse(text, path)
     space[SYNTAX] = {part.name: part for part in tree.body if isinstance(part, ast.FunctionDef)}
     exec(compile(tree, path, "exec"), space)
+
+
 ENTRY = {"pipeline_class": _Compiler}
 INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": _LinkedCompiler}
 

@@ -14,6 +14,7 @@ import operator
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from types import ModuleType
 from typing import Any, TypeAlias
 
@@ -60,10 +61,11 @@ class UnreadError(errors.NumbaError):
 
 @dataclass(frozen=True, slots=True)
 class Typed:
-    """An expression: its type, and what writes its code and returns its value."""
+    """An expression: its type, what writes its code and returns its value, and whether that is an array of nobody else."""
 
     kind: types.Type
     write: Write
+    owned: bool = False
 
     def cast(self, kind: types.Type) -> Write:
         """What writes the value as one of another type."""
@@ -74,15 +76,31 @@ class Typed:
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """A function that was read: what writes its statements, the type of its result, and the variables of one block alone."""
+    """A function that was read.
+
+    Attributes
+    ----------
+    statements : tuple of callable
+        What writes its statements.
+    result : numba.types.Type
+        The type of what it returns.
+    local : frozenset of str
+        The variables of one block alone.
+    arrays : dict
+        The variables that keep arrays alive, and their types.
+    """
 
     statements: tuple[Write, ...]
     result: types.Type
     local: frozenset[str]
+    arrays: dict[str, types.Type]
 
     def write(self, lower: lowering.Lower, arguments: Sequence[Value]) -> None:
         """Write the code of the function, whose arguments have these values."""
         writer = Writer(lower, self)
+        for name, kind in self.arrays.items():
+            whole = lower.context.get_value_type(kind)
+            writer.slots[name] = cgutils.alloca_once(writer.builder, whole, zfill=True)
         for name, value in zip(lower.fndesc.args, arguments, strict=True):
             writer.set(name, value)
         writer.write(self.statements)
@@ -99,6 +117,7 @@ class Writer:
     values: dict[str, Value] = field(default_factory=dict)
     slots: dict[str, Value] = field(default_factory=dict)
     ends: list[tuple[ir.Block, ir.Block]] = field(default_factory=list)
+    lent: list[tuple[types.Type, Value]] = field(default_factory=list)
 
     @property
     def builder(self) -> ir.IRBuilder:
@@ -130,9 +149,26 @@ class Writer:
         if name in self.program.local:
             self.values[name] = value
         elif name in self.slots:
+            self.release(name)
             self.builder.store(value, self.slots[name])
         else:
             self.slots[name] = self.memory(value)
+
+    def keep(self, kind: types.Type, value: Value) -> Value:
+        """An array that one variable more keeps alive."""
+        self.context.nrt.incref(self.builder, kind, value)
+        return value
+
+    def release(self, name: str) -> None:
+        """Keep the array of a variable alive no longer."""
+        if name in self.program.arrays:
+            self.context.nrt.decref(self.builder, self.program.arrays[name], self.get(name))
+
+    def take_back(self, first: int) -> None:
+        """Keep arrays that were lent to a function alive no longer."""
+        for kind, value in self.lent[first:]:
+            self.context.nrt.decref(self.builder, kind, value)
+        del self.lent[first:]
 
     def memory(self, value: Value) -> Value:
         """Memory that holds a value to begin with."""
@@ -157,6 +193,18 @@ class Writer:
         self.builder.cbranch(test(self), holds, fails)
         self.inside(holds, yes, after)
         self.inside(fails, no, after)
+        self.builder.position_at_end(after)
+
+    def each(self, bodies: Sequence[Write]) -> None:
+        """Write what is done in turn."""
+        (after,) = self.blocks(1)
+        for body in bodies:
+            (on,) = self.blocks(1)
+            self.ends.append((on, after))
+            self.inside(self.builder.block, body, on)
+            self.ends.pop()
+            self.builder.position_at_end(on)
+        self.builder.branch(after)
         self.builder.position_at_end(after)
 
     def loop(self, test: Write | None, body: Write, step: Write) -> None:
@@ -201,6 +249,43 @@ def read(
     return _Reader(context, names).function(tree, args, result)
 
 
+def gathered(parts: Sequence[Typed]) -> Typed:
+    """A tuple."""
+    if any(part.owned for part in parts):
+        raise UnreadError
+    kind = types.BaseTuple.from_types([part.kind for part in parts])
+    return Typed(kind, lambda w: w.context.make_tuple(w.builder, kind, [part.write(w) for part in parts]))
+
+
+def part(value: Typed, k: int) -> Typed:
+    """A part of a tuple."""
+    return Typed(value.kind.types[k], lambda w: w.builder.extract_value(value.write(w), k))
+
+
+def lent(value: Typed) -> Typed:
+    """The argument of a function, which has it to its end."""
+    if not value.owned:
+        return value
+
+    def write(w: Writer) -> Value:
+        found = value.write(w)
+        w.lent.append((value.kind, found))
+        return found
+
+    return Typed(value.kind, write)
+
+
+def held(value: Typed) -> tuple[Write, Typed]:
+    """What computes a value, and the value for those that are written behind it."""
+    place: list[Value] = []
+    return lambda w: place.append(value.write(w)), Typed(value.kind, lambda w: place[-1], value.owned)
+
+
+def in_turn(writes: Sequence[Write]) -> Write:
+    """What writes statements that follow each other."""
+    return lambda w: w.write(writes)
+
+
 class _Reader(ast.NodeVisitor):
     """Reads the nodes of a syntax tree, expressions into `Typed`, statements into what writes them.
 
@@ -214,6 +299,7 @@ class _Reader(ast.NodeVisitor):
         self.blocks: defaultdict[str, set[int]] = defaultdict(set)
         self.place = 0
         self.changing: set[str] = set()
+        self.arrays: dict[str, types.Type] = {}
         self.results: list[Typed] = []
 
     def function(self, tree: ast.FunctionDef, args: Sequence[types.Type], result: types.Type | None) -> Program:
@@ -223,10 +309,10 @@ class _Reader(ast.NodeVisitor):
         if not isinstance(tree.body[-1], ast.Return):
             statements.append(self.visit_Return(ast.Return()))
         kind = result or self.common(self.results)
-        local = frozenset(name for name, blocks in self.blocks.items() if len(blocks) == 1)
-        if any(isinstance(part, types.Array) for part in getattr(kind, "types", (kind,))) or not self.changing <= local:
+        local = frozenset(name for name, blocks in self.blocks.items() if len(blocks) == 1 and name not in self.arrays)
+        if not self.changing <= local:
             raise UnreadError
-        return Program(tuple(statements), kind, local)
+        return Program(tuple(statements), kind, local, self.arrays)
 
     def generic_visit(self, node: ast.AST) -> Any:
         """Leave to Numba what has no method here."""
@@ -254,45 +340,28 @@ class _Reader(ast.NodeVisitor):
             signature = self.context.resolve_function_type(kind, tuple(value.kind for value in values), {})
         except errors.TypingError as error:
             raise UnreadError from error
-        if signature is None or signature.recvr or isinstance(signature.return_type, types.Array):
+        if signature is None or signature.recvr:
             raise UnreadError
-        wanted = signature.args
+        wanted, values = signature.args, [lent(value) for value in values]
         if signature.pysig is None:
             given = [value.cast(kind) for value, kind in zip(values, wanted, strict=True)]
         else:
             given = fold_arguments(
-                signature.pysig, values, {}, self.argument(wanted), self.default, self.others(wanted)
+                signature.pysig,
+                values,
+                {},
+                lambda index, _, value: value.cast(wanted[index]),
+                lambda index, _, value: lambda w: w.context.get_constant_generic(w.builder, wanted[index], value),
+                lambda index, _, values: gathered(values).cast(wanted[index]),
             )
 
         def write(w: Writer) -> Value:
+            before = len(w.lent)
             found = w.context.get_function(kind, signature)(w.builder, [argument(w) for argument in given])
+            w.take_back(before)
             return w.context.get_dummy_value() if found is None else found
 
-        return Typed(signature.return_type, write)
-
-    @staticmethod
-    def argument(wanted: Sequence[types.Type]) -> Callable[[int, Any, Typed], Write]:
-        return lambda index, _, value: value.cast(wanted[index])
-
-    @staticmethod
-    def default(*_: Any) -> Write:
-        """Leave an argument that is not given to Numba."""
-        raise UnreadError
-
-    def others(self, wanted: Sequence[types.Type]) -> Callable[[int, Any, Sequence[Typed]], Write]:
-        """What makes a tuple of all further arguments."""
-        return lambda index, _, values: self.gathered(values).cast(wanted[index])
-
-    @staticmethod
-    def gathered(parts: Sequence[Typed]) -> Typed:
-        """A tuple."""
-        kind = types.BaseTuple.from_types([part.kind for part in parts])
-        return Typed(kind, lambda w: w.context.make_tuple(w.builder, kind, [part.write(w) for part in parts]))
-
-    @staticmethod
-    def part(value: Typed, k: int) -> Typed:
-        """A part of a tuple."""
-        return Typed(value.kind.types[k], lambda w: w.builder.extract_value(value.write(w), k))
+        return Typed(signature.return_type, write, isinstance(signature.return_type, types.Array))
 
     def known(self, value: Any) -> Typed:
         """A value that is known when the function is read."""
@@ -356,18 +425,25 @@ class _Reader(ast.NodeVisitor):
         def write(w: Writer) -> Value:
             return w.context.get_getattr(base.kind, name)(w.context, w.builder, base.kind, base.write(w), name)
 
-        return Typed(kind, write)
+        return Typed(kind, write, isinstance(kind, types.Array))
 
     def visit_Subscript(self, node: ast.Subscript) -> Typed:
         base: Typed = self.visit(node.value)
         if not isinstance(base.kind, types.BaseTuple):
             return self.call(operator.getitem, base, self.visit(node.slice))
+        if isinstance(node.slice, ast.Slice):
+            known = (x and ast.literal_eval(x) for x in (node.slice.lower, node.slice.upper, node.slice.step))
+            return gathered([part(base, k) for k in range(len(base.kind))[slice(*known)]])
         if not (isinstance(node.slice, ast.Constant) and isinstance(node.slice.value, int)):
             raise UnreadError
-        return self.part(base, node.slice.value)
+        return part(base, node.slice.value)
+
+    def visit_Slice(self, node: ast.Slice) -> Typed:
+        bounds = [self.known(None) if bound is None else self.visit(bound) for bound in (node.lower, node.upper)]
+        return self.call(slice, *bounds, *([] if node.step is None else [self.visit(node.step)]))
 
     def visit_Tuple(self, node: ast.Tuple) -> Typed:
-        return self.gathered([self.visit(part) for part in node.elts])
+        return gathered([self.visit(part) for part in node.elts])
 
     def visit_BinOp(self, node: ast.BinOp) -> Typed:
         return self.call(OPERATORS[type(node.op)], self.visit(node.left), self.visit(node.right))
@@ -378,7 +454,10 @@ class _Reader(ast.NodeVisitor):
         return self.call(OPERATORS[type(node.op)], self.visit(node.operand))
 
     def visit_Compare(self, node: ast.Compare) -> Typed:
-        if len(node.ops) > 1 or type(node.ops[0]) not in OPERATORS:
+        if len(node.ops) > 1:
+            pairs = zip(pairwise([node.left, *node.comparators]), node.ops, strict=True)
+            return self.visit_BoolOp(ast.BoolOp(ast.And(), [ast.Compare(x, [op], [y]) for (x, y), op in pairs]))
+        if type(node.ops[0]) not in OPERATORS:
             raise UnreadError
         return self.call(OPERATORS[type(node.ops[0])], self.visit(node.left), self.visit(node.comparators[0]))
 
@@ -403,75 +482,106 @@ class _Reader(ast.NodeVisitor):
     def visit_Call(self, node: ast.Call) -> Typed:
         if node.keywords:
             raise UnreadError
+        root: ast.expr = node.func
+        while isinstance(root, ast.Attribute):
+            root = root.value
+        if isinstance(root, ast.Name) and root.id in self.kinds:
+            return self.pointed(self.visit(node.func), [self.visit(value) for value in node.args])
         return self.call(self.found(node.func), *map(self.visit, node.args))
+
+    def pointed(self, function: Typed, values: Sequence[Typed]) -> Typed:
+        """The value of a function that is given by the address of its machine code."""
+        if not isinstance(function.kind, types.FunctionType) or len(values) != len(function.kind.signature.args):
+            raise UnreadError
+        result, kinds = function.kind.signature.return_type, function.kind.signature.args
+        given = [value.cast(kind) for value, kind in zip(values, kinds, strict=True)]
+
+        def write(w: Writer) -> Value:
+            calls, builder = w.context.call_conv, w.builder
+            address = cgutils.create_struct_proxy(function.kind)(w.context, builder, value=function.write(w)).jit_addr
+            pointer = builder.bitcast(address, calls.get_function_type(result, kinds).as_pointer())
+            arguments = [argument(w) for argument in given]
+            status, found = calls.call_function(builder, pointer, result, kinds, arguments)
+            with cgutils.if_unlikely(builder, status.is_error):
+                calls.return_status_propagate(builder, status)
+            return found
+
+        return Typed(result, write)
 
     # -- statements -------------------------------------------------------------------------------------------
 
     def body(self, statements: Sequence[ast.stmt]) -> list[Write]:
-        return [self.visit(statement) for statement in statements]
+        """What writes statements, up to one that leaves them; what stands behind it may have no type."""
+        found = []
+        for statement in statements:
+            found.append(self.visit(statement))
+            if self.leaves(statement):
+                break
+        return found
 
-    def block(self, statements: Sequence[ast.stmt]) -> list[Write]:
-        """Statements in a block of their own; another one begins behind them."""
+    def leaves(self, statement: ast.stmt) -> bool:
+        """True for a statement behind which nothing is done."""
+        if isinstance(statement, ast.If) and (chosen := self.chosen_body(statement)):
+            return self.leaves(chosen[-1])
+        return isinstance(statement, ast.Return | ast.Break | ast.Continue)
+
+    def chosen_body(self, node: ast.If) -> list[ast.stmt] | None:
+        """The statements of a choice by a constant; None if it is another choice."""
+        if not isinstance(node.test, ast.Name) or node.test.id in self.kinds:
+            return None
+        return node.body if self.found(node.test) else node.orelse
+
+    def block(self, statements: Sequence[ast.stmt]) -> Write:
+        """What writes statements in a block of their own; another one begins behind them."""
         self.turn()
         found = self.body(statements)
         self.turn()
-        return found
-
-    def given(self, target: ast.expr, value: Typed) -> tuple[str, Write]:
-        """A variable that gets a value, and what writes the value."""
-        if not isinstance(target, ast.Name):
-            raise UnreadError
-        return target.id, value.cast(self.declare(target.id, value.kind))
+        return in_turn(found)
 
     def visit_Assign(self, node: ast.Assign) -> Write:
-        target = node.targets[0]
-        if len(node.targets) > 1:
-            raise UnreadError
-        if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
-            values = [self.visit(value) for value in node.value.elts]
-            return self.several([self.given(*pair) for pair in zip(target.elts, values, strict=True)])
+        target, many = node.targets[0], len(node.targets) > 1
+        if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple) and not many:
+            pairs = [(one, *held(self.visit(value))) for one, value in zip(target.elts, node.value.elts, strict=True)]
+            return in_turn(
+                [computed for _, computed, _ in pairs] + [self.assigned(one, value) for one, _, value in pairs]
+            )
         value: Typed = self.visit(node.value)
-        if isinstance(target, ast.Tuple):
-            return self.unpacked(target.elts, value)
+        if not many:
+            return self.assigned(target, value)
+        if value.owned:
+            raise UnreadError
+        computed, whole = held(value)
+        return in_turn([computed, *(self.assigned(target, whole) for target in node.targets)])
+
+    def assigned(self, target: ast.expr, value: Typed) -> Write:
+        """What gives a variable, an element, or several of them a value."""
         if isinstance(target, ast.Subscript):
             return self.call(operator.setitem, self.visit(target.value), self.visit(target.slice), value).write
-        name, found = self.given(target, value)
+        if isinstance(target, ast.Tuple):
+            if not isinstance(value.kind, types.BaseTuple) or len(value.kind) != len(target.elts):
+                raise UnreadError
+            computed, whole = held(value)
+            return in_turn([computed, *(self.assigned(one, part(whole, k)) for k, one in enumerate(target.elts))])
+        if not isinstance(target, ast.Name):
+            raise UnreadError
+        name, kind = target.id, self.declare(target.id, value.kind)
+        found = value.cast(kind)
+        if isinstance(kind, types.Array):
+            self.arrays[name] = kind
+            found = value.write if value.owned else lambda w: w.keep(kind, value.write(w))
         return lambda w: w.set(name, found(w))
 
-    @staticmethod
-    def several(pairs: Sequence[tuple[str, Write]]) -> Write:
-        """What gives variables values that are all computed before."""
-
-        def write(w: Writer) -> None:
-            for name, value in [(name, found(w)) for name, found in pairs]:
-                w.set(name, value)
-
-        return write
-
-    def unpacked(self, targets: Sequence[ast.expr], value: Typed) -> Write:
-        """What gives variables the parts of a tuple."""
-        if not isinstance(value.kind, types.BaseTuple):
-            raise UnreadError
-        held: list[Value] = []
-        whole = Typed(value.kind, lambda w: held[-1])
-        give = self.several([self.given(target, self.part(whole, k)) for k, target in enumerate(targets)])
-
-        def write(w: Writer) -> None:
-            held.append(value.write(w))
-            give(w)
-
-        return write
-
     def visit_AugAssign(self, node: ast.AugAssign) -> Write:
-        value = ast.BinOp(node.target, node.op, node.value)
-        if not isinstance(node.target, ast.Name) or self.visit(node.target).kind.mutable:
+        if isinstance(node.target, ast.Name) and self.visit(node.target).kind.mutable:
             raise UnreadError
-        return self.visit_Assign(ast.Assign([node.target], value))
+        return self.visit_Assign(ast.Assign([node.target], ast.BinOp(node.target, node.op, node.value)))
 
     def visit_Expr(self, node: ast.Expr) -> Write:
         if isinstance(node.value, ast.Constant):  # a docstring
             return lambda w: None
         found: Typed = self.visit(node.value)
+        if found.owned:
+            raise UnreadError
         return found.write
 
     def visit_Return(self, node: ast.Return) -> Write:
@@ -480,8 +590,12 @@ class _Reader(ast.NodeVisitor):
 
         def write(w: Writer) -> None:
             kind = w.program.result
-            found = w.context.get_return_value(w.builder, kind, value.cast(kind)(w))
-            w.lower.call_conv.return_value(w.builder, found)
+            found = value.cast(kind)(w)
+            if not value.owned:
+                w.keep(kind, found)
+            for name in w.program.arrays:
+                w.release(name)
+            w.lower.call_conv.return_value(w.builder, w.context.get_return_value(w.builder, kind, found))
 
         return write
 
@@ -492,11 +606,10 @@ class _Reader(ast.NodeVisitor):
         return lambda w: w.builder.branch(w.ends[-1][0])
 
     def visit_If(self, node: ast.If) -> Write:
-        if isinstance(node.test, ast.Name) and node.test.id not in self.kinds:
-            statements = self.block(node.body if self.found(node.test) else node.orelse)  # the others may have no type
-            return lambda w: w.write(statements)
+        if (chosen := self.chosen_body(node)) is not None:  # the others may have no type
+            return self.block(chosen)
         test, yes, no = self.test(node.test), self.block(node.body), self.block(node.orelse)
-        return lambda w: w.choose(test.write, lambda w: w.write(yes), lambda w: w.write(no))
+        return lambda w: w.choose(test.write, yes, no)
 
     def visit_While(self, node: ast.While) -> Write:
         if node.orelse:
@@ -504,27 +617,31 @@ class _Reader(ast.NodeVisitor):
         self.turn()
         endless = isinstance(node.test, ast.Constant) and node.test.value is True
         test = None if endless else self.test(node.test).write
-        statements = self.block(node.body)
-        return lambda w: w.loop(test, lambda w: w.write(statements), lambda w: None)
+        body = self.block(node.body)
+        return lambda w: w.loop(test, body, lambda w: None)
 
     def visit_For(self, node: ast.For) -> Write:
-        counted = node.iter
-        if node.orelse or not (isinstance(counted, ast.Call) and self.found(counted.func) is range):
+        if node.orelse:
             raise UnreadError
-        start, stop, step = self.bounds([self.visit(bound) for bound in counted.args])
+        if (pieces := self.pieces(node.iter)) is not None:
+            return self.unrolled(node, pieces)
+        if not (isinstance(node.iter, ast.Call) and self.found(node.iter.func) is range):
+            raise UnreadError
+        start, stop, step = self.bounds([self.visit(bound) for bound in node.iter.args])
         self.turn()
-        held: list[Value] = []
-        name, value = self.given(node.target, Typed(types.int64, lambda w: w.builder.load(held[-1])))
-        statements = [lambda w: w.set(name, value(w)), *self.body(node.body)]
+        slots: list[Value] = []
+        body = in_turn(
+            [self.assigned(node.target, Typed(types.int64, lambda w: w.builder.load(slots[-1]))), *self.body(node.body)]
+        )
         self.turn()
 
         def write(w: Writer) -> None:
             first, last = start(w), stop(w)
             slot = w.memory(first)
-            held.append(slot)
+            slots.append(slot)
             w.loop(
                 lambda w: w.builder.icmp_signed("<" if step > 0 else ">", w.builder.load(slot), last),
-                lambda w: w.write(statements),
+                body,
                 lambda w: w.builder.store(w.builder.add(w.builder.load(slot), first.type(step)), slot),
             )
 
@@ -539,3 +656,23 @@ class _Reader(ast.NodeVisitor):
         if not isinstance(step, types.IntegerLiteral) or step.literal_value == 0:
             raise UnreadError
         return start.cast(types.int64), stop.cast(types.int64), step.literal_value
+
+    def pieces(self, node: ast.expr) -> list[Typed] | None:
+        """The values of a tuple that is written out or known, numbered by `enumerate` if that is asked for; else None."""
+        if isinstance(node, ast.Tuple):
+            return [self.visit(piece) for piece in node.elts]
+        if isinstance(node, ast.Name) and node.id not in self.kinds and isinstance(values := self.found(node), tuple):
+            return [self.known(value) for value in values]
+        if isinstance(node, ast.Call) and self.found(node.func) is enumerate and len(node.args) == 1:
+            pieces = self.pieces(node.args[0])
+            return None if pieces is None else [gathered([self.known(k), piece]) for k, piece in enumerate(pieces)]
+        return None
+
+    def unrolled(self, node: ast.For, pieces: Sequence[Typed]) -> Write:
+        """A loop whose statements stand there for each of some values."""
+        bodies = []
+        for piece in pieces:
+            self.turn()
+            bodies.append(in_turn([self.assigned(node.target, piece), *self.body(node.body)]))
+        self.turn()
+        return lambda w: w.each(bodies)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numba import types
 from numba.core import errors
+from numba.core.runtime import _nrt_python, rtsys
 
 from synchain.codegen.kernels.compile import _compile, _MachineCode
 from synchain.codegen.simd import syntax
@@ -17,11 +18,26 @@ from synchain.codegen.simd import syntax
 HEAD = """import math
 import numpy as np
 from synchain.codegen.simd import absolute, any_lane, broadcast, load, maximum, minimum, njit, select, sqrt, store
-SIX, YES, NO = 6, True, False
+SIX, YES, NO, SEVERAL = 6, True, False, (1, 4)
 
 @njit(error_model="numpy")
 def both(x, y):
     return x + y, x * y
+
+@njit(error_model="numpy")
+def ones(n):
+    a = np.empty(n)
+    for k in range(n):
+        a[k] = 1.0
+    return a
+
+@njit(error_model="numpy")
+def total(a):
+    b = a
+    found = 0.0
+    for k in range(len(b)):
+        found += b[k]
+    return found
 
 """
 VECTOR = types.float64[::1]
@@ -67,6 +83,7 @@ def _filled(function: Any, seed: int, n: int) -> bytes:
 READ = {
     "sums and products": "a, b = load(x, 0, 4), load(x, 1, 4)\nc = a*b\nstore(out, 0, c + b)\nstore(out, 1, -c - 2*a)",
     "a product of another block": "a = load(x, 0, 4)\nc = a*a\nif n > 2:\n    store(out, 0, c + a)\nstore(out, 1, a - c)",
+    "products inside of blocks": "a = load(x, 0, 4)\nb = a*a\nif n > 2:\n    store(out, 0, b + a)\nc = 2.0*a\nif YES:\n    store(out, 1, c - a)",
     "a choice that is known": "a = x[0]*x[1]\nif YES:\n    b = a + 1.0\nelse:\n    b = nothing\nout[0] = a - b",
     "loops": "s = 0.0\nfor k in range(n):\n    for j in range(k, 0, -1):\n        s += x[k]*x[j] - j\n    out[k] = s",
     "loops in steps": "for k in range(1, n, 2):\n    out[k] = k*k\nfor k in range(n, 0, -3):\n    out[k + 9] = x[k]",
@@ -79,6 +96,18 @@ READ = {
     "a variable of two types": "a = 1\na = 2.5*a\nout[0] = a",
     "negations": "if not n == 3:\n    out[0] = -x[0]\nif n:\n    out[1] = ~n",
     "an early end": "if n > 4:\n    out[0] = 1.0\n    return\nout[0] = 2.0",
+    "three conditions": "out[0] = 1.0 if 0 < n < 4 and x[0] <= x[1] != x[2] else 2.0",
+    "one value for two": "a = out[1] = x[n]\nout[0] = a + out[1]",
+    "values and elements": "a, out[n] = x[n], x[1]\nout[0], (b, c) = a, pair\nout[1] = b - c",
+    "an element that is added to": "out[n] += 2.0\nout[n] *= x[n]",
+    "loops over values": "for k, a in enumerate((1.0, x[3], 2.5)):\n    if k == n:\n        continue\n    if k > 1:\n        break\n"
+    "    out[k] += a\nfor j in SEVERAL:\n    for k in range(j):\n        if k > 1:\n            break\n        out[k] -= j",
+    "what cannot be reached": "if NO:\n    out[0] = nothing\nelse:\n    out[0] = n\n    return\nout.nothing(1)",
+    "memory": "a = np.empty(n + 1)\nfor k in range(n + 1):\n    a[k] = x[k]\nout[0] = a[n]",
+    "memory in turn": "a, b = np.zeros(4), np.full(4, 2.0)\nfor k in range(n):\n    a, b = b, a\n    a[1] += k\n    if k == 5:\n"
+    "        b = np.zeros(4)\n        return\nb = a\nout[0] = a[1] + b[0]",
+    "memory of functions": "a = ones(n + 2)\nout[0] = total(ones(n + 1)) + total(a[1:]) + total(x[n:])\nc = a[:2]\nout[1] = c[0]",
+    "parts of tuples": "a = (n, x[0], x[1], 7)[1:3]\nout[0] = a[1]",
     "values from the end": "out[n - 10] = x[-1] + x[n - 12]",
 }  # fmt: skip
 
@@ -92,18 +121,26 @@ def test_what_is_read_has_the_bits_of_numbas_own_way(tmp_path: Path) -> None:
             assert _filled(read, n, n) == _filled(numbas, n, n), name
 
 
+def test_memory_is_given_back(tmp_path: Path) -> None:
+    pairs, _ = _in_both_ways({name: READ[name] for name in READ if name.startswith("memory")}, tmp_path)
+    _nrt_python.memsys_enable_stats()
+    for name, (read, _) in pairs.items():
+        before = rtsys.get_allocation_stats()
+        for n in range(9):
+            _filled(read, n, n)
+        after = rtsys.get_allocation_stats()
+        assert after.alloc - before.alloc > 8, name
+        assert after.alloc - before.alloc == after.free - before.free, name
+    _nrt_python.memsys_disable_stats()
+
+
 LEFT = {
-    "memory that is allocated": "a = np.empty(3)\na[0] = x[n]\nout[0] = a[0]",
-    "a part of an array": "a = x[1:4]\nout[0] = a[1]",
     "an argument by name": "a, b = both(y=x[0], x=x[1])\nout[0] = a",
-    "two conditions in a row": "out[0] = 1.0 if 0 < n < 4 else 2.0",
-    "one value for two": "a = b = x[0]\nout[0] = a + b",
-    "a loop over values": "for a in (1.0, 2.5):\n    out[0] += a",
-    "an element that is added to": "out[n] += 2.0",
     "a type for each block": "a = 1\nif n > 2:\n    a = 2.5\nout[0] = a",
     "a tuple's unknown part": "out[0] = pair[n % 2]",
     "a step that is not known": "for k in range(0, 6, n + 1):\n    out[k] = x[k]",
     "a loop with another end": "for k in range(n):\n    if x[k] > 9.0:\n        break\nelse:\n    out[0] = 1.0",
+    "something that is nothing": "out[0] = 1.0 if pair is None else 2.0",
 }
 
 
@@ -125,11 +162,13 @@ class _Author:
 
     def __init__(self, seed: int) -> None:
         self.random = random.Random(seed)
+        self.products: list[str] = []
+        self.count = 0
 
     def lane(self, depth: int = 3) -> str:
         pick = self.random.choice
         if depth == 0 or self.random.random() < 0.15:
-            return pick(["a", "b", "c", "s", "2.0", "0.3", "pair[0]", "load(x, n % 3, 4)"])
+            return pick(["a", "b", "c", "s", "2.0", "0.3", "pair[0]", "load(x, n % 3, 4)", *self.products])
         one, two = self.lane(depth - 1), self.lane(depth - 1)
         forms = ["{} + {}", "{} - {}", "{}*{}", "{}*{}", "maximum({}, b*{})", "select(a > {}, b, c*{})", "-{} - {}"]
         return "(" + pick(forms).format(one, two) + ")"
@@ -154,14 +193,21 @@ class _Author:
                 found.append(f"s = {self.number()}")
             elif kind < 0.6:
                 found.append(self.random.choice(["k = (k + 3) % 7", "k += 1", "k = min(k, n)"]))
-            elif kind < 0.7:
+            elif kind < 0.65:
                 found.append("a, b = b*c + a, a")
+            elif kind < 0.8:
+                self.count += 1
+                found.append(f"d{self.count} = {self.lane(2)}*b")
+                self.products.append(f"d{self.count}")
             else:
                 found.append(f"{self.random.choice('abc')} = {self.lane()} + 0.0*a")
         return found
 
     def inner(self, depth: int) -> list[str]:
-        return ["    " + line for line in self.statements(depth - 1)]
+        known = len(self.products)
+        lines = ["    " + line for line in self.statements(depth - 1)]
+        del self.products[known:]
+        return lines
 
     def body(self) -> str:
         first = ["a, b, c = load(x, 0, 4), load(x, 1, 4), load(x, 2, 4)", "s, k = x[5], n", "k = k % 7"]
