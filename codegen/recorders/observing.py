@@ -162,7 +162,8 @@ def climb(added, begin, width, t, h, y, y_new, dense, seen, cell, sums, control,
                 values((load(there, 0, WIDTH) + begin) * width, t, h, y, y_new, dense, address(at, 0), dims[:2])
                 for which in range(WIDTH):
                     if (open_lanes >> which) & 1:
-                        a, m, b, at_a, at_m, at_b = ends[which]
+                        row = ends[which]
+                        a, m, b, at_a, at_m, at_b = row[0], row[1], row[2], row[3], row[4], row[5]
                         u, at_u = there[which], sign * at[k * WIDTH + which]
                         if at_u > at_m:
                             (a, at_a), (b, at_b) = ((m, at_m), (b, at_b)) if u > m else ((a, at_a), (m, at_m))

@@ -1,9 +1,9 @@
-"""From the syntax tree of a function to LLVM, in place of Numba's bytecode, SSA form, type inference and lowering.
+"""From the syntax tree of a function to LLVM: what Numba does by bytecode, SSA form, type inference and lowering.
 
 A step is thousands of lines of plain arithmetic, for which Numba's own way takes twice as long as LLVM takes to make
 machine code of them.  Here each expression is read once: it has a type, and a function that writes its code.  Numba says
-what operators and functions mean for given types, so that both ways have the same code.  Memory that is allocated, and
-what else a step has none of, is left to Numba.
+what operators and functions mean for given types, so that kernels have the bits that Numba itself would give them, but
+for one case: a product in a variable that several blocks give values to, which is added to something in its own block.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeAlias
 
@@ -23,7 +24,7 @@ from numba import types
 from numba.core import cgutils, errors, lowering
 from numba.core.typing.templates import fold_arguments
 
-__all__ = ["Program", "UnreadError", "read"]
+__all__ = ["TREES", "Program", "UnreadError", "functions", "read"]
 
 OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Add: operator.add,
@@ -53,10 +54,14 @@ Write: TypeAlias = "Callable[[Writer], Any]"
 
 
 class UnreadError(errors.NumbaError):
-    """Syntax or types that are left to Numba; its compiler goes on with the next way if it sees such an error."""
+    """Syntax that is not read, or a type that it is not read for."""
 
-    def __init__(self) -> None:
-        super().__init__("left to Numba")
+    def __init__(self, found: str = "") -> None:
+        super().__init__(found)
+        self.found = found
+
+    def __str__(self) -> str:
+        return f"functions of kernels: found {self.found}; expected what codegen/simd/syntax.py reads"
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,19 +228,34 @@ class Writer:
         self.builder.position_at_end(after)
 
 
-def read(
-    context: Any, tree: ast.FunctionDef, names: dict[str, Any], args: Sequence[types.Type], result: types.Type | None
-) -> Program:
+TREES = "__syntax__"
+"""What a module calls the syntax trees of its functions, by the lines that they begin in."""
+
+
+def functions(tree: ast.Module) -> dict[int, ast.FunctionDef]:
+    """Return the functions of a module, by the lines that they begin in."""
+    found = (part for part in tree.body if isinstance(part, ast.FunctionDef))
+    return {min([part.lineno, *(one.lineno for one in part.decorator_list)]): part for part in found}
+
+
+def tree_of(function: Any) -> ast.FunctionDef:
+    """Return the syntax tree of a function at the top of a module."""
+    if TREES not in function.__globals__:
+        text = Path(function.__code__.co_filename).read_text(encoding="utf-8")
+        function.__globals__[TREES] = functions(ast.parse(text))
+    found: ast.FunctionDef = function.__globals__[TREES][function.__code__.co_firstlineno]
+    return found
+
+
+def read(context: Any, function: Any, args: Sequence[types.Type], result: types.Type | None) -> Program:
     """Read a function.
 
     Parameters
     ----------
     context : numba.core.typing.Context
         What Numba knows of types.
-    tree : ast.FunctionDef
-        The function.
-    names : dict
-        What the names of its module stand for.
+    function : function
+        The function, at the top of a module.
     args : sequence of numba.types.Type
         The types of its arguments.
     result : numba.types.Type, optional
@@ -244,9 +264,11 @@ def read(
     Raises
     ------
     UnreadError
-        If it has something that is left to Numba.
+        If it has syntax that is not read.
+    numba.core.errors.TypingError
+        If an operator or a function has no meaning for the types of its operands.
     """
-    return _Reader(context, names).function(tree, args, result)
+    return _Reader(context, function.__globals__).function(tree_of(function), args, result)
 
 
 def gathered(parts: Sequence[Typed]) -> Typed:
@@ -301,6 +323,7 @@ class _Reader(ast.NodeVisitor):
         self.changing: set[str] = set()
         self.arrays: dict[str, types.Type] = {}
         self.results: list[Typed] = []
+        self.meanings: dict[Any, tuple[types.Type, Any]] = {}
 
     def function(self, tree: ast.FunctionDef, args: Sequence[types.Type], result: types.Type | None) -> Program:
         for argument, kind in zip(tree.args.args, args, strict=True):
@@ -311,11 +334,19 @@ class _Reader(ast.NodeVisitor):
         kind = result or self.common(self.results)
         local = frozenset(name for name, blocks in self.blocks.items() if len(blocks) == 1 and name not in self.arrays)
         if not self.changing <= local:
-            raise UnreadError
+            raise UnreadError(f"{', '.join(sorted(self.changing - local))} of several types")
         return Program(tuple(statements), kind, local, self.arrays)
 
+    def visit(self, node: ast.AST) -> Any:
+        """Read a node."""
+        try:
+            return super().visit(node)
+        except UnreadError as error:
+            error.found = error.found or f"{ast.unparse(node)!r} in line {getattr(node, 'lineno', 0)}"
+            raise
+
     def generic_visit(self, node: ast.AST) -> Any:
-        """Leave to Numba what has no method here."""
+        """Refuse what has no method here."""
         raise UnreadError
 
     def turn(self) -> None:
@@ -335,11 +366,7 @@ class _Reader(ast.NodeVisitor):
 
     def call(self, function: Any, *values: Typed) -> Typed:
         """The value of a function or of an operator."""
-        try:
-            kind = self.context.resolve_value_type(function)
-            signature = self.context.resolve_function_type(kind, tuple(value.kind for value in values), {})
-        except errors.TypingError as error:
-            raise UnreadError from error
+        kind, signature = self.meaning(function, tuple(value.kind for value in values))
         if signature is None or signature.recvr:
             raise UnreadError
         wanted, values = signature.args, [lent(value) for value in values]
@@ -363,12 +390,21 @@ class _Reader(ast.NodeVisitor):
 
         return Typed(signature.return_type, write, isinstance(signature.return_type, types.Array))
 
+    def meaning(self, function: Any, kinds: tuple[types.Type, ...]) -> tuple[types.Type, Any]:
+        """The type of a function or of an operator, and what it takes and returns for operands of some types.
+
+        It is found out once: a step adds and multiplies thousands of times.  A function is compiled for integers, not for
+        3, 4 and 5 apart.
+        """
+        if (function, kinds) not in self.meanings:
+            kind = self.context.resolve_value_type(function)
+            given = tuple(map(types.unliteral, kinds)) if isinstance(kind, types.Dispatcher) else kinds
+            self.meanings[function, kinds] = kind, self.context.resolve_function_type(kind, given, {})
+        return self.meanings[function, kinds]
+
     def known(self, value: Any) -> Typed:
         """A value that is known when the function is read."""
-        try:
-            kind = types.maybe_literal(value) or self.context.resolve_value_type(value)
-        except (errors.TypingError, ValueError) as error:
-            raise UnreadError from error
+        kind = types.maybe_literal(value) or self.context.resolve_value_type(value)
         return Typed(kind, lambda w: w.context.get_constant_generic(w.builder, kind, value))
 
     def found(self, node: ast.expr) -> Any:
@@ -377,7 +413,11 @@ class _Reader(ast.NodeVisitor):
             return getattr(module, node.attr)
         if not isinstance(node, ast.Name) or node.id in self.kinds:
             raise UnreadError
-        return self.names[node.id] if node.id in self.names else getattr(builtins, node.id)
+        if node.id in self.names:
+            return self.names[node.id]
+        if not hasattr(builtins, node.id):
+            raise UnreadError
+        return getattr(builtins, node.id)
 
     def common(self, values: Sequence[Typed]) -> types.Type:
         """The type that values of several can have."""
@@ -429,14 +469,12 @@ class _Reader(ast.NodeVisitor):
 
     def visit_Subscript(self, node: ast.Subscript) -> Typed:
         base: Typed = self.visit(node.value)
-        if not isinstance(base.kind, types.BaseTuple):
-            return self.call(operator.getitem, base, self.visit(node.slice))
-        if isinstance(node.slice, ast.Slice):
+        if isinstance(base.kind, types.BaseTuple) and isinstance(node.slice, ast.Slice):
             known = (x and ast.literal_eval(x) for x in (node.slice.lower, node.slice.upper, node.slice.step))
             return gathered([part(base, k) for k in range(len(base.kind))[slice(*known)]])
-        if not (isinstance(node.slice, ast.Constant) and isinstance(node.slice.value, int)):
-            raise UnreadError
-        return part(base, node.slice.value)
+        if isinstance(base.kind, types.BaseTuple) and isinstance(node.slice, ast.Constant):
+            return part(base, node.slice.value)
+        return self.call(operator.getitem, base, self.visit(node.slice))
 
     def visit_Slice(self, node: ast.Slice) -> Typed:
         bounds = [self.known(None) if bound is None else self.visit(bound) for bound in (node.lower, node.upper)]
@@ -564,6 +602,8 @@ class _Reader(ast.NodeVisitor):
             return in_turn([computed, *(self.assigned(one, part(whole, k)) for k, one in enumerate(target.elts))])
         if not isinstance(target, ast.Name):
             raise UnreadError
+        if target.id == "_" and not value.owned:
+            return value.write
         name, kind = target.id, self.declare(target.id, value.kind)
         found = value.cast(kind)
         if isinstance(kind, types.Array):

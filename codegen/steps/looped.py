@@ -264,9 +264,9 @@ class Looped(Step):
         found = [*self.load_stages(PLACE, [1.0] * m.stages), let("old", Load("y", PLACE))]
         found += [let("new", Name("old") + self.increment(m.b, values)), store("y_new", PLACE, "new")]
         if len(m.e) == 1:
-            found += [let("e", self.increment(m.e[0], values)), *self.stiff_errors(values)]
-        found += [*self.embedded(values), let("e", self.scaled_error("e", "old", "new"))]
-        found += [let("total", Name("total") + "e"), let("error", call("maximum", "error", "e"))]
+            found += [let("estimate", self.increment(m.e[0], values)), *self.stiff_errors(values)]
+        found += [*self.embedded(values), let("estimate", self.scaled_error("estimate", "old", "new"))]
+        found += [let("total", Name("total") + "estimate"), let("error", call("maximum", "error", "estimate"))]
         dense: list[Statement] = self.load_stages(PLACE, [0.0] * m.stages + [1.0] * late)
         for j, row in enumerate(m.dense):
             dense.append(store("dense", j * Name("DIMENSION") + PLACE, self.dense_value(row, values)))
@@ -281,7 +281,7 @@ class Looped(Step):
         factors = Name("MATRIX") if self.elimination.exact else Name("MATRIX") + "ENTRIES"
         share = Name("shift") * Load("dense", factors + PLACE)
         share = share * Load("dense", Name("MASS") + PLACE) if self.equations.inertial else share
-        return [If(Name("DENSE"), (let("e", self.stiff_error("e", linear(m.dense[-1], values), share)),))]
+        return [If(Name("DENSE"), (let("estimate", self.stiff_error("estimate", linear(m.dense[-1], values), share)),))]
 
 
 def vector(number: int) -> Expression:

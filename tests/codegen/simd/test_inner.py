@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import importlib
 import operator
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 import pytest
 from numba import types
-from numba.core import errors, utils
-from numba.core.compiler import run_frontend
+from numba.core import utils
 from numba.core.registry import cpu_target
 from numba.core.target_extension import get_local_target
 
 from synchain.codegen.simd import (
     decorator,
     lanes,  # noqa: F401  (defines the operators)
+    syntax,
 )
 from synchain.codegen.simd.decorator import njit, without_repetition
 from synchain.codegen.simd.lane_types import Lane
@@ -29,11 +28,12 @@ def _text(function: Any) -> tuple[str, Any]:
     return made.library.get_llvm_str(), made.fndesc
 
 
-def test_inner_functions_have_no_wrappers() -> None:
-    @njit(error_model="numpy")
-    def half(x: float) -> float:
-        return 0.5 * x
+@njit(error_model="numpy")
+def half(x: float) -> float:
+    return 0.5 * x
 
+
+def test_inner_functions_have_no_wrappers() -> None:
     text, description = _text(half)
     assert description.llvm_func_name in text
     assert description.llvm_cpython_wrapper_name not in text
@@ -92,62 +92,19 @@ def test_the_meaning_of_an_operator_is_found_once(monkeypatch: pytest.MonkeyPatc
     asked = []
     context = cpu_target.typing_context
     context.refresh()
-    add = context.resolve_value_type(operator.add)
-    found = types.Function.get_call_type
+    found = context.resolve_function_type
     monkeypatch.setattr(
-        types.Function, "get_call_type", lambda *request: (asked.append(request[2]), found(*request))[1]
+        context, "resolve_function_type", lambda *request: (asked.append(request[1]), found(*request))[1]
     )
-    counted = types.Function.get_call_type
-    pairs = [(Lane(4), Lane(4)), (types.float64, Lane(4)), [Lane(4), Lane(4)], (Lane(4), Lane(4))]
-    with without_repetition():
-        meanings = [add.get_call_type(context, pair, {}) for pair in pairs]
-        for _ in range(2):
-            with pytest.raises(errors.TypingError):
-                add.get_call_type(context, (Lane(4), Lane(8)), {})
-    assert meanings == [add.get_call_type(context, pair, {}) for pair in pairs]
-    assert asked[:4] == [*pairs[:2], *[(Lane(4), Lane(8))] * 2]
-    assert len(asked) == 4 + len(pairs)
-    assert types.Function.get_call_type is counted
+    reader, four = syntax._Reader(context, {}), Lane(4)
+    pairs = [(four, four), (types.float64, four), (four, four)]
+    meanings = [reader.meaning(operator.add, pair)[1] for pair in pairs]
+    assert [meaning.args for meaning in meanings] == pairs
+    assert asked == pairs[:2]
 
 
-def _sum_of_halves(rows: Any, first: int) -> float:
-    total, (half, _) = 0.0, (0.5, first)
-    for k in range(first, len(rows)):
-        rows[k] = half * max(rows[k], total)
-        total += rows[k]
-    return total
-
-
-def test_the_variables_of_statements_are_those_that_numba_lists() -> None:
-    statements = [
-        one for block in run_frontend(_sum_of_halves).blocks.values() for one in [*block.body, *block.find_exprs()]
-    ]
-    theirs = [one.list_vars() for one in statements]
-    assert any(len(names) > 2 for names in theirs)
-    with without_repetition():
-        assert [one.list_vars() for one in statements] == theirs
-
-
-def test_an_error_says_where_it_happened() -> None:
-    def wrong(x: float) -> object:
-        return x.nothing
-
-    said = []
-    for around in (nullcontext(), without_repetition()):
-        with around, pytest.raises(errors.TypingError) as caught:
-            njit()(wrong).compile((types.float64,))
-        said.append(str(caught.value))
-    assert said[0] == said[1]
-    assert "typing of get attribute at" in said[0]
-
-
-def test_values_have_their_types_and_numba_is_left_as_it_was() -> None:
-    """Operators, which are asked once, and values of other kinds."""
-    context = cpu_target.typing_context
-    context.refresh()
-    values = [operator.add, operator.lt, operator.neg, operator.imul, max, 2.5, 3, (1, 2.0)]
-    theirs = [context.resolve_value_type(value) for value in values]
+def test_numba_is_left_as_it_was() -> None:
     before = [getattr(owner, name) for owner, name, _ in decorator._instead()]
     with without_repetition():
-        assert [context.resolve_value_type(value) for value in values * 2] == theirs * 2
+        assert [getattr(owner, name) for owner, name, _ in decorator._instead()] != before
     assert [getattr(owner, name) for owner, name, _ in decorator._instead()] == before
