@@ -15,7 +15,7 @@ from itertools import chain, compress, count
 import sympy as sp
 
 from ..graphs.links import AllPairs, Link, Links
-from ..inputs.node_name import LinkName
+from ..inputs.names import LinkName
 from ..inputs.shown import Written
 from ..interactions.separation import separated
 from ..mechanics.components import Block, Edge, Node

@@ -22,7 +22,7 @@ from functools import lru_cache, partial
 import sympy as sp
 
 from ..graphs.links import LINK_LIMIT
-from ..inputs.node_name import LinkName
+from ..inputs.names import LinkName
 from ..mechanics.components import TIME, Edge
 from ..symmetries.partitions import class_links, coarsest_balanced
 from .equations import Equations

@@ -18,7 +18,7 @@ from ..graphs.links import LINK_LIMIT, numbered
 from ..graphs.topology import Topology
 from ..inputs.checks import check_number, short_repr, suggestion
 from ..inputs.frozen import Frozen
-from ..inputs.node_name import LinkName, NodeName
+from ..inputs.names import LinkName, NodeName
 from ..interactions.coupling import Coupling, LagrangianCoupling, Potential
 from ..mechanics.components import WEIGHT_NUMBER
 from ..mechanics.friction import ContactModel, FrictionLaw

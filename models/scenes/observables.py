@@ -11,8 +11,7 @@ from ..dynamics.observable import ENERGY, AtNode, Observable, Rate, Reduction, n
 from ..dynamics.observable_text import as_observable, as_value
 from ..inputs.checks import check_table, check_text, short_repr, suggestion
 from ..inputs.frozen import Frozen
-from ..inputs.node_name import NodeName
-from ..inputs.result_names import ATTRIBUTES, expect_free
+from ..inputs.names import ATTRIBUTES, NodeName, expect_free
 from ..mechanics.components import TIME
 from ..networks.energy import energy_of
 from ..networks.model import Model

@@ -17,7 +17,7 @@ from ..dynamics.record import Record
 from ..graphs.topology import Topology
 from ..inputs.checks import check_instance, check_table, check_text, suggestion
 from ..inputs.frozen import Frozen
-from ..inputs.node_name import NodeName
+from ..inputs.names import NodeName
 from ..inputs.shown import Drawn, Written
 from ..interactions.coupling import Coupling
 from ..interactions.link import strength

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..dynamics.synchrony import NoSynchrony, synchronous_node
 from ..graphs.topology import Topology
-from ..inputs.node_name import LinkName, NodeName
+from ..inputs.names import LinkName, NodeName
 from ..interactions.coupling import MatrixCoupling
 from ..networks.model import Model
 

@@ -13,7 +13,7 @@ from ..graphs.readers import as_topology, is_graph
 from ..graphs.topology import Topology
 from ..inputs.checks import check_integer, check_number, check_table, check_text, first_of, short_repr
 from ..inputs.frozen import Frozen
-from ..inputs.node_name import LinkName, NodeName
+from ..inputs.names import LinkName, NodeName
 from ..networks.model import MOST_NUMBERED, WEIGHTS, Model, union_of
 from .axis import LIMIT, Axis
 from .distribution import KNOWN, Draw, read_draw

@@ -10,7 +10,7 @@ from ..dynamics.periodicity import Drive, drive_of
 from ..graphs.readers import as_topology, is_graph
 from ..inputs.checks import check_number, check_table, first_of, is_row, short_repr
 from ..inputs.frozen import Frozen
-from ..inputs.node_name import LinkName, NodeName
+from ..inputs.names import LinkName, NodeName
 from ..networks.model import WEIGHTS, Model, NodeKind, in_range
 from .axis import Axis
 

@@ -12,8 +12,7 @@ import sympy as sp
 
 from ..dynamics.periodicity import as_function, names_in
 from ..inputs.checks import short_repr
-from ..inputs.node_name import NodeName
-from ..inputs.result_names import expect_free
+from ..inputs.names import NodeName, expect_free
 from ..inputs.words import Word
 from ..networks.model import WEIGHTS, Model, in_range
 from .axis import LIMIT, Axis, known_length

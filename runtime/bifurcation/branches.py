@@ -19,7 +19,7 @@ import xarray as xr
 
 from synchain.models.inputs.checks import check_instance, short_repr
 from synchain.models.inputs.keywords import warn
-from synchain.models.inputs.result_names import expect_free
+from synchain.models.inputs.names import expect_free
 from synchain.models.scenes.scene import Scene
 
 from ..cells.keywords import Given

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from synchain.models.dynamics.equations import Equations, Layer
 from synchain.models.graphs.links import Link
-from synchain.models.inputs.node_name import NodeName
+from synchain.models.inputs.names import NodeName
 from synchain.models.mechanics.components import Block, Edge, Node
 
 __all__ = ["Linearised"]

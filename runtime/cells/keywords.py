@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from synchain.models.inputs.checks import check_number, check_table, check_text, is_row, suggestion
-from synchain.models.inputs.node_name import NodeName
+from synchain.models.inputs.names import NodeName
 from synchain.models.scenes.scene import KEYWORDS, Scene, a_scene
 from synchain.models.sweeps.parameters import without
 

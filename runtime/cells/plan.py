@@ -14,7 +14,7 @@ from synchain.codegen.driver.columns import Control, Span
 from synchain.codegen.integrators import Integrator
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.periodicity import Drive, as_function, drive_of, names_in
-from synchain.models.inputs.node_name import NodeName
+from synchain.models.inputs.names import NodeName
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
 

@@ -20,7 +20,7 @@ from synchain.codegen.kernels.observed import Watched
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.reduction import NoQuotient, quotient, substitute_constants
 from synchain.models.inputs.checks import check_flag
-from synchain.models.inputs.node_name import NodeName
+from synchain.models.inputs.names import NodeName
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..support.status import Status

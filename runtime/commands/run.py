@@ -153,7 +153,7 @@ def changed_scene(arguments: Namespace) -> Scene:
 
 def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[str, object]) -> object:
     """The value of a setting as the scene wants it."""
-    from synchain.models.inputs.node_name import NodeName
+    from synchain.models.inputs.names import NodeName
 
     if scene.takes(name) or name in scene.equations.state:
         return value

@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from synchain.models.inputs.checks import suggestion
-from synchain.models.inputs.node_name import NodeName
+from synchain.models.inputs.names import NodeName
 
 from ..results.result import Result
 from ..support.status import Status

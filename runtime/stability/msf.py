@@ -20,7 +20,7 @@ from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.dynamics.variational import mode
 from synchain.models.inputs.checks import check_integer
 from synchain.models.inputs.keywords import warn
-from synchain.models.inputs.result_names import expect_free
+from synchain.models.inputs.names import expect_free
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import ORBITS, Given, with_numbers

@@ -11,7 +11,7 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from synchain.models import end, maximum, mean, minimum, nodes, rate, ring, variance
 from synchain.models.dynamics.observable_text import as_observable
-from synchain.models.inputs.result_names import TAKEN
+from synchain.models.inputs.names import TAKEN
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.results.labels import MEANINGS

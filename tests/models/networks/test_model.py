@@ -10,7 +10,7 @@ import sympy as sp
 
 from synchain.models import Parameter, chain
 from synchain.models.inputs.frozen import Frozen
-from synchain.models.inputs.node_name import NodeName
+from synchain.models.inputs.names import NodeName
 from synchain.models.interactions.coupling import WEIGHT, LagrangianCoupling, MatrixCoupling
 from synchain.models.mechanics.friction import ContactModel, FrictionLaw
 from synchain.models.mechanics.oscillator import FRICTION, Coordinate, FieldModel, LagrangianModel, Oscillator

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import pytest
 
 from synchain.models import Field, Rates, Scene, chain
-from synchain.models.inputs.result_names import ATTRIBUTES, TAKEN
+from synchain.models.inputs.names import ATTRIBUTES, TAKEN
 
 
 def decay(name: str, **keywords: object) -> Scene:

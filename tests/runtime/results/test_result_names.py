@@ -8,7 +8,7 @@ import xarray as xr
 
 from synchain.codegen.driver.columns import Span
 from synchain.models import Field, Rates, Scene, chain, normal
-from synchain.models.inputs.result_names import ATTRIBUTES, TAKEN
+from synchain.models.inputs.names import ATTRIBUTES, TAKEN
 from synchain.runtime import follow, plane, run, skeleton
 from synchain.runtime.bifurcation import branches
 from synchain.runtime.bifurcation.bifurcations import Bifurcation, BifurcationKind

@@ -29,7 +29,7 @@ from synchain.models import (
     uniform,
 )
 from synchain.models.definitions.loader import load_oscillator
-from synchain.models.inputs.node_name import LinkName
+from synchain.models.inputs.names import LinkName
 from synchain.models.scenes.file import load_scene
 from synchain.runtime import cluster_exponents, exponents, lyapunov_spectrum, msf, plane, thresholds, universal_probe
 from synchain.runtime.opening.open import open_result
