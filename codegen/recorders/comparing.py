@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from numba import njit
 
-from ..driver.clock import SYNC, SYNC_PEAK, SYNC_SUM
 from ..driver.dense import inside
-from ..driver.names import SERIES, WIDTH
+from ..driver.names import SERIES, SYNC, SYNC_PEAK, SYNC_SUM, WIDTH
 from ..driver.spread import spread
 from ..simd.lanes import broadcast, load, maximum, select, store
 

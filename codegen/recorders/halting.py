@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from numba import njit
 
-from ..driver.clock import BASE, HALTED, MARK
 from ..driver.dense import inside
-from ..driver.names import SERIES, WIDTH
+from ..driver.names import BASE, HALTED, MARK, SERIES, WIDTH
 from ..simd.lanes import any_lane, broadcast, load, select, store
 from .crossings import at_point, begin, crosses, locate, look, ready
 from .panels import following

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from numba import njit
 
-from ..driver.clock import ATOL, RTOL
-from ..driver.names import WIDTH
+from ..driver.names import ATOL, RTOL, WIDTH
 from ..simd.lanes import absolute, broadcast, load, maximum, minimum, select
 
 # --- kernel text below ---

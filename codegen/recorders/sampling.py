@@ -7,9 +7,8 @@ import math
 import numpy as np
 from numba import njit
 
-from ..driver.clock import BASE, END, NEXT_SAMPLE
 from ..driver.dense import inside
-from ..driver.names import WIDTH
+from ..driver.names import BASE, END, NEXT_SAMPLE, WIDTH
 from ..simd.lanes import load, store
 
 

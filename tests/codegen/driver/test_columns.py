@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from synchain.codegen.driver import clock
+from synchain.codegen.driver import names as text
 from synchain.codegen.driver.columns import Control, Count, Sum
 
 
 @pytest.mark.parametrize(("columns", "prefixes"), [(Control, ("",)), (Sum, ("",)), (Count, ("", "N_"))])
 def test_columns_are_those_of_the_kernel_text(columns: type, prefixes: tuple[str, ...]) -> None:
     for column in columns:
-        names = [name for prefix in prefixes if hasattr(clock, name := prefix + column.name)]
+        names = [name for prefix in prefixes if hasattr(text, name := prefix + column.name)]
         assert names, column
-        assert getattr(clock, names[-1]) == column
+        assert getattr(text, names[-1]) == column
     assert sorted(columns) == list(range(len(columns)))

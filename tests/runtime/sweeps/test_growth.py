@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import synchain as sc
-from synchain.codegen.driver import clock as clocks
+from synchain.codegen.driver import names
 from synchain.codegen.driver.cells import unbounded
 from synchain.runtime.support.status import Status
 
@@ -63,16 +63,16 @@ def test_linear_growth_has_its_exponent() -> None:
 
 def clock(**values: float) -> np.ndarray:
     """The clock of one lane."""
-    found = np.zeros(clocks.CLOCK)
+    found = np.zeros(names.CLOCK)
     for name, value in values.items():
-        found[getattr(clocks, name)] = value
+        found[getattr(names, name)] = value
     return found
 
 
 def control(steps: float) -> np.ndarray:
     """A budget."""
-    found = np.zeros(clocks.FURTHER)
-    found[clocks.MAX_STEPS] = steps
+    found = np.zeros(names.FURTHER)
+    found[names.MAX_STEPS] = steps
     return found
 
 
