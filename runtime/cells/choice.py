@@ -56,7 +56,7 @@ def chosen_integrator(reduction: Reduction) -> Integrator:
     reduction : Reduction
         What is left of the scene to integrate.
     """
-    return _chosen(reduction.scene, reduction.equations, lambda: stiffness(reduction.scene))
+    return _chosen(reduction.scene, reduction.equations, lambda: stiffness(reduction.planner))
 
 
 def chosen_for_rows(scene: Scene, equations: Equations, rows: Plan) -> Integrator:
@@ -71,7 +71,7 @@ def chosen_for_rows(scene: Scene, equations: Equations, rows: Plan) -> Integrato
     rows : Plan
         The extreme cells.
     """
-    return _chosen(scene, equations, lambda: _stiffness(equations, rows, rows))
+    return _chosen(scene, equations, lambda: _stiffness(_each(rates, equations, rows), equations, rows))
 
 
 def _chosen(scene: Scene, equations: Equations, stiffness_of: Callable[[], float]) -> Integrator:
@@ -120,7 +120,7 @@ def _taylor(scene: Scene, equations: Equations) -> Integrator:
     return integrator("taylor", order_for(scene.rtol, scene.atol, is_linear(equations)))
 
 
-def stiffness(scene: Scene) -> float:
+def stiffness(planner: Planner) -> float:
     """Return how much faster motions decay or grow at the start than they turn, the largest of the cells looked at.
 
     The rate is the real part of an eigenvalue of a node's own block of the Jacobian, with twice what
@@ -128,12 +128,11 @@ def stiffness(scene: Scene) -> float:
     parts and one.  In the extreme cells the layers of smoothed jumps are looked at too, although the start lies
     outside.
     """
-    planner = Planner(scene)
-    return _stiffness(scene.equations, planner.sample(), planner.extremes())
+    return _stiffness(planner.rates, planner.equations, planner.extremes())
 
 
-def _stiffness(equations: Equations, sample: Plan, extremes: Plan) -> float:
-    found = [(at.fastest, at.turning) for at in _each(rates, equations, sample)]
+def _stiffness(starts: Iterable[Rates], equations: Equations, extremes: Plan) -> float:
+    found = [(at.fastest, at.turning) for at in starts]
     return _stiffest(found + [(LAYER * at.fastest, LAYER * at.turning) for at in _each(bends, equations, extremes)])
 
 

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import sympy as sp
@@ -111,6 +112,9 @@ class Planner:
         self.slots = {name: k for k, name in enumerate(self.equations.parameters)}
         self.places = {name: k for k, name in enumerate(self.equations.state)}
 
+    def __reduce__(self) -> tuple[type[Planner], tuple[Scene]]:
+        return Planner, (self.scene,)
+
     def columns(self, cells: np.ndarray) -> dict[str, np.ndarray]:
         """Return the value of each axis, and of what is drawn, in each of these cells."""
         if not self.scene.shape:
@@ -165,6 +169,12 @@ class Planner:
         """Return the rows of the extreme cells and of others, evenly spread over the sweep: of LOOKED_AT nodes or two cells."""
         spread = _spread(math.prod(self.scene.shape), LOOKED_AT // self.equations.n)
         return self.rows(np.union1d(self._extremes(), spread))
+
+    @cached_property
+    def rates(self) -> list[Rates]:
+        """How fast motions decay, grow and turn at the start of the cells of the sample."""
+        sample = self.sample()
+        return [rates(self.equations, *cell) for cell in zip(sample.start, sample.numbers, strict=True)]
 
     def _extremes(self) -> np.ndarray:
         ends = [_ends(values) for values in self.values.values()]
@@ -327,9 +337,7 @@ def control_of(planner: Planner, jumps: bool, method: Integrator) -> np.ndarray:
     directions = [DIRECTIONS[section.direction] for section in scene.sections.values() or (scene.section,)]
     control = control_array(rtol, atol, longest_step(scene), scene.max_steps, directions[0], jumps)
     if method.implicit:
-        sample = planner.sample()
-        cells = zip(sample.start, sample.numbers, strict=True)
-        control[Control.FIRST_STEP] = first_step(rates(scene.equations, *cell) for cell in cells)
+        control[Control.FIRST_STEP] = first_step(planner.rates)
     return np.concatenate([control, directions[1:]])
 
 

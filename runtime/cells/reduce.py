@@ -26,7 +26,7 @@ from synchain.models.scenes.scene import Scene, a_scene
 from ..support.status import Status
 from .buffers import IN_MEMORY, Buffers, numbers_of_a_cell
 from .observed import Observed, Sections, watched
-from .plan import Plan
+from .plan import Plan, Planner
 
 __all__ = ["NodeMerge", "Reduction", "as_reduction", "explain", "reduce_scene"]
 
@@ -95,6 +95,8 @@ class Reduction:
     Attributes
     ----------
     scene : Scene
+    planner : Planner
+        Lays out its cells.
     equations : Equations
         The equations that the kernel steps.
     records : tuple of str
@@ -114,6 +116,7 @@ class Reduction:
     """
 
     scene: Scene
+    planner: Planner = field(repr=False)
     equations: Equations = field(repr=False)
     records: tuple[str, ...]
     merge: NodeMerge = field(repr=False)
@@ -226,6 +229,7 @@ def reduce_scene(scene: Scene, reduce: bool = True, fold_all: bool = False) -> R
     first = [seen[k] for k in range(equations.n)]
     return Reduction(
         scene,
+        Planner(scene),
         equations,
         tuple(r for r in scene.record if not (together and r == "sync_error")),
         _node_merge(whole, equations, classes, together),

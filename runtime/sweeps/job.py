@@ -29,7 +29,7 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
 from ..cells.kernels import write_kernel
-from ..cells.plan import Plan, Planner, control_of
+from ..cells.plan import Plan, control_of
 from ..cells.reduce import Reduction
 
 __all__ = ["Job", "JobSpec", "Problem", "RowsJob", "RowsSpec", "Start", "SweepJob", "SweepSpec", "versions"]
@@ -172,12 +172,10 @@ class SweepJob:
     kernel: Kernel
     reduction: Reduction
     room: int | None = None
-    planner: Planner = field(init=False)
     control: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
-        self.planner = Planner(self.reduction.scene)
-        self.control = control_of(self.planner, self.reduction.jumps, self.kernel.origin.method)
+        self.control = control_of(self.reduction.planner, self.reduction.jumps, self.kernel.origin.method)
 
     def cancel(self) -> None:
         """End all cells that run in this process."""
@@ -196,7 +194,7 @@ class SweepJob:
             Synchronisation errors below which the cells end early.
         """
         reduction = self.reduction
-        rows = reduction.rows(self.planner.rows(cells, near))
+        rows = reduction.rows(reduction.planner.rows(cells, near))
         if start is not None:
             rows = replace(rows, start=np.where(start[1][:, None], start[0], rows.start))
         room = first_room(reduction.scene, len(cells) * (reduction.point_size + 1)) if self.room is None else self.room

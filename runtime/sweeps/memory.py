@@ -96,14 +96,12 @@ class Memory:
 
     def warn(self) -> None:
         """Warn of cells whose equations are stiff for the kernel that ran them."""
-        job = self.prepared.job
-        source = job.kernel.origin
+        source, reduction = self.prepared.job.kernel.origin, self.prepared.reduction
         if not (source.method.implicit or source.driver.contacts):
-            reduction = self.prepared.reduction
-            warn_of_stiffness(source, self.buffers, lambda cells: reduction.rows(job.planner.rows(cells)))
+            warn_of_stiffness(source, self.buffers, lambda cells: reduction.rows(reduction.planner.rows(cells)))
 
     def result(self) -> Result:
         """Return the cells so far."""
         prepared, scene = self.prepared, self.prepared.scene
-        spans = prepared.job.planner.spans(np.arange(scene.cells))
+        spans = prepared.reduction.planner.spans(np.arange(scene.cells))
         return gather(scene, prepared.attributes, spans, prepared.reduction.expand(self.buffers), prepared.certificate)

@@ -17,7 +17,7 @@ from synchain.models.scenes.scene import Scene
 from ..cells.buffers import Buffers
 from ..cells.kernels import write_kernel
 from ..cells.layout import block_size
-from ..cells.plan import Plan, Planner, control_of
+from ..cells.plan import Plan, control_of
 from ..cells.reduce import Reduction
 from ..support.execution import Execution
 from ..support.status import CODES, Status, tally
@@ -66,7 +66,7 @@ class Trials:
     def of(cls, reduction: Reduction, execution: Execution) -> Trials:
         """Return trials of what is left of a scene; its cells stand for those of all rounds."""
         source = write_kernel(reduction)
-        control = control_of(Planner(reduction.scene), reduction.jumps, source.method)
+        control = control_of(reduction.planner, reduction.jumps, source.method)
         problem = RowsSpec(reduction.equations, source.method, control, reduction.multiplicity, reduction.records)
         return cls(reduction.scene, problem, source, execution, reduction.expand)
 

@@ -13,7 +13,7 @@ from synchain.models import Field, Scene, chain
 from synchain.runtime import run
 from synchain.runtime.cells.choice import STIFF, chosen_for_rows, stiffness
 from synchain.runtime.cells.kernels import kernel_source
-from synchain.runtime.cells.plan import Plan
+from synchain.runtime.cells.plan import Plan, Planner
 from synchain.runtime.stability.orbits import Orbits
 from synchain.runtime.support.status import Status
 from synchain.runtime.synchronisation.probe import ring_of_three
@@ -78,17 +78,17 @@ def test_a_jump_along_which_motion_may_slide_is_refused():
 
 def test_the_layer_of_a_smoothed_jump_is_seen_from_a_start_outside():
     scene = Scene(topology=chain(2), friction="coulomb", parameters={"kappa": 1e5})
-    assert stiffness(scene) > STIFF > stiffness(scene.replace(parameters={"kappa": 10.0}))
+    assert stiffness(Planner(scene)) > STIFF > stiffness(Planner(scene.replace(parameters={"kappa": 10.0})))
     link = Scene(oscillator="duffing", coupling="friction_damper", topology=chain(2), initial={"v": (0.0, 1.0)})
-    assert stiffness(link.replace(parameters={"sigma": 1e4})) > STIFF > stiffness(link)
+    assert stiffness(Planner(link.replace(parameters={"sigma": 1e4}))) > STIFF > stiffness(Planner(link))
 
 
 @pytest.mark.filterwarnings("error")
 def test_rates_beyond_the_largest_float_are_infinitely_fast():
     link = Scene("van_der_pol", "x->x", chain(2), window=1.0, transient=0.0)
-    assert stiffness(link.replace(parameters={"sigma": 1e308})) == math.inf
+    assert stiffness(Planner(link.replace(parameters={"sigma": 1e308}))) == math.inf
     damper = Scene(oscillator="duffing", coupling="friction_damper", topology=chain(2))
-    assert stiffness(damper.replace(parameters={"sigma": 1e308})) == math.inf
+    assert stiffness(Planner(damper.replace(parameters={"sigma": 1e308}))) == math.inf
 
 
 def test_stiffness_in_the_middle_of_an_axis_is_seen():
@@ -102,9 +102,9 @@ def test_stiffness_in_the_middle_of_an_axis_is_seen():
 
 def test_stiffness_is_that_of_the_extreme_cells():
     scene = Scene(oscillator="van_der_pol", topology=chain(2))
-    assert stiffness(scene.replace(parameters={"mu": 1.0})) < STIFF
+    assert stiffness(Planner(scene.replace(parameters={"mu": 1.0}))) < STIFF
     swept = scene.replace(axes={"mu": [1.0, 200.0]})
-    assert stiffness(swept) > STIFF
+    assert stiffness(Planner(swept)) > STIFF
     assert kernel_source(swept).integrator == "rodas5p"
 
 
