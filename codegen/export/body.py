@@ -40,7 +40,7 @@ __all__ = [
     "rate_symbols",
     "weights",
     "wrapped",
-]  # fmt: skip
+]
 
 LARGEST_UNROLLED = 8
 """Networks up to this size are written node by node, larger ones as loops."""

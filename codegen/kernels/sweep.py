@@ -87,9 +87,11 @@ class KernelSource:
         if isinstance(sizes, ModeDimensions):
             return ("step", "carry", *(("pushes", "release") if driver.contacts else ()))
         wanted = (
-            ("step_smooth", driver.switching), ("pushes", driver.contacts),
-            ("section", sizes.sections or sizes.stops), ("values", sizes.observed),
-        )  # fmt: skip
+            ("step_smooth", driver.switching),
+            ("pushes", driver.contacts),
+            ("section", sizes.sections or sizes.stops),
+            ("values", sizes.observed),
+        )
         return ("step", *(name for name, called in wanted if called))
 
     @property

@@ -49,7 +49,7 @@ from .series import (
     State,
     Time,
     Whole,
-)  # fmt: skip
+)
 from .terms import add, times
 
 __all__ = ["STARTS", "Graph", "Template", "is_analytic", "is_linear", "jump", "split"]

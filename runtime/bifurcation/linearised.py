@@ -40,9 +40,13 @@ class Part:
 
     @classmethod
     def of(
-        cls, symbols: list[sp.Symbol], rates: tuple[sp.Expr, ...], blocks: list[Block], places: tuple[np.ndarray, ...],
+        cls,
+        symbols: list[sp.Symbol],
+        rates: tuple[sp.Expr, ...],
+        blocks: list[Block],
+        places: tuple[np.ndarray, ...],
         numbers: list[float | np.ndarray],
-    ) -> Part:  # fmt: skip
+    ) -> Part:
         """Compile a template."""
         entries = [e for block in blocks for row in block for e in row]
         return cls(sp.lambdify(symbols, [*rates, *entries], ["scipy", "numpy"]), places[0], places, tuple(numbers))

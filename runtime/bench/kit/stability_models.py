@@ -36,7 +36,7 @@ FIELDS: dict[str, tuple[dict[sp.Symbol, sp.Expr], tuple[float, ...]]] = {
     "roots and powers": ({X: V, V: -X / (1 + X**2) ** sp.Rational(3, 2)}, (1.0, 0.0)),
     "at rest": ({X: V, V: -sp.sin(X)}, (0.0, 0.0)),
     "Lorenz": ({X: 10 * (V - X), V: X * (28 - A) - V, A: X * V - sp.Rational(8, 3) * A}, (1.0, 1.0, 1.0)),
-}  # fmt: skip
+}
 """Name -> rates and start of a single node."""
 
 LENGTH = 6.0
