@@ -219,10 +219,12 @@ class Batches:
         """
         blocks, count, per_batch, parts = self.blocks, self.count, self.per_batch, list[int]()
         while most > 0 and not (parts and self._due(blocks, count, per_batch)):
-            if count == BATCHES:
-                count, per_batch = BATCHES // 2, 2 * per_batch
-            parts.append(min(per_batch, most))
-            blocks, count, most = blocks + parts[-1], count + 1, most - parts[-1]
+            count, per_batch = _with_room(count, per_batch)
+            new = min(most, per_batch * (CHECKED - count % CHECKED))  # no check comes before
+            more = -(-new // per_batch)
+            parts += [per_batch] * more
+            parts[-1] -= per_batch * more - new
+            blocks, count, most = blocks + new, count + more, most - new
         return np.array(parts, dtype=np.int64)
 
     def add(self, growth: np.ndarray) -> None:
@@ -252,8 +254,9 @@ class Batches:
         if self.blocks == 0:
             self.sums = np.empty((BATCHES, *growths.shape[1:]))
         while len(growths):
-            if self.count == BATCHES:
-                self.count, self.per_batch = BATCHES // 2, 2 * self.per_batch
+            full = self.count
+            self.count, self.per_batch = _with_room(self.count, self.per_batch)
+            if self.count < full:
                 self.sums[: self.count] = self.sums[::2] + self.sums[1::2]
             new = min(BATCHES - self.count, len(growths))
             self.sums[self.count : self.count + new] = growths[:new]
@@ -304,6 +307,11 @@ class Batches:
         error = self.error()
         self.worst = int(np.argmax(error))
         return float(error[self.worst])
+
+
+def _with_room(count: int, per_batch: int) -> tuple[int, int]:
+    """How many batches of how many blocks there are when a further one begins: BATCHES are joined in pairs."""
+    return (BATCHES // 2, 2 * per_batch) if count == BATCHES else (count, per_batch)
 
 
 @lru_cache(maxsize=MOST)
