@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from fractions import Fraction
 
@@ -64,8 +65,7 @@ def expect_vanishing(what: str, equations: Equations) -> None:
             "links that vanish there; `plane` takes the strength as an axis, `exponents` one at a time"
         )
     for edge in equations.edges:
-        unit = {edge.weight: sp.S.One}
-        if not edge.oriented and any(sp.expand(e - edge.weight * e.xreplace(unit)) != 0 for e in edge.rhs):
+        if not edge.oriented and not _proportional(edge.rhs, edge.weight):
             raise ValueError(f"{what}: a link is not proportional to its weight; expected the weight as a factor")
 
 
@@ -80,26 +80,25 @@ def _with_links(node: Node, layer: Layer, edge: Edge, n: int) -> Node:
     equal = dict(zip((*edge.here, *edge.there), node.state * 2, strict=True))
     felt = [e.xreplace(equal) for e in edge.rhs]
     if any(e.has(sp.nan, sp.zoo, sp.oo, -sp.oo) for e in felt):
-        raise NoSynchrony(
-            f"a link {', '.join(map(str, edge.rhs))} has no value between equal states, so complete synchronisation is no "
-            "solution of this network"
-        )
+        raise _no_solution(f"a link {', '.join(map(str, edge.rhs))} has no value between equal states")
     own = [name for name in layer.varied if any(e.has(sp.Symbol(name, real=True)) for e in felt)]
     if own:
-        raise NoSynchrony(
-            f"a link acts between equal states and {', '.join(own)} differs from link to link, so complete synchronisation is "
-            "no solution of this network"
-        )
-    unit = {edge.weight: sp.S.One}
-    if all(sp.expand(e - edge.weight * e.xreplace(unit)) == 0 for e in felt):
+        raise _no_solution(f"a link acts between equal states and {', '.join(own)} differs from link to link")
+    if _proportional(felt, edge.weight):
         weights = [[sum(own, Fraction(0))] for own in weights]
     if len({tuple(sorted(own)) for own in weights}) > 1:
-        raise NoSynchrony(
-            "a link acts between equal states and the sums of weights differ from node to node, so complete synchronisation "
-            "is no solution of this network"
-        )
+        raise _no_solution("a link acts between equal states and the sums of weights differ from node to node")
     values = [{edge.weight: sp.Rational(w.numerator, w.denominator)} for w in weights[0]]
     rates = tuple(rate + sp.Add(*(e.xreplace(w) for w in values)) for rate, e in zip(node.rhs, felt, strict=True))
     used = {s for e in felt for s in e.free_symbols}
     more = tuple(s for s in edge.parameters if s in used and s not in node.parameters)
     return replace(node, rhs=rates, parameters=(*node.parameters, *more))
+
+
+def _proportional(rates: Iterable[sp.Expr], weight: sp.Symbol) -> bool:
+    """True if a weight is a factor of all rates."""
+    return all(sp.expand(e - weight * e.xreplace({weight: sp.S.One})) == 0 for e in rates)
+
+
+def _no_solution(found: str) -> NoSynchrony:
+    return NoSynchrony(f"{found}, so complete synchronisation is no solution of this network")
