@@ -62,14 +62,14 @@ def arguments(values: object, keywords: Iterable[str], folder: Path | None = Non
     if isinstance(given.get("links"), list):
         given["links"] = [_layer(f"links {k}", entry, folder) for k, entry in enumerate(given["links"], start=1)]
     if isinstance(given.get("nodes"), list):
-        given["nodes"] = [_placed_group(group, folder) for group in given["nodes"]]
+        given["nodes"] = [_placed(group, folder) for group in given["nodes"]]
     return given
 
 
 def _placed(name: object, folder: Path | None) -> object:
-    """The name of a part; a path to a file of code starts in the folder of the scene file, in a table too."""
-    if isinstance(name, Mapping) and "friction" in name:
-        return {**name, "friction": _placed(name["friction"], folder)}
+    """The name of a part, or a table with such names; a path to a file of code starts in the folder of the scene file."""
+    if isinstance(name, Mapping):
+        return {key: _placed(e, folder) if key in ("oscillator", "friction") else e for key, e in name.items()}
     if not isinstance(name, str) or folder is None or not split(name)[0].endswith(".py"):
         return name
     return str(folder / name)
@@ -83,13 +83,6 @@ def _layer(what: str, given: object, folder: Path | None) -> tuple[object, Topol
         if key not in table:
             raise ValueError(f"{what}: {key!r} is missing; expected a coupling and its graph")
     return _placed(table["coupling"], folder), graph_of(check_table(f"{what}: topology", table["topology"]), folder)
-
-
-def _placed_group(group: object, folder: Path | None) -> object:
-    """A group of nodes, its paths to files of code too."""
-    if not isinstance(group, Mapping):
-        return group
-    return {key: _placed(value, folder) if key in ("oscillator", "friction") else value for key, value in group.items()}
 
 
 def graph_of(given: Mapping[object, Any], folder: Path | None = None) -> Topology:
