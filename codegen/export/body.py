@@ -222,13 +222,13 @@ def _body(table: dict, every: bool = False) -> Body:
     return Body(tuple((s, e.xreplace(shown)) for s, e in steps), tuple(zip(kept, values, strict=True)))
 
 
-def wrapped(numbers: Iterable[str], indent: str = "    ", width: int = 110) -> list[str]:
+def wrapped(numbers: Iterable[str]) -> list[str]:
     """Numbers of a long table with commas between them, broken into lines."""
-    lines, line = [], indent
+    lines, line = [], "    "
     for text in numbers:
-        if len(line) + len(text) > width:
+        if len(line) + len(text) > 110:
             lines.append(line.rstrip())
-            line = indent
+            line = "    "
         line += f"{text}, "
     return [*lines, line.rstrip()]
 
