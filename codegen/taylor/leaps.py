@@ -9,7 +9,7 @@ from sympy.functions.elementary.piecewise import ExprCondPair, Piecewise
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.jumps import INEQUALITIES, JUMPING, jumps
+from synchain.models.mechanics.jumps import INEQUALITIES, gaps_of, jumps
 
 __all__ = ["Leap", "changing", "leaping", "templates", "unpassed"]
 
@@ -46,16 +46,16 @@ def unpassed(equations: Equations) -> Iterator[sp.Expr]:
     jumping = {c for own, ends, parts in known for c in range(len(ends[0])) if own[c].has(*parts)}
     for _, ends, parts in known:
         for part in parts:
-            gaps = _gaps(part)
+            gaps = list(gaps_of(part))
             depends = {c for end in ends for c, s in enumerate(end) if any(gap.has(s) for gap in gaps)}
-            if not gaps or depends & jumping or equations.sticks or equations.inertial:
+            if not _passable(part) or depends & jumping or equations.sticks or equations.inertial:
                 yield part
 
 
 def leaping(expressions: Iterable[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:
     """Some expressions with their jumps as `Leap` or sp.floor, parts that no step passes as they are."""
     given = list(expressions)
-    parts = {part for part in jumps(given, moving) if _gaps(part)}
+    parts = {part for part in jumps(given, moving) if _passable(part)}
     return [_leaping(e, parts) for e in given] if parts else given
 
 
@@ -83,12 +83,9 @@ def _choice(pieces: Sequence[ExprCondPair]) -> sp.Expr:
     return Leap(condition.lhs - condition.rhs, above, rest if isinstance(condition, STRICT) else piece, below)
 
 
-def _gaps(part: sp.Expr) -> list[sp.Expr]:
-    """What passes zero, or a whole number, where a part jumps; none for what jumps elsewhere."""
-    if isinstance(part, JUMPING):
-        return [part.args[0]]
-    if isinstance(part, Piecewise) and part.args[-1][1] == sp.true:
-        conditions = [condition for _, condition in part.args[:-1]]
-        if all(isinstance(condition, INEQUALITIES) for condition in conditions):
-            return [condition.lhs - condition.rhs for condition in conditions]
-    return []
+def _passable(part: sp.Expr) -> bool:
+    """False for a choice that is not made by inequalities alone, or that may have no value."""
+    if not isinstance(part, Piecewise):
+        return True
+    *conditions, last = (condition for _, condition in part.args)
+    return last == sp.true and all(isinstance(condition, INEQUALITIES) for condition in conditions)

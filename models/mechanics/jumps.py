@@ -29,7 +29,9 @@ SIDES = {sp.sign: (sp.S.One, sp.S.NegativeOne), sp.Heaviside: (sp.S.One, sp.S.Ze
 
 def gaps_of(part: sp.Basic) -> Iterator[sp.Expr]:
     """Yield what passes zero where a part jumps or has a kink."""
-    if isinstance(part, Relational):
+    if isinstance(part, Piecewise):
+        yield from (gap for _, condition in part.args for r in condition.atoms(Relational) for gap in gaps_of(r))
+    elif isinstance(part, Relational):
         yield part.lhs - part.rhs
     elif isinstance(part, sp.Max | sp.Min):
         yield from (a - b for a, b in itertools.combinations(part.args, 2))
