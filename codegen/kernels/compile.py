@@ -39,7 +39,7 @@ from synchain.models.inputs.keywords import warn
 
 from ..driver import dimensions
 from ..driver.dimensions import Dimensions, ModeDimensions
-from ..simd import addresses, decorator, elementary, lane_types, lanes, special, syntax
+from ..simd import addresses, decorator, elementary, lane_types, lanes, special, syntax, writing
 from ..simd.addresses import ADDRESS
 from ..simd.lane_types import Lane, Mask
 from ..steps.names import NAMES
@@ -448,6 +448,7 @@ def _surroundings() -> str:
         for m in (
             decorator,
             syntax,
+            writing,
             addresses,
             lane_types,
             lanes,

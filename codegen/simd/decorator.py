@@ -23,6 +23,7 @@ from numba.core.compiler_machinery import FunctionPass, PassManager, register_pa
 from numba.core.typed_passes import NativeLowering, NoPythonBackend
 
 from . import syntax
+from .writing import Program
 
 __all__ = ["execute", "njit", "without_repetition"]
 
@@ -56,7 +57,7 @@ class _Linked(JITCodeLibrary):
 class _Function(ir.FunctionIR):
     """What Numba asks of a function that was read from its syntax tree."""
 
-    def __init__(self, identity: Any, program: syntax.Program) -> None:
+    def __init__(self, identity: Any, program: Program) -> None:
         place = ir.Loc(identity.filename, identity.firstlineno)
         blocks = {0: ir.Block(ir.Scope(None, place), place)}
         super().__init__(blocks, False, identity, place, {}, identity.arg_count, identity.arg_names)

@@ -96,6 +96,7 @@ READ = {
     "memory in turn": "a, b = np.zeros(4), np.full(4, 2.0)\nfor k in range(n):\n    a, b = b, a\n    a[1] += k\n    if k == 5:\n"
     "        b = np.zeros(4)\n        return\nb = a\nout[0] = a[1] + b[0]",
     "memory of functions": "a = ones(n + 2)\nout[0] = total(ones(n + 1)) + total(a[1:]) + total(x[n:])\nc = a[:2]\nout[1] = c[0]",
+    "memory of an argument": "x = out\nx[n] = 2.0\nx = np.zeros(9)\nx[0] = n\nout[1] = x[0]",
     "parts of tuples": "a = (n, x[0], x[1], 7)[1:3]\nout[0] = a[1]",
     "what is not kept": "_, a = both(x[0], x[1])\nfor _ in range(n):\n    a += a\nout[0] = a",
     "a part that is not known": "out[0] = pair[n % 2]",
@@ -134,6 +135,8 @@ REFUSED = {
     "an unknown name": ("out[0] = nothing", "nothing"),
     "an unknown attribute": ("out[0] = x.nothing", "x.nothing"),
     "memory of nobody": ("np.empty(3)", "np.empty(3)"),
+    "memory of a choice": ("a = x if n > 2 else np.empty(3)\nout[0] = a[0]", "x if n > 2 else np.empty(3)"),
+    "an attribute of memory": ("out[0] = np.empty(3).size", "np.empty(3).size"),
     "memory of two": ("a = b = np.empty(3)", "a = b = np.empty(3)"),
 }
 
