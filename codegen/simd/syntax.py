@@ -507,21 +507,28 @@ class _Reader(ast.NodeVisitor):
             raise UnreadError
         start, stop, step = self.bounds([self.visit(bound) for bound in node.iter.args])
         self.turn()
-        slots: list[Value] = []
+        numbers: list[Value] = []
         body = in_turn(
-            [self.assigned(node.target, Typed(types.int64, lambda w: w.builder.load(slots[-1]))), *self.body(node.body)]
+            [
+                self.assigned(node.target, Typed(types.int64, lambda w: w.builder.load(numbers[-1]))),
+                *self.body(node.body),
+            ]
         )
         self.turn()
 
         def write(w: Writer) -> None:
             first, last = start(w), stop(w)
-            slot = w.memory(first)
-            slots.append(slot)
-            w.loop(
-                lambda w: w.builder.icmp_signed("<" if step > 0 else ">", w.builder.load(slot), last),
-                body,
-                lambda w: w.builder.store(w.builder.add(w.builder.load(slot), first.type(step)), slot),
-            )
+            following, number = w.memory(first), w.memory(first)
+            numbers.append(number)
+
+            def turn(w: Writer) -> None:
+                """Count before the body, as Numba does: LLVM takes the first turn out of short loops then."""
+                w.builder.store(w.builder.load(following), number)
+                w.builder.store(w.builder.add(w.builder.load(number), first.type(step)), following)
+                body(w)
+
+            more = "<" if step > 0 else ">"
+            w.loop(lambda w: w.builder.icmp_signed(more, w.builder.load(following), last), turn, lambda w: None)
 
         return write
 
