@@ -110,10 +110,10 @@ def _sticking(
         raise ValueError(f"set-valued contact: the oscillator has {len(found)} coordinates; expected one")
     w = sp.Dummy("w", real=True)
     coefficient = friction_coefficient(law, ContactModel.SET_VALUED)
-    (velocity,) = system.velocities
-    rate, contact = set_valued(found[0], FRICTION, coefficient(w), w, static_coefficient(law), velocity)
+    (place,), (velocity,) = system.coordinates, system.velocities
+    rate, contact = set_valued(found[0], FRICTION, coefficient(w), w, static_coefficient(law), place, velocity)
     rates = (velocity, SLIP**2 * rate, sp.S.Zero)
-    return Node((*system.coordinates, velocity, SLIP), rates, parameters, contact, coefficient(SLIDING))
+    return Node((place, velocity, SLIP), rates, parameters, contact, coefficient(SLIDING))
 
 
 def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str) -> None:

@@ -144,6 +144,7 @@ def set_valued(
     law: sp.Expr,
     argument: sp.Symbol,
     static: sp.Expr | None,
+    place: sp.Symbol,
     velocity: sp.Symbol,
 ) -> tuple[sp.Expr, Contact]:
     """Return the acceleration in all modes and the contact conditions.
@@ -160,8 +161,8 @@ def set_valued(
         The sliding velocity in `law`.
     static : Expr or None
         The static coefficient; None for the limit of the law at 0+.
-    velocity : Symbol
-        The velocity of the body.
+    place, velocity : Symbol
+        Where the body is, and its velocity.
 
     Raises
     ------
@@ -173,7 +174,7 @@ def set_valued(
     if len(applied) != 1:
         raise ValueError(f"set-valued contact: friction acts {len(applied)} times in {acceleration}; expected once")
     sliding = sp.expand(applied[0].args[0])
-    speed = _ground(sliding, velocity)
+    speed = _ground(sliding, place, velocity)
     moving = _by_mode(law, argument)
     slow = moving.xreplace({argument: sp.S.Zero, SLIP: sp.S.One})
     largest = slow if static is None else static
@@ -198,14 +199,18 @@ def set_valued(
     return rate, Contact(speed, sliding, up, down, pushed, pulled, shown)
 
 
-def _ground(sliding: sp.Expr, velocity: sp.Symbol) -> sp.Expr:
+def _ground(sliding: sp.Expr, place: sp.Symbol, velocity: sp.Symbol) -> sp.Expr:
     """The velocity at which the sliding velocity is zero; ValueError if that is no constant, or it does not fall."""
     slope = sliding.diff(velocity)
     if not (slope.is_number and slope.is_negative):
         raise ValueError(f"set-valued contact: the sliding velocity {sliding} must fall with {velocity}, linearly")
     speed = sp.solve(sliding, velocity)[0]
-    if speed.free_symbols & {sp.Symbol("t", real=True)}:
-        raise ValueError(f"set-valued contact: the ground's velocity {speed} changes with time; expected a constant")
+    for symbol in (place, sp.Symbol("t", real=True)):
+        if speed.has(symbol):
+            raise ValueError(
+                f"set-valued contact: found a ground with the velocity {speed}, which changes with {symbol}; "
+                "expected a ground of constant velocity; use contact 'atan'"
+            )
     return speed
 
 

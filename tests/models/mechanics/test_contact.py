@@ -44,7 +44,12 @@ def test_the_derived_node_is_the_smooth_one_away_from_the_jump() -> None:
         (-X, sp.sign(W), "friction acts 0 times"),
         (-X + FORCE(X), sp.sign(W), "must fall with v"),
         (-X + FORCE(V), sp.sign(W), "must fall with v"),
-        (-X + FORCE(sp.Symbol("t", real=True) - V), sp.sign(W), "changes with time"),
+        (-X + FORCE(sp.Symbol("t", real=True) - V), sp.sign(W), "which changes with t"),
+        (
+            -X + FORCE(2 + 2 * X - 2 * V),
+            sp.sign(W),
+            r"found a ground with the velocity x \+ 1, which changes with x; expected a ground of constant velocity",
+        ),
         (-X + FORCE(-V) ** 2, sp.sign(W), "acts nonlinearly in .*; expected a multiple of it"),
         (
             -X + (1 + V) * FORCE(-V),
@@ -57,7 +62,7 @@ def test_the_derived_node_is_the_smooth_one_away_from_the_jump() -> None:
 )
 def test_what_has_no_set_valued_form(acceleration: sp.Expr, law: sp.Expr, words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        set_valued(acceleration, FORCE, law, W, None, V)
+        set_valued(acceleration, FORCE, law, W, None, X, V)
 
 
 def test_the_smooth_law_tends_to_the_exact_one() -> None:
