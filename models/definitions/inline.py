@@ -29,9 +29,9 @@ from ..inputs.checks import (
 )
 from ..inputs.expressions import FUNCTIONS
 from ..inputs.frozen import Frozen
-from ..mechanics.components import SLIDING, TIME
+from ..mechanics.components import TIME
 from ..mechanics.expression import RESERVED, exact
-from ..mechanics.friction import ContactModel, FrictionLaw
+from ..mechanics.friction import SLIDING, ContactModel, FrictionLaw
 from ..mechanics.lagrangian import check_masses_exist, mass_matrix
 from ..mechanics.oscillator import FRICTION, Coordinate, FieldModel, LagrangianModel, Oscillator
 from ..mechanics.parameter import Parameter
@@ -80,7 +80,8 @@ def Lagrangian(
         velocity ``w`` and of parameters that occur nowhere else; `friction_law` reads one from text.  A scene may name
         another.
     contact : str, optional
-        How the jump of the law at rest is treated: "atan" (the default), "sign" or "set-valued".
+        How the jump of the law at rest is treated: "atan" (the default), "sign" or "set-valued".  A law without a
+        jump never sticks.
     parameters : mapping, optional
         The default of each parameter: a number, or a `Parameter` with its range.
     initial : mapping, optional
@@ -211,7 +212,7 @@ def friction_law(
     ----------
     force : Expr, number or str
         Friction force over normal load, of the velocity w of the ground relative to the body; w f(w) >= 0.  A jump
-        is written with sign(w).
+        at w = 0 is written with sign(w), and refused if it is not.
     parameters : mapping, optional
         The default of each parameter.  If none has a unit, w is the non-dimensional velocity.
     static : Expr, number or str, optional

@@ -9,9 +9,9 @@ from typing import Any
 import sympy as sp
 
 from ..inputs.checks import check_keys, check_table, check_text, short_repr, typed_repr
-from ..mechanics.components import SLIDING, TIME
+from ..mechanics.components import TIME
 from ..mechanics.expression import read, written
-from ..mechanics.friction import ContactModel, FrictionLaw
+from ..mechanics.friction import SLIDING, ContactModel, FrictionLaw
 from ..mechanics.oscillator import FieldModel, LagrangianModel, Oscillator
 from ..mechanics.parameter import Parameter
 from .inline import Field, Lagrangian, friction_law

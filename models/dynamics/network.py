@@ -22,8 +22,8 @@ from ..interactions.coupling import WEIGHT, Coupling, LagrangianCoupling, Matrix
 from ..interactions.link import edge
 from ..interactions.separation import separated
 from ..mechanics.calculus import cancelled, expanded
-from ..mechanics.components import SLIDING, WEIGHT_NUMBER, Block, Edge, Node
-from ..mechanics.friction import KAPPA, SLIP, ContactModel, FrictionLaw, set_valued
+from ..mechanics.components import WEIGHT_NUMBER, Block, Edge, Node
+from ..mechanics.friction import KAPPA, SLIDING, SLIP, ContactModel, FrictionLaw, regularise, set_valued
 from ..mechanics.lagrangian import LARGEST_BY_MINORS, Mechanics, check_masses_exist, coupled, solve_masses
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
 from ..mechanics.oscillator import FieldModel, Oscillator
@@ -62,7 +62,7 @@ def parameters(
     table: dict[str, Parameter] = dict(oscillator.parameters)
     if friction is not None:
         _join(table, friction.parameters, f"friction law {friction.name!r}")
-        if contact == ContactModel.ATAN and friction.force.has(sp.sign):
+        if contact == ContactModel.ATAN and regularise(friction.force, SLIDING, sp.Symbol("kappa")) != friction.force:
             _join(table, {"kappa": KAPPA}, f"contact {str(contact)!r}")
     for coupling in couplings:
         _join(table, coupling.parameters, f"coupling {str(coupling)!r}")

@@ -11,7 +11,7 @@ import sympy as sp
 from .calculus import derivative
 from .friction import SLIP, Contact
 
-__all__ = ["SLIDING", "TIME", "WEIGHT_NUMBER", "Block", "Edge", "Node"]
+__all__ = ["TIME", "WEIGHT_NUMBER", "Block", "Edge", "Node"]
 
 TIME = sp.Symbol("t", real=True)
 """Non-dimensional time, the one time symbol of all equations."""
@@ -21,9 +21,6 @@ Block: TypeAlias = tuple[tuple[sp.Expr, ...], ...]
 
 WEIGHT_NUMBER = sp.Symbol("W", real=True)
 """The weight of a link as a parameter, a number of the run in place of an exact one of the graph."""
-
-SLIDING = sp.Symbol("w", real=True)
-"""The sliding velocity, the argument of a friction law."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ from ..inputs.frozen import Frozen
 from ..inputs.words import Word
 from .parameter import Parameter
 
-__all__ = ["KAPPA", "SLIP", "Contact", "ContactModel", "FrictionLaw", "regularise", "set_valued"]
+__all__ = ["KAPPA", "SLIDING", "SLIP", "Contact", "ContactModel", "FrictionLaw", "regularise", "set_valued"]
 
 
 class ContactModel(Word):
@@ -37,8 +37,14 @@ class ContactModel(Word):
 
 KAPPA = Parameter(1e5, "s/m", "steepness of the regularised jump, sgn w = (2/pi) atan(kappa w)", positive=True)
 
+SLIDING = sp.Symbol("w", real=True)
+"""The sliding velocity, the argument of a friction law."""
+
 SLIP = sp.Symbol("slip", real=True)
 """The mode of an oscillator: +1 or -1 while it slips, 0 while it sticks."""
+
+TINY, SMALL = sp.Rational(1, 10**30), 1e-6
+"""A sliding velocity next to none, and a coefficient that is larger only where a law jumps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +59,7 @@ class FrictionLaw:
         Parameters of the law, real symbols in its expressions.
     force : Expr
         Friction force over normal load, of the velocity w (`SLIDING`) of the ground relative to the body; w f(w) >= 0.
+        Its jump at w = 0 is written with sign.
     static : Expr, optional
         The static friction coefficient if it exceeds f(0+); only set-valued contact knows it.
     order : tuple of (str, str)
@@ -61,6 +68,11 @@ class FrictionLaw:
         True if the law is meant to feed energy.
     summary, source : str
         What it is, and where it was published.
+
+    Raises
+    ------
+    ValueError
+        If the force jumps at w = 0 by more than its signs do.
     """
 
     name: str
@@ -72,17 +84,24 @@ class FrictionLaw:
     summary: str = field(default="", compare=False)
     source: str = field(default="", compare=False)
 
+    def __post_init__(self) -> None:
+        if _jump(regularise(self.force, SLIDING, sp.S.One), SLIDING):
+            raise ValueError(
+                f"friction law {self.name!r}: found a jump at w = 0 in {self.force} that is not written with sign(w); "
+                "expected it as in mu*sign(w)"
+            )
+
     def __str__(self) -> str:
         return self.name
 
     @property
     def jumps(self) -> bool:
         """True if friction jumps at rest; without a jump nothing sticks."""
-        return self.static is not None or self.force.has(sp.sign)
+        return self.static is not None or _jump(self.force, SLIDING)
 
 
-def regularise(expression: sp.Expr, kappa: sp.Symbol) -> sp.Expr:
-    """Replace every sign(w) by (2/pi) atan(kappa w).
+def regularise(law: sp.Expr, argument: sp.Symbol, kappa: sp.Expr) -> sp.Expr:
+    """Replace every sign(w) that holds the argument by (2/pi) atan(kappa w).
 
     The slope at w = 0 becomes 2 kappa/pi, and for |w| >> 1/kappa the error is 2/(pi kappa |w|).
 
@@ -90,7 +109,15 @@ def regularise(expression: sp.Expr, kappa: sp.Symbol) -> sp.Expr:
     ----------
     Marszal et al., Eur. Phys. J. Special Topics (2016), eq. 5.
     """
-    return expression.replace(sp.sign, lambda w: 2 * sp.atan(kappa * w) / sp.pi)
+    return law.replace(sp.sign, lambda w: 2 * sp.atan(kappa * w) / sp.pi if w.has(argument) else sp.sign(w))
+
+
+def _jump(e: sp.Expr, argument: sp.Symbol) -> bool:
+    """True if an expression jumps where its argument passes zero; other symbols are numbers without a meaning."""
+    others = sorted(e.free_symbols - {argument}, key=str)
+    numbers = {symbol: sp.Rational(2 * k + 3, 2 * k + 5) for k, symbol in enumerate(others)}
+    above, below = (complex(e.xreplace({**numbers, argument: w}).evalf(60)) for w in (TINY, -TINY))
+    return abs(above - below) > SMALL
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +195,7 @@ def set_valued(
     ------
     ValueError
         If friction does not occur exactly once or acts nonlinearly, if the ground's velocity is not a constant, and for
-        a law without a jump at w = 0 or one that is not odd.
+        a law that is not odd, has no jump at w = 0, or has a kink there that is not known to turn with the sign of w.
     """
     applied = sorted(acceleration.atoms(friction), key=str)
     if len(applied) != 1:
@@ -180,7 +207,7 @@ def set_valued(
     largest = slow if static is None else static
     if largest == 0:
         raise ValueError(
-            f"set-valued contact: the law {law} has no jump at w = 0, so nothing sticks; use contact 'atan'"
+            f"set-valued contact: the law {law.xreplace({argument: SLIDING})} has no jump at w = 0, so nothing sticks; use contact 'atan'"
         )
     hidden = sp.Dummy("f", real=True)
     plain = acceleration.xreplace({applied[0]: hidden})

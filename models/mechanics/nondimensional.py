@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping
 import sympy as sp
 
 from .calculus import derivative
-from .components import SLIDING, TIME
-from .friction import ContactModel, FrictionLaw, regularise
+from .components import TIME
+from .friction import SLIDING, ContactModel, FrictionLaw, regularise
 from .lagrangian import Mechanics
 from .oscillator import FRICTION, LagrangianModel, Oscillator
 from .parameter import Parameter, dimension
@@ -151,7 +151,7 @@ def friction_coefficient(law: FrictionLaw, contact: str) -> Callable[[sp.Expr], 
     amounts = {SLIDING: w if pure else w * magnitude("m/s"), **_amounts(law.parameters)}
     value = _cancel(law.force.xreplace(amounts), f"friction law {law}")
     if treatment == ContactModel.ATAN:
-        value = regularise(value, sp.Symbol("kappa", real=True))
+        value = regularise(value, w, sp.Symbol("kappa", real=True))
     return lambda argument: value.xreplace({w: argument})
 
 

@@ -14,7 +14,8 @@ import sympy as sp
 
 from ..dynamics.equations import Equations
 from ..inputs.checks import check_instance
-from ..mechanics.components import SLIDING, TIME, WEIGHT_NUMBER, Edge, Node
+from ..mechanics.components import TIME, WEIGHT_NUMBER, Edge, Node
+from ..mechanics.friction import SLIDING
 from ..mechanics.nondimensional import FRICTION
 from .writer import Latex, Style, Text, Writer
 

@@ -9,8 +9,7 @@ import numpy as np
 import sympy as sp
 from matplotlib.axes import Axes
 
-from synchain.models.mechanics.components import SLIDING
-from synchain.models.mechanics.friction import regularise
+from synchain.models.mechanics.friction import SLIDING, regularise
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 
@@ -67,7 +66,7 @@ def forces(scene: Scene) -> tuple[Function, Function]:
     sharp = law.force
     numbers = {symbol: scene.parameters[key] for key, symbol in symbols.items()}
     numbers[kappa] = scene.parameters["kappa"]
-    smooth = regularise(sharp, kappa)
+    smooth = regularise(sharp, SLIDING, kappa)
     return sp.lambdify(SLIDING, sharp.subs(numbers), "numpy"), sp.lambdify(SLIDING, smooth.subs(numbers), "numpy")
 
 

@@ -9,9 +9,10 @@ import pytest
 import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from parts import coupling_of, law_of
+from parts import coupling_of, law_of, oscillator_of
 
 from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
+from synchain.models.dynamics.network import parameters
 from synchain.models.inputs.frozen import Frozen
 from synchain.models.inputs.plugins import load, names
 from synchain.models.mechanics.friction import KAPPA, ContactModel, FrictionLaw, regularise
@@ -125,11 +126,11 @@ def test_values_between_the_limits() -> None:
 
 def test_regularised_jump_is_smooth_and_close() -> None:
     kappa = sp.Symbol("kappa", positive=True)
-    smooth = regularise(sp.sign(W), kappa)
+    smooth = regularise(sp.sign(W), W, kappa)
     assert smooth == 2 * sp.atan(kappa * W) / sp.pi
     assert smooth.diff(W).subs(W, 0) == 2 * kappa / sp.pi
     assert sp.limit((1 - smooth.subs(W, FAST)) * sp.pi * kappa * FAST / 2, FAST, sp.oo) == 1
-    assert regularise(W**2 * sp.Abs(W), kappa) == W**2 * sp.Abs(W)
+    assert regularise(W**2 * sp.Abs(W), W, kappa) == W**2 * sp.Abs(W)
 
 
 def test_default_steepness_is_the_papers() -> None:
@@ -145,7 +146,7 @@ def test_units_cancel(name: str, contact: str) -> None:
     law = load(FRICTION_LAW, name)
     expected = law.force(W, **{p: sp.Symbol(p, real=True) for p in law.PARAMETERS})
     if contact == "atan":
-        expected = regularise(expected, sp.Symbol("kappa", real=True))
+        expected = regularise(expected, W, sp.Symbol("kappa", real=True))
     assert sp.simplify(friction_coefficient(law_of(name), contact)(W) - expected) == 0
 
 
@@ -155,6 +156,48 @@ def test_a_wrong_unit_is_noticed() -> None:
     law = FrictionLaw("careless", table, sp.exp(-a * sp.Abs(w)) * sp.sign(w))
     with pytest.raises(ValueError, match="friction law careless: the unit m does not cancel"):
         friction_coefficient(law, "sign")
+
+
+MU = sp.Symbol("mu", real=True)
+FRACTION = sp.Rational(1, 10**6)
+
+
+def law_with(force: sp.Expr) -> FrictionLaw:
+    return FrictionLaw("own", Frozen({"mu": Parameter(0.0)}), force)
+
+
+@pytest.mark.parametrize(
+    "force",
+    [
+        MU * W / sp.Abs(W), MU * sp.Abs(W) / W, sp.Piecewise((MU, W > 0), (-MU, True)), sp.Piecewise((MU, W > 0), (-MU / 2, True)),
+        sp.Piecewise((MU, W > 0), (-MU, W < 0), (0, True)), sp.Piecewise((MU, sp.sin(W) > 0), (-MU, True)), sp.Heaviside(W, 0) * MU,
+        MU * (sp.Max(W, 0) + sp.Min(W, 0)) / sp.Abs(W), MU * (sp.floor(W) + sp.ceiling(W)), MU * sp.atan(1 / W),
+        MU * sp.sign(W) + MU * W / sp.Abs(W),
+    ],
+)  # fmt: skip
+def test_a_jump_that_is_no_sign_is_refused(force: sp.Expr) -> None:
+    """The arcus tangent would not smooth it, and nothing would stick."""
+    with pytest.raises(ValueError, match=r"friction law 'own': found a jump at w = 0 in .* not written with sign"):
+        law_with(force)
+
+
+@pytest.mark.parametrize(
+    ("force", "jumps"),
+    [
+        (MU * sp.sign(W), True), (MU * sp.sign(2 * W), True), (sp.sign(W * MU), True), (MU * sp.sign(W) + MU / 4, True),
+        (MU * sp.sign(W) * sp.Piecewise((1, sp.Abs(W) < 1), (2, True)), True), (MU * sp.sign(W) * sp.exp(-sp.Abs(W)), True),
+        (MU * sp.sign(W) * W**2, False), (MU * sp.tanh(W / FRACTION), False), (MU * sp.sign(W) * sp.sqrt(sp.Abs(W)), False),
+        (MU * W * sp.Abs(W), False), (sp.Piecewise((MU * W, W > 0), (2 * MU * W, True)), False), (MU + W - MU, False),
+    ],
+)  # fmt: skip
+def test_what_jumps_at_rest(force: sp.Expr, jumps: bool) -> None:
+    assert law_with(force).jumps is jumps
+
+
+def test_signs_of_parameters_are_not_smoothed() -> None:
+    kappa = sp.Symbol("kappa", real=True)
+    assert regularise(sp.sign(MU) * W, W, kappa) == sp.sign(MU) * W
+    assert "kappa" not in parameters(oscillator_of("friction"), law_with(sp.sign(MU) * W))
 
 
 def test_unknown_contact() -> None:
