@@ -19,6 +19,7 @@ import sympy as sp
 
 from ..inputs.frozen import Frozen
 from ..inputs.words import Word
+from .jumps import rough_at
 from .parameter import Parameter
 
 __all__ = ["KAPPA", "SLIDING", "SLIP", "Contact", "ContactModel", "FrictionLaw", "regularise", "set_valued"]
@@ -202,7 +203,7 @@ def set_valued(
         raise ValueError(f"set-valued contact: friction acts {len(applied)} times in {acceleration}; expected once")
     sliding = sp.expand(applied[0].args[0])
     speed = _ground(sliding, place, velocity)
-    moving = _by_mode(law, argument)
+    moving = _moving(law, argument)
     slow = moving.xreplace({argument: sp.S.Zero, SLIP: sp.S.One})
     largest = slow if static is None else static
     if largest == 0:
@@ -241,11 +242,36 @@ def _ground(sliding: sp.Expr, place: sp.Symbol, velocity: sp.Symbol) -> sp.Expr:
     return speed
 
 
-def _by_mode(law: sp.Expr, argument: sp.Symbol) -> sp.Expr:
-    """The law with the mode for the sign of its argument; ValueError if it has other kinks or is not odd."""
-    moving = law.replace(sp.Abs, lambda w: SLIP * w).replace(sp.sign, lambda w: SLIP)
-    if moving.has(sp.Abs, sp.sign):
-        raise ValueError(f"set-valued contact: the law {law} has another kink than that at w = 0")
-    if sp.simplify(moving.xreplace({argument: -argument, SLIP: -SLIP}) + moving) != 0:
-        raise ValueError(f"set-valued contact: the law {law} is not odd")
+def _moving(law: sp.Expr, argument: sp.Symbol) -> sp.Expr:
+    """The law in slip, with the mode for the sign of its argument; ValueError if it is not odd or not smooth at zero."""
+    what, speed = f"set-valued contact: the law {law.xreplace({argument: SLIDING})}", sp.Dummy("w", positive=True)
+    both = sp.simplify(law.xreplace({argument: speed}) + law.xreplace({argument: -speed}))
+    if both != 0:
+        raise ValueError(f"{what} has f(w) + f(-w) = {both.xreplace({speed: SLIDING})}; expected 0, an odd law")
+    moving = _by_mode(law, argument)
+    slipping = moving.xreplace({SLIP: sp.S.One})
+    if slipping.xreplace({argument: sp.S.Zero}).has(sp.nan, sp.zoo, sp.oo, -sp.oo):
+        raise ValueError(f"{what} has no finite value at w = 0; expected one for slow slip")
+    if _jump(slipping, argument) or rough_at(slipping, {argument: sp.S.Zero}, [argument]) is not None:
+        raise ValueError(f"{what} has another kink at w = 0 than sign(w) and |w| have; expected these alone")
     return moving
+
+
+def _by_mode(e: sp.Basic, argument: sp.Symbol) -> sp.Basic:
+    """An expression with the mode for the signs that follow that of its argument; others stay."""
+    if isinstance(e, sp.Abs | sp.sign):
+        return sp.Mul(
+            *(_factor_by_mode(e.func, factor, argument) for factor in sp.Mul.make_args(sp.factor_terms(e.args[0])))
+        )
+    return e.func(*(_by_mode(part, argument) for part in e.args)) if e.args else e
+
+
+def _factor_by_mode(outer: type[sp.Abs | sp.sign], factor: sp.Expr, argument: sp.Symbol) -> sp.Expr:
+    """The sign or the size of a factor: by the mode if SymPy knows its sign on either side of zero."""
+    speed = sp.Dummy("w", positive=True)
+    above, below = (sp.sign(factor.xreplace({argument: w})) for w in (speed, -speed))
+    inner = _by_mode(factor, argument)
+    if not (above.is_number and below.is_number):
+        return outer(inner)
+    sign = above if above == below else above * SLIP
+    return sign if outer is sp.sign else sign * inner

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 import sympy as sp
 from parts import node
+from scipy.integrate import quad
 
+from synchain.models.definitions.inline import Lagrangian, friction_law
 from synchain.models.dynamics.reduction import substitute_constants
 from synchain.models.graphs.families import topology
 from synchain.models.mechanics.friction import SLIP, set_valued
@@ -14,7 +16,7 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.run import run
 
-X, V, W = (sp.Symbol(name, real=True) for name in ("x", "v", "w"))
+X, V, W, MU = (sp.Symbol(name, real=True) for name in ("x", "v", "w", "mu"))
 FORCE = sp.Function("f", real=True)
 
 
@@ -57,12 +59,58 @@ def test_the_derived_node_is_the_smooth_one_away_from_the_jump() -> None:
             r"found friction under the load v \+ 1, which depends on the velocity v",
         ),
         (-X + FORCE(-V), W, "has no jump"),
-        (-X + FORCE(-V), sp.sign(W) + 1, "is not odd"),
+        (-X + FORCE(-V), sp.sign(W) + 1, r"has f\(w\) \+ f\(-w\) = 2; expected 0, an odd law"),
+        (-X + FORCE(-V), sp.sign(W) * sp.Piecewise((1, W > 0), (2, True)), "expected 0, an odd law"),
+        (-X + FORCE(-V), sp.sign(sp.sin(9 * W)), r"the law sign\(sin\(9\*w\)\) has another kink at w = 0 than sign"),
+        (-X + FORCE(-V), sp.sign(W) * (1 + sp.Abs(sp.sin(9 * W))), "has another kink at w = 0"),
+        (-X + FORCE(-V), sp.sign(W) * (1 + sp.Max(W, -W)), "has another kink at w = 0"),
+        (-X + FORCE(-V), sp.sign(W) + sp.atan(1 / W), "has another kink at w = 0"),
+        (-X + FORCE(-V), sp.sign(W) * sp.sin(W) / W, "has no finite value at w = 0"),
+        (-X + FORCE(-V), sp.sign(W) / sp.sqrt(sp.Abs(W)), "has no finite value at w = 0"),
     ],
 )
 def test_what_has_no_set_valued_form(acceleration: sp.Expr, law: sp.Expr, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         set_valued(acceleration, FORCE, law, W, None, X, V)
+
+
+EDGE = sp.Abs(W) - sp.Rational(1, 5)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        sp.sign(W) * (1 + 3 * sp.Abs(W - 5 * W**3)), sp.sign(W * (W**2 - sp.Rational(1, 25))), sp.sign(W) * (1 + sp.Abs(EDGE)),
+        sp.sign(W) * (1 - sp.sign(EDGE) / 3), sp.sign(W) * sp.Piecewise((1, EDGE < 0), (2, True)), sp.sign(W) * sp.Max(EDGE, 1),
+        sp.sign(W) * sp.Abs(MU), sp.sign(W) * sp.Abs(MU - 1), sp.sign(W * MU), sp.sign(W) * sp.exp(-sp.Abs(W / MU)),
+        sp.sign(W + W**3), -sp.sign(-W - W**3), sp.sign(W * sp.Abs(W)), sp.sign(W**3) * sp.exp(-sp.Abs(W)), MU * sp.sign(sp.tanh(W)),
+    ],
+)  # fmt: skip
+def test_friction_in_slip_is_the_law(law: sp.Expr) -> None:
+    rate, contact = set_valued(FORCE(-V), FORCE, law, W, None, X, V)
+    slow = law.xreplace({W: sp.Rational(1, 10**9)})
+    for value in (sp.Rational(-2, 3), sp.Rational(3, 2)):
+        assert (contact.pushed - slow).xreplace({MU: value}).evalf() == pytest.approx(0, abs=1e-8)
+        for w in map(sp.Rational, ("-1", "-0.3", "-0.1", "0.1", "0.3", "1")):
+            found = rate.xreplace({V: -w, SLIP: sp.sign(w), MU: value})
+            assert float(found) == pytest.approx(float(law.xreplace({W: w, MU: value})))
+
+
+@pytest.mark.parametrize("n", [1, 9])
+def test_kinks_in_slip_are_passed(n: int) -> None:
+    """The distance to rest from v = 1 is the integral of v/f(v); one body in written-out steps, nine in loops."""
+    law = friction_law("mu*sign(w)*(1 + 3*abs(w - 5*w**3))", {"mu": 0.3})
+    body = Lagrangian("v**2/2", 0, {"x": "friction(-v)"}, coordinates={"x": "v"}, friction=law, contact="set-valued")
+    apart = Scene(body, "spring", topology("chain", n), initial={"x": 0.0, "v": 1.0}, parameters={"sigma": 0.0} if n > 1 else {},
+                  transient=0.0, window=6.0, time_unit="time", rtol=1e-10)  # fmt: skip
+    result = run(apart, show_progress=False)
+    kink = 1 / np.sqrt(5)
+    slow, fast = (
+        quad(lambda v: v / (0.3 * (1 + 3 * abs(v - 5 * v**3))), *ends, epsabs=1e-12)[0]
+        for ends in ((0, kink), (kink, 1))
+    )
+    assert result.success
+    np.testing.assert_allclose(result.states("end")[:n], slow + fast, rtol=1e-8)
 
 
 def test_the_smooth_law_tends_to_the_exact_one() -> None:
