@@ -22,7 +22,7 @@ REFINEMENTS = 30
 
 @njit(error_model="numpy")
 def factorise(work, first, apart, scratch, order, place, row_start, after_start, column):
-    """Factorise the matrix, row by row in a scratch vector; the inverse pivots replace the diagonal."""
+    """Factorise the matrix, row by row in a scratch vector; the inverse pivots, NaN of infinite ones, replace the diagonal."""
     if apart > 0:
         for k in range(DIMENSION + column.size):
             store(work, first + apart + k, load(work, first + k, WIDTH))
@@ -41,7 +41,8 @@ def factorise(work, first, apart, scratch, order, place, row_start, after_start,
                 store(work, scratch + column[u], old - factor * load(work, rest + u, WIDTH))
         for s in range(after_start[q], row_start[q + 1]):
             store(work, rest + s, load(work, scratch + column[s], WIDTH))
-        store(work, first + k, 1.0 / load(work, scratch + k, WIDTH))
+        pivot = load(work, scratch + k, WIDTH)
+        store(work, first + k, 1.0 / pivot + 0.0 * pivot)
 
 
 @njit(error_model="numpy")

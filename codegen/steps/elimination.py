@@ -3,6 +3,7 @@
 The plan picks pivots on the diagonal by least fill (Markowitz, Management Science 3, 255, 1957), so positions of a
 mechanical network are eliminated before velocities, a chain or any tree causes no fill, and a ring or a star costs
 what it must.  No numerical pivoting: s is chosen by the step control, and a bad pivot shows up as a rejected step.
+An infinite pivot, as of sqrt(x) at 0, would make the step and its error 0; its inverse is NaN, and so the error is.
 """
 
 from __future__ import annotations
@@ -85,6 +86,11 @@ class _Writer:
     def entry(self, kind: str, r: int, c: int) -> str:
         return f"{kind}_{self.labels[r]}" if r == c else f"{kind}_{self.labels[r]}_{self.labels[c]}"
 
+    def inverse(self, k: int, e: Expression) -> Name:
+        """The inverse of a pivot, NaN of an infinite one."""
+        pivot = self.let(self.entry("pivot", k, k), e)
+        return self.let(self.entry("inv", k, k), 1.0 / pivot + 0.0 * pivot)
+
     def atomic(self, name: str, e: Expression) -> Expression:
         """A name for an entry, or itself where that is a unit or already a name."""
         return e if e in (ONE, negative(ONE)) or isinstance(e, Name) else self.let(name, e)
@@ -127,7 +133,7 @@ def write_elimination(
     inverse: dict[int, Expression] = {}
     for k, down, right in zip(steps.order, steps.below, steps.after, strict=True):
         pivot = diagonal[k]
-        inverse[k] = Name("reach") if pivot == Name("shift") else writer.let(writer.entry("inv", k, k), 1.0 / pivot)
+        inverse[k] = Name("reach") if pivot == Name("shift") else writer.inverse(k, pivot)
         for r in down:
             below[r, k] = writer.let(writer.entry("l", r, k), times(value[r, k], inverse[k]))
             for c in right:

@@ -39,7 +39,7 @@ RESERVED = frozenset(
 """Words of the generated code; a user's symbol of that name gets an underscore behind it."""
 
 PREFIXES = (
-    "m_", "l_", "inv_", "k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8", "k9", "u_", "f_", "r_", "at_", "ft_", "n_", "j_",
+    "m_", "l_", "pivot_", "inv_", "k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8", "k9", "u_", "f_", "r_", "at_", "ft_", "n_", "j_",
     "e_", "_", "along_", "value_", "bend_", "steady_", "g_", "mass_", "sum_", *(f"node{k}" for k in range(2, 10)),
 )  # fmt: skip
 

@@ -95,6 +95,13 @@ def test_statements_solve_the_system(shape, kinds, seed):
     np.testing.assert_allclose(solved(size, jacobian, shift, values, right), expected, rtol=1e-11, atol=1e-13)
 
 
+@pytest.mark.parametrize("endless", [np.inf, -np.inf])
+def test_an_infinite_pivot_has_no_solution(endless):
+    a = sp.Symbol("a", real=True)
+    found = solved(2, {(0, 0): a, (1, 1): -sp.S.One}, 30.0, {"a": endless}, np.ones(2))
+    np.testing.assert_array_equal(np.isnan(found), [True, False])
+
+
 @settings(max_examples=100, deadline=None)
 @given(patterns())
 def test_every_pivot_is_used_once_and_all_updates_are_listed(shape):

@@ -92,6 +92,15 @@ def test_program_solves_like_numpy(graph):
     np.testing.assert_allclose(solved(equations, made, matrix, right), np.linalg.solve(matrix, right), rtol=1e-12)
 
 
+def test_an_infinite_pivot_has_no_solution():
+    equations = Scene(topology=chain(20)).equations
+    matrix = strong(equations, 8.0)
+    matrix[-1, -1] = np.inf
+    with np.errstate(invalid="ignore"):
+        found = solved(equations, program(equations), matrix, np.ones(equations.dimension))
+    assert np.isnan(found[-1])
+
+
 @pytest.mark.parametrize("shift", [8.0, 100.0, 1e6])
 @pytest.mark.parametrize("graph", [grid(30), random_cubic(20)], ids=lambda g: g.name)
 def test_incomplete_elimination_solves_to_rounding(graph, shift):
