@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from synchain.models.scenes.scene import Scene
 from ..support.status import Status
 from .buffers import Buffers
 from .plan import Plan, Planner
-from .rates import Rates, bends, mode_rates, rates
+from .rates import bends, has_slopes, mode_rates, rates
 from .reduce import Reduction
 
 __all__ = [
@@ -33,6 +34,8 @@ __all__ = [
     "warn_of_stiff_modes",
     "warn_of_stiffness",
 ]
+
+T = TypeVar("T")
 
 STIFF = 30.0
 """Stiffness from which Rosenbrock steps are faster than Taylor steps at equal error."""
@@ -49,7 +52,7 @@ def chosen_integrator(reduction: Reduction) -> Integrator:
     otherwise. Nodes or links with a mass matrix take explicit steps too: the recurrences of a dense matrix take longer to
     compile than most runs. Elsewhere Rosenbrock steps, or a switching pair of methods for two oscillators at a tight
     tolerance. A mean field of more nodes than Rosenbrock steps can take, whose Jacobian has an entry for each pair, takes
-    explicit steps however stiff it is.
+    explicit steps however stiff it is, and so does a start where a slope of the rates is infinite.
 
     Parameters
     ----------
@@ -79,10 +82,11 @@ def _chosen(scene: Scene, equations: Equations, stiffness_of: Callable[[], float
         return _taylor(scene, equations)
     if scene.integrator != "auto":
         return integrator(scene.integrator)
-    calm = equations.sticks or stiffness_of() < STIFF
+    found = 0.0 if equations.sticks else stiffness_of()
+    calm = found < STIFF
     if calm and not equations.inertial and jump(equations) is None:
         return _taylor(scene, equations)
-    if calm or any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
+    if calm or math.isinf(found) or any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
         return integrator("dop853")
     pair = equations.n == 2 and not (equations.mixed or equations.inertial) and scene.rtol <= 1e-9
     return integrator("switching" if pair else AUTO)
@@ -126,7 +130,7 @@ def stiffness(planner: Planner) -> float:
     The rate is the real part of an eigenvalue of a node's own block of the Jacobian, with twice what
     its links add, which bounds that of a network of springs; it is compared with the imaginary
     parts and one.  In the extreme cells the layers of smoothed jumps are looked at too, although the start lies
-    outside.
+    outside.  It is infinite where a rate is finite and a slope of it is not, which no method that takes slopes leaves.
     """
     return _stiffness(planner.rates, planner.equations, planner.extremes())
 
@@ -136,7 +140,7 @@ def _stiffness(starts: Iterable[Rates], equations: Equations, extremes: Plan) ->
     return _stiffest(found + [(LAYER * at.fastest, LAYER * at.turning) for at in _each(bends, equations, extremes)])
 
 
-def _each(function: Callable[..., Rates], equations: Equations, rows: Plan) -> Iterator[Rates]:
+def _each(function: Callable[..., T], equations: Equations, rows: Plan) -> Iterator[T]:
     return (function(equations, *cell) for cell in zip(rows.start, rows.numbers, strict=True))
 
 

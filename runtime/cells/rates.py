@@ -16,9 +16,9 @@ from synchain.codegen.steps.mass import turned_masses
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation
 from synchain.models.graphs.links import Link
-from synchain.models.mechanics.components import TIME, Edge
+from synchain.models.mechanics.components import TIME, Edge, Node
 
-__all__ = ["Rates", "bends", "mode_rates", "rates"]
+__all__ = ["Rates", "bends", "has_slopes", "mode_rates", "rates"]
 
 NODES, LINKS = 50, 5000
 """Nodes of a large network that are looked at, and links."""
@@ -43,6 +43,15 @@ def rates(equations: Equations, state: np.ndarray, numbers: np.ndarray, time: fl
 def bends(equations: Equations, state: np.ndarray, numbers: np.ndarray) -> Rates:
     """Return those in the layers of smoothed jumps, into which one state is moved."""
     return _of_blocks(_bends(equations, _named(equations, state, numbers)))
+
+
+def has_slopes(equations: Equations, state: np.ndarray, numbers: np.ndarray) -> bool:
+    """Return False at a state where the rates are finite and a slope of theirs is not: that of sqrt(x) at 0, or of sqrt(t)."""
+    values = _named(equations, state, numbers)
+    forced = (_column(part.time_derivative(), at, values) for part, at in _parts(equations) if part.forced)
+    if _finite((*_blocks(equations, values), *forced)):
+        return True
+    return not _finite(_column(part.rhs, at, values) for part, at in _parts(equations))
 
 
 def mode_rates(variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray) -> Iterator[Rates]:
@@ -98,8 +107,7 @@ def _block(equations: Equations, i: int, values: Mapping[str, float]) -> np.ndar
     found = _value(node.jacobian(), at, values)
     if node.constant_inertia:
         return found
-    size = len(node.state)
-    forces = _value(tuple((e,) * size for e in node.rhs), at, values)[:, :1]
+    forces = _column(node.rhs, at, values)
     rates = [sp.Dummy(s.name, real=True) for s in node.state]
     known = dict(zip(rates, map(sp.Float, _by_masses(equations, i, values, forces)[:, 0]), strict=True))
     return found - _value(turned_masses(node, rates), {**at, **known}, values)
@@ -114,6 +122,16 @@ def _by_masses(equations: Equations, i: int, values: Mapping[str, float], right:
         return np.linalg.solve(_value(inertia, equations.at_node(i), values), right)
     except np.linalg.LinAlgError:
         return np.full(right.shape, math.nan)
+
+
+def _parts(equations: Equations) -> Iterator[tuple[Node | Edge, Mapping[sp.Symbol, sp.Expr]]]:
+    """The nodes and links that are looked at, and what their symbols stand for."""
+    yield from ((equations.node_at(i), equations.at_node(i)) for i in range(min(equations.n, NODES)))
+    yield from ((edge, equations.at_link(link, edge)) for link, edge, _ in _links(equations))
+
+
+def _finite(arrays: Iterable[np.ndarray]) -> bool:
+    return all(np.isfinite(array).all() for array in arrays)
 
 
 def _links(equations: Equations) -> Iterator[tuple[Link, Edge, float]]:
@@ -183,12 +201,16 @@ def _value(
     for s in symbols:
         e = at.get(s, s)
         known[s] = float(e) if e.is_number else values[e.name]
-    size = len(entries)
+    shape = len(entries), len(entries[0])
     try:
         with np.errstate(all="ignore"):
-            return np.array(function(*(known[s] for s in symbols)), dtype=float).reshape(size, size)
+            return np.array(function(*(known[s] for s in symbols)), dtype=float).reshape(shape)
     except (ArithmeticError, TypeError, ValueError):
-        return np.full((size, size), math.nan)
+        return np.full(shape, math.nan)
+
+
+def _column(entries: tuple[sp.Expr, ...], at: Mapping[sp.Symbol, sp.Expr], values: Mapping[str, float]) -> np.ndarray:
+    return _value(tuple((e,) for e in entries), at, values)
 
 
 @lru_cache(maxsize=64)

@@ -39,7 +39,8 @@ _MESSAGES = {
     "along a jump, such as sign(v) in the rate of v",
     Status.STEP_UNDERFLOW: "the step size fell below rounding; the equations may be singular here, the tolerance tighter "
     "than double precision allows, or a part of them beyond 1e308, such as exp(710): write 1/(1 + exp(-x)) as "
-    "(1 + tanh(x/2))/2",
+    "(1 + tanh(x/2))/2; where rates are finite and their slopes are not, as at sqrt(0) or acos(1), runs need "
+    "integrator = 'dop853'",
     Status.DIVERGED: "the state grew without bound, beyond 2^53 or with steps that shrink so that max_steps will not do, or "
     "became undefined; begin on a bounded motion, such as an equilibrium, or shorten the time",
     Status.CHATTERING: "a contact changed between stick and slip hundreds of times while no time passed; "

@@ -8,6 +8,7 @@ import warnings
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from synchain.models import Field, Scene, chain
 from synchain.runtime import run
@@ -231,6 +232,50 @@ def test_a_slope_without_bound_at_the_start_ends_no_run():
 
     expected = solve_ivp(rates, (0, 5), [0, 0], "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
     np.testing.assert_allclose(found.states(), expected, rtol=0, atol=1e-7)
+
+
+ROOT = Scene(
+    Field({"x": "1 - x**a"}, parameters={"a": 0.5}), transient=0, window=3, time_unit="time", initial={"x": 0.0}
+)
+"""x' = 1 - sqrt(x) from 0: with s = sqrt(x), t = -2 s - 2 log(1 - s)."""
+
+ROOT_AT_3 = brentq(lambda s: 3 + 2 * s + 2 * math.log(1 - s), 0.5, 0.99) ** 2
+
+
+@pytest.mark.parametrize("name", ["rodas4", "rodas5p", "rodas6p", "ros34pw2", "switching", "taylor"])
+def test_an_infinite_slope_is_never_passed_by_methods_that_take_slopes(name):
+    found = run(ROOT.replace(integrator=name), show_progress=False)
+    assert found.status == Status.STEP_UNDERFLOW
+    assert "slopes are not, as at sqrt(0) or acos(1), runs need integrator = 'dop853'" in found.message
+
+
+@pytest.mark.parametrize("n", [2, 10])
+def test_an_infinite_slope_of_one_node_is_seen_in_networks(n):
+    net = ROOT.replace(coupling="x->x", topology=chain(n), initial={"x": [0.0] + [0.5] * (n - 1)})
+    net = net.replace(parameters={"sigma": 0.2})
+    found = run(net, show_progress=False)
+    assert found.status == Status.FINISHED
+    assert found.states().min() > 0.75
+    assert run(net.replace(integrator="rodas5p"), show_progress=False).status == Status.STEP_UNDERFLOW
+
+
+@pytest.mark.parametrize(
+    ("field", "x"),
+    [
+        ({"x": "1 - x**a"}, 0.0),  # a slope by the state
+        ({"x": "-1e3*x + a*(t + 1)**a + t**a"}, 0.0),  # a slope by time, and stiff
+        ({"x": "1 - sqrt(x) - a"}, 0.0),
+        ({"x": "a - acos(x)"}, 1.0),
+    ],
+)
+def test_auto_begins_at_an_infinite_slope_by_explicit_steps(field, x):
+    scene = ROOT.replace(oscillator=Field(field, parameters={"a": 0.5}), initial={"x": x})
+    assert method(scene)[0] == "dop853"
+    assert method(scene.replace(initial={"x": 0.5}))[0] == ("dop853" if "t**a" in field["x"] else "taylor")
+
+
+def test_auto_steps_from_an_infinite_slope_are_right():
+    assert run(ROOT, show_progress=False).states().item() == pytest.approx(ROOT_AT_3, abs=1e-6)
 
 
 def test_a_singularity_is_not_called_stiff():
