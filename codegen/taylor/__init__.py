@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .graph import is_analytic, is_linear, jump
+from .graph import is_analytic, is_linear, jump, outlives_series
 from .looped import write_looped
 from .order import order_for
 from .step import TaylorStep
@@ -16,6 +16,7 @@ __all__ = [
     "is_linear",
     "jump",
     "order_for",
+    "outlives_series",
     "write_looped",
     "write_step",
     "write_tangent",

@@ -52,7 +52,7 @@ from .series import (
 )
 from .terms import add, times
 
-__all__ = ["STARTS", "Graph", "Template", "is_analytic", "is_linear", "jump", "split"]
+__all__ = ["STARTS", "Graph", "Template", "is_analytic", "is_linear", "jump", "outlives_series", "split"]
 
 STARTS: dict[type[sp.Expr], str] = {
     sp.exp: "exp", sp.log: "log", sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.sinh: "sinh", sp.cosh: "cosh",
@@ -80,6 +80,12 @@ EVEN = (sp.cos, sp.cosh)
 
 SINGULAR = (sp.log, sp.tan, sp.asin, sp.acos, sp.acosh, sp.atanh)
 """Functions with a pole, or with arguments for which they have no value."""
+
+STEEP = (sp.asin, sp.acos, sp.acosh)
+"""Functions with a value and no slope at the ends of their arguments."""
+
+BOUNDED = (sp.sin, sp.cos, sp.tanh, sp.erf, sp.asinh)
+"""Functions that stay small, or nearly so, where their argument has a pole."""
 
 STEADY = ("sin", "cos")
 """Functions of which some low coefficient is always as large as the argument makes the high ones."""
@@ -111,6 +117,37 @@ def _obstacles(equations: Equations) -> dict[sp.Expr, str]:
         found |= dict.fromkeys(_unserial(own, changing(ends)), "which has no series")
         found |= dict.fromkeys(_guarding(own, changing(ends)), "a part of which has a pole, or no value, somewhere")
     return {part: found[part] for part in sorted(found, key=sp.default_sort_key)}
+
+
+def outlives_series(equations: Equations) -> bool:
+    """True if motion may pass a place where some part has no series: the end of an arc, log|x| at 0, tanh(1/x) at its pole."""
+    return any(
+        _ends_series(part, changing(ends))
+        for own, ends in templates(equations)
+        for e in own
+        for part in e.atoms(sp.Function, sp.Pow)
+    )
+
+
+def _ends_series(e: sp.Expr, moving: Set[sp.Symbol]) -> bool:
+    """True for a part that stays finite, or has a finite integral, where its series ends.
+
+    exp(-1/x) is not among them, as that of a temperature never comes near 0; exp(-1/x**2) and exp(-1/cos(t)) are.
+    """
+    argument = e.args[0]
+    if isinstance(e, STEEP):
+        return bool(argument.free_symbols & moving)
+    if isinstance(e, sp.log):
+        return isinstance(argument, sp.Abs) and bool(argument.free_symbols & moving)
+    poles = [p for p in argument.atoms(sp.Pow, sp.tan) if _is_pole(p) and _is_singular(p, moving)]
+    if isinstance(e, sp.exp):
+        return any(p.free_symbols & moving == {TIME} or (p.is_Pow and p.exp.is_even) for p in poles)
+    return bool(poles) and (isinstance(e, BOUNDED) or (_is_pole(e) and _inverse(argument) is not None))
+
+
+def _is_pole(e: sp.Expr) -> bool:
+    """True for a negative power or a tangent."""
+    return bool(isinstance(e, sp.tan) or (e.is_Pow and e.exp.is_negative))
 
 
 def is_analytic(equations: Equations) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from synchain.codegen.driver.columns import Count, Sum
 from synchain.codegen.integrators import Integrator, integrator
 from synchain.codegen.kernels.sweep import AUTO, KernelSource
-from synchain.codegen.taylor import is_analytic, is_linear, jump, order_for
+from synchain.codegen.taylor import is_analytic, is_linear, jump, order_for, outlives_series
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation
 from synchain.models.graphs.links import LINK_LIMIT
@@ -48,11 +48,12 @@ def chosen_integrator(reduction: Reduction) -> Integrator:
     """Return the integrator of a scene, the fastest at equal error where the scene says "auto".
 
     Where the equations are not stiff in the extreme cells of the sweep and in a sample of the others, and between the
-    events of set-valued friction: power series if all functions are analytic between kinks, and between jumps along which no motion slides, explicit steps
-    otherwise. Nodes or links with a mass matrix take explicit steps too: the recurrences of a dense matrix take longer to
-    compile than most runs. Elsewhere Rosenbrock steps, or a switching pair of methods for two oscillators at a tight
-    tolerance. A mean field of more nodes than Rosenbrock steps can take, whose Jacobian has an entry for each pair, takes
-    explicit steps however stiff it is, and so does a start where a slope of the rates is infinite.
+    events of set-valued friction: power series if all functions are analytic between kinks, and between jumps along which
+    no motion slides, unless motion may pass another place without a series; explicit steps otherwise. Nodes or links with
+    a mass matrix take explicit steps too: the recurrences of a dense matrix take longer to compile than most runs.
+    Elsewhere Rosenbrock steps, or a switching pair of methods for two oscillators at a tight tolerance. A mean field of
+    more nodes than Rosenbrock steps can take, whose Jacobian has an entry for each pair, takes explicit steps however
+    stiff it is, and so does a start where a slope of the rates is infinite.
 
     Parameters
     ----------
@@ -84,7 +85,7 @@ def _chosen(scene: Scene, equations: Equations, stiffness_of: Callable[[], float
         return integrator(scene.integrator)
     found = 0.0 if equations.sticks else stiffness_of()
     calm = found < STIFF
-    if calm and not equations.inertial and jump(equations) is None:
+    if calm and not equations.inertial and jump(equations) is None and not outlives_series(equations):
         return _taylor(scene, equations)
     if calm or math.isinf(found) or any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
         return integrator("dop853")

@@ -179,10 +179,13 @@ def _turned(
 def _turns(rates: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...]) -> tuple[tuple[sp.Symbol, sp.Expr], ...]:
     """For each turning function a state, and the value of it at which the argument is zero.
 
-    A root of a size is steep at a point, and has no layer.
+    A root of a size, which a power of unknown exponent may be, is steep at a point, and has no layer.
     """
     roots = {
-        p: sp.S.Zero for e in rates for p in e.atoms(sp.Pow) if isinstance(p.base, sp.Abs) and (1 - p.exp).is_positive
+        p: sp.S.Zero
+        for e in rates
+        for p in e.atoms(sp.Pow)
+        if isinstance(p.base, sp.Abs) and not (p.exp - 1).is_nonnegative
     }
     gaps = {part.args[0] for e in rates for part in e.xreplace(roots).atoms(*TURNING)}
     found = []
