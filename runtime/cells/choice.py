@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterable, Iterator
-from typing import TypeVar
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from synchain.models.scenes.scene import Scene
 from ..support.status import Status
 from .buffers import Buffers
 from .plan import Plan, Planner
-from .rates import bends, has_slopes, mode_rates, rates
+from .rates import Rates, bends, mode_rates, rates
 from .reduce import Reduction
 
 __all__ = [
@@ -34,8 +34,6 @@ __all__ = [
     "warn_of_stiff_modes",
     "warn_of_stiffness",
 ]
-
-T = TypeVar("T")
 
 STIFF = 30.0
 """Stiffness from which Rosenbrock steps are faster than Taylor steps at equal error."""
@@ -141,7 +139,7 @@ def _stiffness(starts: Iterable[Rates], equations: Equations, extremes: Plan) ->
     return _stiffest(found + [(LAYER * at.fastest, LAYER * at.turning) for at in _each(bends, equations, extremes)])
 
 
-def _each(function: Callable[..., T], equations: Equations, rows: Plan) -> Iterator[T]:
+def _each(function: Callable[..., Rates], equations: Equations, rows: Plan) -> Iterator[Rates]:
     return (function(equations, *cell) for cell in zip(rows.start, rows.numbers, strict=True))
 
 
@@ -216,7 +214,8 @@ def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[
         fastest, turning, growth = rates(source.equations, buffers.end[cell], numbers, times[cell])
         resting = steps[cell] > CRAWLING and fastest * lengths[cell] > LIMITED and not source.equations.forced
         slow = max(turning, 0.0 if resting else 1.0)
-        if fastest * lengths[cell] > 1.0 and fastest > STIFF * slow:
+        bound = math.inf if grown else sys.float_info.max  # an infinite slope, as of sqrt(x) at 0, is no stiffness
+        if fastest * lengths[cell] > 1.0 and STIFF * slow < fastest <= bound:
             if grown and growth >= 0.5 * fastest:
                 warn(
                     f"a state grew to {size:.3g} in {steps[cell]} {kind} steps of a cell; expected a bounded motion; "

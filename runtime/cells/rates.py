@@ -18,7 +18,7 @@ from synchain.models.dynamics.variational import Variation
 from synchain.models.graphs.links import Link
 from synchain.models.mechanics.components import TIME, Edge, Node
 
-__all__ = ["Rates", "bends", "has_slopes", "mode_rates", "rates"]
+__all__ = ["Rates", "bends", "mode_rates", "rates"]
 
 NODES, LINKS = 50, 5000
 """Nodes of a large network that are looked at, and links."""
@@ -35,23 +35,26 @@ class Rates(NamedTuple):
     growth: float
 
 
+ENDLESS = Rates(math.inf, 0.0, math.inf)
+"""Those of a block with an infinite entry."""
+
+
 def rates(equations: Equations, state: np.ndarray, numbers: np.ndarray, time: float = 0.0) -> Rates:
-    """Return those at a state: of the node's own blocks, with twice what their links add, which bounds those of springs."""
-    return _of_blocks(_blocks(equations, _named(equations, state, numbers, time)))
+    """Return those at a state: of the node's own blocks, with twice what their links add, which bounds those of springs.
+
+    They are infinite where a slope by a state or by time has no number although the rates have: those of sqrt(x + t) at 0.
+    """
+    values = _named(equations, state, numbers, time)
+    blocks = _blocks(equations, values)
+    by_time = (_column(part.time_derivative(), at, values) for part, at in _parts(equations, only_forced=True))
+    if not _finite((*blocks, *by_time)) and _finite(_column(part.rhs, at, values) for part, at in _parts(equations)):
+        return ENDLESS
+    return _of_blocks(blocks)
 
 
 def bends(equations: Equations, state: np.ndarray, numbers: np.ndarray) -> Rates:
     """Return those in the layers of smoothed jumps, into which one state is moved."""
     return _of_blocks(_bends(equations, _named(equations, state, numbers)))
-
-
-def has_slopes(equations: Equations, state: np.ndarray, numbers: np.ndarray) -> bool:
-    """Return False at a state where the rates are finite and a slope of theirs is not: that of sqrt(x) at 0, or of sqrt(t)."""
-    values = _named(equations, state, numbers)
-    forced = (_column(part.time_derivative(), at, values) for part, at in _parts(equations) if part.forced)
-    if _finite((*_blocks(equations, values), *forced)):
-        return True
-    return not _finite(_column(part.rhs, at, values) for part, at in _parts(equations))
 
 
 def mode_rates(variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray) -> Iterator[Rates]:
@@ -84,7 +87,7 @@ def _of_blocks(blocks: Iterable[np.ndarray]) -> Rates:
     """
     blocks = [block for block in blocks if not np.isnan(block).any()]
     if any(np.isinf(block).any() for block in blocks):
-        return Rates(math.inf, 0.0, math.inf)
+        return ENDLESS
     found = np.concatenate([np.linalg.eigvals(block) for block in blocks]) if blocks else np.zeros(0)
     real, imaginary = found.real, found.imag
     return Rates(*(float(parts.max(initial=0.0)) for parts in (np.abs(real), np.abs(imaginary), real)))
@@ -124,10 +127,14 @@ def _by_masses(equations: Equations, i: int, values: Mapping[str, float], right:
         return np.full(right.shape, math.nan)
 
 
-def _parts(equations: Equations) -> Iterator[tuple[Node | Edge, Mapping[sp.Symbol, sp.Expr]]]:
+def _parts(
+    equations: Equations, only_forced: bool = False
+) -> Iterator[tuple[Node | Edge, Mapping[sp.Symbol, sp.Expr]]]:
     """The nodes and links that are looked at, and what their symbols stand for."""
-    yield from ((equations.node_at(i), equations.at_node(i)) for i in range(min(equations.n, NODES)))
-    yield from ((edge, equations.at_link(link, edge)) for link, edge, _ in _links(equations))
+    nodes = (equations.node_at(i) for i in range(min(equations.n, NODES)))
+    yield from ((node, equations.at_node(i)) for i, node in enumerate(nodes) if node.forced or not only_forced)
+    if not only_forced or any(edge.forced for edge in equations.edges):
+        yield from ((edge, equations.at_link(link, edge)) for link, edge, _ in _links(equations))
 
 
 def _finite(arrays: Iterable[np.ndarray]) -> bool:

@@ -278,6 +278,15 @@ def test_auto_steps_from_an_infinite_slope_are_right():
     assert run(ROOT, show_progress=False).states().item() == pytest.approx(ROOT_AT_3, abs=1e-6)
 
 
+@pytest.mark.filterwarnings("error")
+def test_an_infinite_slope_is_not_called_stiff():
+    node = Field({"x": "y*sqrt(x)", "y": "cos(50*t)"})
+    found = run(
+        ROOT.replace(oscillator=node, parameters={}, window=10, initial={"x": 0.0, "y": 1.0}), show_progress=False
+    )
+    assert found.steps > 100
+
+
 @pytest.mark.parametrize(
     ("rate", "expected"),
     [
