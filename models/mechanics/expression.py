@@ -7,7 +7,7 @@ a model keeps, wherever it comes from.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -36,6 +36,15 @@ RESERVED = frozenset({"pi", TIME.name, FRICTION_NAME})
 
 _CALLED = dict(sorted({**FUNCTIONS, FRICTION_NAME: FRICTION}.items()))
 _NAMES = {function: name for name, function in FUNCTIONS.items()}
+_QUOTIENTS: Mapping[type, Callable[[sp.Expr], sp.Expr]] = {
+    sp.cot: lambda x: sp.cos(x) / sp.sin(x),
+    sp.sec: lambda x: 1 / sp.cos(x),
+    sp.csc: lambda x: 1 / sp.sin(x),
+    sp.coth: lambda x: 1 / sp.tanh(x),
+    sp.sech: lambda x: 1 / sp.cosh(x),
+    sp.csch: lambda x: 1 / sp.sinh(x),
+}
+"""Functions that SymPy makes of others, as cot(x) of tan(pi/2 - x), by those that a model may call."""
 _SIGNS: Mapping[type, str] = {
     sp.StrictLessThan: "<",
     sp.LessThan: "<=",
@@ -69,7 +78,7 @@ def exact(what: str, value: object, names: Mapping[str, sp.Symbol]) -> sp.Expr:
     if isinstance(value, bool) or not isinstance(value, int | float | Fraction | sp.Expr):
         kind = type(value).__name__
         raise TypeError(f"{what}: found {short_repr(value)} ({kind}); expected an expression")
-    given = sp.sympify(value).replace(sp.Heaviside, _unit_step)
+    given = _by_quotients(sp.sympify(value).replace(sp.Heaviside, _unit_step))
     strange = sorted({s.name for s in given.free_symbols} - {*names})
     if strange:
         raise ValueError(f"{what}: {_undeclared(strange[0], names)}")
@@ -80,6 +89,13 @@ def exact(what: str, value: object, names: Mapping[str, sp.Symbol]) -> sp.Expr:
     except ValueError as error:
         raise ValueError(f"{what}: {error}") from None
     return read(what, text, names)
+
+
+def _by_quotients(e: sp.Expr) -> sp.Expr:
+    """An expression without cot, sec, csc and their hyperbolic counterparts."""
+    for function, quotient in _QUOTIENTS.items():
+        e = e.replace(function, quotient) if e.has(function) else e
+    return e
 
 
 def _unit_step(x: sp.Expr, at_zero: sp.Expr = sp.S.Half) -> sp.Expr:
@@ -280,7 +296,7 @@ def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
     if expression is None:
         found = f"{short_repr(text)}{unpaired(text)}"
         raise ValueError(f"{what}: unreadable expression {found}; expected such as '-k*x + u*cos(omega*t)'")
-    found = _OfModels(what, names).read(expression)
+    found = _by_quotients(_OfModels(what, names).read(expression))
     if found.has(sp.I):
         raise ValueError(f"{what}: found the complex {short_repr(found)}; expected a real value")
     return found

@@ -116,6 +116,17 @@ def test_decimals_are_what_they_say() -> None:
     assert Field({X: long * X}).model.rates[0].as_coeff_Mul()[0] == sp.Rational("0.12345678901234567890123")
 
 
+@pytest.mark.parametrize(
+    "rate",
+    ["tan(pi/2 - x)", sp.tan(sp.pi / 2 - X), sp.cot(X), sp.sec(X), sp.csc(X), sp.coth(X), sp.sech(X), sp.csch(X)],
+)
+def test_functions_that_sympy_makes_of_others_are_known(rate: sp.Expr | str) -> None:
+    (found,) = Field({X: rate}).model.rates
+    assert Field({X: written(found)}).model.rates == (found,)
+    expected = sp.sympify(rate).subs(sp.Symbol("x"), 0.7)
+    assert float(found.subs(sp.Symbol("x", real=True), 0.7)) == pytest.approx(float(expected), rel=1e-14)
+
+
 @pytest.mark.parametrize("at_zero", [0, sp.Rational(1, 2), 1])
 def test_steps_of_heaviside_keep_their_value_at_zero(at_zero: sp.Expr) -> None:
     x = sp.Symbol("x", real=True)
