@@ -263,9 +263,22 @@ def _at_rest(scene: Scene) -> Equations:
     return equations
 
 
+def _jacobian(network: Linearised, state: np.ndarray) -> sparse.csc_array:
+    """The Jacobian; ArithmeticError where it has an entry that is no number."""
+    found = network.jacobian(state)
+    if not np.isfinite(found.data).all():
+        raise ArithmeticError(
+            "equilibrium: met a rate whose slope is infinite, or has no value, as that of sqrt(x) at 0; Newton's method and "
+            "eigenvalues need slopes; start elsewhere"
+        )
+    return found
+
+
 def _slopes(network: Linearised, state: np.ndarray) -> np.ndarray:
     """The sums of the sizes of each row of the Jacobian, the larger of those at a state and beside it."""
-    here, beside = (abs(network.jacobian(at)).sum(axis=1) for at in (state, (1.0 + BESIDE) * state))
+    here, beside = (
+        abs(found).sum(axis=1) for found in (_jacobian(network, state), network.jacobian((1.0 + BESIDE) * state))
+    )
     return np.fmax(here, np.where(np.isfinite(beside), beside, 0.0))
 
 
@@ -305,10 +318,9 @@ def _newton(
     gap = first - shifts @ speeds
     while steps < MOST_STEPS and np.abs(gap).max() > 0.0:
         try:
-            matrix = sparse.block_array([[network.jacobian(state), -border], [border.T, None]], format="csc")
-            change = splu(matrix if shifts.shape[1] else network.jacobian(state)).solve(
-                np.append(-gap, np.zeros(shifts.shape[1]))
-            )
+            jacobian = _jacobian(network, state)
+            matrix = sparse.block_array([[jacobian, -border], [border.T, None]], format="csc")
+            change = splu(matrix if shifts.shape[1] else jacobian).solve(np.append(-gap, np.zeros(shifts.shape[1])))
         except RuntimeError:
             break  # singular: the residual says whether this is a solution
         part = 1.0

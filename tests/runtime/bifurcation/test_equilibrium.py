@@ -48,6 +48,15 @@ def test_at_the_fold_nothing_is_called_stable_and_beyond_it_nothing_is_found() -
         sc.equilibrium(grid(1.001, -1.001))
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("start", [{"x": 0.0, "y": 1.0}, {"x": 1.0, "y": 1.0}])
+def test_an_infinite_slope_is_met_in_words(start: dict[str, float]) -> None:
+    """Newton's method begins at x = 0, or its first step leads there."""
+    scene = sc.Scene(sc.Field({"x": "-x", "y": "1 - y + sqrt(abs(x))"}), initial=start)
+    with pytest.raises(ArithmeticError, match=r"whose slope is infinite, or has no value.*; start elsewhere"):
+        sc.equilibrium(scene)
+
+
 def test_machines_whose_powers_do_not_add_up_to_zero_turn_together() -> None:
     """The sum of the powers balances the damping: w = 2 mean(P)."""
     found = sc.equilibrium(grid(0.7, -0.3))
