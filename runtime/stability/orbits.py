@@ -42,6 +42,8 @@ BESIDE = 42
 FAR = 300.0
 """Logarithm of the size beyond which a factor of a propagator is kept apart; numbers end at 745."""
 
+ALLOWED = 1e-12
+"""Error of an interpolation that is allowed however tight the tolerance is."""
 HOPELESS, FURTHER = 0.1, 1.45
 """An error that so many times more nodes do not mend."""
 
@@ -221,7 +223,7 @@ class Orbits:
             Length of the longest average in units, a whole number of blocks. A short one keeps short blocks, whose
             scatter says its error.
         """
-        limit = max(0.01 * self.scene.rtol, 1e-12)  # later blocks of a chaotic orbit are up to ten times worse
+        limit = max(0.01 * self.scene.rtol, ALLOWED)  # later blocks of a chaotic orbit are up to ten times worse
         failed: list[Choice] = []
         for choice in self._choices(periods):
             if any(choice.is_coarser(other) for other in failed):
