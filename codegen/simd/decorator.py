@@ -76,7 +76,8 @@ class _Reading(FunctionPass):
     def run_pass(self, state: Any) -> bool:
         identity = state.func_id
         program = syntax.read(state.typingctx, identity.func, state.args, state.return_type)
-        state.func_ir, state.calltypes, state.return_type = _Function(identity, program), {}, program.result
+        state.func_ir, state.return_type = _Function(identity, program), program.result
+        state.calltypes = dict(enumerate(program.calls))  # some versions of Numba look for calls that return arrays
         state.typemap = {f"arg.{name}": kind for name, kind in zip(identity.arg_names, state.args, strict=True)}
         return True
 

@@ -168,7 +168,8 @@ class _Reader(ast.NodeVisitor):
         local = frozenset(name for name, blocks in self.blocks.items() if len(blocks) == 1 and name not in self.arrays)
         if not self.changing <= local:
             raise UnreadError(f"{', '.join(sorted(self.changing - local))} of several types")
-        return Program(tuple(statements), kind, local, self.arrays)
+        calls = tuple(signature for _, signature in self.meanings.values())
+        return Program(tuple(statements), kind, local, self.arrays, calls)
 
     def visit(self, node: ast.AST) -> Any:
         """Read a node."""
@@ -294,13 +295,13 @@ class _Reader(ast.NodeVisitor):
             return self.known(self.found(node))
         base: Typed = self.visit(node.value)
         kind = self.context.resolve_getattr(typ=base.kind, attr=name)
-        if kind is None or isinstance(kind, types.Callable) or base.owned:
+        if kind is None or isinstance(kind, types.Callable | types.Array) or base.owned:
             raise UnreadError
 
         def write(w: Writer) -> Value:
             return w.context.get_getattr(base.kind, name)(w.context, w.builder, base.kind, base.write(w), name)
 
-        return Typed(kind, write, isinstance(kind, types.Array))
+        return Typed(kind, write)
 
     def visit_Subscript(self, node: ast.Subscript) -> Typed:
         base: Typed = self.visit(node.value)

@@ -45,12 +45,15 @@ class Program:
         The variables of one block alone.
     arrays : dict
         The variables that keep arrays alive, and their types.
+    calls : tuple of numba.core.typing.Signature
+        What it calls.
     """
 
     statements: tuple[Write, ...]
     result: types.Type
     local: frozenset[str]
     arrays: dict[str, types.Type]
+    calls: tuple[Any, ...]
 
     def write(self, lower: lowering.Lower, arguments: Sequence[Value]) -> None:
         """Write the code of the function, whose arguments have these values."""
