@@ -10,13 +10,7 @@ from typing import Any
 
 import numba
 from llvmlite.binding.newpassmanagers import ModulePassManager
-from numba.core import (
-    base,
-    bytecode,
-    codegen,
-    ir,
-    lowering,
-)
+from numba.core import base, bytecode, codegen, ir, lowering
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase
 from numba.core.compiler_machinery import FunctionPass, PassManager, register_pass

@@ -130,6 +130,18 @@ def lent(value: Typed) -> Typed:
     return Typed(value.kind, write)
 
 
+def called(kind: types.Type, given: Sequence[Write], call: Callable[[Writer, Sequence[Value]], Value]) -> Typed:
+    """What a function returns, which gives back the arrays that were lent to it."""
+
+    def write(w: Writer) -> Value:
+        before = len(w.lent)
+        found = call(w, [argument(w) for argument in given])
+        w.take_back(before)
+        return found
+
+    return Typed(kind, write, isinstance(kind, types.Array))
+
+
 def held(value: Typed) -> tuple[Write, Typed]:
     """What computes a value, and the value for those that are written behind it."""
     place: list[Value] = []
@@ -216,13 +228,11 @@ class _Reader(ast.NodeVisitor):
                 lambda index, _, values: gathered(values).cast(wanted[index]),
             )
 
-        def write(w: Writer) -> Value:
-            before = len(w.lent)
-            found = w.context.get_function(kind, signature)(w.builder, [argument(w) for argument in given])
-            w.take_back(before)
+        def write(w: Writer, arguments: Sequence[Value]) -> Value:
+            found = w.context.get_function(kind, signature)(w.builder, arguments)
             return w.context.get_dummy_value() if found is None else found
 
-        return Typed(signature.return_type, write, isinstance(signature.return_type, types.Array))
+        return called(signature.return_type, given, write)
 
     def meaning(self, function: Any, kinds: tuple[types.Type, ...]) -> tuple[types.Type, Any]:
         """The type of a function or of an operator, and what it takes and returns for operands of some types.
@@ -240,6 +250,12 @@ class _Reader(ast.NodeVisitor):
         """A value that is known when the function is read."""
         kind = types.maybe_literal(value) or self.context.resolve_value_type(value)
         return Typed(kind, lambda w: w.context.get_constant_generic(w.builder, kind, value))
+
+    def is_known(self, node: ast.expr) -> bool:
+        """True for a name of the module, or an attribute of one: it has a value when the function is read."""
+        while isinstance(node, ast.Attribute):
+            node = node.value
+        return isinstance(node, ast.Name) and node.id not in self.kinds
 
     def found(self, node: ast.expr) -> Any:
         """What a name of the module stands for, or an attribute of another module."""
@@ -291,7 +307,7 @@ class _Reader(ast.NodeVisitor):
 
     def visit_Attribute(self, node: ast.Attribute) -> Typed:
         name = node.attr
-        if isinstance(node.value, ast.Name) and node.value.id not in self.kinds:
+        if self.is_known(node):
             return self.known(self.found(node))
         base: Typed = self.visit(node.value)
         kind = self.context.resolve_getattr(typ=base.kind, attr=name)
@@ -351,39 +367,35 @@ class _Reader(ast.NodeVisitor):
 
     def visit_IfExp(self, node: ast.IfExp) -> Typed:
         parts = []
-        for read, part in ((self.test, node.test), (self.visit, node.body), (self.visit, node.orelse)):
-            parts.append(read(part))
+        for read, piece in ((self.test, node.test), (self.visit, node.body), (self.visit, node.orelse)):
+            parts.append(read(piece))
             self.turn()
         return self.chosen(*parts)
 
     def visit_Call(self, node: ast.Call) -> Typed:
         if node.keywords:
             raise UnreadError
-        root: ast.expr = node.func
-        while isinstance(root, ast.Attribute):
-            root = root.value
-        if isinstance(root, ast.Name) and root.id in self.kinds:
-            return self.pointed(self.visit(node.func), [self.visit(value) for value in node.args])
-        return self.call(self.found(node.func), *map(self.visit, node.args))
+        if self.is_known(node.func):
+            return self.call(self.found(node.func), *map(self.visit, node.args))
+        return self.pointed(self.visit(node.func), [self.visit(value) for value in node.args])
 
     def pointed(self, function: Typed, values: Sequence[Typed]) -> Typed:
         """The value of a function that is given by the address of its machine code."""
         if not isinstance(function.kind, types.FunctionType) or len(values) != len(function.kind.signature.args):
             raise UnreadError
         result, kinds = function.kind.signature.return_type, function.kind.signature.args
-        given = [value.cast(kind) for value, kind in zip(values, kinds, strict=True)]
+        given = [lent(value).cast(kind) for value, kind in zip(values, kinds, strict=True)]
 
-        def write(w: Writer) -> Value:
+        def write(w: Writer, arguments: Sequence[Value]) -> Value:
             calls, builder = w.context.call_conv, w.builder
             address = cgutils.create_struct_proxy(function.kind)(w.context, builder, value=function.write(w)).jit_addr
             pointer = builder.bitcast(address, calls.get_function_type(result, kinds).as_pointer())
-            arguments = [argument(w) for argument in given]
             status, found = calls.call_function(builder, pointer, result, kinds, arguments)
             with cgutils.if_unlikely(builder, status.is_error):
                 calls.return_status_propagate(builder, status)
             return found
 
-        return Typed(result, write)
+        return called(result, given, write)
 
     # -- statements -------------------------------------------------------------------------------------------
 
@@ -404,7 +416,7 @@ class _Reader(ast.NodeVisitor):
 
     def chosen_body(self, node: ast.If) -> list[ast.stmt] | None:
         """The statements of a choice by a constant; None if it is another choice."""
-        if not isinstance(node.test, ast.Name) or node.test.id in self.kinds:
+        if not self.is_known(node.test):
             return None
         return node.body if self.found(node.test) else node.orelse
 
@@ -497,7 +509,7 @@ class _Reader(ast.NodeVisitor):
         endless = isinstance(node.test, ast.Constant) and node.test.value is True
         test = None if endless else self.test(node.test).write
         body = self.block(node.body)
-        return lambda w: w.loop(test, body, lambda w: None)
+        return lambda w: w.loop(test, body)
 
     def visit_For(self, node: ast.For) -> Write:
         if node.orelse:
@@ -509,27 +521,22 @@ class _Reader(ast.NodeVisitor):
         start, stop, step = self.bounds([self.visit(bound) for bound in node.iter.args])
         self.turn()
         numbers: list[Value] = []
-        body = in_turn(
-            [
-                self.assigned(node.target, Typed(types.int64, lambda w: w.builder.load(numbers[-1]))),
-                *self.body(node.body),
-            ]
-        )
+        now = Typed(types.int64, lambda w: numbers[-1])
+        body = in_turn([self.assigned(node.target, now), *self.body(node.body)])
         self.turn()
 
         def write(w: Writer) -> None:
             first, last = start(w), stop(w)
-            following, number = w.memory(first), w.memory(first)
-            numbers.append(number)
+            following = w.memory(first)
 
-            def turn(w: Writer) -> None:
+            def count(w: Writer) -> None:
                 """Count before the body, as Numba does: LLVM takes the first turn out of short loops then."""
-                w.builder.store(w.builder.load(following), number)
-                w.builder.store(w.builder.add(w.builder.load(number), first.type(step)), following)
+                numbers.append(w.builder.load(following))
+                w.builder.store(w.builder.add(numbers[-1], first.type(step)), following)
                 body(w)
 
             more = "<" if step > 0 else ">"
-            w.loop(lambda w: w.builder.icmp_signed(more, w.builder.load(following), last), turn, lambda w: None)
+            w.loop(lambda w: w.builder.icmp_signed(more, w.builder.load(following), last), count)
 
         return write
 
@@ -547,7 +554,7 @@ class _Reader(ast.NodeVisitor):
         """The values of a tuple that is written out or known, numbered by `enumerate` if that is asked for; else None."""
         if isinstance(node, ast.Tuple):
             return [self.visit(piece) for piece in node.elts]
-        if isinstance(node, ast.Name) and node.id not in self.kinds and isinstance(values := self.found(node), tuple):
+        if self.is_known(node) and isinstance(values := self.found(node), tuple):
             return [self.known(value) for value in values]
         if isinstance(node, ast.Call) and self.found(node.func) is enumerate and len(node.args) == 1:
             pieces = self.pieces(node.args[0])

@@ -167,17 +167,16 @@ class Writer:
         self.builder.branch(after)
         self.builder.position_at_end(after)
 
-    def loop(self, test: Write | None, body: Write, step: Write) -> None:
-        """Write what is done while a condition holds, and a step each time before that is looked at anew."""
-        again, inside, on, after = self.blocks(4)
+    def loop(self, test: Write | None, body: Write) -> None:
+        """Write what is done while a condition holds."""
+        again, inside, after = self.blocks(3)
         self.builder.branch(again)
         self.builder.position_at_end(again)
         if test is None:
             self.builder.branch(inside)
         else:
             self.builder.cbranch(test(self), inside, after)
-        self.ends.append((on, after))
-        self.inside(inside, body, on)
+        self.ends.append((again, after))
+        self.inside(inside, body, again)
         self.ends.pop()
-        self.inside(on, step, again)
         self.builder.position_at_end(after)
