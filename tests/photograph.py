@@ -471,9 +471,9 @@ def _() -> Quantities:
     return simulated(Scene(oscillator="van_der_pol", coupling="damper", topology=graph, **given), sigma=[0.1, 0.5])
 
 
-@scene("Rössler in a feed-forward chain, switching", long=True)
+@scene("Rössler in a feed-forward chain, rodas6p", long=True)
 def _() -> Quantities:
-    given = SHORT | {"integrator": "switching", "initial": {"x": [1.0, 1.1, 1.2], "y": 0, "z": 0}}
+    given = SHORT | {"integrator": "rodas6p", "initial": {"x": [1.0, 1.1, 1.2], "y": 0, "z": 0}}
     network = {"oscillator": "rossler", "coupling": "y->y", "topology": models.feed_forward(3)}
     return simulated(Scene(**network, **given), sigma=[0.1, 0.5])
 
@@ -533,9 +533,9 @@ def _() -> Quantities:
     return simulated(network, fput_alpha=[0.25, 0.5]) | balance(network)
 
 
-@scene("harmonic hypercube with cubic springs, switching", long=True)
+@scene("harmonic hypercube with cubic springs, rodas6p", long=True)
 def _() -> Quantities:
-    given = SHORT | {"integrator": "switching", "record": ("trajectory",), "samples": 5}
+    given = SHORT | {"integrator": "rodas6p", "record": ("trajectory",), "samples": 5}
     network = Scene(oscillator="harmonic", coupling="cubic_spring", topology=models.hypercube(4), **given)
     return simulated(network, sigma=[0.1, 0.5]) | balance(network.replace(sigma=0.1))
 

@@ -17,6 +17,7 @@ from pendula import pendulum, telescope
 
 from synchain import one_way_ring
 from synchain.codegen import driver
+from synchain.codegen.driver.columns import COUNTS
 from synchain.codegen.kernels.compile import Kernel, load
 from synchain.codegen.kernels.sweep import KernelSource, emit
 from synchain.models import Potential, Rates, chain, ends, ring, star
@@ -25,7 +26,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.cells.plan import control_array, longest_step, plan, tolerances
+from synchain.runtime.cells.plan import control_array, plan, tolerances
 
 TABLE = {"theta_b": 0.1, "mu_s": 0.3, "mu_k": 0.15, "a": 2.5, "kappa": 1e5, "epsilon": 2.0, "u": 0.1, "omega": 1.15,
          "sigma": 0.1}  # fmt: skip
@@ -248,7 +249,7 @@ class Outcome:
 
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
-        return self.end, self.sums, self.counts, self.points, self.samples
+        return self.end, self.sums, self.counts, self.points, self.samples, np.empty((0, 0))
 
     @property
     def steps(self) -> np.ndarray:
@@ -262,7 +263,7 @@ class Outcome:
 
 def blank(cells: int, dimension: int, room: int = 0, samples: int = 0) -> Outcome:
     return Outcome(
-        np.full((cells, dimension), np.nan), np.full((cells, 4), np.nan), np.zeros((cells, 6), np.int64),
+        np.full((cells, dimension), np.nan), np.full((cells, 4), np.nan), np.zeros((cells, COUNTS), np.int64),
         np.full((cells, room, dimension + 1), np.nan), np.full((cells, samples, dimension), np.nan),
     )  # fmt: skip
 
@@ -274,8 +275,9 @@ def drive(
 ) -> Outcome:  # fmt: skip
     """Run cells: rows of start states, of parameters and of (begin, end) of the window."""
     start, spans = np.array(start, float), np.array(spans, float)
-    spans = np.pad(spans, ((0, 0), (0, 4 - spans.shape[1])))
     cells = len(start)
+    spans = np.pad(spans, ((0, 0), (0, 4 - spans.shape[1])))
+    spans = np.hstack([spans, np.tile([1e-4, max_step, math.inf], (cells, 1))])
     values = np.array(values, float).reshape(cells, -1)
     control = np.array([rtol, rtol / 10 if atol is None else atol, 1e-4, max_step, max_steps, direction, 0.0, 0.0])
     outcome = blank(cells, start.shape[1], room, samples) if into is None else into
@@ -286,9 +288,8 @@ def drive(
 def run_cells(compiled: Kernel, scene: Scene) -> Outcome:
     """All cells of a scene by a kernel of its equations, as `run` has them but without reductions and early ends."""
     cells = plan(scene)
-    control = control_array(
-        *tolerances(scene, scene.equations, cells.numbers), longest_step(scene), scene.max_steps, jumps=False
-    )
+    rtol, atol = (own.min() for own in tolerances(scene, scene.equations, cells.numbers))
+    control = control_array(rtol, atol, math.inf, scene.max_steps, jumps=False)
     outcome = blank(*cells.start.shape)
     compiled.drive(0, scene.cells, cells.start, cells.numbers, cells.spans, control, *outcome.arrays)
     return outcome
@@ -355,7 +356,6 @@ class Step:
     y_new: list
     dense: list
     error: Any
-    bound: Any = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -396,5 +396,4 @@ def take_step(
     room = sizes.dense_rows * len(y)
     y_new, dense = [None] * len(y), [None] * (room + sizes.workspace)
     error = kernel.names[name](t, h, y, [*y, *p], y_new, dense, rtol, atol, *graph)
-    error, bound = error if kernel.source.driver.switching else (error, None)
-    return Step(y, y_new, dense[:room], error, bound)
+    return Step(y, y_new, dense[:room], error)

@@ -19,7 +19,7 @@ from synchain.models.dynamics.variational import mode, network_variation
 from synchain.models.scenes.scene import Scene
 from synchain.runtime import run
 from synchain.runtime.cells.kernels import kernel_source
-from synchain.runtime.cells.rates import _blocks
+from synchain.runtime.cells.paces import Templates
 
 
 def hanging(links: int, **more: Any) -> Scene:
@@ -107,10 +107,12 @@ def test_three_coordinates_are_still_solved_in_the_equations():
 def test_the_stiffness_of_a_node_is_that_of_its_rates():
     """The block of the Jacobian that "auto" looks at, against differences of the rates by hand."""
     equations, y = hanging(4).equations, np.array([0.3, 0.2, -0.1, 0.5, 0.1, 0.7, -0.2, 0.3])
-    values = dict(zip((*equations.state, "gravity", "delta"), (*y, 1.0, 0.4), strict=True))
+    values = {"gravity": 1.0, "delta": 0.4}
+    numbers = np.array([[values[name] for name in equations.parameters]])
     rates, steps = ByHand(4, 1.0, 0.4).rates, 1e-6 * np.eye(8)
     expected = np.array([(rates(0, y + e) - rates(0, y - e)) / 2e-6 for e in steps]).T
-    assert np.abs(_blocks(equations, values)[0] - expected).max() < 1e-8
+    found = Templates(equations).blocks(y[None], numbers, np.zeros(1))
+    assert np.abs(found[0, 0] - expected).max() < 1e-8
     assert ", 0 links, dop853." in kernel_source(hanging(4)).text
 
 

@@ -43,21 +43,25 @@ from .names import INTERRUPTED
 from .names import LAPSE
 from .names import LAST
 from .names import LEFT
+from .names import LONGEST
 from .names import LONGEST_RUSH
+from .names import LOOK
+from .names import LOOKED_AT
+from .names import LOOKS
 from .names import MARK
 from .names import MARKED_AT
+from .names import MAX_STEP
 from .names import MAX_STEPS
 from .names import MEAN
 from .names import MEMORY
-from .names import MODE
 from .names import NEXT_SAMPLE
 from .names import NO_JUMPS
 from .names import N_ACCEPTED
 from .names import N_REJECTED
 from .names import N_SKIPPED
-from .names import N_SMOOTH
 from .names import ORIGIN
 from .names import PACE
+from .names import PAUSED
 from .names import PEAK
 from .names import PERIOD
 from .names import PERIODS
@@ -69,7 +73,6 @@ from .names import RUSH
 from .names import SAVED_AT
 from .names import SERIES
 from .names import SKIPPED
-from .names import SMOOTH_STEPS
 from .names import START
 from .names import STATUS
 from .names import STEP
@@ -85,10 +88,11 @@ from .names import TOWER
 from .names import UNDERFLOW
 from .names import UNTIL
 from .names import WIDTH
+from .names import WORTH
 
 # --- kernel text below ---
 # What must repeat for the future to repeat, saved behind state and parameters: the state and these of the clock.
-REPEATING = (STEP, MODE, SYNC)
+REPEATING = (STEP, SYNC)
 LONGEST_CYCLE = 32.0
 # Taylor steps go on beyond the ends of periods, but for one in PROBE, a multiple of many lengths of cycles.  Once a state
 # there is as near as NEAR, or so many rtol, to that at the last one, the steps stop at the ends of all periods.
@@ -127,6 +131,8 @@ def fill(which, cell, start, numbers, spans, control, clock, y, dims):
     if SERIES and not spans[cell, 3] > 0.0:
         put(clock, DUE, which, PROBE if dims.repeats else math.inf)
     put(clock, STEP, which, control[FIRST_STEP])
+    put(clock, LONGEST, which, control[MAX_STEP])
+    put(clock, LOOK, which, math.inf)
     put(clock, CHANGE, which, math.inf)
     put(clock, POWER, which, 1.0)
     put(clock, LEFT, which, -1.0)
@@ -340,16 +346,46 @@ def outcome(which, clock, y, control, dims):
         return BUDGET
     if unbounded(which, clock, control):
         return DIVERGED
+    if pauses(which, clock):
+        return PAUSED
     if CONTACTS and clock[RUSH * WIDTH + which] >= LONGEST_RUSH:
         return CHATTERING
-    if clock[STEP * WIDTH + which] <= 4e-16 * max(1.0, t):
+    if clock[STEP * WIDTH + which] <= 4e-16 * max(min(1.0, clock[UNTIL * WIDTH + which]), t):
         return DIVERGED if largest > 1e8 else UNDERFLOW  # a blow-up in finite time stops the steps first
     return 0
 
 
 @njit(error_model="numpy")
-def finish(which, status, clock, y, i, spans, end, sums, counts, dims):
+def pauses(which, clock):
+    """Whether a cell is to pause, so that its integrator is looked at: at LOOKS times as many steps each time."""
+    steps = clock[ACCEPTED * WIDTH + which] + clock[REJECTED * WIDTH + which]
+    if steps < clock[LOOK * WIDTH + which]:
+        return False
+    now, until = clock[BASE * WIDTH + which] + clock[TIME * WIDTH + which], clock[UNTIL * WIDTH + which]
+    taken, lapse = steps - clock[LOOK * WIDTH + which] / LOOKS, now - clock[LOOKED_AT * WIDTH + which]
+    put(clock, LOOK, which, LOOKS * steps)
+    put(clock, LOOKED_AT, which, now)
+    return taken * (until - now) >= WORTH * lapse
+
+
+@njit(error_model="numpy")
+def come_back(which, clock, y, lane):
+    """Put a cell that has paused into a lane, to the last bit as it left it."""
+    for slot in range(CLOCK):
+        put(clock, slot, which, lane[slot])
+    for slot in range(lane.size - CLOCK):
+        put(y, slot, which, lane[CLOCK + slot])
+
+
+@njit(error_model="numpy")
+def finish(which, status, clock, y, i, spans, end, sums, counts, lanes, dims):
     """Write what is known about the cell in a lane."""
+    comes_back = (status == PAUSED) | (status == UNDERFLOW)
+    if lanes.shape[0] > 0 and comes_back:
+        for slot in range(CLOCK):
+            lanes[i, slot] = clock[slot * WIDTH + which]
+        for slot in range(lanes.shape[1] - CLOCK):
+            lanes[i, CLOCK + slot] = y[slot * WIDTH + which]
     for c in range(dims.dimension):
         end[i, c] = y[c * WIDTH + which]
     stopped, early = clock[BASE * WIDTH + which] + clock[TIME * WIDTH + which], clock[END * WIDTH + which] == -math.inf
@@ -362,27 +398,6 @@ def finish(which, status, clock, y, i, spans, end, sums, counts, dims):
     counts[i, N_ACCEPTED] = int(clock[ACCEPTED * WIDTH + which])
     counts[i, N_REJECTED] = int(clock[REJECTED * WIDTH + which])
     counts[i, N_SKIPPED] = int(clock[SKIPPED * WIDTH + which])
-    counts[i, N_SMOOTH] = int(clock[SMOOTH_STEPS * WIDTH + which])
-
-
-@njit(error_model="numpy")
-def move(a, clock, y, cell, b, other_clock, other_y, other_cell, dims):
-    """Move the cell of lane a in one group to lane b in another."""
-    for slot in range(CLOCK):
-        put(other_clock, slot, b, clock[slot * WIDTH + a])
-    for slot in range(2 * dims.dimension + dims.parameters + len(REPEATING)):
-        put(other_y, slot, b, y[slot * WIDTH + a])
-    other_cell[b] = cell[a]
-    cell[a] = -1
-
-
-@njit(error_model="numpy")
-def vacant(cell):
-    """A lane without a cell, -1 where there is none."""
-    for which in range(WIDTH):
-        if cell[which] < 0:
-            return which
-    return -1
 
 
 @njit(error_model="numpy")
@@ -392,22 +407,3 @@ def occupied(cell):
     for which in range(WIDTH):
         count += cell[which] >= 0
     return count
-
-
-@njit(error_model="numpy")
-def held(cell):
-    """The lanes that hold a cell, as bits."""
-    bits = 0
-    for which in range(WIDTH):
-        if cell[which] >= 0:
-            bits |= 1 << which
-    return bits
-
-
-@njit(error_model="numpy")
-def waiting(clock, cell, mode):
-    """The lane of a waiting cell of one kind, -1 where there is none."""
-    for which in range(WIDTH):
-        if cell[which] >= 0 and clock[MODE * WIDTH + which] == mode:
-            return which
-    return -1

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-__all__ = ["Control", "Count", "Point", "Span", "Sum", "Tally"]
+__all__ = ["COUNTS", "MOST_METHODS", "Control", "Count", "Point", "Span", "Sum", "Tally"]
 
 
 class Control(IntEnum):
@@ -30,7 +30,7 @@ class Control(IntEnum):
 
 
 class Span(IntEnum):
-    """Columns of `spans` (cells, 4), in non-dimensional time."""
+    """Columns of `spans` (cells, 7), in non-dimensional time."""
 
     START = 0
     END = 1
@@ -40,6 +40,11 @@ class Span(IntEnum):
     """Synchronisation error below which a cell is known to stay synchronous; 0 if that is not
     known.
     """
+    FIRST_STEP = 4
+    LONGEST = 5
+    """No step is longer: none can miss a swing of the drive."""
+    LOOK = 6
+    """Steps after which the cell first looks whether to pause; inf if it never does."""
 
 
 class Sum(IntEnum):
@@ -71,7 +76,7 @@ class Tally(IntEnum):
 
 
 class Count(IntEnum):
-    """Columns of `counts` (cells, 6)."""
+    """Columns of `counts` (cells, 8)."""
 
     STATUS = 0
     ACCEPTED = 1
@@ -79,8 +84,15 @@ class Count(IntEnum):
     POINTS = 3
     SKIPPED = 4
     """Periods of the drive that were jumped over."""
-    SMOOTH = 5
-    """Steps of the explicit method in a kernel that switches."""
+    BY_METHOD = 5
+    """Behind those that a kernel writes: the steps by each of up to MOST_METHODS integrators."""
+
+
+MOST_METHODS = 3
+"""Integrators that one cell may go through."""
+
+COUNTS = Count.BY_METHOD + MOST_METHODS
+"""Columns of `counts`."""
 
 
 class Point(IntEnum):

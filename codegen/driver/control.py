@@ -31,15 +31,15 @@ from .names import END
 from .names import FAR
 from .names import FROM
 from .names import HIGH
+from .names import LONGEST
 from .names import LONGEST_RUSH
+from .names import LOOK
 from .names import MARK
-from .names import MAX_STEP
 from .names import MEMORY
 from .names import PERIOD
 from .names import PERIODS
 from .names import REJECTED
 from .names import RUSH
-from .names import SMOOTH
 from .names import START
 from .names import STEP
 from .names import STOP
@@ -50,10 +50,10 @@ from .names import WIDTH
 
 # --- kernel text below ---
 @njit(error_model="numpy", forceinline=True)
-def aim(clock, control):
+def aim(clock):
     """The step to try in each lane: the proposed one, cut to land on the next stop."""
     left = load(clock, STOP, WIDTH) - load(clock, TIME, WIDTH)
-    return minimum(minimum(load(clock, STEP, WIDTH), control[MAX_STEP]), left)
+    return minimum(minimum(load(clock, STEP, WIDTH), load(clock, LONGEST, WIDTH)), left)
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -149,20 +149,8 @@ def wrap(clock):
 def pause(clock, largest):
     """Mask of lanes that need a look: at a stop, at a mark of their steps, with a vanishing step, or out of bounds."""
     t, h = load(clock, TIME, WIDTH), load(clock, STEP, WIDTH)
-    marked = load(clock, ACCEPTED, WIDTH) + load(clock, REJECTED, WIDTH) >= load(clock, MARK, WIDTH)
+    due = minimum(load(clock, MARK, WIDTH), load(clock, LOOK, WIDTH))
+    marked = load(clock, ACCEPTED, WIDTH) + load(clock, REJECTED, WIDTH) >= due
     stopped = (t >= load(clock, END, WIDTH)) | (t >= load(clock, BOUND, WIDTH))
     found = stopped | marked | (h <= 4e-16 * maximum(t, 1.0)) | (largest >= FAR)
     return found | (load(clock, RUSH, WIDTH) >= LONGEST_RUSH) if CONTACTS else found
-
-
-@njit(error_model="numpy", forceinline=True)
-def turned(clock, accept, rate, mode):
-    """Mask of lanes whose next step belongs to the other kind; `rate` bounds the eigenvalues at the start of this one.
-
-    The explicit method is stable while its step times the rate stays below 3 or so (Hairer & Wanner, *Solving ODEs II*,
-    2nd ed. 1996, section IV.2); a stiff cell is smooth again when that number has become small.
-    """
-    reach = load(clock, STEP, WIDTH) * rate
-    if mode == SMOOTH:
-        return ~(reach <= 3.0)
-    return accept & (reach < 0.5)

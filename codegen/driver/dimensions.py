@@ -21,8 +21,6 @@ class Dimensions(NamedTuple):
     workspace: int
     """Groups of scratch memory behind the dense output."""
     error_order: int
-    smooth_error_order: int
-    """That of the explicit step of a switching integrator; 0 if there is none."""
     repeats: int
     """1 if the right-hand side is periodic in time, so that a computation can repeat itself, else 0."""
     observed: int

@@ -58,7 +58,7 @@ from .names import CLOCK
 from .names import CONTACTS
 from .names import FINISHED
 from .names import LANES
-from .names import MAX_STEP
+from .names import LONGEST
 from .names import N_ACCEPTED
 from .names import N_REJECTED
 from .names import PERIODS
@@ -145,7 +145,7 @@ def attempt(
     if a coefficient overflows.
     """
     if SERIES:
-        limit = minimum(load(clock, STOP, WIDTH) - t, steering[MAX_STEP])
+        limit = minimum(load(clock, STOP, WIDTH) - t, load(clock, LONGEST, WIDTH))
         own, reach = functions.step(
             t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, steering[RTOL], steering[ATOL], shared
         )
@@ -160,7 +160,7 @@ def attempt(
                 for c in range(dims.dimension):
                     store(y_new, c, inside(h / own, c, y, y_new, dense, dims))
         return h, accept_series(clock, h, limit)
-    h = aim(clock, steering)
+    h = aim(clock)
     error = functions.step(t, h, y, y, y_new, dense, steering[RTOL], steering[ATOL], shared)
     if any_lane(error <= 1.0) and registers > 0:
         worst = functions.carry(shared, strengths, old, new, registers - 1, registers, tolerance)

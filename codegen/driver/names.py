@@ -7,8 +7,6 @@ from __future__ import annotations
 
 WIDTH = 1
 """Lanes in one register."""
-SWITCHING = False
-"""True if the driver has a second, explicit step for cells that are not stiff at the moment."""
 LOOPED = False
 """True if the step loops over nodes and links; it then takes their arrays."""
 CONTACTS = False
@@ -26,17 +24,19 @@ DIMENSION = 2
 # Times count from BASE, the beginning of the current period of the drive, so that they keep their digits in long runs.
 TIME, STEP, STOP, START, END, MEMORY, CHANGE, ACCEPTED, REJECTED = 0, 1, 2, 3, 4, 5, 6, 7, 8
 SYNC, SYNC_SUM, SYNC_PEAK, NEXT_SAMPLE, BASE, PERIOD, PERIODS = 9, 10, 11, 12, 13, 14, 15
-MODE, SMOOTH_STEPS, POWER, SAVED_AT, CYCLE, LEFT, SUM_BEFORE, SKIPPED, RUSH = 16, 17, 18, 19, 20, 21, 22, 23, 24
+LONGEST, LOOK, POWER, SAVED_AT, CYCLE, LEFT, SUM_BEFORE, SKIPPED, RUSH = 16, 17, 18, 19, 20, 21, 22, 23, 24
 HALTED, MARK, MARKED_AT, LAPSE, HIGH, RECORD, ORIGIN = 25, 26, 27, 28, 29, 30, 31
 # Start and end of the window counted from t = 0; the period at whose end a step must stop; that end, if it is this period.
-FROM, UNTIL, DUE, BOUND = 32, 33, 34, 35
-CLOCK = 36
-# How a cell ended.
-FINISHED, BUDGET, UNDERFLOW, DIVERGED, INTERRUPTED, CHATTERING, STOPPED = 1, 2, 3, 4, 5, 6, 7
+FROM, UNTIL, DUE, BOUND, LOOKED_AT = 32, 33, 34, 35, 36
+CLOCK = 37
+# How a cell left its lane; a cell that pauses comes back, with this integrator or another one.
+FINISHED, BUDGET, UNDERFLOW, DIVERGED, INTERRUPTED, CHATTERING, STOPPED, PAUSED = 1, 2, 3, 4, 5, 6, 7, 8
+# Columns of `spans`: of a sweep, behind start, end, period and the error of synchronous cells.
+FIRST_OF_CELL, LONGEST_OF_CELL, FIRST_LOOK = 4, 5, 6
 # Columns of `control`, of `sums`, behind which stand the values that were observed for some time, and of `counts`.
 RTOL, ATOL, FIRST_STEP, MAX_STEP, MAX_STEPS, DIRECTION, CANCEL, NO_JUMPS, FURTHER = 0, 1, 2, 3, 4, 5, 6, 7, 8
 MEAN, PEAK, LAST, STOPPED_AT, OBSERVED = 0, 1, 2, 3, 4
-STATUS, N_ACCEPTED, N_REJECTED, N_POINTS, N_SKIPPED, N_SMOOTH = 0, 1, 2, 3, 4, 5
+STATUS, N_ACCEPTED, N_REJECTED, N_POINTS, N_SKIPPED = 0, 1, 2, 3, 4
 # So many events in a row without time passing are chattering.
 LONGEST_RUSH = 200.0
 # A state of this size, 2^53, has diverged: its neighbours are further apart than anything that happens at size one.
@@ -45,6 +45,6 @@ FAR = 9007199254740992.0
 # and that of the last one are within a factor of PACE while the state grows by CLIMB; together they must have raised it
 # by TOWER.
 FIRST_MARK, PACE, CLIMB, TOWER = 256.0, 1.1, 1.4142135623730951, 256.0
-# The two ways to step.
-STIFF, SMOOTH = 0, 1
+# A cell looks whether to pause each time that its steps are LOOKS times as many, and pauses if more than WORTH are to come.
+LOOKS, WORTH = 4.0, 1024.0
 ALL = (1 << WIDTH) - 1

@@ -2,15 +2,14 @@
 
 A file holds KIND ("rosenbrock" or "explicit"), ORDER, ERROR_ORDER, DENSE_ORDER, SOURCE and the
 coefficients.  Everything else (number of stages, stiff accuracy, sums that can be reused) is
-computed from them.  A file of the kind "switching" names two others, STIFF and SMOOTH; every cell
-uses the one that suits its stiffness.
+computed from them.
 """
 
 from __future__ import annotations
 
 import importlib
 import pkgutil
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from types import ModuleType
 
@@ -24,8 +23,6 @@ class IntegratorKind(StrEnum):
 
     ROSENBROCK = "rosenbrock"
     EXPLICIT = "explicit"
-    SWITCHING = "switching"
-    """Two methods, of which each cell uses the one that suits its stiffness."""
     TAYLOR = "taylor"
     """The power series of the solution, from recurrences."""
 
@@ -57,8 +54,6 @@ class Integrator:
     inexact
         True for a W-method, whose order does not need the exact Jacobian: its matrix has one block
         for each oscillator.
-    smooth
-        The explicit method for cells that are not stiff at the moment; None for a single method.
 
     Notes
     -----
@@ -102,11 +97,9 @@ class Integrator:
     d: Row = ()
     big_c: tuple[Row, ...] = ()
     inexact: bool = False
-    smooth: Integrator | None = None
 
     def __post_init__(self) -> None:
-        single = (IntegratorKind.ROSENBROCK, IntegratorKind.EXPLICIT, IntegratorKind.TAYLOR)
-        if self.kind not in single:
+        if self.kind not in list(IntegratorKind):
             raise ValueError(
                 f"integrator {self.name}: kind {str(self.kind)!r}; expected 'rosenbrock', 'explicit' or 'taylor'"
             )
@@ -162,10 +155,7 @@ def integrator(name: str, order: int | None = None) -> Integrator:
     if data.KIND == IntegratorKind.TAYLOR:
         order = data.ORDER if order is None else order
         return Integrator(name, IntegratorKind.TAYLOR, order, order, order, data.SOURCE, (), (), (), (), ())
-    if data.KIND != IntegratorKind.SWITCHING:
-        return _read(name, data)
-    stiff, smooth = integrator(data.STIFF), integrator(data.SMOOTH)
-    return replace(stiff, name=name, smooth=smooth, source=f"{stiff.source}; {smooth.name}: {smooth.source}")
+    return _read(name, data)
 
 
 def _read(name: str, data: ModuleType) -> Integrator:

@@ -103,11 +103,11 @@ def signatures(driver: Driver) -> dict[str, Any]:
     else:
         lane = Lane(driver.width)
         times = (lane, lane, lane) if driver.series else (lane, lane)
-        result = types.UniTuple(lane, 2) if driver.switching or driver.series else lane
+        result = types.UniTuple(lane, 2) if driver.series else lane
         step = result(*times, *[ADDRESS] * 4, types.float64, types.float64, *more)
         pushes = types.void(lane, *[ADDRESS] * 3, *more)
-        known = {"step": step, "step_smooth": step, "pushes": pushes, **_recorded(driver.width)}
-        arrays = (*[_input] * 3, _vector, _matrix, _matrix, _counts, _cube, _cube)
+        known = {"step": step, "pushes": pushes, **_recorded(driver.width)}
+        arrays = (*[_input] * 3, _vector, _matrix, _matrix, _counts, _cube, _cube, _matrix)
         own = (_sizes(Dimensions), _vector, _matrix, types.Tuple(more))
     functions = FunctionsType({name: known[name] for name in driver.functions})
     return {**known, driver.entry: types.void(functions, *own, types.int64, types.int64, *arrays)}

@@ -61,12 +61,11 @@ class Driver:
     kind: KernelKind
     width: int
     looped: bool = False
-    switching: bool = False
     contacts: bool = False
     series: bool = False
 
     def __str__(self) -> str:
-        traits = [name for name in ("looped", "switching", "contacts", "series") if getattr(self, name)]
+        traits = [name for name in ("looped", "contacts", "series") if getattr(self, name)]
         subject = "orbits and their modes" if self.kind is KernelKind.MODES else "sweeps"
         return f"driver of {_list(subject, self.width, *traits)}"
 
@@ -75,7 +74,7 @@ class Driver:
         """The functions of a scene and those that record, in the order in which the driver takes them."""
         if self.kind is KernelKind.MODES:
             return "step", "carry", "pushes", "release"
-        return "step", "step_smooth", "pushes", "section", "values", *RECORDERS
+        return "step", "pushes", "section", "values", *RECORDERS
 
     def recorder(self, entry: str) -> Recorder:
         """Return the function that records, by its name; `tally` leaves the inside of a step to the scene."""
@@ -94,7 +93,6 @@ class Driver:
             "WIDTH": 1 if modes else self.width,
             **({"LANES": self.width} if modes else {}),
             "CONTACTS": self.contacts,
-            "SWITCHING": self.switching,
             "LOOPED": self.looped,
             "SERIES": self.series,
         }

@@ -91,7 +91,7 @@ def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int
             f"tangent dynamics of {equations.n} oscillators; expected at most {LARGEST_UNROLLED} (steps are written out)"
         )
     method = integrator(method) if isinstance(method, str) else method
-    if not (method.series or method.implicit) or method.smooth is not None:
+    if not (method.series or method.implicit):
         raise ValueError(f"tangent dynamics: found integrator {method.name}; expected a Rosenbrock or a Taylor method")
     width = lanes.native_width() if width is None else width
     plain = tidy(equations)

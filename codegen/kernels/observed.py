@@ -50,7 +50,7 @@ def rule_of(method: Integrator) -> tuple[tuple[float, ...], ...]:
     Stegun, *Handbook of Mathematical Functions*, 1964, 25.4.32).  Steps of high order are long, and the rule has more
     points for them.
     """
-    order = max(m.order for m in (method, method.smooth) if m is not None)
+    order = method.order
     return _lobatto(11 if method.series else max(5, order - 1))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import sympy as sp
 
@@ -87,7 +87,6 @@ class KernelSource:
         if isinstance(sizes, ModeDimensions):
             return ("step", "carry", *(("pushes", "release") if driver.contacts else ()))
         wanted = (
-            ("step_smooth", driver.switching),
             ("pushes", driver.contacts),
             ("section", sizes.sections or sizes.stops),
             ("values", sizes.observed),
@@ -187,7 +186,7 @@ def emit(
     names = free_names(plain)
     functions, scratch, count = (_series if method.series else _stages)(plain, method, names, elimination)
     width = _suited(equations, method, count) if width is None else width
-    chosen = Driver(KernelKind.SWEEP, width, looped, method.smooth is not None, plain.sticks, method.series)
+    chosen = Driver(KernelKind.SWEEP, width, looped, plain.sticks, method.series)
     cut = _cut(equations, section) if section is not None and "section" in ordered else UNWATCHED
     events = [
         *push_functions(plain, names, looped),
@@ -327,16 +326,14 @@ def _stages(
 
 
 def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimensions:
-    methods = [m for m in (method, method.smooth) if m is not None]
     return Dimensions(
         nodes=plain.n,
         components=0,
         dimension=plain.dimension,
         parameters=len(plain.parameters),
-        dense_rows=max(m.dense_rows for m in methods),
+        dense_rows=method.dense_rows,
         workspace=scratch,
         error_order=method.error_order,
-        smooth_error_order=0 if method.smooth is None else method.smooth.error_order,
         repeats=int(angular_frequency(plain) is not None),
         observed=0,
         gaps=0,
@@ -357,7 +354,7 @@ def _for_many(method: Integrator, equations: Equations, unroll: int) -> Integrat
             f"integrator {method.name}: found a mean field of {equations.n} nodes, whose Jacobian has an entry for each pair; "
             f"expected at most {LINK_LIMIT} pairs; use dop853 or taylor"
         )
-    return replace(method, smooth=None)
+    return method
 
 
 def _steps(
@@ -366,11 +363,8 @@ def _steps(
     """The steps of a kernel by the name of their function, written."""
     if elimination is not None:
         steps: dict[str, Step] = {"step": Looped(plain, blocks, method, elimination)}
-    elif method.smooth is None:
-        steps = {"step": Unrolled(plain, blocks, method)}
     else:
-        methods = {"step": method, "step_smooth": method.smooth}
-        steps = {name: Unrolled(plain, blocks, m, bounded=True) for name, m in methods.items()}
+        steps = {"step": Unrolled(plain, blocks, method)}
     for writer in steps.values():
         writer.write()
     return steps
@@ -383,7 +377,6 @@ def node_functions(steps: Sequence[Step], blocks: NodeBlocks, kind: int = 0) -> 
     for name, doc, body in (
         ("node", "Right-hand side of one oscillator.", blocks.rhs),
         ("node_linear", "Right-hand side of one oscillator and the parts of its Jacobian that move.", blocks.linear),
-        ("node_local", "Right-hand side of one oscillator and the parts of its Jacobian that move.", blocks.local),
     ):
         results = [e for e in body.results if not steps[0].is_plain(e)]
         if results and (name == "node" or any(body is b for b in first)):

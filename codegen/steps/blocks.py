@@ -23,15 +23,13 @@ class NodeBlocks:
     """One node, sorted by how often its parts must run.
 
     `constants` and `timed` are statements; `rhs` gives d(state)/dt; `linear` gives rhs, then the entries of the Jacobian
-    row by row, then the partial time derivative; `local` the same without the latter.  Results may be plain symbols or
-    numbers: those need no code.
+    row by row, then the partial time derivative.  Results may be plain symbols or numbers: those need no code.
     """
 
     constants: tuple[tuple[sp.Symbol, sp.Expr], ...]
     timed: tuple[tuple[sp.Symbol, sp.Expr], ...]
     rhs: Body
     linear: Body
-    local: Body
 
 
 def analyse(node: Node, names: Names, varied: Iterable[str] = ()) -> NodeBlocks:
@@ -56,13 +54,11 @@ def analyse(node: Node, names: Names, varied: Iterable[str] = ()) -> NodeBlocks:
     inner = names.fresh("z")
     rhs = share([e.xreplace(rename) for e in outputs[:size]], inner)
     linear = share([e.xreplace(rename) for e in outputs], inner)
-    local = share([e.xreplace(rename) for e in outputs[: size + size * size]], inner)
     return NodeBlocks(
         constants=tuple((rename[s], e) for s, e in constants.items()),
         timed=tuple((rename[s], e.xreplace(rename)) for s, e in timed.items()),
         rhs=rhs,
         linear=linear,
-        local=local,
     )
 
 

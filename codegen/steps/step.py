@@ -101,14 +101,11 @@ class Step(ABC):
     """Writes one step of `method` for `equations`, whose kinds of nodes were analysed into `kinds`.
 
     The stages are the same for every network.  `Unrolled` keeps each state in a register and writes every node out,
-    `Looped` keeps them in memory and runs over nodes and links.  A `bounded` step returns a bound of the eigenvalues at
-    its start beside the error.
+    `Looped` keeps them in memory and runs over nodes and links.
     """
 
-    def __init__(
-        self, equations: Equations, kinds: Sequence[NodeBlocks], method: Integrator, bounded: bool = False
-    ) -> None:
-        self.equations, self.kinds, self.method, self.bounded = equations, tuple(kinds), method, bounded
+    def __init__(self, equations: Equations, kinds: Sequence[NodeBlocks], method: Integrator) -> None:
+        self.equations, self.kinds, self.method = equations, tuple(kinds), method
         self.state = equations.state
         self.statements: list[Statement] = []
         self.functions: list[Function] = []
@@ -233,9 +230,7 @@ class Step(ABC):
 
     def first_of(self, blocks: NodeBlocks) -> Body:
         """What is evaluated of a node of some kind at the start of a step."""
-        if self.method.implicit:
-            return blocks.linear
-        return blocks.local if self.bounded else blocks.rhs
+        return blocks.linear if self.method.implicit else blocks.rhs
 
     def is_plain(self, e: sp.Expr) -> bool:
         """True where a result needs no function: a number, a parameter term, or one bare state symbol."""
@@ -246,7 +241,7 @@ class Step(ABC):
     @property
     def inner(self) -> set[sp.Symbol]:
         """Symbols defined inside the node functions."""
-        bodies = (body for blocks in self.kinds for body in (blocks.rhs, blocks.linear, blocks.local))
+        bodies = (body for blocks in self.kinds for body in (blocks.rhs, blocks.linear))
         return {s for body in bodies for s, _ in body.statements}
 
     @property

@@ -79,8 +79,6 @@ class Unrolled(Step):
         if self.method.inexact:
             self.mass.refuse(f"integrator {self.method.name}")
         own = self.linear_nodes()
-        if self.bounded:
-            self.bound(own)
         entries = self.mass.at_start(self.gather(own))
         self.steps = plan(len(self.state), set(entries) | self.mass.coupled)
         self.factors = write_factors(self.steps, entries, tuple(self.state), self.mass.entries)
@@ -99,8 +97,8 @@ class Unrolled(Step):
 
         Returns what stands for each, by node.
         """
-        eq, implicit = self.equations, self.method.implicit
-        self.note(f"right-hand side{', Jacobian and time derivative' if implicit else ' and Jacobian'} at the start")
+        eq = self.equations
+        self.note("right-hand side, Jacobian and time derivative at the start")
         self.timed("t", self.wanted([self.first_of(blocks) for blocks in self.kinds]))
         kept = self.keep_times()
         own: list[dict[str, sp.Expr]] = []
@@ -108,8 +106,7 @@ class Unrolled(Step):
             states, body, at = eq.node_at(i).state, self.first_of(self.of(i)), self.at(i, "y")
             words = linearised(states)[: len(body.results)]
             names = [f"{word}_{i + 1}" for word in words]
-            function = "node_linear" if implicit else "node_local"
-            self.put(*self.node_call(function, eq.kind_of[i], body, names, at))
+            self.put(*self.node_call("node_linear", eq.kind_of[i], body, names, at))
             found = {}
             for k, (word, name, e) in enumerate(zip(words, names, body.results, strict=True)):
                 plain = self.is_plain(e)
@@ -143,50 +140,7 @@ class Unrolled(Step):
                 entries[key] = entries.get(key, sp.S.Zero) + e
         return {key: e for key, e in entries.items() if e != 0}
 
-    def bound(self, own: list[dict[str, sp.Expr]]) -> None:
-        """Write `bound`, above the absolute value of the eigenvalues at the start of the step.
-
-        In second-order form (rates of positions are the velocities) an eigenvalue solves z**2 = z D + K, hence
-        |z| <= |D| + sqrt|K| in any norm; otherwise the largest row sum is taken.
-        """
-        eq = self.equations
-        self.mass.refuse(f"integrator {self.method.name}, a step that bounds the eigenvalues")
-        first_kind = eq.nodes[0]
-        half = len(first_kind.state) // 2
-        positions_move = len(first_kind.state) % 2 == 0 and first_kind.rhs[:half] == first_kind.state[half:]
-        second_order = positions_move and not eq.mixed
-        slow: list[list[Expression]] = []
-        fast: list[list[Expression]] = []
-        links, places, rows = list(eq.link_jacobian()), eq.places, []
-        for i in range(eq.n):
-            state = eq.node_at(i).state
-            first = half if second_order else 0
-            rows += [(places[i][a], i, a, r) for a, r in enumerate(state[first:], start=first)]
-        for row, i, _, r in sorted(rows, key=lambda found: found[0]):
-            state = eq.node_at(i).state
-            parts = {b: [size(own[i][entry(r, c)])] for b, c in enumerate(state)}
-            for (at, column), e in links:
-                if at == row:
-                    parts[0 if eq.mixed else column // eq.n].append(size(e))
-            columns = list(parts.items())
-            slow.append([t for b, sizes in columns if second_order and b < half for t in sizes if t != ZERO])
-            fast.append([t for b, sizes in columns if not second_order or b >= half for t in sizes if t != ZERO])
-        self.note("a bound of the eigenvalues")
-        self.let("bound", largest(fast))
-        if any(slow):
-            self.let("bound", Name("bound") + call("sqrt", largest(slow)))
-
     # -- stages -----------------------------------------------------------------------------------------------
-
-    def stage(self, i: int) -> None:
-        """Write one stage; that of a bounded explicit step has its slopes from the linearisation."""
-        if i > 0 or self.method.implicit or not self.bounded:
-            super().stage(i)
-            return
-        self.note("stage 1")
-        self.bound(self.linear_nodes())
-        for name in self.state:
-            self.let(f"k1_{name}", f"f_{name}")
 
     def advance(self, i: int) -> None:
         """Compute the state of stage i > 0; a row of `a` equal to `b` is the new state itself."""
@@ -244,8 +198,7 @@ class Unrolled(Step):
         self.let("total", plus(*terms))
         self.let("error", first)
         self.put(*(let("error", call("maximum", "error", term)) for term in others))
-        results = (Name("error") + 0.0 * Name("total"), *([Name("bound")] * self.bounded))
-        self.put(Return(results, "NaN or infinite where any estimate is"))
+        self.put(Return((Name("error") + 0.0 * Name("total"),), "NaN or infinite where any estimate is"))
 
     def stiff_errors(self) -> None:
         """Raise the errors of states with large pivots to that of the dense output."""

@@ -93,7 +93,7 @@ def network_row(name: str, n: int, method: str) -> Row:
     scene = scene_of(name, n, method)
     compiled, planner = kernel(scene, 1, reduce=False), Planner(scene)
     one, buffers = planner.rows(np.arange(1)), Buffers.empty(1, n, room=0, samples=0)
-    control = control_of(planner, False, compiled.origin.method)
+    control = control_of(planner, False)
     begin = time.process_time()
     compiled.drive(0, 1, one.start, one.numbers, one.spans, control, *buffers.arrays())
     seconds = time.process_time() - begin

@@ -28,7 +28,6 @@ Choice = tuple[str, int, tuple[float, ...]]
 STIFF: tuple[Choice, ...] = (
     ("rodas5p", 1, (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)),
     ("rodas5p", 2, (1e-6, 1e-8, 1e-10)),
-    ("switching", 1, (1e-6, 1e-7, 1e-8, 1e-9, 1e-10)),
     ("rodas4", 1, (1e-5, 1e-7, 1e-9)),
     ("rodas6p", 1, (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)),
     ("ros34pw2", 1, (1e-4, 1e-5, 1e-6)),

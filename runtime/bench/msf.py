@@ -224,7 +224,7 @@ def _alone(orbits: Orbits, periods: int) -> Callable[[], int]:
         parameters={"omega": orbits.scene.parameters["omega"]},
     )
     cells, compiled = plan(scene), kernel(scene, 1, reduce=False)
-    rtol, atol = tolerances(scene, scene.equations, cells.numbers)
+    rtol, atol = (float(own.min()) for own in tolerances(scene, scene.equations, cells.numbers))
     control = control_array(rtol, atol, 0.5 * orbits.unit, scene.max_steps, jumps=False)
 
     def run() -> int:

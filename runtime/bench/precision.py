@@ -92,7 +92,7 @@ EXPLICIT = ("dop853", "taylor")
 TOLERANCES = tuple((rtol, 0.1 * rtol) for rtol in LADDER)
 METHODS = (
     Method("cash_karp", False, (PAPER,), longest=10),
-    *(Method(name, full, TOLERANCES) for name in ("rodas5p", "switching", *EXPLICIT) for full in (False, True)),
+    *(Method(name, full, TOLERANCES) for name in ("rodas5p", *EXPLICIT) for full in (False, True)),
 )
 """This program's rows."""
 

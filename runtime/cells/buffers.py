@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from synchain.codegen.driver.columns import Count, Point, Sum
+from synchain.codegen.driver.columns import COUNTS, Count, Point, Sum
 
 from ..support.status import Status
 
@@ -19,7 +19,7 @@ IN_MEMORY = 10**9
 def numbers_of_a_cell(dimension: int, room: int, samples: int, observed: int = 0, kept: int | None = None) -> int:
     """Return how many numbers the buffers hold for each cell; the arguments are those of `Buffers.empty`."""
     kept = dimension if kept is None else kept
-    return dimension * (1 + samples) + (Point.STATE + kept) * room + len(Sum) + observed + len(Count)
+    return dimension * (1 + samples) + (Point.STATE + kept) * room + len(Sum) + observed + COUNTS
 
 
 @dataclass(slots=True)
@@ -33,13 +33,15 @@ class Buffers:
         States at which the cells stopped.
     sums : ndarray, shape (cells, len(Sum) + observed)
         Synchronisation errors, the time at which each cell stopped, and what was observed.
-    counts : ndarray of int64, shape (cells, len(Count))
+    counts : ndarray of int64, shape (cells, COUNTS)
         Status, steps and numbers of section points.
     points : ndarray, shape (cells, room, 1 + kept)
         Time and state of the section points, or time, number of the section and what it keeps; NaN
         if a cell has fewer.
     samples : ndarray, shape (cells, samples, dimension)
         States at equally spaced times of the window.
+    lanes : ndarray, shape (cells, any)
+        What the lanes of cells held that paused or whose steps underflow; empty if no cell goes on from there.
     """
 
     end: np.ndarray
@@ -47,6 +49,7 @@ class Buffers:
     counts: np.ndarray
     points: np.ndarray
     samples: np.ndarray
+    lanes: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
 
     @classmethod
     def empty(
@@ -69,19 +72,30 @@ class Buffers:
         return cls(
             end=np.full((cells, dimension), np.nan),
             sums=np.full((cells, len(Sum) + observed), np.nan),
-            counts=np.zeros((cells, len(Count)), np.int64),
+            counts=np.zeros((cells, COUNTS), np.int64),
             points=np.full((cells, room, Point.STATE + kept), np.nan),
             samples=np.full((cells, samples, dimension), np.nan),
         )
 
     def arrays(self) -> tuple[np.ndarray, ...]:
         """The arrays in the order of the kernel's arguments."""
-        return self.end, self.sums, self.counts, self.points, self.samples
+        return self.end, self.sums, self.counts, self.points, self.samples, self.lanes
 
     @property
     def status(self) -> np.ndarray:
         """Status (cells,) of each cell; a view of `counts`."""
         return self.counts[:, Count.STATUS]
+
+    @property
+    def steps(self) -> np.ndarray:
+        """Accepted and rejected steps (cells,) of each cell."""
+        return np.asarray(self.counts[:, Count.ACCEPTED] + self.counts[:, Count.REJECTED])
+
+    def take(self, cells: np.ndarray) -> Buffers:
+        """Return copies of the rows of some cells."""
+        return Buffers(
+            *(array[cells] for array in self.arrays()[:-1]), self.lanes[cells] if len(self.lanes) else self.lanes
+        )
 
     @property
     def finished(self) -> np.ndarray:
@@ -121,6 +135,8 @@ class Buffers:
         self.points[cells, : part.points.shape[1]] = part.points
         self.end[cells], self.sums[cells] = part.end, part.sums
         self.counts[cells], self.samples[cells] = part.counts, part.samples
+        if len(self.lanes):
+            self.lanes[cells] = part.lanes
 
     def clear(self, cells: np.ndarray) -> None:
         """Set cells (numbers or a mask) back to the state in which they have not run."""

@@ -1,16 +1,18 @@
-"""Which integrator "auto" stands for, by what was measured (docs/performance.md)."""
+"""Which integrators the cells of a scene go through: the first by where they start, others by what their steps show."""
 
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from synchain.codegen.driver.columns import Count, Sum
+from synchain.codegen.driver.columns import Count, Span, Sum
+from synchain.codegen.driver.names import WORTH
 from synchain.codegen.integrators import Integrator, integrator
-from synchain.codegen.kernels.sweep import AUTO, KernelSource
+from synchain.codegen.kernels.sweep import AUTO
 from synchain.codegen.taylor import is_analytic, is_linear, jump, order_for, outlives_series
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation
@@ -20,49 +22,53 @@ from synchain.models.scenes.scene import Scene
 
 from ..support.status import Status
 from .buffers import Buffers
-from .plan import Plan, Planner
-from .rates import Rates, bends, mode_rates, rates
-from .reduce import Reduction
+from .paces import Paces, Templates
+from .plan import Plan, first_step, tolerances
+from .rates import eigenvalue_rates, mode_rates
 
 __all__ = [
     "STIFF",
+    "Ladder",
     "chosen_for_modes",
     "chosen_for_rows",
-    "chosen_integrator",
+    "method_names",
     "mode_stiffness",
-    "stiffness",
+    "warn_of_steps",
     "warn_of_stiff_modes",
-    "warn_of_stiffness",
 ]
 
 STIFF = 30.0
-"""Stiffness from which Rosenbrock steps are faster than Taylor steps at equal error."""
+"""How many times faster than it turns and goes on a motion decays from where Rosenbrock steps are the faster ones, by
+measurement (docs/performance.md)."""
 
 LAYER = 0.1
 """Part of its stiffness with which the layer of a smoothed jump counts: motion is not always inside."""
 
+FIRST_LOOK = 64.0
+"""Steps after which a cell first looks whether its integrator suits it."""
 
-def chosen_integrator(reduction: Reduction) -> Integrator:
-    """Return the integrator of a scene, the fastest at equal error where the scene says "auto".
-
-    Where the equations are not stiff in the extreme cells of the sweep and in a sample of the others, and between the
-    events of set-valued friction: power series if all functions are analytic between kinks, and between jumps along which
-    no motion slides, unless motion may pass another place without a series; explicit steps otherwise. Nodes or links with
-    a mass matrix take explicit steps too: the recurrences of a dense matrix take longer to compile than most runs.
-    Elsewhere Rosenbrock steps, or a switching pair of methods for two oscillators at a tight tolerance. A mean field of
-    more nodes than Rosenbrock steps can take, whose Jacobian has an entry for each pair, takes explicit steps however
-    stiff it is, and so does a start where a slope of the rates is infinite.
-
-    Parameters
-    ----------
-    reduction : Reduction
-        What is left of the scene to integrate.
-    """
-    return _chosen(reduction.scene, reduction.equations, lambda: stiffness(reduction.planner))
+STALLED = 0.01
+"""Part of the shortest time of a motion below which series are short for a reason of their own, such as a hidden pole."""
 
 
-def chosen_for_rows(scene: Scene, equations: Equations, rows: Plan) -> Integrator:
-    """Return the integrator of equations whose cells come as rows; otherwise as `chosen_integrator`.
+AUTOMATIC = ("taylor", "dop853", AUTO)
+"""What `auto` stands for, in the order in which cells try them."""
+
+
+def method_names(scene: Scene) -> tuple[str, ...]:
+    """Return the names of the integrators that cells of a scene may go through."""
+    return AUTOMATIC if scene.integrator == "auto" else (scene.integrator,)
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """The integrators of some equations in the order in which cells try them.
+
+    Series come first where they exist, then explicit stages, then a Rosenbrock method. A cell begins with the last one
+    if it is stiff where it starts, else with the first one. While it runs it pauses at 64, 256, 1024 ... steps if many
+    are to come, and is handed on from there: to Rosenbrock steps if its steps are as short as its fastest decay while its
+    motion is slow, to explicit stages if its series are far shorter than any time of its motion. A series without a next
+    term ends in steps that underflow, and is handed on as well. Each decision depends on the cell alone.
 
     Parameters
     ----------
@@ -70,25 +76,132 @@ def chosen_for_rows(scene: Scene, equations: Equations, rows: Plan) -> Integrato
         Its integrator and its tolerances.
     equations : Equations
         What is integrated.
-    rows : Plan
-        The extreme cells.
     """
-    return _chosen(scene, equations, lambda: _stiffness(_each(rates, equations, rows), equations, rows))
+
+    scene: Scene
+    equations: Equations
+
+    @cached_property
+    def methods(self) -> tuple[Integrator, ...]:
+        """The integrators; one if the scene names it."""
+        if self.scene.integrator == "taylor":
+            return (_taylor(self.scene, self.equations),)
+        if self.scene.integrator != "auto":
+            return (integrator(self.scene.integrator),)
+        series = (_taylor(self.scene, self.equations),) if _has_series(self.equations) else ()
+        return (*series, integrator("dop853"), *((integrator(AUTO),) if self.solvable else ()))
+
+    @property
+    def columns(self) -> np.ndarray:
+        """Where among `method_names` each method stands."""
+        return np.array([method_names(self.scene).index(method.name) for method in self.methods])
+
+    @property
+    def solvable(self) -> bool:
+        """True if a Rosenbrock method can step the network: no mean field has too many pairs."""
+        return not any(len(pairs) > LINK_LIMIT for _, pairs in self.equations.fields)
+
+    @cached_property
+    def templates(self) -> Templates:
+        """Rates and slopes as numbers."""
+        return Templates(self.equations)
+
+    def first(self, rows: Plan) -> np.ndarray:
+        """Return which of the methods (cells,) each cell begins with."""
+        if len(self.methods) == 1:
+            return np.zeros(len(rows), int)
+        paces = self._at_start(rows)
+        endless = ~np.isfinite(paces.size)
+        slow = np.maximum(paces.turning, paces.growth)
+        stiff = (paces.parted > STIFF * slow) & (paces.parted * rows.spans[:, Span.END] > WORTH) & ~endless
+        stiff |= ~endless & ~stiff & self._enters_layers(rows, slow)
+        last = len(self.methods) - 1 if self.solvable else self._explicit
+        return np.where(stiff & (not self.equations.sticks), last, np.where(endless, self._explicit, 0))
+
+    def main(self, rows: Plan) -> Integrator:
+        """Return the method that most of some cells begin with."""
+        return self.methods[np.bincount(self.first(rows)).argmax()]
+
+    def steps(self, rows: Plan, first: np.ndarray) -> np.ndarray:
+        """Return spans (cells, len(Span)) with the first step and the first look of cells that begin with some methods."""
+        spans = rows.spans.copy()
+        implicit = np.array([method.implicit for method in self.methods])[first]
+        if implicit.any():
+            growth = self._at_start(rows.take(np.flatnonzero(implicit))).growth
+            spans[implicit, Span.FIRST_STEP] = [first_step(rate if math.isfinite(rate) else 0.0) for rate in growth]
+        spans[:, Span.LOOK] = np.where(first < len(self.methods) - 1, FIRST_LOOK, math.inf)
+        return spans
+
+    def further(self, rows: Plan, buffers: Buffers, method: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+        """Return which method (cells,) cells go on with that have paused or whose steps underflow; -1 for none.
+
+        Parameters
+        ----------
+        rows : Plan
+            The cells.
+        buffers : Buffers
+            How they ended.
+        method : ndarray of int, shape (cells,)
+            What they used.
+        lengths : ndarray, shape (cells,)
+            Mean length of their steps since they last paused.
+        """
+        paused = buffers.status == Status.PAUSED
+        series = np.array([m.series for m in self.methods])[method]
+        implicit = np.array([m.implicit for m in self.methods])[method]
+        untried = buffers.counts[:, Count.BY_METHOD + self.columns[self._explicit]] == 0
+        found = np.where(paused, method, np.where(untried, self._explicit, -1))
+        looked = np.flatnonzero(paused & ~implicit & np.isfinite(buffers.end).all(axis=1))
+        if len(looked):
+            at = self.at(rows.take(looked), buffers.end[looked], buffers.sums[looked, Sum.STOPPED_AT])
+            slow, length = np.maximum(at.turning, at.going), lengths[looked]
+            finite = np.isfinite(at.size)
+            stiff = finite & (at.fastest > STIFF * slow) & (at.fastest * length > 1.0) & self.solvable
+            free = length < STALLED * rows.spans[looked, Span.LONGEST]
+            stalled = series[looked] & finite & free & (np.maximum(at.size, at.going) * length < STALLED)
+            found[looked] = np.where(stiff, len(self.methods) - 1, np.where(stalled, self._explicit, found[looked]))
+        return found
+
+    def at(self, rows: Plan, state: np.ndarray, time: np.ndarray) -> Paces:
+        """Return how fast cells move at some states and times, where states are known to the tolerances."""
+        rtol, atol = tolerances(self.scene, self.equations, rows.numbers)
+        noise = rtol[:, None] * np.abs(state) + atol[:, None]
+        return self.templates.paces(state, rows.numbers, time, rows.spans[:, Span.LONGEST], noise)
+
+    @property
+    def _explicit(self) -> int:
+        """Place of the explicit method of stages."""
+        return next(k for k, m in enumerate(self.methods) if not m.series)
+
+    def _at_start(self, rows: Plan) -> Paces:
+        """How fast cells move where they start."""
+        shortest = np.minimum(rows.spans[:, Span.LONGEST], np.maximum(rows.spans[:, Span.END], 1e-300))
+        return self.templates.paces(rows.start, rows.numbers, np.zeros(len(rows)), shortest, None)
+
+    def _enters_layers(self, rows: Plan, slow: np.ndarray) -> np.ndarray:
+        """True for cells (cells,) of which a smoothed jump is stiff inside, although the start lies outside."""
+        found = np.zeros(len(rows), dtype=bool)
+        for blocks in self.templates.layers(rows.start, rows.numbers):
+            fastest, turning, *_ = eigenvalue_rates(blocks)
+            within = LAYER * fastest * rows.spans[:, Span.END] > WORTH
+            found |= within & (LAYER * fastest > STIFF * np.maximum(slow, LAYER * turning)) & np.isfinite(fastest)
+        return found
 
 
-def _chosen(scene: Scene, equations: Equations, stiffness_of: Callable[[], float]) -> Integrator:
-    if scene.integrator == "taylor":
-        return _taylor(scene, equations)
-    if scene.integrator != "auto":
-        return integrator(scene.integrator)
-    found = 0.0 if equations.sticks else stiffness_of()
-    calm = found < STIFF
-    if calm and not equations.inertial and jump(equations) is None and not outlives_series(equations):
-        return _taylor(scene, equations)
-    if calm or math.isinf(found) or any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
-        return integrator("dop853")
-    pair = equations.n == 2 and not (equations.mixed or equations.inertial) and scene.rtol <= 1e-9
-    return integrator("switching" if pair else AUTO)
+@lru_cache(maxsize=64)
+def _has_series(equations: Equations) -> bool:
+    """True if Taylor steps pass all that the equations hold, and take no longer to compile than most runs take.
+
+    Power series where all functions are analytic between kinks, and between jumps along which no motion slides, unless
+    motion may pass another place without a series.  The recurrences of a dense mass matrix take long to compile.
+    """
+    return not equations.inertial and jump(equations) is None and not outlives_series(equations)
+
+
+def chosen_for_rows(scene: Scene, equations: Equations, rows: Plan) -> Integrator:
+    """Return the one integrator for equations whose cells come as rows: the last one that any cell begins with."""
+    ladder = Ladder(scene, equations)
+    return ladder.methods[ladder.first(rows).max()]
 
 
 def chosen_for_modes(
@@ -123,26 +236,6 @@ def _taylor(scene: Scene, equations: Equations) -> Integrator:
     return integrator("taylor", order_for(scene.rtol, scene.atol, is_linear(equations)))
 
 
-def stiffness(planner: Planner) -> float:
-    """Return how much faster motions decay or grow at the start than they turn, the largest of the cells looked at.
-
-    The rate is the real part of an eigenvalue of a node's own block of the Jacobian, with twice what
-    its links add, which bounds that of a network of springs; it is compared with the imaginary
-    parts and one.  In the extreme cells the layers of smoothed jumps are looked at too, although the start lies
-    outside.  It is infinite where a rate is finite and a slope of it is not, which no method that takes slopes leaves.
-    """
-    return _stiffness(planner.rates, planner.equations, planner.extremes())
-
-
-def _stiffness(starts: Iterable[Rates], equations: Equations, extremes: Plan) -> float:
-    found = [(at.fastest, at.turning) for at in starts]
-    return _stiffest(found + [(LAYER * at.fastest, LAYER * at.turning) for at in _each(bends, equations, extremes)])
-
-
-def _each(function: Callable[..., Rates], equations: Equations, rows: Plan) -> Iterator[Rates]:
-    return (function(equations, *cell) for cell in zip(rows.start, rows.numbers, strict=True))
-
-
 def mode_stiffness(variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray) -> float:
     """Return how much faster deviations decay or grow at some states than they turn: the largest of the first orbits.
 
@@ -175,55 +268,52 @@ def _stiffest(rates: Iterable[tuple[float, float]]) -> float:
 
 
 FEW = 100
-"""Steps of a cell that are no crawling, however short."""
-
-CRAWLING, LIMITED = 10_000, 4.0
-"""Steps of a cell that are too many for a motion that has come to rest, and their lengths by its fastest rate, which limits
-explicit steps then."""
+"""Steps of a cell that are not many, however short."""
 
 BLOWN = 1e6
 """Growth of a state from which on what grows as fast as anything is a solution without bound."""
 
 
-def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[[np.ndarray], Plan]) -> None:
-    """Warn if explicit steps of some cells were short because the equations are stiff or the motion has no bound.
-
-    The three cells with the shortest steps are looked at, where they ended, unless they ended at a singularity.
+def warn_of_steps(ladder: Ladder, buffers: Buffers, rows_of: Callable[[np.ndarray], Plan]) -> None:
+    """Warn if no cell came to its end, if some made no step, if explicit steps were short because a cell is stiff, or if a
+    motion has no bound.
 
     Parameters
     ----------
-    source : KernelSource
+    ladder : Ladder
     buffers : Buffers
-        What the kernel filled.
+        How the cells ended.
     rows_of : callable
-        Gives the rows of some cells, as the kernel took them.
+        Gives the rows of some cells.
     """
-    steps = buffers.counts[:, Count.ACCEPTED] + buffers.counts[:, Count.REJECTED]
-    times = buffers.sums[:, Sum.STOPPED_AT]
-    broken = np.isin(buffers.counts[:, Count.STATUS], (Status.STEP_UNDERFLOW, Status.DIVERGED))
-    lengths = np.where((steps > 0) & (times > 0.0) & ~broken, times / np.maximum(steps, 1), math.inf)
-    cells = np.argsort(lengths)[:3]
-    rows, kind = rows_of(cells), "Taylor" if source.method.series else source.method.name
-    for cell, start, numbers in zip(cells, rows.start, rows.numbers, strict=True):
-        if not math.isfinite(lengths[cell]) or not np.isfinite(buffers.end[cell]).all():
-            continue
-        size = np.abs(buffers.end[cell]).max()
-        grown = size > BLOWN * max(1.0, np.abs(start).max())
-        if steps[cell] < FEW and not grown:
-            continue
-        fastest, turning, growth = rates(source.equations, buffers.end[cell], numbers, times[cell])
-        resting = steps[cell] > CRAWLING and fastest * lengths[cell] > LIMITED and not source.equations.forced
-        slow = max(turning, 0.0 if resting else 1.0)
-        bound = math.inf if grown else sys.float_info.max  # an infinite slope, as of sqrt(x) at 0, is no stiffness
-        if fastest * lengths[cell] > 1.0 and STIFF * slow < fastest <= bound:
-            if grown and growth >= 0.5 * fastest:
-                warn(
-                    f"a state grew to {size:.3g} in {steps[cell]} {kind} steps of a cell; expected a bounded motion; "
-                    "check the signs and the size of the parameters"
-                )
-                return
-            warn(
-                f"stiff equations: found a rate of {fastest:.3g} beside slow motion, and {steps[cell]} {kind} steps in a cell; "
-                "expected few; the result may be worse than rtol says; integrator = 'rodas5p' takes longer steps"
-            )
-            return
+    status, steps, times = buffers.status, buffers.steps, buffers.sums[:, Sum.STOPPED_AT]
+    idle = np.isin(status, (Status.STEP_UNDERFLOW, Status.STEP_BUDGET)) & (times <= 0.0)
+    if len(status) and not np.isin(status, (Status.FINISHED, Status.STOPPED, Status.INTERRUPTED, Status.NOT_RUN)).any():
+        warn(f"no cell came to its end: {Status(int(status[0])).message}")
+    elif idle.any():
+        k = int(idle.argmax())
+        warn(f"{idle.sum()} of {len(idle)} cells made no step, cell {k} first: {Status(int(status[k])).message}")
+    explicit = not (ladder.methods[-1].implicit or ladder.equations.sticks)
+    whole = ~np.isin(status, (Status.STEP_UNDERFLOW, Status.DIVERGED)) & (times > 0.0)
+    whole &= np.isfinite(buffers.end).all(axis=1)
+    cells = np.flatnonzero(whole & ((np.abs(buffers.end).max(axis=1) > BLOWN) | (explicit & (steps >= FEW))))
+    if not len(cells):
+        return
+    rows, end, steps, times = rows_of(cells), buffers.end[cells], steps[cells], times[cells]
+    at, length = ladder.at(rows, end, times), times / np.maximum(steps, 1)
+    short = (at.fastest * length > 1.0) & np.isfinite(at.fastest)
+    grown = np.abs(end).max(axis=1) > BLOWN * np.maximum(1.0, np.abs(rows.start).max(axis=1))
+    blown = grown & (at.growth >= 0.5 * at.fastest) & (at.growth * length > 0.5)
+    stiff = explicit & short & ~grown & (at.fastest > STIFF * np.maximum(at.turning, at.going))
+    if blown.any():
+        k = int(blown.argmax())
+        warn(
+            f"a state grew to {np.abs(end[k]).max():.3g} in {steps[k]} steps of a cell; expected a bounded motion; "
+            "check the signs and the size of the parameters"
+        )
+    elif stiff.any():
+        k = int(stiff.argmax())
+        warn(
+            f"stiff equations: found a rate of {at.fastest[k]:.3g} beside slow motion, and {steps[k]} explicit steps in a "
+            "cell; expected few; the result may be worse than rtol says; integrator = 'rodas5p' takes longer steps"
+        )

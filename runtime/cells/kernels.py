@@ -16,10 +16,10 @@ from synchain.models.inputs.checks import check_integer
 from synchain.models.inputs.keywords import warn
 from synchain.models.scenes.scene import Scene
 
-from .choice import chosen_integrator
+from .choice import Ladder
 from .reduce import Reduction, as_reduction
 
-__all__ = ["kernel", "kernel_source", "warn_of_chords", "write_kernel"]
+__all__ = ["chosen_integrator", "kernel", "kernel_source", "ladder_of", "warn_of_chords", "write_kernel"]
 
 
 def kernel(scene: Scene, width: int | None = None, reduce: bool | Reduction = True) -> Kernel:
@@ -50,9 +50,19 @@ def kernel_source(scene: Scene, width: int | None = None, reduce: bool | Reducti
     return write_kernel(as_reduction(scene, reduce), width)
 
 
-def write_kernel(reduction: Reduction, width: int | None = None) -> KernelSource:
+def ladder_of(reduction: Reduction) -> Ladder:
+    """Return the integrators that the cells of what is left of a scene go through."""
+    return Ladder(reduction.scene, reduction.equations)
+
+
+def chosen_integrator(reduction: Reduction) -> Integrator:
+    """Return the integrator that most of the first cells of what is left of a scene begin with."""
+    return ladder_of(reduction).main(reduction.rows(reduction.planner.sample()))
+
+
+def write_kernel(reduction: Reduction, width: int | None = None, method: Integrator | None = None) -> KernelSource:
     """Return the text of the kernel that integrates what is left of a scene; `width` as for
-    `kernel`.
+    `kernel`.  By default the integrator is the one that most cells begin with.
     """
     scene = reduction.scene
     width = 1 if width is None and scene.cells == 1 else width
@@ -61,7 +71,7 @@ def write_kernel(reduction: Reduction, width: int | None = None) -> KernelSource
     section = None
     if "section" in scene.record:
         section = sp.Symbol(reduction.section_variable(), real=True) - sp.Rational(repr(scene.section.level))
-    method = chosen_integrator(reduction)
+    method = chosen_integrator(reduction) if method is None else method
     recorded = (reduction.records, section, width, reduction.multiplicity)
     return _emitted(reduction.equations, method, recorded, reduction.watched)
 

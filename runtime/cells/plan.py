@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import sympy as sp
 
 from synchain.codegen.driver.columns import Control, Span
-from synchain.codegen.integrators import Integrator
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.periodicity import Drive, as_function, drive_of, names_in
 from synchain.models.inputs.names import NodeName
@@ -20,8 +17,7 @@ from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
 
 from .initial_modes import local_clock, with_modes
-from .rates import Rates, rates
-from .stays import shortest_stay
+from .stays import shortest_stays
 
 __all__ = [
     "Plan",
@@ -31,7 +27,7 @@ __all__ = [
     "control_of",
     "first_step",
     "half_swing",
-    "longest_step",
+    "longest_steps",
     "parameter_names",
     "periods",
     "plan",
@@ -44,9 +40,6 @@ control enlarges it sixfold at a time."""
 
 LOOKED_AT = 200
 """Nodes of all cells at whose rates is looked."""
-
-MOST = 144
-"""Rows of the parameters of the drive's jumps and kinks at which these are looked at."""
 
 DIRECTIONS = {"falling": -1.0, "rising": 1.0, "both": 0.0}
 """The numbers that a kernel knows the directions of a section by."""
@@ -63,8 +56,9 @@ class Plan:
     numbers : ndarray, shape (cells, parameters)
         Parameters, in the order of `Equations.parameters`.
     spans : ndarray, shape (cells, len(Span))
-        Start and end of the window and the period of the equations, in non-dimensional time, and
-        the synchronisation error below which a cell ends early (0: none does).
+        Start and end of the window and the period of the equations, in non-dimensional time,
+        the synchronisation error below which a cell ends early (0: none does), the first step, the longest one, and the
+        steps after which the cell first pauses (inf: it never does).
     """
 
     start: np.ndarray
@@ -157,6 +151,8 @@ class Planner:
         spans[:, : Span.PERIOD] = _windows(self.scene, repeat)
         spans[:, Span.PERIOD] = local_clock(self.equations, repeat)
         spans[:, Span.NEAR] = 0.0 if near is None else near
+        spans[:, Span.FIRST_STEP], spans[:, Span.LOOK] = FIRST_STEP, math.inf
+        spans[:, Span.LONGEST] = longest_steps(self.equations, numbers, spans[:, Span.END])
         return spans
 
     def extremes(self) -> Plan:
@@ -169,12 +165,6 @@ class Planner:
         """Return the rows of the extreme cells and of others, evenly spread over the sweep: of LOOKED_AT nodes or two cells."""
         spread = _spread(math.prod(self.scene.shape), LOOKED_AT // self.equations.n)
         return self.rows(np.union1d(self._extremes(), spread))
-
-    @cached_property
-    def rates(self) -> list[Rates]:
-        """How fast motions decay, grow and turn at the start of the cells of the sample."""
-        sample = self.sample()
-        return [rates(self.equations, *cell) for cell in zip(sample.start, sample.numbers, strict=True)]
 
     def _extremes(self) -> np.ndarray:
         ends = [_ends(values) for values in self.values.values()]
@@ -225,21 +215,38 @@ def _sizes(frequency: sp.Expr, values: Mapping[str, np.ndarray], rows: int) -> n
 
 
 def half_swing(equations: Equations, values: Mapping[str, np.ndarray], end: float = 1e3) -> float:
-    """Return half the period of the fastest sine or cosine of time, or the length in which another
+    """Return the shortest half swing of some rows of parameters, see `longest_steps`."""
+    rows = max((len(column) for column in values.values()), default=1)
+    return float(_half_swings(equations, values, np.full(rows, end)).min(initial=math.inf))
+
+
+def longest_steps(equations: Equations, numbers: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Return the longest step (cells,) of cells with these parameters (cells, parameters) that run up to the times `end`.
+
+    That is half the period of the fastest sine or cosine of time, or the length in which another
     function of time can rise and fall again (`Drive.bends`) or stays between two of its jumps,
     kinks (`Drive.gaps`) and rises (`Drive.rises`), if shorter; inf without a drive.
 
     No step may be longer, so that none can miss a whole swing of the drive, or a pulse.  A drive
     without a period is looked at up to the time `end`.
     """
-    rows = max((len(column) for column in values.values()), default=1)
+    if not equations.forced or not len(numbers):
+        return np.full(len(numbers), math.inf)
+    whole = _half_swings(equations, by_node(equations, numbers), np.tile(end, equations.n))
+    return np.asarray(whole.reshape(equations.n, -1).min(axis=0))
+
+
+def _half_swings(equations: Equations, values: Mapping[str, np.ndarray], end: np.ndarray) -> np.ndarray:
+    """The longest step (rows,) of nodes with these parameters."""
+    rows = len(end)
     drive = drive_of((*equations.nodes, *equations.edges), equations.differing)
-    fastest = max((float(np.max(_sizes(pace, values, rows), initial=0.0)) for pace in drive.paces), default=0.0)
-    longest = math.pi / fastest if fastest > 0.0 else math.inf
-    gaps, rises = ([e for e in own if {*names_in(e)} <= {*values, TIME.name}] for own in (drive.gaps, drive.rises))
+    fastest = np.max([np.zeros(rows), *(_sizes(pace, values, rows) for pace in drive.paces)], axis=0)
+    with np.errstate(divide="ignore"):
+        longest = np.where(fastest > 0.0, math.pi / fastest, math.inf)
+    gaps, rises = (tuple(e for e in own if {*names_in(e)} <= {*values, TIME.name}) for own in (drive.gaps, drive.rises))
     if not (gaps or rises):
         return longest
-    return min(longest, shortest_stay(gaps, rises, values, _periods(drive, values, rows), end))
+    return np.minimum(longest, shortest_stays(gaps, rises, values, _periods(drive, values, rows), end))
 
 
 def by_node(equations: Equations, numbers: np.ndarray) -> dict[str, np.ndarray]:
@@ -247,30 +254,6 @@ def by_node(equations: Equations, numbers: np.ndarray) -> dict[str, np.ndarray]:
     columns = dict(zip(equations.parameters, numbers.T, strict=True))
     own = {name: [columns[f"{name}_{i + 1}"] for i in range(equations.n)] for name in equations.varied}
     return {name: np.concatenate(own.get(name) or [columns[name]] * equations.n) for name in (*columns, *own)}
-
-
-def longest_step(scene: Scene) -> float:
-    """Return the half swing at the extremes of the drive's parameters over all nodes and axes of a
-    scene; those of its jumps and kinks take MOST rows of values.
-    """
-    paced, sided = (
-        dict.fromkeys(name for e in found for name in names_in(e) if name != TIME.name)
-        for found in (scene.drive.paces, (*scene.drive.gaps, *scene.drive.rises))
-    )
-    known = {name: _values(scene, name) for name in paced | sided}
-    swept = sum(len(known[name]) > 1 for name in sided)
-    most = {name: int(MOST ** (1.0 / swept)) if swept and name in sided else 2 for name in known}
-    picked = [np.unique(values[_spread(len(values), most[name])]) for name, values in known.items()]
-    corners = np.array(list(itertools.product(*picked)), dtype=float)
-    rows = dict(zip(known, corners.T, strict=True))
-    return half_swing(scene.equations, rows, scene.transient + scene.window)
-
-
-def _values(scene: Scene, name: str) -> np.ndarray:
-    """All values that a parameter has in the nodes and cells of a scene, rising."""
-    names = parameter_names(scene, name)
-    along = (axis.values for axis in (*scene.axes, *scene.drawn) if axis.name in names)
-    return np.unique([*(scene.parameters[own] for own in names), *itertools.chain(*along)])
 
 
 def _spread(count: int, most: int) -> np.ndarray:
@@ -330,39 +313,35 @@ def control_array(
     return control
 
 
-def control_of(planner: Planner, jumps: bool, method: Integrator) -> np.ndarray:
-    """Return the control array of a scene's sweep by some method; `jumps` as for `control_array`."""
-    scene, extremes = planner.scene, planner.extremes()
-    rtol, atol = tolerances(scene, scene.equations, extremes.numbers)
+def control_of(planner: Planner, jumps: bool) -> np.ndarray:
+    """Return the control array of a scene's sweep; `jumps` as for `control_array`, tolerances those of the strictest cell."""
+    scene = planner.scene
+    rtol, atol = (float(own.min()) for own in tolerances(scene, scene.equations, planner.extremes().numbers))
     directions = [DIRECTIONS[section.direction] for section in scene.sections.values() or (scene.section,)]
-    control = control_array(rtol, atol, longest_step(scene), scene.max_steps, directions[0], jumps)
-    if method.implicit:
-        control[Control.FIRST_STEP] = first_step(planner.rates)
+    control = control_array(rtol, atol, math.inf, scene.max_steps, directions[0], jumps)
     return np.concatenate([control, directions[1:]])
 
 
-def first_step(found: Iterable[Rates]) -> float:
+def first_step(growth: float) -> float:
     """Return the length of the first step of a Rosenbrock method, by how fast motions grow where it begins.
 
     Such a method damps fast growth as it does fast decay, and its estimate of the error with it, if a step is much longer:
     it would stay at an equilibrium that repels. Steps that grow with the solution see it.
     """
-    growth = max((at.growth for at in found if math.isfinite(at.growth)), default=0.0)
     return min(FIRST_STEP, SHORT / max(growth, SHORT))
 
 
-def tolerances(scene: Scene, equations: Equations, numbers: np.ndarray) -> tuple[float, float]:
-    """Return (rtol, atol) as integrated with; `numbers` (cells, parameters) are those of the equations.
+def tolerances(scene: Scene, equations: Equations, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return (rtol, atol), each (cells,), as integrated with; `numbers` (cells, parameters) are those of the equations.
 
     A smoothed jump of friction is 1/kappa wide in velocity; a step control that does not see this
     width lets oscillators slip through it unnoticed.  With contact "atan" rtol is therefore at most
-    1/kappa and atol at most 0.1/kappa (not below 1e-13), for the largest kappa of the sweep.
+    1/kappa and atol at most 0.1/kappa (not below 1e-13), for the largest kappa of the nodes.
     """
-    rtol, atol = scene.rtol, scene.atol
+    rtol, atol = np.full(len(numbers), scene.rtol), np.full(len(numbers), scene.atol)
     names = parameter_names(scene, "kappa")
     columns = [k for k, name in enumerate(equations.parameters) if name in names]
-    if scene.contact == "atan" and columns:
-        steepest = numbers[:, columns].max() if numbers.size else max(scene.parameters[name] for name in names)
-        width = 1.0 / max(float(steepest), 1e-300)
-        rtol, atol = min(rtol, max(width, 1e-13)), min(atol, max(0.1 * width, 1e-13))
+    if scene.contact == "atan" and columns and len(numbers):
+        width = 1.0 / np.maximum(numbers[:, columns].max(axis=1), 1e-300)
+        rtol, atol = np.minimum(rtol, np.maximum(width, 1e-13)), np.minimum(atol, np.maximum(0.1 * width, 1e-13))
     return rtol, atol

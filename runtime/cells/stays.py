@@ -12,7 +12,7 @@ import sympy as sp
 from synchain.models.dynamics.periodicity import names_in
 from synchain.models.mechanics.components import TIME
 
-__all__ = ["shortest_stay"]
+__all__ = ["shortest_stays"]
 
 POINTS = 1 << 14
 """Points of a period at which a drive is looked at."""
@@ -30,44 +30,55 @@ TOUCH = 1e-9
 """A stay that is a smaller part of a period than this is none: the drive touches zero to rounding."""
 
 
-def shortest_stay(
-    gaps: Sequence[sp.Expr],
-    rises: Sequence[sp.Expr],
+def shortest_stays(
+    gaps: tuple[sp.Expr, ...],
+    rises: tuple[sp.Expr, ...],
     values: Mapping[str, np.ndarray],
     periods: np.ndarray,
-    end: float,
-) -> float:
-    """Return the shortest time between two zeros of expressions of time; inf if there are no two.
+    end: np.ndarray,
+) -> np.ndarray:
+    """Return the shortest time (rows,) between two zeros of expressions of time; inf if there are no two.
 
     Parameters
     ----------
-    gaps, rises : sequence of Expr
+    gaps, rises : tuple of Expr
         Expressions of time and parameters.  Rises take WIDTH over their slope, and are no nearer to each other than that.
     values : mapping of str to ndarray, shape (rows,)
         Values of the parameters; each row is looked at.
     periods : ndarray, shape (rows,)
         Common period of the expressions in each row; 0 if there is none.
-    end : float
+    end : ndarray, shape (rows,)
         Time up to which expressions without a period are looked at.
 
     Notes
     -----
     Two zeros of one smooth expression are found however close they are, others if they are RESOLVED points apart.
     """
-    shortest, sharp = math.inf, len(gaps)
-    written, names = _written((*gaps, *rises))
-    rows = np.column_stack([*(np.broadcast_to(values[name], periods.shape) for name in names), periods])
-    for *row, period in np.unique(rows, axis=0):
-        # of two periods, one whole stay of each kind at least
-        length, points = (2.0 * period, 2 * POINTS) if period else (end, PERIODS * POINTS)
-        times, pitch = np.linspace(0.0, length, points + 1, retstep=True)
-        with np.errstate(all="ignore"):
-            found = [np.broadcast_to(g, times.shape) for g in written(times, *row)]
-            passages, dips = [_passages(g, k >= sharp) for k, g in enumerate(found)], [_dips(g) for g in found[:sharp]]
-        apart = np.concatenate([_apart(own) for own in (*passages, np.concatenate(passages, axis=1))])
-        stays = np.concatenate([apart[apart > RESOLVED], *dips])
-        shortest = min(shortest, pitch * np.min(stays[stays * pitch > TOUCH * length], initial=math.inf))
-    return shortest
+    _, names = _written((*gaps, *rises))
+    ends = np.where(periods > 0.0, 0.0, end)
+    rows = np.column_stack([*(np.broadcast_to(values[name], periods.shape) for name in names), periods, ends])
+    different, which = np.unique(rows, axis=0, return_inverse=True)
+    found = np.array([_shortest(gaps, rises, *map(float, row)) for row in different])
+    return np.asarray(found[which.reshape(-1)])
+
+
+@lru_cache(maxsize=4096)
+def _shortest(gaps: tuple[sp.Expr, ...], rises: tuple[sp.Expr, ...], *row: float) -> float:
+    """The shortest time of one row: values of the parameters, the period and the end."""
+    written, _ = _written((*gaps, *rises))
+    *known, period, end = row
+    # of two periods, one whole stay of each kind at least
+    length, points = (2.0 * period, 2 * POINTS) if period else (end, PERIODS * POINTS)
+    times, pitch = np.linspace(0.0, length, points + 1, retstep=True)
+    with np.errstate(all="ignore"):
+        found = [np.broadcast_to(g, times.shape) for g in written(times, *known)]
+        passages, dips = (
+            [_passages(g, k >= len(gaps)) for k, g in enumerate(found)],
+            [_dips(g) for g in found[: len(gaps)]],
+        )
+    apart = np.concatenate([_apart(own) for own in (*passages, np.concatenate(passages, axis=1))])
+    stays = np.concatenate([apart[apart > RESOLVED], *dips])
+    return float(pitch * np.min(stays[stays * pitch > TOUCH * length], initial=math.inf))
 
 
 def _passages(values: np.ndarray, rises: bool) -> np.ndarray:

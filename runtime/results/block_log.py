@@ -24,7 +24,7 @@ from typing import Any, TypedDict, cast
 
 import numpy as np
 
-from synchain.codegen.driver.columns import Count, Point, Sum
+from synchain.codegen.driver.columns import COUNTS, Count, Point, Sum
 from synchain.models.inputs.regular_file import open_regular
 
 from ..cells.buffers import Buffers
@@ -312,9 +312,9 @@ def _unpacked(
     """The numbers of a block; None if there are not as many as its cells need, the most section
     points among them.
     """
-    if len(body) < cells * len(Count) * 8:
+    if len(body) < cells * COUNTS * 8:
         return None
-    counts = np.frombuffer(body, "<i8", cells * len(Count)).reshape(cells, len(Count)).astype(np.int64)
+    counts = np.frombuffer(body, "<i8", cells * COUNTS).reshape(cells, COUNTS).astype(np.int64)
     lengths = [int(count) for count in counts[:, Count.POINTS]]
     points = sum(lengths)
     sums_of_a_cell = len(Sum) + observed

@@ -13,6 +13,7 @@ import xarray as xr
 from synchain.codegen.driver.columns import Count, Point, Span, Sum
 from synchain.models.scenes.scene import Scene
 
+from ..cells.choice import method_names
 from ..cells.observed import Observed, Sections
 from ..support.status import Status
 from .certificate import VERDICTS, Certificate
@@ -76,6 +77,8 @@ MEANINGS = {
     "transversal_exponent": "largest transversal exponent of the synchronous state",
     "transversal_stderr": "standard error of the transversal exponent",
     "ended_early": "1 where the cell ended before its window did, certain to stay synchronous",
+    "methods": "integrators that the cell went through",
+    "method_steps": "accepted and rejected steps by each integrator",
     "verdict": "; ".join(f"{k} {words}" for k, words in enumerate(VERDICTS)),
 }
 
@@ -154,6 +157,10 @@ def variables(
     """
     for name in ("status", "steps", "rejected", "periods_skipped"):
         yield name, (), buffers.counts[:, COUNTS[name]].astype(np.int32)
+    if scene.integrator == "auto":
+        by_method = buffers.counts[:, Count.BY_METHOD : Count.BY_METHOD + len(method_names(scene))]
+        yield "methods", (), ((by_method > 0) @ _masks(scene)).astype(np.int32)
+        yield "method_steps", ("integrator",), by_method.astype(np.int32)
     states = States.of(scene)
     yield "end", STATE, states.table(buffers.end)
     yield END_TIME, (), buffers.sums[:, Sum.STOPPED_AT]
@@ -192,6 +199,19 @@ def _drive_phase(scene: Scene, spans: np.ndarray, time: np.ndarray) -> np.ndarra
     return np.asarray(np.mod(time / period, 1.0))
 
 
+def _masks(scene: Scene) -> np.ndarray:
+    """The bit of each integrator in `methods`."""
+    return 2 ** np.arange(len(method_names(scene)))
+
+
+def _attributes(scene: Scene, name: str) -> dict[str, object]:
+    """The attributes of a variable; `methods` is a set of flags (CF conventions 1.11, section 3.5)."""
+    flags: dict[str, object] = {}
+    if name == "methods":
+        flags = {"flag_masks": _masks(scene).astype(np.int32), "flag_meanings": " ".join(method_names(scene))}
+    return {"long_name": meaning(scene, name), **flags}
+
+
 def meaning(scene: Scene, name: str) -> str:
     """Return what a variable of a result holds, in words; those of an observable are its expression."""
     if name in scene.observe:
@@ -222,6 +242,7 @@ def _certified(scene: Scene, spans: np.ndarray, buffers: Buffers, certificate: C
 def coordinates(scene: Scene) -> dict[str, Any]:
     """Return the coordinates of a result: the axes, the components, the numbers of the nodes, and what sections keep."""
     coords: dict[str, Any] = {"component": list(scene.equations.components), "node": np.arange(1, scene.n + 1)}
+    coords |= {"integrator": list(method_names(scene))} if scene.integrator == "auto" else {}
     coords |= {f"{name}_kept": list(section.keep) for name, section in scene.sections.items() if section.keep}
     coords |= {f"{base}_link": list(columns) for base, columns in _of_links(scene).items()}
     return coords | {name: (dims, values) for name, dims, values in swept(scene)}
@@ -271,7 +292,7 @@ def labelled(
     for name, (dim, *more), values in swept(scene):
         coords[name] = ((dim, *more), values[: shape[dims.index(dim)]])
     made = {
-        name: ((*dims, *more), values.reshape((*shape, *values.shape[1:])), {"long_name": meaning(scene, name)})
+        name: ((*dims, *more), values.reshape((*shape, *values.shape[1:])), _attributes(scene, name))
         for name, more, values in found
     }
     coords |= {name: made.pop(name) for name in TIMES if name in made}

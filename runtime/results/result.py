@@ -83,6 +83,21 @@ class Result(Labelled):
         return "; ".join(parts)
 
     @property
+    def integrators(self) -> str:
+        """Which integrators how many cells went through, and with how many steps, in words."""
+        if "methods" not in self.data:
+            return str(self.scene.integrator)
+        names, sets = self.data.integrator.values, self.data.methods.values
+        steps = self.data.method_steps.values.reshape(sets.size, -1)
+        parts = []
+        for code, count in zip(*np.unique(sets, return_counts=True), strict=True):
+            ran = [k for k in range(len(names)) if int(code) >> k & 1]
+            mean = steps[sets.ravel() == code].mean(axis=0)
+            words = ", then ".join(f"{names[k]} ({mean[k]:.4g} steps)" for k in ran) or "no step"
+            parts.append(words if count == sets.size else f"{words} in {count} cell{'s' * (count > 1)}")
+        return "; ".join(parts)
+
+    @property
     def summary(self) -> tuple[tuple[str, str], ...]:
         """The scene, the cells and how they ended, the variables."""
         sizes = ", ".join(f"{name} {size}" for name, size in self.data.sizes.items())
@@ -90,6 +105,7 @@ class Result(Labelled):
         return (
             ("scene", str(self.data.attrs.get("title", repr(self.scene)))),
             ("cells", self.message if cells > 1 else self.message.removeprefix("1 cell: ")),
+            ("integrators", self.integrators),
             ("dimensions", sizes),
             ("variables", ", ".join(map(str, self.data.data_vars))),
         )
@@ -190,6 +206,9 @@ class Result(Labelled):
             for name, column in columns.items():
                 if name in data:
                     table[:, column] = data[name].values.reshape(cells)
+        if "method_steps" in data:
+            by_method = data.method_steps.values.reshape(cells, -1)
+            buffers.counts[:, Count.BY_METHOD : Count.BY_METHOD + by_method.shape[1]] = by_method
         for name, _, place in Observed(self.scene).columns():
             buffers.sums[:, place] = data[name].values.reshape(cells, -1)
         if self.scene.sections:

@@ -9,7 +9,7 @@ import numpy as np
 from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.keywords import warn
 
-from ..cells.rates import rates
+from ..cells.paces import Templates
 
 __all__ = ["warn_of_slow_motion"]
 
@@ -35,7 +35,9 @@ def warn_of_slow_motion(equations: Equations, states: np.ndarray, numbers: np.nd
     """
     if equations.forced:
         return
-    fastest = max(max(rates(equations, state, numbers)[:2]) for state in states)
+    count = len(states)
+    paces = Templates(equations).paces(states, np.tile(numbers, (count, 1)), np.zeros(count), np.ones(count), None)
+    fastest = float(max(paces.fastest.max(), paces.turning.max()))
     if 0.0 < fastest * averaged < TURN:
         warn(
             f"found an orbit that has neither turned nor settled in the average of {averaged:.3g} units of time, its fastest rate is "

@@ -25,6 +25,7 @@ class Status(IntEnum):
     INTERRUPTED = 5
     CHATTERING = 6
     STOPPED = 7
+    PAUSED = 8
 
     @property
     def message(self) -> str:
@@ -46,6 +47,7 @@ _MESSAGES = {
     Status.CHATTERING: "a contact changed between stick and slip hundreds of times while no time passed; "
     "check the friction law",
     Status.STOPPED: "met the stop condition of the scene before the end of the window",
+    Status.PAUSED: "waits for another integrator",
     Status.INTERRUPTED: "stopped by the user before the end; run again with resume",
 }
 

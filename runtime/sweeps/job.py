@@ -12,12 +12,36 @@ import importlib.metadata
 import io
 import math
 import pickle
+import threading
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 
-from synchain.codegen.driver.columns import Control
+from synchain.codegen.driver.cells import REPEATING
+from synchain.codegen.driver.columns import Control, Count, Sum
+from synchain.codegen.driver.names import (
+    ACCEPTED,
+    BOUND,
+    CHANGE,
+    CLOCK,
+    CYCLE,
+    DUE,
+    END,
+    LEFT,
+    LOOK,
+    LOOKS,
+    MEMORY,
+    PERIOD,
+    POWER,
+    REJECTED,
+    SAVED_AT,
+    START,
+    STEP,
+    STOP,
+    TIME,
+    UNTIL,
+)
 from synchain.codegen.integrators import Integrator
 from synchain.codegen.kernels.compile import Kernel, load
 from synchain.codegen.kernels.installation import InstallationError
@@ -28,9 +52,11 @@ from synchain.models.inputs.plugins import allow_code, allowed_code
 from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
-from ..cells.kernels import write_kernel
-from ..cells.plan import Plan, control_of
+from ..cells.choice import Ladder
+from ..cells.kernels import ladder_of, write_kernel
+from ..cells.plan import FIRST_STEP, Plan, control_of, tolerances
 from ..cells.reduce import Reduction
+from ..support.status import Status
 
 __all__ = ["Job", "JobSpec", "Problem", "RowsJob", "RowsSpec", "Start", "SweepJob", "SweepSpec", "versions"]
 
@@ -162,10 +188,11 @@ class SweepSpec:
 
 @dataclass(slots=True)
 class SweepJob:
-    """A kernel, ready to run any cells of a scene's sweep.
+    """The kernels of a scene, ready to run any cells of its sweep.
 
     `room` are section points of a cell to make room for at first; by default two a period, as far
-    as memory allows.  Cells with more are run again with what they need.
+    as memory allows.  Cells with more are run again with what they need.  `kernel` is that of the integrator with which
+    most cells begin; those of others are made when the first cell needs them.
     """
 
     spec: JobSpec
@@ -173,13 +200,21 @@ class SweepJob:
     reduction: Reduction
     room: int | None = None
     control: np.ndarray = field(init=False)
+    ladder: Ladder = field(init=False)
+    kernels: dict[str, Kernel] = field(init=False)
+    controls: dict[tuple[float, float], np.ndarray] = field(init=False, default_factory=dict)
+    lock: threading.Lock = field(init=False, default_factory=threading.Lock)
 
     def __post_init__(self) -> None:
-        self.control = control_of(self.reduction.planner, self.reduction.jumps, self.kernel.origin.method)
+        self.control = control_of(self.reduction.planner, self.reduction.jumps)
+        self.ladder = ladder_of(self.reduction)
+        self.kernels = {self.kernel.origin.integrator: self.kernel}
 
     def cancel(self) -> None:
         """End all cells that run in this process."""
-        self.control[Control.CANCEL] = 1.0
+        with self.lock:
+            for control in (self.control, *self.controls.values()):
+                control[Control.CANCEL] = 1.0
 
     def run(self, cells: np.ndarray, start: Start | None = None, near: np.ndarray | None = None) -> Buffers:
         """Run cells of the sweep.
@@ -198,20 +233,78 @@ class SweepJob:
         if start is not None:
             rows = replace(rows, start=np.where(start[1][:, None], start[0], rows.start))
         room = first_room(reduction.scene, len(cells) * (reduction.point_size + 1)) if self.room is None else self.room
-        buffers = self._drive(rows, room)
+        buffers = self._climb(rows, room)
         short = np.flatnonzero(buffers.point_counts > room)
         if len(short):
-            buffers.put(short, self._drive(rows.take(short), buffers.most_points))
+            buffers.put(short, self._climb(rows.take(short), buffers.most_points))
         buffers.points = np.ascontiguousarray(buffers.points[:, : buffers.most_points])
         return buffers
 
-    def _drive(self, rows: Plan, room: int) -> Buffers:
-        """Run rows with room for so many section points of each."""
-        observed = self.reduction.observed
-        buffers = self.reduction.empty(len(rows), room, observed.tallies)
-        _drive(self.kernel, rows, self.control, buffers)
-        buffers.sums = observed.summary(buffers.sums)
+    def _climb(self, rows: Plan, room: int) -> Buffers:
+        """Run rows with room for so many section points of each, each with the integrators that suit it."""
+        reduction, ladder = self.reduction, self.ladder
+        buffers = reduction.empty(len(rows), room, reduction.observed.tallies)
+        method = ladder.first(rows)
+        rows = replace(rows, spans=ladder.steps(rows, method))
+        if len(ladder.methods) > 1:
+            buffers.lanes = np.zeros((len(rows), lane_size(reduction.equations)))
+        went = np.zeros(len(rows))  # steps and time at the last pause
+        begun = np.zeros(len(rows))
+        cells = np.arange(len(rows))
+        while len(cells):
+            before = buffers.steps[cells]
+            for k in np.unique(method[cells]):
+                self._drive(int(k), cells[method[cells] == k], rows, buffers)
+            taken = buffers.steps[cells] - before
+            buffers.counts[cells, Count.BY_METHOD + ladder.columns[method[cells]]] += taken
+            cells = cells[np.isin(buffers.status[cells], (Status.PAUSED, Status.STEP_UNDERFLOW))]
+            if self.control[Control.CANCEL] != 0.0:
+                buffers.counts[cells, Count.STATUS] = Status.INTERRUPTED
+                break
+            if len(ladder.methods) == 1 or not len(cells):
+                break
+            time, steps = buffers.sums[cells, Sum.STOPPED_AT], buffers.steps[cells]
+            lengths = (time - begun[cells]) / np.maximum(steps - went[cells], 1.0)
+            begun[cells], went[cells] = time, steps
+            following = ladder.further(rows.take(cells), buffers.take(cells), method[cells], lengths)
+            cells, lengths, following = (own[following >= 0] for own in (cells, lengths, following))
+            buffers.counts[cells, Count.STATUS] = Status.PAUSED
+            handed = following != method[cells]
+            hand_over(buffers.lanes, cells[handed], lengths[handed], ladder, following[handed])
+            method[cells] = following
+        buffers.sums = reduction.observed.summary(buffers.sums)
+        buffers.lanes = np.empty((0, 0))
         return buffers
+
+    def _drive(self, method: int, cells: np.ndarray, rows: Plan, buffers: Buffers) -> None:
+        """Run some cells by one method, those of the same tolerances at once."""
+        kernel = self._kernel(self.ladder.methods[method])
+        rtol, atol = tolerances(self.reduction.scene, self.reduction.equations, rows.numbers[cells])
+        pairs, which = np.unique(np.stack([rtol, atol], axis=1), axis=0, return_inverse=True)
+        for k, (own_rtol, own_atol) in enumerate(pairs):
+            own, control = cells[which.reshape(-1) == k], self._control(float(own_rtol), float(own_atol))
+            if len(own) == len(rows):
+                _drive(kernel, rows, control, buffers)
+            else:
+                part = buffers.take(own)
+                _drive(kernel, rows.take(own), control, part)
+                buffers.put(own, part)
+
+    def _control(self, rtol: float, atol: float) -> np.ndarray:
+        """The control array for some tolerances, which `cancel` reaches."""
+        with self.lock:
+            if (rtol, atol) not in self.controls:
+                control = self.controls[rtol, atol] = self.control.copy()
+                control[Control.RTOL], control[Control.ATOL] = rtol, atol
+            return self.controls[rtol, atol]
+
+    def _kernel(self, method: Integrator) -> Kernel:
+        """The kernel of a method; lanes do not change results, so that all but a single cell take what suits it."""
+        with self.lock:
+            if method.name not in self.kernels:
+                width = 1 if self.spec.width == 1 else None
+                self.kernels[method.name] = load(write_kernel(self.reduction, width, method))
+            return self.kernels[method.name]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -267,6 +360,29 @@ class RowsJob:
 def _drive(kernel: Kernel, rows: Plan, control: np.ndarray, buffers: Buffers) -> None:
     """Run all rows into the buffers."""
     kernel.drive(0, len(rows), rows.start, rows.numbers, rows.spans, control, *buffers.arrays())
+
+
+def lane_size(equations: Equations) -> int:
+    """Return how many numbers the lane of a cell holds: clock, state, parameters, and a saved state with what repeats."""
+    return CLOCK + 2 * equations.dimension + len(equations.parameters) + len(REPEATING)
+
+
+def hand_over(lanes: np.ndarray, cells: np.ndarray, length: np.ndarray, ladder: Ladder, method: np.ndarray) -> None:
+    """Let lanes go on by another method from the state that they have reached.
+
+    The new method begins with the mean length of the last steps, and stops at the ends of all periods unless it is a
+    series.  What the old one found to repeat itself need not repeat itself now.
+    """
+    lane = lanes[cells]
+    time, until = lane[:, TIME], lane[:, UNTIL]
+    first = np.where(length > 0.0, length, FIRST_STEP * np.minimum(1.0, until))
+    lane[:, STEP], lane[:, MEMORY], lane[:, CHANGE] = first, 0.0, np.inf
+    lane[:, CYCLE], lane[:, POWER], lane[:, DUE], lane[:, BOUND] = 0.0, 1.0, 0.0, lane[:, PERIOD]
+    lane[:, SAVED_AT] = -np.inf
+    lane[:, LEFT] = np.where(lane[:, LEFT] > 0.0, -1.0, lane[:, LEFT])
+    lane[:, STOP] = np.minimum(np.where(time < lane[:, START], lane[:, START], lane[:, END]), lane[:, BOUND])
+    lane[:, LOOK] = np.where(method < len(ladder.methods) - 1, LOOKS * (lane[:, ACCEPTED] + lane[:, REJECTED]), np.inf)
+    lanes[cells] = lane
 
 
 def versions() -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..cells.buffers import Buffers
-from ..cells.choice import warn_of_stiffness
+from ..cells.choice import warn_of_steps
 from ..cells.layout import Layout
 from ..cells.observed import Sections
 from ..results.result import Result, gather
@@ -95,10 +95,11 @@ class Memory:
             reporter.close()
 
     def warn(self) -> None:
-        """Warn of cells whose equations are stiff for the kernel that ran them."""
-        source, reduction = self.prepared.job.kernel.origin, self.prepared.reduction
-        if not (source.method.implicit or source.driver.contacts):
-            warn_of_stiffness(source, self.buffers, lambda cells: reduction.rows(reduction.planner.rows(cells)))
+        """Warn of cells that came to no end, and of steps that were short."""
+        reduction = self.prepared.reduction
+        warn_of_steps(
+            self.prepared.job.ladder, self.buffers, lambda cells: reduction.rows(reduction.planner.rows(cells))
+        )
 
     def result(self) -> Result:
         """Return the cells so far."""

@@ -151,7 +151,7 @@ def universal_probe(
     rows = _rows(planner, equations.parameters, real.reshape(-1), imaginary.reshape(-1), criterion)
     strongest = criterion.starts * np.atleast_1d(np.hypot(real, imaginary).argmax())
     method = chosen_for_rows(ring, equations, rows.take(strongest))
-    problem = RowsSpec(equations, method, control_of(planner, True, method))
+    problem = RowsSpec(equations, method, control_of(planner, True))
     with Trials(ring, problem, problem.source(), execution) as trials:
         error, status = trials.run(len(rows), rows.take)
     shape = (*real.shape, criterion.starts)

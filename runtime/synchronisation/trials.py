@@ -66,7 +66,7 @@ class Trials:
     def of(cls, reduction: Reduction, execution: Execution) -> Trials:
         """Return trials of what is left of a scene; its cells stand for those of all rounds."""
         source = write_kernel(reduction)
-        control = control_of(reduction.planner, reduction.jumps, source.method)
+        control = control_of(reduction.planner, reduction.jumps)
         problem = RowsSpec(reduction.equations, source.method, control, reduction.multiplicity, reduction.records)
         return cls(reduction.scene, problem, source, execution, reduction.expand)
 

@@ -14,10 +14,9 @@ from synchain.codegen.kernels.compile import Kernel
 from synchain.codegen.kernels.sweep import emit
 
 from ...cells.buffers import Buffers
-from ...cells.choice import chosen_integrator
 from ...cells.initial_modes import with_modes
-from ...cells.kernels import kernel
-from ...cells.plan import control_array, longest_step
+from ...cells.kernels import chosen_integrator, kernel
+from ...cells.plan import FIRST_STEP, control_array, longest_steps
 from ...cells.reduce import as_reduction
 from .cases import Case
 from .clock import Point, best_time, timed_periods
@@ -52,20 +51,23 @@ def prepare(case: Case, integrator: str, width: int | None, readings: int = 0) -
     record = ("trajectory",) if readings else ()
     chosen = case.scene.replace(integrator=integrator, record=record, samples=readings)
     made: dict[tuple[float, float], Kernel] = {}
-    longest = longest_step(case.scene)
     one = np.array([case.scene.parameters[name] for name in case.scene.equations.parameters])
+    longest = float(longest_steps(case.scene.equations, one[None], np.full(1, case.periods * case.period))[0])
     (y0,) = with_modes(case.scene.equations, np.array([case.scene.y0]), one[None])
 
     def solve(rtol: float, atol: float, ends: np.ndarray) -> Ends:
         cells = len(ends)
         spans = np.ascontiguousarray(
-            np.stack([np.zeros(cells), ends, np.full(cells, case.period), np.zeros(cells)], axis=1)
+            np.stack(
+                [np.zeros(cells), ends, *(np.full(cells, e) for e in (case.period, 0.0, FIRST_STEP, longest, np.inf))],
+                axis=1,
+            )
         )
         if (rtol, atol) not in made:  # the order of a Taylor step follows the tolerance
             lanes = full_width(case, integrator, rtol, atol) if width is None else width
             made[rtol, atol] = kernel(chosen.replace(rtol=rtol, atol=atol), lanes, reduce=False)
         compiled = made[rtol, atol]
-        control = control_array(rtol, atol, longest, 1e12, jumps=False)
+        control = control_array(rtol, atol, np.inf, 1e12, jumps=False)
         buffers = Buffers.empty(cells, len(y0), room=0, samples=readings)
         compiled.drive(0, cells, np.tile(y0, (cells, 1)), np.tile(one, (cells, 1)), spans, control, *buffers.arrays())
         if not np.isfinite(buffers.end).all():

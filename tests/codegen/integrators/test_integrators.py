@@ -319,18 +319,9 @@ def test_wrong_integrators_are_refused():
         Integrator(**{**fields, "kind": "rosenbrock"})
     with pytest.raises(
         ValueError,
-        match="unknown integrator 'euler'; known: cash_karp, dop853, rodas4, rodas5p, rodas6p, ros34pw2, switching, taylor",
+        match="unknown integrator 'euler'; known: cash_karp, dop853, rodas4, rodas5p, rodas6p, ros34pw2, taylor",
     ):
         integrators.integrator("euler")
-
-
-def test_a_switching_integrator_is_the_two_it_names():
-    m = integrators.integrator("switching")
-    stiff, smooth = integrators.integrator("rodas5p"), integrators.integrator("dop853")
-    assert m.smooth == smooth
-    assert (m.a, m.b, m.c, m.e, m.gamma, m.order) == (stiff.a, stiff.b, stiff.c, stiff.e, stiff.gamma, stiff.order)
-    assert stiff.source in m.source
-    assert smooth.source in m.source
 
 
 def test_scenes_know_the_integrators_that_there_are():

@@ -165,16 +165,15 @@ def numbers_of(eq: Equations, method: str, looped: bool) -> list[float]:
     made = program(eq)
     y, graph = [0.3, 0.1, -0.2, 0.5], (made.arrays, made.weights) if looped else ()
     found: list[float] = []
-    for name in ("step", "step_smooth") if kernel.source.driver.switching else ("step",):
-        step = take_step(kernel, 0.3, 0.2, y, VALUES, 0.0, 1.0, *graph, name=name)
-        dense = [0.0 if d is None else d for d in step.dense]
-        found += [*step.y_new, *dense, step.error, step.bound or 0.0]
-        found.append(kernel.section(0.3, 0.3, 0.2, VALUES, replace(step, dense=dense)))
+    step = take_step(kernel, 0.3, 0.2, y, VALUES, 0.0, 1.0, *graph)
+    dense = [0.0 if d is None else d for d in step.dense]
+    found += [*step.y_new, *dense, step.error]
+    found.append(kernel.section(0.3, 0.3, 0.2, VALUES, replace(step, dense=dense)))
     return found
 
 
-TEXTS = (("rodas6p", True), ("ros34pw2", False), ("switching", False), ("switching", True))
-"""Methods, in loops or not: that of most stages, and both kinds in one text; Taylor steps have a test of their own."""
+TEXTS = (("rodas6p", True), ("ros34pw2", False), ("dop853", False), ("dop853", True))
+"""Methods, in loops or not: that of most stages, and both kinds; Taylor steps have a test of their own."""
 
 
 @functools.cache

@@ -40,7 +40,6 @@ def test_golden_kernels(golden):
 DRIVERS = {
     "contacts": Driver(KernelKind.SWEEP, 8, contacts=True),
     "looped": Driver(KernelKind.SWEEP, 8, looped=True),
-    "switching": Driver(KernelKind.SWEEP, 8, switching=True),
     "series": Driver(KernelKind.SWEEP, 8, series=True),
     "modes": Driver(KernelKind.MODES, 8, contacts=True),
     "modes_series": Driver(KernelKind.MODES, 8, contacts=True, series=True),
@@ -76,10 +75,9 @@ def test_scenes_of_the_same_kind_share_a_driver():
         emit(friction_chain(1), "rodas5p", (), width=4).driver,
         emit(friction_chain(1), "rodas5p", ("section",), V_1, width=8).driver,
         emit(friction_chain(2), "rodas5p", ("section",), V_1, width=4, unroll=0).driver,
-        emit(friction_chain(1), "switching", ("section",), V_1, width=4).driver,
     }
     assert few.recorders == other.recorders == (Recorder("cut", 4, False),)
-    assert len({driver.text for driver in ways}) == 4
+    assert len({driver.text for driver in ways}) == 3
 
 
 def written() -> str:
@@ -153,7 +151,7 @@ def test_unknown_names_are_refused():
         emit(friction_chain(1), "rodas5p", ("sync",))
     with pytest.raises(
         ValueError,
-        match=r"unknown integrator 'rk4'; known: cash_karp, dop853, rodas4, rodas5p, rodas6p, ros34pw2, switching",
+        match=r"unknown integrator 'rk4'; known: cash_karp, dop853, rodas4, rodas5p, rodas6p, ros34pw2, taylor",
     ):
         emit(friction_chain(1), "rk4")
 

@@ -9,6 +9,7 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
+from synchain.codegen.driver.columns import Span
 from synchain.models.definitions.inline import Field
 from synchain.models.graphs.families import topology
 from synchain.models.inputs.plugins import allow_code
@@ -16,13 +17,19 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.bifurcation.branches import follow
 from synchain.runtime.bifurcation.periodic import periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton
-from synchain.runtime.cells.plan import by_node, half_swing, longest_step, plan
+from synchain.runtime.cells.plan import by_node, half_swing, plan
 from synchain.runtime.stability.clusters import cluster_exponents
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum
 from synchain.runtime.stability.msf import msf, plane
 from synchain.runtime.sweeps.certify import check_certifiable
 from synchain.runtime.sweeps.run import run
+
+
+def longest_step(scene: Scene) -> float:
+    """The longest step of the cell that has the shortest one."""
+    return float(plan(scene).spans[:, Span.LONGEST].min())
+
 
 PAIR, ALONE = topology("chain", 2), topology("chain", 1)
 PERIOD = 2 * np.pi / 1.2
@@ -157,12 +164,14 @@ def test_no_step_is_longer_than_a_drive_stays_between_jumps_kinks_or_rises(drive
     assert longest_step(driven) == pytest.approx(longest, rel=1e-3)
 
 
-def test_every_value_of_an_axis_is_looked_at_for_short_pulses() -> None:
-    """The pulse is shortest inside of the axis: at its end there is none."""
+def test_each_cell_has_the_longest_step_of_its_own_pulses() -> None:
     node = Field({"x": "1 if sin(w*t) > level else 0"}, parameters={"w": 2.0, "level": 0.0})
-    swept = Scene(node, None, ALONE, axes={"level": [0.0, 1.1]}, transient=0.0, window=1.0)
-    assert longest_step(swept) == pytest.approx(0.5 * np.sqrt(np.pi))
-    assert longest_step(swept.replace(axes={"level": [0.0, 0.99, 1.1]})) == pytest.approx(np.arccos(0.99), rel=1e-3)
+    swept = Scene(node, None, ALONE, axes={"level": [0.0, 0.99, 1.1]}, transient=0.0, window=1.0)
+    shortest = [0.5 * np.pi, np.arccos(0.99), 0.5 * np.sqrt(np.pi)]
+    found = plan(swept).spans[:, Span.LONGEST]
+    np.testing.assert_allclose(found[1], shortest[1], rtol=1e-3)
+    for k, level in enumerate([0.0, 0.99, 1.1]):
+        assert found[k] == longest_step(swept.replace(axes={}, parameters={"level": level}))
 
 
 def test_short_pulses_of_unequal_nodes_are_seen_by_sweeps_and_modes() -> None:

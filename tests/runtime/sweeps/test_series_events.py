@@ -10,7 +10,7 @@ from synchain.codegen.kernels.compile import load
 from synchain.codegen.kernels.sweep import emit
 from synchain.models import chain
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.cells.choice import chosen_integrator
+from synchain.runtime.cells.kernels import chosen_integrator
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.sweeps.run import run
 

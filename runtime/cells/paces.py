@@ -1,0 +1,309 @@
+"""How fast motions decay, grow, turn and go on: from exact slopes of the first nodes of a network, in all cells at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+import sympy as sp
+
+from synchain.codegen.steps.mass import turned_masses
+from synchain.models.dynamics.equations import Equations, Layer
+from synchain.models.graphs.links import AllPairs, Link
+from synchain.models.inputs.names import NodeName
+from synchain.models.mechanics.components import TIME, Block, Edge, Node
+
+from .rates import eigenvalue_rates, turns
+
+__all__ = ["Paces", "Templates"]
+
+NODES, LINKS = 50, 5000
+"""Nodes of a large network whose slopes are computed, and links of one layer."""
+
+SHIFT = 1e-6
+"""A motion is followed for this part of its shortest time, to see how its rates change."""
+
+NOISE = 10.0
+"""Rates, and their changes, below those of this many tolerances of the state are errors of steps."""
+
+BLOCK = 4096
+"""Cells that are computed at once."""
+
+Column = int | np.ndarray
+
+
+class Paces(NamedTuple):
+    """Rates per unit of time in each cell (cells,).
+
+    `fastest` is that of decay or growth, `turning` that of rotation, `growth` that of growth alone, and `parted` that of
+    decay far faster than the slowest motion of a node, all eigenvalues;
+    `going` is how fast the rates of the motion itself change, 0 at rest.  `size` bounds the eigenvalues.  `fastest` is
+    inf where a rate is finite and its slope is not.
+    """
+
+    fastest: np.ndarray
+    turning: np.ndarray
+    growth: np.ndarray
+    parted: np.ndarray
+    going: np.ndarray
+    size: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """The nodes of one kind, or the links of one template, as functions of arrays.
+
+    Parameters
+    ----------
+    rates, slopes : callable
+        Rates, and the entries of their derivatives by the node's own states, row by row.
+    own, source : ndarray of int, shape (count, p)
+        Places of the states of each node or of each link's target; those of its source, None for nodes.
+    targets : ndarray of int, shape (count,)
+    columns : tuple of int or ndarray of int, shape (count,)
+        Columns of the parameters among the numbers of a cell.
+    weights : ndarray, shape (count,), optional
+        Weights of links.
+    share : float
+        Links that each of these stands for.
+    turned : tuple of (int, callable)
+        A state and the value of it at which a smoothed jump has its middle.
+    """
+
+    rates: Callable[..., list[float | np.ndarray]]
+    slopes: Callable[..., list[float | np.ndarray]]
+    own: np.ndarray
+    source: np.ndarray | None
+    targets: np.ndarray
+    columns: tuple[Column, ...]
+    weights: np.ndarray | None = None
+    share: float = 1.0
+    turned: tuple[tuple[int, Callable[..., list[float | np.ndarray]]], ...] = ()
+
+    def arguments(self, state: np.ndarray, numbers: np.ndarray, time: np.ndarray) -> list[np.ndarray]:
+        """States, weights, parameters and the time, each (cells, count) or (cells, 1)."""
+        places = (self.own,) if self.source is None else (self.own, self.source)
+        found = [state[:, column] for own in places for column in own.T]
+        found += [] if self.weights is None else [self.weights]
+        found += [numbers[:, [c] if isinstance(c, int) else c] for c in self.columns]
+        return [*found, time[:, None]]
+
+    def values(self, function: Callable[..., list[float | np.ndarray]], arguments: list[np.ndarray]) -> np.ndarray:
+        """What a function gives, (cells, count, entries)."""
+        shape = len(arguments[0]), len(self.own)
+        with np.errstate(all="ignore"):
+            found = [np.broadcast_to(np.asarray(e, dtype=float), shape) for e in function(*arguments)]
+            return self.share * np.stack(found, axis=-1)
+
+
+class Templates:
+    """Rates and slopes of the first nodes of a network."""
+
+    def __init__(self, equations: Equations) -> None:
+        self.dimension = equations.dimension
+        self.nodes = min(equations.n, NODES)
+        self.size = max(len(node.state) for node in equations.nodes)
+        slots = {name: k for k, name in enumerate(equations.parameters)}
+        self.parts = (*_node_parts(equations, slots), *_link_parts(equations, slots))
+        self.masses = tuple(_mass_parts(equations, slots))
+
+    def paces(
+        self, state: np.ndarray, numbers: np.ndarray, time: np.ndarray, shortest: np.ndarray, noise: np.ndarray | None
+    ) -> Paces:
+        """Return how fast the cells of some rows move.
+
+        Parameters
+        ----------
+        state : ndarray, shape (cells, dimension)
+        numbers : ndarray, shape (cells, parameters)
+        time : ndarray, shape (cells,)
+        shortest : ndarray, shape (cells,)
+            No cell is followed for longer than a small part of this time.
+        noise : ndarray, shape (cells, dimension), optional
+            Errors that the states may have; None at the start, where they have none.
+        """
+        if len(state) > BLOCK:
+            each = [
+                self.paces(state[k], numbers[k], time[k], shortest[k], None if noise is None else noise[k])
+                for k in (slice(i, i + BLOCK) for i in range(0, len(state), BLOCK))
+            ]
+            return Paces(*map(np.concatenate, zip(*each, strict=True)))
+        rates, blocks = self._rates(state, numbers, time), self.blocks(state, numbers, time)
+        with np.errstate(all="ignore"):
+            size = np.sqrt((blocks**2).sum(axis=(2, 3))).max(axis=1)
+            size = np.where(np.isnan(size), np.inf, size)
+            size = np.where((size == np.inf) & ~np.isfinite(rates).all(axis=1), 0.0, size)  # there are no rates
+            step = SHIFT * np.minimum(1.0 / np.maximum(size, 1e-300), shortest)
+            ahead = self._rates(state + step[:, None] * rates, numbers, time + step)
+            scale = np.maximum(np.abs(state), np.finfo(float).tiny) if noise is None else noise
+            speed = np.nan_to_num(np.abs(rates) / scale, nan=0.0).max(axis=1)
+            turn = np.nan_to_num(np.abs(ahead - rates) / scale, nan=0.0).max(axis=1) / step
+            if noise is not None:
+                turn = np.where(speed > NOISE * size, np.maximum(turn - NOISE * size**2, 0.0), 0.0)
+            going = np.where(speed > 0.0, turn / speed, 0.0)
+        return Paces(*eigenvalue_rates(blocks), going, size)
+
+    def layers(self, state: np.ndarray, numbers: np.ndarray) -> Iterator[np.ndarray]:
+        """Yield the blocks (cells, count, p, p) of nodes and links in the middle of each smoothed jump, and close by."""
+        for part in self.parts:
+            for k, middle in part.turned:
+                own = part.arguments(state, numbers, np.zeros(len(state)))
+                (place,) = np.moveaxis(part.values(middle, own), -1, 0) / part.share
+                for shift in (-1e-9, 0.0, 1e-9):
+                    own[k] = place + shift * (1.0 + np.abs(place))
+                    yield (1.0 if part.source is None else 2.0) * part.values(part.slopes, own).reshape(
+                        *place.shape, part.own.shape[1], -1
+                    )
+
+    def _rates(self, state: np.ndarray, numbers: np.ndarray, time: np.ndarray) -> np.ndarray:
+        """The rates (cells, dimension), zero beyond the first nodes."""
+        rates = np.zeros((len(state), self.dimension))
+        for part in self.parts:
+            np.add.at(rates, (slice(None), part.own), part.values(part.rates, part.arguments(state, numbers, time)))
+        for part, inverse in self._inverse_masses(state, numbers, time):
+            rates[:, part.own] = np.einsum("cnij,cnj->cni", inverse, rates[:, part.own])
+        return rates
+
+    def blocks(self, state: np.ndarray, numbers: np.ndarray, time: np.ndarray) -> np.ndarray:
+        """Return the nodes' own blocks (cells, nodes, p, p) of the Jacobian, with twice what links add: a bound for springs."""
+        blocks = np.zeros((len(state), self.nodes, self.size, self.size))
+        for part in self.parts:
+            size = part.own.shape[1]
+            found = part.values(part.slopes, part.arguments(state, numbers, time))
+            with np.errstate(all="ignore"):
+                found = (1.0 if part.source is None else 2.0) * found.reshape(len(state), -1, size, size)
+                np.add.at(blocks[:, :, :size, :size], (slice(None), part.targets), found)
+        rates = self._rates(state, numbers, time) if self.masses else np.empty(0)
+        for part, inverse in self._inverse_masses(state, numbers, time):
+            size = part.own.shape[1]
+            with np.errstate(all="ignore"):  # F = M^-1 r: M dF/dy = dr/dy - d(M F)/dy at fixed F
+                fixed = [*part.arguments(state, numbers, time), *np.moveaxis(rates[:, part.own], -1, 0)]
+                turned = part.values(part.slopes, fixed).reshape(len(state), -1, size, size)
+                own = blocks[:, part.targets, :size, :size] - turned
+                blocks[:, part.targets, :size, :size] = inverse @ own
+        return blocks
+
+    def _inverse_masses(
+        self, state: np.ndarray, numbers: np.ndarray, time: np.ndarray
+    ) -> Iterator[tuple[Part, np.ndarray]]:
+        """The inverse mass matrices (cells, count, p, p) of nodes that have one; NaN where it is singular."""
+        for part in self.masses:
+            size = part.own.shape[1]
+            masses = part.values(part.rates, part.arguments(state, numbers, time)).reshape(len(state), -1, size, size)
+            singular = ~np.isfinite(masses).all(axis=(2, 3)) | (np.linalg.det(np.nan_to_num(masses)) == 0.0)
+            masses[singular] = np.eye(size)
+            inverse = np.linalg.inv(masses)
+            inverse[singular] = np.nan
+            yield part, inverse
+
+
+def _node_parts(equations: Equations, slots: dict[str, int]) -> Iterator[Part]:
+    """The first nodes, kind by kind."""
+    for kind, node in enumerate(equations.nodes):
+        nodes = [i for i, k in enumerate(equations.kind_of[:NODES]) if k == kind]
+        if nodes:
+            yield _node_part(equations, slots, node, nodes, node.rhs, node.jacobian())
+
+
+def _mass_parts(equations: Equations, slots: dict[str, int]) -> Iterator[Part]:
+    """The mass matrices of the first nodes that have one."""
+    for kind, node in enumerate(equations.nodes):
+        nodes = [i for i, k in enumerate(equations.kind_of[:NODES]) if k == kind]
+        if nodes and node.inertia:
+            rates = tuple(sp.Dummy(s.name, real=True) for s in node.state)
+            turned = _function((*node.state, *node.parameters, TIME, *rates), _flat(turned_masses(node, list(rates))))
+            yield replace(_node_part(equations, slots, node, nodes, _flat(node.inertia), ()), slopes=turned)
+
+
+def _node_part(
+    equations: Equations, slots: dict[str, int], node: Node, nodes: list[int], rates: tuple[sp.Expr, ...], block: Block
+) -> Part:
+    symbols = (*node.state, *node.parameters, TIME)
+    return Part(
+        _function(symbols, rates),
+        _function(symbols, _flat(block)),
+        np.array([equations.places[i] for i in nodes]),
+        None,
+        np.array(nodes),
+        tuple(_of_nodes(equations, slots, s.name, nodes) for s in node.parameters),
+        turned=_turned(symbols, rates, node.state) if block else (),
+    )
+
+
+def _link_parts(equations: Equations, slots: dict[str, int]) -> Iterator[Part]:
+    """The links that the first nodes feel, template by template."""
+    for layer in equations.layers:
+        links, share = _links(layer)
+        for ends, edge in layer.edge_of:
+            own = [link for link in links if equations.ends(link) == ends]
+            if own:
+                yield _link_part(equations, slots, layer, edge, own, share)
+
+
+def _links(layer: Layer) -> tuple[list[Link], float]:
+    """Links to the first nodes, LINKS at most, and how many each stands for."""
+    pairs = layer.links
+    if isinstance(pairs, AllPairs):
+        count = min(pairs.n, NODES)
+        each = min(pairs.n - 1, LINKS // count)
+        gaps = [1 + k * (pairs.n - 1) // each for k in range(each)]
+        return [(i, (i + gap) % pairs.n, pairs.weight) for i in range(count) for gap in gaps], (pairs.n - 1) / max(
+            each, 1
+        )
+    return [link for link in pairs if link[0] < NODES][:LINKS], 1.0
+
+
+def _link_part(
+    equations: Equations, slots: dict[str, int], layer: Layer, edge: Edge, links: list[Link], share: float
+) -> Part:
+    targets, sources = [i for i, _, _ in links], [j for _, j, _ in links]
+    columns: list[Column] = []
+    for s in edge.parameters:
+        if s.name in layer.varied:
+            columns.append(np.array([slots[layer.name(s.name, link)] for link in links]))
+        else:
+            columns.append(_of_nodes(equations, slots, s.name, targets))
+    columns += [_of_nodes(equations, slots, of.name, sources) for _, of in edge.theirs]
+    symbols = (*edge.here, *edge.there, edge.weight, *edge.parameters, *(s for s, _ in edge.theirs), TIME)
+    return Part(
+        _function(symbols, edge.rhs),
+        _function(symbols, _flat(edge.jacobian_here())),
+        np.array([equations.places[i] for i in targets]),
+        np.array([equations.places[j] for j in sources]),
+        np.array(targets),
+        tuple(columns),
+        np.array([[float(weight) for _, _, weight in links]]),
+        share,
+        _turned(symbols, edge.rhs, edge.here),
+    )
+
+
+def _flat(block: Block) -> tuple[sp.Expr, ...]:
+    """The entries of a block, row by row."""
+    return tuple(e for row in block for e in row)
+
+
+def _of_nodes(equations: Equations, slots: dict[str, int], name: str, nodes: list[int]) -> Column:
+    """The column of a parameter, or that of each of some nodes."""
+    if name not in equations.varied:
+        return slots[name]
+    return np.array([slots[str(NodeName(name, i))] for i in nodes])
+
+
+def _turned(
+    symbols: tuple[sp.Symbol, ...], rates: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...]
+) -> tuple[tuple[int, Callable[..., list[float | np.ndarray]]], ...]:
+    """Where among the arguments the state of each smoothed jump stands, and its value in the middle."""
+    return tuple((symbols.index(state), _function(symbols, (place,))) for state, place in turns(rates, states))
+
+
+@lru_cache(maxsize=256)
+def _function(symbols: tuple[sp.Symbol, ...], entries: tuple[sp.Expr, ...]) -> Callable[..., list[float | np.ndarray]]:
+    """Expressions as a function of arrays, common parts of which are computed once."""
+    function: Callable[..., list[float | np.ndarray]] = sp.lambdify(
+        symbols, list(entries), ["scipy", "numpy"], cse=True
+    )
+    return function
