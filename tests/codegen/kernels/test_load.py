@@ -6,6 +6,7 @@ import dataclasses
 import errno
 import gc
 import importlib.util
+import inspect
 import json
 import math
 import mmap
@@ -32,7 +33,7 @@ from synchain.codegen.kernels import compile as loading
 from synchain.codegen.kernels.driver import Driver, KernelKind
 from synchain.codegen.kernels.modes import emit_modes
 from synchain.codegen.kernels.sweep import emit
-from synchain.codegen.simd import lanes
+from synchain.codegen.simd import decorator, front_end, lanes, syntax
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import network_variation
 from synchain.models.mechanics.components import Node
@@ -42,9 +43,7 @@ x, v = real("x", "v")
 SWING = Equations.of_equal_nodes(Node((x, v), (v, -x), ()), None, 1)
 REAL = emit(SWING, "cash_karp", (), width=1)
 TINY = """
-from numba import njit
-
-from synchain.codegen.simd import broadcast
+from synchain.codegen.simd import broadcast, njit
 
 
 @njit(error_model="numpy", cache=True)
@@ -54,9 +53,7 @@ def step(t, h, y, p, y_new, dense, rtol, atol):
     return broadcast(0.0, 1)
 """
 TINY_DRIVER = """
-from numba import njit
-
-from synchain.codegen.simd import address, broadcast
+from synchain.codegen.simd import address, broadcast, njit
 
 
 @njit(error_model="numpy", nogil=True, cache=True)
@@ -344,31 +341,32 @@ def test_digests_are_stable_and_tell_kernels_apart():
 def test_the_file_name_follows_everything_that_shapes_machine_code(monkeypatch):
     names = {loading._fingerprint(SOURCE.code)}
     import llvmlite.binding as llvm
-    import numba
-
-    from synchain.codegen.driver import dimensions
-    from synchain.codegen.simd import addresses, elementary, lanes
 
     def changed(*change) -> None:
         with monkeypatch.context() as m:
             m.setattr(*change)
-            loading._surroundings.cache_clear()
+            loading._sources.cache_clear()
             names.add(loading._fingerprint(SOURCE.code))
-        loading._surroundings.cache_clear()
+        loading._sources.cache_clear()
 
     changed(numba, "__version__", "9.9")
     changed(sys, "version", "4.0")
     changed(llvm, "get_host_cpu_name", lambda: "abacus")
     changed(llvm, "get_host_cpu_features", lambda: {"beads": True})
-    changed(lanes, "__file__", __file__)
-    changed(elementary, "__file__", __file__)
-    changed(addresses, "__file__", __file__)
-    changed(dimensions, "__file__", __file__)
     changed(loading.importlib.metadata, "version", lambda name: "9.9")
     changed(loading.platform, "machine", lambda: "sun dial")
+    for name in loading.FLAGS:
+        changed(numba.config, name, "another")
+    for k in range(len(loading.SOURCES)):
+        changed(loading, "SOURCES", [*loading.SOURCES[:k], Path(__file__), *loading.SOURCES[k + 1 :]])
+    monkeypatch.setenv("SYNCHAIN_FRONT_END", "numba")
+    names.add(loading._fingerprint(SOURCE.code))
+    monkeypatch.delenv("SYNCHAIN_FRONT_END")
     names.add(loading._fingerprint(SOURCE.code + "\n"))
-    assert len(names) == 12
+    assert len(names) == 9 + len(loading.FLAGS) + len(loading.SOURCES)
     assert loading._fingerprint(SOURCE.code) in names
+    sources = {path.name for path in loading.SOURCES}
+    assert {"front_end.py", "syntax.py", "writing.py", "lanes.py", "dimensions.py", "functions.py"} <= sources
 
 
 # -- kernels that nobody holds, and drivers ahead of time ------------------------------------------------------
@@ -444,6 +442,61 @@ def test_the_common_drivers_compile(folder, capsys):
         assert main(["cache", "warm"]) == 0
         assert [line.startswith(word) for line in capsys.readouterr().out.splitlines()] == [True] * 21
     assert cache.describe()["drivers"] == 21
+
+
+# -- the front end and forks ----------------------------------------------------------------------------------
+
+
+def test_a_fault_of_the_front_end_is_one_warning(folder, monkeypatch):
+    def fail(*given):
+        raise AttributeError("renamed in the next version")
+
+    monkeypatch.setattr(decorator, "front_end_problems", [])
+    monkeypatch.setattr(syntax, "read", fail)
+    loading._warn_once.cache_clear()
+    kernels = [SOURCE, dataclasses.replace(SOURCE, code=TINY.replace("2.0", "1.0 + 1.0"))]
+    with pytest.warns(RuntimeWarning) as caught:
+        loaded = [fresh(one) for one in kernels]
+    assert [works(one) for one in loaded] == [True, True]
+    assert ["Numba's own pipeline" in str(one.message) for one in caught] == [True]
+    assert "AttributeError: renamed" in str(caught[0].message)
+
+
+FORKED = """
+import os, sys, threading
+sys.path[:0] = sys.argv[1].split(os.pathsep)
+from test_load import SOURCE, TINY, dataclasses, fresh, loading, works
+kernel = fresh()
+second, third = (dataclasses.replace(SOURCE, code=TINY.replace("2.0", number)) for number in ("5.0", "7.0"))
+thread = threading.Thread(target=loading.load, args=(second,))
+inside, compiled = threading.Event(), loading._compile
+loading._compile = lambda *given: (inside.set(), compiled(*given))[1]
+thread.start()
+inside.wait(60)
+child = os.fork()
+if not child:
+    again = loading.load(SOURCE) is kernel and works(kernel)
+    loading.load(third)
+    os._exit(0 if again else 1)
+thread.join()
+print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
+def test_a_process_that_forks_while_a_kernel_compiles_has_a_child_that_runs(folder):
+    way = os.pathsep.join(map(str, (HERE, HERE.parents[1])))
+    done = subprocess.run([sys.executable, "-c", FORKED, way], text=True, capture_output=True, timeout=300, check=False)
+    assert done.stdout == "0\n", done.stderr
+
+
+def test_a_loaded_kernel_waits_for_no_compilation(folder):
+    kernel, found = fresh(), []
+    with loading._lock:
+        thread = threading.Thread(target=lambda: found.append(loading.load(SOURCE)), daemon=True)
+        thread.start()
+        thread.join(60)
+    assert found == [kernel]
 
 
 # -- damage --------------------------------------------------------------------------------------------------
@@ -553,26 +606,50 @@ def test_what_python_keeps_beside_a_module_is_not_run(compiled_folder, folder, m
     assert works(fresh())
 
 
-def test_a_cache_of_numba_elsewhere_is_not_used(folder, tmp_path, monkeypatch):
+def shared_state() -> dict[tuple[str, ...], object]:
+    """What all threads share: the configuration of Numba, functions of its modules and classes, and if garbage is collected."""
+    modules = [m for name, m in sys.modules.items() if name.partition(".")[0] in ("numba", "llvmlite")]
+    owners = {
+        (m.__name__, *inner): owner
+        for m in modules
+        for inner, owner in [((), m), *(((k,), c) for k, c in vars(m).items() if isinstance(c, type))]
+    }
+    found = {
+        (*path, k): f for path, owner in owners.items() for k, f in list(vars(owner).items()) if inspect.isfunction(f)
+    }
+    settings = {("config", k): value for k, value in vars(numba.config).items() if k.isupper()}
+    return {**found, **settings, ("gc",): gc.isenabled()}
+
+
+def test_what_threads_share_is_left_alone_while_kernels_compile(folder, tmp_path, monkeypatch):
     elsewhere = tmp_path / "elsewhere"
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(elsewhere))
+    compile_extra, during = front_end.EntryCompiler.compile_extra, []
+    monkeypatch.setattr(
+        front_end.EntryCompiler,
+        "compile_extra",
+        lambda *given: (during.append(shared_state()), compile_extra(*given))[1],
+    )
     assert works(fresh())
+    before = shared_state()
+    assert works(fresh(dataclasses.replace(SOURCE, code=TINY.replace("3.0", "6.0 * 0.5"))))
+    assert {path for path, value in before.items() if during[-1].get(path, value) != value} == set()
+    assert len(during) == 3
     assert not elsewhere.exists()
     assert machine_code(folder)
-    assert str(elsewhere) == numba.config.CACHE_DIR
 
 
 def test_another_processor_compiles_its_own(compiled_folder, folder, monkeypatch):
     copied(compiled_folder, folder)
     monkeypatch.setattr("llvmlite.binding.get_host_cpu_name", lambda: "abacus")
-    loading._surroundings.cache_clear()
+    loading._sources.cache_clear()
     try:
         compiled = fresh()
         assert from_cache(compiled) == dict.fromkeys(MODULES, False)
         assert works(compiled)
     finally:
         monkeypatch.undo()
-        loading._surroundings.cache_clear()
+        loading._sources.cache_clear()
     for module in MODULES:
         assert len(list(folder.glob(f"{module}_*.py"))) == 2
 
@@ -589,7 +666,6 @@ def test_a_kernel_that_cannot_be_compiled_is_an_error(folder):
     broken = dataclasses.replace(SOURCE, code=TINY.replace("2.0", "undefined_name"))
     with pytest.raises(Exception, match="undefined_name"):
         fresh(broken)
-    assert gc.isenabled()  # it pauses while kernels are compiled
 
 
 def test_a_step_of_other_types_than_the_driver_calls_is_an_error(folder):
