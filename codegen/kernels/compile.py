@@ -8,7 +8,6 @@ the versions of Python, Numba and llvmlite, and the processor.
 
 from __future__ import annotations
 
-import atexit
 import functools
 import hashlib
 import importlib.metadata
@@ -16,9 +15,7 @@ import logging
 import os
 import pickle
 import platform
-import shutil
 import sys
-import tempfile
 import threading
 from collections import ChainMap
 from dataclasses import dataclass, field, replace
@@ -146,7 +143,7 @@ class Compiled:
     functions
         The functions by name.
     path
-        The file that holds the text.
+        The file that holds the text; one of a folder `<memory>` if it is kept nowhere.
     from_cache
         True if the machine code was loaded from the cache, False if it was compiled.
     problem
@@ -361,17 +358,17 @@ def _module(text: str, kind: str, wanted: dict[str, Any], what: str) -> Compiled
     except (OSError, RuntimeError) as error:  # RuntimeError: no home folder
         problem = str(error)
     LOG.info("compiling %s, for this process alone", what)
-    path = Path(tempfile.mkdtemp(prefix="synchain-"), f"{name}.py")
-    atexit.register(shutil.rmtree, path.parent, ignore_errors=True)
-    path.write_text(text, encoding="utf-8")
-    return replace(_compile(text, path, wanted, _MachineCode()), problem=problem)
+    return replace(_compile(text, Path("<memory>", f"{name}.py"), wanted, _MachineCode()), problem=problem)
 
 
 def _from_folder(text: str, name: str, wanted: dict[str, Any], what: str, folder: Folder) -> Compiled:
     """The functions from the folder, or compiled into it; what cannot be loaded is compiled anew."""
-    path, written = folder.path / f"{name}.py", text.encode()
-    if folder.read(path.name) != written:
-        folder.write(path.name, written)
+    path, written, problem = folder.path / f"{name}.py", text.encode(), ""
+    try:
+        if folder.trusted(path.name) != written:
+            folder.write(path.name, written)
+    except OSError as error:  # a folder that can only be read
+        problem = str(error)
     if (module := _stored(text, name, wanted, folder, path)) is not None:
         return module
     with folder.turn(name):
@@ -380,8 +377,11 @@ def _from_folder(text: str, name: str, wanted: dict[str, Any], what: str, folder
         LOG.info("compiling %s, kept for later runs", what)
         code = _MachineCode()
         module = _compile(text, path, wanted, code)
-        folder.keep(name, code.data)
-    return module
+        try:
+            folder.keep(name, code.data)
+        except OSError as error:
+            problem = problem or str(error)
+    return replace(module, problem=problem)
 
 
 def _stored(text: str, name: str, wanted: dict[str, Any], folder: Folder, path: Path) -> Compiled | None:

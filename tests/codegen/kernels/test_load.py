@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import errno
 import gc
+import hashlib
 import importlib.util
 import inspect
 import json
@@ -212,6 +213,7 @@ def folder(tmp_path, monkeypatch) -> Path:
 def fresh(source=SOURCE):
     """Load without what this process remembers."""
     loading.forget()
+    cache._refusing.clear()
     return loading.load(source)
 
 
@@ -688,6 +690,19 @@ def warned(match: str):
     return compiled
 
 
+def repaired(match: str):
+    """A file of the cache is refused, with one warning, and written anew."""
+    with pytest.warns(RuntimeWarning, match=match) as caught:
+        compiled = fresh()
+    assert len(caught) == 1
+    assert "refused a file, whose kernel is compiled anew" in str(caught[0].message)
+    assert works(compiled)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert from_cache(fresh()) == ALL_FROM_CACHE
+    return compiled
+
+
 def refused(match: str) -> None:
     """The cache folder cannot be opened; `warned` is what a kernel makes of it."""
     with pytest.raises(OSError, match=match), cache.open_folder(cache.cache_folder()):
@@ -710,8 +725,8 @@ def test_a_folder_that_others_can_write_is_refused(compiled_folder, folder):
 def test_a_file_that_others_can_write_is_refused(compiled_folder, folder, suffix, module):
     copied(compiled_folder, folder)
     next(folder.glob(f"{module}_*.{suffix}")).chmod(0o666)
-    compiled = warned("can be written by others; run: chmod go-w")
-    assert from_cache(compiled) == {**ALL_FROM_CACHE, module: False}
+    compiled = repaired("can be written by others; run: chmod go-w")
+    assert from_cache(compiled) == {**ALL_FROM_CACHE, module: suffix == "py"}
 
 
 @posix
@@ -768,14 +783,95 @@ def test_a_pipe_in_the_place_of_a_file_does_not_keep_anybody_waiting(compiled_fo
     path = next(folder.glob(f"{module}_*.{suffix}"))
     path.unlink()
     os.mkfifo(path, 0o600)
-    assert from_cache(warned("is a pipe or device; expected a file")) == {**ALL_FROM_CACHE, module: False}
+    assert from_cache(repaired("is a pipe or device; expected a file")) == {**ALL_FROM_CACHE, module: suffix == "py"}
 
 
-def test_a_read_only_folder_is_refused(folder, monkeypatch):
-    folder.mkdir()
-    monkeypatch.setattr(cache.os, "access", lambda path, mode: False)
-    refused("is read-only; set SYNCHAIN_CACHE to a folder you can write")
-    assert not list(folder.iterdir())
+@posix
+@pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="only root gives files away")
+def test_a_file_of_somebody_else_is_replaced(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    os.chown(machine_code(folder, "kernel")[0], 4711, 4711)
+    assert from_cache(repaired("belongs to another user")) == {**ALL_FROM_CACHE, "kernel": False}
+
+
+@pytest.fixture
+def read_only(monkeypatch) -> None:
+    """A file system that can only be read, for the superuser too."""
+    opening, making = os.open, os.mkdir
+
+    def only_read(path, flags, *mode, **place):
+        if flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT):
+            raise OSError(errno.EROFS, "Read-only file system", path)
+        return opening(path, flags, *mode, **place)
+
+    def make_nothing(path, *mode, **place):
+        if os.path.isdir(path):
+            return making(path, *mode, **place)
+        raise OSError(errno.EROFS, "Read-only file system", path)
+
+    monkeypatch.setattr(os, "open", only_read)
+    monkeypatch.setattr(os, "mkdir", make_nothing)
+
+
+def test_a_warm_cache_that_can_only_be_read_is_used(compiled_folder, folder, request):
+    copied(compiled_folder, folder)
+    request.getfixturevalue("read_only")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert from_cache(fresh()) == ALL_FROM_CACHE
+
+
+@pytest.mark.usefixtures("folder", "read_only")
+def test_without_a_place_to_write_kernels_are_compiled_in_memory(monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", "/nowhere")
+    warned("Read-only file system")
+
+
+@pytest.fixture
+def settings(tmp_path, monkeypatch) -> Path:
+    """The folder of the key, which does not exist yet."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "settings"))
+    monkeypatch.setattr(sys, "platform", "linux")
+    return tmp_path / "settings" / "synchain"
+
+
+def test_machine_code_that_another_key_signed_is_not_run(compiled_folder, folder, settings):
+    """A cache that is carried here is code, of which a checksum says nothing."""
+    copied(compiled_folder, folder)
+    (code,) = machine_code(folder, "kernel")
+    evil = pickle.dumps(Runs("raise SystemExit('not ours')"))
+    code.write_bytes(hashlib.sha256(f"{code.stem}\n".encode() + evil).digest() + evil)
+    with pytest.warns(RuntimeWarning, match="was signed by another user or machine") as caught:
+        compiled = fresh()
+    assert len(caught) == 1
+    assert from_cache(compiled) == dict.fromkeys(MODULES, False)
+    assert from_cache(fresh()) == ALL_FROM_CACHE
+    key = settings / cache.KEY
+    assert (len(key.read_bytes()), stat.S_IMODE(key.stat().st_mode)) == (32, 0o600)
+    assert [path.name for path in settings.iterdir()] == [cache.KEY]
+
+
+def test_processes_that_make_a_key_at_once_agree(folder, settings, monkeypatch):
+    """The second writes its own after the first has looked for one."""
+    with cache.open_folder(settings) as one, cache.open_folder(settings) as two:
+        write, first = cache.Folder.write, []
+
+        def slow(opened, name, data):
+            if not first:
+                first.append(None)
+                first[0] = two.own_key()
+            write(opened, name, data)
+
+        monkeypatch.setattr(cache.Folder, "write", slow)
+        assert one.own_key() == first[0] == two.own_key()
+
+
+def test_without_settings_the_key_lies_in_the_cache(folder, settings):
+    settings.parent.write_text("no folder")
+    with cache.open_folder(folder) as opened:
+        opened.keep("kernel_a", b"code")
+        assert opened.machine_code("kernel_a") == b"code"
+        assert (folder / cache.KEY).read_bytes() == opened.key()
 
 
 def test_a_folder_of_somebody_else_is_refused(folder, monkeypatch):
