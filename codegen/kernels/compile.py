@@ -37,7 +37,7 @@ from ..driver import dimensions
 from ..driver.dimensions import Dimensions, ModeDimensions
 from ..simd import decorator
 from ..simd.addresses import ADDRESS
-from ..simd.lane_types import Lane, Mask
+from ..simd.lane_types import Lane, Mask, has_fma
 from ..steps.names import NAMES
 from . import functions
 from .cache import Folder, cache_folder, open_folder
@@ -234,7 +234,7 @@ def load(source: KernelSource) -> Kernel:
     -----
     RuntimeWarning
         If the cache folder cannot be used; the kernel is then compiled for this process alone.  Once a process, if Numba's
-        own pipeline had to compile a function in place of the front end.
+        own pipeline had to compile a function in place of the front end, and if the processor has no fused multiply-add.
 
     Notes
     -----
@@ -242,7 +242,7 @@ def load(source: KernelSource) -> Kernel:
     """
     _check_numba()
     kernel = _load(source)
-    _warn_of_front_end()
+    _warn_of_slowness()
     return kernel
 
 
@@ -304,12 +304,17 @@ def _load(source: KernelSource) -> Kernel:
 _warn_once = functools.cache(warn)
 
 
-def _warn_of_front_end() -> None:
-    """Warn, once a process, that the front end failed."""
+def _warn_of_slowness() -> None:
+    """Warn, once a process, of what makes compilation or kernels slow."""
     if decorator.front_end_problems:
         _warn_once(
             "kernels: found a fault of the front end; expected none; Numba's own pipeline compiles with the same results "
             f"in 2 to 4 times the time ({decorator.front_end_problems[0]})"
+        )
+    if not has_fma():
+        _warn_once(
+            f"kernels: found a processor without fused multiply-add ({processor().partition(':')[0]}); expected one; they take "
+            "up to twice the time and round otherwise; unset NUMBA_CPU_NAME and NUMBA_CPU_FEATURES if they are set"
         )
 
 
