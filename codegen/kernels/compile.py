@@ -35,7 +35,7 @@ from synchain.models.inputs.keywords import warn
 
 from ..driver import dimensions
 from ..driver.dimensions import Dimensions, ModeDimensions
-from ..simd import decorator
+from ..simd import decorator, trees
 from ..simd.addresses import ADDRESS
 from ..simd.lane_types import Lane, Mask, has_fma
 from ..steps.names import NAMES
@@ -444,7 +444,7 @@ def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) 
     module.__file__ = str(path)
     sys.modules[path.stem] = module  # Numba looks its functions up there
     try:
-        decorator.execute(text, str(path), module.__dict__)
+        trees.execute(text, str(path), module.__dict__)
         functions = {name: getattr(module, name) for name in wanted}
         for name, function in functions.items():
             function._cache = _FunctionCache(code, name)

@@ -6,7 +6,6 @@ with a version of Numba that it does not know, Numba's own pipeline compiles the
 
 from __future__ import annotations
 
-import ast
 import os
 from collections.abc import Callable
 from typing import Any
@@ -14,10 +13,7 @@ from typing import Any
 import numba
 from numba.core.compiler import Compiler
 
-__all__ = ["TREES", "execute", "front_end_problems", "njit", "uses_front_end"]
-
-TREES = "__syntax__"
-"""What a module calls the syntax trees of its functions, by the lines that they begin in."""
+__all__ = ["front_end_problems", "njit", "uses_front_end"]
 
 front_end_problems: list[str] = []
 """Why Numba's own pipeline compiled functions of this process."""
@@ -62,19 +58,6 @@ class _InnerCompiler(_Compiler):
     """The compiler of functions that only kernels call."""
 
     front_end = "InnerCompiler"
-
-
-def functions(tree: ast.Module) -> dict[int, ast.FunctionDef]:
-    """Return the functions of a module, by the lines that they begin in."""
-    found = (part for part in tree.body if isinstance(part, ast.FunctionDef))
-    return {min([part.lineno, *(one.lineno for one in part.decorator_list)]): part for part in found}
-
-
-def execute(text: str, path: str, space: dict[str, Any]) -> None:
-    """Run the text of a module in a namespace, with the syntax from which its functions are compiled."""
-    tree = ast.parse(text, path)
-    space[TREES] = functions(tree)
-    exec(compile(tree, path, "exec"), space)
 
 
 ENTRY = {"pipeline_class": _Compiler}

@@ -22,7 +22,7 @@ from numba import types
 from numba.core import cgutils, errors
 from numba.core.typing.templates import fold_arguments
 
-from .decorator import TREES, functions
+from .trees import TREES, functions
 from .writing import Program, Typed, Value, Write, Writer
 
 __all__ = ["UnreadError", "read"]

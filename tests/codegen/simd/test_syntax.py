@@ -17,7 +17,7 @@ from numba.core.registry import cpu_target
 from numba.core.runtime import _nrt_python, rtsys
 
 from synchain.codegen.kernels.compile import _compile, _MachineCode
-from synchain.codegen.simd import decorator, front_end, syntax, writing
+from synchain.codegen.simd import decorator, front_end, syntax, trees, writing
 
 HEAD = """import math
 import numpy as np
@@ -164,7 +164,7 @@ REFUSED = {
 @pytest.mark.parametrize(("body", "found"), REFUSED.values(), ids=REFUSED)
 def test_what_is_not_read_is_refused(body: str, found: str) -> None:
     space: dict[str, Any] = {}
-    decorator.execute(_module({"one": body})[1], "<text>", space)
+    trees.execute(_module({"one": body})[1], "<text>", space)
     with pytest.raises(syntax.UnreadError, match=re.escape(found)):
         syntax.read(cpu_target.typing_context, space["f0"].py_func, ARGUMENTS, types.void)
 

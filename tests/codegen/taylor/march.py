@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit as numba_njit
 
 from synchain.codegen import simd
-from synchain.codegen.simd.decorator import execute
+from synchain.codegen.simd.trees import execute
 from synchain.codegen.steps.names import tidy
 from synchain.codegen.steps.program import program
 from synchain.codegen.taylor import TaylorStep, write_looped, write_step
