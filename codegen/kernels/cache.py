@@ -1,14 +1,17 @@
 """The folder of compiled kernels and drivers.  Code is loaded from it, so a folder that others can change is refused.
 
 The folder is opened once and its files are reached through it, so that nobody can replace the folder
-between a check and a reading.  A wrong bit in machine code is a crash or a wrong number, so the
-machine code of a kernel is one file that begins with a checksum.  The file is read once: the bytes
-that were checked are the bytes that are loaded.
+between a check and a reading.  The machine code of a kernel is one file, a pickle, which may run
+anything when it is read: it begins with a signature (HMAC) by a key of the user, which does not lie
+in the folder, so that code of another user or machine is refused, and damaged code too.  The file is
+read once: the bytes that were checked are the bytes that are loaded.  A file that is refused is
+written anew.  Reading needs no right to write.
 """
 
 from __future__ import annotations
 
 import hashlib
+import hmac
 import os
 import secrets
 import shutil
@@ -22,6 +25,7 @@ from io import FileIO
 from pathlib import Path
 from types import TracebackType
 
+from synchain.models.inputs.keywords import warn
 from synchain.models.inputs.regular_file import open_regular
 
 try:
@@ -36,6 +40,9 @@ DIGEST = hashlib.sha256().digest_size
 KINDS = ("kernel", "driver")
 """The modules in the folder, by the beginnings of their names: the functions of a scene, and what runs and records them."""
 
+KEY = "cache.key"
+"""The file of the key that signs machine code."""
+
 PATIENCE = 120.0
 """Seconds after which a process no longer waits for another one that compiles the same kernel."""
 
@@ -48,12 +55,17 @@ def cache_folder() -> Path:
     wish = os.environ.get("SYNCHAIN_CACHE", "")
     if wish:
         return Path(wish).expanduser().absolute()
+    return _user_folder("XDG_CACHE_HOME", ".cache", "Caches")
+
+
+def _user_folder(variable: str, linux: str, mac: str) -> Path:
+    """The folder of this package among those of the user, of a kind that systems name differently."""
     if sys.platform == "win32":
         base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
     elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
+        base = Path.home() / "Library" / mac
     else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+        base = Path(os.environ.get(variable) or Path.home() / linux)
     return base / "synchain"
 
 
@@ -116,16 +128,56 @@ class Folder:
             self.delete(temporary)
             raise
 
-    def machine_code(self, name: str) -> bytes | None:
-        """Return the machine code of the kernel `name`; None if there is none or its checksum is wrong."""
-        data = self.read(f"{name}.code")
-        if data is None or data[:DIGEST] != _digest(name, data[DIGEST:]):
+    def trusted(self, name: str) -> bytes | None:
+        """Return the content of a file; None if there is none, or, with a warning, if it is refused."""
+        try:
+            return self.read(name)
+        except OSError as problem:
+            _warn_of_refusal(self.path, str(problem))
             return None
-        return data[DIGEST:]
+
+    def machine_code(self, name: str) -> bytes | None:
+        """Return the machine code of the kernel `name`; None if there is none, or, with a warning, if it is refused."""
+        data = self.trusted(f"{name}.code")
+        if data is None:
+            return None
+        signed, code = data[:DIGEST], data[DIGEST:]
+        if not hmac.compare_digest(signed, self._signature(name, code)):
+            _warn_of_refusal(self.path, f"{name}.code is damaged, or was signed by another user or machine")
+            return None
+        return code
 
     def keep(self, name: str, code: bytes) -> None:
-        """Write the machine code of the kernel `name` with its checksum."""
-        self.write(f"{name}.code", _digest(name, code) + code)
+        """Write the machine code of the kernel `name` with its signature."""
+        self.write(f"{name}.code", self._signature(name, code) + code)
+
+    def _signature(self, name: str, code: bytes) -> bytes:
+        return hmac.digest(self.key(), f"{name}\n".encode() + code, "sha256")
+
+    def key(self) -> bytes:
+        """Return the key of the user, which is made if it is missing.
+
+        It lies in the user's folder of settings; in this folder only if that one cannot be used.
+        """
+        try:
+            with open_folder(_user_folder("XDG_CONFIG_HOME", ".config", "Application Support")) as settings:
+                return settings.own_key()
+        except (OSError, RuntimeError):  # RuntimeError: no home folder
+            return self.own_key()
+
+    def own_key(self) -> bytes:
+        """Return the key in this folder, which is made if it is missing."""
+        key = self.read(KEY)
+        if key is None:
+            fresh = f"{KEY}-{secrets.token_hex(8)}.tmp"
+            self.write(fresh, secrets.token_bytes(DIGEST))
+            with suppress(FileExistsError):  # of processes that make one at once, the first wins
+                os.link(self._at(fresh), self._at(KEY), src_dir_fd=self.descriptor, dst_dir_fd=self.descriptor)
+            self.delete(fresh)
+            key = self.read(KEY)
+        if key is None or len(key) != DIGEST:
+            raise OSError(f"{self.path / KEY}: found no key of {DIGEST} bytes; expected one; delete the file")
+        return key
 
     @contextmanager
     def turn(self, name: str) -> Iterator[None]:
@@ -174,8 +226,15 @@ def _wait_for(descriptor: int) -> None:
             return
 
 
-def _digest(name: str, code: bytes) -> bytes:
-    return hashlib.sha256(f"{name}\n".encode() + code).digest()
+_refusing: set[Path] = set()
+"""The folders with files that were refused."""
+
+
+def _warn_of_refusal(folder: Path, problem: str) -> None:
+    """Warn, once for each folder, of a file that is not loaded."""
+    if folder not in _refusing:
+        _refusing.add(folder)
+        warn(f"kernel cache {folder}: refused a file, whose kernel is compiled anew, as others may be: {problem}")
 
 
 def open_folder(folder: Path) -> Folder:
@@ -206,8 +265,6 @@ def open_folder(folder: Path) -> Folder:
     try:
         if opened.descriptor is not None:
             _check_owner(folder, os.fstat(opened.descriptor))
-        if not os.access(folder, os.W_OK):
-            raise PermissionError(f"kernel cache {folder} is read-only; set SYNCHAIN_CACHE to a folder you can write")
     except BaseException:
         opened.__exit__(None, None, None)
         raise

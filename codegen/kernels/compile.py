@@ -8,21 +8,16 @@ the versions of Python, Numba and llvmlite, and the processor.
 
 from __future__ import annotations
 
-import atexit
 import functools
-import gc
 import hashlib
 import importlib.metadata
 import logging
+import os
 import pickle
 import platform
-import shutil
 import sys
-import tempfile
 import threading
 from collections import ChainMap
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import ModuleType
@@ -32,6 +27,7 @@ from weakref import WeakValueDictionary
 import numba
 import numpy as np
 from numba import types
+from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
 from synchain.models.dynamics.equations import Equations
@@ -39,10 +35,11 @@ from synchain.models.inputs.keywords import warn
 
 from ..driver import dimensions
 from ..driver.dimensions import Dimensions, ModeDimensions
-from ..simd import addresses, decorator, elementary, lane_types, lanes, special, syntax, writing
+from ..simd import decorator, trees
 from ..simd.addresses import ADDRESS
-from ..simd.lane_types import Lane, Mask
+from ..simd.lane_types import Lane, Mask, has_fma
 from ..steps.names import NAMES
+from . import functions
 from .cache import Folder, cache_folder, open_folder
 from .driver import Driver, KernelKind, Recorder
 from .functions import Functions, FunctionsType
@@ -116,7 +113,11 @@ def signatures(driver: Driver) -> dict[str, Any]:
 LOG = logging.getLogger(__name__)
 """Reports at the level INFO each compilation, which takes seconds."""
 
-_lock = threading.Lock()
+_lock = threading.RLock()
+"""Held while a kernel is loaded or compiled.  A fork waits for it, so that no child begins amid a compilation."""
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_lock.release)
+
 _held: WeakValueDictionary[KernelSource, Kernel] = WeakValueDictionary()
 """The kernels of this process that somebody holds."""
 
@@ -142,7 +143,7 @@ class Compiled:
     functions
         The functions by name.
     path
-        The file that holds the text.
+        The file that holds the text; one of a folder `<memory>` if it is kept nowhere.
     from_cache
         True if the machine code was loaded from the cache, False if it was compiled.
     problem
@@ -232,15 +233,17 @@ def load(source: KernelSource) -> Kernel:
     Warns
     -----
     RuntimeWarning
-        If the cache folder cannot be used; the kernel is then compiled for this process alone.
+        If the cache folder cannot be used; the kernel is then compiled for this process alone.  Once a process, if Numba's
+        own pipeline had to compile a function in place of the front end, and if the processor has no fused multiply-add.
 
     Notes
     -----
     A kernel whose cache file is damaged is compiled anew.
     """
     _check_numba()
-    with _lock:
-        return _load(source)
+    kernel = _load(source)
+    _warn_of_slowness()
+    return kernel
 
 
 def load_shared(part: Driver | Recorder) -> Compiled:
@@ -289,12 +292,30 @@ def _check_numba() -> None:
 @functools.lru_cache(maxsize=16)
 def _load(source: KernelSource) -> Kernel:
     """The kernel; the last ones that were asked for are kept, others are freed when nobody holds them."""
-    kernel = _held.get(source)
-    if kernel is None:
-        kernel = _held[source] = _kernel(source)
-        if problem := kernel.compiled.problem or kernel.driver.problem:
-            warn(f"kernels are not kept on disk: {problem}")
-    return kernel
+    with _lock:  # not around the call: a loaded kernel waits for no compilation
+        kernel = _held.get(source)
+        if kernel is None:
+            kernel = _held[source] = _kernel(source)
+            if problem := kernel.compiled.problem or kernel.driver.problem:
+                warn(f"kernels are not kept on disk: {problem}")
+        return kernel
+
+
+_warn_once = functools.cache(warn)
+
+
+def _warn_of_slowness() -> None:
+    """Warn, once a process, of what makes compilation or kernels slow."""
+    if decorator.front_end_problems:
+        _warn_once(
+            "kernels: found a fault of the front end; expected none; Numba's own pipeline compiles with the same results "
+            f"in 2 to 4 times the time ({decorator.front_end_problems[0]})"
+        )
+    if not has_fma():
+        _warn_once(
+            f"kernels: found a processor without fused multiply-add ({processor().partition(':')[0]}); expected one; they take "
+            "up to twice the time and round otherwise; unset NUMBA_CPU_NAME and NUMBA_CPU_FEATURES if they are set"
+        )
 
 
 @functools.cache
@@ -342,17 +363,17 @@ def _module(text: str, kind: str, wanted: dict[str, Any], what: str) -> Compiled
     except (OSError, RuntimeError) as error:  # RuntimeError: no home folder
         problem = str(error)
     LOG.info("compiling %s, for this process alone", what)
-    path = Path(tempfile.mkdtemp(prefix="synchain-"), f"{name}.py")
-    atexit.register(shutil.rmtree, path.parent, ignore_errors=True)
-    path.write_text(text, encoding="utf-8")
-    return replace(_compile(text, path, wanted, _MachineCode()), problem=problem)
+    return replace(_compile(text, Path("<memory>", f"{name}.py"), wanted, _MachineCode()), problem=problem)
 
 
 def _from_folder(text: str, name: str, wanted: dict[str, Any], what: str, folder: Folder) -> Compiled:
     """The functions from the folder, or compiled into it; what cannot be loaded is compiled anew."""
-    path, written = folder.path / f"{name}.py", text.encode()
-    if folder.read(path.name) != written:
-        folder.write(path.name, written)
+    path, written, problem = folder.path / f"{name}.py", text.encode(), ""
+    try:
+        if folder.trusted(path.name) != written:
+            folder.write(path.name, written)
+    except OSError as error:  # a folder that can only be read
+        problem = str(error)
     if (module := _stored(text, name, wanted, folder, path)) is not None:
         return module
     with folder.turn(name):
@@ -361,8 +382,11 @@ def _from_folder(text: str, name: str, wanted: dict[str, Any], what: str, folder
         LOG.info("compiling %s, kept for later runs", what)
         code = _MachineCode()
         module = _compile(text, path, wanted, code)
-        folder.keep(name, code.data)
-    return module
+        try:
+            folder.keep(name, code.data)
+        except OSError as error:
+            problem = problem or str(error)
+    return replace(module, problem=problem)
 
 
 def _stored(text: str, name: str, wanted: dict[str, Any], folder: Folder, path: Path) -> Compiled | None:
@@ -377,62 +401,56 @@ def _stored(text: str, name: str, wanted: dict[str, Any], folder: Folder, path: 
 
 
 class _MachineCode:
-    """Machine code as checked bytes, in place of the files that Numba reads and writes by their paths."""
+    """The machine code of a module as checked bytes, in place of the files that Numba reads and writes by their paths."""
 
     def __init__(self, stored: bytes = b"") -> None:
         self.stored = stored
 
     @functools.cached_property
-    def known(self) -> dict[Any, Any]:
+    def compiled(self) -> dict[Any, Any]:
         """What was compiled, by function, types and processor; it can be read while its module is known to Python."""
         return dict(pickle.loads(self.stored)) if self.stored else {}
-
-    def load(self, key: Any) -> Any:
-        """What was compiled for these types and this processor; None if there is no such code."""
-        return self.known.get(key)
-
-    def save(self, key: Any, compiled: Any) -> None:
-        self.known[key] = compiled
 
     @property
     def data(self) -> bytes:
         """All of it as bytes."""
-        return dumps(self.known)
+        return dumps(self.compiled)
 
 
-@contextmanager
-def _without_collection() -> Iterator[None]:
-    """Pause the collection of cycles, which takes an eighth of a compilation to find that all is in use."""
-    running = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if running:
-            gc.enable()
+@dataclass(frozen=True, slots=True)
+class _FunctionCache:
+    """What Numba asks of the cache of a function: machine code is loaded from a module's and saved to it."""
+
+    code: _MachineCode
+    name: str
+    cache_path: None = None
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        """The compiled function; None if there is no code for these types and this processor."""
+        target.refresh()
+        found = self.code.compiled.get((self.name, signature, target.codegen().magic_tuple()))
+        return None if found is None else CompileResult._rebuild(target, *found)
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        self.code.compiled[self.name, signature, compiled.codegen.magic_tuple()] = compiled._reduce()
 
 
-@_without_collection()
-@decorator.without_repetition()
 def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) -> Compiled:
     """Compile the functions `wanted` of a module.
 
-    The text comes from memory, not from the file at `path` and not from `__pycache__`.  The file is
-    there for readers, and for Numba, which caches no function without a file.
+    The text comes from memory, not from the file at `path` and not from `__pycache__`.  The file is there for readers.
     """
     module = ModuleType(path.stem)
     module.__file__ = str(path)
-    elsewhere, numba.config.CACHE_DIR = numba.config.CACHE_DIR, ""  # nothing is made in a folder of Numba's own
     sys.modules[path.stem] = module  # Numba looks its functions up there
     try:
-        decorator.execute(text, str(path), module.__dict__)
+        trees.execute(text, str(path), module.__dict__)
         functions = {name: getattr(module, name) for name in wanted}
         for name, function in functions.items():
-            function._cache._cache_file = code
+            function._cache = _FunctionCache(code, name)
             function.compile(wanted[name])
             function.disable_compile()  # arrays of another type are a mistake of ours, not a reason to compile anew
     finally:
-        numba.config.CACHE_DIR = elsewhere
         del sys.modules[path.stem]
         for name in vars(module).keys() - {"__name__"}:  # Numba never frees a function that its module names
             delattr(module, name)
@@ -440,28 +458,25 @@ def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) 
     return Compiled(functions, str(path), hits)
 
 
+SOURCES = [*sorted(Path(decorator.__file__).parent.glob("*.py")), Path(dimensions.__file__), Path(functions.__file__)]
+"""The files, besides the text of a module, whose code is in its machine code."""
+
+FLAGS = (
+    "BOUNDSCHECK", "DEBUG_JIT", "DEBUG_NRT", "DEBUG_NRT_STACK_LIMIT", "DEBUGINFO_DEFAULT", "DISABLE_INTEL_SVML",
+    "ENABLE_PROFILING", "EXTEND_VARIABLE_LIFETIMES", "LLVM_REFPRUNE_FLAGS", "LLVM_REFPRUNE_PASS", "LOOP_VECTORIZE", "OPT", "SLP_VECTORIZE",
+)  # fmt: skip
+"""What Numba reads from the environment (NUMBA_OPT …) that changes machine code; `processor` has the rest."""
+
+
 @functools.cache
-def _surroundings() -> str:
-    """Everything besides the text that the machine code depends on."""
-    here = [
-        Path(m.__file__).read_text(encoding="utf-8")
-        for m in (
-            decorator,
-            syntax,
-            writing,
-            addresses,
-            lane_types,
-            lanes,
-            elementary,
-            special,
-            dimensions,
-            sys.modules[Functions.__module__],
-        )
-        if m.__file__
-    ]
+def _sources() -> str:
+    """The code besides the text of a module that its machine code depends on, and who makes machine code of it."""
     versions = [sys.version, numba.__version__, importlib.metadata.version("llvmlite"), platform.machine()]
-    return "\n".join([*here, *versions, processor()])
+    return "\n".join([*(path.read_text(encoding="utf-8") for path in SOURCES), *versions])
 
 
 def _fingerprint(text: str) -> str:
-    return hashlib.sha256(f"{_surroundings()}\n{text}".encode()).hexdigest()
+    """The hash of everything that machine code depends on."""
+    flags = [f"{name}={getattr(numba.config, name, None)!r}" for name in FLAGS]
+    choices = [processor(), *flags, f"front end {decorator.uses_front_end()}"]
+    return hashlib.sha256("\n".join([_sources(), *choices, text]).encode()).hexdigest()

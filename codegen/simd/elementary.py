@@ -5,6 +5,7 @@ logarithm's final sum as in Tang, ACM Trans. Math. Softw. 16, 378, 1990).  The p
 by the relative error of the result.  `ATAN`, `SINE` and `EXP` are fitted in 40-digit arithmetic on 120 Chebyshev points;
 in the first two each of the three lowest coefficients is rounded to double precision before the higher ones are fitted
 anew.  Beside each stands its error with the rounded coefficients; tests/test_elementary_fits.py makes all three again.
+`fma` stands where the rounding of a product would count, `multiply_add` elsewhere.
 They are summed by halves of halves (Estrin, Proc. Western Joint Computer Conf. 17, 33, 1960), so that few operations wait
 for each other.
 The circular functions subtract three parts of pi: their error is below 1.5 units in the last place up to |x| = 1e9, below
@@ -25,6 +26,7 @@ from .lanes import (
     copysign,
     floor,  # re-exported: kernels take all their functions from here
     fma,
+    multiply_add,
     scale_binary,
     select,
     split_binary,
@@ -83,7 +85,7 @@ def _flip_odd(typingctx: Any, value: Any, shifted: Any) -> Any:
 @lane_function
 def _four(c0, c1, c2, c3, x, square):
     """c0 + c1 x + c2 x**2 + c3 x**3."""
-    return fma(fma(c3, x, c2), square, fma(c1, x, c0))
+    return multiply_add(multiply_add(c3, x, c2), square, multiply_add(c1, x, c0))
 
 
 @lane_function
@@ -91,7 +93,9 @@ def _exp_series(r, z):
     """(exp(r) - 1 - r)/z with z = r**2."""
     c0, c1, c2, c3, c4, c5, c6, c7, c8, c9 = EXP
     w = z * z
-    return fma(fma(fma(c9, r, c8), w, _four(c4, c5, c6, c7, r, z)), w, _four(c0, c1, c2, c3, r, z))
+    return multiply_add(
+        multiply_add(multiply_add(c9, r, c8), w, _four(c4, c5, c6, c7, r, z)), w, _four(c0, c1, c2, c3, r, z)
+    )
 
 
 @lane_function
@@ -99,14 +103,14 @@ def exp(x):
     """e**x; 0 below -745.2, inf above 709.8."""
     y = select(x < -746.0, -746.0, x)
     y = select(y > 710.0, 710.0, y)  # NaN passes
-    shifted = fma(y, LOG2E, MAGIC)
+    shifted = multiply_add(y, LOG2E, MAGIC)
     k = shifted - MAGIC
-    r = fma(k, -LN2_LOW, fma(k, -LN2_HIGH, y))
+    r = multiply_add(k, -LN2_LOW, fma(k, -LN2_HIGH, y))
     z = r * r
-    p = fma(z, _exp_series(r, z), r)
+    p = multiply_add(z, _exp_series(r, z), r)
     # 2**k in two factors, so that neither over- nor underflows
     factor = scale_binary(select(x < 0.0, LARGE, SMALL), shifted)
-    return fma(factor, p, factor) * select(x < 0.0, SMALL, LARGE)
+    return multiply_add(factor, p, factor) * select(x < 0.0, SMALL, LARGE)
 
 
 @lane_function
@@ -114,18 +118,18 @@ def _expm1_parts(x):
     """e**x - 1 as the sum of a double and a small correction, for |x| <= 700 (clamped there)."""
     y = select(x < -700.0, -700.0, x)
     y = select(y > 700.0, 700.0, y)
-    shifted = fma(y, LOG2E, MAGIC)
+    shifted = multiply_add(y, LOG2E, MAGIC)
     k = shifted - MAGIC
     high = fma(k, -LN2_HIGH, y)  # exact
-    r = fma(k, -LN2_LOW, high)
+    r = multiply_add(k, -LN2_LOW, high)
     z = r * r
     tail = z * _exp_series(r, z)
     p = r + tail
-    rest = ((r - p) + tail) + fma(k, -LN2_LOW, high - r)
+    rest = ((r - p) + tail) + multiply_add(k, -LN2_LOW, high - r)
     scale = scale_binary(r * 0.0 + 1.0, shifted)
     base = scale - 1.0
-    whole = fma(scale, p, base)
-    return whole, fma(scale, rest, fma(scale, p, base - whole))
+    whole = multiply_add(scale, p, base)
+    return whole, multiply_add(scale, rest, multiply_add(scale, p, base - whole))
 
 
 @lane_function
@@ -145,11 +149,12 @@ def log(x):
     s = f / (2.0 + f)
     z = s * s
     w = z * z
-    even = fma(fma(0.06624980704723496, w, 0.09090887754046581), w, 0.1428571428453648)
-    odd = fma(fma(fma(0.06626380506870277, w, 0.07693548837276801), w, 0.11111111324377015), w, 0.20000000000003143)
-    tail = 2.0 * z * (0.3333333333333333 + z * fma(even, z, odd))
+    even = multiply_add(multiply_add(0.06624980704723496, w, 0.09090887754046581), w, 0.1428571428453648)
+    odd = multiply_add(multiply_add(0.06626380506870277, w, 0.07693548837276801), w, 0.11111111324377015)
+    odd = multiply_add(odd, w, 0.20000000000003143)
+    tail = 2.0 * z * (0.3333333333333333 + z * multiply_add(even, z, odd))
     square = 0.5 * f * f
-    result = k * LN2_SHORT - ((square - fma(s, square + tail, k * LN2_REST)) - f)
+    result = k * LN2_SHORT - ((square - multiply_add(s, square + tail, k * LN2_REST)) - f)
     result = select(x == 0.0, -inf, result)
     result = select(x > 1.7976931348623157e308, x, result)
     return select(x >= 0.0, result, nan)
@@ -162,10 +167,12 @@ def _atan_series(z):
     z2 = z * z
     z4 = z2 * z2
     z8 = z4 * z4
-    low = fma(_four(c5, c6, c7, c8, z, z2), z4, _four(c1, c2, c3, c4, z, z2))
-    middle = fma(_four(d3, d4, d5, d6, z, z2), z4, _four(c9, d0, d1, d2, z, z2))
-    high = fma(d9, z2, fma(d8, z, d7))
-    return fma(fma(fma(high, z8, middle), z8, low), z, c0)  # c0 last: it is the largest, and so rounded but once
+    low = multiply_add(_four(c5, c6, c7, c8, z, z2), z4, _four(c1, c2, c3, c4, z, z2))
+    middle = multiply_add(_four(d3, d4, d5, d6, z, z2), z4, _four(c9, d0, d1, d2, z, z2))
+    high = multiply_add(d9, z2, multiply_add(d8, z, d7))
+    return multiply_add(
+        multiply_add(multiply_add(high, z8, middle), z8, low), z, c0
+    )  # c0 last: it is the largest, and so rounded but once
 
 
 @lane_function
@@ -175,33 +182,34 @@ def atan(x):
     beyond = size > 1.0
     t = select(beyond, -1.0 / size, size)
     z = t * t
-    p = fma(t * z, _atan_series(z), select(beyond, HALF_PI_LOW, 0.0))
+    p = multiply_add(t * z, _atan_series(z), select(beyond, HALF_PI_LOW, 0.0))
     return copysign((select(beyond, HALF_PI, 0.0) + t) + p, x)
 
 
 @lane_function
 def _alternating_sine(x, k, shifted):
     """sin(x - k pi), its sign changed where `shifted` is odd; within [-1, 1] whatever k."""
-    r = fma(k, -PI_REST, fma(k, -PI_LOW, fma(k, -PI, x)))
+    r = multiply_add(k, -PI_REST, multiply_add(k, -PI_LOW, fma(k, -PI, x)))
     z = r * r
     w = z * z
     c0, c1, c2, c3, c4, c5, c6, c7 = SINE
-    series = fma(fma(c7, w, fma(c6, z, c5)), w * w, _four(c1, c2, c3, c4, z, w))
-    cube = fma(r, z, r * fma(r, r, -z))  # with what rounding took from r**2: it would count near the crests
-    return _flip_odd(select(z < 3.25, fma(cube, fma(series, z, c0), r), r * 0.0), shifted)
+    high = multiply_add(c7, w, multiply_add(c6, z, c5))
+    series = multiply_add(high, w * w, _four(c1, c2, c3, c4, z, w))
+    cube = multiply_add(r, z, r * fma(r, r, -z))  # with what rounding took from r**2: it would count near the crests
+    return _flip_odd(select(z < 3.25, multiply_add(cube, multiply_add(series, z, c0), r), r * 0.0), shifted)
 
 
 @lane_function
 def sin(x):
     """Sine; NaN for infinite x, no accuracy for |x| > 1e15."""
-    shifted = fma(x, ONE_OVER_PI, MAGIC)
+    shifted = multiply_add(x, ONE_OVER_PI, MAGIC)
     return select(x == 0.0, x, _alternating_sine(x, shifted - MAGIC, shifted))
 
 
 @lane_function
 def cos(x):
     """Cosine, as the sine a quarter turn further; NaN for infinite x, no accuracy for |x| > 1e15."""
-    shifted = fma(x, ONE_OVER_PI, 0.5) + MAGIC
+    shifted = multiply_add(x, ONE_OVER_PI, 0.5) + MAGIC
     return _alternating_sine(x, (shifted - MAGIC) - 0.5, shifted)
 
 
@@ -215,7 +223,7 @@ def tanh(x):
     below_rest = ((2.0 - (below - part)) + (e - part)) + e_rest
     inverse = 1.0 / below
     q = e * inverse
-    return copysign(select(x == x, fma(fma(-q, below, e) + (e_rest - q * below_rest), inverse, q), x), x)
+    return copysign(select(x == x, multiply_add(fma(-q, below, e) + (e_rest - q * below_rest), inverse, q), x), x)
 
 
 @lane_function

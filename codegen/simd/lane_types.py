@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import platform
 from typing import Any
 
 import llvmlite.binding as llvm
+import numba
 from llvmlite import ir
 from numba import types
 from numba.extending import models, register_model
@@ -21,6 +23,7 @@ __all__ = [
     "as_lane",
     "common_width",
     "constant",
+    "has_fma",
     "native_width",
     "splat",
     "vector",
@@ -82,6 +85,15 @@ def native_width(registers: int = 1) -> int:
     if features.get("avx512f"):
         return 8 * registers
     return (4 if features.get("avx") else 2) * registers
+
+
+def has_fma() -> bool:
+    """Return True if kernels are compiled for a processor with an instruction for x * y + z with one rounding."""
+    if platform.machine().lower() not in ("x86_64", "amd64", "i386", "i686"):
+        return True  # all that Numba compiles for besides x86 have it
+    if numba.config.CPU_FEATURES is not None:
+        return "+fma" in numba.config.CPU_FEATURES.split(",")
+    return bool(numba.config.ENABLE_AVX and llvm.get_host_cpu_features().get("fma"))
 
 
 def splat(builder: ir.IRBuilder, value: ir.Value, width: int) -> ir.Value:

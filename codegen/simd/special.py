@@ -13,7 +13,7 @@ from numba.extending import intrinsic
 
 from .elementary import atan, cos, exp, expm1, lane_function, log, sin
 from .lane_types import INT64, Lane, constant, vector
-from .lanes import absolute, copysign, floor, fma, maximum, minimum, select, sqrt
+from .lanes import absolute, copysign, floor, maximum, minimum, multiply_add, select, sqrt
 
 __all__ = [
     "acos",
@@ -143,12 +143,12 @@ def erf(x):
     z = x * x
     small = z * 0.0 + ERF[11]
     for k in range(10, -1, -1):
-        small = fma(small, z, ERF[k])
+        small = multiply_add(small, z, ERF[k])
     far = minimum(size, 6.0)
     t = (far - 2.0) / (far + 2.0)
     large = t * 0.0 + ERFCX[17]
     for k in range(16, -1, -1):
-        large = fma(large, t, ERFCX[k])
+        large = multiply_add(large, t, ERFCX[k])
     large = 1.0 - exp(-far * far) * large
     return select(x == x, select(size < 1.0, small * x, copysign(large, x)), x)
 

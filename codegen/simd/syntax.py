@@ -22,9 +22,10 @@ from numba import types
 from numba.core import cgutils, errors
 from numba.core.typing.templates import fold_arguments
 
+from .trees import TREES, functions
 from .writing import Program, Typed, Value, Write, Writer
 
-__all__ = ["TREES", "UnreadError", "functions", "read"]
+__all__ = ["UnreadError", "read"]
 
 OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Add: operator.add,
@@ -59,16 +60,6 @@ class UnreadError(errors.NumbaError):
 
     def __str__(self) -> str:
         return f"functions of kernels: found {self.found}; expected what codegen/simd/syntax.py reads"
-
-
-TREES = "__syntax__"
-"""What a module calls the syntax trees of its functions, by the lines that they begin in."""
-
-
-def functions(tree: ast.Module) -> dict[int, ast.FunctionDef]:
-    """Return the functions of a module, by the lines that they begin in."""
-    found = (part for part in tree.body if isinstance(part, ast.FunctionDef))
-    return {min([part.lineno, *(one.lineno for one in part.decorator_list)]): part for part in found}
 
 
 def tree_of(function: Any) -> ast.FunctionDef:

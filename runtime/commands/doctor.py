@@ -29,6 +29,8 @@ SOUND, DOUBTFUL, WRONG = "fine", "doubtful", "wrong"
 TRAJECTORY_ERROR = 1e-9
 """Largest error of a state of the trial kernel."""
 
+NO_FMA = "kernels take up to twice the time and round otherwise; unset NUMBA_CPU_NAME and NUMBA_CPU_FEATURES if set"
+
 Answer = tuple[str, str, str]
 """Outcome, what was found, what helps."""
 
@@ -145,7 +147,7 @@ def _cache() -> Answer:
 def _processor() -> Answer:
     import llvmlite.binding as llvm
 
-    from synchain.codegen.simd.lane_types import native_width
+    from synchain.codegen.simd.lane_types import has_fma, native_width
 
     from ..support.threads import worker_count
 
@@ -153,6 +155,8 @@ def _processor() -> Answer:
     words = f"{llvm.get_host_cpu_name()}, {width} lanes of double precision, {threads} threads"
     if width < 4 and platform.machine().lower() in ("x86_64", "amd64"):
         return DOUBTFUL, words, "without AVX sweeps take several times as long; unset SYNCHAIN_WIDTH if it is set"
+    if not has_fma():
+        return DOUBTFUL, f"{words}, no fused multiply-add", NO_FMA
     return SOUND, words, ""
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import dataclasses
 import errno
 import gc
+import hashlib
 import importlib.util
+import inspect
 import json
 import math
 import mmap
@@ -32,7 +34,7 @@ from synchain.codegen.kernels import compile as loading
 from synchain.codegen.kernels.driver import Driver, KernelKind
 from synchain.codegen.kernels.modes import emit_modes
 from synchain.codegen.kernels.sweep import emit
-from synchain.codegen.simd import lanes
+from synchain.codegen.simd import decorator, front_end, lanes, syntax
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import network_variation
 from synchain.models.mechanics.components import Node
@@ -42,9 +44,7 @@ x, v = real("x", "v")
 SWING = Equations.of_equal_nodes(Node((x, v), (v, -x), ()), None, 1)
 REAL = emit(SWING, "cash_karp", (), width=1)
 TINY = """
-from numba import njit
-
-from synchain.codegen.simd import broadcast
+from synchain.codegen.simd import broadcast, njit
 
 
 @njit(error_model="numpy", cache=True)
@@ -54,9 +54,7 @@ def step(t, h, y, p, y_new, dense, rtol, atol):
     return broadcast(0.0, 1)
 """
 TINY_DRIVER = """
-from numba import njit
-
-from synchain.codegen.simd import address, broadcast
+from synchain.codegen.simd import address, broadcast, njit
 
 
 @njit(error_model="numpy", nogil=True, cache=True)
@@ -215,6 +213,7 @@ def folder(tmp_path, monkeypatch) -> Path:
 def fresh(source=SOURCE):
     """Load without what this process remembers."""
     loading.forget()
+    cache._refusing.clear()
     return loading.load(source)
 
 
@@ -344,31 +343,32 @@ def test_digests_are_stable_and_tell_kernels_apart():
 def test_the_file_name_follows_everything_that_shapes_machine_code(monkeypatch):
     names = {loading._fingerprint(SOURCE.code)}
     import llvmlite.binding as llvm
-    import numba
-
-    from synchain.codegen.driver import dimensions
-    from synchain.codegen.simd import addresses, elementary, lanes
 
     def changed(*change) -> None:
         with monkeypatch.context() as m:
             m.setattr(*change)
-            loading._surroundings.cache_clear()
+            loading._sources.cache_clear()
             names.add(loading._fingerprint(SOURCE.code))
-        loading._surroundings.cache_clear()
+        loading._sources.cache_clear()
 
     changed(numba, "__version__", "9.9")
     changed(sys, "version", "4.0")
     changed(llvm, "get_host_cpu_name", lambda: "abacus")
     changed(llvm, "get_host_cpu_features", lambda: {"beads": True})
-    changed(lanes, "__file__", __file__)
-    changed(elementary, "__file__", __file__)
-    changed(addresses, "__file__", __file__)
-    changed(dimensions, "__file__", __file__)
     changed(loading.importlib.metadata, "version", lambda name: "9.9")
     changed(loading.platform, "machine", lambda: "sun dial")
+    for name in loading.FLAGS:
+        changed(numba.config, name, "another")
+    for k in range(len(loading.SOURCES)):
+        changed(loading, "SOURCES", [*loading.SOURCES[:k], Path(__file__), *loading.SOURCES[k + 1 :]])
+    monkeypatch.setenv("SYNCHAIN_FRONT_END", "numba")
+    names.add(loading._fingerprint(SOURCE.code))
+    monkeypatch.delenv("SYNCHAIN_FRONT_END")
     names.add(loading._fingerprint(SOURCE.code + "\n"))
-    assert len(names) == 12
+    assert len(names) == 9 + len(loading.FLAGS) + len(loading.SOURCES)
     assert loading._fingerprint(SOURCE.code) in names
+    sources = {path.name for path in loading.SOURCES}
+    assert {"front_end.py", "syntax.py", "writing.py", "lanes.py", "dimensions.py", "functions.py"} <= sources
 
 
 # -- kernels that nobody holds, and drivers ahead of time ------------------------------------------------------
@@ -444,6 +444,61 @@ def test_the_common_drivers_compile(folder, capsys):
         assert main(["cache", "warm"]) == 0
         assert [line.startswith(word) for line in capsys.readouterr().out.splitlines()] == [True] * 21
     assert cache.describe()["drivers"] == 21
+
+
+# -- the front end and forks ----------------------------------------------------------------------------------
+
+
+def test_a_fault_of_the_front_end_is_one_warning(folder, monkeypatch):
+    def fail(*given):
+        raise AttributeError("renamed in the next version")
+
+    monkeypatch.setattr(decorator, "front_end_problems", [])
+    monkeypatch.setattr(syntax, "read", fail)
+    loading._warn_once.cache_clear()
+    kernels = [SOURCE, dataclasses.replace(SOURCE, code=TINY.replace("2.0", "1.0 + 1.0"))]
+    with pytest.warns(RuntimeWarning) as caught:
+        loaded = [fresh(one) for one in kernels]
+    assert [works(one) for one in loaded] == [True, True]
+    assert ["Numba's own pipeline" in str(one.message) for one in caught] == [True]
+    assert "AttributeError: renamed" in str(caught[0].message)
+
+
+FORKED = """
+import os, sys, threading
+sys.path[:0] = sys.argv[1].split(os.pathsep)
+from test_load import SOURCE, TINY, dataclasses, fresh, loading, works
+kernel = fresh()
+second, third = (dataclasses.replace(SOURCE, code=TINY.replace("2.0", number)) for number in ("5.0", "7.0"))
+thread = threading.Thread(target=loading.load, args=(second,))
+inside, compiled = threading.Event(), loading._compile
+loading._compile = lambda *given: (inside.set(), compiled(*given))[1]
+thread.start()
+inside.wait(60)
+child = os.fork()
+if not child:
+    again = loading.load(SOURCE) is kernel and works(kernel)
+    loading.load(third)
+    os._exit(0 if again else 1)
+thread.join()
+print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
+def test_a_process_that_forks_while_a_kernel_compiles_has_a_child_that_runs(folder):
+    way = os.pathsep.join(map(str, (HERE, HERE.parents[1])))
+    done = subprocess.run([sys.executable, "-c", FORKED, way], text=True, capture_output=True, timeout=300, check=False)
+    assert done.stdout == "0\n", done.stderr
+
+
+def test_a_loaded_kernel_waits_for_no_compilation(folder):
+    kernel, found = fresh(), []
+    with loading._lock:
+        thread = threading.Thread(target=lambda: found.append(loading.load(SOURCE)), daemon=True)
+        thread.start()
+        thread.join(60)
+    assert found == [kernel]
 
 
 # -- damage --------------------------------------------------------------------------------------------------
@@ -553,26 +608,50 @@ def test_what_python_keeps_beside_a_module_is_not_run(compiled_folder, folder, m
     assert works(fresh())
 
 
-def test_a_cache_of_numba_elsewhere_is_not_used(folder, tmp_path, monkeypatch):
+def shared_state() -> dict[tuple[str, ...], object]:
+    """What all threads share: the configuration of Numba, functions of its modules and classes, and if garbage is collected."""
+    modules = [m for name, m in sys.modules.items() if name.partition(".")[0] in ("numba", "llvmlite")]
+    owners = {
+        (m.__name__, *inner): owner
+        for m in modules
+        for inner, owner in [((), m), *(((k,), c) for k, c in vars(m).items() if isinstance(c, type))]
+    }
+    found = {
+        (*path, k): f for path, owner in owners.items() for k, f in list(vars(owner).items()) if inspect.isfunction(f)
+    }
+    settings = {("config", k): value for k, value in vars(numba.config).items() if k.isupper()}
+    return {**found, **settings, ("gc",): gc.isenabled()}
+
+
+def test_what_threads_share_is_left_alone_while_kernels_compile(folder, tmp_path, monkeypatch):
     elsewhere = tmp_path / "elsewhere"
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(elsewhere))
+    compile_extra, during = front_end.EntryCompiler.compile_extra, []
+    monkeypatch.setattr(
+        front_end.EntryCompiler,
+        "compile_extra",
+        lambda *given: (during.append(shared_state()), compile_extra(*given))[1],
+    )
     assert works(fresh())
+    before = shared_state()
+    assert works(fresh(dataclasses.replace(SOURCE, code=TINY.replace("3.0", "6.0 * 0.5"))))
+    assert {path for path, value in before.items() if during[-1].get(path, value) != value} == set()
+    assert len(during) == 3
     assert not elsewhere.exists()
     assert machine_code(folder)
-    assert str(elsewhere) == numba.config.CACHE_DIR
 
 
 def test_another_processor_compiles_its_own(compiled_folder, folder, monkeypatch):
     copied(compiled_folder, folder)
     monkeypatch.setattr("llvmlite.binding.get_host_cpu_name", lambda: "abacus")
-    loading._surroundings.cache_clear()
+    loading._sources.cache_clear()
     try:
         compiled = fresh()
         assert from_cache(compiled) == dict.fromkeys(MODULES, False)
         assert works(compiled)
     finally:
         monkeypatch.undo()
-        loading._surroundings.cache_clear()
+        loading._sources.cache_clear()
     for module in MODULES:
         assert len(list(folder.glob(f"{module}_*.py"))) == 2
 
@@ -589,7 +668,6 @@ def test_a_kernel_that_cannot_be_compiled_is_an_error(folder):
     broken = dataclasses.replace(SOURCE, code=TINY.replace("2.0", "undefined_name"))
     with pytest.raises(Exception, match="undefined_name"):
         fresh(broken)
-    assert gc.isenabled()  # it pauses while kernels are compiled
 
 
 def test_a_step_of_other_types_than_the_driver_calls_is_an_error(folder):
@@ -609,6 +687,19 @@ def warned(match: str):
     assert len(caught) == 1
     assert "kernels are not kept on disk" in str(caught[0].message)
     assert works(compiled)
+    return compiled
+
+
+def repaired(match: str):
+    """A file of the cache is refused, with one warning, and written anew."""
+    with pytest.warns(RuntimeWarning, match=match) as caught:
+        compiled = fresh()
+    assert len(caught) == 1
+    assert "refused a file, whose kernel is compiled anew" in str(caught[0].message)
+    assert works(compiled)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert from_cache(fresh()) == ALL_FROM_CACHE
     return compiled
 
 
@@ -634,8 +725,8 @@ def test_a_folder_that_others_can_write_is_refused(compiled_folder, folder):
 def test_a_file_that_others_can_write_is_refused(compiled_folder, folder, suffix, module):
     copied(compiled_folder, folder)
     next(folder.glob(f"{module}_*.{suffix}")).chmod(0o666)
-    compiled = warned("can be written by others; run: chmod go-w")
-    assert from_cache(compiled) == {**ALL_FROM_CACHE, module: False}
+    compiled = repaired("can be written by others; run: chmod go-w")
+    assert from_cache(compiled) == {**ALL_FROM_CACHE, module: suffix == "py"}
 
 
 @posix
@@ -692,14 +783,95 @@ def test_a_pipe_in_the_place_of_a_file_does_not_keep_anybody_waiting(compiled_fo
     path = next(folder.glob(f"{module}_*.{suffix}"))
     path.unlink()
     os.mkfifo(path, 0o600)
-    assert from_cache(warned("is a pipe or device; expected a file")) == {**ALL_FROM_CACHE, module: False}
+    assert from_cache(repaired("is a pipe or device; expected a file")) == {**ALL_FROM_CACHE, module: suffix == "py"}
 
 
-def test_a_read_only_folder_is_refused(folder, monkeypatch):
-    folder.mkdir()
-    monkeypatch.setattr(cache.os, "access", lambda path, mode: False)
-    refused("is read-only; set SYNCHAIN_CACHE to a folder you can write")
-    assert not list(folder.iterdir())
+@posix
+@pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="only root gives files away")
+def test_a_file_of_somebody_else_is_replaced(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    os.chown(machine_code(folder, "kernel")[0], 4711, 4711)
+    assert from_cache(repaired("belongs to another user")) == {**ALL_FROM_CACHE, "kernel": False}
+
+
+@pytest.fixture
+def read_only(monkeypatch) -> None:
+    """A file system that can only be read, for the superuser too."""
+    opening, making = os.open, os.mkdir
+
+    def only_read(path, flags, *mode, **place):
+        if flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT):
+            raise OSError(errno.EROFS, "Read-only file system", path)
+        return opening(path, flags, *mode, **place)
+
+    def make_nothing(path, *mode, **place):
+        if os.path.isdir(path):
+            return making(path, *mode, **place)
+        raise OSError(errno.EROFS, "Read-only file system", path)
+
+    monkeypatch.setattr(os, "open", only_read)
+    monkeypatch.setattr(os, "mkdir", make_nothing)
+
+
+def test_a_warm_cache_that_can_only_be_read_is_used(compiled_folder, folder, request):
+    copied(compiled_folder, folder)
+    request.getfixturevalue("read_only")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert from_cache(fresh()) == ALL_FROM_CACHE
+
+
+@pytest.mark.usefixtures("folder", "read_only")
+def test_without_a_place_to_write_kernels_are_compiled_in_memory(monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", "/nowhere")
+    warned("Read-only file system")
+
+
+@pytest.fixture
+def settings(tmp_path, monkeypatch) -> Path:
+    """The folder of the key, which does not exist yet."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "settings"))
+    monkeypatch.setattr(sys, "platform", "linux")
+    return tmp_path / "settings" / "synchain"
+
+
+def test_machine_code_that_another_key_signed_is_not_run(compiled_folder, folder, settings):
+    """A cache that is carried here is code, of which a checksum says nothing."""
+    copied(compiled_folder, folder)
+    (code,) = machine_code(folder, "kernel")
+    evil = pickle.dumps(Runs("raise SystemExit('not ours')"))
+    code.write_bytes(hashlib.sha256(f"{code.stem}\n".encode() + evil).digest() + evil)
+    with pytest.warns(RuntimeWarning, match="was signed by another user or machine") as caught:
+        compiled = fresh()
+    assert len(caught) == 1
+    assert from_cache(compiled) == dict.fromkeys(MODULES, False)
+    assert from_cache(fresh()) == ALL_FROM_CACHE
+    key = settings / cache.KEY
+    assert (len(key.read_bytes()), stat.S_IMODE(key.stat().st_mode)) == (32, 0o600)
+    assert [path.name for path in settings.iterdir()] == [cache.KEY]
+
+
+def test_processes_that_make_a_key_at_once_agree(folder, settings, monkeypatch):
+    """The second writes its own after the first has looked for one."""
+    with cache.open_folder(settings) as one, cache.open_folder(settings) as two:
+        write, first = cache.Folder.write, []
+
+        def slow(opened, name, data):
+            if not first:
+                first.append(None)
+                first[0] = two.own_key()
+            write(opened, name, data)
+
+        monkeypatch.setattr(cache.Folder, "write", slow)
+        assert one.own_key() == first[0] == two.own_key()
+
+
+def test_without_settings_the_key_lies_in_the_cache(folder, settings):
+    settings.parent.write_text("no folder")
+    with cache.open_folder(folder) as opened:
+        opened.keep("kernel_a", b"code")
+        assert opened.machine_code("kernel_a") == b"code"
+        assert (folder / cache.KEY).read_bytes() == opened.key()
 
 
 def test_a_folder_of_somebody_else_is_refused(folder, monkeypatch):

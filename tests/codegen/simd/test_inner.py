@@ -14,11 +14,10 @@ from numba.core.registry import cpu_target
 from numba.core.target_extension import get_local_target
 
 from synchain.codegen.simd import (
-    decorator,
     lanes,  # noqa: F401  (defines the operators)
     syntax,
 )
-from synchain.codegen.simd.decorator import njit, without_repetition
+from synchain.codegen.simd.decorator import njit
 from synchain.codegen.simd.lane_types import Lane
 
 
@@ -101,10 +100,3 @@ def test_the_meaning_of_an_operator_is_found_once(monkeypatch: pytest.MonkeyPatc
     meanings = [reader.meaning(operator.add, pair)[1] for pair in pairs]
     assert [meaning.args for meaning in meanings] == pairs
     assert asked == pairs[:2]
-
-
-def test_numba_is_left_as_it_was() -> None:
-    before = [getattr(owner, name) for owner, name, _ in decorator._instead()]
-    with without_repetition():
-        assert [getattr(owner, name) for owner, name, _ in decorator._instead()] != before
-    assert [getattr(owner, name) for owner, name, _ in decorator._instead()] == before

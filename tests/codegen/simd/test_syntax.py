@@ -1,9 +1,10 @@
-"""Functions that are read from their syntax tree: they have the bits that Numba's own way gives them."""
+"""Functions that are read from their syntax tree: they have the bits that Numba's own way gives them, which is a way back."""
 
 from __future__ import annotations
 
 import random
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,11 @@ import numpy as np
 import pytest
 from numba import types
 from numba.core import errors
+from numba.core.registry import cpu_target
 from numba.core.runtime import _nrt_python, rtsys
 
 from synchain.codegen.kernels.compile import _compile, _MachineCode
-from synchain.codegen.simd import syntax
+from synchain.codegen.simd import decorator, front_end, syntax, trees, writing
 
 HEAD = """import math
 import numpy as np
@@ -46,13 +48,19 @@ VECTOR = types.float64[::1]
 ARGUMENTS = (VECTOR, VECTOR, types.int64, types.UniTuple(types.float64, 2))
 
 
-def _in_both_ways(bodies: dict[str, str], folder: Path) -> dict[str, tuple[Any, Any]]:
-    """Functions of these bodies compiled from their syntax and by Numba itself, by name."""
+def _module(bodies: dict[str, str]) -> tuple[list[str], str]:
+    """The names of functions of these bodies, and their module."""
     names = [f"f{k}" for k in range(len(bodies))]
     text = HEAD
     for name, body in zip(names, bodies.values(), strict=True):
         lines = "\n".join("    " + line for line in body.splitlines())
         text += f'\n\n@njit(error_model="numpy", cache=True)\ndef {name}(x, out, n, pair):\n{lines}\n'
+    return names, text
+
+
+def _in_both_ways(bodies: dict[str, str], folder: Path) -> dict[str, tuple[Any, Any]]:
+    """Functions of these bodies compiled from their syntax and by Numba itself, by name."""
+    names, text = _module(bodies)
     path, wanted = folder / "text.py", dict.fromkeys(names, types.void(*ARGUMENTS))
     path.write_text(text)
     read = _compile(text, path, wanted, _MachineCode()).functions
@@ -104,6 +112,18 @@ READ = {
 }  # fmt: skip
 
 
+@pytest.fixture(params=["", "numba"])
+def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """The front end, which must not fail, or Numba's own pipeline, which must not call the front end."""
+    monkeypatch.setenv("SYNCHAIN_FRONT_END", request.param)
+    if request.param:
+        monkeypatch.delattr(syntax, "read")
+    monkeypatch.setattr(decorator, "front_end_problems", problems := [])
+    yield request.param
+    assert problems == []
+
+
+@pytest.mark.usefixtures("way")
 def test_what_is_read_has_the_bits_of_numbas_own_way(tmp_path: Path) -> None:
     for name, (read, numbas) in _in_both_ways(READ, tmp_path).items():
         assert any(_filled(read, n, n).strip(b"\0") for n in range(9)), name
@@ -142,9 +162,46 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("body", "found"), REFUSED.values(), ids=REFUSED)
-def test_what_is_not_read_is_refused(body: str, found: str, tmp_path: Path) -> None:
+def test_what_is_not_read_is_refused(body: str, found: str) -> None:
+    space: dict[str, Any] = {}
+    trees.execute(_module({"one": body})[1], "<text>", space)
     with pytest.raises(syntax.UnreadError, match=re.escape(found)):
-        _in_both_ways({"one": body}, tmp_path)
+        syntax.read(cpu_target.typing_context, space["f0"].py_func, ARGUMENTS, types.void)
+
+
+ONLY_NUMBA = ("an argument by name", "a type for each block", "a step that is not known", "a loop with another end")
+
+
+def test_what_is_not_read_is_left_to_numba(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(decorator, "front_end_problems", problems := [])
+    pairs = _in_both_ways({name: REFUSED[name][0] for name in ONLY_NUMBA}, tmp_path)
+    for (name, (compiled, numbas)), problem in zip(pairs.items(), problems, strict=True):
+        assert REFUSED[name][1] in problem
+        for n in range(9):
+            assert _filled(compiled, n, n) == _filled(numbas, n, n), name
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "fault"),
+    [
+        (syntax, "read", AttributeError),
+        (writing.Program, "write", TypeError),
+        (front_end, "InnerCompiler", ImportError),
+        (front_end._Lower, "setup_function", KeyError),
+    ],
+)
+def test_a_front_end_that_fails_is_left_out(
+    owner: Any, name: str, fault: type[Exception], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*given: Any) -> Any:
+        raise fault("renamed in the next version")
+
+    monkeypatch.setattr(decorator, "front_end_problems", problems := [])
+    monkeypatch.setattr(owner, name, fail)
+    ((read, numbas),) = _in_both_ways({"one": READ["tuples"]}, tmp_path).values()
+    assert problems
+    assert f"{fault.__name__}: " in problems[0]
+    assert _filled(read, 3, 3) == _filled(numbas, 3, 3)
 
 
 def test_operands_without_a_meaning_are_refused_by_numba(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit as numba_njit
 
 from synchain.codegen import simd
-from synchain.codegen.simd.decorator import execute, without_repetition
+from synchain.codegen.simd.trees import execute
 from synchain.codegen.steps.names import tidy
 from synchain.codegen.steps.program import program
 from synchain.codegen.taylor import TaylorStep, write_looped, write_step
@@ -54,8 +54,7 @@ class Lanes:
         t = np.full(self.width, float(more.get("t", 0.0)))
         ends = np.broadcast_to(np.asarray(end, float), self.width).copy()
         atol = rtol / 10 if atol is None else atol
-        with without_repetition():  # the first call compiles
-            steps = self.march(t, y, ends, rtol, atol, float(more.get("scale", 2.0**-6)))
+        steps = self.march(t, y, ends, rtol, atol, float(more.get("scale", 2.0**-6)))
         return y[: self.equations.dimension * self.width].reshape(-1, self.width).T.copy(), steps
 
     def bank(self, start: Any, numbers: Any) -> np.ndarray:
@@ -76,8 +75,7 @@ class Lanes:
         )
         rtol, atol = more.get("rtol", 1e-10), more.get("atol", 1e-11)
         t, scale = float(more.get("t", 0.0)), float(more.get("scale", 1.0))
-        with without_repetition():  # the first call compiles
-            length = self.once(t, float(h), scale, y, y_new, dense, rtol, atol)
+        length = self.once(t, float(h), scale, y, y_new, dense, rtol, atol)
         return length, y_new.reshape(size, -1).T, dense[: self.order * size * self.width].reshape(self.order, size, -1)
 
 

@@ -180,7 +180,7 @@ sums = st.lists(st.tuples(turns, st.fractions(-3, 3, max_denominator=4)), max_si
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(sums, sums)
 def test_sums_and_products_of_cosines(a: AngleSum, b: AngleSum) -> None:
     assert (a + b).near == pytest.approx(a.near + b.near, abs=1e-9)
@@ -206,7 +206,7 @@ def test_equal_sums_are_told_from_nearly_equal_ones() -> None:
     ]  # fmt: skip
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(sums)
 def test_minimal_polynomials_of_sums(a: AngleSum) -> None:
     found = minimal_polynomial(a)

@@ -330,7 +330,7 @@ def test_a_graph_is_built_without_sympy() -> None:
     assert done.stdout == "[]\n"
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(1, 9), st.data())
 def test_leading_groups_are_as_many_as_zero_eigenvalues(n: int, data: st.DataObject) -> None:
     pairs = [(i, j) for i, j in product(range(n), repeat=2) if i != j]

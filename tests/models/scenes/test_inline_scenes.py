@@ -83,7 +83,7 @@ def fields(draw: st.DrawFn) -> Oscillator:
     return Field(rates, parameters={"k": draw(st.floats(-2, 2))})
 
 
-@settings(deadline=None, max_examples=20, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
 @given(st.data())
 def test_scene_to_file_and_back(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     node = data.draw(lagrangians() | fields() | st.sampled_from([SLIDER, STICKY]))
@@ -177,7 +177,7 @@ def paths(tree: object, at: tuple[object, ...] = ()) -> list[tuple[object, ...]]
     return [at, *(path for key, value in items for path in paths(value, (*at, key)))]
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(st.data())
 def test_any_mutated_table_is_an_oscillator_or_one_clear_line(data: st.DataObject) -> None:
     tree: dict = copy.deepcopy(TABLE)

@@ -726,7 +726,7 @@ def paths(tree: object, at: tuple[object, ...] = ()) -> list[tuple[object, ...]]
     return [at, *(path for key, value in items for path in paths(value, (*at, key)))]
 
 
-@settings(deadline=None, max_examples=250)
+@settings(max_examples=250)
 @given(st.data())
 def test_any_mutated_scene_is_a_scene_or_one_clear_line(data: st.DataObject) -> None:
     tree = copy.deepcopy(VALID)
@@ -750,7 +750,7 @@ def test_any_mutated_scene_is_a_scene_or_one_clear_line(data: st.DataObject) -> 
         assert hash(scene) == hash(Scene.from_dict(scene.as_dict()))
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(st.sampled_from(sorted(VALID)), ANYTHING)
 def test_any_value_of_any_key_is_a_scene_or_one_clear_line(key: str, value: object) -> None:
     scene, words = outcome({key: value})

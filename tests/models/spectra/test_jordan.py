@@ -69,7 +69,7 @@ def test_blocks_of_irrational_eigenvalues(graph: Topology, layers: int) -> None:
     assert found.defective == tuple(others)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.data())
 def test_random_one_way_graphs_have_the_blocks_of_sympy(data: st.DataObject) -> None:
     n = data.draw(st.integers(2, 6))

@@ -215,7 +215,7 @@ def test_all_connected_graphs_of_few_nodes_against_numpy(largest: int) -> None:
 weights = st.fractions(min_value=-3, max_value=3, max_denominator=12)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(2, 7), st.data())
 def test_random_rational_symmetric_matrices(n: int, data: st.DataObject) -> None:
     links = []
@@ -229,7 +229,7 @@ def test_random_rational_symmetric_matrices(n: int, data: st.DataObject) -> None
     assert np.sort(expanded(found)) == pytest.approx(np.linalg.eigvalsh(floats(graph)), rel=1e-9, abs=1e-9)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(2, 6), st.data())
 def test_random_one_way_graphs(n: int, data: st.DataObject) -> None:
     pairs = [(i, j) for i, j in product(range(n), repeat=2) if i != j]

@@ -59,7 +59,7 @@ def test_a_missing_and_an_old_package_are_wrong(monkeypatch, capsys) -> None:
     check = outcome("packages")
     assert check.outcome == "wrong"
     assert "tqdm is missing, expected tqdm>=" in check.found
-    assert "numba is 0.1, expected numba>=" in check.found
+    assert "numba is 0.1, expected numba" in check.found
     assert main(["doctor", "--json"]) == 1
     captured = capsys.readouterr()
     assert json.loads(captured.out)["sound"] is False

@@ -62,7 +62,7 @@ def test_windows_are_the_rounded_projection_of_ranges(graph: Topology, ranges: l
     assert [list(p) for p in pieces(windows(ranges, graph))] == [pytest.approx(list(p), rel=1e-14) for p in expected]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 10_000), st.lists(st.integers(0, 400), min_size=2, max_size=6, unique=True))
 def test_every_sigma_is_inside_exactly_where_all_modes_are_stable(seed: int, ends: list[int]) -> None:
     ends = sorted(ends)[: len(ends) // 2 * 2]

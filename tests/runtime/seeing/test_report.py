@@ -51,6 +51,8 @@ def browse(file: Path, *options: str) -> str:
     command = [
         str(BROWSER),
         *("--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--enable-logging=stderr"),
+        *("--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update"),
+        "--disable-sync",
         f"--user-data-dir={file.parent / 'profile'}",
         f"--window-size={SIZE[0]},{SIZE[1]}",
         *options,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -291,21 +290,27 @@ def test_ctrl_c_in_a_continued_sweep_in_memory_goes_on_where_it_was(files, tmp_p
     assert (tmp_path / "a.nc").read_bytes() == files[UP]
 
 
+FULL = """
+import errno, resource, sys
+from streams import MAP, partial
+from pathlib import Path
+from synchain.runtime.sweeps.errors import SweepFailed
+from synchain.runtime.sweeps.stream import stream
+path = Path(sys.argv[1])
+resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
+try:
+    stream(MAP, path, workers=1, show_progress=False)
+except SweepFailed as problem:
+    good = problem.__cause__.errno == errno.EFBIG and 0 < problem.finished < MAP.cells
+    sys.exit(7 if good and str(partial(path)) in str(problem) else 1)
+"""
+
+
 def test_a_disk_that_fills_up(files, tmp_path):
     """A limit on the size of files in a process of its own stands for the disk."""
-    path = tmp_path / "a.nc"
-    child = os.fork() if threading.active_count() == 1 else None
-    if child is None:
-        pytest.skip("this process has threads")
-    if child == 0:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
-        try:
-            stream(MAP, path, workers=1, show_progress=False)
-        except SweepFailed as problem:
-            good = problem.__cause__.errno == errno.EFBIG and 0 < problem.finished < MAP.cells
-            os._exit(7 if good and str(partial(path)) in str(problem) else 1)
-        os._exit(2)
-    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+    path, here = tmp_path / "a.nc", {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    done = subprocess.run([sys.executable, "-c", FULL, str(path)], env=here, capture_output=True, text=True)
+    assert done.returncode == 7, done.stderr
     assert 0 < int((open_result(partial(path)).status == Status.FINISHED).sum()) < MAP.cells
     stream(MAP, path, resume=True, show_progress=False)
     assert path.read_bytes() == files[MAP]
