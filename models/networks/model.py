@@ -302,12 +302,22 @@ def _unlinked(kinds: tuple[NodeKind, ...], kind_of: tuple[int, ...], contact: Co
 
 @lru_cache(maxsize=64)
 def union_of(graphs: tuple[Topology, ...], name: str) -> Topology:
-    """Return the union of graphs: a link of weight 1 wherever one of them has a link."""
-    n = graphs[0].n
+    """Return the union of graphs: a link of weight 1 wherever one of them has a link.
+
+    Raises ValueError if two graphs give their nodes different labels, or one order of them and another.
+    """
+    n, labels = graphs[0].n, None
+    for graph in graphs:
+        if graph.labelled and tuple(graph.labels) != (labels or tuple(graph.labels)):
+            raise ValueError(
+                f"links: found the nodes {short_repr(labels)} and {short_repr(graph.labels)}; expected one order of the same "
+                "labels in all graphs"
+            )
+        labels = tuple(graph.labels) if graph.labelled else labels
     if any(graph.all_to_all is not None for graph in graphs):
-        return Topology(name, n, rule=topology("complete", n).rule)
+        return Topology(name, n, rule=topology("complete", n).rule, labels=labels)
     pairs = sorted({link[:2] for graph in graphs for link in graph.links})
-    return Topology(name, n, tuple((*p, Fraction(1)) for p in pairs))
+    return Topology(name, n, tuple((*p, Fraction(1)) for p in pairs), labels=labels)
 
 
 @lru_cache(maxsize=64)
