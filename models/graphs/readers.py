@@ -97,7 +97,9 @@ def edge_graph(edges: object, nodes: Sequence[Hashable] | None, directed: object
     for k, edge in enumerate(listed, start=1):
         strange = next((node for node in edge[:2] if node not in known), None)
         if strange is not None:
-            raise ValueError(f"{name}: edge {k}: found the node {short_repr(strange)}; expected one of {_listed(nodes)}")
+            raise ValueError(
+                f"{name}: edge {k}: found the node {short_repr(strange)}; expected one of {_listed(nodes)}"
+            )
     return assembled(nodes, ((*edge, one_way) for edge in listed), name)
 
 

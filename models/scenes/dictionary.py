@@ -101,7 +101,9 @@ def graph_of(given: Mapping[object, Any], folder: Path | None = None) -> Topolog
     for key in ("name", "n"):
         if key not in given:
             found = short_repr(dict(given))
-            raise ValueError(f"topology: {key!r} is missing in {found}; expected name and n, or edges, or matrix, or file")
+            raise ValueError(
+                f"topology: {key!r} is missing in {found}; expected name and n, or edges, or matrix, or file"
+            )
     n = check_integer("topology n", given["n"], 0, MOST_NODES)
     if not known and is_composed(part("topology name", name)):
         return _composed(str(name), n)

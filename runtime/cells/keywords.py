@@ -80,10 +80,17 @@ class Given:
         TypeError
             If `scene` is no Scene.
         ValueError
-            If a name is no parameter of the scene, or is given twice; as `expect_one_cell`.
+            If a name is no parameter of the scene, or is given twice, for a list; as `expect_one_cell`.
         """
         self.expect_one_cell(scene, free)
-        return with_numbers(scene, self.checked(scene), **{**ONE_CELL, **settings})
+        numbers = self.checked(scene)
+        listed = next((name for name, value in numbers.items() if is_row(value)), None)
+        if listed is not None:
+            raise ValueError(
+                f"{self.function.__name__}: found a list for {listed!r}; expected one number, since only functions that sweep "
+                f"take lists, as axes; give each node or link its own number in the scene: scene.replace({listed}=[…])"
+            )
+        return with_numbers(scene, numbers, **{**ONE_CELL, **settings})
 
     def expect_one_cell(self, scene: Scene, free: Collection[str] = ()) -> None:
         """Raise ValueError for a scene with draws, or with axes that no parameter fixes: one cell would stand for all.
