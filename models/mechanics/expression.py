@@ -17,6 +17,7 @@ from sympy.logic.boolalg import Boolean
 from ..inputs.checks import short_repr, suggestion
 from ..inputs.expressions import FUNCTIONS, Expressions
 from ..inputs.reader import NoMeaning, parse, unpaired
+from ..inputs.unsupported import COMPLEX
 from .components import TIME
 from .oscillator import FRICTION
 
@@ -101,7 +102,9 @@ def _settled(what: str, e: sp.Expr, names: Mapping[str, sp.Symbol]) -> sp.Expr:
             again = read(what, written(e), names)
         except ValueError as error:
             reason = str(error).removeprefix(f"{what}: ")
-            raise ValueError(f"{what}: {short_repr(e)} cannot be written as text: {reason}; write it otherwise") from None
+            raise ValueError(
+                f"{what}: {short_repr(e)} cannot be written as text: {reason}; write it otherwise"
+            ) from None
         if again == e:
             return e
         e = again
@@ -319,7 +322,7 @@ def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
         raise ValueError(f"{what}: unreadable expression {found}; expected such as '-k*x + u*cos(omega*t)'")
     found = _by_quotients(_OfModels(what, names).read(expression))
     if found.has(sp.I):
-        raise ValueError(f"{what}: found the complex {short_repr(found)}; expected a real value")
+        raise ValueError(f"{what}: found the complex {short_repr(found)}; expected a real value; {COMPLEX}")
     return found
 
 

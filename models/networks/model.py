@@ -16,9 +16,10 @@ from ..dynamics.equations import Equations
 from ..graphs.families import topology
 from ..graphs.links import LINK_LIMIT, numbered
 from ..graphs.topology import Topology
-from ..inputs.checks import check_number, short_repr, suggestion
+from ..inputs.checks import check_number, listed, short_repr, suggestion
 from ..inputs.frozen import Frozen
 from ..inputs.names import LinkName, NodeName
+from ..inputs.unsupported import unsupported
 from ..interactions.coupling import Coupling, LagrangianCoupling, Potential
 from ..mechanics.components import WEIGHT_NUMBER
 from ..mechanics.friction import ContactModel, FrictionLaw
@@ -273,7 +274,7 @@ class Model:
 
     def unknown(self, name: str, what: str, known: Iterable[str]) -> str:
         """Return the sentence that refuses a name; a parameter of the coupling without links has its own."""
-        known, reason = tuple(known), self.no_link(name)
+        known, reason = tuple(known), self.no_link(name) or unsupported(name)
         if reason:
             return f"unknown {what} {name!r}; {reason}"
         for coupling, graph in self.layers:
@@ -282,7 +283,7 @@ class Model:
                     f"{what} {name!r} couples oscillators, but {graph.name}({graph.n}) has no links: "
                     f"there is nothing to couple; leave it out or take at least two oscillators, e.g. chain(2)"
                 )
-        return f"unknown {what} {short_repr(name)}; known: {', '.join(known)}{suggestion(name, known)}"
+        return f"unknown {what} {short_repr(name)}; known: {listed(known)}{suggestion(name, known)}"
 
     def check_state(self, name: str, what: str) -> None:
         """Raise ValueError if a name such as "v_2" is no state of the network; `what` says what the name is for."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pkgutil
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -41,8 +42,8 @@ METHODS = Path(__file__).parents[2] / "codegen" / "integrators"
 """The folder of the integrators, one file each; it is listed here, and read by the code generator alone."""
 
 LIMITS: Mapping[str, tuple[Any, Any]] = {
-    "transient": (0.0, 1e9),
-    "window": (0.0, 1e9),
+    "transient": (0.0, sys.float_info.max),
+    "window": (0.0, sys.float_info.max),
     "rtol": (1e-15, 0.1),
     "atol": (0.0, 0.1),
     "max_steps": (1, 10**12),

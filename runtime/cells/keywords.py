@@ -9,8 +9,9 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from synchain.models.inputs.checks import check_number, check_table, check_text, is_row, suggestion
+from synchain.models.inputs.checks import check_number, check_table, check_text, is_row, listed, suggestion
 from synchain.models.inputs.names import NodeName
+from synchain.models.inputs.unsupported import unsupported
 from synchain.models.scenes.scene import KEYWORDS, Scene, a_scene
 from synchain.models.sweeps.parameters import without
 
@@ -158,14 +159,14 @@ class Given:
             return f"{of} takes no {name!r}: {self.refused[name]}"
         if name in KEYWORDS:
             return f"{of}: {name!r} is a field of the scene; expected parameters; write scene.replace({name}=…)"
-        reason = scene.model.no_link(name)
+        reason = scene.model.no_link(name) or unsupported(name)
         if reason:
             return f"{of}: unknown parameter {name!r}; {reason}"
         initial = scene.equations.state if states else ()
         words = suggestion(name, (*scene.parameters, *initial, *own)) or suggestion(name, KEYWORDS)
         shown = initial if len(initial) <= SHOWN else (f"{initial[0]} … {initial[-1]}",)
         known = dict.fromkeys((*scene.parameters, *shown, *own))
-        return f"unknown parameter or keyword {name!r} of {of}; known: {', '.join(known)}{words}"
+        return f"unknown parameter or keyword {name!r} of {of}; known: {listed(known)}{words}"
 
 
 def with_numbers(scene: Scene, values: Mapping[str, object], **settings: object) -> Scene:
