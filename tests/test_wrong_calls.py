@@ -73,7 +73,7 @@ CALLS = [
     (lambda: models.from_edges([{0, 1}]), r"edge 1 is \{0, 1\}; expected \(i, j\)"),
     (lambda: models.from_edges([{"a": 1, "b": 2}]), "edge 1 is"),
     (lambda: models.from_edges([(0, 1)], directed="no"), "directed: found 'no'"),
-    (lambda: models.from_edges([(0.0, 1)]), r"node \(counted from 0\) = 0\.0; expected a whole"),
+    (lambda: models.from_edges([({0}, 1)]), r"node: found \{0\} \(set\); expected a label"),
     (lambda: models.from_matrix(scipy.sparse.eye(3)), "read by from_sparse"),
     (lambda: models.from_sparse(scipy.sparse.coo_array(np.ones(3))), "expected a square matrix"),
     (lambda: models.from_symbols(3), "is a int; expected rows"),

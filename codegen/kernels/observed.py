@@ -295,7 +295,7 @@ class _Writer:
     def _loads(self, values: Sequence[sp.Expr], places: Mapping[str, tuple[str, Expression]]) -> list[Statement]:
         """The statements that load what has a place and is used: states, their rates, and parameters."""
         rates = {r.args[0].name for e in values for r in e.atoms(Rate)}
-        plain = {s.name for e in values for s in e.xreplace({r: sp.S.Zero for r in e.atoms(Rate)}).free_symbols}
+        plain = {s.name for e in values for s in e.xreplace({r: sp.Dummy() for r in e.atoms(Rate)}).free_symbols}
         body: list[Statement] = []
         for name, (shown, place) in places.items():
             if name in rates:

@@ -1,12 +1,13 @@
 """The language of claims about spectra, one claim a line of text.
 
-chain 4: 0, -2+sqrt(2), -2, -2-sqrt(2)      # the whole spectrum, in any order star 6: 0, -1^4, -6
-# ^4: four times star n=3..12: 0, -1^(n-2), -n               # every n of a range torus 9 shape=3x3:
-0, -3^4, -6^4            # options of the family: name=value, without blanks ring n=3..9:
--4*sin(k*pi/n)**2 for k=0..n-1 matrix G.txt: ~-3.414, -2, ~-0.586, 0       # ~: an approximation,
-right if it is the value rounded to its digits chain 1000000: largest = -4*cos(pi/(2*n))**2,
-distinct = n   # parts, of graphs of any size: see `parts` cartesian(chain(2), ring(5)): ratio < 10
-# products and unions of families: see `graph_text`
+chain 4: 0, -2+sqrt(2), -2, -2-sqrt(2)                # the whole spectrum, in any order
+star 6: 0, -1^4, -6                                   # ^4: four times
+star n=3..12: 0, -1^(n-2), -n                         # every n of a range
+torus 9 shape=3x3: 0, -3^4, -6^4                      # options of the family: name=value, without blanks
+ring n=3..9: -4*sin(k*pi/n)**2 for k=0..n-1
+matrix G.txt: ~-3.414, -2, ~-0.586, 0                 # ~: right if it is the value rounded to its digits
+chain 1000000: largest = -4*cos(pi/(2*n))**2, distinct = n    # parts, of graphs of any size: see `parts`
+cartesian(chain(2), ring(5)): ratio < 10              # products and unions of families: see `graph_text`
 """
 
 from __future__ import annotations

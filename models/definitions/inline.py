@@ -397,6 +397,10 @@ def _name(what: str, role: str, key: object) -> str:
             f"{what}: found {typed_repr(key)} for a {role}; expected a symbol, a function of time or a name"
         )
     plain = name.isidentifier() and not iskeyword(name) and not name.startswith("_") and len(name) <= 60
+    if iskeyword(name):
+        raise ValueError(
+            f"{what}: {name!r} is a word of Python, which no text can use; call the {role} {name}_ or {name[:3]}"
+        )
     if not plain or unicodedata.normalize("NFKC", name) != name:
         raise ValueError(
             f"{what}: {short_repr(name)} is no name of a {role}; expected letters and digits, such as 'mu_1'"

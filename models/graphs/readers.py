@@ -6,9 +6,10 @@ to v means that v feels u: it becomes the link v <- u.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from fractions import Fraction
+from numbers import Number
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -62,9 +63,11 @@ def from_edges(
     Parameters
     ----------
     edges : iterable of (i, j) or (i, j, weight)
-        Nodes count from 0, so that the first state is that of node 0; the weight is 1 without.
+        Nodes are labels of any kind that can be hashed, numbers too; the weight is 1 without.  Whole numbers are put in
+        ascending order, other labels in that of their first mention: the first one has the first state, such as
+        ``x_1``.  Results and drawings name nodes by their labels.
     n : int, optional
-        Number of nodes; without, the largest node is the last.
+        Number of nodes, which are 0 … n - 1 then, those without edges too.
     directed : bool, optional
         True if j feels i, but i does not feel j.
     name : str, optional
@@ -73,25 +76,40 @@ def from_edges(
     Raises
     ------
     ValueError
-        On a wrong node, a loop, a repeated edge, a weight that is not rational or 0.
+        On a loop, a repeated edge, a weight that is not rational or 0, and on a node outside 0 … n - 1.
     TypeError
-        On nodes that are no whole numbers.
+        On nodes that cannot be hashed.
     """
+    if n is not None:
+        return edge_graph(edges, range(check_integer(f"{name}: n", n, 1)), directed, name)
+    return edge_graph(edges, None, directed, name)
+
+
+def edge_graph(edges: object, nodes: Sequence[Hashable] | None, directed: object, name: str) -> Topology:
+    """Return the graph of a list of edges between given nodes, or between those that the edges name."""
     if isinstance(edges, str | bytes | Mapping) or not isinstance(edges, Iterable):
         raise TypeError(f"{name}: found {typed_repr(edges)}; expected a list of edges, e.g. [(0, 1), (1, 2, 0.5)]")
-    check_flag("directed", directed)
-    last = None if n is None else check_integer(f"{name}: n", n, 1) - 1
-    found = [_edge(edge, f"{name}: edge {k + 1}", last) for k, edge in enumerate(edges)]
-    size = 1 + (max((max(i, j) for i, j, _ in found), default=-1) if last is None else last)
-    weights: Weights = {}
-    called = _Names(name, range(size))
-    for i, j, weight in found:
-        _put(weights, j, i, weight, directed, called)
-    return _graph(name, size, weights)
+    one_way = check_flag("directed", directed)
+    listed = [_edge(edge, f"{name}: edge {k}") for k, edge in enumerate(edges, start=1)]
+    if nodes is None:
+        nodes = sorted_labels(dict.fromkeys(node for edge in listed for node in edge[:2]))
+    known = nodes if isinstance(nodes, range) else set(nodes)
+    for k, edge in enumerate(listed, start=1):
+        strange = next((node for node in edge[:2] if node not in known), None)
+        if strange is not None:
+            raise ValueError(
+                f"{name}: edge {k}: found the node {short_repr(strange)}; expected one of {_listed(nodes)}"
+            )
+    return assembled(nodes, ((*edge, one_way) for edge in listed), name)
+
+
+def _listed(nodes: Sequence[Hashable]) -> str:
+    """The nodes in words, of many the first and the last."""
+    return ", ".join(map(str, nodes)) if len(nodes) < 5 else f"{nodes[0]} … {nodes[-1]}"
 
 
 def from_graph(graph: Any, weight: str | None = "weight", name: str = "graph") -> Topology:
-    """Return the graph of a networkx graph, nodes in its order.
+    """Return the graph of a networkx graph, nodes in its order and with its labels.
 
     Edges of a directed graph act from their first node on their second; parallel edges of a
     multigraph add up.
@@ -126,7 +144,7 @@ def from_graph(graph: Any, weight: str | None = "weight", name: str = "graph") -
     for u, v, data in edges:
         value = rational(data.get(weight, 1), f"{name}: weight of edge {u!r} - {v!r}")
         _put(weights, place[v], place[u], value, graph.is_directed(), called, many)
-    return _graph(name, len(nodes), weights)
+    return _graph(name, len(nodes), weights, [_label(node, f"{name}: node") for node in nodes])
 
 
 def is_graph(value: object) -> bool:
@@ -209,7 +227,7 @@ def read_edges(path: str | Path, directed: bool = False) -> Topology:
                 raise ValueError(f"{name}: line {number} has edge {most + 1}; expected at most {LINK_LIMIT} links")
     numbers = all(word.isascii() and word.isdecimal() and len(word) < 19 for word in order)
     nodes = sorted(order, key=int) if numbers else list(order)
-    return assembled(nodes, [(u, v, weight, directed) for u, v, weight in edges], name)
+    return assembled(nodes, [(u, v, weight, directed) for u, v, weight in edges], name, int if numbers else str)
 
 
 def read_graphml(path: str | Path, weight: str = "weight") -> Topology:
@@ -239,9 +257,12 @@ def read_graphml(path: str | Path, weight: str = "weight") -> Topology:
 
 
 def assembled(
-    nodes: Sequence[Hashable], edges: Iterable[tuple[Hashable, Hashable, object, bool]], name: str
+    nodes: Sequence[Hashable],
+    edges: Iterable[tuple[Hashable, Hashable, object, bool]],
+    name: str,
+    label: Callable[[Any], object] = lambda node: node,
 ) -> Topology:
-    """Return the graph of named nodes and edges (from, to, weight, one-way)."""
+    """Return the graph of named nodes and edges (from, to, weight, one-way); the labels are `label` of the names."""
     for node in nodes:
         check_printable(f"{name}: node name", str(node))
     place = {node: k for k, node in enumerate(nodes)}
@@ -249,7 +270,13 @@ def assembled(
     for u, v, value, directed in edges:
         number = value if type(value) is Fraction else rational(value, f"{name}: weight of edge {u} - {v}")
         _put(weights, place[v], place[u], number, directed, called)
-    return _graph(name, len(nodes), weights)
+    return _graph(name, len(nodes), weights, [*map(label, nodes)])
+
+
+def sorted_labels(labels: Iterable[Hashable]) -> list[Hashable]:
+    """Return whole numbers in ascending order, other labels as they are."""
+    listed = list(labels)
+    return sorted(listed) if all(type(label) is int for label in listed) else listed  # type: ignore[type-var]
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,18 +311,36 @@ def _put(
             )
 
 
-def _edge(edge: Sequence[object], where: str, last: int | None) -> tuple[int, int, Fraction]:
+def _edge(edge: Sequence[object], where: str) -> tuple[Hashable, Hashable, Fraction]:
     unordered = isinstance(edge, str | bytes | Set | Mapping)
     if unordered or not hasattr(edge, "__len__") or len(edge) not in (2, 3):
         raise ValueError(f"{where} is {short_repr(edge)}; expected (i, j) or (i, j, weight)")
-    i, j = (check_integer(f"{where}: node (counted from 0)", node, 0, last) for node in edge[:2])
+    i, j = (_label(node, f"{where}: node") for node in edge[:2])
     return i, j, rational(edge[2], where) if len(edge) == 3 else Fraction(1)
 
 
-def _graph(name: str, n: int, weights: Weights) -> Topology:
+def _label(node: object, what: str) -> Hashable:
+    """A label of a node; a number that is whole, 1.0 or that of NumPy, is an int, to which it is equal."""
+    if node is None or not isinstance(node, Hashable):
+        raise TypeError(f"{what}: found {typed_repr(node)}; expected a label: a number, a text or a tuple")
+    if isinstance(node, Number) and not isinstance(node, bool) and node == (whole := _whole(node)):
+        return whole
+    return node
+
+
+def _whole(number: Any) -> int | None:
+    """The nearest int towards 0; None of what has none."""
+    try:
+        return int(number)
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
+def _graph(name: str, n: int, weights: Weights, labels: Sequence[object] | None = None) -> Topology:
     if len(weights) > LINK_LIMIT:
         raise ValueError(f"{name}: {len(weights)} links; expected at most {LINK_LIMIT}")
-    return Topology(name, n, tuple((i, j, weights[i, j]) for i, j in sorted(weights) if weights[i, j]))
+    links = tuple((i, j, weights[i, j]) for i, j in sorted(weights) if weights[i, j])
+    return Topology(name, n, links, labels=labels)
 
 
 Edge = tuple[str, str, object, bool]

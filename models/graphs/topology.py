@@ -72,11 +72,14 @@ class Topology(Exact, Drawn):
         Keywords with which its family made the graph.
     rule : Rule, optional
         The family or operation that made the graph.
+    labels : sequence, optional
+        What the nodes are called: different numbers, texts or other values, such as those of networkx.  Whole numbers
+        are kept as they are; if one label is none, the texts of all are kept.  Without, nodes are called 1 … n.
 
     Raises
     ------
     ValueError, TypeError
-        If a link is outside the nodes, joins a node to itself, is repeated, out of order or without
+        If labels are not n different ones, if a link is outside the nodes, joins a node to itself, is repeated, out of order or without
         weight.
     """
 
@@ -85,6 +88,7 @@ class Topology(Exact, Drawn):
     options: Options
     rule: Rule | None
     _links: tuple[Link, ...] | None
+    _labels: tuple[int, ...] | tuple[str, ...] | None
 
     def __init__(
         self,
@@ -93,22 +97,35 @@ class Topology(Exact, Drawn):
         links: tuple[Link, ...] | None = None,
         options: Options = (),
         rule: Rule | None = None,
+        labels: Sequence[object] | None = None,
     ) -> None:
         if links is not None or rule is None:
             _check_size(name, n)
             _check_links(name, n, links)
-        for key, value in (("name", name), ("n", n), ("options", options), ("rule", rule), ("_links", links)):
+        called = None if labels is None else _node_labels(name, n, labels)
+        values = (name, n, options, rule, links, called)
+        for key, value in zip(("name", "n", "options", "rule", "_links", "_labels"), values, strict=True):
             object.__setattr__(self, key, value)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Topology):
             return NotImplemented
-        if (self.name, self.n, self.options) != (other.name, other.n, other.options):
+        if (self.name, self.n, self.options, self._labels) != (other.name, other.n, other.options, other._labels):
             return False
         return (self.rule is not None and self.rule == other.rule) or self.links == other.links
 
     def __hash__(self) -> int:
         return hash((self.name, self.n, self.options))
+
+    @property
+    def labels(self) -> Sequence[int] | Sequence[str]:
+        """What the nodes are called, in their order: labels of the edges that made the graph, else 1 … n."""
+        return range(1, self.n + 1) if self._labels is None else self._labels
+
+    @property
+    def labelled(self) -> bool:
+        """True if the nodes were given labels."""
+        return self._labels is not None
 
     @property
     def links(self) -> tuple[Link, ...]:
@@ -150,13 +167,13 @@ class Topology(Exact, Drawn):
     @property
     def asymmetry(self) -> str:
         """The first two nodes whose links there and back differ, in words for a message; "" on a symmetric graph."""
-        known = {} if self.all_to_all is not None else {link[:2]: link[2] for link in self.links}
-        for (target, source), weight in known.items():
-            back = known.get((source, target))
+        weights = {} if self.all_to_all is not None else {link[:2]: link[2] for link in self.links}
+        for (target, source), weight in weights.items():
+            back = weights.get((source, target))
             if back is None:
-                return f"one-way links, first from {source + 1} to {target + 1}"
+                return f"one-way links, first from {self.labels[source]} to {self.labels[target]}"
             if back != weight:
-                return f"the weights {back} from {target + 1} to {source + 1} and {weight} back"
+                return f"the weights {back} from {self.labels[target]} to {self.labels[source]} and {weight} back"
         return ""
 
     @property
@@ -253,7 +270,7 @@ class Topology(Exact, Drawn):
         Returns
         -------
         networkx.Graph or networkx.DiGraph
-            Nodes 0 … n - 1; the edge attribute `weight` is an int, or a Fraction.  A graph that is
+            Nodes have their labels, or 0 … n - 1 if they were given none; the edge attribute `weight` is an int, or a Fraction.  A graph that is
             not symmetric is directed: an edge from j to i means that i feels j.  `from_graph` makes
             the same links of it.
 
@@ -270,10 +287,12 @@ class Topology(Exact, Drawn):
             ) from None
         both = self.symmetric
         graph = networkx.Graph(name=self.name) if both else networkx.DiGraph(name=self.name)
-        graph.add_nodes_from(range(self.n))
+        nodes = self.labels if self.labelled else range(self.n)
+        graph.add_nodes_from(nodes)
         for target, source, weight in self.links:
             if not both or source < target:
-                graph.add_edge(source, target, weight=int(weight) if weight.denominator == 1 else weight)
+                number = int(weight) if weight.denominator == 1 else weight
+                graph.add_edge(nodes[source], nodes[target], weight=number)
         return graph
 
     def __repr__(self) -> str:
@@ -355,6 +374,22 @@ def _check_size(name: object, n: object) -> None:
     size = check_integer(f"{what}: n", n, -(10**18))
     if size < 1:
         raise ValueError(f"{what}: n = {size}; expected at least one node")
+
+
+def _node_labels(name: str, n: int, labels: Sequence[object]) -> tuple[int, ...] | tuple[str, ...]:
+    """The labels as whole numbers if all are, else as texts; ValueError unless they are n different ones."""
+    if all(type(label) is int for label in labels):
+        numbers = tuple(label for label in labels if isinstance(label, int))
+        if len(numbers) == n == len(set(numbers)):
+            return numbers
+    texts = tuple(label if isinstance(label, str) else str(label) for label in labels)
+    if len(set(texts)) < len(texts):
+        texts = tuple(map(repr, labels))
+    if len(texts) != n or len(set(texts)) < n:
+        raise ValueError(f"topology {name}: found the labels {short_repr(texts)}; expected {n} different ones")
+    for text in texts:
+        check_printable(f"topology {name}: label of a node", text)
+    return texts
 
 
 def _check_links(name: str, n: int, links: object) -> None:

@@ -14,11 +14,12 @@ import os
 import re
 import reprlib
 from collections.abc import Callable, Iterable, Mapping, Sized
-from itertools import islice
+from itertools import groupby, islice
 from pathlib import Path
 from typing import Any, TypeGuard, TypeVar
 
 from .arithmetic import constant
+from .unsupported import unsupported
 
 __all__ = [
     "check_callable",
@@ -35,6 +36,7 @@ __all__ = [
     "check_text",
     "first_of",
     "is_row",
+    "listed",
     "short_repr",
     "suggestion",
     "typed_repr",
@@ -89,6 +91,19 @@ def suggestion(found: object, known: Iterable[str], other: Mapping[str, str] | N
     return f"; did you mean {meant[close[0]]!r}?" if close else ""
 
 
+_NUMBERED = re.compile(r"(.+?)((?:_\d+)+)")
+"""Names of one node or link, such as a_2 or k_1_2."""
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return names with commas between them; of more than two in a row that differ by numbers alone the first and the last."""
+    words: list[str] = []
+    for base, same in groupby(names, lambda name: match[1] if (match := _NUMBERED.fullmatch(name)) else name):
+        row = list(same)
+        words += row if len(row) < 3 or row[0] == base else [f"{row[0]} … {row[-1]}"]
+    return ", ".join(words)
+
+
 def first_of(values: Iterable[T], n: int) -> tuple[tuple[T, ...], str]:
     """Return up to n + 1 of some values, and in words how many there are; endless ones are not counted."""
     first = tuple(islice(values, n + 1))
@@ -125,6 +140,8 @@ def check_keys(what: str, given: Mapping[object, object], known: Iterable[str]) 
         if not isinstance(key, str):
             raise TypeError(f"{what}: key {short_repr(key)} is a {type(key).__name__}; expected text")
         if key not in known:
+            if reason := unsupported(key):
+                raise ValueError(f"{what}: unknown key {short_repr(key)}: {reason}")
             close = suggestion(key, known)
             raise ValueError(f"{what}: unknown key {short_repr(key)}; known: {', '.join(known) or 'none'}{close}")
 

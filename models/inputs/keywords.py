@@ -10,6 +10,7 @@ from inspect import Parameter, currentframe, isfunction, signature
 from typing import Any
 
 from .checks import suggestion
+from .unsupported import unsupported
 
 __all__ = ["check_methods", "public", "warn"]
 
@@ -107,6 +108,8 @@ class _Taken:
             return None
         strange = next((name for name in keywords if name not in self.names and not self.any_name), None)
         if strange is not None:
+            if reason := unsupported(strange):
+                return f"unknown keyword {strange!r} of {self.name}: {reason}"
             other = f"; a parameter is given as parameters={{{strange!r}: …}}" if "parameters" in self.names else ""
             return (
                 f"unknown keyword {strange!r} of {self.name}; known: {', '.join(self.names) or 'none'}"

@@ -287,8 +287,9 @@ def _parameters(what: str, given: Mapping[sp.Symbol | str, object] | None) -> Fr
     for key, value in check_table(f"{what}: parameters", {} if given is None else given).items():
         name = key.name if isinstance(key, sp.Symbol) else key
         if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
-            why = ", a word of Python" if isinstance(name, str) and keyword.iskeyword(name) else ""
-            raise ValueError(f"{what}: found the parameter {short_repr(key)}{why}; expected a name such as 'K'")
+            word = isinstance(name, str) and keyword.iskeyword(name)
+            why, close = (", a word of Python", f"{name}_") if word else ("", "K")
+            raise ValueError(f"{what}: found the parameter {short_repr(key)}{why}; expected a name such as {close!r}")
         if name in (TIME.name, WEIGHT.name, _WEIGHT):
             meaning = "the time" if name == TIME.name else "the weight of a link"
             raise ValueError(f"{what}: the parameter {name!r} has the name of {meaning}; rename it")

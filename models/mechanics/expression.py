@@ -17,6 +17,7 @@ from sympy.logic.boolalg import Boolean
 from ..inputs.checks import short_repr, suggestion
 from ..inputs.expressions import FUNCTIONS, Expressions
 from ..inputs.reader import NoMeaning, parse, unpaired
+from ..inputs.unsupported import COMPLEX
 from .components import TIME
 from .oscillator import FRICTION
 
@@ -24,6 +25,9 @@ __all__ = ["FRICTION_NAME", "LENGTH", "exact", "read", "written"]
 
 LENGTH = 20_000
 """Most characters."""
+
+_FORMS = 6
+"""Most forms of an expression that are tried until its text makes it again."""
 
 DIGITS = 10**1000
 """Largest whole number, above and below a line."""
@@ -74,7 +78,7 @@ def exact(what: str, value: object, names: Mapping[str, sp.Symbol]) -> sp.Expr:
         For unknown functions and symbols, and for numbers that are not finite and real.
     """
     if isinstance(value, str):
-        return read(what, value, names)
+        return _settled(what, read(what, value, names), names)
     if isinstance(value, bool) or not isinstance(value, int | float | Fraction | sp.Expr):
         kind = type(value).__name__
         raise TypeError(f"{what}: found {short_repr(value)} ({kind}); expected an expression")
@@ -88,7 +92,23 @@ def exact(what: str, value: object, names: Mapping[str, sp.Symbol]) -> sp.Expr:
         text = written(given.xreplace({**numbers, **symbols}))
     except ValueError as error:
         raise ValueError(f"{what}: {error}") from None
-    return read(what, text, names)
+    return _settled(what, read(what, text, names), names)
+
+
+def _settled(what: str, e: sp.Expr, names: Mapping[str, sp.Symbol]) -> sp.Expr:
+    """The form of an expression that its own text makes again, so that files keep what runs; ValueError if none is found."""
+    for _ in range(_FORMS):
+        try:
+            again = read(what, written(e), names)
+        except ValueError as error:
+            reason = str(error).removeprefix(f"{what}: ")
+            raise ValueError(
+                f"{what}: {short_repr(e)} cannot be written as text: {reason}; write it otherwise"
+            ) from None
+        if again == e:
+            return e
+        e = again
+    raise ValueError(f"{what}: found {short_repr(e)}, which SymPy changes each time it reads it; expected another form")
 
 
 def _by_quotients(e: sp.Expr) -> sp.Expr:
@@ -167,6 +187,9 @@ def _text(e: sp.Basic) -> tuple[str, int]:
         return f"{_inside(e.args[0], _SUM)} {_SIGNS[type(e)]} {_inside(e.args[1], _SUM)}", _COMPARE
     if isinstance(e, sp.Not):
         return f"not {_inside(e.args[0], _NOT)}", _NOT
+    if isinstance(e, sp.ITE):  # SymPy's form of a comparison with a choice
+        condition, yes, no = e.args
+        return _text(sp.Or(sp.And(condition, yes), sp.And(sp.Not(condition), no)))
     if isinstance(e, sp.And | sp.Or):
         word, level = ("and", _AND) if isinstance(e, sp.And) else ("or", _OR)
         parts = (_inside(part, level + 1) for part in sorted(e.args, key=sp.default_sort_key))
@@ -209,7 +232,9 @@ def _row(terms: Sequence[tuple[str, str]]) -> str:
         half = len(terms) // 2
         return f"({_row(terms[:half])}) + ({_row(terms[half:])})"
     (sign, first), *others = terms
-    return ("-" if sign == "-" else "") + first + "".join(f" {sign} {text}" for sign, text in others)
+    if sign == "-":  # -(a + b)*c would be read as (-a - b)*c
+        first = f"-({first})" if first.startswith("(") else f"-{first}"
+    return first + "".join(f" {sign} {text}" for sign, text in others)
 
 
 def _product(e: sp.Mul) -> tuple[str, int]:
@@ -218,8 +243,7 @@ def _product(e: sp.Mul) -> tuple[str, int]:
     if not isinstance(number, sp.Rational):
         raise ValueError(f"found {number}; expected rational numbers, decimals and pi")
     if number < 0:
-        text = _inside(_negated(e), _PRODUCT)
-        return (f"-({text})" if text.startswith("(") else f"-{text}"), _SUM
+        return _row([("-", _inside(_negated(e), _PRODUCT))]), _SUM
     factors = rest.as_ordered_factors()
     below = [factor for factor in factors if isinstance(factor, sp.Pow) and factor.exp.is_Rational and factor.exp < 0]
     above = [_inside(factor, _POWER) for factor in factors if factor not in below]
@@ -298,7 +322,7 @@ def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
         raise ValueError(f"{what}: unreadable expression {found}; expected such as '-k*x + u*cos(omega*t)'")
     found = _by_quotients(_OfModels(what, names).read(expression))
     if found.has(sp.I):
-        raise ValueError(f"{what}: found the complex {short_repr(found)}; expected a real value")
+        raise ValueError(f"{what}: found the complex {short_repr(found)}; expected a real value; {COMPLEX}")
     return found
 
 

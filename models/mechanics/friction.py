@@ -204,7 +204,7 @@ def set_valued(
     sliding = sp.expand(applied[0].args[0])
     speed = _ground(sliding, place, velocity)
     moving = _moving(law, argument)
-    slow = moving.xreplace({argument: sp.S.Zero, SLIP: sp.S.One})
+    slow = _at_rest(moving, argument)
     largest = slow if static is None else static
     if largest == 0:
         raise ValueError(
@@ -223,7 +223,7 @@ def set_valued(
     up, down = (at_rest.xreplace({hidden: sign * largest}) for sign in (1, -1))
     pushed, pulled = (at_rest.xreplace({hidden: sign * slow}) for sign in (1, -1))
     shown = plain.xreplace({hidden: law.xreplace({argument: sliding})})
-    rate = plain.xreplace({hidden: moving.xreplace({argument: sliding})})
+    rate = plain.xreplace({hidden: _beyond_rest(moving, argument).xreplace({argument: sliding})})
     return rate, Contact(speed, sliding, up, down, pushed, pulled, shown)
 
 
@@ -250,11 +250,31 @@ def _moving(law: sp.Expr, argument: sp.Symbol) -> sp.Expr:
         raise ValueError(f"{what} has f(w) + f(-w) = {both.xreplace({speed: SLIDING})}; expected 0, an odd law")
     moving = _by_mode(law, argument)
     slipping = moving.xreplace({SLIP: sp.S.One})
-    if slipping.xreplace({argument: sp.S.Zero}).has(sp.nan, sp.zoo, sp.oo, -sp.oo):
+    if _at_rest(slipping, argument).has(sp.nan, sp.zoo, sp.oo, -sp.oo):
         raise ValueError(f"{what} has no finite value at w = 0; expected one for slow slip")
     if _jump(slipping, argument) or rough_at(slipping, {argument: sp.S.Zero}, [argument]) is not None:
         raise ValueError(f"{what} has another kink at w = 0 than sign(w) and |w| have; expected these alone")
     return moving
+
+
+def _at_rest(moving: sp.Expr, argument: sp.Symbol) -> sp.Expr:
+    """The limit of a law in slip as w falls to zero: powers of w with a letter as exponent, which is positive, go to zero."""
+    speed = sp.Dummy("w", positive=True)
+    above = moving.xreplace({argument: speed, SLIP: sp.S.One})
+    powers = {p: sp.S.Zero for p in _powers_from_zero(above, speed) if not p.exp.is_number}
+    return above.xreplace(powers).xreplace({speed: sp.S.Zero})
+
+
+def _powers_from_zero(e: sp.Expr, argument: sp.Symbol) -> list[sp.Pow]:
+    """The powers in an expression that are no polynomials and whose base is zero with the argument."""
+    powers = (p for p in e.atoms(sp.Pow) if not p.exp.is_integer and p.base.has(argument))
+    return [p for p in powers if p.base.xreplace({argument: sp.S.Zero}) == 0]
+
+
+def _beyond_rest(moving: sp.Expr, argument: sp.Symbol) -> sp.Expr:
+    """The law in slip with |w|**p for (s w)**p, which has no value where trial steps go past rest."""
+    powers = _powers_from_zero(moving, argument)
+    return moving.xreplace({p: sp.Abs(p.base.xreplace({SLIP: sp.S.One})) ** p.exp for p in powers})
 
 
 def _by_mode(e: sp.Basic, argument: sp.Symbol) -> sp.Basic:

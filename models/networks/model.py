@@ -16,9 +16,10 @@ from ..dynamics.equations import Equations
 from ..graphs.families import topology
 from ..graphs.links import LINK_LIMIT, numbered
 from ..graphs.topology import Topology
-from ..inputs.checks import check_number, short_repr, suggestion
+from ..inputs.checks import check_number, listed, short_repr, suggestion
 from ..inputs.frozen import Frozen
 from ..inputs.names import LinkName, NodeName
+from ..inputs.unsupported import unsupported
 from ..interactions.coupling import Coupling, LagrangianCoupling, Potential
 from ..mechanics.components import WEIGHT_NUMBER
 from ..mechanics.friction import ContactModel, FrictionLaw
@@ -273,7 +274,7 @@ class Model:
 
     def unknown(self, name: str, what: str, known: Iterable[str]) -> str:
         """Return the sentence that refuses a name; a parameter of the coupling without links has its own."""
-        known, reason = tuple(known), self.no_link(name)
+        known, reason = tuple(known), self.no_link(name) or unsupported(name)
         if reason:
             return f"unknown {what} {name!r}; {reason}"
         for coupling, graph in self.layers:
@@ -282,7 +283,7 @@ class Model:
                     f"{what} {name!r} couples oscillators, but {graph.name}({graph.n}) has no links: "
                     f"there is nothing to couple; leave it out or take at least two oscillators, e.g. chain(2)"
                 )
-        return f"unknown {what} {short_repr(name)}; known: {', '.join(known)}{suggestion(name, known)}"
+        return f"unknown {what} {short_repr(name)}; known: {listed(known)}{suggestion(name, known)}"
 
     def check_state(self, name: str, what: str) -> None:
         """Raise ValueError if a name such as "v_2" is no state of the network; `what` says what the name is for."""
@@ -302,12 +303,22 @@ def _unlinked(kinds: tuple[NodeKind, ...], kind_of: tuple[int, ...], contact: Co
 
 @lru_cache(maxsize=64)
 def union_of(graphs: tuple[Topology, ...], name: str) -> Topology:
-    """Return the union of graphs: a link of weight 1 wherever one of them has a link."""
-    n = graphs[0].n
+    """Return the union of graphs: a link of weight 1 wherever one of them has a link.
+
+    Raises ValueError if two graphs give their nodes different labels, or one order of them and another.
+    """
+    n, labels = graphs[0].n, None
+    for graph in graphs:
+        if graph.labelled and tuple(graph.labels) != (labels or tuple(graph.labels)):
+            raise ValueError(
+                f"links: found the nodes {short_repr(labels)} and {short_repr(graph.labels)}; expected one order of the same "
+                "labels in all graphs"
+            )
+        labels = tuple(graph.labels) if graph.labelled else labels
     if any(graph.all_to_all is not None for graph in graphs):
-        return Topology(name, n, rule=topology("complete", n).rule)
+        return Topology(name, n, rule=topology("complete", n).rule, labels=labels)
     pairs = sorted({link[:2] for graph in graphs for link in graph.links})
-    return Topology(name, n, tuple((*p, Fraction(1)) for p in pairs))
+    return Topology(name, n, tuple((*p, Fraction(1)) for p in pairs), labels=labels)
 
 
 @lru_cache(maxsize=64)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pkgutil
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,6 @@ from typing import Any
 import sympy as sp
 
 from ..dynamics.record import Record
-from ..graphs.topology import Topology
 from ..inputs.checks import check_choice, check_integer, check_number, check_text, short_repr
 from ..inputs.frozen import Frozen
 from ..inputs.words import Word
@@ -21,7 +21,7 @@ from ..mechanics.physics import check_masses, check_power
 from ..networks.model import Model, NodeKind
 from ..networks.parts import as_contact, as_coupling, as_groups, as_law, as_layers, as_oscillator
 from ..sweeps.axis import Axis
-from ..sweeps.draw import GRAPH, LIMIT, drawn_axes, drawn_graph, draws
+from ..sweeps.draw import GRAPH, LIMIT, Draws, drawn_axes, drawn_graph, drawn_nodes, draws
 from ..sweeps.parameters import at_nodes, drive, parameters, varied
 from ..sweeps.start import SEED_LIMIT, chosen_start, default_start
 from ..sweeps.sweep import check_cells, check_draws, check_sweep, read_axes
@@ -42,8 +42,8 @@ METHODS = Path(__file__).parents[2] / "codegen" / "integrators"
 """The folder of the integrators, one file each; it is listed here, and read by the code generator alone."""
 
 LIMITS: Mapping[str, tuple[Any, Any]] = {
-    "transient": (0.0, 1e9),
-    "window": (0.0, 1e9),
+    "transient": (0.0, sys.float_info.max),
+    "window": (0.0, sys.float_info.max),
     "rtol": (1e-15, 0.1),
     "atol": (0.0, 0.1),
     "max_steps": (1, 10**12),
@@ -83,7 +83,7 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     values["seed"] = check_integer("seed", given["seed"], *LIMITS["seed"])
     values["draws"] = draws(given["draws"], given["realisations"])
     values["rng"] = check_integer("rng", given["rng"], *LIMITS["rng"])
-    values |= _model(given, drawn_graph(values["draws"], given["realisations"], values["rng"]))
+    values |= _model(given, values["draws"], values["rng"])
     model: Model = values["model"]
     values["axes"] = axes = read_axes(given["axes"], given["zipped"])
     check_cells(axes, given["zipped"], given["realisations"])
@@ -125,20 +125,21 @@ def _check_graphs(model: Model, own: tuple[str, ...]) -> None:
             )
 
 
-def _model(given: Mapping[str, Any], drawn: Topology | None) -> dict[str, Any]:
-    """The parts of the model, and the model, on the graph that is `drawn` if there is one."""
+def _model(given: Mapping[str, Any], drawn: Mapping[str, Draws], rng: int) -> dict[str, Any]:
+    """The parts of the model, and the model, on the union of the graphs that are drawn if there are any."""
     oscillator = as_oscillator(given["oscillator"])
     if given["links"] is not None and given["coupling"] not in (None, "spring"):
         raise ValueError("links: found a coupling beside it; expected each layer with its own coupling; leave one out")
     coupling = as_coupling(given["coupling"]) if given["links"] is None else None
     layers = as_layers(given["links"], coupling, given["topology"])
-    if drawn is not None:
-        if len(layers) > 1 or (given["topology"] is not None and layers[0][1].n != drawn.n):
-            found = f"{len(layers)} layers of links" if len(layers) > 1 else f"graphs of {drawn.n} nodes"
+    if GRAPH in drawn:
+        nodes = drawn_nodes(drawn, rng)  # known before any link is drawn
+        if len(layers) > 1 or (given["topology"] is not None and layers[0][1].n != nodes):
+            found = f"{len(layers)} layers of links" if len(layers) > 1 else f"graphs of {nodes} nodes"
             raise ValueError(
                 f"draw topology: found {found}; expected graphs of {layers[0][1].n} nodes for a single layer"
             )
-        layers = ((coupling, drawn),)
+        layers = ((coupling, drawn_graph(drawn, given["realisations"], rng)),)
     friction = as_law(given["friction"], oscillator)
     groups = as_groups(given["nodes"], layers[0][1].n)
     contact = as_contact(given["contact"], (oscillator, *(group.oscillator for group in groups)))

@@ -9,6 +9,7 @@ from typing import Any
 from ..definitions.table import as_name_or_table
 from ..graphs.families import family, names, topology
 from ..graphs.graph_text import checked_name, is_composed, read_graph
+from ..graphs.readers import edge_graph
 from ..graphs.topology import Topology, from_matrix, read_matrix
 from ..inputs.checks import check_integer, check_keys, check_table, check_text, short_repr
 from ..inputs.plugins import part
@@ -90,15 +91,19 @@ def graph_of(given: Mapping[object, Any], folder: Path | None = None) -> Topolog
     name = _placed(given.get("name"), folder)
     known = isinstance(name, str) and "matrix" not in given and (name in names() or name.endswith(".py"))
     options = family(str(name)).options if known else {}
-    check_keys("topology", given, ("name", "n", *options, "matrix", "file"))
+    check_keys("topology", given, ("name", "n", *options, "matrix", "edges", "labels", "directed", "file"))
     if "file" in given:
         return _of_file(given, folder)
+    if "edges" in given:
+        return _of_edges(given)
     if "matrix" in given:
         return _of_matrix(given)
     for key in ("name", "n"):
         if key not in given:
             found = short_repr(dict(given))
-            raise ValueError(f"topology: {key!r} is missing in {found}; expected name and n, or matrix, or file")
+            raise ValueError(
+                f"topology: {key!r} is missing in {found}; expected name and n, or edges, or matrix, or file"
+            )
     n = check_integer("topology n", given["n"], 0, MOST_NODES)
     if not known and is_composed(part("topology name", name)):
         return _composed(str(name), n)
@@ -122,6 +127,20 @@ def _of_file(given: Mapping[object, Any], folder: Path | None) -> Topology:
         return read_matrix(path)
     except OSError as error:
         raise ValueError(f"topology: {' '.join(str(error).split())}") from None
+
+
+def _of_edges(given: Mapping[object, Any]) -> Topology:
+    """The graph of a list of edges, of nodes 1 … n, of the nodes of `labels`, or of whatever nodes the edges name."""
+    name = check_text("topology name", given.get("name", "edges"))
+    if "n" in given and "labels" in given:
+        raise ValueError("topology: found n beside labels; expected one of them; leave n out")
+    labels = given.get("labels")
+    if "n" in given:
+        labels = range(1, check_integer("topology n", given["n"], 1, MOST_NODES) + 1)
+    elif labels is not None and not isinstance(labels, list):
+        raise TypeError(f"topology labels: found {short_repr(labels)}; expected a list of texts or whole numbers")
+    graph = edge_graph(given["edges"], labels, given.get("directed", False), name)
+    return checked_name("topology", Topology(name, graph.n, graph.links) if "n" in given else graph)
 
 
 def _of_matrix(given: Mapping[object, Any]) -> Topology:
@@ -183,9 +202,9 @@ def _coupling(coupling: Coupling | None) -> object:
 
 
 def graph_table(graph: Topology) -> dict[str, object]:
-    """Return a graph in JSON types: its family and options, or its matrix; `graph_of` reads it.
+    """Return a graph in JSON types: its family and options, or its edges; `graph_of` reads it.
 
-    Of a weighted complete graph, whose matrix may be too large, it is the text of the operation.
+    Of a weighted complete graph, whose links may be too many to be listed, it is the text of the operation.
     """
     try:
         composed = graph.all_to_all is not None and is_composed(graph.name)
@@ -195,4 +214,11 @@ def graph_table(graph: Topology) -> dict[str, object]:
     if same:
         options = {key: list(value) if isinstance(value, tuple) else value for key, value in graph.options}
         return {"name": str(graph.name), "n": graph.n, **options}
-    return {"name": str(graph.name), "matrix": [[str(entry) for entry in row] for row in graph.rows]}
+    labels, one_way = graph.labels, not graph.symmetric
+    edges: list[list[object]] = []
+    for target, source, weight in graph.links:
+        if one_way or source < target:
+            number = () if weight == 1 else (int(weight) if weight.denominator == 1 else str(weight),)
+            edges.append([labels[source], labels[target], *number])
+    nodes = {"labels": list(labels)} if graph.labelled else {"n": graph.n}
+    return {"name": str(graph.name), **nodes, **({"directed": True} if one_way else {}), "edges": edges}

@@ -15,10 +15,11 @@ from ..dynamics.observable import Observable
 from ..dynamics.periodicity import Drive, as_function, names_in, period_of
 from ..dynamics.record import Record
 from ..graphs.topology import Topology
-from ..inputs.checks import check_instance, check_table, check_text, suggestion
+from ..inputs.checks import check_instance, check_table, check_text, listed, suggestion
 from ..inputs.frozen import Frozen
 from ..inputs.names import NodeName
 from ..inputs.shown import Drawn, Written
+from ..inputs.unsupported import unsupported
 from ..interactions.coupling import Coupling
 from ..interactions.link import strength
 from ..mechanics.friction import SLIP, ContactModel, FrictionLaw
@@ -329,11 +330,11 @@ class Scene(Drawn, Written):
         single = {name: changes.pop(name) for name in tuple(changes) if name not in self.given and self.takes(name)}
         strange = next((name for name in changes if name not in self.given), None)
         if strange is not None:
-            names, reason = (*self.parameters, *self.given), self.model.no_link(strange)
+            names, reason = (*self.parameters, *self.given), self.model.no_link(strange) or unsupported(strange)
             raise TypeError(
                 f"unknown parameter {strange!r}; {reason}"
                 if reason
-                else f"unknown parameter or keyword {strange!r}; known: {', '.join(names)}{suggestion(strange, names)}"
+                else f"unknown parameter or keyword {strange!r}; known: {listed(names)}{suggestion(strange, names)}"
             )
         if changes.get("topology") is not None:
             changes["topology"] = as_topology(changes["topology"])

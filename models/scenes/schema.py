@@ -176,16 +176,26 @@ def _written_out() -> tuple[Table, Table]:
 
 
 def _graphs() -> list[Table]:
-    """The tables of a topology: one for each family, a file of code, a matrix, a file of a matrix."""
+    """The tables of a topology: one for each family, a file of code, a matrix, a list of edges, a file of a matrix."""
     rows = {"type": "array", "minItems": 1, "items": {"type": "array", "items": NUMBER}}
     outside = {"type": "object", "properties": {"name": FILE, "n": WHOLE}, "required": ["name", "n"]}
     matrix = {"matrix": rows, "name": TEXT, "n": WHOLE}
+    label = {"type": ["integer", "string"]}
+    edge = {"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 3}
+    edges = {
+        "edges": {"type": "array", "items": edge},
+        "labels": {"type": "array", "minItems": 1, "items": label},
+        "directed": {"type": "boolean"},
+        "name": TEXT,
+        "n": WHOLE,
+    }
     composed: dict[str, Table] = {"name": {"type": "string", "pattern": r"\("}, "n": WHOLE}
     return [
         *(_family(family(name)) for name in families()),
         outside,
         _table(composed, "name", "n"),
         _table(matrix, "matrix"),
+        _table(edges, "edges"),
         _table({"file": {"type": "string"}}, "file"),
     ]
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import islice
 from typing import TypeGuard
 
 from ..graphs.graph_text import checked_name, read_graph
@@ -24,6 +25,7 @@ __all__ = [
     "Draws",
     "drawn_axes",
     "drawn_graph",
+    "drawn_nodes",
     "draws",
 ]
 
@@ -104,10 +106,21 @@ def draws(given: object, realisations: object) -> Frozen[Draws]:
     )
 
 
-def drawn_graph(drawn: Mapping[str, Draws], count: int, rng: int) -> Topology | None:
-    """Return the union of the graphs of all realisations, None if no graphs are drawn or listed."""
-    graphs = drawn.get(GRAPH)
-    return _realised(graphs, count, rng).union if isinstance(graphs, Graphs | RandomGraph) else None
+def drawn_graph(drawn: Mapping[str, Draws], count: int, rng: int) -> Topology:
+    """Return the union of the graphs of all realisations, which are drawn or listed."""
+    return _realised(_graphs_of(drawn), count, rng).union
+
+
+def drawn_nodes(drawn: Mapping[str, Draws], rng: int) -> int:
+    """Return the number of nodes of the graphs that are drawn or listed, without a link of a random one."""
+    graphs = _graphs_of(drawn)
+    return graphs.graphs[0].n if isinstance(graphs, Graphs) else next(_random_graph(graphs.text, rng)).n
+
+
+def _graphs_of(drawn: Mapping[str, Draws]) -> Graphs | RandomGraph:
+    graphs = drawn[GRAPH]
+    assert isinstance(graphs, Graphs | RandomGraph)
+    return graphs
 
 
 def _realised(graphs: Graphs | RandomGraph, count: int, rng: int) -> Graphs:
@@ -136,19 +149,24 @@ def _graphs(what: str, value: object, count: int) -> Graphs | RandomGraph:
 @lru_cache(maxsize=8)
 def _random_graphs(text: str, count: int, rng: int) -> Graphs:
     """The graphs of a text whose seeds are a stream of their own, which depends on `rng` alone."""
+    return Graphs(_bounded(islice(_random_graph(text, rng), count), count))
+
+
+def _random_graph(text: str, rng: int) -> Iterator[Topology]:
+    """Yield graphs of a text without end; their links are drawn when they are asked for."""
     stream = random.Random(f"{rng} {GRAPH}")
     seeds, begin = iter(lambda: stream.getrandbits(52), None), stream.getstate()
-    try:
-        found = _bounded((read_graph(text, MOST_NUMBERED, seeds) for _ in range(count)), count)
-    except ValueError as error:
-        words = str(error)
-        raise ValueError(words if words.startswith(f"draw {GRAPH}") else f"draw {GRAPH}: {words}") from None
-    if stream.getstate() == begin:
-        raise ValueError(
-            f"draw {GRAPH}: found {short_repr(text)}, the same graph in every realisation; expected a random family, such as "
-            "erdos_renyi(20, p=0.3)"
-        )
-    return Graphs(found)
+    while True:
+        try:
+            graph = read_graph(text, MOST_NUMBERED, seeds)
+        except ValueError as error:
+            raise ValueError(f"draw {GRAPH}: {error}") from None
+        if stream.getstate() == begin:
+            raise ValueError(
+                f"draw {GRAPH}: found {short_repr(text)}, the same graph in every realisation; expected a random family, such as "
+                "erdos_renyi(20, p=0.3)"
+            )
+        yield graph
 
 
 def _bounded(graphs: Iterable[Topology], count: int) -> tuple[Topology, ...]:

@@ -120,7 +120,7 @@ class Equilibrium(Labelled):
         }
         labels = {
             "component": list(states.components),
-            "node": np.arange(1, states.nodes + 1),
+            "node": list(self.scene.topology.labels),
             "number": np.arange(1, len(self.eigenvalues) + 1),
             "shift": list(self.shifts),
         }

@@ -9,8 +9,9 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from synchain.models.inputs.checks import check_number, check_table, check_text, is_row, suggestion
+from synchain.models.inputs.checks import check_number, check_table, check_text, is_row, listed, suggestion
 from synchain.models.inputs.names import NodeName
+from synchain.models.inputs.unsupported import unsupported
 from synchain.models.scenes.scene import KEYWORDS, Scene, a_scene
 from synchain.models.sweeps.parameters import without
 
@@ -80,10 +81,17 @@ class Given:
         TypeError
             If `scene` is no Scene.
         ValueError
-            If a name is no parameter of the scene, or is given twice; as `expect_one_cell`.
+            If a name is no parameter of the scene, or is given twice, for a list; as `expect_one_cell`.
         """
         self.expect_one_cell(scene, free)
-        return with_numbers(scene, self.checked(scene), **{**ONE_CELL, **settings})
+        numbers = self.checked(scene)
+        listed = next((name for name, value in numbers.items() if is_row(value)), None)
+        if listed is not None:
+            raise ValueError(
+                f"{self.function.__name__}: found a list for {listed!r}; expected one number, since only functions that sweep "
+                f"take lists, as axes; give each node or link its own number in the scene: scene.replace({listed}=[…])"
+            )
+        return with_numbers(scene, numbers, **{**ONE_CELL, **settings})
 
     def expect_one_cell(self, scene: Scene, free: Collection[str] = ()) -> None:
         """Raise ValueError for a scene with draws, or with axes that no parameter fixes: one cell would stand for all.
@@ -151,14 +159,14 @@ class Given:
             return f"{of} takes no {name!r}: {self.refused[name]}"
         if name in KEYWORDS:
             return f"{of}: {name!r} is a field of the scene; expected parameters; write scene.replace({name}=…)"
-        reason = scene.model.no_link(name)
+        reason = scene.model.no_link(name) or unsupported(name)
         if reason:
             return f"{of}: unknown parameter {name!r}; {reason}"
         initial = scene.equations.state if states else ()
         words = suggestion(name, (*scene.parameters, *initial, *own)) or suggestion(name, KEYWORDS)
         shown = initial if len(initial) <= SHOWN else (f"{initial[0]} … {initial[-1]}",)
         known = dict.fromkeys((*scene.parameters, *shown, *own))
-        return f"unknown parameter or keyword {name!r} of {of}; known: {', '.join(known)}{words}"
+        return f"unknown parameter or keyword {name!r} of {of}; known: {listed(known)}{words}"
 
 
 def with_numbers(scene: Scene, values: Mapping[str, object], **settings: object) -> Scene:

@@ -223,7 +223,7 @@ def _state(values: xr.DataArray, name: str) -> xr.DataArray:
     """One state of a variable, by its name such as "x_1"."""
     parts = NodeName.parse(name)
     assert parts is not None
-    return values.sel(component=parts.base, node=parts.index + 1)
+    return values.sel(component=parts.base).isel(node=parts.index)
 
 
 def _own(values: xr.DataArray, result: Result, k: int) -> xr.DataArray:

@@ -241,7 +241,7 @@ def _certified(scene: Scene, spans: np.ndarray, buffers: Buffers, certificate: C
 
 def coordinates(scene: Scene) -> dict[str, Any]:
     """Return the coordinates of a result: the axes, the components, the numbers of the nodes, and what sections keep."""
-    coords: dict[str, Any] = {"component": list(scene.equations.components), "node": np.arange(1, scene.n + 1)}
+    coords: dict[str, Any] = {"component": list(scene.equations.components), "node": list(scene.topology.labels)}
     coords |= {"integrator": list(method_names(scene))} if scene.integrator == "auto" else {}
     coords |= {f"{name}_kept": list(section.keep) for name, section in scene.sections.items() if section.keep}
     coords |= {f"{base}_link": list(columns) for base, columns in _of_links(scene).items()}

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -30,7 +31,10 @@ SVG_NODES, SVG_LINES = 300, 3000
 """Most nodes and lines of an SVG; a larger graph is described in words."""
 
 NUMBERED = 0.05
-"""Least radius of nodes that carry their numbers."""
+"""Least radius of nodes that carry their labels."""
+
+LETTERS = 4
+"""Most letters of a label in a node."""
 
 POINTS = 60.0
 """Points of a new figure for each unit of the places."""
@@ -76,12 +80,15 @@ class Picture:
         The kind of each node.
     names : tuple of str
         The kinds.
+    labels : sequence
+        What the nodes are called.
     """
 
     place: np.ndarray
     lines: tuple[Line, ...]
     kind: tuple[int, ...]
     names: tuple[str, ...]
+    labels: Sequence[int] | Sequence[str]
 
     @classmethod
     def of(cls, value: Drawn) -> Picture:
@@ -92,7 +99,12 @@ class Picture:
         names: tuple[str, ...] = ("",)
         if isinstance(value, Scene):
             kinds, names = value.equations.kind_of, tuple(kind.oscillator.name for kind in value.model.kinds)
-        return cls(place, _lines(graph, place), kinds, names)
+        return cls(place, _lines(graph, place), kinds, names, graph.labels)
+
+    def inscription(self, i: int) -> str:
+        """The label of a node as it fits into its circle."""
+        text = str(self.labels[i])
+        return text if len(text) <= LETTERS else f"{text[: LETTERS - 1]}…"
 
     @property
     def radius(self) -> float:
@@ -176,7 +188,7 @@ def draw_graph(value: Drawn, ax: Axes | None = None) -> Axes:
 
 
 def _nodes(axes: Axes, picture: Picture) -> None:
-    """Draw the nodes with their colours and numbers, and name several kinds."""
+    """Draw the nodes with their colours and labels, and name several kinds."""
     place, kind = picture.place, np.array(picture.kind)
     size = (2.0 * POINTS * picture.radius) ** 2
     for k, name in enumerate(picture.names):
@@ -184,13 +196,11 @@ def _nodes(axes: Axes, picture: Picture) -> None:
         colour = COLOURS[k % len(COLOURS)]
         axes.scatter(place[own, 0], place[own, 1], s=size, color=colour, zorder=2, label=name, linewidths=0.0)
     if picture.radius >= NUMBERED:
-        style: dict[str, Any] = {"color": "white", "ha": "center", "va": "center_baseline", "zorder": 3}
-        style["fontsize"] = min(POINTS * picture.radius, 7.0)
         for i, (x, y) in enumerate(place.tolist()):
             axes.text(
                 x,
                 y,
-                str(i + 1),
+                picture.inscription(i),
                 color="white",
                 ha="center",
                 va="center_baseline",
@@ -249,10 +259,10 @@ def _svg_line(picture: Picture, line: Line, scale: float) -> str:
 
 
 def _svg_node(picture: Picture, i: int, scale: float) -> str:
-    """One node with its number if there are few."""
+    """One node with its label if there are few."""
     (x, y), k = picture.place[i] * [scale, -scale], picture.kind[i]
     name = picture.names[k]
-    title = f"<title>{escape(f'node {i + 1}' + (f', {name}' if name else ''))}</title>"
+    title = f"<title>{escape(f'node {picture.labels[i]}' + (f', {name}' if name else ''))}</title>"
     colour = COLOURS[k % len(COLOURS)]
     dot = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{picture.radius * scale:.1f}" fill="{colour}">{title}</circle>'
     if picture.radius < NUMBERED:
@@ -260,5 +270,5 @@ def _svg_node(picture: Picture, i: int, scale: float) -> str:
     size = min(picture.radius * scale * 1.1, 12.0)
     return dot + (
         f'<text x="{x:.1f}" y="{y + 0.35 * size:.1f}" fill="#fff" font-size="{size:.1f}" text-anchor="middle" '
-        f'font-family="sans-serif">{i + 1}</text>'
+        f'font-family="sans-serif">{escape(picture.inscription(i))}</text>'
     )

@@ -62,7 +62,7 @@ def started(scene: Scene, start: Start) -> tuple[Scene, float]:
     initial = {}
     for name in scene.components:
         if name != SLIP.name:  # the modes of contacts follow from the other states
-            nodes = [i + 1 for i in scene.equations.holders(name)]
+            nodes = [scene.topology.labels[i] for i in scene.equations.holders(name)]
             initial[name] = [float(x) for x in end.sel(component=name, node=nodes).values]
     if not all(math.isfinite(x) for values in initial.values() for x in values):
         raise ValueError("start: found a state that is not finite; expected those of a cell that finished")
@@ -75,7 +75,7 @@ def _in_order(scene: Scene, start: Sequence[float] | np.ndarray) -> xr.DataArray
     if len(values) != len(names):
         raise ValueError(f"start: found {len(values)} numbers; expected {len(names)}, of {_listed(names)}")
     states = States.of(scene)
-    labels = {"component": list(states.components), "node": range(1, states.nodes + 1)}
+    labels = {"component": list(states.components), "node": list(scene.topology.labels)}
     return xr.DataArray(states.table(values), labels, STATE)
 
 
@@ -88,7 +88,7 @@ def _check_labels(scene: Scene, end: xr.DataArray) -> None:
             f"start: found the states of several cells, along {', '.join(map(str, further))}; expected those of one; "
             f"choose it, e.g. result.end.isel({axis}=-1)"
         )
-    expected = {"component": tuple(scene.equations.components), "node": tuple(range(1, scene.n + 1))}
+    expected = {"component": tuple(scene.equations.components), "node": tuple(scene.topology.labels)}
     for name, labels in expected.items():
         found = tuple(end.coords[name].values.tolist()) if name in end.dims and name in end.coords else ()
         if set(found) != set(labels) or len(found) != len(labels):

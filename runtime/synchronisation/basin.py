@@ -67,7 +67,7 @@ class Basin(Labelled):
                 "status": (("sample",), self.status, "how the cell ended"),
                 "synchronous": (("sample",), self.synchronous, "whether the start synchronised"),
             },
-            {"component": list(states.components), "node": np.arange(1, states.nodes + 1)},
+            {"component": list(states.components), "node": list(self.scene.topology.labels)},
             self.scene,
         )
 

@@ -18,6 +18,8 @@ from synchain.models.graphs.products import cartesian, complement, weighted
 from synchain.models.graphs.readers import as_topology, from_edges, from_graph, from_sparse, read_edges, read_graphml
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.inputs.rationals import FILE_LIMIT
+from synchain.models.networks.model import union_of
+from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.models.symmetries.clusters import orbital_partitions
 
@@ -39,6 +41,42 @@ def test_edges_by_hand() -> None:
 
 
 @pytest.mark.parametrize(
+    ("edges", "labels"),
+    [
+        ([(1, 2), (2, 3), (3, 1)], [1, 2, 3]),
+        ([(7, 3), (3, 5.0)], [3, 5, 7]),
+        (np.array([[10, 30], [30, 20]]), [10, 20, 30]),
+        ([("b", "a"), ("a", "c")], ["b", "a", "c"]),
+        ([((0, 0), (0, 1)), ((0, 1), "x")], ["(0, 0)", "(0, 1)", "x"]),
+        ([(1, "1")], ["1", "'1'"]),
+    ],
+)
+def test_nodes_are_labels(edges: Any, labels: list, tmp_path: Path) -> None:
+    graph = from_edges(edges)
+    assert list(graph.labels) == labels and graph.components == 1
+    found = from_graph(nx.Graph([*map(tuple, edges)]))
+    assert set(found.labels) == set(labels) and found.components == 1
+    again = from_graph(graph.to_networkx(), name=graph.name)
+    assert again == graph
+    scene = Scene("mass", "spring", graph)
+    assert Scene.from_dict(scene.as_dict()) == scene
+    scene.save(tmp_path / "scene.toml")
+    assert load_scene(tmp_path / "scene.toml") == scene
+
+
+def test_a_file_and_the_same_edges_make_one_graph(tmp_path: Path) -> None:
+    (tmp_path / "edges").write_text("5 2\n2 9 1/2\n")
+    assert read_edges(tmp_path / "edges") == from_edges([(5, 2), (2, 9, "1/2")], name="edges")
+
+
+def test_layers_with_different_labels() -> None:
+    first, second = from_edges([("a", "b")]), from_edges([("b", "a")])
+    with pytest.raises(ValueError, match=r"nodes \('a', 'b'\) and \('b', 'a'\); expected one order of the same labels"):
+        union_of((first, second), "both")
+    assert list(union_of((first, topology("chain", 2)), "both").labels) == ["a", "b"]
+
+
+@pytest.mark.parametrize(
     ("edges", "n", "error", "words"),
     [
         ([(0, 0)], None, ValueError, "edges: edge 0 - 0 joins a node to itself"),
@@ -48,10 +86,11 @@ def test_edges_by_hand() -> None:
         ([(0, 1, float("nan"))], None, ValueError, "not finite"),
         ([(0,)], None, ValueError, "edge 1 is (0,); expected (i, j) or (i, j, weight)"),
         (["01"], None, ValueError, "edge 1 is '01'"),
-        ([(0, -1)], None, ValueError, "edge 1: node (counted from 0) = -1; expected at least 0"),
-        ([(0, 1.0)], None, TypeError, "node (counted from 0) = 1.0; expected a whole number"),
-        ([(1, 2), (2, 3)], 3, ValueError, "edge 2: node (counted from 0) = 3; expected at most 2"),
-        ([(0, 5), (0, 5)], 3, ValueError, "edge 1: node (counted from 0) = 5; expected at most 2"),
+        ([(0, -1)], 3, ValueError, "edge 1: found the node -1; expected one of 0, 1, 2"),
+        ([(0, [1])], None, TypeError, "edge 1: node: found [1] (list); expected a label: a number, a text or a tuple"),
+        ([(0, None)], None, TypeError, "edge 1: node: found None"),
+        ([(1, 2), (2, 3)], 3, ValueError, "edge 2: found the node 3; expected one of 0, 1, 2"),
+        ([("a", "b")], 9, ValueError, "edge 1: found the node 'a'; expected one of 0 … 8"),
         ([], None, ValueError, "n = 0; expected at least one node"),
     ],
 )
@@ -75,7 +114,7 @@ def test_networkx_graphs() -> None:
     assert from_graph(many).links[0] == (0, 1, ONE * 2)
     empty = nx.Graph()
     empty.add_nodes_from("xyz")
-    assert from_graph(empty) == Topology("graph", 3, ())
+    assert from_graph(empty) == Topology("graph", 3, (), labels="xyz") != Topology("graph", 3, ())
 
 
 def test_an_edge_of_a_directed_graph_acts_on_its_second_node() -> None:

@@ -176,7 +176,7 @@ def test_starts_are_those_of_runs(tmp_path: Path) -> None:
     """A run settles; its end is where the search begins, and what is found stays where it is."""
     scene = grid(0.5, -0.5).replace(time_unit="time", transient=0, window=40)
     found = sc.equilibrium(scene, sc.run(scene))
-    again = sc.equilibrium(scene, found.data.state, P=[0.6, -0.6])
+    again = sc.equilibrium(scene.replace(P=[0.6, -0.6]), found.data.state)
     assert again.state[0] - again.state[1] == pytest.approx(np.arcsin(0.6), abs=1e-12)
     stays = sc.run(scene, start=found.data.state)
     np.testing.assert_allclose(stays.end.values.ravel(), found.state, atol=1e-9)

@@ -1,0 +1,30 @@
+"""What networks of the literature have and this program has not, by the words that ask for it, and who has it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+__all__ = ["COMPLEX", "unsupported"]
+
+_DELAYS = "delays are not supported; JiTCDDE and DifferentialEquations.jl (DDEProblem) integrate them"
+_NOISE = "noise is not supported; JiTCSDE and DifferentialEquations.jl (SDEProblem) integrate it"
+_RESETS = "resets of the state are not supported; Brian 2 and callbacks of DifferentialEquations.jl have them"
+_CONSTRAINTS = "constraints are not supported; take coordinates without them, or a solver of DAEs such as SUNDIALS IDA"
+_TRIADS = "links of more than two nodes are not supported; XGI holds such networks, SciPy integrates them"
+_MAPS = "maps are not supported, time is continuous; DynamicalSystems.jl iterates them"
+COMPLEX = "complex states are not supported; write real and imaginary part as two states"
+
+_WORDS: Mapping[str, str] = {
+    **dict.fromkeys(("delay", "delays", "time_delay", "history"), _DELAYS),
+    **dict.fromkeys(("noise", "noises", "noise_strength", "diffusion", "stochastic"), _NOISE),
+    **dict.fromkeys(("reset", "resets", "callback", "callbacks"), _RESETS),
+    **dict.fromkeys(("constraint", "constraints"), _CONSTRAINTS),
+    **dict.fromkeys(("triad", "triads", "triangles", "hyperedges", "simplices", "higher_order"), _TRIADS),
+    **dict.fromkeys(("map", "maps", "discrete"), _MAPS),
+    **dict.fromkeys(("complex", "complex_states"), COMPLEX),
+}
+
+
+def unsupported(name: object) -> str:
+    """Return the sentence for a word that asks for what is not supported; "" for other words."""
+    return _WORDS.get(name, "") if isinstance(name, str) else ""
