@@ -15,7 +15,7 @@ import sympy as sp
 from synchain.models.dynamics.variational import Variation
 
 from .limit_cycle import limit_cycle
-from .motion import ROUNDING, rests
+from .motion import rests
 from .orbits import FAR, Orbits, within
 
 __all__ = ["Attractor", "Motion", "cycle_propagators", "find_attractor"]
@@ -154,7 +154,7 @@ def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
         orbits.state[row] = orbit.state[0] = states[-1]
         gaps = np.abs(np.array(states[-2::-1]) - states[-1])
         moves = np.maximum(np.ptp([*states, *within(orbit)], axis=0), CLOSE * orbit.extent)
-        rounding = ROUNDING * np.abs(states[-1])
+        rounding = orbit.rates.rounding(states[-1], LONGEST * orbit.unit)
         cycle = next((k + 1 for k, gap in enumerate(gaps) if np.all(gap <= closed * moves + rounding)), 0)
         if cycle:
             return _periodic(orbit, Motion.PERIODIC, cycle)

@@ -33,8 +33,8 @@ from ..support.execution import Execution
 from ..support.progress import Hook, Reporter
 from .attractor import Attractor, Motion, find_attractor
 from .averages import Averaging, Batches
-from .network import unused_axes
 from .motion import starts_near
+from .network import unused_axes
 from .orbits import Orbits
 from .slowness import warn_of_slow_motion
 
@@ -88,6 +88,8 @@ class Exponents(Labelled):
         Indices of the starts on each attractor; the first one is that of the scene's own start.
     unit : str
         Unit of time in which transients and averages are counted.
+    precision : float
+        Standard error that was asked for.
     """
 
     alpha: np.ndarray
@@ -99,6 +101,7 @@ class Exponents(Labelled):
     attractors: tuple[Attractor, ...] = ()
     groups: tuple[tuple[int, ...], ...] = ()
     unit: str = ""
+    precision: float = 0.0
 
     @property
     def data(self) -> xr.Dataset:
@@ -129,8 +132,21 @@ class Exponents(Labelled):
             ("smallest, largest", f"{self.exponent.min():z.4f}, {self.exponent.max():z.4f}"),
             ("motion", ", ".join(dict.fromkeys(a.kind for a in self.attractors))),
             ("average", f"{self.time:.6g} units of time for each of {self.starts} starts"),
-            *((("unit", self.unit),) if self.unit else ()),
+            *self.accuracy,
         )
+
+    @property
+    def accuracy(self) -> tuple[tuple[str, str], ...]:
+        """The largest error beside the one that was asked for, undecided signs, and the unit of time, for a summary."""
+        rows: list[tuple[str, str]] = []
+        if self.undecided:
+            rows.append(("undecided for alpha", words_of(self.undecided)))
+        worst = float(np.max(self.stderr, initial=0.0))
+        if self.precision and worst > self.precision:
+            rows.append(("errors", f"up to {worst:.2g}; precision = {self.precision:g} was not reached; raise periods"))
+        if self.unit:
+            rows.append(("unit", self.unit))
+        return tuple(rows)
 
     @property
     def on_a_line(self) -> bool:
@@ -164,25 +180,71 @@ class Exponents(Labelled):
         ValueError
             If the strengths are complex, or those of several layers.
         """
-        x, y, error = self.alpha, self.exponent, self.stderr
+        x, error = self.alpha, self.stderr
         if not self.on_a_line:
             kind = "complex" if np.iscomplexobj(x) else f"those of {x.shape[1]} layers"
             raise ValueError(f"strengths are {kind}; ranges need real ones of a single layer")
-        rounding = ROUNDING * np.max(np.abs(y[np.isfinite(y)]), initial=0.0)
-        if abs(y[0]) <= max(2.0 * error[0], rounding) < np.inf:
-            y = np.append(0.0, y[1:])  # zero to its error, such as that of a limit cycle at strength 0
-        ends: list[Interval] = [(float(x[0]), 0.0)] if y[0] < 0 else []
-        for i in map(int, np.flatnonzero((y[1:] < 0) != (y[:-1] < 0))):
+        y, stable, _ = self._judged
+        # beside a stretch of undecided signs an end lies anywhere within it
+        blurred = np.zeros(len(x), dtype=bool)
+        for first, last in _uncertain(y, error):
+            blurred[max(first - 1, 0) : last + 1] = True
+        ends: list[Interval] = [(float(x[0]), 0.0)] if stable[0] else []
+        for i in map(int, np.flatnonzero(stable[1:] != stable[:-1])):
             a, b = max(i - 2, 0), min(i + 3, len(x) - 1)
             step = y[i + 1] - y[i] if np.isfinite(y[i] * y[i + 1]) else np.inf  # an exponent of -inf has no slope
             smooth = b - a >= 3 and bool(np.all(np.isfinite(y[a:b])))
             slope = abs(np.polyfit(x[a:b], y[a:b], 1)[0] if smooth else step / (x[i + 1] - x[i]))
             zero = x[i] - y[i] / step * (x[i + 1] - x[i]) if np.isfinite(step) else (x[i] if y[i] >= 0 else x[i + 1])
             spread = float(max(error[i], error[i + 1]) / max(slope, 1e-300))
-            ends.append((float(zero), spread + _bend(x, y, i, float(zero))))
-        if y[-1] < 0:
+            ends.append((float(zero), spread + _bend(x, y, i, float(zero)) + _stretch(x, blurred, i)))
+        if stable[-1]:
             ends.append((float(x[-1]), 0.0))
         return tuple(zip(ends[::2], ends[1::2], strict=True))
+
+    @property
+    def undecided(self) -> tuple[Interval, ...]:
+        """Ranges of real strengths where the exponent seems to change its sign, but by less than two errors."""
+        x, stretches = self.alpha, self._judged[2] if self.on_a_line else ()
+        return tuple((float(x[first]), float(x[last])) for first, last in stretches)
+
+    @property
+    def _judged(self) -> tuple[np.ndarray, np.ndarray, tuple[tuple[int, int], ...]]:
+        """The exponents (m,) with a first one that is zero to its error; which are in an interval; the undecided stretches."""
+        y, error = self.exponent, self.stderr
+        rounding = ROUNDING * np.max(np.abs(y[np.isfinite(y)]), initial=0.0)
+        if abs(y[0]) <= max(2.0 * error[0], rounding) < np.inf:
+            y = np.append(0.0, y[1:])  # zero to its error, such as that of a limit cycle at strength 0
+        stable, changed = y < 0, list[tuple[int, int]]()
+        for first, last in _uncertain(y, error):
+            inside = slice(first, last + 1)
+            gap = first > 0 and last + 1 < len(y) and y[first - 1] < 0 and y[last + 1] < 0
+            if np.any(stable[inside] != gap) and (gap or np.any(stable[inside])):
+                changed.append((first, last))
+                stable[inside] = gap
+        return y, stable, tuple(changed)
+
+
+def _uncertain(y: np.ndarray, error: np.ndarray) -> list[tuple[int, int]]:
+    """The first and last indices of stretches in which no sign is certain, of one or several runs of one sign each.
+
+    A sign is certain if one exponent of the run is two errors from zero; an error that is unknown casts no doubt.
+    """
+    certain = ~np.isfinite(error) | (y + 2.0 * error < 0.0) | (y - 2.0 * error >= 0.0)
+    runs = np.cumsum(np.append(0, (y[1:] < 0) != (y[:-1] < 0)))
+    doubtful = ~np.isin(runs, runs[certain])
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], doubtful, [False]])))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _stretch(x: np.ndarray, blurred: np.ndarray, i: int) -> float:
+    """Length of the undecided stretch that point i lies at the end of; 0 if there is none."""
+    first = last = i
+    while last + 1 < len(x) and blurred[i] and blurred[last]:
+        last += 1
+    while first > 0 and blurred[i] and blurred[first]:
+        first -= 1
+    return float(x[last] - x[first])
 
 
 def _bend(x: np.ndarray, y: np.ndarray, i: int, zero: float) -> float:
@@ -347,7 +409,8 @@ def along(orbits: Orbits, strengths: np.ndarray, averaging: Averaging, reporter:
             f"({others}); expected one motion; the exponents are those of the scene's own, by_start has all"
         )
     mean, spread = by_start[own].mean(axis=0), np.sqrt((error[own] ** 2).sum(axis=0)) / len(own)
-    return Exponents(strengths, mean, spread, length, starts, by_start, attractors, groups, str(orbits.turns))
+    unit = "" if orbits.linear else str(orbits.turns)
+    return Exponents(strengths, mean, spread, length, starts, by_start, attractors, groups, unit, averaging.precision)
 
 
 def _settle(orbits: Orbits, transient: float, reporter: Reporter) -> list[bool]:

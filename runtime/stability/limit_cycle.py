@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from .motion import ROUNDING, Rates, path, rests, shortest_time
+from .motion import Rates, path, rests, shortest_time
 from .orbits import Orbits
 from .variational_integrator import VariationalIntegrator
 
@@ -152,7 +152,7 @@ def _newton(
         gap = image - state
         if not np.all(np.abs(gap) <= near):
             return None
-        if np.all(np.abs(gap) <= closed * extent + ROUNDING * np.abs(image)):
+        if np.all(np.abs(gap) <= closed * extent + rates.rounding(image, period)):
             return Cycle(image, period, matrix, steps)
         change = _correction(matrix, gap, period, (rates.values(state), rates.values(image)), _scale(extent))
         state, period = state + change[:-1], period + float(change[-1])

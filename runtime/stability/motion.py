@@ -11,12 +11,23 @@ from typing import NamedTuple
 import numpy as np
 import sympy as sp
 
-from synchain.codegen.driver.columns import Control
 from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import TIME
 
 from .variational_integrator import VariationalIntegrator
 
-__all__ = ["Rates", "Turns", "extent_of", "path", "rates_of", "rests", "starts_near", "turns_of"]
+__all__ = [
+    "Rates",
+    "Turns",
+    "above",
+    "extent_of",
+    "path",
+    "rates_of",
+    "rests",
+    "shortest_time",
+    "starts_near",
+    "turns_of",
+]
 
 SHARE = 8
 """Least number of steps of a path from one end of a component to the other."""
@@ -50,10 +61,14 @@ REACH = 0.4
 
 
 class Rates(NamedTuple):
-    """Rates (p,) of a state (p,) without a drive, and the sums of the sizes of their terms."""
+    """Rates (p,) of a state (p,) at time 0, and the sums of the sizes of their terms, with those of a drive at its largest."""
 
     values: Callable[[np.ndarray], np.ndarray]
     sizes: Callable[[np.ndarray], np.ndarray]
+
+    def rounding(self, state: np.ndarray, time: float) -> np.ndarray:
+        """How far each component (p,) may move by rounding alone within a time."""
+        return np.asarray(ROUNDING * (np.abs(state) + np.nan_to_num(time * self.sizes(state))))
 
     def slopes(self, state: np.ndarray, extent: np.ndarray) -> np.ndarray:
         """How much each rate changes by (p, p) if one component moves by its extent, to first order."""
@@ -76,11 +91,13 @@ class Turns(NamedTuple):
 
 
 def rates_of(equations: Equations, parameters: dict[str, float]) -> Rates:
-    """Return the rates of undriven equations as functions of the state alone."""
+    """Return the rates of equations as functions of the state alone."""
     names = [sp.Symbol(name, real=True) for name in (*equations.state, *equations.parameters)]
     values = [parameters[name] for name in equations.parameters]
     rhs = equations.rhs()
-    rates, sizes = (sp.lambdify(names, list(e), "numpy") for e in (rhs, map(_size, rhs)))
+    rates, sizes = (
+        sp.lambdify(names, [e.xreplace({TIME: sp.S.Zero}) for e in both], "numpy") for both in (rhs, map(_size, rhs))
+    )
     return Rates(
         lambda state: np.array(rates(*state, *values), dtype=float),
         lambda state: np.array(sizes(*state, *values), dtype=float),
@@ -88,7 +105,9 @@ def rates_of(equations: Equations, parameters: dict[str, float]) -> Rates:
 
 
 def _size(e: sp.Expr) -> sp.Expr:
-    """The sum of the sizes of the terms of an expression, in products too."""
+    """The sum of the sizes of the terms of an expression, in products too; waves of time count with their amplitude."""
+    if isinstance(e, sp.sin | sp.cos) and e.has(TIME):
+        return sp.S.One
     if isinstance(e, sp.Add | sp.Mul):
         return e.func(*map(_size, e.args))
     if isinstance(e, sp.Pow) and e.exp.is_integer and e.exp.is_positive:
@@ -100,6 +119,11 @@ def extent_of(states: np.ndarray, settled: np.ndarray) -> np.ndarray:
     """Return how far each component (p,) moves in settled states (k, p), or in all states if it has come to rest."""
     later, whole = np.ptp(settled, axis=0), np.ptp(states, axis=0)
     return np.where(later > STILL * whole, later, whole)
+
+
+def above(extent: np.ndarray, rounding: np.ndarray) -> np.ndarray:
+    """Return the extents (p,), 0 for those that may be rounding."""
+    return np.where(extent > rounding, extent, 0.0)
 
 
 def starts_near(state: np.ndarray, extent: np.ndarray, count: int, seed: int) -> np.ndarray:
@@ -167,21 +191,22 @@ def turns_of(integrator: VariationalIntegrator, rates: Rates) -> Turns:
                 states.append(integrator.state[0])
                 if not np.isfinite(time) or k == SAMPLES:
                     break
-                if k % LOOKED == 0:
-                    if rests(rates, states[-1], REST, extent):
-                        break
-                    if _mean_turn(np.array(times[k // 4 :]), np.array(states[k // 4 :]), ENOUGH):
-                        break
+                still = np.all(np.abs(states[-1] - states[-2]) <= STILL * extent)
+                if still and k > LOOKED and rests(rates, states[-1], REST, extent):
+                    break
+                if k % LOOKED == 0 and _mean_turn(np.array(times[k // 4 :]), np.array(states[k // 4 :]), ENOUGH):
+                    break
         except FloatingPointError:  # what grows without bound is refused where it is settled
             pass
     early = len(times) // 4
     late = np.array(states[early:])
     extent = extent_of(np.array(states), late[len(late) // 2 :])
+    unit, words = time or 2.0 * np.pi, "time in which nothing returns" if time else "nothing moves"
     if turn := _mean_turn(np.array(times[early:]), late, 1):
-        return Turns(turn, extent, "mean return time")
-    if rests(rates, states[-1], REST, extent) and (slow := _slowest(rates, states[-1], extent)):
-        return Turns(2.0 * np.pi / slow, extent, "turn of the slowest rate")
-    return Turns(time or 2.0 * np.pi, extent, "time in which nothing returns" if time else "nothing moves")
+        unit, words = turn, "mean return time"
+    elif rests(rates, states[-1], REST, extent) and (slow := _slowest(rates, states[-1], extent)):
+        unit, words = 2.0 * np.pi / slow, "turn of the slowest rate"
+    return Turns(unit, above(extent, rates.rounding(states[-1], unit)), words)
 
 
 def _mean_turn(times: np.ndarray, states: np.ndarray, fewest: int) -> float:
@@ -196,9 +221,7 @@ def _mean_turn(times: np.ndarray, states: np.ndarray, fewest: int) -> float:
         (up,) = np.nonzero((side[clear[1:]] > 0) & (side[clear[:-1]] < 0))
         if len(up) > best:
             after = clear[up + 1]  # the first state that is clearly above
-            passed = [
-                np.interp(middle, x[a : b + 1], times[a : b + 1]) for a, b in zip(clear[up], after, strict=True)
-            ]
+            passed = [np.interp(middle, x[a : b + 1], times[a : b + 1]) for a, b in zip(clear[up], after, strict=True)]
             best, mean = len(up), float(passed[-1] - passed[0]) / (len(up) - 1)
     return mean
 

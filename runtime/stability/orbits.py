@@ -24,7 +24,7 @@ from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import with_modes
 from .averages import BATCHES, SLACK, TRIED, error_of_steps
 from .interpolation import Interpolation, exact_interpolation, lines_of, strength_interpolation
-from .motion import Rates, Turns, extent_of, rates_of, turns_of
+from .motion import Rates, Turns, above, extent_of, rates_of, turns_of
 from .variational_integrator import NO_TRACKS, Travellers, VariationalIntegrator
 
 __all__ = ["Orbits", "unit_of_time"]
@@ -157,7 +157,9 @@ class Orbits:
         rows = (variation, state, numbers, _rows(strengths))
         # until the motion is known, all of it may be fast: power series, whose steps find their length, look at it first
         method = chosen_for_modes(scene, *rows, 2.0 * math.pi / turns.time if turns else math.inf)
-        orbits = cls(scene, variation, strengths, state, workers, turns or Turns(unit, np.zeros(state.shape[1])), method)
+        orbits = cls(
+            scene, variation, strengths, state, workers, turns or Turns(unit, np.zeros(state.shape[1])), method
+        )
         if turns is None and not orbits.linear:
             orbits.turns = turns_of(orbits._observer(), orbits.rates)
             orbits.method = chosen_for_modes(scene, *rows, 2.0 * math.pi / orbits.unit)
@@ -181,7 +183,7 @@ class Orbits:
 
     @property
     def rates(self) -> Rates:
-        """Rates of the state of undriven orbits."""
+        """Rates of the state, at time 0."""
         return _rates(self.variation.orbit, tuple(self.numbers))
 
     @property
@@ -251,7 +253,8 @@ class Orbits:
         if not self.forced:
             return
         states = [self.state[:1], *driven_states(self.part([0]))]
-        self.turns = self.turns._replace(extent=extent_of(np.concatenate(states), states[-1]))
+        extent = above(extent_of(np.concatenate(states), states[-1]), self.rates.rounding(self.state[0], self.unit))
+        self.turns = self.turns._replace(extent=extent)
 
     def settle(self, periods: float, advanced: Callable[[float], object] | None = None) -> None:
         """Advance all orbits over a transient of a number of units.
@@ -486,7 +489,7 @@ def _variation(equations: Equations, plane: bool) -> Variation:
 
 @lru_cache(maxsize=16)
 def _rates(equations: Equations, numbers: tuple[float, ...]) -> Rates:
-    """The rates of undriven equations; a limit cycle needs them at every step."""
+    """The rates of equations; a limit cycle needs them at every step."""
     return rates_of(equations, dict(zip(equations.parameters, numbers, strict=True)))
 
 
