@@ -47,6 +47,9 @@ REST = 1e-9
 ROUNDING = 100.0 * float(np.finfo(float).eps)
 """Part of the size of its terms below which a sum is rounding."""
 
+DIGITS = 1e-10
+"""Part of its terms below which a rate is zero, and of its size below which a component stays: steps leave such traces."""
+
 ASIDE = 1e-6
 """How far aside rates are evaluated for their slopes, relative to the extent of the motion."""
 
@@ -137,7 +140,7 @@ def rests(rates: Rates, state: np.ndarray, closed: float, extent: np.ndarray) ->
     """Return whether the rates at a state are zero: below rounding of their terms, or within what they change by over a part `closed` of the extent."""
     changes = np.abs(rates.slopes(state, extent)).sum(axis=1)
     here = np.abs(rates.values(state))
-    return bool(np.all(here <= np.nan_to_num(closed * changes) + ROUNDING * rates.sizes(state)))
+    return bool(np.all(here <= np.nan_to_num(closed * changes) + DIGITS * rates.sizes(state)))
 
 
 def path(integrator: VariationalIntegrator, shortest: float) -> Iterator[tuple[np.ndarray, float, np.ndarray]]:
@@ -214,7 +217,7 @@ def _mean_turn(times: np.ndarray, states: np.ndarray, fewest: int) -> float:
     best, mean = fewest, 0.0
     low, high = states.min(axis=0), states.max(axis=0)
     for x, middle, extent in zip(states.T, 0.5 * (low + high), high - low, strict=True):
-        if not extent > ROUNDING * np.abs(x).max():
+        if not extent > DIGITS * np.abs(x).max():
             continue
         side = np.where(x > middle + extent / 8, 1, np.where(x < middle - extent / 8, -1, 0))
         (clear,) = np.nonzero(side)

@@ -55,8 +55,8 @@ LEG, LANDINGS = 4.0, 5_000
 TRIAL = 8
 """Blocks on which an interpolation is tried."""
 
-OF_EXTENT = 0.1
-"""Largest absolute tolerance, relative to the relative one and to the least extent of a component that moves."""
+OF_EXTENT = 1.0
+"""Largest absolute tolerance, relative to the relative one times the least extent of a component that moves."""
 
 LOOKS, STROBES = 8, 16
 """States of a period of the drive from which the extent of a motion is seen, and periods before them."""
@@ -431,19 +431,20 @@ class Orbits:
 
 
 def driven_states(orbits: Orbits) -> tuple[np.ndarray, np.ndarray]:
-    """States of a driven orbit at the beginning of its next STROBES periods, and LOOKS ones within the period behind them."""
+    """States of a driven orbit at the beginning of its next STROBES periods, and LOOKS ones within each of the later half."""
     integrator, found = orbits.integrator_of(orbits.strengths[:1]), []
     for _ in range(STROBES):
         integrator.advance(orbits.unit)
         found.append(integrator.state[0])
-    late = replace(orbits, state=found[-1][None])
-    return np.array(found), np.concatenate([found[STROBES // 2 :], within(late)])
+    strobes = np.array(found)
+    return strobes, within(replace(orbits, state=strobes[STROBES // 2 :]))
 
 
 def within(orbits: Orbits) -> np.ndarray:
-    """States (LOOKS, components) of a driven orbit within its next period; stretches of time begin with that of the drive."""
-    integrator = orbits.part([0] * LOOKS).integrator_of(orbits.strengths[:1])
-    integrator.advance(orbits.unit * np.arange(1, LOOKS + 1) / LOOKS)
+    """States (starts LOOKS, components) of driven orbits within their next period; stretches of time begin with that of the drive."""
+    starts = len(orbits.state)
+    integrator = orbits.part([*range(starts)] * LOOKS).integrator_of(orbits.strengths[:1])
+    integrator.advance(orbits.unit * np.repeat(np.arange(1, LOOKS + 1), starts) / LOOKS)
     return integrator.state
 
 
