@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 __all__ = ["VERDICTS", "Certificate"]
 
 NEAR = 1e-11
-"""Synchronisation error below which a certified cell ends."""
+"""Synchronisation error below which a certified cell ends, relative to the size of the motion."""
 
-ERRORS, CHANCE = 5.0, 1e-6
-"""A cell may end early if its exponent is below 0 by so many standard errors, and if the chance of
-a burst from NEAR to BURST is below CHANCE.
+ERRORS, CHANCE = 3.5, 1e-6
+"""An exponent is certainly negative if it is below 0 by so many standard errors of a normal variable, or as many of
+Student's as are equally certain; the chance of a burst from NEAR to BURST that a cell may end early with.
 """
 
 BURST, SYNCHRONOUS = 1e-6, 1e-3
-"""Synchronisation error that a certified cell must not reach again; mean error below which a cell
-counts as synchronous, as in `synchain.runtime.synchronisation.threshold`.
+"""Synchronisation error that a certified cell must not reach again; mean error below which a cell counts as synchronous;
+relative to the size of the motion.
 """
 
 VERDICTS = (
@@ -40,12 +40,15 @@ class Certificate:
     and its standard error.
 
     diffusion (cells,): variance of the logarithm of a deviation, per unit of time, about its mean
-    growth.
+    growth.  margin (cells,): how far below 0 an exponent must be to be certainly negative.  size (cells,): how far the
+    motion moves, the norm over components.
     """
 
     exponent: np.ndarray
     stderr: np.ndarray
     diffusion: np.ndarray
+    margin: np.ndarray
+    size: np.ndarray
 
     @property
     def near(self) -> np.ndarray:
@@ -58,11 +61,11 @@ class Certificate:
         """
         climb = math.log(BURST / NEAR)
         rare = -2.0 * climb * self.exponent > -math.log(CHANCE) * self.diffusion
-        return np.where((self.exponent + ERRORS * self.stderr < 0.0) & rare, NEAR, 0.0)
+        return np.where((self.exponent + self.margin < 0.0) & rare, NEAR * self.size, 0.0)
 
     def take(self, cells: np.ndarray) -> Certificate:
         """The part for some cells."""
-        return Certificate(self.exponent[cells], self.stderr[cells], self.diffusion[cells])
+        return Certificate(*(getattr(self, part.name)[cells] for part in fields(self)))
 
     def verdicts(self, finished: np.ndarray, error: np.ndarray, largest: np.ndarray) -> np.ndarray:
         """Index into VERDICTS for each cell, from whether it finished, its mean and its largest
@@ -72,7 +75,8 @@ class Certificate:
         small distance bursts although the exponent is negative (Ashwin, Buescu & Stewart, Phys.
         Lett. A 193, 126 (1994)).
         """
-        sign = np.where(self.exponent + 2 * self.stderr < 0.0, -1, np.where(self.exponent > 2 * self.stderr, 1, 0))
-        together = np.where((sign < 0) & (largest >= SYNCHRONOUS), 7, np.array([1, 2, 3])[sign + 1])
+        allowed = SYNCHRONOUS * self.size
+        sign = np.where(self.exponent + self.margin < 0.0, -1, np.where(self.exponent > 2 * self.stderr, 1, 0))
+        together = np.where((sign < 0) & (largest >= allowed), 7, np.array([1, 2, 3])[sign + 1])
         apart = np.array([6, 5, 4])[sign + 1]
-        return np.where(finished, np.where(error < SYNCHRONOUS, together, apart), 0)
+        return np.where(finished, np.where(error < allowed, together, apart), 0)

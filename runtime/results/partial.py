@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import closing
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -43,7 +44,7 @@ def describe_sweep(
 ) -> Description:
     """Return what a block log says of its sweep."""
     merge = reduction.merge
-    exponents = None if certificate is None else (certificate.exponent, certificate.stderr, certificate.diffusion)
+    exponents = None if certificate is None else [getattr(certificate, part.name) for part in fields(certificate)]
     return {
         "attributes": dict(attributes),
         "blocks": layout.blocks,

@@ -15,7 +15,7 @@ from synchain.models.inputs.checks import check_integer, check_number, check_pos
 from ..support.execution import Execution
 from ..support.progress import Reporter
 
-__all__ = ["SLACK", "TRIED", "Averaging", "Batches", "check_whole", "error_of_steps"]
+__all__ = ["SLACK", "TRIED", "Averaging", "Batches", "check_whole", "error_of_steps", "errors_for"]
 
 BATCHES = 64
 """Most batches that are kept."""
@@ -318,6 +318,15 @@ def _with_room(count: int, per_batch: int) -> tuple[int, int]:
 def _wide(freedom: int) -> float:
     """Half of Student's quantile by which a mean lies within two errors of the truth as often as a normal variable."""
     return float(stdtrit(freedom, ndtr(2.0)) / 2.0)
+
+
+def errors_for(gaussian: float, periods: float) -> float:
+    """Return how many stated errors of an average over some periods are as certain as so many of a normal variable.
+
+    The few squares of a short average have the long tails of Student's distribution.
+    """
+    freedom = max(1, min(round(NARROW * periods ** (2.0 / 3.0)), MOST))
+    return float(stdtrit(freedom, ndtr(gaussian))) / _wide(freedom)
 
 
 @lru_cache(maxsize=8)

@@ -1,5 +1,5 @@
-"""Certification: the transversal exponents of every cell of a sweep say whether its synchronous
-state is stable.
+"""Certification: the transversal exponents along the motion that every cell of a sweep ends on say whether its
+synchronous state is stable.
 
 Two oscillators can become equal bit for bit by rounding and then stay together although the state
 is unstable (Pikovsky, Phys. Rev. Lett. 73, 2931 (1994)), and a cell that starts outside the basin
@@ -9,35 +9,113 @@ cases apart, and let a cell that is certain to stay synchronous end early.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from synchain.models.dynamics.variational import mode
 from synchain.models.scenes.scene import Scene
 from synchain.models.sweeps.sweep import rest_in_sweep
 
-from ..cells.keywords import with_numbers
+from ..cells.buffers import Buffers
+from ..cells.keywords import Given, with_numbers
+from ..cells.layout import Layout
 from ..cells.plan import Planner
-from ..results.certificate import Certificate
-from ..stability.exponents import Exponents, exponents
+from ..cells.reduce import Reduction
+from ..results.certificate import ERRORS, Certificate
+from ..results.labels import States
+from ..stability.attractor import Motion
+from ..stability.averages import Averaging, errors_for
+from ..stability.exponents import along, coupled_cell
 from ..stability.network import shared_orbits, transversal_modes
-from ..stability.orbits import unit_of_time
+from ..stability.orbits import Orbits, unit_of_time, within
+from ..support.execution import Execution
+from .job import Start
+from .pool import Task
+from .prepare import PreparedRun
+from .scheduler import BlockScheduler
 
-__all__ = ["certify", "check_certifiable"]
+__all__ = ["certified", "certify", "check_certifiable"]
 
 MOST = 10**7
 """Cells of the largest certified sweep: exponents and verdicts of all of them are held in memory."""
 
+TRANSIENT, RTOL = 300, 1e-6
+"""Units of time before the average along an orbit, and its tolerance."""
 
-def certify(scene: Scene, *, precision: float = 2e-3, periods: float = 2000, workers: int | None = None) -> Certificate:
-    """Return the exponents of every cell's synchronous state.
+LOOKED, STARTS = 64, 4
+"""Looks at a motion by which cells are told apart, and cells of each motion along which exponents are averaged."""
 
-    Cells that differ only in their starts and in the strength of links that vanish between equal states share one orbit.  Of
-    several kinds of attractor found by four starts the least stable counts.
+ALIKE, CLOSE = 0.25, 1e-3
+"""Motions whose means differ by less, relative to their extents and to those of all motions of a group, count as one."""
+
+
+@dataclass(slots=True)
+class _Ends:
+    """Keeps where the cells of a sweep end, of what is left of the network and of all of it."""
+
+    layout: Layout
+    reduction: Reduction
+    left: np.ndarray
+    whole: np.ndarray
+    finished: np.ndarray
+
+    def missing(self, block: int) -> np.ndarray:
+        """Numbers of all cells of a block."""
+        return self.layout.rows(block)
+
+    def ends(self, block: int) -> Start:
+        """The final states of a block, and which of its cells finished."""
+        rows = self.layout.rows(block)
+        return self.left[rows], self.finished[rows]
+
+    def put(self, task: Task, buffers: Buffers) -> None:
+        """Keep the ends of a block."""
+        self.left[task.cells], self.finished[task.cells] = buffers.end, buffers.finished
+        self.whole[task.cells] = self.reduction.expand(buffers).end
+
+
+def certified(prepared: PreparedRun) -> PreparedRun:
+    """Return a run with the exponents of every cell along the motion that it ends on: all cells run once for their ends.
+
+    Raises
+    ------
+    ValueError
+        As `certify`.
+    """
+    scene, layout = prepared.scene, prepared.layout()
+    check_certifiable(scene)
+    shape = (scene.cells, prepared.reduction.dimension), (scene.cells, len(scene.y0))
+    finished = np.zeros(scene.cells, dtype=bool)
+    ends = _Ends(layout, prepared.reduction, np.empty(shape[0]), np.empty(shape[1]), finished)
+    quiet = replace(prepared.execution, show_progress=False, progress=None)
+    reporter = quiet.reporter(scene.cells)
+    BlockScheduler(layout, np.zeros(layout.blocks, dtype=bool), ends, prepared, reporter).run()
+    workers = quiet.workers if quiet.executor is None else None
+    states = np.where(finished[:, None], ends.whole, Planner(scene).rows(np.arange(scene.cells)).start)
+    return replace(prepared, certificate=certify(scene, states, workers=workers))
+
+
+def certify(
+    scene: Scene,
+    states: np.ndarray | None = None,
+    *,
+    precision: float = 2e-3,
+    periods: float = 2000,
+    workers: int | None = None,
+) -> Certificate:
+    """Return the exponents of the synchronous motion that every cell is on.
+
+    Cells that differ only in their starts and in the strength of links that vanish between equal states share the
+    exponents of each motion that they are on.
 
     Parameters
     ----------
     scene : Scene
         A sweep, with its axes.
+    states : ndarray, shape (cells, states), optional
+        Where the cells ended, of which the first node counts; by default where they start.
     precision, periods, workers
         As for `exponents`.
 
@@ -47,19 +125,60 @@ def certify(scene: Scene, *, precision: float = 2e-3, periods: float = 2000, wor
         If the synchronous state has no transversal exponents; as `exponents` does.
     """
     check_certifiable(scene)
-    exponent, stderr, diffusion = (np.empty(scene.cells) for _ in range(3))
-    for group in shared_orbits(scene, Planner(scene).columns(np.arange(scene.cells))):
+    averaging = Averaging(precision, periods, TRANSIENT, 0, Execution(workers, None, False))
+    planner, cells = Planner(scene), np.arange(scene.cells)
+    starts = planner.rows(cells).start
+    places = States.of(scene)
+    begun = places.table(starts if states is None else states)[:, :, 0]
+    table = {name: np.empty(scene.cells) for name in ("exponent", "stderr", "diffusion", "margin", "size")}
+    for group in shared_orbits(scene, planner.columns(cells)):
         single = with_numbers(scene, group.numbers, axes=(), zipped=False, continuation="none")
-        found = exponents(
-            single, group.strengths, precision=precision, periods=periods, workers=workers, show_progress=False
-        )
-        worst, error = _least_stable(found)
-        table = worst[group.place]
-        rows, worst_mode = np.arange(len(group.cells)), table.argmax(axis=1)
-        exponent[group.cells] = table[rows, worst_mode]
-        stderr[group.cells] = error[group.place][rows, worst_mode]
-        diffusion[group.cells] = stderr[group.cells] ** 2 * found.time * found.averaged
-    return Certificate(exponent, stderr, diffusion)
+        cell = coupled_cell(Given(certify), single, RTOL)
+        orbits = Orbits.make(cell, group.strengths, begun[group.cells[:1]], averaging.execution.size)
+        orbits = orbits.begun_at(begun[group.cells])
+        spread = places.table(starts[group.cells]).transpose(0, 2, 1).reshape(-1, begun.shape[1])
+        for members, extent, whole in _motions(orbits, spread):
+            chosen = members[np.linspace(0, len(members) - 1, min(STARTS, len(members))).astype(int)].tolist()
+            with averaging.reporter() as reporter:
+                found = along(orbits.part(chosen), group.strengths, averaging, reporter)
+            # of several motions that look alike, the least stable counts
+            means = [found.by_start[list(rows)].mean(axis=0) for rows in found.groups]
+            worst, place = np.nanmax(means, axis=0), group.place[members]
+            values = worst[place]
+            rows, mode_of = np.arange(len(members)), values.argmax(axis=1)
+            here = group.cells[members]
+            stderr = found.stderr[place][rows, mode_of]
+            table["exponent"][here], table["stderr"][here] = values[rows, mode_of], stderr
+            table["diffusion"][here] = stderr**2 * found.time * found.averaged
+            table["margin"][here] = errors_for(ERRORS, found.time / orbits.unit) * stderr
+            rests = found.attractors[0].motion in (Motion.FIXED_POINT, Motion.LINEAR)
+            table["size"][here] = np.linalg.norm(whole if rests else extent)
+    return Certificate(**table)
+
+
+def _motions(orbits: Orbits, starts: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Yield the rows of orbits that are on one motion, its extent (p,), and that of all motions with the states (any, p) before.
+
+    Motions are one if their means and extents over some units of time agree.
+    """
+    integrator = orbits.integrator_of(orbits.strengths[:1])
+    step = orbits.unit if orbits.forced else orbits.unit / 8
+    path = [integrator.state]
+    for _ in range(LOOKED):
+        integrator.advance(step)
+        path.append(integrator.state)
+    mean, extent = np.mean(path, axis=0), np.ptp(path, axis=0)
+    whole = np.ptp(np.concatenate([*path, starts]), axis=0)
+    left = np.arange(len(mean))
+    while len(left):
+        first = left[0]
+        allowed = ALIKE * np.maximum(extent[first], extent[left]) + CLOSE * whole
+        apart = np.abs(mean[left] - mean[first]) > allowed
+        wider = np.abs(extent[left] - extent[first]) > 2.0 * allowed
+        alike = ~np.any(apart | wider, axis=1) | orbits.linear
+        looks = within(orbits.part(left[alike].tolist())) if orbits.forced else np.array(path)[:, left[alike]]
+        yield left[alike], np.ptp(looks.reshape(-1, len(whole)), axis=0), whole
+        left = left[~alike]
 
 
 def check_certifiable(scene: Scene) -> None:
@@ -77,9 +196,3 @@ def check_certifiable(scene: Scene) -> None:
     rest = None if frequency is None else rest_in_sweep(frequency, scene.parameters, scene.axes, scene.zipped)
     if rest is not None:
         raise ValueError(f"a certificate needs a drive with a period; found {rest[0]} = {rest[1]:g} in the sweep")
-
-
-def _least_stable(found: Exponents) -> tuple[np.ndarray, np.ndarray]:
-    """Exponent and error (m,) of the attractor that is least stable at each strength."""
-    means = [found.by_start[rows].mean(axis=0) for rows in found.groups]
-    return np.max(means, axis=0), found.stderr

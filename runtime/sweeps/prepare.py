@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 from synchain.codegen.driver.columns import Control
 from synchain.codegen.kernels.compile import load
-from synchain.models.inputs.checks import check_flag
 from synchain.models.scenes.scene import Scene
 
 from ..cells.kernels import warn_of_chords, write_kernel
@@ -18,7 +17,6 @@ from ..cells.reduce import Reduction
 from ..results.certificate import Certificate
 from ..results.labels import provenance
 from ..support.execution import Execution
-from .certify import certify
 from .job import JobSpec, SweepJob, SweepSpec
 
 __all__ = ["PreparedRun", "prepare"]
@@ -69,7 +67,7 @@ class PreparedRun:
 def prepare(
     reduction: Reduction,
     execution: Execution,
-    certified: bool | Certificate = False,
+    certificate: Certificate | None = None,
     *,
     width: int | None = None,
     room: int | None = None,
@@ -80,20 +78,15 @@ def prepare(
     ----------
     reduction : Reduction
     execution : Execution
-    certified : bool or Certificate
-        True computes the exponents of all cells; a Certificate has them already.
+    certificate : Certificate, optional
+        The exponents of all cells of a certified run that goes on.
     width : int, optional
         Number of lanes.
     room : int, optional
         Section points of a cell to make room for at first.
     """
-    scene = reduction.scene
-    certify_now = not isinstance(certified, Certificate) and check_flag("certified", certified)
     source = write_kernel(reduction, width)
     warn_of_chords(source)
-    certificate = certified if isinstance(certified, Certificate) else None
-    if certify_now:
-        certificate = certify(scene, workers=execution.workers if execution.executor is None else None)
     began = time.perf_counter()
     problem = SweepSpec(reduction, room)
     job = problem.job(JobSpec.of(problem, source), load(source))

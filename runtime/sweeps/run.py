@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import Executor
 
-from synchain.models.inputs.checks import check_instance
+from synchain.models.inputs.checks import check_flag, check_instance
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import Given
@@ -13,6 +13,7 @@ from ..cells.reduce import Reduction, as_reduction
 from ..results.result import Result
 from ..support.execution import Execution
 from ..support.progress import Hook
+from .certify import certified as with_certificate
 from .memory import Memory
 from .prepare import prepare
 from .start import Start, started
@@ -101,7 +102,9 @@ def run(
     reporter = execution.reporter(scene.cells)
     reduction = as_reduction(scene, reduce)
     reduction.check_memory()
-    prepared = prepare(reduction, execution, certified, width=width)
+    prepared = prepare(reduction, execution, width=width)
+    if check_flag("certified", certified):
+        prepared = with_certificate(prepared)
     memory = Memory.of(prepared, resume)
     memory.run(reporter)
     result = memory.result()

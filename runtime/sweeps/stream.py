@@ -32,6 +32,7 @@ from ..support.execution import Execution
 from ..support.files import drop_leftovers, understood
 from ..support.progress import Hook, Progress, Reporter
 from ..support.status import Status, tally
+from .certify import certified as with_certificate
 from .errors import SweepFailed, SweepInterrupted
 from .job import Start
 from .pool import Task, worker_lost
@@ -151,9 +152,10 @@ def stream(
     partial = partial_path(path)
     if state == "continue":
         certificate = certificate_of(BlockLog.describe(partial))
-        prepared = prepare(reduction, execution, certificate or False, width=width)
+        prepared = prepare(reduction, execution, certificate, width=width)
     else:
-        prepared = prepare(reduction, execution, certified, width=width)
+        prepared = prepare(reduction, execution, width=width)
+        prepared = with_certificate(prepared) if certified else prepared
         about = describe_sweep(reduction, prepared.layout(), prepared.attributes, prepared.certificate)
         BlockLog.create(partial, about)
     log = BlockLog.open(partial, writing=True)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from synchain.models import Field
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.opening.open import open_result
@@ -80,11 +82,41 @@ def test_every_mode_and_every_attractor_must_be_stable() -> None:
 def test_when_an_early_end_is_safe() -> None:
     one = np.ones(5)
     exponent = np.array([-0.1, -0.1, -0.1, -0.001, 0.1])
-    made = Certificate(exponent, np.array([1e-3, 0.03, 1e-3, 1e-3, 1e-3]), 1e-2 * one * [1, 1, 100, 1, 1])
-    assert list(made.near > 0) == [True, False, False, False, False]
+    stderr = np.array([1e-3, 0.015, 1e-3, 1e-3, 1e-3])
     finished, mean = np.array([True, True, True, True, False]), np.array([0.0, 1.0, 1e-9, 1.0, 0.0])
-    assert list(made.verdicts(finished, mean, 10 * mean)) == [1, 6, 1, 5, 0]
-    assert list(made.verdicts(finished, 1e-4 * mean, 100 * mean)) == [1, 7, 1, 2, 0]
+    for size in (1e-9, 1.0):
+        made = Certificate(exponent, stderr, 1e-2 * one * [1, 1, 100, 1, 1], 5 * stderr, size * one)
+        assert list(made.near) == [NEAR * size, NEAR * size, 0.0, 0.0, 0.0]
+        assert list(made.verdicts(finished, size * mean, 10 * size * mean)) == [1, 6, 1, 5, 0]
+        assert list(made.verdicts(finished, 1e-4 * size * mean, 100 * size * mean)) == [1, 7, 1, 2, 0]
+    short = replace(made, margin=10 * stderr)  # of an average so short that its errors have long tails
+    assert list(short.near) == [NEAR, 0.0, 0.0, 0.0, 0.0]
+    assert list(short.verdicts(finished, mean, 10 * mean)) == [1, 5, 1, 5, 0]
+
+
+@pytest.mark.parametrize("s", [1e-6, 1.0])
+def test_a_cell_is_certified_along_the_motion_that_it_ends_on(s: float) -> None:
+    """Wells at -0.975 s and 1.025 s: all nodes end in the upper one, wherever the first begins; slope 1 - 3 x² + x/10 there."""
+    well = Field({"x": "s*(x/s - (x/s)**3 + (x/s)**2/20)"}, parameters={"s": 1.0})
+    found = []
+    for start in ([-0.5, 0.9, 0.9, 0.9], [0.9, 0.9, 0.9, -0.5]):
+        begun = Scene(well, "x->x", topology("chain", 4), initial={"x": [s * x for x in start]}, parameters={"s": s})
+        ended = run(begun, sigma=[0.5, 1.0], certified=True, show_progress=False)
+        assert set(ended.data.verdict.values) == {1}
+        found.append(ended.data.transversal_exponent.values)
+    x = (0.05 + np.sqrt(0.05**2 + 4.0)) / 2.0
+    expected = 1.0 - 3.0 * x**2 + x / 10.0 - (2.0 - np.sqrt(2.0)) * np.array([0.5, 1.0])
+    np.testing.assert_allclose(found, [expected, expected], atol=1e-7)
+
+
+def test_cells_of_one_sweep_that_end_apart_have_exponents_of_their_own() -> None:
+    well = Field({"x": "x - x**3 + x**2/20"})
+    pair = Scene(
+        well, "x->x", topology("chain", 2), axes={"x_1": [-0.9, 0.9], "x_2": [-0.8, 0.8]}, parameters={"sigma": 1.0}
+    )
+    ended = run(pair, certified=True, show_progress=False)
+    exponent, x = ended.data.transversal_exponent.values, ended.end.values.reshape(2, 2, 2)[..., 0]
+    np.testing.assert_allclose(exponent, 1.0 - 3.0 * x**2 + x / 10.0 - 2.0, atol=1e-7)
 
 
 def test_an_interrupted_run_is_resumed_with_its_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
