@@ -21,6 +21,7 @@ import xarray as xr
 from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.graphs.families import topology
 from synchain.models.inputs.checks import check_integer
+from synchain.models.inputs.keywords import warn
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import ONE_CELL, ORBITS, Given
@@ -30,8 +31,9 @@ from ..support.arrays import numbers
 from ..support.arrays import row as row_of
 from ..support.execution import Execution
 from ..support.progress import Hook, Reporter
-from .attractor import Attractor, find_attractor
+from .attractor import Attractor, Motion, find_attractor
 from .averages import Averaging, Batches
+from .motion import starts_near
 from .network import unused_axes
 from .orbits import Orbits
 from .slowness import warn_of_slow_motion
@@ -51,6 +53,9 @@ __all__ = [
 ]
 
 
+APART = 5.0
+"""Averages of two starts that differ by more errors, at any strength, are those of two motions."""
+
 ROUNDING = 1e-9
 """Share of the largest exponent that is no sign of the first one."""
 
@@ -59,7 +64,7 @@ ROUNDING = 1e-9
 class Exponents(Labelled):
     """Largest transversal exponent at each strength.
 
-    The mean is over the starts that reached the attractor found most often.
+    The mean is over the scene's own start and the further ones that reached the same attractor.
 
     Parameters
     ----------
@@ -79,6 +84,12 @@ class Exponents(Labelled):
         Exponents of each start.
     attractors : tuple of Attractor
         Motion of each start.
+    groups : tuple of tuple of int
+        Indices of the starts on each attractor; the first one is that of the scene's own start.
+    unit : str
+        Unit of time in which transients and averages are counted.
+    precision : float
+        Standard error that was asked for.
     """
 
     alpha: np.ndarray
@@ -88,6 +99,9 @@ class Exponents(Labelled):
     starts: int
     by_start: np.ndarray = field(repr=False)
     attractors: tuple[Attractor, ...] = ()
+    groups: tuple[tuple[int, ...], ...] = ()
+    unit: str = ""
+    precision: float = 0.0
 
     @property
     def data(self) -> xr.Dataset:
@@ -118,7 +132,21 @@ class Exponents(Labelled):
             ("smallest, largest", f"{self.exponent.min():z.4f}, {self.exponent.max():z.4f}"),
             ("motion", ", ".join(dict.fromkeys(a.kind for a in self.attractors))),
             ("average", f"{self.time:.6g} units of time for each of {self.starts} starts"),
+            *self.accuracy,
         )
+
+    @property
+    def accuracy(self) -> tuple[tuple[str, str], ...]:
+        """The largest error beside the one that was asked for, undecided signs, and the unit of time, for a summary."""
+        rows: list[tuple[str, str]] = []
+        if self.undecided:
+            rows.append(("undecided for alpha", words_of(self.undecided)))
+        worst = float(np.max(self.stderr, initial=0.0))
+        if self.precision and worst > self.precision:
+            rows.append(("errors", f"up to {worst:.2g}; precision = {self.precision:g} was not reached; raise periods"))
+        if self.unit:
+            rows.append(("unit", self.unit))
+        return tuple(rows)
 
     @property
     def on_a_line(self) -> bool:
@@ -133,12 +161,7 @@ class Exponents(Labelled):
     @property
     def averaged(self) -> int:
         """Number of starts in the mean."""
-        return max(map(len, self.groups))
-
-    @property
-    def groups(self) -> list[list[int]]:
-        """Indices of the starts, grouped by attractor."""
-        return group_by_attractor(self.attractors, self.by_start)
+        return len(self.groups[0]) if self.groups else self.starts
 
     @property
     def intervals(self) -> tuple[Interval, ...]:
@@ -157,25 +180,71 @@ class Exponents(Labelled):
         ValueError
             If the strengths are complex, or those of several layers.
         """
-        x, y, error = self.alpha, self.exponent, self.stderr
+        x, error = self.alpha, self.stderr
         if not self.on_a_line:
             kind = "complex" if np.iscomplexobj(x) else f"those of {x.shape[1]} layers"
             raise ValueError(f"strengths are {kind}; ranges need real ones of a single layer")
-        rounding = ROUNDING * np.max(np.abs(y[np.isfinite(y)]), initial=0.0)
-        if abs(y[0]) <= max(2.0 * error[0], rounding) < np.inf:
-            y = np.append(0.0, y[1:])  # zero to its error, such as that of a limit cycle at strength 0
-        ends: list[Interval] = [(float(x[0]), 0.0)] if y[0] < 0 else []
-        for i in map(int, np.flatnonzero((y[1:] < 0) != (y[:-1] < 0))):
+        y, stable, _ = self._judged
+        # beside a stretch of undecided signs an end lies anywhere within it
+        blurred = np.zeros(len(x), dtype=bool)
+        for first, last in _uncertain(y, error):
+            blurred[max(first - 1, 0) : last + 1] = True
+        ends: list[Interval] = [(float(x[0]), 0.0)] if stable[0] else []
+        for i in map(int, np.flatnonzero(stable[1:] != stable[:-1])):
             a, b = max(i - 2, 0), min(i + 3, len(x) - 1)
             step = y[i + 1] - y[i] if np.isfinite(y[i] * y[i + 1]) else np.inf  # an exponent of -inf has no slope
             smooth = b - a >= 3 and bool(np.all(np.isfinite(y[a:b])))
             slope = abs(np.polyfit(x[a:b], y[a:b], 1)[0] if smooth else step / (x[i + 1] - x[i]))
             zero = x[i] - y[i] / step * (x[i + 1] - x[i]) if np.isfinite(step) else (x[i] if y[i] >= 0 else x[i + 1])
             spread = float(max(error[i], error[i + 1]) / max(slope, 1e-300))
-            ends.append((float(zero), spread + _bend(x, y, i, float(zero))))
-        if y[-1] < 0:
+            ends.append((float(zero), spread + _bend(x, y, i, float(zero)) + _stretch(x, blurred, i)))
+        if stable[-1]:
             ends.append((float(x[-1]), 0.0))
         return tuple(zip(ends[::2], ends[1::2], strict=True))
+
+    @property
+    def undecided(self) -> tuple[Interval, ...]:
+        """Ranges of real strengths where the exponent seems to change its sign, but by less than two errors."""
+        x, stretches = self.alpha, self._judged[2] if self.on_a_line else ()
+        return tuple((float(x[first]), float(x[last])) for first, last in stretches)
+
+    @property
+    def _judged(self) -> tuple[np.ndarray, np.ndarray, tuple[tuple[int, int], ...]]:
+        """The exponents (m,) with a first one that is zero to its error; which are in an interval; the undecided stretches."""
+        y, error = self.exponent, self.stderr
+        rounding = ROUNDING * np.max(np.abs(y[np.isfinite(y)]), initial=0.0)
+        if abs(y[0]) <= max(2.0 * error[0], rounding) < np.inf:
+            y = np.append(0.0, y[1:])  # zero to its error, such as that of a limit cycle at strength 0
+        stable, changed = y < 0, list[tuple[int, int]]()
+        for first, last in _uncertain(y, error):
+            inside = slice(first, last + 1)
+            gap = first > 0 and last + 1 < len(y) and y[first - 1] < 0 and y[last + 1] < 0
+            if np.any(stable[inside] != gap) and (gap or np.any(stable[inside])):
+                changed.append((first, last))
+                stable[inside] = gap
+        return y, stable, tuple(changed)
+
+
+def _uncertain(y: np.ndarray, error: np.ndarray) -> list[tuple[int, int]]:
+    """The first and last indices of stretches in which no sign is certain, of one or several runs of one sign each.
+
+    A sign is certain if one exponent of the run is two errors from zero; an error that is unknown casts no doubt.
+    """
+    certain = ~np.isfinite(error) | (y + 2.0 * error < 0.0) | (y - 2.0 * error >= 0.0)
+    runs = np.cumsum(np.append(0, (y[1:] < 0) != (y[:-1] < 0)))
+    doubtful = ~np.isin(runs, runs[certain])
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], doubtful, [False]])))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _stretch(x: np.ndarray, blurred: np.ndarray, i: int) -> float:
+    """Length of the undecided stretch that point i lies at the end of; 0 if there is none."""
+    first = last = i
+    while last + 1 < len(x) and blurred[i] and blurred[last]:
+        last += 1
+    while first > 0 and blurred[i] and blurred[first]:
+        first -= 1
+    return float(x[last] - x[first])
 
 
 def _bend(x: np.ndarray, y: np.ndarray, i: int, zero: float) -> float:
@@ -301,7 +370,13 @@ def transversal(
 
 def orbits_of(scene: Scene, strengths: np.ndarray, starts: int, averaging: Averaging) -> Orbits:
     """Return the synchronous orbits of a scene that sweeps nothing, with modes; parameters as for `transversal`."""
-    return Orbits.make(scene, strengths, initial_states(scene, starts, averaging.seed), averaging.execution.size)
+    starts = check_integer("starts", starts, 1)
+    first = np.array([values[0] for values in scene.initial.values()], dtype=float)
+    orbits = Orbits.make(scene, strengths, first[None], averaging.execution.size)
+    if starts > 1 and not orbits.linear:
+        orbits.observe()
+    states = starts_near(first, orbits.extent[: len(first)], starts, averaging.seed)
+    return orbits.begun_at(states)
 
 
 def along(orbits: Orbits, strengths: np.ndarray, averaging: Averaging, reporter: Reporter) -> Exponents:
@@ -319,22 +394,56 @@ def along(orbits: Orbits, strengths: np.ndarray, averaging: Averaging, reporter:
         Counts the periods.
     """
     starts = len(orbits.state)
-    if not orbits.linear:
-        orbits.settle(averaging.transient, reporter.advance)
-    attractors = tuple(find_attractor(orbits, row, averaging.transient) for row in range(starts))
+    bounded = [True] * starts if orbits.linear else _settle(orbits, averaging.transient, reporter)
+    attractors = tuple(
+        find_attractor(orbits, row, averaging.transient) if bounded[row] else Attractor(Motion.UNBOUNDED, 0.0)
+        for row in range(starts)
+    )
     by_start, error, length = _by_start(orbits, attractors, averaging, reporter)
-    largest = max(group_by_attractor(attractors, by_start), key=len)
-    mean, spread = by_start[largest].mean(axis=0), np.sqrt((error[largest] ** 2).sum(axis=0)) / len(largest)
-    return Exponents(strengths, mean, spread, length, starts, by_start, attractors)
+    groups = group_by_attractor(attractors, by_start, error)
+    own = list(groups[0])
+    if len(groups) > 1:
+        others = ", ".join(dict.fromkeys(attractors[group[0]].kind for group in groups[1:]))
+        warn(
+            f"exponents: found {starts - len(own)} of {starts} starts on another motion than the scene's own start "
+            f"({others}); expected one motion; the exponents are those of the scene's own, by_start has all"
+        )
+    mean, spread = by_start[own].mean(axis=0), np.sqrt((error[own] ** 2).sum(axis=0)) / len(own)
+    unit = "" if orbits.linear else str(orbits.turns)
+    return Exponents(strengths, mean, spread, length, starts, by_start, attractors, groups, unit, averaging.precision)
+
+
+def _settle(orbits: Orbits, transient: float, reporter: Reporter) -> list[bool]:
+    """Advance all starts over the transient; True for each that stays bounded. FloatingPointError if the scene's own does not."""
+    begun = orbits.state
+    try:
+        orbits.settle(transient, reporter.advance)
+        return [True] * len(begun)
+    except FloatingPointError:
+        if len(begun) == 1:
+            raise
+    ends, bounded = begun.copy(), [True] * len(begun)
+    for row in range(len(begun)):
+        alone = orbits.part([row])
+        try:
+            alone.settle(transient)
+        except FloatingPointError:
+            if row == 0:
+                raise
+            bounded[row] = False
+        else:
+            ends[row] = alone.state[0]
+    orbits.state = ends
+    return bounded
 
 
 def _by_start(
     orbits: Orbits, attractors: Sequence[Attractor], averaging: Averaging, reporter: Reporter
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Exponents and errors (starts, m) from eigenvalues or averages, and the time averaged over."""
-    exponent = np.empty((len(attractors), len(orbits.strengths)))
-    error = np.empty_like(exponent)
-    rest = [row for row, attractor in enumerate(attractors) if attractor.propagators is None]
+    """Exponents and errors (starts, m) from eigenvalues or averages, NaN of unbounded motion, and the time averaged over."""
+    exponent = np.full((len(attractors), len(orbits.strengths)), np.nan)
+    error = np.full_like(exponent, np.nan)
+    rest = [row for row, attractor in enumerate(attractors) if attractor.motion is Motion.APERIODIC]
     for row, attractor in enumerate(attractors):
         if attractor.propagators is not None:
             exponent[row], error[row] = attractor.exponents()
@@ -399,61 +508,38 @@ def single_cell(given: Given, scene: Scene, rtol: float) -> Scene:
     ValueError
         If a parameter is unknown, and for axes and draws.
     """
-    return given.scene(scene, rtol=rtol, atol=None)
+    return given.scene(scene, rtol=rtol)
 
 
 def initial_states(scene: Scene, starts: int, seed: int) -> np.ndarray:
-    """Return initial states near that of the first oscillator.
-
-    Parameters
-    ----------
-    scene : Scene
-        Source of the first state.
-    starts : int
-        Number of states.
-    seed : int
-        Seed of the displacements of up to 0.4 in the first component.
-
-    Returns
-    -------
-    ndarray, shape (starts, components)
-    """
-    starts = check_integer("starts", starts, 1)
-    state = np.tile([values[0] for values in scene.initial.values()], (starts, 1))
-    state[1:, 0] += np.random.default_rng(seed).uniform(-0.4, 0.4, starts - 1)
-    return state
+    """Return the first oscillator's initial state and others near it (starts, components), by the extent of its motion."""
+    return orbits_of(scene, np.zeros(1), starts, Averaging(0.0, 1, 0, seed, Execution(1))).state
 
 
-def group_by_attractor(attractors: Sequence[Attractor], by_start: np.ndarray) -> list[list[int]]:
-    """Group the starts by attractor.
+def group_by_attractor(
+    attractors: Sequence[Attractor], by_start: np.ndarray, error: np.ndarray
+) -> tuple[tuple[int, ...], ...]:
+    """Group the starts by attractor, that of the first start first.
 
-    Two attractors are the same if they are of one kind and, for exponents from eigenvalues, if
-    their exponents agree, to their errors (`Attractor.resolution`).
-
-    Parameters
-    ----------
-    attractors : sequence of Attractor
-        Motion of each start.
-    by_start : ndarray, shape (starts, m)
-        Exponents of each start.
-
-    Returns
-    -------
-    list of list of int
-        Indices of the starts on each attractor.
+    Two attractors are the same if they are of one kind and their exponents (starts, m) agree, to their errors: those of
+    cycles and fixed points to `Attractor.resolution`, averages within APART errors.
     """
     groups: list[list[int]] = []
     for row, attractor in enumerate(attractors):
         for others in groups:
-            alike = attractors[others[0]].kind == attractor.kind
+            first = others[0]
+            alike = attractors[first].kind == attractor.kind
             if alike and attractor.propagators is not None:
-                alike = np.allclose(by_start[others[0]], by_start[row], rtol=1e-3, atol=attractor.resolution())
+                alike = np.allclose(by_start[first], by_start[row], rtol=1e-3, atol=attractor.resolution())
+            elif alike and attractor.motion is Motion.APERIODIC:
+                both = APART * np.hypot(error[first], error[row])
+                alike = not np.any(np.abs(by_start[first] - by_start[row]) > both)
             if alike:
                 others.append(row)
                 break
         else:
             groups.append([row])
-    return groups
+    return tuple(map(tuple, groups))
 
 
 def average(orbits: Orbits, averaging: Averaging, reporter: Reporter) -> tuple[np.ndarray, np.ndarray, float]:

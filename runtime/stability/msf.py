@@ -51,6 +51,7 @@ class StabilityClass(StrEnum):
 
     NEVER has no zero and is positive, EVERYWHERE no zero and is negative. HALF_LINE is stable from
     one zero to the end of the grid. BOUNDED is one interval, which may begin with the grid.
+    UNDECIDED has no exponent that is negative by more than its error, but some that may be.
     """
 
     NEVER = "never stable"
@@ -58,6 +59,7 @@ class StabilityClass(StrEnum):
     HALF_LINE = "half-line"
     BOUNDED = "bounded interval"
     SEVERAL = "several intervals"
+    UNDECIDED = "undecided within the errors"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -107,12 +109,13 @@ class MSF(Labelled):
         sigma = self._without_windows or words_of([(w.low, w.high) for w in known], beyond=beyond)
         return (
             ("scene", repr(self.scene)),
-            ("class", f"{self.kind}, for alpha {ends_of(self.fine.alpha)}"),
+            ("class", f"{self.kind}{f' ({self.gamma})' if self.gamma else ''}, for alpha {ends_of(self.fine.alpha)}"),
             ("negative for alpha", alpha),
             ("sigma", sigma),
             *((("...", "the grid of alpha ends here, the range may go on"),) if "..." in alpha + sigma else ()),
             ("motion", ", ".join(dict.fromkeys(self.attractors))),
             ("average", f"{self.fine.time:.6g} units of time for each of {self.fine.starts} starts"),
+            *self.fine.accuracy,
         )
 
     @property
@@ -155,8 +158,27 @@ class MSF(Labelled):
 
     @property
     def kind(self) -> StabilityClass:
-        """Class of the function on its grid."""
+        """Class of the function on its grid, by the signs that are certain."""
+        if self.undecided and not self.intervals:
+            return StabilityClass.UNDECIDED
         return classify(self.intervals, float(self.fine.alpha[-1]), float(self.fine.alpha[0]))
+
+    @property
+    def gamma(self) -> str:
+        """Class by the number of zeros on alpha > 0, Γ0, Γ1, Γ2 …, of a function that is positive before them; else empty."""
+        alpha, inside = self.fine.alpha, [end for pair in self.intervals for end in pair]
+        if (
+            self.kind is StabilityClass.UNDECIDED
+            or alpha[-1] <= 0.0
+            or any(low <= max(alpha[0], 0.0) for low, _ in self.intervals)
+        ):
+            return ""
+        return f"Γ{sum(0.0 < end < alpha[-1] for end in inside)}"
+
+    @property
+    def undecided(self) -> tuple[Interval, ...]:
+        """Ranges of alpha where the exponent seems to change its sign, but by less than two errors."""
+        return self.fine.undecided
 
     @property
     def attractors(self) -> tuple[str, ...]:
