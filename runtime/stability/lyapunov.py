@@ -17,7 +17,7 @@ Source: Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15, 9 (1980).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -39,10 +39,11 @@ from ..support.execution import Execution
 from ..support.progress import Hook
 from .averages import SLACK, TRIED, Averaging, Batches, error_of_steps
 from .exponents import single_cell
+from .interpolation import Interpolation, Panel
 from .motion import Turns, rates_of, turns_of
 from .orbits import LOOKS, OF_EXTENT, unit_of_time
 from .slowness import warn_of_slow_motion
-from .variational_integrator import VariationalIntegrator
+from .variational_integrator import Travellers, VariationalIntegrator
 
 __all__ = ["Lyapunov", "lyapunov_spectrum"]
 
@@ -60,6 +61,9 @@ CLEAR, LOST = 1e4, 10.0
 
 From the first on it is clear of the error, below the second it is lost.
 """
+
+MOST_BLOCKS, FINE, FINEST = 32, 1e-7, 1e-10
+"""Most blocks between two orthogonalisations, the least angle between directions that their trial may end with, and any other."""
 
 UNIT = 1024
 """Factor between units of deviations: a power of two, and so large that components of usual sizes share one."""
@@ -256,11 +260,12 @@ def lyapunov_spectrum(
             frame.advance()
             reporter.advance(1)
         frame.choose_block()
+        frame.choose_group()
         batches, lost = Batches(frame.unit, 1.0 / frame.parts), np.zeros(frame.count, dtype=bool)
-        for _ in averaging.rounds(batches, lambda: batches.error()[:-1][~lost], reporter):
-            growth, gone = frame.measure()
-            np.logical_or(lost, gone, out=lost)
-            batches.add(growth[None])
+        for left in averaging.rounds(batches, lambda: batches.error()[:-1][~lost], reporter):
+            for growth, gone in frame.measure_group(min(frame.group, left)):
+                np.logical_or(lost, gone, out=lost)
+                batches.add(growth[None])
         steps = frame.error_of_steps()
     orbit = frame.integrator
     warn_of_slow_motion(frame.variation.orbit, orbit.state, orbit.numbers[0], batches.time)
@@ -341,6 +346,10 @@ class TangentFrame:
         Blocks in a period.
     phase : int
         Block within the period.
+    group : int
+        Blocks between two orthogonalisations, over which propagators are multiplied.
+    carried : tuple, optional
+        What multiplies them, made at the first call.
     rates : callable
         The matrix (size, size) of the variational equation as a function of states and parameters.
     """
@@ -352,6 +361,8 @@ class TangentFrame:
     turns: Turns
     parts: int = 1
     phase: int = 0
+    group: int = 1
+    carried: tuple[VariationalIntegrator, Travellers] | None = None
     rates: Callable[..., np.ndarray] = field(kw_only=True)
 
     @classmethod
@@ -487,6 +498,84 @@ class TangentFrame:
         if lost.sum() == 1 and self.count == self.variation.size and self.variation.events is None:
             growth[lost], lost = volume - growth[~lost].sum(), np.zeros_like(lost)
         return np.append(np.where(np.isfinite(growth), growth, 0.0), volume), lost
+
+    def measure_group(self, blocks: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Advance by several blocks, and yield for each what `measure` returns."""
+        begun, basis = self.integrator.state, self.basis
+        if blocks > 1:
+            growths, angles, volumes = self.advance_group(blocks)
+            shares = growths - np.maximum(growths.max(axis=1, keepdims=True), 0.0)
+            if angles.min() > FINEST and shares.min() > math.log(LOST * self.rtol):
+                yield from zip(np.column_stack([growths, volumes]), np.zeros(growths.shape, dtype=bool), strict=True)
+                return
+            self.integrator.state, self.basis = begun, basis
+        yield from (self.measure() for _ in range(blocks))
+
+    def advance_group(self, blocks: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Advance by several blocks in one call: propagators of single blocks move the directions, which are orthogonal at the end.
+
+        Propagators are as exact as the steps, and their products lose no more than rounding.
+
+        Returns
+        -------
+        growths : ndarray, shape (blocks, count)
+            Logarithm of the growth in each direction over each block.
+        angles : ndarray, shape (blocks, count)
+            Length of the part of each direction, at unit length, that is normal to those before.
+        volumes : ndarray, shape (blocks,)
+            Logarithm of the growth of volumes; nan with set-valued friction.
+        """
+        size, count = self.variation.size, self.count
+        carrier, travellers = self.carried = self.carried or self._carriers()
+        carrier.state = self.integrator.state
+        carrier.set_deviations(np.eye(size)[None])
+        lanes = travellers.registers.lanes
+        registers = travellers.vectors.reshape(-1, size, lanes)
+        directions = np.resize(self.basis.T, (len(registers) * lanes, size))
+        registers[:] = directions.reshape(-1, lanes, size).swapaxes(1, 2)
+        states = carrier.state.shape[1]
+        tracks = np.empty((1, blocks, states + registers.size))
+        gains = carrier.follow(self.unit / self.parts, np.ones(blocks, dtype=np.int64), travellers, tracks)[:, 0]
+        ends = np.concatenate([tracks[0, 1:, states:].reshape(-1, *registers.shape), registers[None]])
+        moved = ends.swapaxes(2, 3).reshape(blocks, -1, size)[:, :count].swapaxes(1, 2)
+        bases, triangles = np.linalg.qr(moved)
+        self.basis, angles = bases[-1], np.abs(np.diagonal(triangles, axis1=1, axis2=2))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            growths = np.diff(np.cumsum(gains, axis=0) + np.log(angles), axis=0, prepend=0.0)
+        volumes = np.full(blocks, np.nan)
+        if self.variation.events is None:
+            passed = [*tracks[0, :, states - self.scene.n : states], carrier.state[0, -self.scene.n :]]
+            volumes = np.diff(np.sum(passed, axis=1))
+            carrier.state[:, -self.scene.n :] = 0.0
+        self.integrator.state = carrier.state
+        return growths, angles, volumes
+
+    def _carriers(self) -> tuple[VariationalIntegrator, Travellers]:
+        """An integrator of the propagator of the network, and the directions, which all take this one."""
+        size, count, own = self.variation.size, self.count, self.integrator
+        carrier = own
+        if count < size:
+            rows = self.variation, own.state, own.numbers, np.zeros((0, size))
+            carrier = VariationalIntegrator.make(self.scene, *rows, 1, method=own.kernel.origin.method)
+            carrier.control, carrier.watch, carrier.slow = own.control, own.watch, own.slow
+        shared = Panel(np.arange(count), np.zeros(1), np.zeros(0), np.ones((count, 1)), np.zeros((0, 1)))
+        registers = Interpolation(np.zeros(count), (shared,)).registers(own.kernel.origin.width)
+        return carrier, Travellers.make(registers, 1, size, size)
+
+    def choose_group(self) -> None:
+        """Choose the most blocks whose product of propagators keeps all directions clear of rounding."""
+        self.group = 1
+        phased = PHASE.name in self.variation.orbit.parameters and self.parts > 1
+        if phased or self.followed() < self.count:
+            return
+        begun, basis = self.integrator.state, self.basis
+        growths, angles, _ = self.advance_group(MOST_BLOCKS)
+        self.integrator.state, self.basis = begun, basis
+        with np.errstate(invalid="ignore"):
+            shares = growths - growths.max(axis=1, keepdims=True)
+        clear = np.all((angles > FINE) & (shares > math.log(CLEAR * self.rtol)), axis=1)
+        while 2 * self.group <= MOST_BLOCKS and clear[: 2 * self.group].all():
+            self.group *= 2
 
     def error_of_steps(self) -> np.ndarray:
         """Advance by TRIED periods, and return the error of all growth rates (count + 1,) that is due to the steps."""

@@ -125,9 +125,7 @@ class GrowthWatch:
     origins: np.ndarray = field(default_factory=lambda: np.zeros((2, 1)))
     last: np.ndarray = field(default_factory=lambda: np.array([[np.inf], [0.0]]))
 
-    def status(
-        self, codes: np.ndarray, steps: np.ndarray, times: np.ndarray, sizes: np.ndarray, most: float
-    ) -> Status:
+    def status(self, codes: np.ndarray, steps: np.ndarray, times: np.ndarray, sizes: np.ndarray, most: float) -> Status:
         """Return FINISHED, or why the first orbit (cells,) that is given up is; codes: those of the kernel."""
         bad = codes != Status.FINISHED
         if bad.any():
