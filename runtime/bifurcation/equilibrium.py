@@ -7,7 +7,10 @@ If a coordinate of all nodes can be shifted together (the phases of oscillators,
 equilibria are not isolated.  Unknown is then also the common speed of the shift, r(state) = speed * shift, and the correction is
 normal to the shift.  A speed other than zero makes a rigid rotation: an equilibrium in the frame that moves with it.
 
-Sources: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), section 1.2; Deuflhard, Newton Methods
+Where Newton's method fails, implicit Euler steps follow the motion from the same start, the longer the smaller the rates
+have become (pseudo-transient continuation), and Newton's method goes on from there.
+
+Sources: Kelley & Keyes, SIAM J. Numer. Anal. 35, 508 (1998); Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), section 1.2; Deuflhard, Newton Methods
 for Nonlinear Problems (Springer, 2004), section 3.3 (the monotonicity of the residual).
 """
 
@@ -39,7 +42,21 @@ MOST_STEPS, HALVINGS = 100, 40
 """Most steps of Newton's method, and how often one is halved until the residual falls."""
 
 CLOSED = 1e-11
-"""Largest rate at an equilibrium, relative to its scale."""
+"""Largest rate at an equilibrium, relative to the sizes of its terms."""
+
+TAIL = 0.34
+"""Largest part of the rates that the closing step of Newton's method leaves.
+
+A root of multiplicity m leaves (1 - 1/m)^m, 1/4 of a fold; a tail x^-p of rates without a root leaves (1 + 1/p)^-p,
+more than 1/e.
+"""
+
+MOST_RELAXED, FIRST_RATE = 500, 10.0
+"""Most steps along the motion, and the inverse length of the first, by the largest slope."""
+
+WORSE, NEWTON = 1.5, 1e-6
+"""Growth of the rates over a step along the motion that is repeated with a shorter one, and rates that are small enough
+for Newton's method."""
 
 DENSE = 2000
 """Most states of which all eigenvalues are computed."""
@@ -58,13 +75,13 @@ ZERO = 1e-7
 1e-16 moves the eigenvalue by its root."""
 
 LEAST = 1e-12
-"""Size of an eigenvalue that is rounding, relative to the slopes of the rates."""
+"""Size of an eigenvalue that is rounding, relative to the fastest."""
 
 BESIDE = 0.1
 """How far aside, relative to the state, the slopes of rates are looked at: at a fold those at the state itself may be zero."""
 
-SHIFT = 0.7
-"""Distance of a shift that must not change the rates."""
+SHIFTS = (7e-13, 7e-9, 7e-5, 0.7, 7e3, 7e7, 7e11)
+"""Distances of shifts that must not change the rates, whatever the unit of the state."""
 
 REFUSED = {
     "rtol": "Newton's method ends at rounding",
@@ -192,6 +209,8 @@ def equilibrium(
 ) -> Equilibrium:
     """Find an equilibrium of a network without a drive by Newton's method, and its stability.
 
+    If that fails, steps along the motion lead closer to the rest that it comes to, if it does.
+
     Parameters
     ----------
     scene : Scene
@@ -239,11 +258,11 @@ def equilibrium(
     wanted = None if count is None else check_integer("count", count, 1)
     if wanted is not None and wanted > size:
         raise ValueError(f"count = {count}; expected at most {size}, the states of the network")
-    slopes = _slopes(network, state)
+    start, slopes = state, _slopes(network, state)
     names, shifts = _shifts(scene, network, state, slopes)
-    state, speeds, residual, steps = _newton(network, state, shifts, slopes)
+    state, speeds, residual, steps = _at_equilibrium(network, state, shifts)
     found = _eigenvalues(network, state, wanted)
-    found[np.abs(found) <= LEAST * _fastest(network, state, slopes)] = 0.0
+    found[np.abs(found) <= LEAST * _fastest(network, start, state)] = 0.0
     return Equilibrium(scene, state, _in_order(found), names, speeds, residual, steps)
 
 
@@ -282,11 +301,15 @@ def _slopes(network: Linearised, state: np.ndarray) -> np.ndarray:
     return np.fmax(here, np.where(np.isfinite(beside), beside, 0.0))
 
 
-def _fastest(network: Linearised, state: np.ndarray, slopes: np.ndarray) -> float:
-    """The size of eigenvalues of M^-1 J, from the slopes at the start of the search and at its end."""
-    mass = network.mass(state)
-    heavy = 1.0 if mass is None else float(abs(mass).max())
-    return float(max(slopes.max(), _slopes(network, state).max())) / heavy
+def _fastest(network: Linearised, *states: np.ndarray) -> float:
+    """The size of eigenvalues of M^-1 J at some states and beside them, in no unit but that of time: a, sqrt(b c) of [[a, b], [c, 0]]."""
+    sizes = [0.0]
+    for state in (*states, *((1.0 + BESIDE) * state for state in states)):
+        jacobian, mass = network.jacobian(state), network.mass(state)
+        pairs = np.sqrt(abs(jacobian.multiply(jacobian.T)).data)
+        heavy = 1.0 if mass is None else float(abs(mass).max())
+        sizes.append(float(np.max(pairs[np.isfinite(pairs)], initial=0.0)) / heavy)
+    return max(sizes)
 
 
 def _shifts(
@@ -301,49 +324,155 @@ def _shifts(
         along = np.zeros(len(state))
         along[first : first + nodes] = 1.0
         first += nodes
-        still = np.all(np.abs(jacobian @ along) <= 1e-12 * slopes)
-        change = np.abs(network.rates(state + SHIFT * along) - rates)
-        if still and np.all(change <= 1e-10 * (slopes + np.abs(rates))):
+        moved = (state + distance * along for distance in SHIFTS)
+        if np.all(np.abs(jacobian @ along) <= 1e-12 * slopes) and all(
+            np.all(np.abs(network.rates(x) - rates) <= CLOSED * (network.term_sizes(x) + network.term_sizes(state)))
+            for x in moved
+        ):
             names.append(name)
             rows.append(along)
     return tuple(names), np.array(rows).reshape(-1, len(state)).T
 
 
-def _newton(
-    network: Linearised, state: np.ndarray, shifts: np.ndarray, slopes: np.ndarray
+@dataclass(slots=True)
+class Search:
+    """A state on its way to rest, with the rates that are left: r(state) - shifts @ speeds.
+
+    shifts: vectors of ones (states, shifts); scales (states,): sizes of the rates, by which their squares are added.
+    """
+
+    network: Linearised
+    shifts: np.ndarray
+    state: np.ndarray
+    speeds: np.ndarray
+    scales: np.ndarray
+    steps: int = 0
+
+    @classmethod
+    def begin(cls, network: Linearised, state: np.ndarray, shifts: np.ndarray) -> Search:
+        """Return the search that begins at a state."""
+        scales, slopes = network.term_sizes(state), abs(_jacobian(network, state)).tocoo()
+        # where all terms vanish: the slopes times the changes of the states that the other rates would notice
+        with np.errstate(divide="ignore", invalid="ignore"):
+            noticed = np.zeros(len(state))
+            np.maximum.at(noticed, slopes.col, np.nan_to_num(scales[slopes.row] / slopes.data, posinf=0.0))
+        scales = np.where(scales > 0.0, scales, slopes @ noticed)
+        scales[scales == 0.0] = scales.max(initial=0.0) or 1.0
+        return cls(network, shifts, state, _speeds(network.rates(state), shifts), scales)
+
+    @property
+    def gap(self) -> np.ndarray:
+        """The rates that are left."""
+        return self.left(self.state, self.speeds)
+
+    def left(self, state: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+        """Return the rates that are left at a state."""
+        return np.asarray(self.network.rates(state) - self.shifts @ speeds)
+
+    def size(self, gap: np.ndarray) -> float:
+        """Return one number for rates that are left."""
+        return float(np.linalg.norm(gap / self.scales))
+
+    def correction(self, gap: np.ndarray, rate: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return a step (states,), (shifts,) of Newton's method, or of the implicit Euler method of length 1/rate.
+
+        RuntimeError if the matrix is singular.
+        """
+        matrix, count = _jacobian(self.network, self.state), self.shifts.shape[1]
+        if rate:
+            mass = self.network.mass(self.state)
+            matrix = matrix - rate * (sparse.eye_array(len(gap), format="csc") if mass is None else mass)
+        if count:
+            border = sparse.csc_array(self.shifts)
+            matrix = sparse.block_array([[matrix, -border], [border.T, None]], format="csc")
+        change = splu(matrix).solve(np.append(-gap, np.zeros(count)))
+        return change[: len(gap)], change[len(gap) :]
+
+    def newton(self) -> bool:
+        """Advance by Newton's method to an equilibrium, and return whether there is one."""
+        gap = self.gap
+        gaps, limits = [np.abs(gap)], [self.closed(self.state)]
+        for _ in range(MOST_STEPS):
+            if not gap.any():
+                break
+            try:
+                change, turn = self.correction(gap)
+            except RuntimeError:
+                break  # singular: the residual says whether this is a solution
+            for part in 0.5 ** np.arange(HALVINGS):
+                tried = self.state + part * change, self.speeds + part * turn
+                left = self.left(*tried)
+                if self.size(left) < self.size(gap):
+                    break
+            else:
+                break
+            (self.state, self.speeds), gap, self.steps = tried, left, self.steps + 1
+            gaps.append(np.abs(gap))
+            limits.append(self.closed(self.state))
+        return self._is_at_root(np.array(gaps), np.array(limits))
+
+    def closed(self, state: np.ndarray) -> np.ndarray:
+        """Return the rates that may be left at an equilibrium."""
+        return np.asarray(CLOSED * (self.network.term_sizes(state) + np.abs(self.shifts @ self.speeds)))
+
+    def _is_at_root(self, gaps: np.ndarray, limits: np.ndarray) -> bool:
+        """Whether the search ended at a root; states that vanish to rounding become zero.
+
+        gaps, limits (steps, states): the rates that were left after each step, and that may be.
+        """
+        closed = limits[-1]
+        still = gaps[-1] <= closed
+        if not still.all():
+            # rates whose terms all vanish, such as v at rest: states of a size that no other rate notices are zero
+            change = abs(_jacobian(self.network, self.state)) @ sparse.diags_array(np.abs(self.state)).tocsc()
+            unnoticed = np.asarray((change[still] > closed[still][:, None]).sum(axis=0)).ravel() == 0
+            rounded = np.where(unnoticed, 0.0, self.state)
+            if not np.all(np.abs(self.left(rounded, self.speeds)) <= self.closed(rounded)):
+                return False
+            self.state = rounded
+        # along a tail of the rates, which has no root, the step that closes them lowers them by less than e
+        last = int(np.argmax(np.all((gaps <= limits)[:, still], axis=1)))
+        levels = (gaps / np.where(closed > 0.0, closed, np.inf))[:, still].max(axis=1, initial=0.0)
+        return last == 0 or bool(levels[last] <= TAIL * levels[last - 1])
+
+    def relax(self) -> None:
+        """Follow the motion towards rest: implicit Euler steps that grow as the rates fall."""
+        gap = self.gap
+        rate = FIRST_RATE * float(abs(_jacobian(self.network, self.state)).sum(axis=1).max())
+        for _ in range(MOST_RELAXED):
+            if self.size(gap) <= NEWTON:
+                return
+            try:
+                change, turn = self.correction(gap, rate)
+            except RuntimeError:
+                rate *= 2.0
+                continue
+            tried = self.state + change, self.speeds + turn
+            left = self.left(*tried)
+            ratio = self.size(left) / self.size(gap)
+            if not ratio < WORSE:  # NaN too
+                rate *= 4.0
+                continue
+            (self.state, self.speeds), gap, self.steps = tried, left, self.steps + 1
+            rate *= ratio
+
+
+def _at_equilibrium(
+    network: Linearised, state: np.ndarray, shifts: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float, int]:
     """State, speeds along the shifts, residual and number of steps."""
-    border, start, first = sparse.csc_array(shifts), state, network.rates(state)
-    speeds, steps = _speeds(first, shifts), 0
-    gap = first - shifts @ speeds
-    while steps < MOST_STEPS and np.abs(gap).max() > 0.0:
-        try:
-            jacobian = _jacobian(network, state)
-            matrix = sparse.block_array([[jacobian, -border], [border.T, None]], format="csc")
-            change = splu(matrix if shifts.shape[1] else jacobian).solve(np.append(-gap, np.zeros(shifts.shape[1])))
-        except RuntimeError:
-            break  # singular: the residual says whether this is a solution
-        part = 1.0
-        for _ in range(HALVINGS):
-            tried = state + part * change[: len(state)]
-            rates = network.rates(tried)
-            moved = speeds + part * change[len(state) :]
-            left = rates - shifts @ moved
-            if np.linalg.norm(left) < np.linalg.norm(gap):
-                break
-            part *= 0.5
-        else:
-            break
-        state, speeds, gap, steps = tried, moved, left, steps + 1
-    size = max(np.abs(start).max(), np.abs(state).max())
-    scales = np.fmax(np.fmax(slopes, _slopes(network, state)) * size, np.fmax(np.abs(first), np.abs(shifts @ speeds)))
-    residual = float(np.abs(gap).max())
-    if not np.all(np.abs(gap) <= CLOSED * scales):
-        raise ArithmeticError(
-            f"no equilibrium near the start: Newton's method left rates of {residual:.2g}; start elsewhere, "
-            "or there is none"
-        )
-    return state, np.where(np.abs(speeds) > EVEN * scales.max(), speeds, 0.0), residual, steps
+    search = Search.begin(network, state, shifts)
+    if not search.newton():
+        failed, search = search, Search.begin(network, state, shifts)
+        search.relax()
+        if not search.newton():
+            raise ArithmeticError(
+                f"no equilibrium near the start: Newton's method left rates of {np.abs(failed.gap).max():.2g}, and steps "
+                f"along the motion {np.abs(search.gap).max():.2g}; start elsewhere, or there is none"
+            )
+    terms = network.term_sizes(search.state) + np.abs(shifts @ search.speeds)
+    speeds = np.where(np.abs(search.speeds) > EVEN * terms.max(), search.speeds, 0.0)
+    return search.state, speeds, float(np.abs(search.gap).max()), search.steps
 
 
 def _speeds(rates: np.ndarray, shifts: np.ndarray) -> np.ndarray:

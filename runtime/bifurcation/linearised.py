@@ -12,6 +12,7 @@ from scipy import sparse
 from synchain.models.dynamics.equations import Equations, Layer
 from synchain.models.graphs.links import Link
 from synchain.models.inputs.names import NodeName
+from synchain.models.mechanics.calculus import derivative
 from synchain.models.mechanics.components import Block, Edge, Node
 
 __all__ = ["Linearised"]
@@ -31,12 +32,15 @@ class Part:
         Places by which rates are differentiated: `own`, and for links those of the source.
     numbers : tuple of float or ndarray, shape (count,)
         Values of the parameters.
+    sizes : callable
+        Sizes of the terms of the rates, as a function of states and parameters.
     """
 
     function: Callable[..., list[float | np.ndarray]]
     own: np.ndarray
     others: tuple[np.ndarray, ...]
     numbers: tuple[float | np.ndarray, ...]
+    sizes: Callable[..., list[float | np.ndarray]]
 
     @classmethod
     def of(
@@ -49,13 +53,23 @@ class Part:
     ) -> Part:
         """Compile a template."""
         entries = [e for block in blocks for row in block for e in row]
-        return cls(sp.lambdify(symbols, [*rates, *entries], ["scipy", "numpy"]), places[0], places, tuple(numbers))
+        states = frozenset(symbols[: sum(table.shape[1] for table in places)])
+        made = sp.lambdify(symbols, [*rates, *entries], ["scipy", "numpy"])
+        sizes = sp.lambdify(symbols, [term_size(e, states) for e in rates], ["scipy", "numpy"], cse=True)
+        return cls(made, places[0], places, tuple(numbers), sizes)
 
     def __call__(self, state: np.ndarray) -> np.ndarray:
         """The values (count, all) of rates and entries at a state of the network."""
+        return self._values(self.function, state)
+
+    def term_sizes(self, state: np.ndarray) -> np.ndarray:
+        """The sizes (count, p) of the terms of the rates at a state of the network."""
+        return np.nan_to_num(self._values(self.sizes, state))  # 0 times an infinite slope
+
+    def _values(self, function: Callable[..., list[float | np.ndarray]], state: np.ndarray) -> np.ndarray:
         states = [column for places in self.others for column in state[places].T]
         with np.errstate(all="ignore"):  # far from the start there may be no numbers
-            found = self.function(*states, *self.numbers)
+            found = function(*states, *self.numbers)
         return np.stack([np.broadcast_to(np.asarray(x, dtype=float), len(self.own)) for x in found], axis=1)
 
 
@@ -99,6 +113,13 @@ class Linearised:
             np.add.at(rates, part.own, part(state)[:, :size])
         return rates
 
+    def term_sizes(self, state: np.ndarray) -> np.ndarray:
+        """Return the sizes (dimension,) of the terms of r at a state: r is zero to rounding if it is far smaller."""
+        sizes = np.zeros(self.dimension)
+        for part in self.parts:
+            np.add.at(sizes, part.own, part.term_sizes(state))
+        return sizes
+
     def jacobian(self, state: np.ndarray) -> sparse.csc_array:
         """Return the derivative of r by the state, in sparse form."""
         return self._assembled(self.parts, state, 1)
@@ -120,6 +141,25 @@ class Linearised:
                 values.append(block.ravel())
         entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
         return sparse.csc_array(sparse.coo_array(entries, shape=(self.dimension, self.dimension)))
+
+
+def term_size(e: sp.Expr, states: frozenset[sp.Symbol]) -> sp.Expr:
+    """The sum of the sizes of the terms of an expression of some states, which rounding is relative to: 2 + |x| of 2 - x.
+
+    A function of u has the size |f(u)| + |f'(u)| times the size of u, which the rounding of u moves it by.
+    """
+    if e.is_Add:
+        return sp.Add(*(term_size(term, states) for term in e.args))
+    if e.is_Mul:
+        return sp.Mul(*(term_size(factor, states) for factor in e.args))
+    if isinstance(e, sp.Piecewise):
+        return sp.Piecewise(*((term_size(branch, states), condition) for branch, condition in e.args))
+    size, u = sp.Abs(e), sp.Dummy("u", real=True)
+    for k, argument in enumerate(e.args):
+        if isinstance(argument, sp.Expr) and argument.free_symbols & states:
+            slope = derivative(e.func(*e.args[:k], u, *e.args[k + 1 :]), u).xreplace({u: argument})
+            size += sp.Abs(slope) * term_size(argument, states)
+    return size
 
 
 Source = tuple[

@@ -17,18 +17,21 @@ Source: Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15, 9 (1980).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import cast
 
 import numpy as np
 import sympy as sp
 import xarray as xr
 
+from synchain.codegen.driver.columns import Control
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.dynamics.variational import PHASE, Variation, network_variation, phase_shifted, with_volume
 from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
+from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import with_modes
 from ..cells.keywords import ONE_ORBIT, Given
 from ..results.labelled import Labelled, dataset
@@ -36,9 +39,11 @@ from ..support.execution import Execution
 from ..support.progress import Hook
 from .averages import SLACK, TRIED, Averaging, Batches, error_of_steps
 from .exponents import single_cell
-from .orbits import unit_of_time
+from .interpolation import Interpolation, Panel
+from .motion import Turns, rates_of, turns_of
+from .orbits import LOOKS, OF_EXTENT, unit_of_time
 from .slowness import warn_of_slow_motion
-from .variational_integrator import VariationalIntegrator
+from .variational_integrator import Travellers, VariationalIntegrator
 
 __all__ = ["Lyapunov", "lyapunov_spectrum"]
 
@@ -56,6 +61,15 @@ CLEAR, LOST = 1e4, 10.0
 
 From the first on it is clear of the error, below the second it is lost.
 """
+
+MOST_BLOCKS, FINE, FINEST = 32, 1e-7, 1e-10
+"""Most blocks between two orthogonalisations, the least angle between directions that their trial may end with, and any other."""
+
+UNIT = 1024
+"""Factor between units of deviations: a power of two, and so large that components of usual sizes share one."""
+
+LOOKED = 2
+"""Periods of the drive in which the extent of a motion is seen."""
 
 LARGEST_RTOL = 1e-5
 """Beyond, no direction is ever clear of the error."""
@@ -81,7 +95,8 @@ class Lyapunov(Labelled):
     stderr : ndarray, shape (count,)
         Standard errors.
     resolved : ndarray of bool, shape (count,)
-        False if several directions decay faster than can be followed; their exponents are -inf, their errors 0.
+        False if several directions decay faster than can be followed; their exponents are -inf. Their errors are 0 with
+        set-valued friction, whose stick makes directions vanish, else nan: they are only known to decay fast.
     divergence : float
         Mean divergence along the orbit: the sum of all exponents of the network. With set-valued
         friction it is that sum itself, -inf if an oscillator has stuck, nan if not all exponents
@@ -94,6 +109,8 @@ class Lyapunov(Labelled):
         Time between two orthogonalisations.
     components : int
         Number of all exponents.
+    unit : str
+        Unit in which transient and average are counted.
     """
 
     exponent: np.ndarray
@@ -104,6 +121,7 @@ class Lyapunov(Labelled):
     time: float
     block: float
     components: int
+    unit: str = ""
 
     @property
     def data(self) -> xr.Dataset:
@@ -121,16 +139,19 @@ class Lyapunov(Labelled):
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
         """The exponents with errors, their sum, the dimension and the length of the average."""
-        shown = [f"{x:.5g} ± {e:.1g}" for x, e in zip(self.exponent[:8], self.stderr[:8], strict=True)]
+        known = zip(self.exponent[:8], self.stderr[:8], strict=True)
+        shown = [f"{x:.5g}" if math.isnan(e) else f"{x:.5g} ± {e:.1g}" for x, e in known]
         low, high = self.dimension_range
+        dimension = f"{self.dimension:.4g}, from {low:.4g} to {high:.4g} within two errors"
         lost = int((~self.resolved).sum())
         fast = f"{lost} direction{'s' * (lost > 1)}, which decay too fast; their exponents sum to {self.rest:.8g}"
         return (
             ("exponents", ", ".join([*shown, *(["…"] if len(self.exponent) > len(shown) else [])])),
             *((("not followed", fast),) if lost and len(self.exponent) == self.components else ()),
             ("divergence", f"{self.divergence:.5g} ± {self.divergence_error:.1g}"),
-            ("Kaplan-Yorke dimension", f"{self.dimension:.4g}, from {low:.4g} to {high:.4g} within two errors"),
+            ("Kaplan-Yorke dimension", f"above {len(self.exponent)}" if math.isnan(self.dimension) else dimension),
             ("average", f"{self.time:.6g} units of time"),
+            *((("unit", self.unit),) if self.unit else ()),
         )
 
     @property
@@ -140,7 +161,7 @@ class Lyapunov(Labelled):
 
     @property
     def dimension(self) -> float:
-        """Kaplan-Yorke dimension; nan if too few exponents are known.
+        """Kaplan-Yorke dimension; nan if it exceeds the number of computed exponents.
 
         A negative exponent within its standard error counts as 0, as that along a periodic orbit is,
         whose dimension is 1. `dimension_range` says what the errors leave open.
@@ -158,7 +179,8 @@ class Lyapunov(Labelled):
 
         It rises with each exponent, so that all exponents within their errors give dimensions between.
         """
-        return self._dimension(self.exponent - 2.0 * self.stderr), self._dimension(self.exponent + 2.0 * self.stderr)
+        errors = np.nan_to_num(2.0 * self.stderr, nan=0.0, posinf=math.inf)
+        return self._dimension(self.exponent - errors), self._dimension(self.exponent + errors)
 
     def _dimension(self, exponent: np.ndarray) -> float:
         """The dimension that some exponents give."""
@@ -196,7 +218,7 @@ def lyapunov_spectrum(
     precision : float
         Averaging stops if every standard error is below this value.
     periods : float
-        Longest average, in periods of the drive, or in units of 2 pi if there is none; a whole number.
+        Longest average, in periods of the drive, or in mean return times of undriven motion; a whole number.
     transient : float
         Transient before the average, in the same units.
     rtol : float
@@ -238,11 +260,12 @@ def lyapunov_spectrum(
             frame.advance()
             reporter.advance(1)
         frame.choose_block()
+        frame.choose_group()
         batches, lost = Batches(frame.unit, 1.0 / frame.parts), np.zeros(frame.count, dtype=bool)
-        for _ in averaging.rounds(batches, lambda: batches.error()[:-1][~lost], reporter):
-            growth, gone = frame.measure()
-            np.logical_or(lost, gone, out=lost)
-            batches.add(growth[None])
+        for left in averaging.rounds(batches, lambda: batches.error()[:-1][~lost], reporter):
+            for growth, gone in frame.measure_group(min(frame.group, left)):
+                np.logical_or(lost, gone, out=lost)
+                batches.add(growth[None])
         steps = frame.error_of_steps()
     orbit = frame.integrator
     warn_of_slow_motion(frame.variation.orbit, orbit.state, orbit.numbers[0], batches.time)
@@ -253,7 +276,8 @@ def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray, steps: np.n
     """Means and errors; exponents after a lost direction are lost as well."""
     resolved = ~np.logical_or.accumulate(lost)
     mean, error = batches.mean()[0], np.hypot(batches.error_by_start()[0], steps)
-    exponent, spread = np.where(resolved, mean[:-1], -np.inf), np.where(resolved, error[:-1], 0.0)
+    unknown = np.nan if frame.variation.events is None else 0.0
+    exponent, spread = np.where(resolved, mean[:-1], -np.inf), np.where(resolved, error[:-1], unknown)
     order = np.argsort(-exponent, kind="stable")
     time, volume = batches.time, (float(mean[-1]), float(error[-1]))
     if frame.variation.events is not None:
@@ -267,6 +291,7 @@ def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray, steps: np.n
         time=time,
         block=frame.unit / frame.parts,
         components=frame.variation.size,
+        unit=str(frame.turns),
     )
 
 
@@ -278,6 +303,27 @@ def _counted(scene: Scene, count: int | None) -> int:
     if not 1 <= check_integer("count", count, -dimension) <= dimension:
         raise ValueError(f"count = {count}; expected 1 … {dimension}, the components of the network's state")
     return count
+
+
+@dataclass(slots=True)
+class Observed:
+    """An integrator whose last states, the logarithms of volumes, are hidden from who looks at the motion."""
+
+    integrator: VariationalIntegrator
+    hidden: int
+
+    @property
+    def state(self) -> np.ndarray:
+        """The other states (1, any)."""
+        return self.integrator.state[:, : self.integrator.state.shape[1] - self.hidden]
+
+    @state.setter
+    def state(self, state: np.ndarray) -> None:
+        self.integrator.state = np.pad(state, ((0, 0), (0, self.hidden)))
+
+    def advance(self, length: float) -> None:
+        """Integrate over a length of time."""
+        self.integrator.advance(length)
 
 
 @dataclass(slots=True)
@@ -294,12 +340,16 @@ class TangentFrame:
         Integrator of the orbit and its deviations.
     basis : ndarray, shape (size, count)
         Orthonormal deviations.
-    unit : float
-        Period of the drive, or 2 pi.
+    turns : Turns
+        Period of the drive, or mean return time of undriven motion.
     parts : int
         Blocks in a period.
     phase : int
         Block within the period.
+    group : int
+        Blocks between two orthogonalisations, over which propagators are multiplied.
+    carried : tuple, optional
+        What multiplies them, made at the first call.
     rates : callable
         The matrix (size, size) of the variational equation as a function of states and parameters.
     """
@@ -308,9 +358,11 @@ class TangentFrame:
     variation: Variation
     integrator: VariationalIntegrator
     basis: np.ndarray
-    unit: float
+    turns: Turns
     parts: int = 1
     phase: int = 0
+    group: int = 1
+    carried: tuple[VariationalIntegrator, Travellers] | None = None
     rates: Callable[..., np.ndarray] = field(kw_only=True)
 
     @classmethod
@@ -331,18 +383,51 @@ class TangentFrame:
         ValueError
             If time enters without a known period.
         """
-        unit = unit_of_time(scene)
+        turns = Turns(unit_of_time(scene), np.zeros(0), "period of the drive")
         network = network_variation(without_drive(scene.equations, scene.parameters))
         sticks = network.events is not None
         variation = network if sticks else Variation(with_volume(network.orbit), network.size, network.matrix)
         variation = phase_shifted(variation) if variation.orbit.forced else variation
         values = {**scene.parameters, PHASE.name: 0.0}
         numbers = np.array([[values[name] for name in variation.orbit.parameters]])
-        state = np.array([[*scene.y0, *(0.0 for _ in range(0 if sticks else scene.n))]])
-        state = with_modes(variation.orbit, state, numbers)
-        integrator = VariationalIntegrator.make(scene, variation, state, numbers, np.zeros((0, count)), 1)
+        hidden = 0 if sticks else scene.n
+        state = with_modes(variation.orbit, np.array([[*scene.y0, *(0.0 for _ in range(hidden))]]), numbers)
+
+        def integrator_of(scaled: Variation, slow: float) -> VariationalIntegrator:
+            rows = scaled, state, numbers, np.zeros((0, count))
+            method = chosen_for_modes(scene, *rows, slow)
+            made = VariationalIntegrator.make(scene, *rows, 1, method=method)
+            made.slow = slow
+            return made
+
         basis = np.linalg.qr(np.random.default_rng(seed).normal(size=(network.size, count)))[0]
-        return cls(scene, variation, integrator, basis, unit, rates=_rates(variation))
+        if variation.orbit.forced:
+            integrator = integrator_of(variation, 2.0 * math.pi / turns.time)
+            looked = cls(scene, variation, integrator, basis, turns, rates=_rates(variation))
+            turns = turns._replace(extent=looked.extent_of_driven(hidden))
+        else:
+            observed = Observed(integrator_of(variation, math.inf), hidden)
+            observed.integrator.warned = True
+            turns = turns_of(cast("VariationalIntegrator", observed), rates_of(network.orbit, dict(scene.parameters)))
+        variation = variation if sticks else _scaled(variation, turns.extent)
+        integrator = integrator_of(variation, 2.0 * math.pi / turns.time)
+        moving = turns.extent[turns.extent > 0.0]
+        least = OF_EXTENT * integrator.control[Control.RTOL] * float(moving.min(initial=np.inf))
+        integrator.control[Control.ATOL] = min(integrator.control[Control.ATOL], least)
+        return cls(scene, variation, integrator, basis, turns, rates=_rates(variation))
+
+    def extent_of_driven(self, hidden: int) -> np.ndarray:
+        """Return how far each state moves over the next periods of the drive."""
+        self.parts, states = LOOKS, [self.integrator.state[0]]
+        for _ in range(LOOKED * LOOKS):
+            self.advance()
+            states.append(self.integrator.state[0])
+        return np.asarray(np.ptp(states, axis=0)[: len(states[0]) - hidden])
+
+    @property
+    def unit(self) -> float:
+        """Unit of time: the period of the drive, or the mean return time of undriven motion."""
+        return self.turns.time
 
     @property
     def count(self) -> int:
@@ -414,6 +499,84 @@ class TangentFrame:
             growth[lost], lost = volume - growth[~lost].sum(), np.zeros_like(lost)
         return np.append(np.where(np.isfinite(growth), growth, 0.0), volume), lost
 
+    def measure_group(self, blocks: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Advance by several blocks, and yield for each what `measure` returns."""
+        begun, basis = self.integrator.state, self.basis
+        if blocks > 1:
+            growths, angles, volumes = self.advance_group(blocks)
+            shares = growths - np.maximum(growths.max(axis=1, keepdims=True), 0.0)
+            if angles.min() > FINEST and shares.min() > math.log(LOST * self.rtol):
+                yield from zip(np.column_stack([growths, volumes]), np.zeros(growths.shape, dtype=bool), strict=True)
+                return
+            self.integrator.state, self.basis = begun, basis
+        yield from (self.measure() for _ in range(blocks))
+
+    def advance_group(self, blocks: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Advance by several blocks in one call: propagators of single blocks move the directions, which are orthogonal at the end.
+
+        Propagators are as exact as the steps, and their products lose no more than rounding.
+
+        Returns
+        -------
+        growths : ndarray, shape (blocks, count)
+            Logarithm of the growth in each direction over each block.
+        angles : ndarray, shape (blocks, count)
+            Length of the part of each direction, at unit length, that is normal to those before.
+        volumes : ndarray, shape (blocks,)
+            Logarithm of the growth of volumes; nan with set-valued friction.
+        """
+        size, count = self.variation.size, self.count
+        carrier, travellers = self.carried = self.carried or self._carriers()
+        carrier.state = self.integrator.state
+        carrier.set_deviations(np.eye(size)[None])
+        lanes = travellers.registers.lanes
+        registers = travellers.vectors.reshape(-1, size, lanes)
+        directions = np.resize(self.basis.T, (len(registers) * lanes, size))
+        registers[:] = directions.reshape(-1, lanes, size).swapaxes(1, 2)
+        states = carrier.state.shape[1]
+        tracks = np.empty((1, blocks, states + registers.size))
+        gains = carrier.follow(self.unit / self.parts, np.ones(blocks, dtype=np.int64), travellers, tracks)[:, 0]
+        ends = np.concatenate([tracks[0, 1:, states:].reshape(-1, *registers.shape), registers[None]])
+        moved = ends.swapaxes(2, 3).reshape(blocks, -1, size)[:, :count].swapaxes(1, 2)
+        bases, triangles = np.linalg.qr(moved)
+        self.basis, angles = bases[-1], np.abs(np.diagonal(triangles, axis1=1, axis2=2))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            growths = np.diff(np.cumsum(gains, axis=0) + np.log(angles), axis=0, prepend=0.0)
+        volumes = np.full(blocks, np.nan)
+        if self.variation.events is None:
+            passed = [*tracks[0, :, states - self.scene.n : states], carrier.state[0, -self.scene.n :]]
+            volumes = np.diff(np.sum(passed, axis=1))
+            carrier.state[:, -self.scene.n :] = 0.0
+        self.integrator.state = carrier.state
+        return growths, angles, volumes
+
+    def _carriers(self) -> tuple[VariationalIntegrator, Travellers]:
+        """An integrator of the propagator of the network, and the directions, which all take this one."""
+        size, count, own = self.variation.size, self.count, self.integrator
+        carrier = own
+        if count < size:
+            rows = self.variation, own.state, own.numbers, np.zeros((0, size))
+            carrier = VariationalIntegrator.make(self.scene, *rows, 1, method=own.kernel.origin.method)
+            carrier.control, carrier.watch, carrier.slow = own.control, own.watch, own.slow
+        shared = Panel(np.arange(count), np.zeros(1), np.zeros(0), np.ones((count, 1)), np.zeros((0, 1)))
+        registers = Interpolation(np.zeros(count), (shared,)).registers(own.kernel.origin.width)
+        return carrier, Travellers.make(registers, 1, size, size)
+
+    def choose_group(self) -> None:
+        """Choose the most blocks whose product of propagators keeps all directions clear of rounding."""
+        self.group = 1
+        phased = PHASE.name in self.variation.orbit.parameters and self.parts > 1
+        if phased or self.followed() < self.count:
+            return
+        begun, basis = self.integrator.state, self.basis
+        growths, angles, _ = self.advance_group(MOST_BLOCKS)
+        self.integrator.state, self.basis = begun, basis
+        with np.errstate(invalid="ignore"):
+            shares = growths - growths.max(axis=1, keepdims=True)
+        clear = np.all((angles > FINE) & (shares > math.log(CLEAR * self.rtol)), axis=1)
+        while 2 * self.group <= MOST_BLOCKS and clear[: 2 * self.group].all():
+            self.group *= 2
+
     def error_of_steps(self) -> np.ndarray:
         """Advance by TRIED periods, and return the error of all growth rates (count + 1,) that is due to the steps."""
         usual, looser = [], []
@@ -441,6 +604,17 @@ class TangentFrame:
         self.parts, self.phase = fewest, 0
         for _ in range(TRIAL * fewest):
             self.advance()
+
+
+def _scaled(variation: Variation, extent: np.ndarray) -> Variation:
+    """The equation of deviations in units of the extent of each component, in steps of UNIT: those of like size stay."""
+    moving = extent[: variation.size] > 0.0
+    if not moving.any():
+        return variation
+    logarithms = np.log(np.where(moving, extent[: variation.size], 1.0)) / math.log(UNIT)
+    powers = np.where(moving, np.round(logarithms - np.median(logarithms[moving])), 0.0).astype(int)
+    matrix = tuple(((r, c), e * sp.Integer(UNIT) ** int(powers[c] - powers[r])) for (r, c), e in variation.matrix)
+    return Variation(variation.orbit, variation.size, matrix)
 
 
 def _rates(variation: Variation) -> Callable[..., np.ndarray]:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -53,6 +53,11 @@ NO_PANELS = (
 NO_LEGS, NO_TRACKS = NO_PANELS[-4:-1], NO_PANELS[-1]
 """What the last ones are for propagators that are integrated from the beginning of a block to its end, and if what a
 batch begins with is not asked for."""
+
+
+STEEP, LONG, HIGH, FEWEST_STEPS = 1.1, 3, 256.0, 16
+"""A rise of an orbit without bound: by which factor the steps per time grow in each stretch, in how many at least, and by
+which these and the size in all; stretches of fewer steps tell nothing."""
 
 
 @dataclass(slots=True)
@@ -108,6 +113,34 @@ class Travellers:
 
 
 @dataclass(slots=True)
+class GrowthWatch:
+    """Watches orbits over stretches of time that follow each other, as a kernel does within one.
+
+    steps (cells,): all so far; rises (cells,): stretches since steps per time began to rise; last, origins (2, cells): steps
+    per time and largest size, in the last stretch and before that rise.
+    """
+
+    steps: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    rises: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    origins: np.ndarray = field(default_factory=lambda: np.zeros((2, 1)))
+    last: np.ndarray = field(default_factory=lambda: np.array([[np.inf], [0.0]]))
+
+    def status(self, codes: np.ndarray, steps: np.ndarray, times: np.ndarray, sizes: np.ndarray, most: float) -> Status:
+        """Return FINISHED, or why the first orbit (cells,) that is given up is; codes: those of the kernel."""
+        bad = codes != Status.FINISHED
+        if bad.any():
+            return Status(int(codes[bad.argmax()]))
+        now = np.array([steps / np.where(times > 0.0, times, np.inf), np.fmax(sizes, self.last[1])])
+        rising = (now[0] > STEEP * self.last[0]) & (steps >= FEWEST_STEPS)
+        self.rises = np.where(rising, self.rises + 1, 0)
+        self.origins, self.last = np.where(self.rises <= 1, self.last, self.origins), now
+        self.steps = self.steps + steps
+        if np.any((self.rises >= LONG) & np.all(now > HIGH * self.origins, axis=0)):
+            return Status.DIVERGED
+        return Status.STEP_BUDGET if np.any(self.steps >= most) else Status.FINISHED
+
+
+@dataclass(slots=True)
 class VariationalIntegrator:
     """Orbits with several deviations each, which differ in their strengths.
 
@@ -139,6 +172,8 @@ class VariationalIntegrator:
         Whether it was said that the steps are short because the modes are stiff.
     slow : float
         Rate of the motion that steps must follow anyway.
+    watch : GrowthWatch
+        Ends orbits without bound, and those that take more than `max_steps` steps in all.
     """
 
     variation: Variation
@@ -154,6 +189,7 @@ class VariationalIntegrator:
     steps: int = 0
     warned: bool = False
     slow: float = 1.0
+    watch: GrowthWatch = field(default_factory=GrowthWatch)
 
     @classmethod
     def make(
@@ -327,7 +363,15 @@ class VariationalIntegrator:
         numbers, period, vectors = (
             np.concatenate([part] * times) for part in (self.numbers, self.period, self.vectors)
         )
-        other = replace(self, state=state, numbers=numbers, period=period, vectors=vectors, control=self.control.copy())
+        other = replace(
+            self,
+            state=state,
+            numbers=numbers,
+            period=period,
+            vectors=vectors,
+            control=self.control.copy(),
+            watch=GrowthWatch(),
+        )
         other.loosen(ratio)
         return other
 
@@ -376,9 +420,11 @@ class VariationalIntegrator:
             self.kernel.drive(0, cells, *rest)
         else:
             self._share(np.linspace(0, cells, min(cells, self.workers) + 1).astype(int), rest)
-        bad = counts[:, 0] != Status.FINISHED
-        if bad.any():
-            status = Status(int(counts[bad.argmax(), 0]))
+        times = panels[0].sum() * spans[:, 1]
+        status = self.watch.status(
+            counts[:, 0], counts[:, 1:3].sum(axis=1), times, np.abs(end).max(axis=1), self.control[Control.MAX_STEPS]
+        )
+        if status is not Status.FINISHED:
             largest = np.hypot.reduce(self.strengths).max()
             modes = f" of strengths up to {largest:g}" if largest else ""
             raise FloatingPointError(f"the orbit with its deviations{modes} cannot be integrated: {status.message}")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 import synchain as sc
 from synchain.runtime.bifurcation import equilibrium as module
@@ -234,3 +235,56 @@ def test_identical_phases_at_zero_lock_at_their_lagging_speed_in_any_unit_of_tim
     found = sc.equilibrium(sc.Scene(PHASE, lagging, sc.cycle(5), parameters={"w": 0.3 * unit}, initial={"theta": 0.0}))
     assert found.speeds / unit == pytest.approx([0.3 - 2.0 * np.sin(0.1)], rel=1e-14)
     assert found.stable
+
+
+@pytest.mark.parametrize("form", ["S/(K + S)", "tanh(S/K)", "1 - exp(-S/K)", "S**2/(K**2 + S**2)"])
+def test_rates_that_level_off_above_zero_have_no_equilibrium(form: str) -> None:
+    """k - V f(S) with k >= V, alone and in a linked pair, in any units; with k < V there is one."""
+    pool = sc.Field({"S": f"k - V*({form})"}, parameters={"k": 1, "V": 1, "K": 1})
+    lone, pair = sc.Scene(pool, None), sc.Scene(pool, sc.Rates({"S": "d*W*(S_j - S_i)"}, {"d": 1}), sc.chain(2))
+    for size, unit in ((1.0, 1.0), (1e-6, 1e3), (1e9, 1e-5)):
+        for k in (1.5, 1.0):
+            for scene in (lone, pair.replace(parameters={"d": 0.3 * unit})):
+                scene = scene.replace(initial={"S": size})
+                with pytest.raises(ArithmeticError, match="no equilibrium near the start"):
+                    sc.equilibrium(scene, k=k * size * unit, V=size * unit, K=size)
+        found = sc.equilibrium(lone.replace(initial={"S": size}), k=0.5 * size * unit, V=size * unit, K=size)
+        assert found.residual < 1e-14 * size * unit
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-3, 1.0, 1e6])
+@pytest.mark.parametrize("offset", [0.0, 3.0])
+def test_an_equilibrium_does_not_depend_on_units_of_its_components(size: float, offset: float) -> None:
+    """x = c + s X, v = r V with X' = V, V' = -X^3 - V/2 + X: three equilibria, all by their own starts."""
+    rates = {"x": "k*v*s/r", "v": "k*r*(-((x - c)/s)**3 - v/r/2 + (x - c)/s)"}
+    well = sc.Field(rates, parameters={"s": size, "r": 1e3 / size, "c": offset * size, "k": 1 / size})
+    for start, rest in ((1.3, 1.0), (-0.8, -1.0), (0.2, 0.0)):
+        found = sc.equilibrium(sc.Scene(well, None, initial={"x": size * (start + offset), "v": 0.0}))
+        np.testing.assert_allclose(found.state / size, [rest + offset, 0.0], atol=1e-14)
+        assert found.stable == (rest != 0.0)
+        np.testing.assert_allclose(found.eigenvalues.real.max() * size, -0.25 if rest else (17**0.5 - 1) / 4, rtol=1e-9)
+
+
+def test_a_rate_that_is_flat_at_the_start_is_no_shift_in_large_units() -> None:
+    """x' = k (1 - (x/s)^3): at x = 0, s = 10^9 a shift by one changes the rate by 10^-27."""
+    found = sc.equilibrium(sc.Scene(sc.Field({"x": "1 - (x/s)**3"}, parameters={"s": 1e9}, initial={"x": 1e3}), None))
+    assert found.shifts == ()
+    assert found.state == pytest.approx([1e9], rel=1e-12)
+
+
+RELAXING = sc.Field({"x": "p - 1.2*x - x**3 + 1.41*y", "y": "-0.88*y + tanh(x)"}, parameters={"p": 0})
+
+
+def test_where_newton_fails_the_motion_leads_to_rest() -> None:
+    """A pair of which the run ends at x = (-.229, -.867); a chain in a double well, begun beside a ridge."""
+    graph = sc.from_sparse(sparse.coo_array([[0.0, 0.71], [-0.46, 0.0]]), adjacency=True)
+    link = sc.Rates({"x": "K*W*sin(x_j - x_i)"}, {"K": 0.7})
+    start = {"x": [0.785, -0.311], "y": 0.0}
+    found = sc.equilibrium(sc.Scene(RELAXING, link, graph, initial=start, parameters={"p": [0.37, -0.38]}))
+    np.testing.assert_allclose(found.state[:2], [-0.22902549, -0.86742193], atol=1e-8)
+    assert found.stable
+    # Newton's method meets the flat top of the hump of x^3 - 3x + 3, whose root is at -2.1038
+    hump = sc.Field({"x": "-k*(x**3/s**2 - 3*x + 3*s)"}, parameters={"k": 1, "s": 1})
+    for unit, size in ((1.0, 1.0), (1e6, 1e-6), (1e-6, 1e6)):
+        found = sc.equilibrium(sc.Scene(hump, None, initial={"x": 1.5 * size}), k=unit, s=size)
+        assert found.state / size == pytest.approx([-2.103803402735536], rel=1e-12)

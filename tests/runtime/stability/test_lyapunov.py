@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from synchain.models.definitions.inline import Field
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import PHASE, network_variation, phase_shifted, with_volume
 from synchain.models.graphs.families import topology
@@ -149,6 +150,8 @@ def test_dimension_by_hand() -> None:
     assert of(1.0, -np.inf, -np.inf) == 1.0
     assert of(1.0, 0.0, -1.0) == 3.0
     assert np.isnan(of(1.0, 0.0))
+    few = Lyapunov(np.array([1.0, 0.0]), np.zeros(2), np.ones(2, dtype=bool), 0.0, 0.0, 1.0, 1.0, 3)
+    assert dict(few.summary)["Kaplan-Yorke dimension"] == "above 2"
 
 
 @pytest.mark.parametrize(
@@ -180,3 +183,53 @@ def test_what_is_refused() -> None:
         with_volume(Scene(contact="set-valued").equations)
     with pytest.raises(ValueError, match="9 oscillators; expected at most 8"):
         lyapunov_spectrum(Scene(topology=topology("chain", 9)))
+
+
+UNITS = Field(
+    {"x": "10*k*s*(y - (x - c)/s)", "y": "k*((x - c)/s*(28 - z) - y)", "z": "k*((x - c)/s*y - 8*z/3)"},
+    parameters={"k": 1.0, "s": 1.0, "c": 0.0},
+)
+"""Lorenz's system in units of time 1/k and of x, which is s X + c."""
+
+
+@pytest.mark.parametrize(
+    ("k", "s", "c"), [(100.0, 1.0, 0.0), (1e-6, 1.0, 0.0), (1e6, 1.0, 0.0), (1.0, 1e-6, 1e-5), (1.0, 1e6, 0.0)]
+)
+def test_units_of_time_and_of_a_component_change_nothing(k: float, s: float, c: float) -> None:
+    scene = Scene(UNITS, None, initial={"x": s + c, "y": 1.0, "z": 20.0}, parameters={"k": k, "s": s, "c": c})
+    found = lyapunov_spectrum(scene, periods=128, transient=20, precision=0.0)
+    assert found.resolved.all()
+    assert np.all(np.abs(found.exponent / k - [0.9056, 0.0, -14.5723]) < 4 * found.stderr / k + 1e-3)
+    assert found.stderr.max() < 0.3 * k
+    assert found.exponent.sum() / k == pytest.approx(-41 / 3, abs=1e-6)
+    assert found.unit.startswith("mean return time")
+    assert found.time * k == pytest.approx(128 * 0.75, rel=0.05)
+
+
+@pytest.mark.parametrize("rate", ["-x**3 + v/2", "-k*x**3 + v/3"])
+def test_an_orbit_without_bound_whose_steps_shrink_ends_in_words(rate: str) -> None:
+    node = Field({"x": "v", "v": rate}, parameters={"k": 5.0} if "k" in rate else None, initial={"x": 1.0})
+    with pytest.raises(FloatingPointError, match="the state grew without bound"):
+        lyapunov_spectrum(Scene(node, None))
+
+
+def test_an_average_takes_no_more_steps_than_max_steps() -> None:
+    with pytest.raises(FloatingPointError, match="used up max_steps before the end"):
+        lyapunov_spectrum(lone("duffing").replace(max_steps=2000), periods=5000)
+
+
+def test_the_absolute_tolerance_of_a_scene_counts() -> None:
+    found = [
+        lyapunov_spectrum(lone("duffing").replace(atol=atol), periods=4, transient=0, rtol=1e-6).exponent[0]
+        for atol in (1e-9, 1e-14)
+    ]
+    assert found[0] != found[1]
+
+
+def test_products_of_propagators_grow_as_single_blocks_do() -> None:
+    for scene, count in ((lone("lorenz"), 3), (lone("duffing", u=4.0), 1)):
+        frames = [TangentFrame.make(scene, count, seed=0) for _ in range(2)]
+        single = np.array([frames[0].measure()[0] for _ in range(4)])
+        group = np.array([growth for growth, _ in frames[1].measure_group(4)])
+        np.testing.assert_allclose(group, single, atol=1e-5)
+        np.testing.assert_allclose(np.abs(frames[1].basis), np.abs(frames[0].basis), atol=1e-5)
