@@ -126,7 +126,10 @@ class Branch(Labelled):
         stable = sum(orbit.stable for orbit in self.orbits)
         turns = "; ".join(f"{turn.kind} at {turn.value:.8g}" for turn in self.bifurcations)
         return (
-            ("orbits", f"{len(self.orbits)} of {self.orbits[0].periods} drive periods, {stable} stable"),
+            (
+                "orbits",
+                f"{len(self.orbits)} of {self.orbits[0].periods} drive periods, {stable} stable for one oscillator",
+            ),
             (self.name, ends_of(self.values)),
             ("bifurcations", turns or "none"),
             *((("lost", f"at {numbers(self.lost)}"),) if self.lost else ()),

@@ -22,8 +22,9 @@ from scipy.optimize import brentq
 
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.inputs.checks import short_repr
+from synchain.models.inputs.keywords import warn
 from synchain.models.mechanics.friction import SLIP
-from synchain.models.scenes.scene import Scene
+from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import Given
 from ..results.labelled import Labelled, dataset
@@ -125,15 +126,16 @@ class PeriodicOrbit(Labelled):
         sizes = ", ".join(f"{value:.6g}" for value in self.multipliers)
         return (
             ("scene", repr(self.scene)),
+            ("orbit", "of one oscillator, alone or in step with the others"),
             ("period", f"{self.period:.12g} units of time") if self.free else ("drive periods", str(self.periods)),
             ("state", state),
-            ("multipliers", f"{sizes}: {'stable' if self.stable else 'unstable'}"),
+            ("multipliers", f"{sizes}: {'stable' if self.stable else 'unstable'} for one oscillator"),
             ("residual", f"{self.residual:.1e} after {self.steps} steps"),
         )
 
     @property
     def stable(self) -> bool:
-        """True if every multiplier, but that of a shift along the orbit, lies inside the unit circle."""
+        """True if every multiplier of one oscillator, but that of a shift along the orbit, lies inside the unit circle."""
         shift = [int(np.abs(self.multipliers - 1.0).argmin())] if self.free else []
         return bool(np.all(np.abs(np.delete(self.multipliers, shift)) < 1.0))
 
@@ -181,7 +183,9 @@ def periodic_orbit(
     parameters: Mapping[str, float] | None = None,
     **more: float,
 ) -> PeriodicOrbit:
-    """Find a periodic orbit of a scene's oscillator.
+    """Find a periodic orbit of a scene's oscillator: of one, which all of a network follow in step.
+
+    Whether a network stays in step is told by `PeriodicOrbit.transversal_multipliers`.
 
     Parameters
     ----------
@@ -201,6 +205,11 @@ def periodic_orbit(
     -------
     PeriodicOrbit
 
+    Warns
+    -----
+    RuntimeWarning
+        If the nodes of a network were given different initial states, which one oscillator does not have.
+
     Raises
     ------
     ValueError
@@ -208,6 +217,8 @@ def periodic_orbit(
     ArithmeticError
         If Newton's method does not converge.
     """
+    if start is None:
+        _warn_of_different_starts(a_scene(scene))
     few = {name: "a few steps of Newton's method are soon done" for name in ("show_progress", "progress")}
     scene = coupled_cell(Given(periodic_orbit, parameters, more, {**NEWTON, **few}), scene, TOLERANCE)
     check_periods(periods)
@@ -337,6 +348,17 @@ def _driven(given: Given, scene: Scene) -> Scene:
             "periodic orbits are looked for on the stroboscopic map of a drive; found an oscillator without one"
         )
     return coupled_cell(Given(given.function), scene, TOLERANCE)
+
+
+def _warn_of_different_starts(scene: Scene) -> None:
+    """Warn if the nodes of a network were given different initial states."""
+    given = scene.given["initial"] or {}
+    apart = next((name for name in given if name in scene.initial and len({*scene.initial[name]}) > 1), None)
+    if apart is not None:
+        warn(
+            f"periodic_orbit: found different initial {apart} of {scene.n} nodes; expected equal ones, as the orbit is that "
+            "of one oscillator; the start of the first is taken; run the scene to see how the network moves"
+        )
 
 
 def _initial(scene: Scene) -> np.ndarray:

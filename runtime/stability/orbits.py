@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -17,6 +18,7 @@ from synchain.models.dynamics.mode_inertia import inertia_of_modes
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.dynamics.variational import Variation, mode
 from synchain.models.graphs.families import topology
+from synchain.models.mechanics.friction import SLIP
 from synchain.models.scenes.scene import Scene
 
 from ..cells.choice import chosen_for_modes
@@ -25,7 +27,7 @@ from .averages import BATCHES, SLACK, TRIED, error_of_steps
 from .interpolation import Interpolation, exact_interpolation, lines_of, strength_interpolation
 from .variational_integrator import NO_TRACKS, Travellers, VariationalIntegrator
 
-__all__ = ["Orbits", "unit_of_time"]
+__all__ = ["Orbits", "pair_of", "unit_of_time"]
 
 NODES, PARTS = (13, 21, 29, 37, 61), (1, 2, 4, 8, 16)
 """Nodes of a panel of strengths, and panels on each side, that are tried; with three for comparison they fill registers."""
@@ -370,13 +372,19 @@ class Orbits:
         return usual, error_of_steps(usual, looser, length)
 
 
+def pair_of(scene: Scene, **changes: Any) -> Scene:
+    """Return two copies of a lone oscillator that start where it does."""
+    start = {name: values[0] for name, values in scene.initial.items() if name != SLIP.name}
+    return scene.replace(topology=topology("chain", 2), initial=start, **changes)
+
+
 def _joined(scene: Scene, strengths: np.ndarray) -> Scene:
     """A lone oscillator and a partner, joined by any link: its strength is 0; ValueError if it is not."""
-    pair, first = topology("chain", 2), next(iter(scene.initial))
+    first = next(iter(scene.initial))
     if not np.any(strengths):
-        return scene.replace(coupling=f"{first}->{first}", topology=pair)
+        return pair_of(scene, coupling=f"{first}->{first}")
     try:
-        scene.replace(topology=pair)
+        pair_of(scene)
     except ValueError as error:
         raise ValueError(f"transversal modes need a link to a partner: {error}; strength 0 needs none") from None
     raise ValueError(f"transversal modes: found no links in {scene!r}; expected a coupling and a topology")
