@@ -86,7 +86,8 @@ class Scene(Drawn, Written):
     transient, window : float
         Time before the records, and time of the records, in units of `time_unit`.
     time_unit : str, optional
-        "period" (of the drive; the default if the equations repeat themselves in time) or "time".
+        "period" (of the drive; the default if the equations repeat themselves in time at all values of the parameters)
+        or "time".
     samples : int
         Points of a trajectory.
     integrator : str
