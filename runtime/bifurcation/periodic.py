@@ -30,7 +30,8 @@ from ..cells.keywords import Given
 from ..results.labelled import Labelled, dataset
 from ..stability.attractor import RETURN, cycle_propagators
 from ..stability.exponents import coupled_cell, single_cell
-from ..stability.limit_cycle import limit_cycle, rates_of, rests
+from ..stability.limit_cycle import limit_cycle
+from ..stability.motion import Turns, rests
 from ..stability.orbits import Orbits, unit_of_time
 from .phases import Phases, phases_of
 
@@ -258,7 +259,7 @@ def _limit_cycle(scene: Scene, periods: int, start: Sequence[float] | np.ndarray
     state = _initial(scene) if start is None else _state(scene, start)
     orbit = Orbits.make(scene, np.zeros(1), state[None], 1)
     orbit.settle(scene.transient)
-    if rests(rates_of(orbit), orbit.state[0], RETURN):
+    if rests(orbit.rates, orbit.state[0], RETURN, orbit.extent):
         at = ", ".join(f"{name} = {x:.6g}" for name, x in zip(scene.components, orbit.state[0], strict=False))
         raise ArithmeticError(f"no cycle: the motion comes to rest at {at}; `equilibrium` finds such states")
     free, steps = limit_cycle(orbit, RETURN)
@@ -432,8 +433,9 @@ def _strobe(
     """State some periods later, of the drive or of length `free`, and the propagator of a deviation of strength alpha."""
     start = np.zeros(len(scene.initial))
     start[: len(state)] = state
-    orbits = Orbits.make(scene, np.array([alpha]), start[None], 1)
-    propagators, logarithms = cycle_propagators(orbits, periods, free / orbits.unit if free else 1.0)
+    known = Turns(free, np.zeros(len(start)), "period of the cycle") if free else None
+    orbits = Orbits.make(scene, np.array([alpha]), start[None], 1, known)
+    propagators, logarithms = cycle_propagators(orbits, periods)
     if (size := float(logarithms[0, 0])) > 700.0:
         raise FloatingPointError(
             f"multipliers: found a deviation that grows by exp({size:.3g}); expected exp(700) at most"

@@ -92,7 +92,12 @@ def _chosen(scene: Scene, equations: Equations, stiffness_of: Callable[[], float
 
 
 def chosen_for_modes(
-    scene: Scene, variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray
+    scene: Scene,
+    variation: Variation,
+    state: np.ndarray,
+    numbers: np.ndarray,
+    strengths: np.ndarray,
+    slow: float = 1.0,
 ) -> Integrator:
     """Return the integrator of orbits with deviations along them, Taylor or Rosenbrock steps: modes have no others.
 
@@ -110,11 +115,13 @@ def chosen_for_modes(
         Values of the parameters of the orbit.
     strengths : ndarray, shape (number of strengths, modes)
         Strengths of the modes.
+    slow : float
+        Rate of the motion that steps must follow anyway, 2 pi over the time of a turn.
     """
     if scene.integrator == "taylor":
         return _taylor(scene, variation.orbit)
     smooth = scene.integrator == "auto" and is_analytic(variation.orbit)
-    if smooth and mode_stiffness(variation, state, numbers, strengths) < STIFF:
+    if smooth and mode_stiffness(variation, state, numbers, strengths, slow) < STIFF:
         return _taylor(scene, variation.orbit)
     return integrator(AUTO)
 
@@ -143,25 +150,32 @@ def _each(function: Callable[..., Rates], equations: Equations, rows: Plan) -> I
     return (function(equations, *cell) for cell in zip(rows.start, rows.numbers, strict=True))
 
 
-def mode_stiffness(variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray) -> float:
-    """Return how much faster deviations decay or grow at some states than they turn: the largest of the first orbits.
+def mode_stiffness(
+    variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray, slow: float = 1.0
+) -> float:
+    """Return how much faster deviations decay or grow at some states than they or the motion turn: the largest of the first orbits.
 
     Of the strengths none and the largest are looked at; parameters as for `chosen_for_modes`.
     """
-    return _stiffest((at.fastest, at.turning) for at in mode_rates(variation, state, numbers, strengths))
+    return _stiffest(((at.fastest, at.turning) for at in mode_rates(variation, state, numbers, strengths)), slow)
 
 
 def warn_of_stiff_modes(
-    variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray, step: float
+    variation: Variation,
+    state: np.ndarray,
+    numbers: np.ndarray,
+    strengths: np.ndarray,
+    step: float,
+    slow: float = 1.0,
 ) -> bool:
     """Warn if Taylor steps with deviations were short, `step` in the mean, because they are stiff where they ended.
 
     The other parameters are those of `chosen_for_modes`.  Return whether they were.
     """
-    if step * STIFF >= 1.0:
+    if step * STIFF * slow >= 1.0:
         return False
     for fastest, turning, _ in mode_rates(variation, state, numbers, strengths):
-        if fastest * step > 1.0 and fastest > STIFF * max(1.0, turning):
+        if fastest * step > 1.0 and fastest > STIFF * max(slow, turning):
             warn(
                 f"stiff modes: found a rate of {fastest:.3g} beside slow motion, and Taylor steps of {step:.2g}; "
                 "expected longer ones; integrator = 'rodas5p' takes them"
@@ -170,8 +184,8 @@ def warn_of_stiff_modes(
     return False
 
 
-def _stiffest(rates: Iterable[tuple[float, float]]) -> float:
-    return max((fastest / max(1.0, turning) for fastest, turning in rates), default=0.0)
+def _stiffest(rates: Iterable[tuple[float, float]], slow: float = 1.0) -> float:
+    return max((fastest / max(slow, turning) for fastest, turning in rates), default=0.0)
 
 
 FEW = 100

@@ -14,8 +14,9 @@ import sympy as sp
 
 from synchain.models.dynamics.variational import Variation
 
-from .limit_cycle import limit_cycle, rates_of, rests
-from .orbits import FAR, Orbits
+from .limit_cycle import limit_cycle
+from .motion import ROUNDING, rests
+from .orbits import FAR, Orbits, within
 
 __all__ = ["Attractor", "Motion", "cycle_propagators", "find_attractor"]
 
@@ -26,10 +27,7 @@ RETURN = 1e-9
 """Largest distance of a closed cycle in each component, relative to what it moves; at least 0.1 rtol."""
 
 CLOSE = 1e-3
-"""Largest distance of a state that returns, relative to its size, and the least part of its size that a component moves."""
-
-LOOKS = 8
-"""States of a period from which it is seen what each component moves."""
+"""Largest distance of a state that returns, relative to the extent of the motion, and the least part of it that a component moves."""
 
 SLACK = 10.0
 """How many times the tolerance a cycle is compared with."""
@@ -39,12 +37,16 @@ ALIKE = 1e-5
 
 
 class Motion(StrEnum):
-    """Kind of motion on an attractor; of linear equations every motion, bounded or not, has the same exponents."""
+    """Kind of motion on an attractor; of linear equations every motion, bounded or not, has the same exponents.
+
+    An unbounded motion is that of a further start that left every bound; it has no exponents.
+    """
 
     LINEAR = "linear"
     FIXED_POINT = "fixed point"
     PERIODIC = "periodic"
     APERIODIC = "aperiodic"
+    UNBOUNDED = "unbounded"
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,12 +152,13 @@ def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
             integrator.advance(orbit.unit)
             states.append(integrator.state[0])
         orbits.state[row] = orbit.state[0] = states[-1]
-        gaps, sizes = np.abs(np.array(states[-2::-1]) - states[-1]), np.abs(states[-1])
-        moves = np.maximum(np.ptp([*states, *_within(orbit)], axis=0), CLOSE * np.maximum(1.0, sizes))
-        cycle = next((k + 1 for k, gap in enumerate(gaps) if np.all(gap < closed * moves)), 0)
+        gaps = np.abs(np.array(states[-2::-1]) - states[-1])
+        moves = np.maximum(np.ptp([*states, *within(orbit)], axis=0), CLOSE * orbit.extent)
+        rounding = ROUNDING * np.abs(states[-1])
+        cycle = next((k + 1 for k, gap in enumerate(gaps) if np.all(gap <= closed * moves + rounding)), 0)
         if cycle:
             return _periodic(orbit, Motion.PERIODIC, cycle)
-        if not np.any(np.all(gaps <= CLOSE * np.maximum(sizes, moves), axis=1)):
+        if not np.any(np.all(gaps <= CLOSE * np.maximum(moves, orbit.extent), axis=1)):
             break
         integrator.advance(max(1, round(patience)) * orbit.unit)
     return Attractor(Motion.APERIODIC, 0.0)
@@ -170,13 +173,6 @@ def _periodic(orbit: Orbits, motion: Motion, cycle: int, unit: float | None = No
     found += [cycle_propagators(orbit, cycle, block), cycle_propagators(orbit, cycle, block, settled, SLACK)]
     propagators, logarithms = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return Attractor(motion, cycle * unit, propagators, cycle, logarithms)
-
-
-def _within(orbit: Orbits) -> np.ndarray:
-    """States (LOOKS, components) of a driven orbit within its next period; stretches of time begin with that of the drive."""
-    integrator = orbit.part([0] * LOOKS).integrator_of(orbit.strengths[:1])
-    integrator.advance(orbit.unit * np.arange(1, LOOKS + 1) / LOOKS)
-    return integrator.state
 
 
 def cycle_propagators(
@@ -219,7 +215,7 @@ def cycle_propagators(
 
 def _free(orbit: Orbits, closed: float) -> Attractor:
     """Return the fixed point or the limit cycle of an undriven orbit, else aperiodic motion."""
-    if rests(rates_of(orbit), orbit.state[0], closed):
+    if rests(orbit.rates, orbit.state[0], closed, orbit.extent):
         return _steady(orbit, Motion.FIXED_POINT)
     period = 0.0 if orbit.variation.events else limit_cycle(orbit, closed)[0]
     return _periodic(orbit, Motion.PERIODIC, 1, period) if period else Attractor(Motion.APERIODIC, 0.0)

@@ -20,6 +20,7 @@ import xarray as xr
 
 from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.inputs.checks import check_integer
+from synchain.models.inputs.keywords import warn
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import ONE_CELL, ORBITS, Given
@@ -29,9 +30,10 @@ from ..support.arrays import numbers
 from ..support.arrays import row as row_of
 from ..support.execution import Execution
 from ..support.progress import Hook, Reporter
-from .attractor import Attractor, find_attractor
+from .attractor import Attractor, Motion, find_attractor
 from .averages import Averaging, Batches
 from .network import unused_axes
+from .motion import starts_near
 from .orbits import Orbits, pair_of
 from .slowness import warn_of_slow_motion
 
@@ -50,6 +52,9 @@ __all__ = [
 ]
 
 
+APART = 5.0
+"""Averages of two starts that differ by more errors, at any strength, are those of two motions."""
+
 ROUNDING = 1e-9
 """Share of the largest exponent that is no sign of the first one."""
 
@@ -58,7 +63,7 @@ ROUNDING = 1e-9
 class Exponents(Labelled):
     """Largest transversal exponent at each strength.
 
-    The mean is over the starts that reached the attractor found most often.
+    The mean is over the scene's own start and the further ones that reached the same attractor.
 
     Parameters
     ----------
@@ -78,6 +83,10 @@ class Exponents(Labelled):
         Exponents of each start.
     attractors : tuple of Attractor
         Motion of each start.
+    groups : tuple of tuple of int
+        Indices of the starts on each attractor; the first one is that of the scene's own start.
+    unit : str
+        Unit of time in which transients and averages are counted.
     """
 
     alpha: np.ndarray
@@ -87,6 +96,8 @@ class Exponents(Labelled):
     starts: int
     by_start: np.ndarray = field(repr=False)
     attractors: tuple[Attractor, ...] = ()
+    groups: tuple[tuple[int, ...], ...] = ()
+    unit: str = ""
 
     @property
     def data(self) -> xr.Dataset:
@@ -117,6 +128,7 @@ class Exponents(Labelled):
             ("smallest, largest", f"{self.exponent.min():z.4f}, {self.exponent.max():z.4f}"),
             ("motion", ", ".join(dict.fromkeys(a.kind for a in self.attractors))),
             ("average", f"{self.time:.6g} units of time for each of {self.starts} starts"),
+            *((("unit", self.unit),) if self.unit else ()),
         )
 
     @property
@@ -132,12 +144,7 @@ class Exponents(Labelled):
     @property
     def averaged(self) -> int:
         """Number of starts in the mean."""
-        return max(map(len, self.groups))
-
-    @property
-    def groups(self) -> list[list[int]]:
-        """Indices of the starts, grouped by attractor."""
-        return group_by_attractor(self.attractors, self.by_start)
+        return len(self.groups[0]) if self.groups else self.starts
 
     @property
     def intervals(self) -> tuple[Interval, ...]:
@@ -300,7 +307,13 @@ def transversal(
 
 def orbits_of(scene: Scene, strengths: np.ndarray, starts: int, averaging: Averaging) -> Orbits:
     """Return the synchronous orbits of a scene that sweeps nothing, with modes; parameters as for `transversal`."""
-    return Orbits.make(scene, strengths, initial_states(scene, starts, averaging.seed), averaging.execution.size)
+    starts = check_integer("starts", starts, 1)
+    first = np.array([values[0] for values in scene.initial.values()], dtype=float)
+    orbits = Orbits.make(scene, strengths, first[None], averaging.execution.size)
+    if starts > 1 and not orbits.linear:
+        orbits.observe()
+    states = starts_near(first, orbits.extent[: len(first)], starts, averaging.seed)
+    return orbits.begun_at(states)
 
 
 def along(orbits: Orbits, strengths: np.ndarray, averaging: Averaging, reporter: Reporter) -> Exponents:
@@ -318,22 +331,55 @@ def along(orbits: Orbits, strengths: np.ndarray, averaging: Averaging, reporter:
         Counts the periods.
     """
     starts = len(orbits.state)
-    if not orbits.linear:
-        orbits.settle(averaging.transient, reporter.advance)
-    attractors = tuple(find_attractor(orbits, row, averaging.transient) for row in range(starts))
+    bounded = [True] * starts if orbits.linear else _settle(orbits, averaging.transient, reporter)
+    attractors = tuple(
+        find_attractor(orbits, row, averaging.transient) if bounded[row] else Attractor(Motion.UNBOUNDED, 0.0)
+        for row in range(starts)
+    )
     by_start, error, length = _by_start(orbits, attractors, averaging, reporter)
-    largest = max(group_by_attractor(attractors, by_start), key=len)
-    mean, spread = by_start[largest].mean(axis=0), np.sqrt((error[largest] ** 2).sum(axis=0)) / len(largest)
-    return Exponents(strengths, mean, spread, length, starts, by_start, attractors)
+    groups = group_by_attractor(attractors, by_start, error)
+    own = list(groups[0])
+    if len(groups) > 1:
+        others = ", ".join(dict.fromkeys(attractors[group[0]].kind for group in groups[1:]))
+        warn(
+            f"exponents: found {starts - len(own)} of {starts} starts on another motion than the scene's own start "
+            f"({others}); expected one motion; the exponents are those of the scene's own, by_start has all"
+        )
+    mean, spread = by_start[own].mean(axis=0), np.sqrt((error[own] ** 2).sum(axis=0)) / len(own)
+    return Exponents(strengths, mean, spread, length, starts, by_start, attractors, groups, str(orbits.turns))
+
+
+def _settle(orbits: Orbits, transient: float, reporter: Reporter) -> list[bool]:
+    """Advance all starts over the transient; True for each that stays bounded. FloatingPointError if the scene's own does not."""
+    begun = orbits.state
+    try:
+        orbits.settle(transient, reporter.advance)
+        return [True] * len(begun)
+    except FloatingPointError:
+        if len(begun) == 1:
+            raise
+    ends, bounded = begun.copy(), [True] * len(begun)
+    for row in range(len(begun)):
+        alone = orbits.part([row])
+        try:
+            alone.settle(transient)
+        except FloatingPointError:
+            if row == 0:
+                raise
+            bounded[row] = False
+        else:
+            ends[row] = alone.state[0]
+    orbits.state = ends
+    return bounded
 
 
 def _by_start(
     orbits: Orbits, attractors: Sequence[Attractor], averaging: Averaging, reporter: Reporter
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Exponents and errors (starts, m) from eigenvalues or averages, and the time averaged over."""
-    exponent = np.empty((len(attractors), len(orbits.strengths)))
-    error = np.empty_like(exponent)
-    rest = [row for row, attractor in enumerate(attractors) if attractor.propagators is None]
+    """Exponents and errors (starts, m) from eigenvalues or averages, NaN of unbounded motion, and the time averaged over."""
+    exponent = np.full((len(attractors), len(orbits.strengths)), np.nan)
+    error = np.full_like(exponent, np.nan)
+    rest = [row for row, attractor in enumerate(attractors) if attractor.motion is Motion.APERIODIC]
     for row, attractor in enumerate(attractors):
         if attractor.propagators is not None:
             exponent[row], error[row] = attractor.exponents()
@@ -398,61 +444,38 @@ def single_cell(given: Given, scene: Scene, rtol: float) -> Scene:
     ValueError
         If a parameter is unknown, and for axes and draws.
     """
-    return given.scene(scene, rtol=rtol, atol=None)
+    return given.scene(scene, rtol=rtol)
 
 
 def initial_states(scene: Scene, starts: int, seed: int) -> np.ndarray:
-    """Return initial states near that of the first oscillator.
-
-    Parameters
-    ----------
-    scene : Scene
-        Source of the first state.
-    starts : int
-        Number of states.
-    seed : int
-        Seed of the displacements of up to 0.4 in the first component.
-
-    Returns
-    -------
-    ndarray, shape (starts, components)
-    """
-    starts = check_integer("starts", starts, 1)
-    state = np.tile([values[0] for values in scene.initial.values()], (starts, 1))
-    state[1:, 0] += np.random.default_rng(seed).uniform(-0.4, 0.4, starts - 1)
-    return state
+    """Return the first oscillator's initial state and others near it (starts, components), by the extent of its motion."""
+    return orbits_of(scene, np.zeros(1), starts, Averaging(0.0, 1, 0, seed, Execution(1))).state
 
 
-def group_by_attractor(attractors: Sequence[Attractor], by_start: np.ndarray) -> list[list[int]]:
-    """Group the starts by attractor.
+def group_by_attractor(
+    attractors: Sequence[Attractor], by_start: np.ndarray, error: np.ndarray
+) -> tuple[tuple[int, ...], ...]:
+    """Group the starts by attractor, that of the first start first.
 
-    Two attractors are the same if they are of one kind and, for exponents from eigenvalues, if
-    their exponents agree, to their errors (`Attractor.resolution`).
-
-    Parameters
-    ----------
-    attractors : sequence of Attractor
-        Motion of each start.
-    by_start : ndarray, shape (starts, m)
-        Exponents of each start.
-
-    Returns
-    -------
-    list of list of int
-        Indices of the starts on each attractor.
+    Two attractors are the same if they are of one kind and their exponents (starts, m) agree, to their errors: those of
+    cycles and fixed points to `Attractor.resolution`, averages within APART errors.
     """
     groups: list[list[int]] = []
     for row, attractor in enumerate(attractors):
         for others in groups:
-            alike = attractors[others[0]].kind == attractor.kind
+            first = others[0]
+            alike = attractors[first].kind == attractor.kind
             if alike and attractor.propagators is not None:
-                alike = np.allclose(by_start[others[0]], by_start[row], rtol=1e-3, atol=attractor.resolution())
+                alike = np.allclose(by_start[first], by_start[row], rtol=1e-3, atol=attractor.resolution())
+            elif alike and attractor.motion is Motion.APERIODIC:
+                both = APART * np.hypot(error[first], error[row])
+                alike = not np.any(np.abs(by_start[first] - by_start[row]) > both)
             if alike:
                 others.append(row)
                 break
         else:
             groups.append([row])
-    return groups
+    return tuple(map(tuple, groups))
 
 
 def average(orbits: Orbits, averaging: Averaging, reporter: Reporter) -> tuple[np.ndarray, np.ndarray, float]:

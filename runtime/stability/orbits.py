@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from synchain.codegen.driver.columns import Control
 from synchain.codegen.integrators import Integrator
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.mode_inertia import inertia_of_modes
@@ -25,6 +26,7 @@ from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import with_modes
 from .averages import BATCHES, SLACK, TRIED, error_of_steps
 from .interpolation import Interpolation, exact_interpolation, lines_of, strength_interpolation
+from .motion import Rates, Turns, extent_of, rates_of, turns_of
 from .variational_integrator import NO_TRACKS, Travellers, VariationalIntegrator
 
 __all__ = ["Orbits", "pair_of", "unit_of_time"]
@@ -33,7 +35,7 @@ NODES, PARTS = (13, 21, 29, 37, 61), (1, 2, 4, 8, 16)
 """Nodes of a panel of strengths, and panels on each side, that are tried; with three for comparison they fill registers."""
 
 BLOCKS, FREE_BLOCKS = (8.0, 4.0, 2.0, 1.0), (1.0, 0.5, 0.25, 0.125)
-"""Lengths of a block that are tried, in periods of the drive and in units of 2 pi."""
+"""Lengths of a block that are tried, in periods of the drive and in turns of undriven motion."""
 
 STEP, BLOCK = 200, 60_000
 """Multiplications that take as long as a step of a deviation, and as a block without any."""
@@ -54,6 +56,12 @@ LEG, LANDINGS = 4.0, 5_000
 
 TRIAL = 8
 """Blocks on which an interpolation is tried."""
+
+OF_EXTENT = 0.1
+"""Largest absolute tolerance, relative to the relative one and to the least extent of a component that moves."""
+
+LOOKS, STROBES = 8, 16
+"""States of a period of the drive from which the extent of a motion is seen, and periods before them."""
 
 LOOSENESS = 10.0
 """Ratio of the tolerance of the modes to that of the orbit if their growth is averaged.
@@ -79,8 +87,9 @@ class Orbits:
         Current states.
     workers : int or None
         Number of threads.
-    unit : float
-        Period of the drive, or 2 pi if there is none, in units of non-dimensional time.
+    turns : Turns
+        The unit of time, which is the period of the drive or the mean return time of undriven motion, and how far the
+        components move; without a drive from the start of the first orbit, with one from `settle` on.
     method : Integrator
         Method of all steps, the one that suits all strengths.
     block : float
@@ -101,7 +110,7 @@ class Orbits:
     strengths: np.ndarray
     state: np.ndarray
     workers: int | None
-    unit: float
+    turns: Turns
     method: Integrator
     block: float = 1.0
     interpolation: Interpolation = field(init=False, repr=False)
@@ -109,7 +118,9 @@ class Orbits:
     travellers: Travellers = field(init=False, repr=False)
 
     @classmethod
-    def make(cls, scene: Scene, strengths: np.ndarray, state: np.ndarray, workers: int | None) -> Orbits:
+    def make(
+        cls, scene: Scene, strengths: np.ndarray, state: np.ndarray, workers: int | None, turns: Turns | None = None
+    ) -> Orbits:
         """Set up orbits at the start of their transient.
 
         Parameters
@@ -122,6 +133,8 @@ class Orbits:
             Initial states.
         workers : int or None
             Number of threads.
+        turns : Turns, optional
+            Unit of time and extent, if they are known; by default observed along the first orbit.
 
         Raises
         ------
@@ -141,8 +154,37 @@ class Orbits:
         row = np.array([[scene.parameters[name] for name in variation.orbit.parameters]])
         numbers = np.repeat(row, len(state), axis=0)
         state, strengths = with_modes(variation.orbit, state, numbers), _of_modes(scene, strengths)
-        method = chosen_for_modes(scene, variation, state, numbers, _rows(strengths))
-        return cls(scene, variation, strengths, state, workers, unit, method)
+        if turns is None and equations.forced:
+            turns = Turns(unit, np.zeros(state.shape[1]), "period of the drive")
+        rows = (variation, state, numbers, _rows(strengths))
+        # until the motion is known, all of it may be fast: power series, whose steps find their length, look at it first
+        method = chosen_for_modes(scene, *rows, 2.0 * math.pi / turns.time if turns else math.inf)
+        orbits = cls(scene, variation, strengths, state, workers, turns or Turns(unit, np.zeros(state.shape[1])), method)
+        if turns is None and not orbits.linear:
+            orbits.turns = turns_of(orbits._observer(), orbits.rates)
+            orbits.method = chosen_for_modes(scene, *rows, 2.0 * math.pi / orbits.unit)
+        return orbits
+
+    def _observer(self) -> VariationalIntegrator:
+        """An integrator of the first orbit, whose steps are too short and too few to warn of."""
+        integrator = self.part([0]).integrator_of(np.zeros_like(self.strengths[:1]))
+        integrator.warned = True
+        return integrator
+
+    @property
+    def unit(self) -> float:
+        """Unit of time: the period of the drive, or the mean return time of undriven motion."""
+        return self.turns.time
+
+    @property
+    def extent(self) -> np.ndarray:
+        """How far each component (p,) of the first orbit moves."""
+        return self.turns.extent
+
+    @property
+    def rates(self) -> Rates:
+        """Rates of the state of undriven orbits."""
+        return _rates(self.variation.orbit, tuple(self.numbers))
 
     @property
     def components(self) -> int:
@@ -172,9 +214,7 @@ class Orbits:
 
     def part(self, rows: list[int]) -> Orbits:
         """Return the orbits of some starts."""
-        return Orbits(
-            self.scene, self.variation, self.strengths, self.state[rows], self.workers, self.unit, self.method
-        )
+        return replace(self, state=self.state[rows], block=1.0)
 
     def integrator_of(
         self, strengths: np.ndarray, looseness: float = 1.0, tolerance: float = 1.0
@@ -196,8 +236,24 @@ class Orbits:
         integrator = VariationalIntegrator.make(
             self.scene, self.variation, self.state, numbers, rows, self.workers, looseness, self.method
         )
+        moving = self.extent[self.extent > 0.0]
+        least = integrator.control[Control.RTOL] * float(moving.min(initial=np.inf))
+        integrator.control[Control.ATOL] = min(integrator.control[Control.ATOL], OF_EXTENT * least)
         integrator.loosen(tolerance)
+        integrator.slow = 2.0 * math.pi / self.unit
         return integrator
+
+    def begun_at(self, states: np.ndarray) -> Orbits:
+        """Return the orbits with the same scales from other states (starts, components of a node)."""
+        numbers = np.repeat(self.numbers[None], len(states), axis=0)
+        return replace(self, state=with_modes(self.variation.orbit, states, numbers))
+
+    def observe(self) -> None:
+        """Set the extent of driven motion by the first orbit, from its current state on."""
+        if not self.forced:
+            return
+        states = [self.state[:1], *driven_states(self.part([0]))]
+        self.turns = self.turns._replace(extent=extent_of(np.concatenate(states), states[-1]))
 
     def settle(self, periods: float, advanced: Callable[[float], object] | None = None) -> None:
         """Advance all orbits over a transient of a number of units.
@@ -209,6 +265,7 @@ class Orbits:
         advanced : callable, optional
             Hears the length of each stretch of it.
         """
+        self.observe()
         integrator = self.integrator_of(self.strengths[:1])
         for length in _stretches(round(periods)):
             integrator.advance(length * self.unit)
@@ -378,6 +435,23 @@ def pair_of(scene: Scene, **changes: Any) -> Scene:
     return scene.replace(topology=topology("chain", 2), initial=start, **changes)
 
 
+def driven_states(orbits: Orbits) -> tuple[np.ndarray, np.ndarray]:
+    """States of a driven orbit at the beginning of its next STROBES periods, and LOOKS ones within the period behind them."""
+    integrator, found = orbits.integrator_of(orbits.strengths[:1]), []
+    for _ in range(STROBES):
+        integrator.advance(orbits.unit)
+        found.append(integrator.state[0])
+    late = replace(orbits, state=found[-1][None])
+    return np.array(found), np.concatenate([found[STROBES // 2 :], within(late)])
+
+
+def within(orbits: Orbits) -> np.ndarray:
+    """States (LOOKS, components) of a driven orbit within its next period; stretches of time begin with that of the drive."""
+    integrator = orbits.part([0] * LOOKS).integrator_of(orbits.strengths[:1])
+    integrator.advance(orbits.unit * np.arange(1, LOOKS + 1) / LOOKS)
+    return integrator.state
+
+
 def _joined(scene: Scene, strengths: np.ndarray) -> Scene:
     """A lone oscillator and a partner, joined by any link: its strength is 0; ValueError if it is not."""
     first = next(iter(scene.initial))
@@ -416,6 +490,12 @@ def _of_modes(scene: Scene, alpha: np.ndarray) -> np.ndarray:
 def _variation(equations: Equations, plane: bool) -> Variation:
     """Variational equation of a mode; Newton's method on an orbit needs it at every step."""
     return mode(equations, plane=plane)
+
+
+@lru_cache(maxsize=16)
+def _rates(equations: Equations, numbers: tuple[float, ...]) -> Rates:
+    """The rates of undriven equations; a limit cycle needs them at every step."""
+    return rates_of(equations, dict(zip(equations.parameters, numbers, strict=True)))
 
 
 def unit_of_time(scene: Scene) -> float:

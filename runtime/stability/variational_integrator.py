@@ -137,6 +137,8 @@ class VariationalIntegrator:
         Steps taken so far.
     warned : bool
         Whether it was said that the steps are short because the modes are stiff.
+    slow : float
+        Rate of the motion that steps must follow anyway.
     """
 
     variation: Variation
@@ -151,6 +153,7 @@ class VariationalIntegrator:
     workers: int
     steps: int = 0
     warned: bool = False
+    slow: float = 1.0
 
     @classmethod
     def make(
@@ -382,7 +385,9 @@ class VariationalIntegrator:
         if self.kernel.origin.method.series and taken:
             step = float(panels[0].sum()) * float(spans[:, 1].sum()) / taken
             self.control[Control.FIRST_STEP] = step  # any scale finds its length, only the first few steps gain
-            self.warned = self.warned or warn_of_stiff_modes(self.variation, end, self.numbers, self.strengths, step)
+            self.warned = self.warned or warn_of_stiff_modes(
+                self.variation, end, self.numbers, self.strengths, step, self.slow
+            )
         self.state = end
         self.steps += taken
 

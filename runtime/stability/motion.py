@@ -1,0 +1,214 @@
+"""Scales of a motion that know no unit: how far each component moves, how long a turn takes, and how large the terms of rates are.
+
+All lengths here follow the motion under x -> s x + c for each component, and all times under t -> k t.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+import sympy as sp
+
+from synchain.codegen.driver.columns import Control
+from synchain.models.dynamics.equations import Equations
+
+from .variational_integrator import VariationalIntegrator
+
+__all__ = ["Rates", "Turns", "extent_of", "path", "rates_of", "rests", "starts_near", "turns_of"]
+
+SHARE = 8
+"""Least number of steps of a path from one end of a component to the other."""
+
+FIRST = 1e-6
+"""First step of a path, relative to the shortest time that the start lets guess."""
+
+SAMPLES, LOOKED = 4096, 64
+"""Most steps of a path in which turns are counted, and steps between two counts."""
+
+ENOUGH = 12
+"""Turns whose mean is taken."""
+
+REST = 1e-9
+"""Rates are zero if they are below what they change by over this part of the extent of the motion."""
+
+ROUNDING = 100.0 * float(np.finfo(float).eps)
+"""Part of the size of its terms below which a sum is rounding."""
+
+ASIDE = 1e-6
+"""How far aside rates are evaluated for their slopes, relative to the extent of the motion."""
+
+STILL = 1e-6
+"""A component whose later motion is below this part of all its motion has come to rest: its approach is its extent."""
+
+FLAT = 1e-6
+"""Part of the fastest rate of an equilibrium below which another one is not resolved."""
+
+REACH = 0.4
+"""Largest distance of a further start in the first component, relative to the extent of the motion."""
+
+
+class Rates(NamedTuple):
+    """Rates (p,) of a state (p,) without a drive, and the sums of the sizes of their terms."""
+
+    values: Callable[[np.ndarray], np.ndarray]
+    sizes: Callable[[np.ndarray], np.ndarray]
+
+    def slopes(self, state: np.ndarray, extent: np.ndarray) -> np.ndarray:
+        """How much each rate changes by (p, p) if one component moves by its extent, to first order."""
+        here = self.values(state)
+        with np.errstate(all="ignore"):
+            moved = [self.values(state + move) - here for move in np.diag(ASIDE * extent)]
+        return np.array(moved).T / ASIDE
+
+
+class Turns(NamedTuple):
+    """What a path shows: mean time of a turn, extent (p,) of the motion, and what the time is."""
+
+    time: float
+    extent: np.ndarray
+    words: str = "unit of time"
+
+    def __str__(self) -> str:
+        """What the unit of time is, and its length."""
+        return f"{self.words}, {self.time:.6g} units of time"
+
+
+def rates_of(equations: Equations, parameters: dict[str, float]) -> Rates:
+    """Return the rates of undriven equations as functions of the state alone."""
+    names = [sp.Symbol(name, real=True) for name in (*equations.state, *equations.parameters)]
+    values = [parameters[name] for name in equations.parameters]
+    rhs = equations.rhs()
+    rates, sizes = (sp.lambdify(names, list(e), "numpy") for e in (rhs, map(_size, rhs)))
+    return Rates(
+        lambda state: np.array(rates(*state, *values), dtype=float),
+        lambda state: np.array(sizes(*state, *values), dtype=float),
+    )
+
+
+def _size(e: sp.Expr) -> sp.Expr:
+    """The sum of the sizes of the terms of an expression, in products too."""
+    if isinstance(e, sp.Add | sp.Mul):
+        return e.func(*map(_size, e.args))
+    if isinstance(e, sp.Pow) and e.exp.is_integer and e.exp.is_positive:
+        return _size(e.base) ** e.exp
+    return sp.Abs(e)
+
+
+def extent_of(states: np.ndarray, settled: np.ndarray) -> np.ndarray:
+    """Return how far each component (p,) moves in settled states (k, p), or in all states if it has come to rest."""
+    later, whole = np.ptp(settled, axis=0), np.ptp(states, axis=0)
+    return np.where(later > STILL * whole, later, whole)
+
+
+def starts_near(state: np.ndarray, extent: np.ndarray, count: int, seed: int) -> np.ndarray:
+    """Return `count` states: the given one (p,), and copies up to REACH extents away in the first component, at random."""
+    starts = np.tile(state, (count, 1))
+    starts[1:, 0] += extent[0] * np.random.default_rng(seed).uniform(-REACH, REACH, count - 1)
+    return starts
+
+
+def rests(rates: Rates, state: np.ndarray, closed: float, extent: np.ndarray) -> bool:
+    """Return whether the rates at a state are zero: below rounding of their terms, or within what they change by over a part `closed` of the extent."""
+    changes = np.abs(rates.slopes(state, extent)).sum(axis=1)
+    here = np.abs(rates.values(state))
+    return bool(np.all(here <= np.nan_to_num(closed * changes) + ROUNDING * rates.sizes(state)))
+
+
+def path(integrator: VariationalIntegrator, shortest: float) -> Iterator[tuple[np.ndarray, float, np.ndarray]]:
+    """Advance a single orbit by steps in which no component moves by more than a share of its extent so far.
+
+    Yield, after each step, the state before it, its length and the extent (p,) so far.  Steps of the shortest length may
+    move by more, as the first ones do.  The absolute tolerance follows the extent.
+    """
+    step, low, high = shortest, integrator.state[0].copy(), integrator.state[0].copy()
+    while True:
+        before = integrator.state
+        integrator.advance(step)
+        after = integrator.state[0]
+        lower, higher = np.minimum(low, after), np.maximum(high, after)
+        moved, extent = SHARE * np.abs(after - before[0]), higher - lower
+        if step > shortest and np.any(moved > extent):
+            integrator.state, step = before, max(shortest, 0.5 * step)
+            continue
+        low, high = lower, higher
+        yield before, step, extent
+        step *= 1.5 if np.all(2.0 * moved <= extent) else 1.0
+
+
+def shortest_time(rates: Rates, state: np.ndarray) -> float:
+    """Return a time in which nothing has happened yet at a state that does not rest; 1 if nothing tells one."""
+    size, speed = np.abs(state), np.abs(rates.values(state))
+    known = (size > 0.0) & (speed > 0.0)
+    times = [*(size[known] / speed[known])]
+    scale = np.where(size > 0.0, size, size.max(initial=0.0) or 1.0)
+    slopes = rates.slopes(state, scale) / scale[None, :]
+    if np.isfinite(slopes).all() and (fastest := np.abs(np.linalg.eigvals(slopes)).max()) > 0.0:
+        times.append(1.0 / fastest)
+    return FIRST * float(min(times, default=1.0 / FIRST))
+
+
+def turns_of(integrator: VariationalIntegrator, rates: Rates) -> Turns:
+    """Return the mean return time of an undriven orbit, or the slowest rate of the equilibrium that it comes to.
+
+    A turn of a component is a passage upwards through the middle of its extent, after it has been an eighth of that
+    below and before it is as much above.  The component with most turns counts; they are looked for in the later three
+    quarters of a path.
+    """
+    start = integrator.state[0].copy()
+    times, states, time = [0.0], [start], 0.0
+    extent = np.zeros_like(start)
+    if not rests(rates, start, REST, extent):
+        try:
+            for k, (_, step, extent) in enumerate(path(integrator, shortest_time(rates, start)), 1):
+                time += step
+                times.append(time)
+                states.append(integrator.state[0])
+                if not np.isfinite(time) or k == SAMPLES:
+                    break
+                if k % LOOKED == 0:
+                    if rests(rates, states[-1], REST, extent):
+                        break
+                    if _mean_turn(np.array(times[k // 4 :]), np.array(states[k // 4 :]), ENOUGH):
+                        break
+        except FloatingPointError:  # what grows without bound is refused where it is settled
+            pass
+    early = len(times) // 4
+    late = np.array(states[early:])
+    extent = extent_of(np.array(states), late[len(late) // 2 :])
+    if turn := _mean_turn(np.array(times[early:]), late, 1):
+        return Turns(turn, extent, "mean return time")
+    if rests(rates, states[-1], REST, extent) and (slow := _slowest(rates, states[-1], extent)):
+        return Turns(2.0 * np.pi / slow, extent, "turn of the slowest rate")
+    return Turns(time or 2.0 * np.pi, extent, "time in which nothing returns" if time else "nothing moves")
+
+
+def _mean_turn(times: np.ndarray, states: np.ndarray, fewest: int) -> float:
+    """Mean time between upward passages of the component with most of them; 0 if there are fewer than `fewest` turns."""
+    best, mean = fewest, 0.0
+    low, high = states.min(axis=0), states.max(axis=0)
+    for x, middle, extent in zip(states.T, 0.5 * (low + high), high - low, strict=True):
+        if not extent > ROUNDING * np.abs(x).max():
+            continue
+        side = np.where(x > middle + extent / 8, 1, np.where(x < middle - extent / 8, -1, 0))
+        (clear,) = np.nonzero(side)
+        (up,) = np.nonzero((side[clear[1:]] > 0) & (side[clear[:-1]] < 0))
+        if len(up) > best:
+            after = clear[up + 1]  # the first state that is clearly above
+            passed = [
+                np.interp(middle, x[a : b + 1], times[a : b + 1]) for a, b in zip(clear[up], after, strict=True)
+            ]
+            best, mean = len(up), float(passed[-1] - passed[0]) / (len(up) - 1)
+    return mean
+
+
+def _slowest(rates: Rates, state: np.ndarray, extent: np.ndarray) -> float:
+    """The slowest rate of an equilibrium that is resolved; 0 if there is none."""
+    scale = np.where(extent > 0.0, extent, np.where(state != 0.0, np.abs(state), 1.0))
+    slopes = rates.slopes(state, scale) / scale[None, :]
+    if not np.isfinite(slopes).all():
+        return 0.0
+    found = np.abs(np.linalg.eigvals(slopes))
+    found = found[found > FLAT * found.max(initial=0.0)]
+    return float(found.min(initial=np.inf)) if len(found) else 0.0
