@@ -65,7 +65,7 @@ class Drive:
         return self.frequency is not None and self.frequency.has(common)
 
 
-class common(sp.Function):  # noqa: N801
+class common(sp.Function):
     """The largest number of which some numbers, those that are 0 left out, are whole multiples; nan if there is none."""
 
     is_real = True
@@ -160,7 +160,9 @@ def _multiple(rates: list[tuple[sp.Expr, set[sp.Symbol]]], frequency: sp.Expr) -
 def _repeats(e: sp.Expr, states: set[sp.Symbol], frequency: sp.Expr, parts: int) -> bool:
     """Whether a rate is the same a part of a period later, for all values of its waves."""
     slopes = {wave: _slope(wave, states) for wave in e.atoms(sp.sin, sp.cos)}
-    turns = {wave: 2 * sp.pi / parts * sp.cancel(slope / frequency) for wave, slope in slopes.items() if slope is not None}
+    turns = {
+        wave: 2 * sp.pi / parts * sp.cancel(slope / frequency) for wave, slope in slopes.items() if slope is not None
+    }
     later = e.xreplace({wave: wave.func(sp.expand(wave.args[0]) + turn) for wave, turn in turns.items()})
     return bool(_ordered(later) == _ordered(e) or sp.expand(later - e) == 0)
 

@@ -32,8 +32,8 @@ from ..support.execution import Execution
 from ..support.progress import Hook, Reporter
 from .attractor import Attractor, Motion, find_attractor
 from .averages import Averaging, Batches
-from .network import unused_axes
 from .motion import starts_near
+from .network import unused_axes
 from .orbits import Orbits, pair_of
 from .slowness import warn_of_slow_motion
 

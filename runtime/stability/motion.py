@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 import sympy as sp
 
-from synchain.codegen.driver.columns import Control
 from synchain.models.dynamics.equations import Equations
 
 from .variational_integrator import VariationalIntegrator
@@ -196,9 +195,7 @@ def _mean_turn(times: np.ndarray, states: np.ndarray, fewest: int) -> float:
         (up,) = np.nonzero((side[clear[1:]] > 0) & (side[clear[:-1]] < 0))
         if len(up) > best:
             after = clear[up + 1]  # the first state that is clearly above
-            passed = [
-                np.interp(middle, x[a : b + 1], times[a : b + 1]) for a, b in zip(clear[up], after, strict=True)
-            ]
+            passed = [np.interp(middle, x[a : b + 1], times[a : b + 1]) for a, b in zip(clear[up], after, strict=True)]
             best, mean = len(up), float(passed[-1] - passed[0]) / (len(up) - 1)
     return mean
 

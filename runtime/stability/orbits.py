@@ -159,7 +159,9 @@ class Orbits:
         rows = (variation, state, numbers, _rows(strengths))
         # until the motion is known, all of it may be fast: power series, whose steps find their length, look at it first
         method = chosen_for_modes(scene, *rows, 2.0 * math.pi / turns.time if turns else math.inf)
-        orbits = cls(scene, variation, strengths, state, workers, turns or Turns(unit, np.zeros(state.shape[1])), method)
+        orbits = cls(
+            scene, variation, strengths, state, workers, turns or Turns(unit, np.zeros(state.shape[1])), method
+        )
         if turns is None and not orbits.linear:
             orbits.turns = turns_of(orbits._observer(), orbits.rates)
             orbits.method = chosen_for_modes(scene, *rows, 2.0 * math.pi / orbits.unit)
@@ -445,10 +447,11 @@ def driven_states(orbits: Orbits) -> tuple[np.ndarray, np.ndarray]:
     return np.array(found), np.concatenate([found[STROBES // 2 :], within(late)])
 
 
-def within(orbits: Orbits) -> np.ndarray:
-    """States (LOOKS, components) of a driven orbit within its next period; stretches of time begin with that of the drive."""
-    integrator = orbits.part([0] * LOOKS).integrator_of(orbits.strengths[:1])
-    integrator.advance(orbits.unit * np.arange(1, LOOKS + 1) / LOOKS)
+def within(orbits: Orbits, periods: int = 1) -> np.ndarray:
+    """States of a driven orbit within its next periods, LOOKS in each of the first few; stretches of time begin with that of the drive."""
+    looks = LOOKS * min(periods, LOOKS)
+    integrator = orbits.part([0] * looks).integrator_of(orbits.strengths[:1])
+    integrator.advance(orbits.unit * np.arange(1, looks + 1) / LOOKS)
     return integrator.state
 
 

@@ -20,6 +20,7 @@ from ..results.labels import provenance
 from ..support.execution import Execution
 from .certify import certify
 from .job import JobSpec, SweepJob, SweepSpec
+from .start import expect_whole_periods
 
 __all__ = ["PreparedRun", "prepare"]
 
@@ -89,6 +90,7 @@ def prepare(
     """
     scene = reduction.scene
     certify_now = not isinstance(certified, Certificate) and check_flag("certified", certified)
+    expect_whole_periods(reduction.planner)
     source = write_kernel(reduction, width)
     warn_of_chords(source)
     certificate = certified if isinstance(certified, Certificate) else None
