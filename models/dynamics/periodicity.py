@@ -5,16 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import lru_cache
 
 import sympy as sp
 from sympy.core.relational import Relational
+from sympy.simplify.fu import TR8
 
 from ..mechanics.components import TIME, Edge, Node
 from ..mechanics.jumps import JUMPING, KINKED, gaps_of
 from .equations import Equations
 
 __all__ = ["Drive", "angular_frequency", "as_function", "drive_of", "gaps", "names_in", "period_of"]
+
+HIGHEST, MOST_TIMES = 8, 64
+"""Highest power of waves that is written as a sum, and most shares of a period that are tried."""
+
+LARGEST, ROUNDING = 1000, 1e-14
+"""Largest denominator of a ratio of two frequencies that is found in their values, and how well it agrees with them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,10 +37,10 @@ class Drive:
         pi over the lengths in which other functions of time can rise and fall again, expressions of
         the parameters: sqrt(pi)/w for exp(-(t/w)**2).
     frequency : Expr or None
-        The largest angular frequency of which all waves are whole multiples, so that the right-hand
-        side has the period 2 pi over its absolute value; None if there is no such frequency.
+        The angular frequency whose period 2 pi over its absolute value is the least one of the right-hand side; None if
+        there is no such frequency. Where the values of parameters decide, it is their function `common`.
     problem : str
-        Why there is none, as a predicate of the oscillator.
+        Why there is none, or may be none at some values, as a predicate of the oscillator.
     gaps : tuple of Expr
         Expressions of time and the parameters at whose zeros the drive jumps or has a kink.
     rises : tuple of Expr
@@ -50,6 +58,28 @@ class Drive:
     def paces(self) -> tuple[sp.Expr, ...]:
         """pi over each of the lengths in which the drive can rise and fall again."""
         return (*self.waves, *self.bends)
+
+    @property
+    def by_values(self) -> bool:
+        """True if there is a period at some values of the parameters alone."""
+        return self.frequency is not None and self.frequency.has(common)
+
+
+class common(sp.Function):
+    """The largest number of which some numbers, those that are 0 left out, are whole multiples; nan if there is none."""
+
+    is_real = True
+
+
+def _common(*waves: float) -> float:
+    """The value of `common`, from ratios of small whole numbers that agree to rounding."""
+    moving = [abs(wave) for wave in waves if wave]
+    if not moving:
+        return 0.0
+    ratios = [Fraction(wave / moving[0]).limit_denominator(LARGEST) for wave in moving]
+    if not all(math.isclose(r, wave / moving[0], rel_tol=ROUNDING) for r, wave in zip(ratios, moving, strict=True)):
+        return math.nan
+    return moving[0] * math.gcd(*(r.numerator for r in ratios)) / math.lcm(*(r.denominator for r in ratios))
 
 
 def angular_frequency(equations: Equations) -> sp.Expr | None:
@@ -76,7 +106,7 @@ def drive_of(templates: tuple[Node | Edge, ...], varied: tuple[str, ...] = ()) -
 
 
 def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Drive:
-    """The waves of a driven network and their common frequency."""
+    """The waves of a driven network and the largest frequency of which all are multiples, whatever form the rates have."""
     waves: set[sp.Expr] = set()
     rest = [_without_waves(e, _local(template), waves) for template in templates for e in template.rhs]
     found = tuple(sorted(waves, key=sp.default_sort_key))
@@ -87,12 +117,68 @@ def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Dr
         return Drive(
             found, problem=f"is driven at a frequency that differs from node to node or link to link ({', '.join(own)})"
         )
-    ratios = [sp.cancel(wave / found[0]) for wave in found]
-    strange = next((wave for wave, ratio in zip(found, ratios, strict=True) if not ratio.is_Rational), None)
-    if strange is not None:
-        return Drive(found, problem=f"is driven at {found[0]} and {strange}, which have no common period")
+    rates = [(_sum_of_waves(e), _local(template)) for template in templates for e in template.rhs if e.has(TIME)]
+    summed: set[sp.Expr] = set()
+    for e, states in rates:
+        _without_waves(e, states, summed)
+    paces = tuple(sorted(summed, key=sp.default_sort_key)) or found
+    ratios = [sp.cancel(wave / paces[0]) for wave in paces]
+    strange = next((wave for wave, ratio in zip(paces, ratios, strict=True) if not ratio.is_Rational), None)
+    if strange is not None:  # the values of the parameters decide
+        return Drive(found, common(*paces), f"is driven at {paces[0]} and {strange}, which have no common period")
     share = sp.Rational(math.gcd(*(int(r.p) for r in ratios)), math.lcm(*(int(r.q) for r in ratios)))
-    return Drive(found, share * found[0])
+    return Drive(found, _multiple(rates, share * paces[0]) * share * paces[0])
+
+
+def _sum_of_waves(e: sp.Expr) -> sp.Expr:
+    """Write products and powers of sines and cosines of time as sums; what is free of time stays as it is."""
+    free: dict[sp.Basic, sp.Dummy] = {}
+
+    def without_free(part: sp.Basic) -> sp.Basic:
+        if part.has(TIME):
+            return part.func(*map(without_free, part.args)) if part.args else part
+        return part if part.is_Atom or not isinstance(part, sp.Expr) else free.setdefault(part, sp.Dummy(real=True))
+
+    timed = without_free(e)
+    if max((p.exp for p in timed.atoms(sp.Pow) if p.exp.is_Integer), default=0) <= HIGHEST:
+        for _ in range(HIGHEST):  # a pass halves the powers
+            before, timed = timed, TR8(sp.expand(timed))
+            if timed == before:
+                break
+    return timed.xreplace({dummy: part for part, dummy in free.items()})
+
+
+def _multiple(rates: list[tuple[sp.Expr, set[sp.Symbol]]], frequency: sp.Expr) -> int:
+    """How many times the rates repeat themselves in the period of a frequency: products of 2, 3 and 5 are tried."""
+    times = 1
+    for k in (2, 3, 5):
+        while times < MOST_TIMES and all(_repeats(e, states, frequency, k * times) for e, states in rates):
+            times *= k
+    return times
+
+
+def _repeats(e: sp.Expr, states: set[sp.Symbol], frequency: sp.Expr, parts: int) -> bool:
+    """Whether a rate is the same a part of a period later, for all values of its waves."""
+    slopes = {wave: _slope(wave, states) for wave in e.atoms(sp.sin, sp.cos)}
+    turns = {
+        wave: 2 * sp.pi / parts * sp.cancel(slope / frequency) for wave, slope in slopes.items() if slope is not None
+    }
+    later = e.xreplace({wave: wave.func(sp.expand(wave.args[0]) + turn) for wave, turn in turns.items()})
+    return bool(_ordered(later) == _ordered(e) or sp.expand(later - e) == 0)
+
+
+def _ordered(e: sp.Expr) -> sp.Expr:
+    """Write choices between two cases with the condition that comes first; both hold at no more than single times."""
+
+    def chosen(*cases: tuple[sp.Expr, sp.Basic]) -> sp.Expr:
+        if len(cases) != 2 or cases[1][1] != sp.true or not isinstance(cases[0][1], Relational):
+            return sp.Piecewise(*cases)
+        (one, condition), (other, _) = cases
+        gap = condition.gts - condition.lts
+        turned = sp.default_sort_key(-gap) < sp.default_sort_key(gap)
+        return sp.Piecewise((other, -gap > 0), (one, True)) if turned else sp.Piecewise((one, gap > 0), (other, True))
+
+    return e.replace(sp.Piecewise, chosen)
 
 
 def _local(template: Node | Edge) -> set[sp.Symbol]:
@@ -117,6 +203,8 @@ def _without_waves(e: sp.Expr, states: set[sp.Symbol], found: set[sp.Expr]) -> s
 
 def _slope(wave: sp.Expr, states: set[sp.Symbol]) -> sp.Expr | None:
     """The constant a of a function of a t + b; None for any other argument."""
+    if not wave.has(TIME):
+        return None
     slope = sp.diff(wave.args[0], TIME)
     steady = slope != 0 and not slope.has(TIME, *states)
     return slope if steady and not sp.expand(wave.args[0] - slope * TIME).has(TIME) else None
@@ -211,7 +299,8 @@ def _paces(inner: sp.Expr, power: int, even: bool) -> Iterator[sp.Expr]:
 @lru_cache(maxsize=64)
 def as_function(frequency: sp.Expr) -> Callable[..., float]:
     """Return a frequency as a function of numbers in the order of `names_in`; nan if undefined."""
-    written = sp.lambdify([sp.Symbol(name, real=True) for name in names_in(frequency)], frequency, "math")
+    names = [sp.Symbol(name, real=True) for name in names_in(frequency)]
+    written = sp.lambdify(names, frequency, [{"common": _common}, "math"])
 
     def value(*numbers: float) -> float:
         try:

@@ -227,7 +227,7 @@ def _check_sections(values: Mapping[str, Any]) -> None:
 def _times(model: Model, numbers: Mapping[str, float], given: Mapping[str, object]) -> dict[str, object]:
     """The unit of time: the period of the drive if there is one."""
     motion = drive(model, numbers)
-    default = TimeUnit.TIME if motion.frequency is None else TimeUnit.PERIOD
+    default = TimeUnit.TIME if motion.frequency is None or motion.by_values else TimeUnit.PERIOD
     unit = default if given["time_unit"] is None else TimeUnit.parse("time_unit", given["time_unit"])
     if unit == TimeUnit.PERIOD and motion.frequency is None:
         names = " and ".join(dict.fromkeys(repr(kind.oscillator.name) for kind in model.kinds))

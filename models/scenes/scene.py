@@ -15,7 +15,7 @@ from ..dynamics.observable import Observable
 from ..dynamics.periodicity import Drive, as_function, names_in, period_of
 from ..dynamics.record import Record
 from ..graphs.topology import Topology
-from ..inputs.checks import check_instance, check_table, check_text, listed, suggestion
+from ..inputs.checks import check_instance, check_table, check_text, is_row, listed, suggestion
 from ..inputs.frozen import Frozen
 from ..inputs.names import NodeName
 from ..inputs.shown import Drawn, Written
@@ -25,7 +25,7 @@ from ..interactions.link import strength
 from ..mechanics.friction import SLIP, ContactModel, FrictionLaw
 from ..mechanics.oscillator import Oscillator
 from ..networks.model import Group, Model
-from ..networks.parts import as_oscillator, as_topology
+from ..networks.parts import as_topology
 from ..sweeps.axis import Axis
 from ..sweeps.draw import GRAPH, Draws, drawn_axes
 from ..sweeps.parameters import drive, varied, without
@@ -87,7 +87,8 @@ class Scene(Drawn, Written):
     transient, window : float
         Time before the records, and time of the records, in units of `time_unit`.
     time_unit : str, optional
-        "period" (of the drive; the default if the equations repeat themselves in time) or "time".
+        "period" (of the drive; the default if the equations repeat themselves in time at all values of the parameters)
+        or "time".
     samples : int
         Points of a trajectory.
     integrator : str
@@ -319,8 +320,8 @@ class Scene(Drawn, Written):
         ----------
         **changes
             Keywords of `Scene`, or names of parameters (sigma above), which change that one alone; `parameters`
-            replaces them all.  What was not given follows its default.  Another number or kind of oscillators starts
-            from the default initial states unless `initial` is given.
+            replaces them all.  What was not given follows its default.  Initial states that were given stay: a number
+            and a range fit every number of nodes; a list that no longer fits is refused.
 
         Raises
         ------
@@ -351,12 +352,9 @@ class Scene(Drawn, Written):
         return Scene(**given)
 
     def _kept_start(self, changes: Mapping[str, object]) -> Mapping[str, object] | None:
-        """The initial states that were given, if they fit a scene with other keywords."""
-        other = "oscillator" in changes and as_oscillator(changes["oscillator"]) != self.oscillator
-        if other or "nodes" in changes or _nodes({"links": None, "topology": self.topology, **changes}) != self.n:
-            return None
+        """The initial states that were given, without modes of contacts if the friction may be another."""
         start: Mapping[str, object] | None = self.given["initial"]
-        if start and ("contact" in changes or "friction" in changes):
+        if start and not {"contact", "friction", "oscillator", "nodes"}.isdisjoint(changes):
             return {name: at for name, at in start.items() if name != SLIP.name}  # modes follow from x and v
         return start
 
@@ -447,10 +445,17 @@ def _kept(given: Mapping[str, Any], values: Mapping[str, Any]) -> Frozen[Any]:
     if GRAPH in values["draws"] and given["topology"] is not None:
         kept["topology"] = as_topology(given["topology"])
     if given["initial"] is not None:
-        kept["initial"] = Frozen({name: values["initial"][name] for name in given["initial"]})
+        kept["initial"] = Frozen({n: _kept_states(at, values["initial"][n]) for n, at in given["initial"].items()})
     if given["parameters"] is not None:
         kept["parameters"] = Frozen(_kept_parameters(given["parameters"], values["model"], values["parameters"]))
     return Frozen(kept)
+
+
+def _kept_states(given: object, states: tuple[float, ...]) -> object:
+    """The states of a component as they were given: a number, a range, or a tuple with one number for each node."""
+    if isinstance(given, Mapping):
+        return Frozen(given)
+    return states if is_row(given.tolist() if hasattr(given, "tolist") else given) else states[0]
 
 
 def _kept_parameters(given: Mapping[str, object], model: Model, numbers: Mapping[str, float]) -> dict[str, object]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import islice
 from typing import Any, TypeAlias, TypeVar
 
-from ..dynamics.periodicity import Drive, drive_of
+from ..dynamics.periodicity import Drive, as_function, drive_of, names_in
 from ..graphs.readers import as_topology, is_graph
 from ..inputs.checks import check_number, check_table, first_of, is_row, short_repr
 from ..inputs.frozen import Frozen
@@ -251,7 +253,11 @@ def drive(model: Model, values: Mapping[str, float]) -> Drive:
     """Return at which frequencies time enters the equations of a model whose parameters have these values."""
     timed = any(coupling.forced for coupling, _ in model.linked)
     own = varied(values, model.parameters)
-    return drive_of((*model.unlinked.nodes, *(model.equations(own).edges if timed else ())), own)
+    found = drive_of((*model.unlinked.nodes, *(model.equations(own).edges if timed else ())), own)
+    if found.frequency is None or not found.by_values:
+        return found
+    value = as_function(found.frequency)(*(values[name] for name in names_in(found.frequency)))
+    return replace(found, frequency=None) if math.isnan(value) else found
 
 
 def without(model: Model, values: Mapping[object, object], names: Iterable[str]) -> dict[object, object]:

@@ -255,7 +255,7 @@ def _root(test: Callable[[float], float], arc: Arc, ends: tuple[float, float]) -
     If Newton's method loses the orbit on the way, the end nearer to zero is returned.
     """
     try:
-        value = float(brentq(test, *ends, xtol=1e-14, rtol=1e-14))
+        value = float(brentq(test, *ends, xtol=1e-14 * max(map(abs, ends)), rtol=1e-14))
         return value, arc.at(value)
     except ArithmeticError:
         value = min(ends, key=lambda end: abs(test(end)))
@@ -300,7 +300,7 @@ def _graze(arc: Arc, beyond: float) -> Bifurcation:
     share, reach = SHARE, 0.5
     for _ in range(MOST_STEPS):
         low, gap = arc.values[-1], _known(arc).gap
-        if gap < SHUT or abs(beyond - low) <= 1e-15 * max(1.0, abs(low)) or reach < LEAST_REACH:
+        if gap < SHUT or abs(beyond - low) <= 1e-15 * abs(low) or reach < LEAST_REACH:
             break
         value = _where(arc, share * gap)
         guided = share < 0.99 and min(low, beyond) < value < max(low, beyond)

@@ -28,7 +28,7 @@ from ..support.execution import Execution
 from ..support.progress import Hook
 from .bifurcations import Bifurcation, bifurcations_at_end, bifurcations_between
 from .continuation import Arc
-from .periodic import NEWTON, PeriodicOrbit, periodic_orbit
+from .periodic import NEWTON, PeriodicOrbit, periodic_orbit, relative
 from .phases import Phases
 
 __all__ = ["Branch", "checked_values", "follow", "others", "traced"]
@@ -55,7 +55,7 @@ FAR = 0.3
 """Largest distance from the expected state, relative to the step, of an orbit of other phases on the same branch."""
 
 KINK = 1e-2
-"""Distance from the expected state that such an orbit may always have: changes of phases are kinks."""
+"""Distance from the expected state that such an orbit may always have, relative to its extent: changes of phases are kinks."""
 
 NAMES = frozenset(
     {
@@ -126,7 +126,10 @@ class Branch(Labelled):
         stable = sum(orbit.stable for orbit in self.orbits)
         turns = "; ".join(f"{turn.kind} at {turn.value:.8g}" for turn in self.bifurcations)
         return (
-            ("orbits", f"{len(self.orbits)} of {self.orbits[0].periods} drive periods, {stable} stable"),
+            (
+                "orbits",
+                f"{len(self.orbits)} of {self.orbits[0].periods} drive periods, {stable} stable for one oscillator",
+            ),
             (self.name, ends_of(self.values)),
             ("bifurcations", turns or "none"),
             *((("lost", f"at {numbers(self.lost)}"),) if self.lost else ()),
@@ -359,6 +362,7 @@ class BranchTracer:
 
     def _kinks(self, value: float, orbit: PeriodicOrbit) -> bool:
         """True if an orbit of other phases is close to the expected state."""
-        guess, last = self.arc.guess(value), self.arc.orbits[-1].state
-        near = FAR * float(np.abs(guess - last).max()) + KINK
-        return len(self.arc.values) == 1 or float(np.abs(orbit.state - guess).max()) < near
+        extent, last = self.arc.orbits[-1].extent, self.arc.orbits[-1].state
+        change, miss = self.arc.guess(value) - last, orbit.state - self.arc.guess(value)
+        near = FAR * relative(change, extent) + KINK
+        return len(self.arc.values) == 1 or relative(miss, extent) < near

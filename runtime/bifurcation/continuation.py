@@ -32,7 +32,7 @@ from scipy.optimize import brentq
 from synchain.models.scenes.scene import Scene
 
 from .kinds import BifurcationKind
-from .periodic import SAME, PeriodicOrbit, orbit_through, periodic_orbit, strobe
+from .periodic import SAME, PeriodicOrbit, closed, orbit_through, periodic_orbit, relative, strobe
 from .phases import Phases
 
 __all__ = ["Arc", "det", "find_turn", "turns"]
@@ -56,8 +56,11 @@ BESIDE = 1e-2
 NEUTRAL = 1e-6
 """Largest distance from 1 of the multiplier at a branch point; a kink has none so near."""
 
-DIFFERENCE = 1e-6
-"""Relative step of the difference quotient for the derivative by the parameter."""
+DIFFERENCE, SHARE = 1e-6, 1e-3
+"""Step of the difference quotient for the derivative by the parameter, relative to it and to its way along the arc."""
+
+CLOSED = 1e-11
+"""Largest distance of a point of an arc from its image, relative to the extent of each component."""
 
 
 @dataclass(slots=True)
@@ -141,12 +144,12 @@ class Arc:
         matrix : ndarray, shape (components, components)
             Derivative of `image` by the state.
         """
-        return strobe(self.scene, point[:-1], self.periods, {self.name: float(point[-1])})
+        return strobe(self.scene, point[:-1], self.periods, {self.name: float(point[-1])}, self.orbits[-1].extent)
 
-    def slope(self, point: np.ndarray) -> np.ndarray:
-        """Return the derivative of `image` by the parameter at a point, shape (components,)."""
+    def slope(self, point: np.ndarray, way: float) -> np.ndarray:
+        """Return the derivative of `image` by the parameter at a point, shape (components,); the parameter goes a `way`."""
         step = np.zeros(len(point))
-        step[-1] = DIFFERENCE * max(1.0, abs(point[-1]))
+        step[-1] = max(DIFFERENCE * abs(point[-1]), SHARE * abs(way))
         return np.asarray((self.image(point + step)[0] - self.image(point - step)[0]) / (2.0 * step[-1]))
 
     def joins(self, value: float, orbit: PeriodicOrbit) -> bool:
@@ -162,10 +165,11 @@ class Arc:
         orbit : PeriodicOrbit
             Orbit at the value.
         """
-        point, change = np.append(orbit.state, value), orbit.state - self.orbits[-1].state
-        matrix = np.eye(len(change)) - self.image(point)[1]
-        expected = (value - self.values[-1]) * np.linalg.lstsq(matrix, self.slope(point), rcond=None)[0]
-        if not np.abs(change - expected).max() < FIT * np.abs(change).max() + SAME:
+        point, change, extent = np.append(orbit.state, value), orbit.state - self.orbits[-1].state, orbit.extent
+        way, units = value - self.values[-1], np.where(extent > 0.0, extent, 1.0)
+        matrix = np.eye(len(change)) - self.image(point)[1] * units / units[:, None]
+        expected = way * np.linalg.lstsq(matrix, self.slope(point, way) / units, rcond=None)[0]
+        if not np.abs(change / units - expected).max() < FIT * relative(change, extent) + SAME:
             return False
         return not turns(self, (self.values[-1], value), (self.orbits[-1], orbit))
 
@@ -224,7 +228,7 @@ def find_turn(arc: Arc, beyond: float) -> tuple[BifurcationKind, float, Periodic
     slip_states = None if arc.phases[-1] is None else arc.phases[-1].slip_states
     here, before = (np.append(arc.orbits[k].state, arc.values[k]) for k in (-1, -2))
     way, path = ArclengthStep(arc, here, here - before), [before, here]
-    length = float(np.linalg.norm(here - before))
+    length = way.length(here - before)
     shortest = SHORTEST * length
     for _ in range(MOST_STEPS):
         there = way.point(length)
@@ -284,7 +288,7 @@ class ArclengthStep:
 
     def border(self, point: np.ndarray) -> float:
         """Return the determinant of M - 1 with its border at a point: zero at a branch point."""
-        return float(np.linalg.det(self._bordered(self.arc.image(point)[1], self.arc.slope(point))))
+        return float(np.linalg.det(self._bordered(self.arc.image(point)[1], self._slope(point))))
 
     def rate(self, point: np.ndarray) -> float:
         """Return the parameter's share of the tangent at a point: zero where the arc turns."""
@@ -305,22 +309,23 @@ class ArclengthStep:
         ndarray, shape (components + 1,), or None
             State and parameter; None if Newton's method does not converge.
         """
-        unit = self._unit
-        guess = self.start + length * unit if guess is None else guess
-        slope = self.arc.slope(guess)
+        guess = self.start + length * self.along / self.length(self.along) if guess is None else guess
+        slope = self._slope(guess)
         point, best = guess, np.inf
         for _ in range(30):
             image, matrix = self.arc.image(point)
-            rest = np.append(image - point[:-1], unit @ (point - guess))
-            size = float(np.abs(rest).max())
+            gap = image - point[:-1]
+            size = max(relative(gap, self.weights[:-1]), abs(self.along_way(point - guess)))
             if not size < best:
                 break
-            best, kept = size, point
+            best, kept, rest = size, point, gap
             try:
-                point = point - np.linalg.solve(self._bordered(matrix, slope), rest)
+                point = point - np.linalg.solve(
+                    self._bordered(matrix, slope), np.append(gap, self.along_way(point - guess))
+                )
             except np.linalg.LinAlgError:
                 return None
-        return kept if best < 1e-11 else None
+        return kept if closed(rest, CLOSED * self.weights[:-1], kept[:-1]) else None
 
     def root(self, test: Callable[[np.ndarray], float], path: Sequence[np.ndarray]) -> tuple[float, PeriodicOrbit]:
         """Locate the zero of a function of the point between the last two points of a path along the arc.
@@ -331,7 +336,8 @@ class ArclengthStep:
             If Newton's method loses the arc on the way.
         """
         known = self._known(path)
-        at = brentq(lambda at: test(self._between(known, at)), *[*known][-2:], xtol=1e-13, rtol=1e-13)
+        one, other = [*known][-2:]
+        at = brentq(lambda at: test(self._between(known, at)), one, other, xtol=1e-13 * abs(other - one), rtol=1e-13)
         return self._place(self._between(known, float(at)))
 
     def summit(self, test: Callable[[np.ndarray], float], path: Sequence[np.ndarray]) -> tuple[float, PeriodicOrbit]:
@@ -355,7 +361,7 @@ class ArclengthStep:
 
     def _known(self, path: Sequence[np.ndarray]) -> dict[float, np.ndarray]:
         """Points by their length."""
-        return {float(self._unit @ (point - self.start)): point for point in path}
+        return {self.along_way(point - self.start): point for point in path}
 
     def _between(self, known: dict[float, np.ndarray], length: float) -> np.ndarray:
         """Point at a length, kept among the known ones: Newton's method starts from a polynomial through them."""
@@ -370,11 +376,33 @@ class ArclengthStep:
         """Parameter and orbit at a point."""
         return float(point[-1]), self.orbit(point)
 
+    def length(self, way: np.ndarray) -> float:
+        """Return the length of a difference of points, relative to the weights."""
+        return float(np.linalg.norm(way / self.weights))
+
+    def along_way(self, way: np.ndarray) -> float:
+        """Return the part of a difference of points along the direction."""
+        return float(self._row @ way)
+
     @property
-    def _unit(self) -> np.ndarray:
-        """The direction, of length 1."""
-        return np.asarray(self.along / np.linalg.norm(self.along))
+    def weights(self) -> np.ndarray:
+        """By what state and parameter (components + 1,) are measured: the extent of the orbit, and the way along the whole arc.
+
+        Near a turn the parameter hardly moves in this measure, so that the direction is that of the state.
+        """
+        ways = [abs(value - self.arc.values[-1]) for value in self.arc.values]
+        known = np.append(self.arc.orbits[-1].extent, max(ways) or abs(self.along[-1]))
+        return np.where(known > 0.0, known, 1.0)
+
+    @property
+    def _row(self) -> np.ndarray:
+        """The row that takes the part along the direction from a difference of points."""
+        return np.asarray(self.along / self.weights**2 / self.length(self.along))
+
+    def _slope(self, point: np.ndarray) -> np.ndarray:
+        """Derivative (components,) of the image by the parameter."""
+        return self.arc.slope(point, float(self.weights[-1]))
 
     def _bordered(self, matrix: np.ndarray, slope: np.ndarray) -> np.ndarray:
         """M - 1 with the derivative by the parameter as last column and the direction as last row."""
-        return np.vstack([np.column_stack([matrix - np.eye(len(matrix)), slope]), self._unit])
+        return np.vstack([np.column_stack([matrix - np.eye(len(matrix)), slope]), self._row])

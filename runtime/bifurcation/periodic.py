@@ -22,8 +22,9 @@ from scipy.optimize import brentq
 
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.inputs.checks import short_repr
+from synchain.models.inputs.keywords import warn
 from synchain.models.mechanics.friction import SLIP
-from synchain.models.scenes.scene import Scene
+from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import Given
 from ..results.labelled import Labelled, dataset
@@ -31,7 +32,7 @@ from ..stability.attractor import RETURN, cycle_propagators
 from ..stability.exponents import coupled_cell, single_cell
 from ..stability.limit_cycle import limit_cycle
 from ..stability.motion import Turns, rests
-from ..stability.orbits import Orbits, unit_of_time
+from ..stability.orbits import Orbits, unit_of_time, within
 from .phases import Phases, phases_of
 
 __all__ = [
@@ -39,8 +40,10 @@ __all__ = [
     "SAME",
     "PeriodicOrbit",
     "check_periods",
+    "closed",
     "orbit_through",
     "periodic_orbit",
+    "relative",
     "stability_end",
     "strobe",
 ]
@@ -56,10 +59,19 @@ NEWTON = {
 """What functions of periodic orbits do not take, and why."""
 
 SAME = 1e-7
-"""Largest distance of two orbits that count as one."""
+"""Largest distance of two orbits that count as one, relative to the extent of each component."""
 
-ROUNDING = 1e-12
-"""Largest sliding speed that counts as a rounding error for an orbit that sticks."""
+CLOSED = 1e-9
+"""Largest distance of the state of an orbit from its image, relative to the extent of each component."""
+
+ROUNDING = 10.0 * TOLERANCE
+"""Largest error of the integration, relative to a state; a sliding speed below this part of its extent is one."""
+
+TRAVELLED = 1e-3
+"""An orbit that moves less than this part of the way on which Newton's method came to it is measured by that part."""
+
+ASTRAY = 1e6
+"""How many extents of the motion from its start Newton's method may go away."""
 
 MOST_STEPS = 30
 LONGEST = 10_000
@@ -87,6 +99,9 @@ class PeriodicOrbit(Labelled):
         Steps of Newton's method.
     free : float
         The time after which the motion of an undriven oscillator repeats itself; 0 with a drive.
+    extent : ndarray, shape (components,)
+        How far each component moves, by which distances between states are measured; one that rests is measured by the
+        way on which Newton's method came to it.
     """
 
     scene: Scene = field(repr=False)
@@ -96,6 +111,7 @@ class PeriodicOrbit(Labelled):
     residual: float
     steps: int
     free: float = 0.0
+    extent: np.ndarray = field(default_factory=lambda: np.ones(1), repr=False)
 
     @property
     def period(self) -> float:
@@ -126,15 +142,16 @@ class PeriodicOrbit(Labelled):
         sizes = ", ".join(f"{value:.6g}" for value in self.multipliers)
         return (
             ("scene", repr(self.scene)),
+            ("orbit", "of one oscillator, alone or in step with the others"),
             ("period", f"{self.period:.12g} units of time") if self.free else ("drive periods", str(self.periods)),
             ("state", state),
-            ("multipliers", f"{sizes}: {'stable' if self.stable else 'unstable'}"),
+            ("multipliers", f"{sizes}: {'stable' if self.stable else 'unstable'} for one oscillator"),
             ("residual", f"{self.residual:.1e} after {self.steps} steps"),
         )
 
     @property
     def stable(self) -> bool:
-        """True if every multiplier, but that of a shift along the orbit, lies inside the unit circle."""
+        """True if every multiplier of one oscillator, but that of a shift along the orbit, lies inside the unit circle."""
         shift = [int(np.abs(self.multipliers - 1.0).argmin())] if self.free else []
         return bool(np.all(np.abs(np.delete(self.multipliers, shift)) < 1.0))
 
@@ -148,15 +165,21 @@ class PeriodicOrbit(Labelled):
         """The states (periods, components) at the beginning of each period of the drive."""
         points = [self.state]
         for _ in range(self.periods - 1):
-            points.append(_strobe(self.scene, points[-1], 1, 0.0)[0][: len(self.state)])
+            points.append(_strobe(self.scene, points[-1], 1, 0.0, extent=self.extent)[0][: len(self.state)])
         return np.array(points)
 
     @property
     def least(self) -> int:
         """Least number of drive periods after which the motion repeats itself, to within SAME."""
+        if self.periods == 1:
+            return 1
         points = self.points
         divisors = (k for k in range(1, self.periods) if self.periods % k == 0)
-        return next((k for k in divisors if np.abs(points[k] - points[0]).max() < SAME), self.periods)
+        return next((k for k in divisors if self.meets(points[k])), self.periods)
+
+    def meets(self, state: np.ndarray) -> bool:
+        """Return whether a state is that of the orbit at the beginning of a period, to within SAME."""
+        return closed(state - self.state, SAME * self.extent, self.state)
 
     def transversal_multipliers(self, alpha: float) -> np.ndarray:
         """Compute the multipliers of a transversal mode along the orbit.
@@ -171,7 +194,7 @@ class PeriodicOrbit(Labelled):
         ndarray, shape (components,)
             The largest first.
         """
-        return _sorted(_strobe(self.scene, self.state, self.periods, alpha, self.free)[1])
+        return _sorted(_strobe(self.scene, self.state, self.periods, alpha, self.free, self.extent)[1])
 
 
 def periodic_orbit(
@@ -182,7 +205,9 @@ def periodic_orbit(
     parameters: Mapping[str, float] | None = None,
     **more: float,
 ) -> PeriodicOrbit:
-    """Find a periodic orbit of a scene's oscillator.
+    """Find a periodic orbit of a scene's oscillator: of one, which all of a network follow in step.
+
+    Whether a network stays in step is told by `PeriodicOrbit.transversal_multipliers`.
 
     Parameters
     ----------
@@ -192,7 +217,7 @@ def periodic_orbit(
         Number of drive periods after which the orbit repeats itself; 1 without a drive.
     start : array_like, shape (components,), optional
         Start of Newton's method; by default the scene's initial state after its transient.  Of an undriven oscillator it is a
-        state from which the orbit is reached, and the orbit must attract.
+        state from which the orbit is reached, and the orbit must attract; its transient counts mean return times.
     parameters : mapping of str to float, optional
         Parameters of the scene to set, for names that are keywords already.
     **more : float
@@ -202,6 +227,11 @@ def periodic_orbit(
     -------
     PeriodicOrbit
 
+    Warns
+    -----
+    RuntimeWarning
+        If the nodes of a network were given different initial states, which one oscillator does not have.
+
     Raises
     ------
     ValueError
@@ -209,32 +239,60 @@ def periodic_orbit(
     ArithmeticError
         If Newton's method does not converge.
     """
+    if start is None:
+        _warn_of_different_starts(a_scene(scene))
     few = {name: "a few steps of Newton's method are soon done" for name in ("show_progress", "progress")}
     scene = coupled_cell(Given(periodic_orbit, parameters, more, {**NEWTON, **few}), scene, TOLERANCE)
     check_periods(periods)
     if not without_drive(scene.equations, scene.parameters).forced:
         return _limit_cycle(scene, periods, start)
     state = _settled(scene) if start is None else _state(scene, start)
-    best, steps, kept = np.inf, 0, state
+    return _newton(scene, int(periods), state)
+
+
+def _newton(scene: Scene, periods: int, start: np.ndarray) -> PeriodicOrbit:
+    """The orbit of a driven oscillator near a start (components,), by Newton's method."""
+    extent = _extent(scene, start, periods)
+    best, steps, kept, state = np.inf, 0, start, start
     while steps < MOST_STEPS:
-        image, matrix = _strobe(scene, state, periods, 0.0)
+        image, matrix = _strobe(scene, state, periods, 0.0, extent=extent)
         gap = image[: len(state)] - state
-        if _nearly_sticks(image, gap):
+        if _nearly_sticks(image, gap, extent):
             state = image[: len(state)] - np.array([gap[0], 0.0])
             continue
-        residual = float(np.abs(gap).max())
+        residual = relative(gap, extent)
         if not residual < best:
             break
-        best, kept, monodromy = residual, state, matrix
+        best, kept, monodromy, rest = residual, state, matrix, gap
         if residual == 0.0:
             break
         state = state + _correction(matrix, gap)
         steps += 1
-    if not best < 1e-9 * max(1.0, float(np.abs(kept).max())):
+        if not relative(state - start, extent) < ASTRAY:
+            break
+    extent = np.maximum(_extent(scene, kept, periods, extent), TRAVELLED * np.abs(kept - start))
+    size = float(np.abs(rest).max())
+    if not closed(rest, CLOSED * extent, kept):
         raise ArithmeticError(
-            f"no orbit of {periods} drive period{'s' * (periods > 1)} near the start: the best residual was {best:.1e}"
+            f"no orbit of {periods} drive period{'s' * (periods > 1)} near the start: the best residual was {size:.1e}"
         )
-    return PeriodicOrbit(scene, int(periods), kept, _sorted(monodromy), best, steps)
+    return PeriodicOrbit(scene, periods, kept, _sorted(monodromy), size, steps, extent=extent)
+
+
+def relative(distance: np.ndarray, extent: np.ndarray) -> float:
+    """The largest component of a distance, relative to the extent of the motion; one that never moved has no extent."""
+    return float(np.abs(distance / np.where(extent > 0.0, extent, 1.0)).max())
+
+
+def closed(gap: np.ndarray, allowed: np.ndarray, state: np.ndarray) -> bool:
+    """Return whether no component of a gap at a state is larger than allowed, errors of the integration left out."""
+    return bool(np.all(np.abs(gap) <= allowed + ROUNDING * np.abs(state)))
+
+
+def _extent(scene: Scene, state: np.ndarray, periods: int, known: np.ndarray | None = None) -> np.ndarray:
+    """How far each component (components,) moves within some drive periods from a state."""
+    orbit = _orbits(scene, state, 0.0, scene.period, known)
+    return np.asarray(np.ptp([orbit.state[0], *within(orbit, periods)], axis=0)[: len(state)])
 
 
 def _limit_cycle(scene: Scene, periods: int, start: Sequence[float] | np.ndarray | None) -> PeriodicOrbit:
@@ -256,14 +314,14 @@ def _limit_cycle(scene: Scene, periods: int, start: Sequence[float] | np.ndarray
         raise ArithmeticError(
             f"no attracting cycle near the motion after {scene.transient:g} units of 2 pi; start elsewhere, or settle longer"
         )
-    state = orbit.state[0]
-    image, matrix = _strobe(scene, state, 1, 0.0, free)
-    return PeriodicOrbit(scene, 1, state, _sorted(matrix), float(np.abs(image - state).max()), steps, free)
+    state, extent = orbit.state[0], orbit.extent
+    image, matrix = _strobe(scene, state, 1, 0.0, free, extent)
+    return PeriodicOrbit(scene, 1, state, _sorted(matrix), float(np.abs(image - state).max()), steps, free, extent)
 
 
-def _nearly_sticks(image: np.ndarray, gap: np.ndarray) -> bool:
+def _nearly_sticks(image: np.ndarray, gap: np.ndarray, extent: np.ndarray) -> bool:
     """True if a state slips at a speed of rounding errors and its image sticks."""
-    return len(image) > len(gap) and image[-1] == 0.0 and 0.0 < abs(gap[1]) < ROUNDING
+    return len(image) > len(gap) and image[-1] == 0.0 and 0.0 < abs(gap[1]) < ROUNDING * extent[1]
 
 
 def check_periods(periods: object) -> None:
@@ -298,12 +356,18 @@ def orbit_through(scene: Scene, periods: int, state: np.ndarray, parameters: Map
         Its residual says how well the state returns.
     """
     scene = _driven(Given(orbit_through, parameters), scene)
-    image, matrix = _strobe(scene, state, periods, 0.0)
-    return PeriodicOrbit(scene, periods, state, _sorted(matrix), float(np.abs(image[: len(state)] - state).max()), 0)
+    extent = _extent(scene, state, periods)
+    image, matrix = _strobe(scene, state, periods, 0.0, extent=extent)
+    residual = float(np.abs(image[: len(state)] - state).max())
+    return PeriodicOrbit(scene, periods, state, _sorted(matrix), residual, 0, extent=extent)
 
 
 def strobe(
-    scene: Scene, state: np.ndarray, periods: int, parameters: Mapping[str, float] | None = None
+    scene: Scene,
+    state: np.ndarray,
+    periods: int,
+    parameters: Mapping[str, float] | None = None,
+    extent: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Evaluate the stroboscopic map and its derivative.
 
@@ -317,6 +381,8 @@ def strobe(
         Number of drive periods.
     parameters : mapping of str to float, optional
         Parameters of the scene to set.
+    extent : ndarray, shape (components,), optional
+        How far each component moves; the absolute tolerance of the integration follows it.
 
     Returns
     -------
@@ -325,7 +391,7 @@ def strobe(
     matrix : ndarray, shape (components, components)
         Derivative of `image` by `state`.
     """
-    image, matrix = _strobe(_driven(Given(strobe, parameters), scene), state, periods, 0.0)
+    image, matrix = _strobe(_driven(Given(strobe, parameters), scene), state, periods, 0.0, extent=extent)
     return image[: len(state)], matrix
 
 
@@ -340,6 +406,17 @@ def _driven(given: Given, scene: Scene) -> Scene:
     return coupled_cell(Given(given.function), scene, TOLERANCE)
 
 
+def _warn_of_different_starts(scene: Scene) -> None:
+    """Warn if the nodes of a network were given different initial states."""
+    given = scene.given["initial"] or {}
+    apart = next((name for name in given if name in scene.initial and len({*scene.initial[name]}) > 1), None)
+    if apart is not None:
+        warn(
+            f"periodic_orbit: found different initial {apart} of {scene.n} nodes; expected equal ones, as the orbit is that "
+            "of one oscillator; the start of the first is taken; run the scene to see how the network moves"
+        )
+
+
 def _initial(scene: Scene) -> np.ndarray:
     """The initial state of the first oscillator."""
     return np.array([values[0] for values in scene.initial.values()], dtype=float)
@@ -348,7 +425,8 @@ def _initial(scene: Scene) -> np.ndarray:
 def _settled(scene: Scene) -> np.ndarray:
     """State (components,) after the scene's transient from its initial one."""
     orbits = Orbits.make(scene, np.zeros(1), _initial(scene)[None], 1)
-    orbits.settle(scene.transient)
+    units = scene.transient if scene.time_unit == "period" else math.ceil(scene.transient / orbits.unit)
+    orbits.settle(units)
     return np.asarray(orbits.state[0][: orbits.components])
 
 
@@ -406,13 +484,10 @@ def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:
 
 
 def _strobe(
-    scene: Scene, state: np.ndarray, periods: int, alpha: float, free: float = 0.0
+    scene: Scene, state: np.ndarray, periods: int, alpha: float, free: float = 0.0, extent: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """State some periods later, of the drive or of length `free`, and the propagator of a deviation of strength alpha."""
-    start = np.zeros(len(scene.initial))
-    start[: len(state)] = state
-    known = Turns(free, np.zeros(len(start)), "period of the cycle") if free else None
-    orbits = Orbits.make(scene, np.array([alpha]), start[None], 1, known)
+    orbits = _orbits(scene, state, alpha, free or scene.period, extent)
     propagators, logarithms = cycle_propagators(orbits, periods)
     if (size := float(logarithms[0, 0])) > 700.0:
         raise FloatingPointError(
@@ -420,6 +495,17 @@ def _strobe(
         )
     matrix = propagators[0, 0] * math.exp(size)
     return orbits.state[0], matrix
+
+
+def _orbits(
+    scene: Scene, state: np.ndarray, alpha: float, period: float | None, extent: np.ndarray | None = None
+) -> Orbits:
+    """A single orbit with a mode of strength alpha, whose unit of time is a period; its absolute tolerance follows its extent."""
+    start, moves = np.zeros(len(scene.initial)), np.zeros(len(scene.initial))
+    start[: len(state)] = state
+    if extent is not None:
+        moves[: len(state)] = extent
+    return Orbits.make(scene, np.array([alpha]), start[None], 1, Turns(period or 2.0 * math.pi, moves, "period"))
 
 
 def _sorted(matrix: np.ndarray) -> np.ndarray:

@@ -10,35 +10,47 @@ Source: Auerbach, Cvitanovic, Eckmann, Gunaratne & Procaccia, Phys. Rev. Lett. 5
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from numbers import Integral
 
 import numpy as np
 import xarray as xr
 
-from synchain.models.inputs.checks import check_integer, check_number, short_repr
+from synchain.models.dynamics.reduction import without_drive
+from synchain.models.inputs.checks import check_integer, check_keys, check_number, check_table, short_repr
+from synchain.models.mechanics.friction import SLIP
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import Given, with_numbers
 from ..results.labelled import Labelled, dataset
-from ..stability.exponents import coupled_cell, initial_states
-from ..stability.orbits import Orbits
+from ..stability.exponents import coupled_cell
+from ..stability.orbits import Orbits, driven_states, within
+from ..support.arrays import row
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .bifurcations import BifurcationKind
 from .branches import Branch, checked_values, others, traced, warn_of_lost
-from .periodic import NEWTON, SAME, TOLERANCE, PeriodicOrbit, check_periods, periodic_orbit
+from .periodic import NEWTON, TOLERANCE, PeriodicOrbit, check_periods, periodic_orbit, relative
 
-__all__ = ["Skeleton", "near_returns", "skeleton"]
+__all__ = ["Skeleton", "near_returns", "skeleton", "starts_of"]
 
-STARTS, LENGTH, DROPPED = 16, 200, 20
+Range = tuple[float, float]
+"""Ends of an interval."""
+
+STARTS, LENGTH, DROPPED = 64, 200, 20
 """Motions that are searched for returns, their length and their transient in drive periods."""
+
+SCALES = (1.0, 2.0, 4.0, 8.0)
+"""Sizes of the boxes of their starts around the motion from the scene's own start, relative to the extent of that."""
+
+MOST_STEPS = 100_000
+"""Most steps of a motion in a drive period; one that takes more is left."""
 
 NEARER = 4
 """The other sheet at a fold is entered at 4^-NEARER of the distance between fold and last orbit."""
 
 CLOSE, APART, TRIES = 0.05, 0.02, 12
-"""Largest distance of a return, least distance between starts, most starts for one period."""
+"""Largest distance of a return and least distance between starts, relative to the extent of the motion; most starts for one period."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -49,9 +61,12 @@ class Skeleton(Labelled):
     ----------
     branches : tuple of Branch
         Each rises in the parameter; sorted by the number of periods and the first value.
+    searched : mapping of str to (float, float)
+        Between which initial values of each component motions were searched for orbits.
     """
 
     branches: tuple[Branch, ...]
+    searched: Mapping[str, Range] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.branches)
@@ -90,7 +105,7 @@ class Skeleton(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """One row for each branch."""
+        """One row for each branch, and where orbits were searched."""
         rows = tuple(
             (
                 f"branch {k}",
@@ -98,7 +113,8 @@ class Skeleton(Labelled):
             )
             for k, branch in enumerate(self.branches, 1)
         )
-        return rows or (("branches", "none"),)
+        box = ", ".join(f"{name} from {low:.4g} to {high:.4g}" for name, (low, high) in self.searched.items())
+        return (*(rows or (("branches", "none"),)), *((("starts", box),) if box else ()))
 
 
 def skeleton(
@@ -108,6 +124,7 @@ def skeleton(
     periods: Sequence[int] = (1, 2),
     looks: int = 8,
     *,
+    ranges: Mapping[str, Range] | None = None,
     transient: float = DROPPED,
     seed: int = 0,
     show_progress: bool | None = None,
@@ -133,6 +150,10 @@ def skeleton(
         Numbers of drive periods of the orbits.
     looks : int
         Number of values at which orbits are searched.
+    ranges : mapping of str to (float, float), optional
+        Components and the ends of the initial values between which motions are searched; other components start as the
+        scene does. By default all components start in boxes of 1, 2, 4 and 8 times the extent of the motion from the
+        scene's own start, around it. `Skeleton.searched` says what was searched.
     transient : float
         Drive periods before the search.
     seed : int
@@ -154,7 +175,8 @@ def skeleton(
     Raises
     ------
     ValueError
-        If the parameter is unknown, the values are not monotonic, or `looks` is less than one.
+        If the parameter is unknown, the values are not monotonic, `looks` is less than one, a range is empty or of an
+        unknown component, and for an oscillator without a drive.
     """
     grid = sorted(checked_values(a_scene(scene), name, values))
     if isinstance(periods, Integral | str) or len(periods) == 0:
@@ -164,7 +186,14 @@ def skeleton(
         raise ValueError(f"looks = {short_repr(looks)}; expected a whole number, at least 1")
     for each in periods:
         check_periods(each)
+    if not without_drive(scene.equations, scene.parameters).forced:
+        raise ValueError(
+            "skeleton: found an oscillator without a drive; expected one with a drive, whose periods count those of orbits; "
+            "periodic_orbit(scene) finds the cycle that attracts it at one value, equilibrium(scene) a state at rest"
+        )
+    box = None if ranges is None else _box(scene, ranges)
     branches: list[Branch] = []
+    searched: list[np.ndarray] = []
 
     def take(k: int, orbit: PeriodicOrbit) -> None:
         """Follow an orbit at grid[k] that is new, and what its branch turns into at its folds."""
@@ -179,14 +208,56 @@ def skeleton(
     transient, seed = check_number("transient", transient, 0.0), check_integer("seed", seed, 0)
     with Execution(1, None, show_progress, progress).reporter(len(places), "value") as reporter:
         for k in reporter.each(places):
-            for orbit in near_returns(with_numbers(scene, {name: grid[k]}), periods, transient, seed):
+            one = with_numbers(scene, {name: grid[k]})
+            states = starts_of(one, seed, box)
+            searched.append(states)
+            for orbit in near_returns(one, periods, transient, states):
                 take(k, orbit)
     warn_of_lost("skeleton", branches)
-    return Skeleton(tuple(sorted(branches, key=lambda branch: (branch.orbits[0].periods, branch.values[0]))))
+    low, high = (of(np.concatenate(searched), axis=0).tolist() for of in (np.min, np.max))
+    names = (component for component in scene.components if component != SLIP.name)
+    return Skeleton(
+        tuple(sorted(branches, key=lambda branch: (branch.orbits[0].periods, branch.values[0]))),
+        {component: ends for component, *ends in zip(names, low, high, strict=False)},
+    )
+
+
+def _box(scene: Scene, ranges: Mapping[str, Range]) -> np.ndarray:
+    """The ends (2, components) of the initial values in some ranges and, of other components, those of the scene."""
+    names = [name for name in scene.components if name != SLIP.name]
+    check_keys("skeleton: ranges", check_table("skeleton: ranges", ranges), names)
+    ends = np.array([[scene.initial[name][0]] * 2 for name in names], dtype=float).T
+    for name, given in ranges.items():
+        pair = row(f"skeleton: the range of {name}", given, 2)
+        if len(pair) != 2 or not pair[0] < pair[1]:
+            raise ValueError(
+                f"skeleton: the range of {name} is {short_repr(given)}; expected two numbers, the lower one first"
+            )
+        ends[:, names.index(name)] = pair
+    return ends
+
+
+def starts_of(scene: Scene, seed: int, box: np.ndarray | None = None) -> np.ndarray:
+    """Return the starts (STARTS, components) of a search: the scene's own, and random ones around its motion, or in a box."""
+    own = np.array([values[0] for name, values in scene.initial.items() if name != SLIP.name], dtype=float)
+    share = np.random.default_rng(seed).uniform(0.0, 1.0, (STARTS, len(own)))
+    if box is None:
+        orbit = _orbits(scene, own[None])
+        try:
+            motion = np.concatenate([own[None], *(states[:, : len(own)] for states in driven_states(orbit))])
+        except FloatingPointError:  # its own start escapes, and says nothing of bounded motion but its size
+            motion = np.array([own, -own])
+        extent = np.ptp(motion, axis=0)
+        extent = np.where(extent > 0.0, extent, 1.0 if not extent.any() else 0.0)  # nothing moves, so no scale is known
+        sizes = np.resize(SCALES, STARTS)[:, None] * extent
+        box = 0.5 * (motion.min(axis=0) + motion.max(axis=0)) + sizes * np.array([-0.5, 0.5])[:, None, None]
+    starts = box[0] + (box[1] - box[0]) * share
+    starts[0] = own
+    return np.asarray(starts)
 
 
 def near_returns(
-    scene: Scene, periods: Sequence[int], transient: float = DROPPED, seed: int = 0
+    scene: Scene, periods: Sequence[int], transient: float = DROPPED, starts: np.ndarray | None = None
 ) -> list[PeriodicOrbit]:
     """Find the periodic orbits to which motions from several starts nearly return.
 
@@ -198,18 +269,18 @@ def near_returns(
         Numbers of drive periods of the orbits.
     transient : float
         Drive periods before the search.
-    seed : int
-        Seed of the initial states.
+    starts : ndarray, shape (any, components), optional
+        Initial states; by default around the motion from the scene's own start.
 
     Returns
     -------
     list of PeriodicOrbit
         Each orbit once.
     """
-    path = _path(scene, transient, seed)
+    path, extent = _paths(scene, transient, starts_of(scene, 0) if starts is None else starts)
     orbits: list[PeriodicOrbit] = []
     for count in periods:
-        for start in _returning(path, count):
+        for start in _returning(path, extent, count):
             try:
                 orbit = periodic_orbit(scene, count, start)
             except ArithmeticError:
@@ -220,35 +291,60 @@ def near_returns(
     return orbits
 
 
-def _path(scene: Scene, transient: float, seed: int) -> np.ndarray:
-    """States (LENGTH + 1, starts, components) at the beginning of each period of the drive."""
-    loose = scene.replace(rtol=1e-8)
-    orbits = Orbits.make(loose, np.zeros(1), initial_states(loose, STARTS, seed), 1)
+def _paths(scene: Scene, transient: float, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """States (LENGTH + 1, motions, components) at the beginning of periods of bounded motions, and the extents of those."""
+    loose = scene.replace(rtol=1e-8, max_steps=min(scene.max_steps, MOST_STEPS))
+    parts = [starts]
+    found: list[tuple[np.ndarray, np.ndarray]] = []
+    for part in parts:
+        try:
+            found.append(_path(loose, transient, part))
+        except FloatingPointError:  # some escape or take too many steps: halves are tried
+            parts += np.array_split(part, 2) if len(part) > 1 else []
+    if not found:
+        return np.empty((LENGTH + 1, 0, starts.shape[1])), np.empty((0, starts.shape[1]))
+    return np.concatenate([path for path, _ in found], axis=1), np.concatenate([extent for _, extent in found])
+
+
+def _path(scene: Scene, transient: float, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """States (LENGTH + 1, starts, components) at the beginning of each period, and the extent of each motion."""
+    orbits = _orbits(scene, starts)
     orbits.settle(transient)
     integrator = orbits.integrator_of(orbits.strengths)
     states = [integrator.state]
     for _ in range(LENGTH):
         integrator.advance(orbits.unit)
         states.append(integrator.state)
-    return np.array(states)[:, :, : orbits.components]
+    path = np.array(states)[:, :, : orbits.components]
+    last = replace(orbits, state=states[-1])
+    inner = [within(last.part([k]))[:, : orbits.components] for k in range(len(starts))]
+    return path, np.array([np.ptp([*path[:, k], *looks], axis=0) for k, looks in enumerate(inner)])
 
 
-def _returning(path: np.ndarray, periods: int) -> list[np.ndarray]:
-    """States of a path with the closest returns after some periods, apart from each other."""
-    gap = np.abs(path[periods:] - path[:-periods]).max(axis=2)
-    starts: list[np.ndarray] = []
+def _orbits(scene: Scene, starts: np.ndarray) -> Orbits:
+    """Orbits from starts (any, components) without the modes of contacts, which follow from them."""
+    states = np.zeros((len(starts), len(scene.initial)))
+    states[:, : starts.shape[1]] = starts
+    return Orbits.make(scene, np.zeros(1), states, 1)
+
+
+def _returning(path: np.ndarray, extent: np.ndarray, periods: int) -> list[np.ndarray]:
+    """States of paths with the closest returns after some periods, apart from each other."""
+    size = np.where(extent > 0.0, extent, 1.0)
+    gap = np.abs((path[periods:] - path[:-periods]) / size).max(axis=2)
+    starts: list[tuple[np.ndarray, np.ndarray]] = []
     for flat in np.argsort(gap, axis=None, kind="stable"):
-        k, row = np.unravel_index(flat, gap.shape)
-        if gap[k, row] > CLOSE or len(starts) == TRIES:
+        k, motion = np.unravel_index(flat, gap.shape)
+        if gap[k, motion] > CLOSE or len(starts) == TRIES:
             break
-        if all(np.abs(path[k, row] - other).max() > APART for other in starts):
-            starts.append(path[k, row])
-    return starts
+        if all(relative(path[k, motion] - start, np.minimum(size[motion], its)) > APART for start, its in starts):
+            starts.append((path[k, motion], size[motion]))
+    return [state for state, _ in starts]
 
 
 def _same(orbit: PeriodicOrbit, other: PeriodicOrbit) -> bool:
     """True if two orbits of as many periods are one, perhaps shifted by drive periods."""
-    return bool(np.abs(orbit.points - other.state).max(axis=1).min() < SAME)
+    return any(other.meets(point) for point in orbit.points)
 
 
 def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:

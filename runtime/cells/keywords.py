@@ -120,20 +120,23 @@ class Given:
         """
         fixed: dict[str, object] = {}
         swept: dict[str, object] = {axis.name: axis.values for axis in a_scene(scene).axes}
-        start = {name: list(values) for name, values in scene.initial.items()}
+        start: dict[str, list[float]] = {}
         given = self.checked(scene, states=True)
         for name, value in given.items():
             if is_row(value):
                 swept[name] = value
                 continue
             if state := _state(scene, name):
-                start[state.base][scene.equations.holders(state.base).index(state.index)] = check_number(name, value)
+                states = start.setdefault(state.base, list(scene.initial[state.base]))
+                states[scene.equations.holders(state.base).index(state.index)] = check_number(name, value)
             else:
                 fixed[name] = value
             swept.pop(name, None)
         settings = {name: value for name, value in settings.items() if value is not None}
         if given:
-            settings |= {"axes": swept, "initial": start}
+            settings["axes"] = swept
+        if start:  # a scene remembers as given only what is
+            settings["initial"] = {**(scene.given["initial"] or {}), **start}
         return with_numbers(scene, fixed, **settings)
 
     def parted(self) -> tuple[dict[str, Any], Given]:

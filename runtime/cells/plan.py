@@ -277,8 +277,10 @@ def _windows(scene: Scene, period: np.ndarray) -> np.ndarray:
     """Start and end (cells, 2) of the windows of cells whose drives have these periods."""
     unit = period if scene.time_unit == "period" else np.ones(len(period))
     if np.any(unit == 0.0):
-        name = scene.drive.frequency
-        raise ValueError(f"a window in drive periods needs {name} other than 0, found 0; set time_unit = 'time'")
+        raise ValueError(
+            f"a window in drive periods: found a cell in which {scene.drive.frequency} is 0, or undefined; expected a "
+            "drive with a period; set time_unit = 'time'"
+        )
     spans = np.stack([scene.transient * unit, (scene.transient + scene.window) * unit], axis=1)
     if not np.all(spans < 1e12):
         raise ValueError(

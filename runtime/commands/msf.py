@@ -192,11 +192,9 @@ def _check(scene: Scene, network: bool, arguments: Namespace, rows: Rows) -> Non
     """Raise ValueError for what cannot be computed, before anything is."""
     import numpy as np
 
-    from synchain.models.graphs.families import topology
-
     from ..console.line_report import complex_modes
     from ..prediction.synchronisability import windows
-    from ..stability.orbits import Orbits
+    from ..stability.orbits import Orbits, pair_of
 
     axes = (*rows.values(), *(() if len(rows) == 2 else (_alpha(arguments), arguments.beta or (0.0,))))
     if math.prod(map(len, axes)) > POINTS:
@@ -205,7 +203,7 @@ def _check(scene: Scene, network: bool, arguments: Namespace, rows: Rows) -> Non
         raise WrongUse("the scene has no coupling, by which modes differ; expected one, e.g. coupling = 'spring'")
     if rows:
         return
-    one = scene if scene.topology.link_count else scene.replace(topology=topology("chain", 2))
+    one = scene if scene.topology.link_count else pair_of(scene)
     strength = np.zeros(1, dtype=float if arguments.beta is None else complex)
     Orbits.make(one, strength, np.zeros((1, len(one.components))), None)
     if network and not complex_modes(scene.topology, 1.0):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from synchain.models.graphs.topology import Topology
@@ -18,6 +19,7 @@ from ..bifurcation.skeleton import Skeleton
 from ..figures.exponent import draw_exponent, finite
 from ..figures.plane import draw_plane
 from ..figures.result_plot import draw_result
+from ..figures.skeleton import MARK, MARKERS, STABLE, UNSTABLE
 from ..figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, bands, note, symbol
 from ..results.result import Result
 from ..stability.clusters import BlockVerdict, ClusterExponents
@@ -199,23 +201,54 @@ def _(value: Skeleton, axes: Axes) -> Axes:
 
 
 def _branches(branches: tuple[Branch, ...], axes: Axes) -> Axes:
-    """First component at the start of a period along the parameter; dashed where unstable."""
+    """First component at the start of a period: solid where stable, dashed where unstable."""
     colours = (PURPLE, BLUE, ORANGE, GREEN)
-    for k, branch in enumerate(branches):
-        colour = colours[k % len(colours)]
-        x = np.array([orbit.state[0] for orbit in branch.orbits])
-        stable = np.array([orbit.stable for orbit in branch.orbits])
-        near = stable | np.roll(stable, 1) | np.roll(stable, -1)
-        axes.plot(branch.values, np.where(near, x, np.nan), color=colour, linewidth=1.2)
-        axes.plot(branch.values, np.where(stable, np.nan, x), color=colour, linestyle="--", linewidth=0.8)
+    counts = sorted({branch.orbits[0].periods for branch in branches})
+    seen: dict[str, dict[str, Any]] = {
+        f"{n} drive period{'s' * (n > 1)}": {"color": colours[k % len(colours)]} for k, n in enumerate(counts)
+    }
+    for branch in branches:
+        colour = colours[counts.index(branch.orbits[0].periods) % len(colours)]
+        for stable, values, states in stretches(branch):
+            axes.plot(values, states[:, 0], color=colour, **(STABLE if stable else UNSTABLE))
+            seen["stable" if stable else "unstable"] = {"color": BLACK, **(STABLE if stable else UNSTABLE)}
         for turn in branch.bifurcations:
-            axes.plot([turn.value], [turn.orbit.state[0]], marker="o", markerfacecolor="white", color=colour)
-            place = (turn.value, turn.orbit.state[0])
-            axes.annotate(str(turn.kind), place, (3, 3), textcoords="offset points", fontsize=6)
+            axes.plot([turn.value], [turn.orbit.state[0]], color=colour, marker=MARKERS[turn.kind], **MARK)
+            seen[str(turn.kind)] = {"color": BLACK, "marker": MARKERS[turn.kind], **MARK}
     if branches:
         name = symbol(branches[0].orbits[0].components[0])
         axes.set(xlabel=symbol(branches[0].name), ylabel=f"{name} at the beginning of a period")
+        handles = [Line2D([], [], label=label, **style) for label, style in seen.items()]
+        axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=6)
     return axes
+
+
+def stretches(branch: Branch) -> list[tuple[bool, np.ndarray, np.ndarray]]:
+    """Cut a branch at its bifurcations into stretches of one stability.
+
+    Returns
+    -------
+    list of (bool, ndarray, ndarray)
+        Whether the orbits of a stretch are stable, values (k,) of the parameter and states
+        (k, components), those at
+        the bifurcations at both ends among them.
+    """
+    orbits = [(float(value), orbit, False) for value, orbit in zip(branch.values, branch.orbits, strict=True)]
+    turns = [(float(turn.value), turn.orbit, True) for turn in branch.bifurcations]
+    found: list[tuple[bool, list[tuple[float, np.ndarray]]]] = []
+    ends: list[tuple[float, np.ndarray]] = []
+    for value, orbit, turned in sorted(orbits + turns, key=lambda each: each[0]):
+        point = (value, orbit.state)
+        if turned:
+            if found and not ends:
+                found[-1][1].append(point)
+            ends = [point]
+        elif not found or ends or found[-1][0] != orbit.stable:
+            found.append((orbit.stable, [*ends, point]))
+            ends = []
+        else:
+            found[-1][1].append(point)
+    return [(s, np.array([v for v, _ in line]), np.array([state for _, state in line])) for s, line in found]
 
 
 @_draw.register

@@ -19,7 +19,6 @@ import numpy as np
 import xarray as xr
 
 from synchain.models.dynamics.synchrony import expect_vanishing
-from synchain.models.graphs.families import topology
 from synchain.models.inputs.checks import check_integer
 from synchain.models.inputs.keywords import warn
 from synchain.models.scenes.scene import Scene, a_scene
@@ -35,7 +34,7 @@ from .attractor import Attractor, Motion, find_attractor
 from .averages import Averaging, Batches
 from .motion import starts_near
 from .network import unused_axes
-from .orbits import Orbits
+from .orbits import Orbits, pair_of
 from .slowness import warn_of_slow_motion
 
 __all__ = [
@@ -482,7 +481,7 @@ def with_partner(scene: Scene) -> Scene:
     if a_scene(scene).model.linked:
         return scene.replace(**ONE_CELL)
     try:
-        coupled = scene.replace(topology=topology("chain", 2), **ONE_CELL)
+        coupled = pair_of(scene, **ONE_CELL)
     except ValueError:
         return scene.replace(**ONE_CELL)
     expect_vanishing("a lone oscillator gets a partner", coupled.equations)

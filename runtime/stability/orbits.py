@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -18,6 +19,7 @@ from synchain.models.dynamics.mode_inertia import inertia_of_modes
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.dynamics.variational import Variation, mode
 from synchain.models.graphs.families import topology
+from synchain.models.mechanics.friction import SLIP
 from synchain.models.scenes.scene import Scene
 
 from ..cells.choice import chosen_for_modes
@@ -27,7 +29,7 @@ from .interpolation import Interpolation, exact_interpolation, lines_of, strengt
 from .motion import Rates, Turns, above, extent_of, rates_of, turns_of
 from .variational_integrator import NO_TRACKS, Travellers, VariationalIntegrator
 
-__all__ = ["Orbits", "unit_of_time"]
+__all__ = ["Orbits", "pair_of", "unit_of_time"]
 
 NODES, PARTS = (13, 21, 29, 37, 61), (1, 2, 4, 8, 16)
 """Nodes of a panel of strengths, and panels on each side, that are tried; with three for comparison they fill registers."""
@@ -430,6 +432,12 @@ class Orbits:
         return usual, error_of_steps(usual, looser, length)
 
 
+def pair_of(scene: Scene, **changes: Any) -> Scene:
+    """Return two copies of a lone oscillator that start where it does."""
+    start = {name: values[0] for name, values in scene.initial.items() if name != SLIP.name}
+    return scene.replace(topology=topology("chain", 2), initial=start, **changes)
+
+
 def driven_states(orbits: Orbits) -> tuple[np.ndarray, np.ndarray]:
     """States of a driven orbit at the beginning of its next STROBES periods, and LOOKS ones within each of the later half."""
     integrator, found = orbits.integrator_of(orbits.strengths[:1]), []
@@ -440,21 +448,21 @@ def driven_states(orbits: Orbits) -> tuple[np.ndarray, np.ndarray]:
     return strobes, within(replace(orbits, state=strobes[STROBES // 2 :]))
 
 
-def within(orbits: Orbits) -> np.ndarray:
-    """States (starts LOOKS, components) of driven orbits within their next period; stretches of time begin with that of the drive."""
-    starts = len(orbits.state)
-    integrator = orbits.part([*range(starts)] * LOOKS).integrator_of(orbits.strengths[:1])
-    integrator.advance(orbits.unit * np.repeat(np.arange(1, LOOKS + 1), starts) / LOOKS)
+def within(orbits: Orbits, periods: int = 1) -> np.ndarray:
+    """States (starts looks, components) of driven orbits within their next periods, LOOKS in each of the first few."""
+    starts, looks = len(orbits.state), LOOKS * min(periods, LOOKS)
+    integrator = orbits.part([*range(starts)] * looks).integrator_of(orbits.strengths[:1])
+    integrator.advance(orbits.unit * np.repeat(np.arange(1, looks + 1), starts) / LOOKS)
     return integrator.state
 
 
 def _joined(scene: Scene, strengths: np.ndarray) -> Scene:
     """A lone oscillator and a partner, joined by any link: its strength is 0; ValueError if it is not."""
-    pair, first = topology("chain", 2), next(iter(scene.initial))
+    first = next(iter(scene.initial))
     if not np.any(strengths):
-        return scene.replace(coupling=f"{first}->{first}", topology=pair)
+        return pair_of(scene, coupling=f"{first}->{first}")
     try:
-        scene.replace(topology=pair)
+        pair_of(scene)
     except ValueError as error:
         raise ValueError(f"transversal modes need a link to a partner: {error}; strength 0 needs none") from None
     raise ValueError(f"transversal modes: found no links in {scene!r}; expected a coupling and a topology")

@@ -18,6 +18,7 @@ from ..results.certificate import Certificate
 from ..results.labels import provenance
 from ..support.execution import Execution
 from .job import JobSpec, SweepJob, SweepSpec
+from .start import expect_whole_periods
 
 __all__ = ["PreparedRun", "prepare"]
 
@@ -85,6 +86,7 @@ def prepare(
     room : int, optional
         Section points of a cell to make room for at first.
     """
+    expect_whole_periods(reduction.planner)
     source = write_kernel(reduction, width)
     warn_of_chords(source)
     began = time.perf_counter()

@@ -9,21 +9,26 @@ from typing import TypeAlias
 import numpy as np
 import xarray as xr
 
+from synchain.codegen.driver.columns import Span
 from synchain.models.inputs.checks import typed_repr
 from synchain.models.mechanics.friction import SLIP
 from synchain.models.scenes.scene import Scene
 
+from ..cells.plan import Planner
 from ..results.labels import DRIVE_PHASE, END_TIME, STATE, States
 from ..results.result import Result
 from ..support.arrays import row
 
-__all__ = ["Start", "started"]
+__all__ = ["Start", "expect_whole_periods", "started"]
 
 Start: TypeAlias = Result | xr.DataArray | Mapping[str, object] | Sequence[float] | np.ndarray
 """What a run may start from."""
 
 WHOLE = 1e-9
 """Largest distance of a time from a whole number of drive periods, in periods."""
+
+CELLS = 65536
+"""Cells of a continued sweep that are looked at together."""
 
 
 def started(scene: Scene, start: Start) -> tuple[Scene, float]:
@@ -67,6 +72,31 @@ def started(scene: Scene, start: Start) -> tuple[Scene, float]:
     if not all(math.isfinite(x) for values in initial.values() for x in values):
         raise ValueError("start: found a state that is not finite; expected those of a cell that finished")
     return scene.replace(initial=initial), time
+
+
+def expect_whole_periods(planner: Planner) -> None:
+    """Refuse a continued sweep in which the drive is amid a period at the end of a cell, as each cell begins with one.
+
+    Raises
+    ------
+    ValueError
+        With the part of the period.
+    """
+    scene = planner.scene
+    if not (scene.continued and scene.forced) or scene.time_unit == "period":
+        return
+    for first in range(0, scene.cells, CELLS):
+        spans = planner.spans(np.arange(first, min(first + CELLS, scene.cells)))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            periods = np.where(spans[:, Span.PERIOD] > 0.0, spans[:, Span.END] / spans[:, Span.PERIOD], np.nan)
+        amid = np.abs(periods - np.rint(periods)) < WHOLE
+        if not amid.all():
+            part = periods[amid.argmin()] % 1.0
+            where = "has no period" if math.isnan(part) else f"is {part:.6f} into a period"
+            raise ValueError(
+                f"continuation: the drive {where} at the end of a cell; expected the beginning of one, where the next cell "
+                "begins; let transient + window be whole drive periods, or set time_unit = 'period'"
+            )
 
 
 def _in_order(scene: Scene, start: Sequence[float] | np.ndarray) -> xr.DataArray:

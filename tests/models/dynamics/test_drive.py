@@ -13,6 +13,7 @@ from synchain.codegen.driver.columns import Span
 from synchain.models.definitions.inline import Field
 from synchain.models.graphs.families import topology
 from synchain.models.inputs.plugins import allow_code
+from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.bifurcation.branches import follow
 from synchain.runtime.bifurcation.periodic import periodic_orbit
@@ -67,7 +68,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "own": (1.2, "sp.cos(Omega * t)"),
         "half": (0.6, "sp.cos(2 * Omega * t)"),
         "comb": (0.6, "sp.cos(2 * Omega * t) + sp.cos(3 * Omega * t)"),
-        "two": (1.2, "sp.cos(Omega * t) + sp.cos(omega * t)"),
+        "two": (np.sqrt(2), "sp.cos(Omega * t) + sp.cos(omega * t)"),
         "fading": (1.2, "sp.cos(Omega * t) * sp.exp(-t)"),
     }
     for name, (value, wave) in waves.items():
@@ -110,6 +111,55 @@ def test_a_scene_takes_its_period_from_the_equations(files: Path) -> None:
         assert longest_step(found) == PERIOD / 2
     assert own.replace(Omega=2.4).period == PERIOD / 2
     assert Scene(parameters={"omega": 1.4}).period == 2 * np.pi / 1.4
+
+
+@pytest.mark.parametrize(
+    ("drive", "times"),
+    [
+        ("cos(w*t)**2", 2), ("abs(sin(w*t))", 2), ("sin(w*t)*cos(w*t)", 2), ("cos(0.3*cos(w*t))", 2), ("cos(w*t)", 1),
+        ("cos(w*t)**3", 1), ("cos(w*t)**3 - 3/4*cos(w*t)", 3), ("cos(w*t - x)**2", 2), ("cos(w*t) + cos(w*t)**2", 1),
+        ("max(cos(w*t), cos(w*t + 2*pi/3), cos(w*t + 4*pi/3))", 3), ("x*cos(w*t)**2 + sin(w*t)*cos(w*t)", 2),
+        ("sign(sin(w*t))", 1), ("sin(w*t)*sign(sin(w*t))", 2), ("(sin(w*t) if sin(w*t) > 0 else -sin(w*t))", 2),
+        ("(1 if sin(w*t) > 0.99999 else 0)", 1), ("1/(2 + cos(w*t)**2)", 2), ("abs(cos(2*w*t)) + abs(sin(2*w*t))", 8),
+        ("sqrt(1 - cos(2*w*t)**2)", 4), ("cos(w*t)**10", 2), ("(cos(w*t) + sin(w*t))**2", 2), ("max(0, sin(w*t))", 1),
+        ("abs(cos(w*t)**5 - 5/4*cos(w*t)**3 + 5/16*cos(w*t))", 10), ("cos(x + v*cos(w*t))", 1),
+    ],
+)  # fmt: skip
+def test_the_period_is_the_least_one_whatever_the_form_of_the_drive(drive: str, times: int) -> None:
+    """The right-hand side repeats itself in this share of 2 pi/w, and in no smaller one."""
+    driven = Scene(Field({"x": "v", "v": f"-x + {drive}"}, parameters={"w": 1.7}), None, ALONE)
+    assert driven.angular_frequency == pytest.approx(times * 1.7, rel=1e-15)
+    assert driven.drive.waves[0] in {k * sp.Symbol("w", real=True) for k in (1, 2)}  # steps do not become shorter
+    symbols = [*(sp.Symbol(name, real=True) for name in driven.equations.state), sp.Symbol("w", real=True), TIME]
+    of = np.vectorize(sp.lambdify(symbols, driven.equations.rhs()[1], "math"))
+    t = np.linspace(0.0013, 3.0, 1001)
+    np.testing.assert_allclose(of(0.3, 0.7, 1.7, t + driven.period), of(0.3, 0.7, 1.7, t), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("drive", "numbers", "frequency"),
+    [
+        ("cos(w*t) + cos(v*t)", {"w": 1.1, "v": 3.3}, 1.1), ("cos(t) + sin(n*t)", {"n": 15}, 1.0),
+        ("cos(w*t)*cos(v*t)", {"w": 1.1, "v": 3.3}, 2.2), ("cos(w*t) + cos(v*t)", {"w": 1.0, "v": 1.2}, 0.2),
+        ("cos(w*t) + cos(v*t)", {"w": 1.0, "v": 2**0.5}, None), ("cos(w*t) + cos(v*t)", {"w": 1.0, "v": 1 + 1e-9}, None),
+    ],
+)  # fmt: skip
+def test_numbers_whose_ratio_is_rational_have_a_common_period(
+    drive: str, numbers: dict[str, float], frequency: float | None
+) -> None:
+    """In that scene alone: times are counted in periods if they are asked for."""
+    driven = Scene(Field({"x": f"-x + {drive}"}, parameters=numbers), None, ALONE, transient=2.0, window=3.0)
+    assert driven.time_unit == "time"
+    assert driven.angular_frequency == (None if frequency is None else pytest.approx(frequency, rel=1e-14))
+    if frequency is None:
+        with pytest.raises(ValueError, match="which have no common period"):
+            driven.replace(time_unit="period")
+        return
+    counted = driven.replace(time_unit="period")
+    np.testing.assert_allclose(plan(counted).spans[0, :3] * frequency / (2 * np.pi), [2.0, 5.0, 1.0])
+    name = next(iter(numbers))
+    with pytest.raises(ValueError, match=r"found a cell in which common\(.*\) is 0, or undefined"):
+        plan(counted.replace(axes={name: [numbers[name], np.sqrt(5)]}))
 
 
 def test_times_count_the_periods_of_each_cell(files: Path) -> None:
@@ -241,7 +291,7 @@ def test_any_drive_runs_over_plain_times(files: Path) -> None:
     end = run(found, show_progress=False).states("end")
 
     def rates(t: float, y: np.ndarray) -> list[float]:
-        return [y[1], y[0] - y[0] ** 3 - 0.15 * y[1] + 0.3 * (np.cos(1.2 * t) + np.cos(t))]
+        return [y[1], y[0] - y[0] ** 3 - 0.15 * y[1] + 0.3 * (np.cos(np.sqrt(2) * t) + np.cos(t))]
 
     expected = solve_ivp(rates, (0.0, 20.0), [0.3, 0.0], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
     np.testing.assert_allclose(end, expected, atol=1e-6)

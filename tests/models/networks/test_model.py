@@ -100,4 +100,4 @@ def test_what_was_given_stays_and_what_was_not_follows() -> None:
     assert Scene(record=()).replace(topology=chain(2)).record == ()
     assert scene.replace(friction="coulomb").parameters["omega"] == 1.15
     assert scene.replace(oscillator="lorenz", parameters=None).time_unit == "time"
-    assert Scene(topology=chain(2), initial={"x": [1, 2]}).replace(topology=chain(3)).y0 == Scene(topology=chain(3)).y0
+    assert Scene(topology=chain(2), initial={"x": 1}).replace(topology=chain(3)).initial["x"] == (1.0, 1.0, 1.0)

@@ -422,10 +422,23 @@ def test_another_contact_keeps_the_start_and_finds_the_modes_anew() -> None:
     assert smooth.replace(contact="set-valued").initial == exact.initial
 
 
-def test_replace_topology_starts_anew() -> None:
+def test_another_network_keeps_the_start_that_was_given() -> None:
+    """A number and a range fit every number of nodes; a list that no longer fits is refused."""
+    many = two(initial={"x": 5, "v": {"low": -1, "high": 1}}).replace(topology=star(5))
+    assert many == Scene(topology=star(5), initial={"x": 5, "v": {"low": -1, "high": 1}})
+    assert many.replace(seed=3) == Scene(topology=star(5), initial={"x": 5, "v": {"low": -1, "high": 1}}, seed=3)
+    assert two().replace(topology=star(5)) == Scene(topology=star(5))
     scene = two(initial={"x": [1, 2]})
-    assert scene.replace(topology=star(5)).initial == Scene(topology=star(5)).initial
+    with pytest.raises(
+        ValueError, match="initial x: found 2 values for 5 oscillators; expected 5 values or one number"
+    ):
+        scene.replace(topology=star(5))
     assert scene.replace(topology=chain(3), initial={"x": 0.1}).initial["x"] == (0.1,) * 3
+    assert scene.replace(nodes=[{"at": [2], "oscillator": "duffing"}], friction="default").initial["x"] == (1.0, 2.0)
+    smooth = Scene("harmonic", None, None, initial={"x": 2}).replace(oscillator="duffing")
+    assert smooth.initial == {"x": (2.0,), "v": (0.0,)}
+    with pytest.raises(ValueError, match="initial: unknown key 'x'; known: phi"):
+        smooth.replace(oscillator="double_pendulum")
     assert scene.replace(topology=from_matrix([[-2, 2], [2, -2]])).initial["x"] == (1.0, 2.0)
 
 

@@ -147,3 +147,16 @@ def test_a_skeleton_says_which_branches_are_lost() -> None:
         found = skeleton(scene, "j", [-1.0, -0.5, 0.5, 1.0], (1,), 2)
     assert [len(branch.lost) for branch in found] == [1, 1]
     assert "lost at" in repr(found)
+
+
+def test_doublings_of_a_parametric_oscillator_are_found_in_any_form_of_its_drive() -> None:
+    """cos(wt)^2 has half the period of cos(wt): over two periods both doublings pass at 1."""
+    drive = "cos(w*t)**2"
+    node = Field(
+        {"x": "v", "v": f"-d*v - (1 + a*{drive})*x - x**3 + f0*{drive}"},
+        parameters={"w": 1.1, "d": 0.1, "a": 1, "f0": 0.05},
+    )
+    one = Scene(node, None, None, initial={"x": 0, "v": 0}, transient=100)
+    branch = follow(one, "w", [1.1, 1.12, 1.15, 1.23, 1.3, 1.33], periodic_orbit(one))
+    assert [turn.kind for turn in branch.bifurcations] == ["period doubling"] * 2
+    np.testing.assert_allclose([turn.value for turn in branch.bifurcations], [1.133433, 1.310721], atol=1e-6)
