@@ -21,6 +21,7 @@ from synchain.codegen.driver.columns import Control
 from synchain.codegen.integrators import Integrator
 from synchain.codegen.kernels.compile import Kernel, load
 from synchain.codegen.kernels.installation import InstallationError
+from synchain.codegen.kernels.observed import UNWATCHED, Watched
 from synchain.codegen.kernels.processor import processor, told_apart
 from synchain.codegen.kernels.sweep import KernelSource, emit
 from synchain.models.dynamics.equations import Equations
@@ -228,6 +229,8 @@ class RowsSpec:
         How many oscillators each node stands for in the synchronisation error.
     records : tuple of str
         ("sync_error",), or none if all oscillators are stepped as one.
+    watched : Watched
+        Holds the stop of a scene, if it has one.
     """
 
     equations: Equations
@@ -235,10 +238,11 @@ class RowsSpec:
     control: np.ndarray
     multiplicity: tuple[int, ...] | None = None
     records: tuple[str, ...] = ("sync_error",)
+    watched: Watched = UNWATCHED
 
     def source(self, width: int | None = None) -> KernelSource:
         """Return the text of the kernel."""
-        return emit(self.equations, self.integrator, self.records, None, width, self.multiplicity)
+        return emit(self.equations, self.integrator, self.records, None, width, self.multiplicity, watched=self.watched)
 
     def job(self, spec: JobSpec, kernel: Kernel) -> RowsJob:
         """Return the job that runs the kernel."""

@@ -178,7 +178,7 @@ def test_starts_run_on_any_executor_and_tell_how_far_they_are(found):
     assert np.array_equal(here.error, there.error)
     assert len(np.unique(here.error)) > 5
     assert np.array_equal(here.status, there.status)
-    assert (seen[0].done, seen[-1].done, seen[-1].total) == (0, 40, 40)
+    assert {(at.done, at.total) for at in seen} >= {(0, 40), (40, 40)}  # the motion and second looks have bars of their own
 
 
 @pytest.mark.parametrize("found", [starts, plane])
