@@ -174,5 +174,5 @@ def _interval(ends: Interval, grid: Sequence[float], errors: Interval = (0.0, 0.
     words = []
     for end, error, lasts in zip(ends, errors, (grid[::2] if ends[0] else (), grid[1::2]), strict=True):
         onwards = any(math.isclose(end, last, rel_tol=1e-12) for last in lasts)
-        words.append(f"{end:z.4f}{f' ± {error:.1g}' if error else ''}{'...' if onwards else ''}")
+        words.append(f"{end:z.4f}{'...' if onwards else f' ± {error:.1g}' if error else ''}")
     return f"[{', '.join(words)}]"

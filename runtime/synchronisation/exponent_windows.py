@@ -27,7 +27,7 @@ class ExponentWindows:
     intervals : tuple of (float, float)
         Lower and upper end of each window, in ascending order.
     errors : tuple of (float, float)
-        Errors of the ends: 0 at sigma = 0 and at an end of the grid, inf if the average is
+        Errors of the ends: 0 at sigma = 0, inf at an end of the grid, beyond which nothing is known, and if the average is
         too short for an estimate.
     absent : str
         Why exponents say nothing about the network; empty if they do.
