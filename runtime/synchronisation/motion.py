@@ -117,9 +117,12 @@ def measure_motion(
 
     columns, unit = columns_of(equations), float(row.spans[0, Span.START])
     period = float(row.spans[0, Span.PERIOD])
-    fastest = max(rates(equations, row.start[0], row.numbers[0])[:2])
-    inverse = 1.0 / fastest if 0.0 < fastest < math.inf else 1.0
-    radian = period / (2.0 * math.pi) if period else _radian(sample, columns, inverse)
+
+    def inverse(state: np.ndarray) -> float:
+        fastest = max(rates(equations, state, row.numbers[0])[:2])
+        return 1.0 / fastest if 0.0 < fastest < math.inf else math.inf
+
+    radian = period / (2.0 * math.pi) if period else _radian(sample, columns, row.start[0], inverse)
     transient, window = (
         radian * radians if time is None else time * unit for time, radians in zip(times, (1000.0, 100.0), strict=True)
     )
@@ -132,23 +135,34 @@ def measure_motion(
     return Motion(np.where(extent > 0.0, extent, apart), radian, max(float(paces.max()), 1.0 / radian), unit)
 
 
-def _radian(sample: Callable[[np.ndarray], Outcome], columns: np.ndarray, inverse: float) -> float:
-    """The time in which an undriven motion turns by a radian; if it does not, the inverse of its fastest rate."""
-    length = inverse
+def _radian(
+    sample: Callable[[np.ndarray], Outcome],
+    columns: np.ndarray,
+    start: np.ndarray,
+    inverse: Callable[[np.ndarray], float],
+) -> float:
+    """The time in which an undriven motion turns by a radian; if it does not, the inverse of its fastest rate.
+
+    1 if there is no rate.
+    """
+    least = inverse(start)
+    length = least if math.isfinite(least) else 1.0
     for _ in range(ROUNDS):
-        states = sample(length * np.arange(1, SAMPLES + 1) / SAMPLES).end[:, columns[:, 0]]
+        found = sample(length * np.arange(1, SAMPLES + 1) / SAMPLES)
+        states = found.end[:, columns[:, 0]]
         if not np.isfinite(states).all():
             break
         moved = _without_drift(np.arange(SAMPLES), states, 0)
         whole, last = np.ptp(moved, axis=0), np.ptp(moved[SAMPLES // 2 :], axis=0)
         moves = last > REST * np.ptp(states, axis=0)
         if not moves.any():
+            least = min(least, inverse(found.end[-1]))
             break
         turns = (np.abs(np.diff(moved, axis=0)).sum(axis=0)[moves] / (2.0 * whole[moves])).max()
         if turns >= TURNS:
             return float(length / (2.0 * math.pi * turns))
         length *= LONGER
-    return inverse
+    return least if math.isfinite(least) else 1.0
 
 
 def _without_drift(time: np.ndarray, states: np.ndarray, first: int) -> np.ndarray:

@@ -22,8 +22,8 @@ VDP = Field(
     {"x": "pace*s/r*v", "v": "pace*((1 - ((x - c)/s)**2)*v - r/s*(x - c))"},
     parameters={"s": 1.0, "r": 1.0, "c": 0.0, "pace": 1.0},
 )
-I, J, W = ends(VDP)
-DAMPER = Rates({I.v: "k*W*(v_j - v_i)"}, {"k": 0.2})
+HERE = ends(VDP)[0]
+DAMPER = Rates({HERE.v: "k*W*(v_j - v_i)"}, {"k": 0.2})
 UNITS = [(1e-9, 1e-9, 0.0, 1.0), (1e9, 1e-9, 0.0, 1e6), (1e-5, 1e9, 0.0, 1e-5), (1e-3, 1e-3, 7.0, 1.0)]
 """Of position, velocity, offset of the position, and pace."""
 
