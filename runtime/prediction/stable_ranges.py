@@ -84,8 +84,8 @@ def exact_ranges(
             uncertainties = (float(below) if low > 0 else 0.0, float(above) if end is not None else 0.0)
             begin = max(_exact(low), Fraction(0))
             if touches and exact:  # closed ranges that touch are one
-                before = exact.pop()
-                begin, uncertainties = before.low, (before.errors[0], uncertainties[1])
+                joined = exact.pop()
+                begin, uncertainties = joined.low, (joined.errors[0], uncertainties[1])
             exact.append(StableRange(begin, end, uncertainties))
     return exact
 

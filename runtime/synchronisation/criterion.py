@@ -168,7 +168,7 @@ def checked(criterion: Criterion | None) -> Criterion:
 
 def preset(criterion: Criterion, scene: Scene) -> Criterion:
     """Return the criterion with what the scene says about times, rtol and seed."""
-    said = {"rtol": scene.rtol, "seed": scene.seed}
+    said: dict[str, Any] = {"rtol": scene.rtol, "seed": scene.seed}
     for name, periods in TIMES.items():
         own = getattr(scene, name)
         if own != inspect.signature(Scene).parameters[name].default:

@@ -111,7 +111,7 @@ def measure_motion(
     def sample(ends: np.ndarray) -> Outcome:
         spans = np.tile(row.spans, (len(ends), 1))
         spans[:, Span.START], spans[:, Span.END] = 0.0, ends
-        cells = Plan(*(np.repeat(part, len(ends), axis=0) for part in (row.start, row.numbers)), spans)
+        cells = replace(row.take(np.zeros(len(ends), dtype=int)), spans=spans)
         lay_out: Rows = lambda which: rows(cells.take(which))  # noqa: E731
         return trials.run(len(ends), lay_out)
 
