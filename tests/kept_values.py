@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from synchain.models.definitions.inline import Field
@@ -21,7 +23,7 @@ from synchain.runtime.stability.exponents import Exponents
 from synchain.runtime.stability.lyapunov import Lyapunov
 from synchain.runtime.stability.msf import MSF, Plane
 from synchain.runtime.synchronisation.basin import Basin
-from synchain.runtime.synchronisation.criterion import Criterion
+from synchain.runtime.synchronisation.criterion import PAPER
 from synchain.runtime.synchronisation.exponent_windows import ExponentWindows
 from synchain.runtime.synchronisation.probe import Probe
 from synchain.runtime.synchronisation.threshold import Sweep, Thresholds
@@ -60,6 +62,13 @@ def swept(x: np.ndarray, low: float, high: float) -> Sweep:
     return Sweep(x, np.where(good, 0.0, np.inf), good.astype(float), ((low, high),))
 
 
+def basin() -> Basin:
+    """Three starts: one synchronous, one not, one without an end."""
+    errors, codes = np.array([0.0, 0.5, np.inf]), np.array([1, 1, 2])
+    start, earlier = np.arange(12.0).reshape(3, 4), np.array([np.nan, 0.5, np.nan])
+    return Basin(PAIR, PAPER, 0.95, start, errors, codes, earlier, np.array([0, 2, 5]), -0.1, 0.01)
+
+
 def thresholds() -> Thresholds:
     """Ranges of a pair, with a warning."""
     sigma = np.linspace(0.0, 0.6, 7)
@@ -68,7 +77,7 @@ def thresholds() -> Thresholds:
         swept(2 * sigma, 0.0, 0.4),
         ((0.0, 0.2),),
         swept(sigma, 0.0, 0.2),
-        Criterion(starts=3),
+        replace(PAPER, starts=3),
         ExponentWindows(((0.0, 0.2),), ((0.0, 0.01),)),
         ("w",),
     )
@@ -100,9 +109,15 @@ def every_kind() -> dict[str, Labelled]:
         ),
         branch(),
         Skeleton((branch(), branch())),
-        Basin(PAIR, 1e-3, 0.95, np.arange(12.0).reshape(3, 4), np.array([0.0, 0.5, np.inf]), np.array([1, 1, 2])),
+        basin(),
         Probe(
-            PAIR, Criterion(starts=2), alpha, 0.1 * alpha, alpha, np.array([1.0, 1, 0.5, 0, 0]), np.ones((5, 2), int)
+            PAIR,
+            replace(PAPER, starts=2),
+            alpha,
+            0.1 * alpha,
+            alpha,
+            np.array([1.0, 1, 0.5, 0, 0]),
+            np.ones((5, 2), int),
         ),
         thresholds(),
     )

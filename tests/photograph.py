@@ -23,7 +23,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -79,7 +79,7 @@ from synchain.models.presentation.equations import text
 from synchain.runtime.cli import main  # isort: skip
 from synchain.runtime.results.energy import energy_function  # isort: skip
 from synchain.runtime.cells.reduce import as_reduction, explain  # isort: skip
-from synchain.runtime.synchronisation.threshold import Criterion  # isort: skip
+from synchain.runtime.synchronisation.criterion import PAPER  # isort: skip
 
 __all__ = ["SCENES", "Picture", "camera", "compare", "take"]
 
@@ -709,7 +709,7 @@ def _() -> Quantities:
 
 # -- synchronisation of networks ---------------------------------------------------------------------------------
 
-TINY = Criterion(transient=20, window=5, starts=2, tolerance=1e-2)
+TINY = replace(PAPER, transient=20, window=5, starts=2, tolerance=1e-2)
 
 
 @scene("thresholds of a friction pair", long=True)

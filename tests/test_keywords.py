@@ -53,7 +53,8 @@ TAKEN = {
 """What each function that computes takes of the shared keywords."""
 
 OTHER = {
-    ("basin", "transient"): 1000.0,  # of a cell, as in Criterion
+    ("basin", "transient"): None,  # of a cell, as in Criterion
+    ("basin", "seed"): None,  # that of the scene, as in Criterion
     ("periodic_orbit", "periods"): 1,  # of the orbit
     ("skeleton", "periods"): (1, 2),  # of the orbits
     ("skeleton", "transient"): 20,  # of the search
@@ -336,6 +337,29 @@ def test_seed_and_transient_of_a_skeleton_are_used(monkeypatch: pytest.MonkeyPat
     )
     runtime.skeleton(DRIVEN, "omega", [1.3], (1,), 1, transient=7, seed=3, show_progress=False)
     assert asked == [("seed", 3), ("transient", 7.0)]
+
+
+FIELDS: dict[str, Any] = {"rtol": 1e-5, "transient": 3.0, "window": 2.5, "seed": 3}
+OPEN = Criterion(starts=2, tolerance=1.0, reach=0.1)
+SIMULATIONS = {
+    "basin": lambda scene: runtime.basin(scene, samples=2, show_progress=False),
+    "thresholds": lambda scene: runtime.thresholds(
+        scene, sigma=[0.1, 0.2], criterion=OPEN, resolution=1.0, periods=2, show_progress=False
+    ),
+    "universal_probe": lambda scene: runtime.universal_probe(scene, 0.1, 0.0, criterion=OPEN, show_progress=False),
+    "agreement": lambda scene: agreement(scene, [0.1], criterion=OPEN, show_progress=False),
+}
+
+
+@pytest.mark.parametrize("name", SIMULATIONS)
+def test_simulations_obey_the_times_tolerance_and_seed_of_a_scene(name: str) -> None:
+    short = DRIVEN.replace(topology=chain(2), transient=5.0, window=2.0)
+    plain = SIMULATIONS[name](short).criterion
+    for field, value in FIELDS.items():
+        found = SIMULATIONS[name](short.replace(**{field: value})).criterion
+        assert getattr(found, field) == value != getattr(plain, field), field
+        for other in {"transient", "window"} - {field}:
+            assert getattr(found, other) == getattr(short, other)
 
 
 def test_an_executor_runs_the_cells_of_the_probe_and_parameters_reach_it() -> None:

@@ -17,7 +17,7 @@ from synchain.models.scenes.scene import Scene
 
 from ..prediction.intervals import Interval
 from ..stability.exponents import exponents
-from ..synchronisation.criterion import Criterion
+from ..synchronisation.criterion import PAPER
 from ..synchronisation.threshold import project, simulate
 
 __all__ = ["CASES", "CHANGES", "COLUMNS", "PROJECTED", "measure"]
@@ -52,7 +52,7 @@ def measure(quick: bool = False) -> list[tuple[object, ...]]:
         scene = _chain(n, omega)
         grid = np.linspace(low, high, 13 if quick else 33)
         for words, change in CHANGES[:3] if quick else CHANGES:
-            criterion = replace(Criterion(), **change)  # type: ignore[arg-type]
+            criterion = replace(PAPER, **change)  # type: ignore[arg-type]
             found = simulate(scene, grid, criterion).intervals
             rows.append((n, omega, words, *_widest(found), len(found)))
         rows.append(_by_exponent(n, omega, quick))

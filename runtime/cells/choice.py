@@ -31,6 +31,7 @@ __all__ = [
     "Ladder",
     "chosen_for_modes",
     "chosen_for_rows",
+    "first_steps",
     "method_names",
     "mode_stiffness",
     "warn_of_steps",
@@ -110,7 +111,7 @@ class Ladder:
         """Return which of the methods (cells,) each cell begins with."""
         if len(self.methods) == 1:
             return np.zeros(len(rows), int)
-        paces = self._at_start(rows)
+        paces = at_start(self.templates, rows)
         endless = ~np.isfinite(paces.size)
         slow = np.maximum(paces.turning, paces.growth)
         stiff = (paces.parted > STIFF * slow) & (paces.parted * rows.spans[:, Span.END] > WORTH) & ~endless
@@ -125,10 +126,9 @@ class Ladder:
     def steps(self, rows: Plan, first: np.ndarray) -> np.ndarray:
         """Return spans (cells, len(Span)) with the first step and the first look of cells that begin with some methods."""
         spans = rows.spans.copy()
-        implicit = np.array([method.implicit for method in self.methods])[first]
-        if implicit.any():
-            growth = self._at_start(rows.take(np.flatnonzero(implicit))).growth
-            spans[implicit, Span.FIRST_STEP] = [first_step(rate if math.isfinite(rate) else 0.0) for rate in growth]
+        implicit = np.flatnonzero(np.array([method.implicit for method in self.methods])[first])
+        if len(implicit):
+            spans[implicit, Span.FIRST_STEP] = first_steps(self.templates, rows.take(implicit))
         spans[:, Span.LOOK] = np.where(first < len(self.methods) - 1, FIRST_LOOK, math.inf)
         return spans
 
@@ -173,11 +173,6 @@ class Ladder:
         """Place of the explicit method of stages."""
         return next(k for k, m in enumerate(self.methods) if not m.series)
 
-    def _at_start(self, rows: Plan) -> Paces:
-        """How fast cells move where they start."""
-        shortest = np.minimum(rows.spans[:, Span.LONGEST], np.maximum(rows.spans[:, Span.END], 1e-300))
-        return self.templates.paces(rows.start, rows.numbers, np.zeros(len(rows)), shortest, None)
-
     def _enters_layers(self, rows: Plan, slow: np.ndarray) -> np.ndarray:
         """True for cells (cells,) of which a smoothed jump is stiff inside, although the start lies outside."""
         found = np.zeros(len(rows), dtype=bool)
@@ -186,6 +181,18 @@ class Ladder:
             within = LAYER * fastest * rows.spans[:, Span.END] > WORTH
             found |= within & (LAYER * fastest > STIFF * np.maximum(slow, LAYER * turning)) & np.isfinite(fastest)
         return found
+
+
+def at_start(templates: Templates, rows: Plan) -> Paces:
+    """Return how fast cells move where they start."""
+    shortest = np.minimum(rows.spans[:, Span.LONGEST], np.maximum(rows.spans[:, Span.END], 1e-300))
+    return templates.paces(rows.start, rows.numbers, np.zeros(len(rows)), shortest, None)
+
+
+def first_steps(templates: Templates, rows: Plan) -> np.ndarray:
+    """Return the first step (cells,) of each cell by a Rosenbrock method."""
+    growth = at_start(templates, rows).growth
+    return np.array([first_step(rate if math.isfinite(rate) else 0.0) for rate in growth])
 
 
 @lru_cache(maxsize=64)

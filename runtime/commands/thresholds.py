@@ -45,7 +45,10 @@ def configure(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--starts", metavar="K", type=positive, help="initial states for each value (default: 8)")
     parser.add_argument(
-        "--transient", metavar="P", type=above_zero, help="drive periods before the error is averaged (default: 1000)"
+        "--transient",
+        metavar="P",
+        type=above_zero,
+        help="drive periods, or units of time, before the error is averaged (default: that of SCENE, or 1000 periods)",
     )
     parser.add_argument(
         "--quick",
@@ -71,7 +74,8 @@ def execute(arguments: Namespace) -> int:
         criterion = _criterion(arguments)
         sigma = arguments.sigma or default_grid(scene.topology.spectrum, 0.005 if arguments.quick else 0.0025)
         scene.replace(axes={scene.strength: sigma})
-    warn((*scene.warnings, *hidden_modes(scene)))
+    said = (*scene.warnings, *hidden_modes(scene))
+    warn(said)
     result = thresholds(
         scene,
         sigma=sigma,
@@ -79,10 +83,11 @@ def execute(arguments: Namespace) -> int:
         criterion=criterion,
         workers=arguments.workers,
     )
+    warn(result.warnings[len(said) :])
     if arguments.json:
         print_json(result.as_dict())
     else:
-        print(report(result, criterion))
+        print(report(result))
     return FINE
 
 
@@ -109,18 +114,18 @@ def _scene(arguments: Namespace) -> Scene:
     return scene_on(network, scene, arguments)
 
 
-def report(result: Thresholds, criterion: Criterion) -> str:
+def report(result: Thresholds) -> str:
     """The ranges as a table."""
     scene = result.scene
     grid, alpha = ((float(x[0]), float(x[-1])) for x in (result.direct.x, result.probe.x))
     steepest = max(abs(value) for value in scene.topology.spectrum.values)
     reach = (*grid, *(end / steepest for end in alpha))
-    unit = "drive periods" if scene.time_unit == "period" else "units of time"
+    unit, criterion = "drive periods" if scene.time_unit == "period" else "units of time", result.criterion
     rows = [
+        (f"{scene.strength}, negative exponents", _with_errors(result, reach)),
         (f"{scene.strength}, simulated", _written(result.direct.intervals, grid)),
         (f"{scene.strength}, predicted by the probe", _written(result.predicted, reach)),
         *_wu_chua(result),
-        (f"{scene.strength}, negative exponents", _with_errors(result, reach)),
         (f"alpha = {scene.strength} |gamma|, probe", _written(result.probe.intervals, alpha)),
     ]
     wide = max(len(name) for name, _ in rows)
@@ -128,8 +133,8 @@ def report(result: Thresholds, criterion: Criterion) -> str:
         [
             f"{scene.topology.name}({scene.n}){drive_words(scene)}: where all oscillators synchronise",
             *(f"  {name:<{wide}}  {ranges}" for name, ranges in rows),
-            f"synchronous: mean error below {criterion.tolerance:g} over {criterion.window:g} {unit} after "
-            f"{criterion.transient:g}, from at least half of {criterion.starts} starts",
+            f"synchronous, simulated and probe: mean error below {criterion.tolerance:.3g} over {criterion.window:.6g} "
+            f"{unit} after {criterion.transient:.6g}, from at least half of {criterion.starts} starts",
             *(["...: the grid ends here, the range may go on"] if any("..." in ranges for _, ranges in rows) else []),
         ]
     )
@@ -169,5 +174,5 @@ def _interval(ends: Interval, grid: Sequence[float], errors: Interval = (0.0, 0.
     words = []
     for end, error, lasts in zip(ends, errors, (grid[::2] if ends[0] else (), grid[1::2]), strict=True):
         onwards = any(math.isclose(end, last, rel_tol=1e-12) for last in lasts)
-        words.append(f"{end:z.4f}{f' ± {error:.1g}' if error else ''}{'...' if onwards else ''}")
+        words.append(f"{end:z.4f}{'...' if onwards else f' ± {error:.1g}' if error else ''}")
     return f"[{', '.join(words)}]"

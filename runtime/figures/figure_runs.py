@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from threading import Event, Lock
 from typing import Any, TypeVar
 
@@ -20,8 +20,7 @@ from ..results.result import Result
 from ..support.execution import Execution
 from ..support.progress import Progress
 from ..sweeps.run import run
-from ..synchronisation.criterion import QUICK as FIRST_LOOK
-from ..synchronisation.criterion import Criterion
+from ..synchronisation.criterion import PAPER, AppliedCriterion
 from ..synchronisation.threshold import Sweep, probe, project, simulate
 
 __all__ = ["FULL", "QUICK", "FigureRuns", "Quality", "thin"]
@@ -39,7 +38,7 @@ class Quality:
         Most values of a scene's axis if every value is run once; None for all.
     grid : int, optional
         Number of values on which synchronous ranges are searched; None for all.
-    criterion : Criterion
+    criterion : AppliedCriterion
         Criterion of synchronisation.
     resolution : float
         Width in sigma to which the ends of synchronous ranges are refined.
@@ -49,7 +48,7 @@ class Quality:
 
     points: int | None = None
     grid: int | None = None
-    criterion: Criterion = field(default_factory=Criterion)
+    criterion: AppliedCriterion = PAPER
     resolution: float = 5e-4
     networks: tuple[int, ...] = (5, 6)
 
@@ -63,7 +62,7 @@ class Quality:
 
 
 FULL = Quality()
-QUICK = Quality(241, 121, FIRST_LOOK, 2e-3, (5,))
+QUICK = Quality(241, 121, replace(PAPER, starts=5, transient=400.0, window=50.0, rtol=1e-6), 2e-3, (5,))
 
 
 class FigureRuns:

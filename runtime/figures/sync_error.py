@@ -12,7 +12,7 @@ from synchain.models.scenes.file import load_scene
 from ..prediction.intervals import Interval, grid_intervals
 from ..results.result import Result
 from ..support.status import Status
-from ..synchronisation.criterion import Criterion
+from ..synchronisation.criterion import PAPER
 from .figure_runs import FigureRuns
 from .published import published
 from .style import BLUE, COLUMN, ORANGE, bands, bracket, failures, note
@@ -39,7 +39,7 @@ def compute(name: str, runs: FigureRuns) -> Errors:
     return Errors(runs.run(scene.replace(record=("sync_error", "section"))), row.intervals if row else ())
 
 
-def synchronous(result: Result, tolerance: float = Criterion().tolerance) -> list[Interval]:
+def synchronous(result: Result, tolerance: float = PAPER.tolerance) -> list[Interval]:
     """Find the ranges of the first axis with an average error below a tolerance.
 
     Parameters

@@ -13,6 +13,7 @@ from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 
 from ..prediction.intervals import Interval, intersect
+from ..synchronisation.criterion import Criterion
 from ..synchronisation.exponent_windows import ExponentWindows
 from . import projection
 from .exponent import curve, finite
@@ -177,8 +178,8 @@ def table(data: Comparison) -> Table:
     columns += ["exponents_low_error", "exponents_high_error"]
     columns += [f"{kind}_minus_published_{end}" for kind in FOUND for end in ("low", "high")]
     columns += [*(f"all_{kind}" for kind in FOUND), "status", "remark", "resolution"]
-    columns += [field.name for field in fields(data.quality.criterion)]
-    criterion = [getattr(data.quality.criterion, field.name) for field in fields(data.quality.criterion)]
+    columns += [field.name for field in fields(Criterion)]
+    criterion = [getattr(data.quality.criterion, field.name) for field in fields(Criterion)]
     rows = []
     for row in data.rows:
         *found, printed = _ends(row)

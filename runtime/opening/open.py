@@ -41,7 +41,7 @@ def _classes() -> dict[str, type]:
     from ..stability.lyapunov import Lyapunov
     from ..stability.msf import MSF, Plane
     from ..synchronisation.basin import Basin
-    from ..synchronisation.criterion import Criterion
+    from ..synchronisation.criterion import AppliedCriterion, Criterion
     from ..synchronisation.exponent_windows import ExponentWindows
     from ..synchronisation.probe import Probe
     from ..synchronisation.threshold import Sweep, Thresholds
@@ -49,7 +49,7 @@ def _classes() -> dict[str, type]:
     exponents = (ClusterExponents, Exponents, Lyapunov, MSF, Plane)
     kept = (Basin, Branch, Equilibrium, PeriodicOrbit, Probe, Skeleton, Thresholds, *exponents)
     motions = (Attractor, Bifurcation, BifurcationKind, Block, Clusters, Motion, Phases)
-    parts = (*motions, Criterion, ExponentWindows, Sweep)
+    parts = (*motions, AppliedCriterion, Criterion, ExponentWindows, Sweep)
     return {kind.__name__: kind for kind in (*kept, *parts)}
 
 

@@ -49,7 +49,7 @@ def exact_ranges(
     Parameters
     ----------
     ranges : sequence of (float, float)
-        Disjoint and ascending ranges; the last may end at infinity.
+        Ascending ranges, the last may end at infinity; those that touch are joined.
     errors : sequence of (float, float), optional
         Uncertainties of the ends.
 
@@ -66,22 +66,27 @@ def exact_ranges(
     """
     if errors is not None and len(errors) != len(ranges):
         raise ValueError(f"errors: found {len(errors)} pairs for {len(ranges)} ranges; expected one for each range")
-    exact, last = [], -math.inf
+    exact: list[StableRange] = []
+    last = -math.inf
     for i, (low, high) in enumerate(ranges):
-        if not (-math.inf < low <= high and low > last):
+        if not (-math.inf < low <= high and low >= last):
             before = f" after {last}" if i else ""
             raise ValueError(
                 f"stable range {i + 1} is ({low}, {high}){before}; expected disjoint ranges (low, high), low <= high, "
-                "ascending: sort them and join those that touch"
+                "ascending: sort them"
             )
-        last = high
+        touches, last = low == last, high
         below, above = errors[i] if errors is not None else (0.0, 0.0)
         if not (0 <= below < math.inf and 0 <= above < math.inf):
             raise ValueError(f"errors of range {i + 1}: found ({below}, {above}); expected two finite numbers >= 0")
         if high >= 0:
             end = None if high == math.inf else _exact(high)
             uncertainties = (float(below) if low > 0 else 0.0, float(above) if end is not None else 0.0)
-            exact.append(StableRange(max(_exact(low), Fraction(0)), end, uncertainties))
+            begin = max(_exact(low), Fraction(0))
+            if touches and exact:  # closed ranges that touch are one
+                joined = exact.pop()
+                begin, uncertainties = joined.low, (joined.errors[0], uncertainties[1])
+            exact.append(StableRange(begin, end, uncertainties))
     return exact
 
 

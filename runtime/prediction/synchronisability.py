@@ -73,7 +73,7 @@ class Window:
     low, high : float
         Ends of the interval.
     low_error, high_error : float
-        Uncertainties of the ends, in sigma.
+        Uncertainties of the ends, in sigma: infinite at the end of a grid, beyond which nothing is known, 0 at sigma = 0.
     low_mode, high_mode : NetworkMode or None
         First mode that is lost beyond the end; None if the end is 0, infinite, or the end of a
         grid.
@@ -263,13 +263,18 @@ def windows_complex(
             Window(
                 low,
                 high,
-                low_error=reach if inner_low else 0.0,
-                high_error=reach if inner_high else 0.0,
+                low_error=reach if inner_low else _beyond(low),
+                high_error=reach if inner_high else _beyond(high),
                 low_mode=lost(low - reach) if inner_low else None,
                 high_mode=lost(high + reach) if inner_high else None,
             )
         )
     return OneWay(tuple(windows), tuple(mode for mode in transversal_modes(graph) if mode.defective))
+
+
+def _beyond(end: float) -> float:
+    """Error of an end of a grid, beyond which nothing is known; none at 0, where couplings begin."""
+    return 0.0 if end == 0.0 else math.inf
 
 
 def verdict(

@@ -28,7 +28,7 @@ from ..stability.lyapunov import Lyapunov
 from ..stability.msf import MSF, Plane
 from ..sweeps.run import run
 from ..sweeps.stream import Streamed
-from ..synchronisation.basin import Basin
+from ..synchronisation.basin import Basin, Fate
 from ..synchronisation.probe import Probe
 from ..synchronisation.threshold import Thresholds
 from .canvas import canvas
@@ -123,8 +123,11 @@ def _(value: Basin, axes: Axes) -> Axes:
     """First two components of the first node at the start, by what became of it."""
     initial, names = value.data.initial.values[:, :2, 0], [str(name) for name in value.data.component.values[:2]]
     across, up = (initial[:, 0], initial[:, -1])
-    for chosen, colour, words in ((value.synchronous, BLUE, "synchronous"), (~value.synchronous, ORANGE, "not")):
-        axes.plot(across[chosen], up[chosen], **DOTS, markersize=2.5, color=colour, label=words)
+    colours = (BLUE, GREEN, ORANGE, PURPLE, BLACK, GREY)
+    for k, (fate, colour) in enumerate(zip(Fate, colours, strict=True)):
+        chosen = value.fate == k
+        if chosen.any():
+            axes.plot(across[chosen], up[chosen], **DOTS, markersize=2.5, color=colour, label=fate)
     axes.set(xlabel=symbol(f"{names[0]}_1"), ylabel=symbol(f"{names[-1]}_1"))
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     return axes

@@ -195,8 +195,8 @@ class MSF(Labelled):
     def windows(self) -> tuple[Window, ...]:
         """Ranges of sigma in which every mode of the scene's network is stable.
 
-        Eigenvalues must be real. No mode is lost at an end that comes from an end of the grid. The errors of ends at
-        which one is are infinite if an average was too short to estimate them.
+        Eigenvalues must be real. No mode is lost at an end that comes from an end of the grid: its error is infinite. So are
+        those of ends at which one is, if an average was too short to estimate them.
         """
         return tuple(self._trimmed(window) for window in windows(self.open_ranges, self.scene.topology, self.errors))
 
@@ -209,8 +209,10 @@ class MSF(Labelled):
         ]
         known = self.errors is not None
         low_error, high_error = (
-            0.0 if mode is None else error if known else math.inf
-            for mode, error in zip(modes, (window.low_error, window.high_error), strict=True)
+            0.0 if end == 0.0 else error if known and mode is not None else math.inf
+            for mode, end, error in zip(
+                modes, (window.low, window.high), (window.low_error, window.high_error), strict=True
+            )
         )
         return replace(window, low_mode=modes[0], high_mode=modes[1], low_error=low_error, high_error=high_error)
 

@@ -19,7 +19,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from synchain.codegen.driver.cells import REPEATING
-from synchain.codegen.driver.columns import Control, Count, Sum
+from synchain.codegen.driver.columns import Control, Count, Span, Sum
 from synchain.codegen.driver.names import (
     ACCEPTED,
     BOUND,
@@ -45,6 +45,7 @@ from synchain.codegen.driver.names import (
 from synchain.codegen.integrators import Integrator
 from synchain.codegen.kernels.compile import Kernel, load
 from synchain.codegen.kernels.installation import InstallationError
+from synchain.codegen.kernels.observed import UNWATCHED, Watched
 from synchain.codegen.kernels.processor import processor, told_apart
 from synchain.codegen.kernels.sweep import KernelSource, emit
 from synchain.models.dynamics.equations import Equations
@@ -52,8 +53,9 @@ from synchain.models.inputs.plugins import allow_code, allowed_code
 from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
-from ..cells.choice import Ladder
+from ..cells.choice import Ladder, first_steps
 from ..cells.kernels import ladder_of, write_kernel
+from ..cells.paces import Templates
 from ..cells.plan import FIRST_STEP, Plan, control_of, tolerances
 from ..cells.reduce import Reduction
 from ..support.status import Status
@@ -321,6 +323,8 @@ class RowsSpec:
         How many oscillators each node stands for in the synchronisation error.
     records : tuple of str
         ("sync_error",), or none if all oscillators are stepped as one.
+    watched : Watched
+        Holds the stop of a scene, if it has one.
     """
 
     equations: Equations
@@ -328,10 +332,11 @@ class RowsSpec:
     control: np.ndarray
     multiplicity: tuple[int, ...] | None = None
     records: tuple[str, ...] = ("sync_error",)
+    watched: Watched = UNWATCHED
 
     def source(self, width: int | None = None) -> KernelSource:
         """Return the text of the kernel."""
-        return emit(self.equations, self.integrator, self.records, None, width, self.multiplicity)
+        return emit(self.equations, self.integrator, self.records, None, width, self.multiplicity, watched=self.watched)
 
     def job(self, spec: JobSpec, kernel: Kernel) -> RowsJob:
         """Return the job that runs the kernel."""
@@ -353,6 +358,10 @@ class RowsJob:
     def run(self, rows: Plan) -> Buffers:
         """Run the cells of these rows."""
         buffers = Buffers.empty(len(rows), rows.start.shape[1], room=0, samples=0)
+        if self.kernel.origin.method.implicit:
+            spans = rows.spans.copy()
+            spans[:, Span.FIRST_STEP] = first_steps(Templates(self.kernel.equations), rows)
+            rows = replace(rows, spans=spans)
         _drive(self.kernel, rows, self.control, buffers)
         return buffers
 

@@ -28,8 +28,8 @@ from ..stability.exponents import Exponents, exponents
 from ..stability.network import unused_axes
 from ..support.execution import Execution
 from ..support.progress import Hook
-from .criterion import IN_CRITERION, Criterion, checked
-from .threshold import check_probe, simulate
+from .criterion import IN_CRITERION, AppliedCriterion, Criterion, checked
+from .threshold import check_probe, fitted, simulate
 
 __all__ = ["CAUSES", "OUTCOMES", "Agreement", "Cell", "agreement", "strengths"]
 
@@ -42,13 +42,13 @@ LONGER = 4.0
 """How many times the transient is repeated in the search for a reason."""
 
 MERGED = 1e-14
-"""A mean synchronisation error below this is round-off, not a distance."""
+"""A mean synchronisation error below this part of the motion's extent is round-off, not a distance."""
 
 NEAR_ZERO = 5.0
 """An exponent within this many standard errors of 0 allows for bursts in either direction."""
 
 NUDGE = 1e-5
-"""Distance between neighbours in a start next to the synchronous state."""
+"""Distance between neighbours in a start next to the synchronous state, as a part of the motion's extent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ class Agreement:
     """A scene's network judged twice for each sigma."""
 
     scene: Scene
-    criterion: Criterion
+    criterion: AppliedCriterion
     cells: tuple[Cell, ...] = field(repr=False)
 
     @property
@@ -155,7 +155,8 @@ def agreement(
     grid = np.atleast_1d(np.asarray(sigma, dtype=float))
     if grid.ndim != 1 or not (np.all(np.isfinite(grid)) and np.all(np.diff(grid) > 0.0) and np.all(grid >= 0.0)):
         raise ValueError("sigma: expected finite numbers from 0 up that increase")
-    simulation = DirectSimulation(scene, checked(criterion), Execution(workers, executor, show_progress, progress))
+    execution = Execution(workers, executor, show_progress, progress)
+    simulation = DirectSimulation(scene, fitted(scene, grid, checked(criterion), execution), execution)
     alpha = strengths(scene.topology, grid)
     line = line or exponents(scene, np.unique(alpha), workers=workers, show_progress=show_progress, progress=progress)
     places = _places(line, alpha)
@@ -208,7 +209,7 @@ class DirectSimulation:
     """Direct simulation of one scene."""
 
     scene: Scene
-    criterion: Criterion
+    criterion: AppliedCriterion
     execution: Execution
 
     def simulate(self, sigma: np.ndarray, longer: float = 1.0, near: bool = False) -> tuple[np.ndarray, np.ndarray]:
@@ -218,9 +219,11 @@ class DirectSimulation:
         scene = self.scene
         if near:
             first = {name: np.array(values[:1] * scene.n) for name, values in scene.initial.items()}
-            first[scene.components[0]] = first[scene.components[0]] + NUDGE * np.arange(scene.n)
+            move = NUDGE * self.criterion.extent[0] * np.arange(scene.n)
+            first[scene.components[0]] = first[scene.components[0]] + move
             scene = scene.replace(initial={name: values.tolist() for name, values in first.items()})
-        criterion = replace(self.criterion, transient=longer * self.criterion.transient)
+        used = self.criterion
+        criterion = replace(used, transient=longer * used.transient, max_steps=int(longer * used.max_steps))
         sweep = simulate(scene, sigma, criterion, math.inf, self.execution)
         return sweep.share, sweep.error
 
@@ -237,17 +240,18 @@ def _explained(simulation: DirectSimulation, cells: Sequence[Cell], split: Seque
     longer = simulation.simulate(sigma, LONGER)[0]
     near = simulation.simulate(sigma, LONGER, near=True)[0]
     for i, later, close in zip(odd, longer, near, strict=True):
-        made[i] = replace(cells[i], cause=_cause(cells[i], float(later), float(close), split[i]))
+        merged = cells[i].error < MERGED * simulation.criterion.size
+        made[i] = replace(cells[i], cause=_cause(cells[i], merged, float(later), float(close), split[i]))
     return made
 
 
-def _cause(cell: Cell, longer: float, near: float, split: bool) -> str:
+def _cause(cell: Cell, merged: bool, longer: float, near: float, split: bool) -> str:
     """Why a simulation disagrees, from the shares of starts that synchronise after a longer
     transient and from nearby.
     """
     stable = cell.outcome == OUTCOMES[2]
     mixed = 0.0 < cell.share < 1.0 or 0.0 < longer < 1.0
-    if not stable and cell.error < MERGED:
+    if not stable and merged:
         return CAUSES[1]
     if (longer >= 0.5) == stable:
         return CAUSES[0]

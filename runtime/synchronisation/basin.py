@@ -9,6 +9,7 @@ Sources: Menck, Heitzig, Marwan & Kurths, Nature Phys. 9, 89 (2013); Clopper & P
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
@@ -17,54 +18,91 @@ import numpy as np
 import xarray as xr
 
 from synchain.models.inputs.checks import check_integer, check_number, check_table
+from synchain.models.inputs.words import Word
 from synchain.models.mechanics.friction import SLIP
+from synchain.models.scenes.complete import TimeUnit
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import Given
 from ..cells.plan import Planner
-from ..cells.reduce import reduce_scene
+from ..cells.reduce import Reduction, reduce_scene
 from ..results.labelled import Labelled, dataset
 from ..results.labels import STATE, States
 from ..support.arrays import row
 from ..support.execution import Execution
 from ..support.progress import Hook
 from ..support.status import Status
-from .trials import Trials
+from ..sweeps.certify import certify
+from .criterion import AppliedCriterion, Criterion, errors, preset, resolved
+from .motion import Motion, alike, measure_motion, spread_of
+from .trials import Outcome, Trials
 
-__all__ = ["Basin", "basin", "random_starts"]
+__all__ = ["Basin", "Fate", "basin", "random_starts"]
 
 Range = tuple[float, float]
 
 SAMPLE_LIMIT = 10_000_000
 """Most starts of one call."""
 
+LONGEST = 5000.0
+"""Longest average of the exponent, in its units of time."""
+
+
+class Fate(Word):
+    """What became of a start: synchronous, on its way there when its time was over, on another motion, or no end."""
+
+    SYNCHRONOUS = "synchronous"
+    APPROACHING = "still approaching"
+    OTHER = "not synchronous"
+    ESCAPED = "escaped"
+    STOPPED = "stopped"
+    UNFINISHED = "not finished"
+
+
+FATES = tuple(Fate)
+ENDS = {Status.DIVERGED: Fate.ESCAPED, Status.STOPPED: Fate.STOPPED}
+UNDECIDED = (Fate.APPROACHING, Fate.UNFINISHED)
+
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Basin(Labelled):
     """Which random starts of a scene's network synchronise.
 
-    start (samples, dimension), in the order of the state; error (samples,): mean synchronisation
-    error, infinite where a cell did not finish; status (samples,): how it ended.  A start is
-    synchronous where the error is below `tolerance`.  A cell that did not finish counts among the
-    samples as not synchronous, and `statuses` says how many there are and why.
+    start (samples, dimension), in the order of the state; error (samples,): synchronisation error that the tolerance of
+    the criterion is compared with, infinite where a cell did not finish; status (samples,): how it ended; earlier
+    (samples,): the error after half of the transient, NaN where it was not needed; fate (samples,): number of its `Fate`.
+
+    A start that is not synchronous is still approaching if its error falls, or if no error could have fallen below the
+    tolerance in this time: `exponent` and `stderr` are the largest transversal exponent of the synchronous state, NaN if
+    it was not needed or is not known.
     """
 
     scene: Scene
-    tolerance: float
+    criterion: AppliedCriterion
     confidence: float
     start: np.ndarray = field(repr=False)
     error: np.ndarray = field(repr=False)
     status: np.ndarray = field(repr=False)
+    earlier: np.ndarray = field(repr=False)
+    fate: np.ndarray = field(repr=False)
+    exponent: float = math.nan
+    stderr: float = math.nan
 
     @property
     def data(self) -> xr.Dataset:
-        """Start, error, status and verdict of each sample."""
+        """Start, errors, status and fate of each sample."""
         states = States.of(self.scene)
         return dataset(
             {
                 "initial": (("sample", *STATE), states.table(self.start), "initial states"),
                 "error": (("sample",), self.error, "mean synchronisation error, inf where a cell did not finish"),
+                "earlier_error": (
+                    ("sample",),
+                    self.earlier,
+                    "the same after half of the transient, where it was needed",
+                ),
                 "status": (("sample",), self.status, "how the cell ended"),
+                "fate": (("sample",), self.fate, ", ".join(f"{k} {words}" for k, words in enumerate(FATES))),
                 "synchronous": (("sample",), self.synchronous, "whether the start synchronised"),
             },
             {"component": list(states.components), "node": list(self.scene.topology.labels)},
@@ -73,8 +111,12 @@ class Basin(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """Scene, share with its interval, how cells ended."""
-        return ("scene", repr(self.scene)), *(("starts", words) for words in self.message.split("; "))
+        """Scene, shares with their interval, how cells ended, and the criterion."""
+        return (
+            ("scene", repr(self.scene)),
+            *(("starts", words) for words in self.message.split("; ")),
+            ("synchronous", self.criterion.words),
+        )
 
     @property
     def samples(self) -> int:
@@ -82,9 +124,14 @@ class Basin(Labelled):
         return len(self.error)
 
     @property
+    def tolerance(self) -> float:
+        """Error below which a start is synchronous."""
+        return self.criterion.tolerance
+
+    @property
     def synchronous(self) -> np.ndarray:
         """True for each start (samples,) that synchronised."""
-        return self.error < self.tolerance
+        return np.asarray(self.fate == FATES.index(Fate.SYNCHRONOUS))
 
     @property
     def count(self) -> int:
@@ -97,14 +144,23 @@ class Basin(Labelled):
         return self.count / self.samples
 
     @property
+    def shares(self) -> dict[str, float]:
+        """The part of the starts of each fate."""
+        counts = np.bincount(self.fate, minlength=len(FATES))
+        return {str(name): int(count) / self.samples for name, count in zip(FATES, counts, strict=True)}
+
+    @property
     def interval(self) -> Range:
-        """Exact confidence interval of the share among all possible starts, of the level
-        `confidence` or a higher one.
+        """Confidence interval of the share among all possible starts, of the level `confidence` or a higher one.
+
+        The lower end is that of the starts that synchronised, the upper end that with those that are undecided.
         """
         from scipy.stats import binomtest
 
-        found = binomtest(self.count, self.samples).proportion_ci(self.confidence, method="exact")
-        return float(found.low), float(found.high)
+        undecided = int(np.isin(self.fate, [FATES.index(fate) for fate in UNDECIDED]).sum())
+        counts = (self.count, self.count + undecided)
+        few, most = (binomtest(k, self.samples).proportion_ci(self.confidence, method="exact") for k in counts)
+        return float(few.low), float(most.high)
 
     @property
     def statuses(self) -> dict[Status, int]:
@@ -114,11 +170,16 @@ class Basin(Labelled):
 
     @property
     def message(self) -> str:
-        """Share, interval and how many cells ended how, in words."""
+        """Shares, interval, the exponent if it was needed, and how many cells ended how, in words."""
         low, high = self.interval
         first = f"{self.count} of {self.samples} starts synchronised: {self.share:.4g}"
+        others = (f"{name}: {share:.4g}" for name, share in self.shares.items() if share and name != Fate.SYNCHRONOUS)
         sure = f"with confidence {self.confidence:g} {low:.4g} … {high:.4g}"
-        return "; ".join([first, sure, *(f"{n} cell{'s' * (n > 1)}: {s.message}" for s, n in self.statuses.items())])
+        known = [] if math.isnan(self.exponent) else [f"exponent {self.exponent:.2g} ± {self.stderr:.1g}"]
+        if self.exponent - 2.0 * self.stderr > 0.0:
+            known.append("the synchronous state is unstable: starts that synchronised have not left it yet")
+        ends = (f"{n} cell{'s' * (n > 1)}: {s.message}" for s, n in self.statuses.items())
+        return "; ".join([first, *others, sure, *known, *ends])
 
 
 def basin(
@@ -126,10 +187,10 @@ def basin(
     *,
     samples: int = 1000,
     ranges: Mapping[str, Range] | None = None,
-    tolerance: float = 1e-3,
-    transient: float = 1000.0,
-    window: float = 100.0,
-    seed: int = 0,
+    tolerance: float | None = None,
+    transient: float | None = None,
+    window: float | None = None,
+    seed: int | None = None,
     confidence: float = 0.95,
     workers: int | None = None,
     executor: Executor | None = None,
@@ -146,23 +207,31 @@ def basin(
     Parameters
     ----------
     scene : Scene
-        The network; its records are not used.
+        The network; its records are not used, its stop ends cells.
     samples : int
         Number of starts.
     ranges : mapping of str to (float, float), optional
         Lowest and highest value of a component (default: -1 and 1 for all components); a component
         that is not named starts as in the scene.
-    tolerance : float
-        A start is synchronous if its mean synchronisation error over the window is below this.
-    transient, window : float
-        In the scene's unit of time.
-    seed : int
+    tolerance : float, optional
+        A start is synchronous if its mean synchronisation error over the window is below this; by default a thousandth of
+        what the synchronous motion moves, for each component too.
+    transient, window : float, optional
+        In the scene's unit of time; by default as for a `Criterion`.
+    seed : int, optional
+        By default that of the scene.
     confidence : float
         Level of the confidence interval.
     workers, executor, show_progress, progress
         As for `run`.
     parameters, **more
         Override the parameters of the scene, as for `exponents`.
+
+    Returns
+    -------
+    Basin
+        A cell takes at most a hundred times the steps of the synchronous motion; what needs more has escaped or is not
+        finished.
 
     Raises
     ------
@@ -172,15 +241,88 @@ def basin(
     TypeError
         If the number of samples is not whole.
     """
-    _check(scene, samples, tolerance, confidence, seed)
+    _check(scene, samples, tolerance, confidence)
     execution = Execution(workers, executor, show_progress, progress)
-    timed = {"transient": transient, "window": window}
-    scene = Given(basin, parameters, more).scene(scene, record=("sync_error",), **timed)
-    planner = Planner(random_starts(scene, samples, ranges, seed))
-    whole = replace(reduce_scene(planner.scene, reduce=False), jumps=True)
-    with Trials.of(whole, execution) as trials:
-        error, status = trials.run(samples, planner.rows)
-    return Basin(scene, tolerance, confidence, planner.rows(np.arange(samples)).start, error, status)
+    asked = Criterion(tolerance, 1, 0.0, transient, window, None, seed)
+    scene = Given(basin, parameters, more).scene(scene, record=("sync_error",), stop=scene.stop)
+    known = preset(asked, scene)
+    scene = random_starts(scene, samples, ranges, known.seed or 0)
+    used = resolved(known, scene, lambda atol: _motion(scene, known, atol, execution))
+    settings = {"window": used.window, "max_steps": used.max_steps, "atol": used.atol or scene.given["atol"]}
+    found, start = _run(scene.replace(transient=used.transient, **settings), np.arange(samples), used, execution)
+    error, fate = errors(found, used, scene.equations), np.full(samples, FATES.index(Fate.UNFINISHED))
+    for status, end in ENDS.items():
+        fate[found.status == status] = FATES.index(end)
+    finished = found.status == Status.FINISHED
+    fate[finished] = FATES.index(Fate.OTHER)
+    fate[finished & (error < used.tolerance)] = FATES.index(Fate.SYNCHRONOUS)
+    apart, earlier = np.flatnonzero(fate == FATES.index(Fate.OTHER)), np.full(samples, np.nan)
+    single = scene.replace(axes=(), zipped=False, stop=None)
+    if not len(apart):
+        return Basin(single.replace(stop=scene.stop), used, confidence, start, error, found.status, earlier, fate)
+    half, _ = _run(scene.replace(transient=0.5 * used.transient, **settings), apart, used, execution)
+    earlier[apart] = errors(half, used, scene.equations)
+    exponent, stderr = _exponent(single, used, execution)
+    late = _approaching(error[apart], earlier[apart], used, _length(single, used), exponent, stderr)
+    fate[apart[late]] = FATES.index(Fate.APPROACHING)
+    single = single.replace(stop=scene.stop)
+    return Basin(single, used, confidence, start, error, found.status, earlier, fate, exponent, stderr)
+
+
+def _run(scene: Scene, cells: np.ndarray, used: AppliedCriterion, execution: Execution) -> tuple[Outcome, np.ndarray]:
+    """Run some cells of a scene; also their starts (cells, dimension)."""
+    planner = Planner(scene)
+    with Trials.of(_whole(scene), execution) as trials:
+        found = trials.run(len(cells), lambda which: planner.rows(cells[which]))
+    return found, planner.rows(cells).start
+
+
+def _whole(scene: Scene) -> Reduction:
+    """A scene in which nothing is left out."""
+    return replace(reduce_scene(scene, reduce=False), jumps=True)
+
+
+def _motion(scene: Scene, known: Criterion, atol: float | None, execution: Execution) -> Motion:
+    """The motion from the state of the scene's first oscillator."""
+    unit = scene.replace(transient=1.0, window=1.0, atol=atol or scene.given["atol"])
+    planner, equations = Planner(unit), scene.equations
+    spread = spread_of(equations, planner.rows(np.arange(min(scene.cells, 100))).start)
+    first = Planner(unit.replace(axes=(), zipped=False)).rows(np.arange(1))
+    with Trials.of(_whole(unit), execution) as trials:
+        times = (known.transient, known.window)
+        return measure_motion(trials, lambda rows: rows, equations, alike(equations, first), times, spread)
+
+
+def _length(scene: Scene, used: AppliedCriterion) -> float:
+    """Transient and window in non-dimensional time."""
+    return (used.transient + used.window) * ((scene.period or 1.0) if scene.time_unit == TimeUnit.PERIOD else 1.0)
+
+
+def _exponent(scene: Scene, used: AppliedCriterion, execution: Execution) -> tuple[float, float]:
+    """The largest transversal exponent and its error, which a transient can tell from 0; NaN if there is none."""
+    try:
+        found = certify(scene, precision=0.5 / _length(scene, used), periods=LONGEST, workers=execution.workers)
+    except (ValueError, FloatingPointError):
+        return math.nan, math.nan
+    return float(found.exponent[0]), float(found.stderr[0])
+
+
+def _approaching(
+    error: np.ndarray, earlier: np.ndarray, used: AppliedCriterion, length: float, exponent: float, stderr: float
+) -> np.ndarray:
+    """Whether starts (samples,) that are not synchronous may only need more time.
+
+    Errors fall at most by exp(2 stderr - exponent) in a unit of time, so that a short transient tells nothing.  After a
+    long one they are on their way if they fall at half of that pace at least; without an exponent, by a factor e.
+    """
+    if math.isnan(exponent):
+        return np.asarray(error < earlier / math.e)
+    fastest = 2.0 * stderr - exponent
+    if fastest <= 0.0:
+        return np.zeros(len(error), dtype=bool)
+    if fastest * length < math.log(max(used.size / used.tolerance, 1.0)):
+        return np.ones(len(error), dtype=bool)
+    return np.asarray(error < earlier * math.exp(0.25 * min(exponent, 0.0) * length))
 
 
 def random_starts(scene: Scene, samples: int, ranges: Mapping[str, Range] | None = None, seed: int = 0) -> Scene:
@@ -193,12 +335,11 @@ def random_starts(scene: Scene, samples: int, ranges: Mapping[str, Range] | None
     return scene.replace(axes=dict(zip(names, values.T, strict=True)), zipped=True)
 
 
-def _check(scene: Scene, samples: object, tolerance: object, confidence: object, seed: object) -> None:
+def _check(scene: Scene, samples: object, tolerance: object, confidence: object) -> None:
     if a_scene(scene).n < 2:
         raise ValueError(f"basin: found {scene.n} oscillator; expected at least two, which can synchronise")
     check_integer("basin: samples", samples, 1, SAMPLE_LIMIT)
-    check_integer("basin: seed", seed, 0)
-    if not check_number("basin: tolerance", tolerance) > 0:
+    if tolerance is not None and not check_number("basin: tolerance", tolerance) > 0:
         raise ValueError(f"basin: tolerance = {tolerance}; expected a positive number")
     if not 0 < check_number("basin: confidence", confidence) < 1:
         raise ValueError(f"basin: confidence = {confidence}; expected a number between 0 and 1, e.g. 0.95")

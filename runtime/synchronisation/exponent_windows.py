@@ -27,15 +27,19 @@ class ExponentWindows:
     intervals : tuple of (float, float)
         Lower and upper end of each window, in ascending order.
     errors : tuple of (float, float)
-        Errors of the ends: 0 at sigma = 0 and at an end of the grid, inf if the average is
+        Errors of the ends: 0 at sigma = 0, inf at an end of the grid, beyond which nothing is known, and if the average is
         too short for an estimate.
     absent : str
         Why exponents say nothing about the network; empty if they do.
+    strengths, values : tuple of float
+        Strengths alpha and exponents at them.
     """
 
     intervals: tuple[Interval, ...] = ()
     errors: tuple[Interval, ...] = ()
     absent: str = ""
+    strengths: tuple[float, ...] = ()
+    values: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.errors) != len(self.intervals):
@@ -52,7 +56,13 @@ class ExponentWindows:
         return cls(
             tuple((window.low, window.high) for window in found),
             tuple((window.low_error, window.high_error) for window in found),
+            strengths=tuple(map(float, function.alpha)),
+            values=tuple(map(float, function.exponent)),
         )
+
+    def at(self, alpha: np.ndarray) -> np.ndarray:
+        """Return exponents at strengths of any shape, by linear interpolation."""
+        return np.interp(alpha, self.strengths, self.values)
 
     @property
     def words(self) -> str:

@@ -36,7 +36,8 @@ from ..support.arrays import numbers
 from ..support.execution import Execution
 from ..support.progress import Hook
 from ..sweeps.job import RowsSpec
-from .criterion import IN_CRITERION, Criterion, checked, offsets
+from .criterion import IN_CRITERION, AppliedCriterion, Criterion, checked, errors, offsets, preset, resolved
+from .motion import Motion, alike, first_starts, measure_motion, spread_of
 from .trials import Trials
 
 __all__ = ["MODE_ALPHA", "MODE_BETA", "Probe", "ring_of_three", "universal_probe"]
@@ -56,7 +57,7 @@ class Probe(Labelled):
     """
 
     scene: Scene
-    criterion: Criterion
+    criterion: AppliedCriterion
     alpha: np.ndarray = field(repr=False)
     beta: np.ndarray = field(repr=False)
     error: np.ndarray = field(repr=False)
@@ -84,6 +85,7 @@ class Probe(Labelled):
             ("scene", repr(self.scene)),
             ("strengths", f"{self.alpha.size}: alpha {ends_of(self.alpha)}, beta {ends_of(self.beta)}"),
             ("synchronous", f"{int(self.synchronous.sum())} of {self.synchronous.size}"),
+            ("criterion", self.criterion.words),
         )
 
     @property
@@ -112,7 +114,8 @@ def universal_probe(
     Parameters
     ----------
     scene : Scene
-        Oscillator, coupling and parameters; its network, start and sigma are not used.
+        Oscillator, coupling and parameters; its network and sigma are not used, and the three start
+        as its first two oscillators go on (`first_starts`).
     alpha, beta : array_like
         Real and imaginary part of the strengths, broadcast against each other; negative numbers are
         allowed.
@@ -139,25 +142,42 @@ def universal_probe(
     scene = Given(universal_probe, parameters, more, IN_CRITERION).scene(scene, unused_axes(scene))
     if scene.varied:
         scene.equations.expect_alike("the three-oscillator probe")
+    known = preset(criterion, scene)
     ring = scene.replace(
         record=("sync_error",),
         topology=topology("ring", 3),
-        initial=None,
-        transient=criterion.transient,
-        window=criterion.window,
-        rtol=criterion.rtol,
+        initial=first_starts(scene, 3),
+        transient=1.0,
+        window=1.0,
+        rtol=known.rtol,
     )
     equations, planner = ring_of_three(ring.equations), Planner(ring)
-    rows = _rows(planner, equations.parameters, real.reshape(-1), imaginary.reshape(-1), criterion)
-    strongest = criterion.starts * np.atleast_1d(np.hypot(real, imaginary).argmax())
-    method = chosen_for_rows(ring, equations, rows.take(strongest))
-    problem = RowsSpec(equations, method, control_of(planner, True))
-    with Trials(ring, problem, problem.source(), execution) as trials:
-        error, status = trials.run(len(rows), rows.take)
-    shape = (*real.shape, criterion.starts)
-    error, status = error.reshape(shape), status.reshape(shape)
-    share = np.asarray((error < criterion.tolerance).mean(axis=-1))
-    return Probe(scene, criterion, real, imaginary, np.asarray(np.median(error, axis=-1)), share, status)
+    plain = _rows(planner, equations.parameters, real.reshape(-1), imaginary.reshape(-1), np.zeros(known.starts))
+    strongest = known.starts * np.atleast_1d(np.hypot(real, imaginary).argmax())
+    method = chosen_for_rows(ring, equations, plain.take(strongest))
+    source = RowsSpec(equations, method, control_of(planner, True)).source()
+
+    def trials(scene: Scene) -> Trials:
+        problem = RowsSpec(equations, method, control_of(Planner(scene), True))
+        return Trials(scene, problem, source, execution)
+
+    def measure(atol: float | None) -> Motion:
+        one = alike(equations, _rows(planner, equations.parameters, np.zeros(1), np.zeros(1), np.zeros(1)))
+        with trials(ring if atol is None else ring.replace(atol=atol)) as few:
+            times, apart = (known.transient, known.window), spread_of(equations, plain.start[:1])
+            return measure_motion(few, lambda rows: rows, equations, one, times, apart)
+
+    used = resolved(known, ring, measure)
+    atol = ring.given["atol"] if used.atol is None else used.atol
+    ring = ring.replace(transient=used.transient, window=used.window, max_steps=used.max_steps, atol=atol)
+    planner = Planner(ring)
+    rows = _rows(planner, equations.parameters, real.reshape(-1), imaginary.reshape(-1), offsets(used))
+    with trials(ring) as many:
+        found = many.run(len(rows), rows.take)
+    shape = (*real.shape, used.starts)
+    error, status = errors(found, used, equations).reshape(shape), found.status.reshape(shape)
+    share = np.asarray((error < used.tolerance).mean(axis=-1))
+    return Probe(scene, used, real, imaginary, np.asarray(np.median(error, axis=-1)), share, status)
 
 
 def ring_of_three(equations: Equations) -> Equations:
@@ -223,16 +243,16 @@ def _broadcast(alpha: ArrayLike, beta: ArrayLike) -> tuple[np.ndarray, np.ndarra
     return np.array(real), np.array(imaginary)
 
 
-def _rows(planner: Planner, names: tuple[str, ...], alpha: np.ndarray, beta: np.ndarray, criterion: Criterion) -> Plan:
+def _rows(planner: Planner, names: tuple[str, ...], alpha: np.ndarray, beta: np.ndarray, moves: np.ndarray) -> Plan:
     """Rows of every strength and start, the starts fastest; a start moves all oscillators alike in
     the position.
     """
-    one, scene, starts = planner.rows(np.arange(1)), planner.scene, criterion.starts
+    one, scene, starts = planner.rows(np.arange(1)), planner.scene, len(moves)
     count = len(alpha) * starts
     values = {**scene.parameters, MODE_ALPHA.name: 0.0, MODE_BETA.name: 0.0}
     numbers = np.tile([values[name] for name in names], (count, 1))
     numbers[:, names.index(MODE_ALPHA.name)] = np.repeat(alpha, starts)
     numbers[:, names.index(MODE_BETA.name)] = np.repeat(beta, starts)
     start = np.tile(one.start, (count, 1))
-    start[:, : scene.n] += np.tile(offsets(criterion), len(alpha))[:, None]
+    start[:, : scene.n] += np.tile(moves, len(alpha))[:, None]
     return Plan(start, numbers, np.tile(one.spans, (count, 1)))

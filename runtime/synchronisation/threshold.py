@@ -11,9 +11,9 @@ without a transient or a tolerance, and with error bars.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import xarray as xr
@@ -22,6 +22,7 @@ from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
 from synchain.models.inputs.checks import check_number, check_positive
+from synchain.models.scenes.complete import TimeUnit
 from synchain.models.scenes.scene import Scene, a_scene
 from synchain.models.spectra.spectrum import Spectrum
 from synchain.models.sweeps.axis import LIMIT
@@ -37,9 +38,10 @@ from ..stability.network import unused_axes
 from ..support.arrays import row
 from ..support.execution import Execution
 from ..support.progress import Hook
-from .criterion import IN_CRITERION, Criterion, checked, offsets
+from .criterion import IN_CRITERION, AppliedCriterion, Criterion, checked, errors, offsets, preset, resolved
 from .exponent_windows import ExponentWindows, exponent_windows
 from .hidden_modes import hidden_modes
+from .motion import Motion, alike, first_starts, measure_motion, spread_of
 from .trials import Trials
 
 __all__ = [
@@ -79,17 +81,17 @@ class Sweep:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Thresholds(Labelled):
-    """Synchronous ranges of one network: measured directly, predicted from the probe, and from the
-    exponents of its modes.
+    """Synchronous ranges of one network: from the exponents of its modes, measured directly, and predicted from the probe.
 
-    `direct` is in sigma, `probe` in alpha = sigma abs(gamma), `predicted` and `exponents` in sigma.
+    The exponents decide.  Simulation and probe know a transient: near an end errors fall so slowly that they measure it;
+    `warnings` names these ends.  `criterion` holds the numbers that were used.  `direct` is in sigma, `probe` in alpha = sigma abs(gamma), `predicted` and `exponents` in sigma.
     """
 
     scene: Scene
     probe: Sweep
     predicted: tuple[Interval, ...]
     direct: Sweep
-    criterion: Criterion
+    criterion: AppliedCriterion
     exponents: ExponentWindows
     warnings: tuple[str, ...] = field(default=())
 
@@ -124,11 +126,12 @@ class Thresholds(Labelled):
         """Scene and ranges."""
         return (
             ("scene", repr(self.scene)),
+            ("sigma, negative exponents", self.exponents.words),
             ("sigma, simulated", words_of(self.direct.intervals)),
             ("sigma, predicted by the probe", words_of(self.predicted)),
-            ("sigma, negative exponents", self.exponents.words),
             ("alpha, probe", words_of(self.probe.intervals)),
             ("grid of sigma", ends_of(self.direct.x)),
+            ("simulated and probe", f"after a transient: {self.criterion.words}"),
             *(("warning", words) for words in self.warnings),
         )
 
@@ -178,7 +181,8 @@ def thresholds(
         Ends of ranges are refined to this width in sigma, those of the probe to twice as much in
         alpha.
     criterion : Criterion, optional
-        When a value of sigma counts as synchronous; it holds rtol, seed and transient of all cells.
+        When a value of sigma counts as synchronous; it holds rtol, seed and transient of all cells, and follows scene
+        and motion in what it leaves open.
     precision, periods : float
         Standard error and longest average of the exponents, as for `exponents`.
     workers, executor, show_progress, progress
@@ -211,11 +215,38 @@ def thresholds(
     precision = check_number("precision", precision, 0.0)
     periods = check_whole("periods", check_positive("periods", periods))
     alpha = _probe_grid(grid, spectrum)
-    stable = exponent_windows(scene, alpha, execution, precision, periods, criterion.seed)
-    pair = probe(scene, alpha, criterion, resolution, execution)
-    direct = simulate(scene, grid, criterion, resolution, execution)
-    predicted = project(pair.intervals, spectrum, float(grid[-1]), float(grid[0]))
-    return Thresholds(scene, pair, tuple(predicted), direct, criterion, stable, (*scene.warnings, *hidden_modes(scene)))
+    stable = exponent_windows(scene, alpha, execution, precision, periods, preset(criterion, scene).seed or 0)
+    used = fitted(_pair(scene), 0.5 * alpha, criterion, execution)
+    pair = probe(scene, alpha, used, resolution, execution)
+    direct = simulate(scene, grid, used, resolution, execution)
+    predicted = tuple(project(pair.intervals, spectrum, float(grid[-1]), float(grid[0])))
+    found = Thresholds(scene, pair, predicted, direct, used, stable, (*scene.warnings, *hidden_modes(scene)))
+    return replace(found, warnings=(*found.warnings, *_limited(found)))
+
+
+def _limited(found: Thresholds) -> Iterator[str]:
+    """Sentences about ends at which the exponent is negative, but errors take longer than the transient to fall."""
+    used, scene = found.criterion, found.scene
+    length = used.transient * ((scene.period or 1.0) if scene.time_unit == TimeUnit.PERIOD else 1.0)
+    sizes = np.array([abs(value) for value in scene.spectrum.values if abs(value) > 0.0])
+    grid, fall = {float(found.direct.x[0]), float(found.direct.x[-1])}, math.log(used.size / used.tolerance)
+    if not found.exponents.strengths or not fall > 0.0:
+        return
+    for words, ranges in (("simulated", found.direct.intervals), ("predicted by the probe", found.predicted)):
+        ends = np.array(sorted({end for pair in ranges for end in pair} - grid))
+        if not len(ends):
+            continue
+        exponent = found.exponents.at(np.outer(ends, sizes)).max(axis=1)
+        late = (exponent < 0.0) & (-exponent * length < fall)
+        if late.any():
+            shown = ", ".join(
+                f"{end:.4f} (exponent {at:.2g})" for end, at in zip(ends[late], exponent[late], strict=True)
+            )
+            yield (
+                f"the ends of what is {words} at {scene.strength} = {shown} come of the transient: errors fall by the factor "
+                f"{math.exp(fall):.3g} in ln({math.exp(fall):.3g})/|exponent|, and {length:.4g} units of time are given; "
+                "trust the exponents there, or raise Criterion(transient=…)"
+            )
 
 
 def default_grid(spectrum: Spectrum, step: float = 0.0025) -> np.ndarray:
@@ -263,7 +294,7 @@ def probe(
     Parameters
     ----------
     scene : Scene
-        Oscillator, coupling and parameters; its network, start and axes are not used.
+        Oscillator, coupling and parameters; the pair starts as the first two oscillators (`first_starts`).
     alpha : sequence of float
         An increasing grid.
     criterion : Criterion
@@ -276,9 +307,14 @@ def probe(
     Sweep
         Its `x` and intervals are values of alpha.
     """
-    pair = scene.replace(topology=topology("chain", 2), initial=None, axes=())
+    pair = _pair(scene)
     sweep = simulate(pair, 0.5 * np.asarray(alpha, dtype=float), criterion, resolution, execution)
     return Sweep(2.0 * sweep.x, sweep.error, sweep.share, tuple(scale(sweep.intervals, 2.0)))
+
+
+def _pair(scene: Scene) -> Scene:
+    """The two oscillators of the probe."""
+    return scene.replace(topology=topology("chain", 2), initial=first_starts(scene, 2), axes=())
 
 
 def simulate(
@@ -302,19 +338,38 @@ def simulate(
         Ends of ranges are refined to this width in sigma.
     execution : Execution, optional
     """
-    x = row("sigma", sigma, rising=True)
-    reduction = reduce_scene(cells_of(scene, x, criterion))
-    with Trials.of(reduction, execution or Execution()) as trials:
+    x, execution = row("sigma", sigma, rising=True), execution or Execution()
+    used = fitted(scene, x, criterion, execution)
+    reduction = reduce_scene(cells_of(scene, x, used))
+    with Trials.of(reduction, execution) as trials:
 
         def measure(points: np.ndarray) -> np.ndarray:
-            planner = Planner(cells_of(scene, points, criterion))
-            error, _ = trials.run(planner.scene.cells, lambda cells: reduction.rows(planner.rows(cells)))
-            return error.reshape(len(points), criterion.starts)
+            planner = Planner(cells_of(scene, points, used))
+            found = trials.run(planner.scene.cells, lambda cells: reduction.rows(planner.rows(cells)))
+            return errors(found, used, scene.equations).reshape(len(points), used.starts)
 
-        return judge(measure, x, resolution, criterion)
+        return judge(measure, x, resolution, used)
 
 
-def judge(measure: Measure, x: np.ndarray, resolution: float, criterion: Criterion) -> Sweep:
+def fitted(scene: Scene, sigma: np.ndarray, criterion: Criterion, execution: Execution) -> AppliedCriterion:
+    """Return a criterion with the numbers that follow from the motion of a scene's equal oscillators."""
+    if isinstance(criterion, AppliedCriterion):
+        return criterion
+    known, apart = preset(criterion, scene), spread_of(scene.equations, np.array([scene.y0]))
+
+    def measure(atol: float | None) -> Motion:
+        rtol = known.rtol or scene.rtol
+        unit = AppliedCriterion(1.0, known.starts, 0.0, 1.0, 1.0, rtol, 0, (), max_steps=scene.max_steps, atol=atol)
+        reduction = reduce_scene(cells_of(scene, sigma, unit))
+        first = alike(scene.equations, Planner(cells_of(scene, np.zeros(1), unit)).rows(np.arange(1)))
+        with Trials.of(reduction, execution) as trials:
+            times = (known.transient, known.window)
+            return measure_motion(trials, reduction.rows, scene.equations, first, times, apart)
+
+    return resolved(known, scene, measure)
+
+
+def judge(measure: Measure, x: np.ndarray, resolution: float, criterion: AppliedCriterion) -> Sweep:
     """Return the verdicts on a grid and the synchronous ranges, with ends refined to `resolution`.
 
     Parameters
@@ -330,13 +385,13 @@ def judge(measure: Measure, x: np.ndarray, resolution: float, criterion: Criteri
     def share(errors: np.ndarray) -> np.ndarray:
         return np.asarray((errors < criterion.tolerance).mean(axis=1))
 
-    errors = measure(x)
-    on_grid = share(errors)
+    found = measure(x)
+    on_grid = share(found)
     ranges = refine(lambda points: share(measure(points)) >= 0.5, x, on_grid >= 0.5, resolution)
-    return Sweep(x, np.asarray(np.median(errors, axis=1)), on_grid, tuple(ranges))
+    return Sweep(x, np.asarray(np.median(found, axis=1)), on_grid, tuple(ranges))
 
 
-def cells_of(scene: Scene, sigma: np.ndarray, criterion: Criterion) -> Scene:
+def cells_of(scene: Scene, sigma: np.ndarray, criterion: AppliedCriterion) -> Scene:
     """Return the scene with a cell for every sigma and start of a criterion, the starts fastest."""
     position, moves = scene.components[0], offsets(criterion)
     axes: dict[str, np.ndarray] = {scene.strength: np.repeat(sigma, len(moves))}
@@ -349,6 +404,8 @@ def cells_of(scene: Scene, sigma: np.ndarray, criterion: Criterion) -> Scene:
         transient=criterion.transient,
         window=criterion.window,
         rtol=criterion.rtol,
+        max_steps=criterion.max_steps,
+        atol=scene.given["atol"] if criterion.atol is None else criterion.atol,
     )
 
 

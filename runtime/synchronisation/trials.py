@@ -1,20 +1,22 @@
-"""Trials: cells whose mean synchronisation error alone is asked for, run in rounds by one kernel on
-one pool of workers.
+"""Trials: cells of which the mean synchronisation error and the end are asked for, run in rounds by one kernel on one
+pool of workers.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from synchain.codegen.driver.columns import Sum
+from synchain.codegen.driver.columns import Count, Sum
 from synchain.codegen.kernels.compile import load
 from synchain.codegen.kernels.sweep import KernelSource
 from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
+from ..cells.choice import chosen_for_rows
 from ..cells.kernels import write_kernel
 from ..cells.layout import block_size
 from ..cells.plan import Plan, control_of
@@ -25,10 +27,21 @@ from ..sweeps.errors import SweepFailed, SweepInterrupted
 from ..sweeps.job import JobSpec, RowsSpec
 from ..sweeps.pool import Task, WorkerPool, worker_lost
 
-__all__ = ["Trials", "mean_errors"]
+__all__ = ["Outcome", "Rows", "Trials", "mean_errors"]
 
 Rows = Callable[[np.ndarray], Plan]
 """Lays out cells by their numbers (count,)."""
+
+
+class Outcome(NamedTuple):
+    """What became of cells: mean synchronisation errors (cells,), infinite if a cell did not finish; how they ended (cells,);
+    states at the end (cells, dimension); steps (cells,).
+    """
+
+    error: np.ndarray
+    status: np.ndarray
+    end: np.ndarray
+    steps: np.ndarray
 
 
 class Trials:
@@ -65,9 +78,12 @@ class Trials:
     @classmethod
     def of(cls, reduction: Reduction, execution: Execution) -> Trials:
         """Return trials of what is left of a scene; its cells stand for those of all rounds."""
-        source = write_kernel(reduction)
+        strongest = reduction.rows(reduction.planner.extremes())
+        source = write_kernel(reduction, method=chosen_for_rows(reduction.scene, reduction.equations, strongest))
         control = control_of(reduction.planner, reduction.jumps)
-        problem = RowsSpec(reduction.equations, source.method, control, reduction.multiplicity, reduction.records)
+        problem = RowsSpec(
+            reduction.equations, source.method, control, reduction.multiplicity, reduction.records, reduction.watched
+        )
         return cls(reduction.scene, problem, source, execution, reduction.expand)
 
     def __enter__(self) -> Trials:
@@ -76,7 +92,7 @@ class Trials:
     def __exit__(self, *problem: object) -> None:
         self.pool.close()
 
-    def run(self, count: int, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
+    def run(self, count: int, rows: Rows) -> Outcome:
         """Run a round.
 
         Parameters
@@ -86,13 +102,6 @@ class Trials:
         rows : callable
             Lays out cells by their numbers, block by block.
 
-        Returns
-        -------
-        error : ndarray, shape (count,)
-            Mean synchronisation errors, infinite if a cell did not finish.
-        status : ndarray of int, shape (count,)
-            How the cells ended.
-
         Raises
         ------
         SweepInterrupted
@@ -101,12 +110,18 @@ class Trials:
             If the workers are lost.
         """
         error, status = np.full(count, np.inf), np.full(count, int(Status.NOT_RUN))
+        end, steps = np.full((count, self.scene.equations.dimension), np.nan), np.zeros(count, dtype=np.int64)
         reporter = self.execution.reporter(count)
         size = block_size(self.scene, self.width, self.execution.size, count)
 
         def finish(task: Task, buffers: Buffers) -> None:
-            error[task.cells] = mean_errors(buffers if self.expand is None else self.expand(buffers))
+            whole = buffers if self.expand is None else self.expand(buffers)
+            error[task.cells], end[task.cells] = (
+                mean_errors(whole),
+                np.where(whole.finished[:, None], whole.end, np.nan),
+            )
             status[task.cells] = buffers.status
+            steps[task.cells] = buffers.counts[:, [Count.ACCEPTED, Count.REJECTED]].sum(axis=1)
             reporter.add(tally(buffers.status))
 
         blocks = (np.arange(first, min(first + size, count)) for first in range(0, count, size))
@@ -123,7 +138,7 @@ class Trials:
             raise SweepFailed(f"the workers are lost ({problem})", finished, count) from problem
         finally:
             reporter.close()
-        return error, status
+        return Outcome(error, status, end, steps)
 
 
 def mean_errors(buffers: Buffers) -> np.ndarray:

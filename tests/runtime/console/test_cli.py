@@ -29,6 +29,7 @@ from synchain.runtime.console.outcome import print_json
 from synchain.runtime.opening.open import open_result
 from synchain.runtime.sweeps import job, stream
 from synchain.runtime.synchronisation import threshold
+from synchain.runtime.synchronisation.criterion import PAPER
 from synchain.runtime.synchronisation.exponent_windows import ExponentWindows
 
 SCENE = """
@@ -371,11 +372,11 @@ def fake_thresholds(found: list[dict[str, Any]]) -> Any:
         nothing = np.zeros(3)
         pair = threshold.Sweep(2 * x, nothing, nothing, ((0.0, 0.466), (0.9, 1.2)))
         direct = threshold.Sweep(x, nothing, nothing, ((0.0, 0.15), (0.3, 0.6)))
-        windows = ExponentWindows(((0.0, 0.1551), (0.3, 0.4)), ((0.0, 2e-4), (math.inf, 0.0)))
+        windows = ExponentWindows(((0.0, 0.1551), (0.3, 0.4)), ((0.0, 2e-4), (math.inf, math.inf)))
         if scene.topology.name == "ring":
             windows = ExponentWindows(absent="a contact without a jump")
         ranges = ((0.0, 0.155), (0.3, 0.4))
-        return threshold.Thresholds(scene, pair, ranges, direct, criterion, windows, ("a warning",))
+        return threshold.Thresholds(scene, pair, ranges, direct, PAPER, windows, ("a warning",))
 
     return thresholds
 
@@ -386,13 +387,11 @@ def test_thresholds_below_zero_end_with_the_grid_at_zero() -> None:
     below = [np.array([low, 0.0]) for low in (-0.4, -1.2)]
     pair, direct = (threshold.Sweep(x, nothing, nothing, ((x[0], -0.1), (-0.05, 0.0))) for x in below)
     windows = ExponentWindows(((-0.2, 0.0),), ((0.001, 0.0),))
-    found = threshold.Thresholds(
-        Scene(topology=chain(3)), pair, ((-0.02, 0.0),), direct, threshold.Criterion(), windows
-    )
-    ranges = [line.split("  ")[-1].strip() for line in report(found, threshold.Criterion()).splitlines()[1:5]]
-    assert ranges[0] == "[-1.2000..., -0.1000], [-0.0500, 0.0000...]"
-    assert ranges[1] == "[-0.0200, 0.0000...]"
-    assert ranges[2] == "[-0.2000 ± 0.001, 0.0000...]"
+    found = threshold.Thresholds(Scene(topology=chain(3)), pair, ((-0.02, 0.0),), direct, PAPER, windows)
+    ranges = [line.split("  ")[-1].strip() for line in report(found).splitlines()[1:5]]
+    assert ranges[0] == "[-0.2000 ± 0.001, 0.0000...]"
+    assert ranges[1] == "[-1.2000..., -0.1000], [-0.0500, 0.0000...]"
+    assert ranges[2] == "[-0.0200, 0.0000...]"
     assert ranges[3] == "[-0.4000..., -0.1000], [-0.0500, 0.0000...]"
 
 
@@ -406,17 +405,18 @@ def test_thresholds_as_json_and_as_a_table(monkeypatch: pytest.MonkeyPatch, caps
         "probe": [[0.0, 0.466], [0.9, 1.2]],
         "predicted": [[0.0, 0.155], [0.3, 0.4]],
         "exponents": [[0.0, 0.1551], [0.3, 0.4]],
-        "exponent_errors": [[0.0, 2e-4], [None, 0.0]],
+        "exponent_errors": [[0.0, 2e-4], [None, None]],
         "no_exponents": None,
         "warnings": ["a warning"],
     }
     assert main(words) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "chain(3), omega = 1.15: where all oscillators synchronise"
-    assert lines[1].split(maxsplit=2)[2] == "[0.0000, 0.1500], [0.3000, 0.6000...]"
-    assert lines[2].endswith("[0.0000, 0.1550], [0.3000, 0.4000...]")  # the probe ends at 1.2 / 3
+    assert lines[2].split(maxsplit=2)[2] == "[0.0000, 0.1500], [0.3000, 0.6000...]"
+    assert lines[3].endswith("[0.0000, 0.1550], [0.3000, 0.4000...]")  # the probe ends at 1.2 / 3
     assert next(line for line in lines if "Wu-Chua" in line).endswith(" [0.0000, 0.1553]")  # 0.466 / 3
-    exponents = next(line for line in lines if "negative exponents" in line)
+    exponents = lines[1]
+    assert "negative exponents" in exponents
     assert exponents.endswith("  [0.0000, 0.1551 ± 0.0002], [0.3000 ± inf, 0.4000...]")
     assert main([*words, "--topology", "ring"]) == 0
     lines = capsys.readouterr().out.splitlines()

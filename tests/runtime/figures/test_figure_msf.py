@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from synchain.runtime.figures import exponent, load, plane, style, synchronisabi
 from synchain.runtime.figures.figure_runs import QUICK, FigureRuns, Quality
 from synchain.runtime.figures.make import make
 from synchain.runtime.stability.msf import MSF, Plane
-from synchain.runtime.synchronisation.criterion import Criterion
+from synchain.runtime.synchronisation.criterion import PAPER
 
 
 @pytest.fixture
@@ -215,7 +216,7 @@ def test_the_map_is_written_with_a_column_for_each_network(simulation: Simulatio
 
 
 def test_a_tiny_function_from_a_real_run() -> None:
-    runs = FigureRuns(Quality(points=3, criterion=Criterion(starts=1, transient=2.0)), workers=1)
+    runs = FigureRuns(Quality(points=3, criterion=replace(PAPER, starts=1, transient=2.0)), workers=1)
     (found, *_) = (exponent.curve(load_scene("figure_5"), runs),)
     assert found.alpha.tolist() == [0.0, 0.6, 1.2]
     assert found.exponent[0] < 0 < found.exponent[1]

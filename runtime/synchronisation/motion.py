@@ -1,0 +1,184 @@
+"""The synchronous motion of a network: how far it moves, how fast it turns, and how many steps it takes.
+
+Tolerances and times follow it, so that results depend neither on the units of states nor on that of time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from synchain.codegen.driver.columns import Span
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.friction import SLIP
+from synchain.models.scenes.scene import Scene
+
+from ..cells.plan import Plan
+from ..cells.rates import rates
+from ..support.status import Status
+from .trials import Outcome, Rows, Trials
+
+__all__ = ["Motion", "alike", "columns_of", "first_starts", "measure_motion", "spread_of"]
+
+SAMPLES = 64
+"""States at which a stretch of the motion is looked at."""
+
+REST = 1e-5
+"""A component rests if it moves by less than this part of what it moved from the start on."""
+
+SEEN = 1e-7
+"""Part of the size of a state below which a movement is that of rounding."""
+
+TURNS, ROUNDS, LONGER = 2.0, 20, 2.0
+"""Turns of an undriven motion that tell its pace; most stretches of time that are tried, each so many times the last."""
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What is measured of a synchronous motion.
+
+    extent (components,): what each compared component moves, less its drift; of one that comes to rest, what it moved from
+    the start on.  radian: time in which the motion turns by a radian.  pace: steps in a unit of time.  unit: the scene's
+    unit of time, in non-dimensional time.
+    """
+
+    extent: np.ndarray
+    radian: float
+    pace: float
+    unit: float
+
+    @property
+    def size(self) -> float:
+        """The extent of all components, as the synchronisation error is one distance."""
+        return float(np.linalg.norm(self.extent))
+
+
+def columns_of(equations: Equations) -> np.ndarray:
+    """Return where in the state the compared components stand (components, nodes)."""
+    place = {name: k for k, name in enumerate(equations.state)}
+    return np.array([[place[f"{name}_{i + 1}"] for i in range(equations.n)] for name in equations.compared])
+
+
+def alike(equations: Equations, row: Plan) -> Plan:
+    """Return a row in which all oscillators start from the state of the first one."""
+    start, columns = row.start.copy(), columns_of(equations)
+    start[:, columns] = start[:, columns[:, :1]]
+    return replace(row, start=start)
+
+
+def first_starts(scene: Scene, count: int) -> dict[str, list[float]] | None:
+    """Return starts of so many oscillators that go on as the first two of a scene do; None for the default start."""
+    if scene.given["initial"] is None:
+        return None
+    first = {name: (*values, values[0])[:2] for name, values in scene.initial.items() if name != SLIP.name}
+    return {name: [a + k * (b - a) for k in range(count)] for name, (a, b) in first.items()}
+
+
+def spread_of(equations: Equations, start: np.ndarray) -> np.ndarray:
+    """Return how far apart the oscillators of some starts (cells, dimension) are, by components."""
+    return np.asarray(np.ptp(start[:, columns_of(equations)], axis=(0, 2)))
+
+
+def measure_motion(
+    trials: Trials,
+    rows: Callable[[Plan], Plan],
+    equations: Equations,
+    row: Plan,
+    times: tuple[float | None, float | None],
+    apart: np.ndarray,
+) -> Motion:
+    """Measure the motion that begins with a row of the whole network.
+
+    Parameters
+    ----------
+    trials : Trials
+        Run the equations, or what is left of them.
+    rows : callable
+        What is left of rows of the whole network.
+    equations : Equations
+        Those of the whole network.
+    row : Plan
+        One row (`alike`), whose window begins after one unit of the scene's time.
+    times : (float or None, float or None)
+        Transient and window in units of the scene's time; None for 1000 and 100 radians.
+    apart : ndarray, shape (components,)
+        Extent of components that do not move at all.
+    """
+
+    def sample(ends: np.ndarray) -> Outcome:
+        spans = np.tile(row.spans, (len(ends), 1))
+        spans[:, Span.START], spans[:, Span.END] = 0.0, ends
+        cells = replace(row.take(np.zeros(len(ends), dtype=int)), spans=spans)
+        lay_out: Rows = lambda which: rows(cells.take(which))  # noqa: E731
+        return trials.run(len(ends), lay_out)
+
+    columns, unit = columns_of(equations), float(row.spans[0, Span.START])
+    period = float(row.spans[0, Span.PERIOD])
+
+    def inverse(state: np.ndarray) -> float:
+        fastest = max(rates(equations, state, row.numbers[0])[:2])
+        return 1.0 / fastest if 0.0 < fastest < math.inf else math.inf
+
+    radian = period / (2.0 * math.pi) if period else _radian(sample, columns, row.start[0], inverse)
+    transient, window = (
+        radian * radians if time is None else time * unit for time, radians in zip(times, (1000.0, 100.0), strict=True)
+    )
+    early = window * np.arange(1, SAMPLES + 1) / SAMPLES
+    late = transient + window * (np.arange(1, SAMPLES + 1) * (math.sqrt(5.0) - 1.0) / 2.0 % 1.0)
+    found = sample(np.concatenate([early, late]))
+    paces = np.where(found.status == Status.FINISHED, found.steps / np.concatenate([early, late]), 0.0)
+    states = np.concatenate([row.start, found.end])[:, columns]
+    extent = _extent(np.concatenate([[0.0], early, late]), states, SAMPLES)
+    return Motion(np.where(extent > 0.0, extent, apart), radian, max(float(paces.max()), 1.0 / radian), unit)
+
+
+def _radian(
+    sample: Callable[[np.ndarray], Outcome],
+    columns: np.ndarray,
+    start: np.ndarray,
+    inverse: Callable[[np.ndarray], float],
+) -> float:
+    """The time in which an undriven motion turns by a radian; if it does not, the inverse of its fastest rate.
+
+    1 if there is no rate.
+    """
+    least = inverse(start)
+    length = least if math.isfinite(least) else 1.0
+    for _ in range(ROUNDS):
+        found = sample(length * np.arange(1, SAMPLES + 1) / SAMPLES)
+        states = found.end[:, columns[:, 0]]
+        if not np.isfinite(states).all():
+            break
+        moved = _without_drift(np.arange(SAMPLES), states, 0)
+        whole, last = np.ptp(moved, axis=0), np.ptp(moved[SAMPLES // 2 :], axis=0)
+        moves = last > REST * np.ptp(states, axis=0)
+        if not moves.any():
+            least = min(least, inverse(found.end[-1]))
+            break
+        turns = (np.abs(np.diff(moved, axis=0)).sum(axis=0)[moves] / (2.0 * whole[moves])).max()
+        if turns >= TURNS:
+            return float(length / (2.0 * math.pi * turns))
+        length *= LONGER
+    return least if math.isfinite(least) else 1.0
+
+
+def _without_drift(time: np.ndarray, states: np.ndarray, first: int) -> np.ndarray:
+    """States (times, …) less the straight line through those from the `first` on."""
+    late = time[first:] - time[first:].mean()
+    slope = np.tensordot(late, states[first:], axes=1) / (late @ late)
+    return np.asarray(states - np.multiply.outer(time - time[first:].mean(), slope) - states[first:].mean(axis=0))
+
+
+def _extent(time: np.ndarray, states: np.ndarray, late: int) -> np.ndarray:
+    """What components move in the `late` last of some states (times, components, nodes), 0 where all of them rest."""
+    good = np.isfinite(states).all(axis=(1, 2))
+    late = int(good[-late:].sum())
+    if late < 3:
+        return np.zeros(states.shape[1])
+    moved = _without_drift(time[good], states[good], -late)
+    now, ever, least = np.ptp(moved[-late:], axis=0), np.ptp(moved, axis=0), SEEN * np.abs(states[good]).max(axis=0)
+    moves, came = now > np.maximum(REST * ever, least), ever > least
+    return np.asarray(np.where(moves, now, np.where(came, ever, 0.0)).max(axis=-1))
