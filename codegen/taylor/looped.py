@@ -1,8 +1,8 @@
 """A Taylor step for a large network: loops over orders, nodes and links around the same recurrences.
 
 Behind the rows of the dense output stand the coefficients of the states, the rates of one order, and the coefficients of
-every series that a convolution reads: coefficient k of node i at `at_… + k*NODES + i`, of link e at `at_… + k*LINKS + e`, of
-what depends on time alone at `at_… + k`.
+every series that a convolution reads: coefficient k of node i at `at_… + i*TERMS + k`, of link e at `at_… + e*TERMS + k`, of
+what depends on time alone at `at_… + k`.  A convolution reads neighbours in memory, whatever the size of the network.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Block, Edge, Node
 
-from ..program.expressions import ONE, ZERO, Expression, Load, Name, Number, Product, call, factors_of, plus
+from ..program.expressions import ONE, ZERO, Expression, Load, Name, Number, call, plus
 from ..program.passes import Hoist, Names, real
 from ..program.statements import Assign, Comment, Loop, Statement, Store, let, whole
 from ..steps.fields import MeanField, compensated, mean_fields
@@ -37,11 +37,11 @@ __all__ = ["write_looped"]
 
 CONVOLUTION = '''
 @njit(error_model='numpy')
-def convolution(dense, left, left_step, right, right_step, k, first, end):
-    """Sum of left_j*right_(k-j) for j = first … end - 1; the coefficients of a series stand a step apart."""
+def convolution(dense, left, right, k, first, end):
+    """Sum of left_j*right_(k-j) for j = first … end - 1."""
     total = broadcast(0.0, WIDTH)
     for j in range(first, end):
-        total = total + load(dense, left + j*left_step, WIDTH)*load(dense, right + (k - j)*right_step, WIDTH)
+        total = total + load(dense, left + j, WIDTH)*load(dense, right + (k - j), WIDTH)
     return total
 '''.strip()
 """Loops of its own in each sum would take most of the time of a compilation."""
@@ -55,9 +55,6 @@ START, ORDER = Number(0), Name("k")
 NOTHING = 0.0 * Name("scale")
 """Zeros in all lanes."""
 
-COUNTS = {"": Number(1), "i": Name("NODES"), "e": Name("LINKS")}
-"""How far the coefficients of a series of one order stand behind those of the last, by the loop that makes them."""
-
 
 @dataclass(frozen=True, slots=True)
 class Hoisted:
@@ -69,18 +66,16 @@ class Hoisted:
 
 
 class Track(NamedTuple):
-    """Where the coefficients of a series stand in the workspace: in a part of it, by order and place."""
+    """Where the coefficients of a series stand in the workspace: in a part of it, by place and order."""
 
     name: str
-    stride: Expression
     place: Expression | None
 
     def at(self, order: Expression) -> Expression:
         """Where that of some order stands."""
         if self.place is None:
             return Name(f"at_{self.name}") + order
-        behind = [] if order == START else [Product((order, *factors_of(self.stride)))]
-        return plus(Name(f"at_{self.name}"), *behind, self.place)
+        return plus(Name(f"at_{self.name}"), self.place * Name("TERMS"), order)
 
     def load(self, order: Expression) -> Expression:
         """The coefficient of some order."""
@@ -140,7 +135,7 @@ class Section(Part):
             return ZERO if first else times(self.of(left), self.of(right))
         total = f"s{self.sums}"
         self.sums += 1
-        ends = (part for s in (left, right) for part in (self.track(s).at(START), self.track(s).stride))
+        ends = (self.track(s).at(START) for s in (left, right))
         end = ORDER + 1 if last == 0 else ORDER
         self.put(let(total, call("convolution", "dense", *ends, ORDER, first, end)))
         return Name(total)
@@ -163,7 +158,7 @@ class Section(Part):
 
     def own(self, name: str) -> Track:
         """Where something of this section stands."""
-        return Track(name, COUNTS[self.index], Name(self.index) if self.index else None)
+        return Track(name, Name(self.index) if self.index else None)
 
     def track(self, series: Series) -> Track:
         """Where the coefficients of a series stand."""
@@ -185,10 +180,14 @@ class Section(Part):
         return {*used, *self.graph.watched, *self.graph.positive, *self.lent} - {*self.outer}
 
     def recall(self, what: str) -> Expression:
-        return self.own(what).load(START)
+        return Load("dense", self.single(what))
 
     def note(self, what: str, value: Expression) -> Statement:
-        return self.own(what).store(START, value)
+        return Store("dense", self.single(what), value)
+
+    def single(self, what: str) -> Expression:
+        """Where something stands that has one value for each turn of the section, whatever the order."""
+        return plus(Name(f"at_{what}"), *([Name(self.index)] if self.index else []))
 
     def signs(self, series: Series) -> list[Statement]:
         return [span("k", self.order + 1, 1).over([further(self.at(series, ORDER))])]
@@ -207,7 +206,7 @@ class Section(Part):
 
     def stored(self, series: Sequence[Series], sizes: Sequence[Expression]) -> tuple[list[Statement], list[Stored]]:
         tracks = zip(sizes, map(self.track, series), strict=True)
-        return [], [Stored(size, track.at(START), track.stride, self.order) for size, track in tracks]
+        return [], [Stored(size, track.at(START), self.order) for size, track in tracks]
 
     # -- statements -----------------------------------------------------------------------------------------------
 
@@ -276,12 +275,12 @@ class Totals(Section):
 
 def of_state(place: Expression) -> Track:
     """Where the coefficients of a state stand."""
-    return Track("states", Name("DIMENSION"), place)
+    return Track("states", place)
 
 
 def of_gap(place: Expression) -> Track:
     """Where the coefficients of the gap of a contact stand."""
-    return Track("gaps", 2 * Name("NODES"), place)
+    return Track("gaps", place)
 
 
 def gaps_of(mode: str) -> Gaps:
@@ -543,11 +542,11 @@ class Looped(StepWriter):
             sizes |= {"gaps": (p + 1) * 2 * eq.n, "sizes": 2 * eq.n, "closing": p + 1}
         for section in self.parts:
             kept = {s.name for s in section.remembered}
-            sizes |= {name: self.orders * section.count for name in sorted(kept - {"t", ""})}
+            sizes |= {name: (p + 1) * section.count for name in sorted(kept - {"t", ""})}
             sizes |= {name: section.count for name in (*section.kept, *section.hints)}
             if isinstance(section, Totals):
-                sizes |= {name: self.orders for name, _ in section.totals}
-        found, size = list[Statement](), 0
+                sizes |= {name: p + 1 for name, _ in section.totals}
+        found, size = [whole("TERMS", Number(p + 1))], 0
         for name, groups in sizes.items():
             found.append(whole(f"at_{name}", Name("DENSE_ROWS") * "DIMENSION" + size))
             size += groups
