@@ -8,7 +8,7 @@ import sympy as sp
 from samples import real
 
 from synchain.models.interactions import separation
-from synchain.models.interactions.separation import separated
+from synchain.models.interactions.separation import separated, summed
 from synchain.models.mechanics.components import TIME, Edge
 
 X, Y, X_J, Y_J, W, K, A, OMEGA, OMEGA_J = real("x_i", "y_i", "x_j", "y_j", "weight", "K", "a", "omega", "omega_j")
@@ -93,3 +93,48 @@ def test_a_wrong_theorem_does_not_pass_the_proof(name: str, monkeypatch: pytest.
     }
     monkeypatch.setattr(separation, "_THEOREMS", wrong)
     assert separated.__wrapped__(SEPARATE[name][0]) is None
+
+
+SUMMED = {
+    "sine": (edge(K * W * sp.sin(GAP - A)), 2, False),
+    "sum inside": (edge(K * W * (sp.sin(GAP) + A * sp.cos(2 * GAP))), 4, False),
+    "synapse": (edge(-K * W * (X - A) / (1 + sp.exp(-3 * X_J))), 1, False),
+    "sine beside a spring": (edge(W * sp.sin(GAP) + K * W * GAP), 2, True),
+    "parameters of both": (edge(K * W * OMEGA * OMEGA_J * sp.sin(X_J), theirs=True), 1, False),
+}  # fmt: skip
+
+UNSUMMED = {
+    "difference": edge(K * W * GAP),
+    "cube": edge(K * W * GAP**3),
+    "exponential": edge(K * W * sp.exp(GAP)),
+    "gap times a function": edge(K * W * GAP * sp.tanh(X_J)),
+    "square of a sine": edge(K * W * sp.sin(GAP) ** 2),
+    "driven": edge(K * W * sp.sin(GAP - TIME)),
+    "oriented": edge(K * W * sp.sin(X_J), oriented=True),
+}
+
+
+@pytest.mark.parametrize("name", SUMMED)
+def test_sums_over_links_and_the_rest_are_the_link(name: str) -> None:
+    link, sources, remains = SUMMED[name]
+    found = summed(link, ("omega",))
+    assert found is not None
+    assert (len(found.sources), any(found.rest)) == (sources, remains)
+    for rate, row, rest in zip(link.rhs, found.products, found.rest, strict=True):
+        total = rest + sum(shared * own * target * source for shared, own, target, source in row)
+        assert sp.expand(sp.expand_trig(rate - total)) == 0
+        for shared, own, target, source in row:
+            assert not shared.free_symbols & {X, Y, X_J, Y_J, OMEGA, OMEGA_J, W}
+            assert own.free_symbols <= {W}
+            assert not target.free_symbols & {X_J, Y_J, OMEGA_J}
+            assert not source.free_symbols & {X, Y, OMEGA}
+
+
+@pytest.mark.parametrize("name", UNSUMMED)
+def test_links_whose_products_lose_digits_stay_as_they_are(name: str) -> None:
+    assert summed(UNSUMMED[name], ("omega",)) is None
+
+
+def test_numbers_of_a_link_stand_with_its_weight() -> None:
+    found = summed(edge(K * A * W * sp.sin(GAP)), (), ("a",))
+    assert {own for _, own, *_ in found.products[0]} == {A * W}
