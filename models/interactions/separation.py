@@ -113,8 +113,10 @@ def summed(edge: Edge, varied: tuple[str, ...] = (), numbered: tuple[str, ...] =
         row, left = [], []
         for term in sp.Add.make_args(e):
             found = _products(term, target, source, bounded=True)
-            curved = found and any(not f.is_polynomial(*target, *source) for pair in found for f in pair)
-            if curved and found and _vanishes(term - sum(c * a * b for (a, b), c in found.items())):
+            functions = [f for pair in found or () for f in pair]
+            curved = any(not f.is_polynomial(*target, *source) for f in functions)
+            alike = not any(f.has(*own) for f in functions)  # the same function for all links
+            if curved and alike and found and _vanishes(term - sum(c * a * b for (a, b), c in found.items())):
                 row += [(*c.as_independent(*own, as_Add=False), a, b) for (a, b), c in found.items()]
             else:
                 left.append(term)
