@@ -23,7 +23,7 @@ from ..simd import lanes
 from ..steps.blocks import NodeBlocks, analyse
 from ..steps.contacts import push_functions
 from ..steps.looped import Looped
-from ..steps.names import renamed, tidy
+from ..steps.names import tidy
 from ..steps.program import FILL_LIMIT, Program, program, workspace
 from ..steps.step import Step, function_name, node_function, scaling
 from ..steps.unrolled import Unrolled
@@ -394,7 +394,8 @@ def describe(
     more: str = "",
 ) -> str:
     """The docstring at the head of a kernel module."""
-    swapped = tuple(f"{a} as {b}" for a, b in renamed(equations, plain).items() if a != b)
+    names = ((*eq.state, *eq.parameters) for eq in (equations, plain))
+    swapped = tuple(f"{a} as {b}" for a, b in zip(*names, strict=True) if a != b)
     rows = [
         f"Generated kernel: {equations.n} oscillator{'s' * (equations.n > 1)}, {equations.link_count} links, {method.name}.",
         "",

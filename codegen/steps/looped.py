@@ -34,7 +34,7 @@ from ..program.statements import (
     whole,
 )
 from .blocks import NodeBlocks
-from .fields import mean_fields
+from .fields import LinkSums, link_sums, mean_fields
 from .mass import added_masses, momentum_slopes, turned_masses
 from .names import NAMES
 from .places import Joint, Kind, link_ends, named, places, span
@@ -61,6 +61,9 @@ class Looped(Step):
     ) -> None:
         super().__init__(equations, kinds, method)
         self.places, self.elimination, self.fields = places(equations), elimination, mean_fields(equations)
+        self.sums, self.joints = list[LinkSums](), list(self.places.joints)
+        if not method.implicit:  # the matrix of an implicit step needs both ends of each link anyway
+            self.sums, self.joints = link_sums(equations, self.places.joints)
         self.mass = LoopMass(self)
 
     def opening(self) -> None:
@@ -71,7 +74,7 @@ class Looped(Step):
         if self.solves:
             base["ENTRIES"] = Name("DIMENSION") + "column.size"
             base |= self.mass.bases(base["MATRIX"] + self.matrices)
-        if any(field.alike for field in self.fields):
+        if self.sums or any(field.alike for field in self.fields):
             base["FIELD"] = base["MATRIX"] + self.matrices if self.solves else base["MATRIX"]
         self.put(Assign(NAMES, Name("graph"), whole=True))
         self.put(*(whole(name, place) for name, place in base.items()))
@@ -103,6 +106,9 @@ class Looped(Step):
             for field in self.fields:
                 self.put(*field.statements(self.places, "y", "out", kept))
                 kept += len(field.alike)
+            for links in self.sums:
+                self.put(*links.statements(self.places, "y", "out", kept))
+                kept += links.kept
         needed = mentioned(body)
         given = [name for name in ("h", "p", *targets(self.statements), "weights") if name in needed]
         about = "Write the right-hand side at the states y behind the place `out` of the workspace."
@@ -124,7 +130,7 @@ class Looped(Step):
         """Add what each link contributes to the slopes, where `out` says where, in a stage or at the `start` of the step,
         and on demand to the matrix and to the time slopes.
         """
-        for joint in self.places.joints:
+        for joint in self.joints:
             edge = joint.edge
             inertia = [e for block in edge.inertia for row in block for e in row] if jacobian else []
             found, swap = self.link(joint, base, (*edge.rhs, *inertia)), named(joint) | ({} if start else NOW)

@@ -210,7 +210,8 @@ def joint_numbers(equations: Equations) -> list[int]:
     found, first = list[int](), 0
     for layer in equations.listed:
         number = {ends: k for k, (ends, _) in enumerate(layer.edge_of, start=first)}
-        found += [number[equations.ends(link)] for link in layer.links]
+        alike = len(number) == 1
+        found += [first] * len(layer.links) if alike else [number[equations.ends(link)] for link in layer.links]
         first += len(number)
     return found
 
@@ -221,14 +222,21 @@ def by_kind(equations: Equations) -> list[int]:
 
 
 def by_joint(equations: Equations) -> tuple[Link, ...]:
-    """Return the listed links in the order in which a kernel numbers them: joint after joint."""
+    """Return the listed links in the order in which a kernel numbers them: joint after joint, of each the first of all nodes.
+
+    Neighbours in this order add to different nodes, so that no addition waits for the one before.
+    """
     return tuple(link for link, _ in _by_joint(equations))
 
 
 def _by_joint(equations: Equations) -> list[tuple[Link, Layer]]:
     links = ((link, layer) for layer in equations.listed for link in layer.links)
-    pairs = zip(joint_numbers(equations), links, strict=True)
-    return [pair for _, pair in sorted(pairs, key=lambda pair: pair[0])]
+    pairs, numbers, seen = list(links), joint_numbers(equations), Counter[tuple[int, int]]()
+    keys = list[tuple[int, int]]()
+    for number, (link, _) in zip(numbers, pairs, strict=True):
+        keys.append((number, seen[number, link[0]]))
+        seen[number, link[0]] += 1
+    return [pairs[k] for k in sorted(range(len(pairs)), key=keys.__getitem__)]
 
 
 def link_table(equations: Equations) -> np.ndarray:

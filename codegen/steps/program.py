@@ -23,9 +23,9 @@ from synchain.models.graphs.links import Link
 from synchain.models.mechanics.components import Edge, Node
 
 from .elimination import Entry, Plan
-from .fields import mean_fields
+from .fields import link_sums, mean_fields
 from .mass import added_masses, momentum_slopes, turned_masses
-from .places import by_joint, by_kind, joint_numbers, link_table, table
+from .places import by_joint, by_kind, joint_numbers, link_table, places, table
 from .step import Step
 
 __all__ = ["FILL_LIMIT", "Program", "block_pattern", "program", "workspace"]
@@ -275,10 +275,13 @@ def workspace(w: Step, elimination: Program) -> int:
     """Groups of scratch memory: stages, stage state, slopes, time slopes and, for implicit methods, the matrix.
 
     Factors of an incomplete elimination stand beside the matrix, exact ones replace it.  Where M is not the
-    identity, an implicit method keeps it too, and the rates at the start if M depends on the state.  A mean field keeps what nodes are as sources.
+    identity, an implicit method keeps it too, and the rates at the start if M depends on the state.  A mean field keeps what nodes are as sources, links that
+    are summed by nodes their sums too.
     """
     vectors = (len(w.method.c) + 3) * w.equations.dimension
     vectors += sum(len(field.alike) for field in mean_fields(w.equations)) * w.equations.n
+    if not w.method.implicit:
+        vectors += sum(links.kept for links in link_sums(w.equations, places(w.equations).joints)[0]) * w.equations.n
     if not w.method.implicit and not w.equations.inertial:
         return vectors
     matrix = elimination.entries if elimination.exact else 2 * elimination.entries

@@ -1,8 +1,8 @@
 """A Taylor step for a large network: loops over orders, nodes and links around the same recurrences.
 
 Behind the rows of the dense output stand the coefficients of the states, the rates of one order, and the coefficients of
-every series that a convolution reads: coefficient k of node i at `at_… + k*NODES + i`, of link e at `at_… + k*LINKS + e`, of
-what depends on time alone at `at_… + k`.
+every series that a convolution reads: coefficient k of node i at `at_… + i*TERMS + k`, of link e at `at_… + e*TERMS + k`, of
+what depends on time alone at `at_… + k`.  A convolution reads neighbours in memory, whatever the size of the network.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Block, Edge, Node
 
-from ..program.expressions import ONE, ZERO, Expression, Load, Name, Number, Product, call, factors_of, plus
+from ..program.expressions import ONE, ZERO, Expression, Load, Name, Number, call, plus
+from ..program.lowering import lower
 from ..program.passes import Hoist, Names, real
 from ..program.statements import Assign, Comment, Loop, Statement, Store, let, whole
-from ..steps.fields import MeanField, compensated, mean_fields
+from ..steps.fields import LinkSums, MeanField, compensated, link_sums, mean_fields
 from ..steps.names import NAMES
 from ..steps.places import Joint, Kind, Span, link_ends, places, span, theirs
 from ..steps.step import lane
@@ -37,11 +38,11 @@ __all__ = ["write_looped"]
 
 CONVOLUTION = '''
 @njit(error_model='numpy')
-def convolution(dense, left, left_step, right, right_step, k, first, end):
-    """Sum of left_j*right_(k-j) for j = first … end - 1; the coefficients of a series stand a step apart."""
+def convolution(dense, left, right, k, first, end):
+    """Sum of left_j*right_(k-j) for j = first … end - 1."""
     total = broadcast(0.0, WIDTH)
     for j in range(first, end):
-        total = total + load(dense, left + j*left_step, WIDTH)*load(dense, right + (k - j)*right_step, WIDTH)
+        total = total + load(dense, left + j, WIDTH)*load(dense, right + (k - j), WIDTH)
     return total
 '''.strip()
 """Loops of its own in each sum would take most of the time of a compilation."""
@@ -55,9 +56,6 @@ START, ORDER = Number(0), Name("k")
 NOTHING = 0.0 * Name("scale")
 """Zeros in all lanes."""
 
-COUNTS = {"": Number(1), "i": Name("NODES"), "e": Name("LINKS")}
-"""How far the coefficients of a series of one order stand behind those of the last, by the loop that makes them."""
-
 
 @dataclass(frozen=True, slots=True)
 class Hoisted:
@@ -69,18 +67,16 @@ class Hoisted:
 
 
 class Track(NamedTuple):
-    """Where the coefficients of a series stand in the workspace: in a part of it, by order and place."""
+    """Where the coefficients of a series stand in the workspace: in a part of it, by place and order."""
 
     name: str
-    stride: Expression
     place: Expression | None
 
     def at(self, order: Expression) -> Expression:
         """Where that of some order stands."""
         if self.place is None:
             return Name(f"at_{self.name}") + order
-        behind = [] if order == START else [Product((order, *factors_of(self.stride)))]
-        return plus(Name(f"at_{self.name}"), *behind, self.place)
+        return plus(Name(f"at_{self.name}"), self.place * Name("TERMS"), order)
 
     def load(self, order: Expression) -> Expression:
         """The coefficient of some order."""
@@ -140,7 +136,7 @@ class Section(Part):
             return ZERO if first else times(self.of(left), self.of(right))
         total = f"s{self.sums}"
         self.sums += 1
-        ends = (part for s in (left, right) for part in (self.track(s).at(START), self.track(s).stride))
+        ends = (self.track(s).at(START) for s in (left, right))
         end = ORDER + 1 if last == 0 else ORDER
         self.put(let(total, call("convolution", "dense", *ends, ORDER, first, end)))
         return Name(total)
@@ -163,7 +159,7 @@ class Section(Part):
 
     def own(self, name: str) -> Track:
         """Where something of this section stands."""
-        return Track(name, COUNTS[self.index], Name(self.index) if self.index else None)
+        return Track(name, Name(self.index) if self.index else None)
 
     def track(self, series: Series) -> Track:
         """Where the coefficients of a series stand."""
@@ -185,10 +181,14 @@ class Section(Part):
         return {*used, *self.graph.watched, *self.graph.positive, *self.lent} - {*self.outer}
 
     def recall(self, what: str) -> Expression:
-        return self.own(what).load(START)
+        return Load("dense", self.single(what))
 
     def note(self, what: str, value: Expression) -> Statement:
-        return self.own(what).store(START, value)
+        return Store("dense", self.single(what), value)
+
+    def single(self, what: str) -> Expression:
+        """Where something stands that has one value for each turn of the section, whatever the order."""
+        return plus(Name(f"at_{what}"), *([Name(self.index)] if self.index else []))
 
     def signs(self, series: Series) -> list[Statement]:
         return [span("k", self.order + 1, 1).over([further(self.at(series, ORDER))])]
@@ -207,7 +207,7 @@ class Section(Part):
 
     def stored(self, series: Sequence[Series], sizes: Sequence[Expression]) -> tuple[list[Statement], list[Stored]]:
         tracks = zip(sizes, map(self.track, series), strict=True)
-        return [], [Stored(size, track.at(START), track.stride, self.order) for size, track in tracks]
+        return [], [Stored(size, track.at(START), self.order) for size, track in tracks]
 
     # -- statements -----------------------------------------------------------------------------------------------
 
@@ -274,14 +274,38 @@ class Totals(Section):
                 self.put(let(f"{name}_value", value), *compensated(name, f"{name}_value"))
 
 
+@dataclass(eq=False)
+class Gathered(Section):
+    """The sums over the links of each node of some series, by their names."""
+
+    totals: list[tuple[str, Series]] = field(default_factory=list)
+
+    def coefficients(self, order: Expression) -> list[Statement]:
+        """The statements for coefficients `order`, behind those that begin with zero."""
+        zeros = [self.sum_of(name).store(order, NOTHING) for name, _ in self.totals]
+        return [span("i", "NODES").over(zeros), *super().coefficients(order)]
+
+    def finish(self) -> None:
+        """Add the coefficients to the sums; those of a constant beyond the first are zero."""
+        for name, rate in self.totals:
+            value, track = self.of(rate), self.sum_of(name)
+            if value != ZERO:
+                self.put(let("value", add(track.load(self.k), value)), track.store(self.k, Name("value")))
+
+    @staticmethod
+    def sum_of(name: str) -> Track:
+        """Where a sum of the target stands."""
+        return Track(name, Name("i"))
+
+
 def of_state(place: Expression) -> Track:
     """Where the coefficients of a state stand."""
-    return Track("states", Name("DIMENSION"), place)
+    return Track("states", place)
 
 
 def of_gap(place: Expression) -> Track:
     """Where the coefficients of the gap of a contact stand."""
-    return Track("gaps", 2 * Name("NODES"), place)
+    return Track("gaps", place)
 
 
 def gaps_of(mode: str) -> Gaps:
@@ -332,9 +356,10 @@ class Looped(StepWriter):
         self.names = Names([*words, *self.called.values(), *(s + end for s in words for end in ("_here", "_there"))])
         self.varied = [real(name) for name in eq.differing]
         self.waves = Section(Graph(self.names), order)
-        kinds, joints = self.places.kinds, self.places.joints
-        nodes = [self.hoisted(with_gaps(kind.node), [*kind.node.state, *self.varied]) for kind in kinds]
-        links = [self.of_links(joint.edge, with_pushes(joint)) for joint in joints]
+        kinds, (self.sums, joints) = self.places.kinds, link_sums(equations, self.places.joints)
+        rates = [[*with_gaps(kind.node), *(e for links in self.sums for e in links.of_node())] for kind in kinds]
+        nodes = [self.hoisted(e, [*kind.node.state, *self.varied]) for kind, e in zip(kinds, rates, strict=True)]
+        pushes = [self.of_links(joint.edge, with_pushes(joint)) for joint in joints]
         fields = [
             [self.of_links(f.edge, e, (*f.sums, *f.shared)) for e in (f.sums.values(), f.shared.values(), f.rates)]
             for f in self.fields
@@ -342,9 +367,13 @@ class Looped(StepWriter):
         self.waves.graph.settle(self.waves.lent)
         if self.waves.lent:
             self.waves.outer.append(self.time)
-        self.parts: list[Section] = [self.waves, *map(self.node, kinds, nodes), *map(self.link, joints, links)]
+        self.parts: list[Section] = [self.waves, *map(self.node, kinds, nodes), *map(self.link, joints, pushes)]
         for mean, parts in zip(self.fields, fields, strict=True):
             self.parts += self.field(mean, *parts)
+        names = [name for links in self.sums for name in links.functions]
+        functions = dict(zip(names, self.lent, strict=True))
+        for links in self.sums:
+            self.parts += self.summed(links, {name: functions[name] for name in links.functions})
         self.ends = eq.sticks or any(section.graph.kinks for section in self.parts)
         self.orders = order + 1 if self.ends else order
 
@@ -356,7 +385,11 @@ class Looped(StepWriter):
         self.end(section, node.state, node, ("", "i"), node.state)
         used = {s for e in (*found.rates, *(e for row in node.inertia for e in row)) for s in e.free_symbols}
         section.setting += self.loaded(self.places.own(used))
-        self.store(section, node, self.read(section, found, node.inertia))
+        series, size = self.read(section, found, node.inertia), len(with_gaps(node))
+        self.store(section, node, series[:size])
+        # what the node is as a source of links that are summed stands in memory for them
+        self.node_part, self.lent = section, series[size:]
+        section.lent += [s for s in series[size:] if not isinstance(s, Constant)]
         if node.contact is not None:
             section.contacts.append(gaps_of(self.called[node.state[2].name]))
         return section
@@ -444,6 +477,29 @@ class Looped(StepWriter):
         self.store(target, field.node, self.read(target, replace(rates, rates=wanted)))
         yield target
 
+    def summed(self, links: LinkSums, functions: Mapping[sp.Symbol, Series]) -> Iterator[Section]:
+        """The sums over links of functions of their sources, and what is added to the rates."""
+        edge, nodes, n = links.joint.edge, self.places.kinds[0].span, self.equations.n
+        sums = Gathered(Graph(self.names), self.order, span=links.joint.span, count=self.places.links)
+        sums.setting += link_ends(edge, self.called[edge.weight.name], "j_there")
+        used = {s for factor, _ in links.sums.values() for s in factor.free_symbols}
+        sums.setting += self.loaded(self.places.of_link(edge, used, "j_there"))
+        for symbol, s in functions.items():
+            known = isinstance(s, Constant)
+            sums.moving[symbol] = s if known else sums.reads(Track(s.name, Name("j_there")), s.name)
+        found = self.read(sums, Hoisted([a * b for a, b in links.sums.values()]))
+        sums.totals = [(s.name, series) for s, series in zip(links.sums, found, strict=True)]
+        yield sums
+        target = Section(Graph(self.names), self.order, span=nodes, count=n, adds=True)
+        rates = links.applied()
+        used = {s for e in rates for s in e.free_symbols}
+        self.end(target, edge.here, links.joint.target, ("_here", "i"), used)
+        target.setting += self.loaded(self.places.own(used))
+        self.see(target, self.node_part, {symbol: s for symbol, s in functions.items() if symbol in used})
+        self.see(target, target, {s: State(name=s.name) for s in links.sums})
+        self.store(target, links.joint.target, self.read(target, Hoisted(rates)))
+        yield target
+
     def field_end(self, section: Section, field: MeanField, suffix: str, used: Container[sp.Symbol]) -> None:
         """Let a section read a node of a mean field; states of which differences alone matter count from the first node's."""
         symbols = field.edge.there if suffix == "_there" else field.edge.here
@@ -461,7 +517,9 @@ class Looped(StepWriter):
 
     def moves(self, node: Node) -> list[bool]:
         """Which states of a node move: one at rest, such as the mode of a contact, is a constant of the step."""
-        edges = [joint.edge for joint in self.places.joints if joint.target == node]
+        edges = [
+            joint.edge for joint in self.places.joints if joint.target == node
+        ]  # those that are summed by nodes too
         return moving(node, [*edges, *(field.edge for field in self.fields)])
 
     def loaded(self, loads: Sequence[Assign]) -> list[Statement]:
@@ -512,6 +570,7 @@ class Looped(StepWriter):
             Assign(NAMES, Name("graph"), whole=True),
             whole("LINKS", Name("target.size")),
             *(let(self.called[name], Load("p", Number(slot))) for slot, name in numbers),
+            *(let(s.name, lower(e.xreplace(self.swap))) for links in self.sums for s, e in links.factors.items()),
             *self.waves.graph.constants,
         ]
 
@@ -543,11 +602,13 @@ class Looped(StepWriter):
             sizes |= {"gaps": (p + 1) * 2 * eq.n, "sizes": 2 * eq.n, "closing": p + 1}
         for section in self.parts:
             kept = {s.name for s in section.remembered}
-            sizes |= {name: self.orders * section.count for name in sorted(kept - {"t", ""})}
+            sizes |= {name: (p + 1) * section.count for name in sorted(kept - {"t", ""})}
             sizes |= {name: section.count for name in (*section.kept, *section.hints)}
+            if isinstance(section, Gathered):
+                sizes |= {name: (p + 1) * eq.n for name, _ in section.totals}
             if isinstance(section, Totals):
-                sizes |= {name: self.orders for name, _ in section.totals}
-        found, size = list[Statement](), 0
+                sizes |= {name: p + 1 for name, _ in section.totals}
+        found, size = list[Statement]([whole("TERMS", Number(p + 1))]), 0
         for name, groups in sizes.items():
             found.append(whole(f"at_{name}", Name("DENSE_ROWS") * "DIMENSION" + size))
             size += groups

@@ -40,10 +40,10 @@ def side_of(value, least):
 
 
 @njit(error_model='numpy')
-def passage(side, size, part, nearest, dense, first, stride, degree, ratio):
+def passage(side, size, part, nearest, dense, first, degree, ratio):
     """How far, from `nearest` at most to `ratio`, until a series has just left its side of zero; 0 is no side.
 
-    Its coefficients stand from group `first` on, each `stride` behind the last. What bounds the bend of the series bounds it
+    Its coefficients stand from group `first` on. What bounds the bend of the series bounds it
     from below by a parabola, whose zero lies before its own, so that the first passage is found whatever comes later; the
     zeros converge like those of Newton's method. A passage counts once it has gone a small `part` of the way that the series
     goes in the step, and more than rounding of `size`; the step ends there. What is neglected is of the order of that part
@@ -51,16 +51,16 @@ def passage(side, size, part, nearest, dense, first, stride, degree, ratio):
     """
     bend, spread = 0.0*ratio, 0.0*ratio
     for k in range(degree, 1, -1):
-        term = absolute(load(dense, first + k*stride, WIDTH))
+        term = absolute(load(dense, first + k, WIDTH))
         bend, spread = fma(bend, ratio, k*(k - 1.0)*term), fma(spread, ratio, term)
-    spread = fma(spread, ratio, absolute(load(dense, first + stride, WIDTH)))*ratio
+    spread = fma(spread, ratio, absolute(load(dense, first + 1, WIDTH)))*ratio
     start = load(dense, first, WIDTH)
     active = (absolute(side) > 0.5) & (side*start <= 1.0001*spread)  # no other series comes as far as zero
     if not any_lane(active):
         return ratio
     unit = side/maximum(fma(0.0*ratio + 1e-4, size, spread), 1e-300)
     bend = absolute(unit)*bend
-    value, slope = fma(unit, start, 0.75*part), unit*load(dense, first + stride, WIDTH)
+    value, slope = fma(unit, start, 0.75*part), unit*load(dense, first + 1, WIDTH)
     place, active = select(active, 0.0, ratio), active & (value > 0.25*part)
     for _ in range(60):
         if not any_lane(active):
@@ -71,7 +71,7 @@ def passage(side, size, part, nearest, dense, first, stride, degree, ratio):
         active = active & (place < ratio)
         value, slope = 0.0*ratio, 0.0*ratio
         for k in range(degree, 0, -1):
-            term = load(dense, first + k*stride, WIDTH)
+            term = load(dense, first + k, WIDTH)
             value, slope = fma(value, place, term), fma(slope, place, 1.0*k*term)
         value, slope = fma(unit, fma(value, place, start), 0.75*part), unit*slope
         active = active & (value > 0.25*part)
@@ -80,7 +80,7 @@ def passage(side, size, part, nearest, dense, first, stride, degree, ratio):
 
 CLOSING = '''
 @njit(error_model='numpy')
-def closing(side, late, size, nearest, dense, first, stride, room, degree, ratio):
+def closing(side, late, size, nearest, dense, first, room, degree, ratio):
     """`passage` of the gap of a contact, from above; a gap that begins at zero is divided by the time.
 
     The rate of a velocity jumps where slip ends, so the passage is as exact as rounding lets it be, or to a part `late`.
@@ -91,11 +91,11 @@ def closing(side, late, size, nearest, dense, first, stride, room, degree, ratio
         return ratio
     if any_lane(begins):
         for k in range(degree):
-            term = load(dense, first + k*stride, WIDTH)
-            store(dense, room + k, select(begins, load(dense, first + (k + 1)*stride, WIDTH), term))
-        store(dense, room + degree, select(begins, 0.0, load(dense, first + degree*stride, WIDTH)))
-        first, stride = room, 1
-    return passage(side, 1e4*size, 1e-14 + late, nearest, dense, first, stride, degree, ratio)
+            term = load(dense, first + k, WIDTH)
+            store(dense, room + k, select(begins, load(dense, first + (k + 1), WIDTH), term))
+        store(dense, room + degree, select(begins, 0.0, load(dense, first + degree, WIDTH)))
+        first = room
+    return passage(side, 1e4*size, 1e-14 + late, nearest, dense, first, degree, ratio)
 '''.strip()
 
 SIDES = '''
@@ -143,22 +143,21 @@ def closed(mode: str, exact: bool, gaps: Sequence[Stored], stuck: str, room: Exp
     late = 0.0 * Name("t") if exact else LATE * Name(stuck)
     found: list[Statement] = [let(stuck, plus(ONE, Negation(Name(mode) * Name(mode))))]
     for side, gap in zip((ONE + 0.0 * Name("t"), Name(stuck)), gaps, strict=True):
-        where = ("dense", gap.first, gap.stride, room, gap.order, "passed")
+        where = ("dense", gap.first, room, gap.order, "passed")
         found.append(let("passed", call("closing", side, late, gap.size, "nearest", *where)))
     return found
 
 
 class Stored(NamedTuple):
-    """A series whose coefficients stand in memory: the size of the terms that it begins with, where, and how far apart."""
+    """A series whose coefficients stand in memory: the size of the terms that it begins with, and where."""
 
     size: Expression
     first: Expression
-    stride: Expression
     order: int
 
     def passage(self, side: Expression, size: Expression, part: Value, nearest: Expression) -> Statement:
         """The statement that ends a step where it passes zero."""
-        where = ("dense", self.first, self.stride, self.order, "passed")
+        where = ("dense", self.first, self.order, "passed")
         return let("passed", call("passage", side, size, part, nearest, *where))
 
 

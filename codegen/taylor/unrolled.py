@@ -122,7 +122,7 @@ class Lines(Part):
         places = [Number(self.room + k) for k in range(len(known))]
         stores: list[Statement] = [Store("dense", place, e) for place, e in zip(places, known, strict=True)]
         firsts = places[:: self.order + 1]
-        return stores, [Stored(size, first, Number(1), self.order) for size, first in zip(sizes, firsts, strict=True)]
+        return stores, [Stored(size, first, self.order) for size, first in zip(sizes, firsts, strict=True)]
 
     def of_exponent(self, series: Exponential, k: int) -> Expression:
         return self.at(series.argument, k)

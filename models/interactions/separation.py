@@ -2,7 +2,8 @@
 
 Between all pairs of nodes such a link needs the sums of its source functions alone, a mean field: one loop over the nodes
 adds them up, another one applies them (Y. Kuramoto, Chemical Oscillations, Waves, and Turbulence, Springer, 1984, section
-5.4, for the sine).
+5.4, for the sine).  On any other graph a node needs the sums over its own links: links are products, and functions are
+computed once for each node.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import sympy as sp
 
 from ..mechanics.components import Edge
 
-__all__ = ["MOST_PRODUCTS", "Separated", "separated"]
+__all__ = ["MOST_PRODUCTS", "Separated", "Summed", "separated", "summed"]
 
 MOST_PRODUCTS = 32
 """Most products in the rate of one state, and highest power of a sum that is multiplied out."""
@@ -64,6 +65,66 @@ class Separated:
         return tuple(dict.fromkeys(source for row in self.products for _, _, source in row))
 
 
+@dataclass(frozen=True, slots=True)
+class Summed:
+    """A link as products that are summed over the links of a node, and a rest that is not.
+
+    Parameters
+    ----------
+    products : tuple of tuple of (Expr, Expr, Expr, Expr)
+        For each state of the target the terms of its rate: what all links share, what each link has for itself, a
+        function of the target, and one of the source.
+    rest : tuple of Expr
+        What is added to these, a function of both ends.
+    """
+
+    products: tuple[tuple[tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr], ...], ...]
+    rest: tuple[sp.Expr, ...]
+
+    @property
+    def sources(self) -> tuple[sp.Expr, ...]:
+        """The functions of the source, each once."""
+        return tuple(dict.fromkeys(source for row in self.products for *_, source in row if source != 1))
+
+
+@lru_cache(maxsize=64)
+def summed(edge: Edge, varied: tuple[str, ...] = (), numbered: tuple[str, ...] = ()) -> Summed | None:
+    """Return a link with those of its terms as products that have no digits to lose; None if there are none.
+
+    Sines and cosines are bounded, so that their addition theorems cost a rounding error of the rate at most.  Powers and
+    exponentials of differences stay as they are: far from the origin their products are larger than their sum.
+
+    Parameters
+    ----------
+    edge : Edge
+        What a link adds.
+    varied : tuple of str
+        Parameters that have a value for each node.
+    numbered : tuple of str
+        Parameters that have a value for each link.
+    """
+    if edge.inertia or edge.oriented or edge.forced:
+        return None
+    source = frozenset((*edge.there, *(s for s, _ in edge.theirs)))
+    target = frozenset((*edge.here, *(s for s in edge.parameters if s.name in varied)))
+    own = (edge.weight, *(s for s in edge.parameters if s.name in numbered))
+    rows, rest = [], []
+    for e in edge.rhs:
+        row, left = [], []
+        for term in sp.Add.make_args(e):
+            found = _products(term, target, source, bounded=True)
+            functions = [f for pair in found or () for f in pair]
+            curved = any(not f.is_polynomial(*target, *source) for f in functions)
+            alike = not any(f.has(*own) for f in functions)  # the same function for all links
+            if curved and alike and found and _vanishes(term - sum(c * a * b for (a, b), c in found.items())):
+                row += [(*c.as_independent(*own, as_Add=False), a, b) for (a, b), c in found.items()]
+            else:
+                left.append(term)
+        rows.append(tuple(row))
+        rest.append(sp.Add(*left))
+    return Summed(tuple(rows), tuple(rest)) if any(rows) else None
+
+
 @lru_cache(maxsize=64)
 def separated(edge: Edge, varied: tuple[str, ...] = ()) -> Separated | None:
     """Return a link as sums of products, None if none is found; the expanded difference is proved to be zero.
@@ -91,22 +152,27 @@ def separated(edge: Edge, varied: tuple[str, ...] = ()) -> Separated | None:
     return Separated(tuple(rows), own, _shifted(edge, {b for row in rows for _, _, b in row}))
 
 
-def _products(e: sp.Expr, target: Symbols, source: Symbols) -> Products | None:
-    """An expression as a sum of products, None if it is not seen to be one."""
+def _products(e: sp.Expr, target: Symbols, source: Symbols, bounded: bool = False) -> Products | None:
+    """An expression as a sum of products, None if it is not seen to be one; `bounded` ones alone where their sum is."""
     here, there = bool(e.free_symbols & target), bool(e.free_symbols & source)
     if not here and not there:
         return {(sp.S.One, sp.S.One): e} if e != 0 else {}
     if e.is_Mul:
         found: Products | None = {(sp.S.One, sp.S.One): sp.S.One}
         for part in e.args:
-            found = _times(found, _products(part, target, source))
+            found = _times(found, _products(part, target, source, bounded))
         return found
     if not there:
         return {(e, sp.S.One): sp.S.One}
-    if e.is_Add:
+    if e.is_Add and not bounded:
         return _sum([_products(part, target, source) for part in e.args])
     if not here:
         return {(sp.S.One, e): sp.S.One}
+    states = target | source
+    if e.is_Add and not any(part.free_symbols & states and part.is_polynomial(*states) for part in e.args):
+        return _sum([_products(part, target, source, bounded) for part in e.args])
+    if bounded and e.func not in _SLOPES:
+        return None
     if e.is_Pow and e.exp.is_Integer and 1 < e.exp <= MOST_PRODUCTS:
         base, found = _products(e.base, target, source), {(sp.S.One, sp.S.One): sp.S.One}
         for _ in range(int(e.exp)):

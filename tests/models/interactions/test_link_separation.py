@@ -138,3 +138,8 @@ def test_links_whose_products_lose_digits_stay_as_they_are(name: str) -> None:
 def test_numbers_of_a_link_stand_with_its_weight() -> None:
     found = summed(edge(K * A * W * sp.sin(GAP)), (), ("a",))
     assert {own for _, own, *_ in found.products[0]} == {A * W}
+
+
+@pytest.mark.parametrize("rate", [W * sp.tanh(A * X_J), sp.tanh(W * X_J), W * X_J * sp.exp(-A * X)])
+def test_a_function_that_differs_from_link_to_link_stays_with_it(rate: sp.Expr) -> None:
+    assert summed(edge(rate), (), ("a",)) is None
