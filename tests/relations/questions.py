@@ -116,7 +116,7 @@ def of_stream(units: Units, change: Change, path: Path) -> Answer:
 
 def of_basin(units: Units, change: Change, path: Path) -> Answer:
     box = {name: (low, high) for name, (low, high) in units.put([-2, 2], [-2, 2]).items()}
-    times = {"transient": 24.0 / units.k, "window": 4.0 / units.k}
+    times = {"transient": 36.0 / units.k, "window": 4.0 / units.k}
     found = sc.basin(change(pair(units)), samples=8, ranges=box, **times, **QUIET)
     return {"share": np.array(found.share)}
 
@@ -260,12 +260,13 @@ def ask(name: str, path: Path, units: Units = PLAIN, change: Change = same_scene
 
 
 def _of_process(name: str, path: Path, units: Units, seconds: float) -> Answer:
-    """The answer by a process that can be ended, which gets ten times as long on the clock as on the processor."""
+    """The answer by a process that can be ended, by its time on the processor."""
     text = f"import questions, pathlib; questions._answer({name!r}, pathlib.Path({str(path)!r}), questions.{units!r}, save=True)"
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
-    limit = "import resource; resource.setrlimit(resource.RLIMIT_CPU, (%d, %d)); " % (seconds + 10.0, seconds + 12.0)
+    most = int(seconds) + 10
+    limit = f"import resource; resource.setrlimit(resource.RLIMIT_CPU, ({most}, {most + 2})); "
     command = [sys.executable, "-W", "ignore", "-c", limit + text]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=10.0 * seconds, check=False)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60.0 * seconds, check=False)
     if done.returncode:
         raise RuntimeError((done.stderr or f"more than {seconds} s of processor time").strip().splitlines()[-1])
     with np.load(path / "answer.npz") as held:
