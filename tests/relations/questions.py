@@ -174,7 +174,7 @@ def of_equilibrium(units: Units, change: Change, path: Path) -> Answer:
     scene = pair(units, REST, (0.5, 0.2), (0.1, 0.0))
     found = sc.equilibrium(change(scene))
     return {
-        "state": units.take(np.reshape(found.state, (2, 2), order="F")),
+        "state": units.take(np.reshape(found.state, (2, -1))),
         "real": np.sort(found.eigenvalues.real) / units.k,
         "imaginary": np.sort(found.eigenvalues.imag) / units.k,
     }

@@ -36,7 +36,7 @@ DEFECTS: dict[str, dict[str, tuple[str, ...]]] = {
         "msf": ("s = 1e-09", "s = 1e-06", "s = 0.001", "s = 1e-9, 1e9", "s = 1e-4, c = 1"),
         "plane": ("s = 1e-09", "s = 1e-06", "s = 0.001", "s = 1e-9, 1e9", "s = 1e-4, c = 1"),
         "lyapunov_spectrum": ("s = 1e-9, 1e9", "s = 1e6, 1e-3"),
-        "equilibrium": ("s = 1e-9, 1e9", "s = 1e6, 1e-3", "c = 1, -2", "c = 1000, -300"),
+        "equilibrium": ("s = 1e-9, 1e9",),
         "periodic_orbit": ("s = 1e-09",),
         "follow": ("s = 1e-9, 1e9", "s = 1e6, 1e-3"),
     },
