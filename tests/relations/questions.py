@@ -1,0 +1,302 @@
+"""What each function that computes is asked, in any units, and its answer without units.
+
+A `Units` changes the unit of time and, for each component, scale and origin.  Rates, strengths, starts, ranges, times and
+precisions are those of the same motion in other units; counts of periods and relative tolerances have none.  So each
+answer, divided by its units, is the same number.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import synchain as sc
+
+Answer = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Units:
+    """Rates are `k` times as fast; a state z is offset + scale times what it is in units of 1."""
+
+    k: float = 1.0
+    scale: tuple[float, float] = (1.0, 1.0)
+    offset: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        return dict(zip(("k", "p", "q", "c", "d"), (self.k, *self.scale, *self.offset), strict=True))
+
+    def put(self, x: ArrayLike, v: ArrayLike) -> dict[str, list[float]]:
+        """States in these units."""
+        columns = zip((x, v), self.scale, self.offset, strict=True)
+        return dict(zip("xv", (np.atleast_1d(o + s * np.asarray(z)).tolist() for z, s, o in columns), strict=True))
+
+    def take(self, states: ArrayLike) -> np.ndarray:
+        """States (2, nodes) in units of 1."""
+        return (np.asarray(states, float) - np.c_[list(self.offset)]) / np.c_[list(self.scale)]
+
+
+PLAIN = Units()
+X, V = "((x - c)/p)", "((v - d)/q)"
+Change = Callable[[sc.Scene], sc.Scene]
+
+
+def field(second: str, **parameters: float) -> sc.Field:
+    """x'' = second(x, x', t) in the units p, q of the states, with the origin (c, d) and k times as fast."""
+    rates = {"x": f"k*p*{V}", "v": f"k*q*({second.replace('X', X).replace('V', V)})"}
+    return sc.Field(rates, parameters={**PLAIN.parameters, **parameters})
+
+
+PULL = sc.Rates({"v": "g*W*(v_j - v_i)"}, {"g": 0.2})
+CYCLE = field("(1 - X**2)*V - X")
+"""Van der Pol's oscillator: one attractor, a period of 6.6633, exponents 0, -0.1376, -0.5914 at g = 0, 0.3, 1."""
+DRIVEN = field("-X - X**3 - V/5 + u*cos(w*k*t)", u=0.3, w=1.2)
+REST = field("h - X - X**3 - V", h=0.7)
+
+
+def pair(
+    units: Units = PLAIN, node: sc.Field = CYCLE, x: ArrayLike = (1.0, -0.5), v: ArrayLike = (0.1, 0.4)
+) -> sc.Scene:
+    """Two nodes, each with a start of its own, coupled through their velocities."""
+    return sc.Scene(
+        node,
+        PULL,
+        sc.chain(2),
+        parameters={**units.parameters, "g": 0.2 * units.k},
+        initial=units.put(x, v),
+        transient=0.0,
+        window=20.0 / units.k,
+        time_unit="time",
+    )
+
+
+def driven(units: Units = PLAIN) -> sc.Scene:
+    """One node with a drive."""
+    return sc.Scene(DRIVEN, None, parameters=units.parameters, initial=units.put(0.5, 0.1), transient=20.0, window=5.0)
+
+
+QUIET: dict[str, Any] = {"show_progress": False}
+SHORT: dict[str, Any] = {"periods": 40, "transient": 20, **QUIET}
+FEW = {"starts": 2, "transient": 120.0, "window": 10.0}
+STRENGTHS = np.array([0.0, 0.3, 1.0])
+
+
+def criterion(units: Units) -> sc.Criterion:
+    return sc.Criterion(**(FEW | {"transient": FEW["transient"] / units.k, "window": FEW["window"] / units.k}))
+
+
+def edges(intervals: Any) -> np.ndarray:
+    """All ends of some ranges in one row."""
+    return np.array([end for interval in intervals for end in interval], float)
+
+
+def of_run(units: Units, change: Change, path: Path) -> Answer:
+    return {"end": units.take(sc.run(change(pair(units)), **QUIET).end.values)}
+
+
+def of_stream(units: Units, change: Change, path: Path) -> Answer:
+    target = path / "cells.nc"
+    target.unlink(missing_ok=True)
+    written = sc.stream(change(pair(units)), target, **QUIET)
+    return {"end": units.take(sc.open_result(written.path).end.values)}
+
+
+def of_basin(units: Units, change: Change, path: Path) -> Answer:
+    box = {name: (low, high) for name, (low, high) in units.put([-2, 2], [-2, 2]).items()}
+    times = {"transient": 36.0 / units.k, "window": 4.0 / units.k}
+    found = sc.basin(change(pair(units)), samples=8, ranges=box, **times, **QUIET)
+    return {"share": np.array(found.share)}
+
+
+def of_thresholds(units: Units, change: Change, path: Path) -> Answer:
+    found = sc.thresholds(
+        change(pair(units)),
+        sigma=units.k * np.array([0.02, 0.3, 0.6]),
+        resolution=0.1 * units.k,
+        precision=3e-3 * units.k,
+        periods=40,
+        criterion=criterion(units),
+        **QUIET,
+    )
+    return {
+        "exponents": edges(found.exponents.intervals) / units.k,
+        "probe": edges(found.probe.intervals) / units.k,
+        "direct": edges(found.direct.intervals) / units.k,
+    }
+
+
+def of_probe(units: Units, change: Change, path: Path) -> Answer:
+    strengths = units.k * np.array([-0.3, 0.3, 1.0])
+    found = sc.universal_probe(change(pair(units)), strengths, 0.0, criterion=criterion(units), **QUIET)
+    return {"synchronous": np.asarray(found.synchronous, float)}
+
+
+def of_exponents(units: Units, change: Change, path: Path) -> Answer:
+    found = sc.exponents(change(pair(units)), units.k * STRENGTHS, precision=3e-3 * units.k, **SHORT)
+    return {"exponent": found.exponent / units.k}
+
+
+def of_msf(units: Units, change: Change, path: Path) -> Answer:
+    found = sc.msf(change(pair(units)), units.k * np.array([-0.3, 0.3, 1.0]), precision=3e-3 * units.k, **SHORT)
+    return {"exponent": found.exponent / units.k, "open": np.array(len(found.intervals), float)}
+
+
+def of_plane(units: Units, change: Change, path: Path) -> Answer:
+    grid = units.k * np.array([0.3, 1.0])
+    found = sc.plane(change(pair(units)), grid, units.k * np.array([0.0, 0.5]), precision=3e-3 * units.k, **SHORT)
+    return {"exponent": found.exponent / units.k}
+
+
+def of_clusters(units: Units, change: Change, path: Path) -> Answer:
+    found = sc.cluster_exponents(change(pair(units)), [0, 0], precision=3e-3 * units.k, **SHORT)
+    return {"exponent": np.sort(np.ravel(found.exponent)) / units.k}
+
+
+def of_spectrum(units: Units, change: Change, path: Path) -> Answer:
+    found = sc.lyapunov_spectrum(change(pair(units)), precision=3e-3 * units.k, **SHORT)
+    return {"exponent": found.exponent / units.k}
+
+
+def of_equilibrium(units: Units, change: Change, path: Path) -> Answer:
+    scene = pair(units, REST, (0.5, 0.2), (0.1, 0.0))
+    found = sc.equilibrium(change(scene))
+    return {
+        "state": units.take(np.reshape(found.state, (2, -1))),
+        "real": np.sort(found.eigenvalues.real) / units.k,
+        "imaginary": np.sort(found.eigenvalues.imag) / units.k,
+    }
+
+
+def of_orbit(units: Units, change: Change, path: Path) -> Answer:
+    scene = pair(units, x=(1.0, 1.0), v=(0.1, 0.1)).replace(transient=60.0 / units.k)
+    found = sc.periodic_orbit(change(scene))
+    return {"period": np.array(found.period * units.k), "multipliers": np.sort(np.abs(found.multipliers))}
+
+
+def _orbit_of_drive(units: Units, change: Change) -> tuple[sc.Scene, sc.PeriodicOrbit]:
+    scene = change(driven(units))
+    return scene, sc.periodic_orbit(scene)
+
+
+def of_follow(units: Units, change: Change, path: Path) -> Answer:
+    scene, first = _orbit_of_drive(units, change)
+    branch = sc.follow(scene, "w", [1.2, 1.25], first, **QUIET)
+    return {"states": units.take(np.array([orbit.state for orbit in branch.orbits]).T)}
+
+
+def of_skeleton(units: Units, change: Change, path: Path) -> Answer:
+    found = sc.skeleton(change(driven(units)), "w", [1.2, 1.25], (1,), 1, **QUIET)
+    states = [orbit.state for branch in found for orbit in branch.orbits]
+    return {"branches": np.array(len(found), float), "states": units.take(np.array(states).T)}
+
+
+ASKED: dict[str, Callable[[Units, Change, Path], Answer]] = {
+    "run": of_run,
+    "stream": of_stream,
+    "basin": of_basin,
+    "thresholds": of_thresholds,
+    "universal_probe": of_probe,
+    "exponents": of_exponents,
+    "msf": of_msf,
+    "plane": of_plane,
+    "cluster_exponents": of_clusters,
+    "lyapunov_spectrum": of_spectrum,
+    "equilibrium": of_equilibrium,
+    "periodic_orbit": of_orbit,
+    "follow": of_follow,
+    "skeleton": of_skeleton,
+}
+"""Every function that computes, as `TAKEN` of tests/test_keywords.py lists them."""
+
+SIMULATED = {"run": 1e-6, "stream": 1e-6}
+EXACT = {"equilibrium": 1e-8, "periodic_orbit": 1e-5, "follow": 1e-6, "skeleton": 1e-6}
+TOLERANCE = {name: (SIMULATED | EXACT).get(name, 0.02) for name in ASKED}
+"""How far two answers may lie apart: exponents by their error, edges by what a resolution of 0.1 allows."""
+RESOLUTION = {"probe": 0.2, "direct": 0.1, "exponents": 0.1}
+
+
+def same_scene(scene: sc.Scene) -> sc.Scene:
+    return scene
+
+
+@contextmanager
+def bounded(seconds: float) -> Iterator[None]:
+    """End in an error what takes more than some seconds of the processor."""
+
+    def end(*_: object) -> None:
+        raise TimeoutError(f"more than {seconds} s of processor time")
+
+    before = signal.signal(signal.SIGPROF, end)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+
+
+SLOWEST = 1e5
+"""Factors of time from which a function that counts periods in a unit of its own may never end, nor listen to signals."""
+
+
+def ask(name: str, path: Path, units: Units = PLAIN, change: Change = same_scene, seconds: float = 60.0) -> Answer:
+    """The answer of a function, without its warnings."""
+    if units.k > SLOWEST and change is same_scene:
+        return _of_process(name, path, units, seconds)
+    return _answer(name, path, units, change, seconds)
+
+
+def _of_process(name: str, path: Path, units: Units, seconds: float) -> Answer:
+    """The answer by a process that can be ended, by its time on the processor."""
+    text = f"import questions, pathlib; questions._answer({name!r}, pathlib.Path({str(path)!r}), questions.{units!r}, save=True)"
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
+    most = int(seconds) + 10
+    limit = f"import resource; resource.setrlimit(resource.RLIMIT_CPU, ({most}, {most + 2})); "
+    command = [sys.executable, "-W", "ignore", "-c", limit + text]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60.0 * seconds, check=False)
+    if done.returncode:
+        raise RuntimeError((done.stderr or f"more than {seconds} s of processor time").strip().splitlines()[-1])
+    with np.load(path / "answer.npz") as held:
+        return dict(held)
+
+
+def _answer(
+    name: str, path: Path, units: Units, change: Change = same_scene, seconds: float = 60.0, save: bool = False
+) -> Answer:
+    with warnings.catch_warnings(), bounded(seconds):
+        warnings.simplefilter("ignore")
+        found = ASKED[name](units, change, path)
+    if save:
+        np.savez(path / "answer.npz", **found)
+    return found
+
+
+@cache
+def plain_answer(name: str, path: Path) -> Answer:
+    """The answer in units of 1, once for all tests."""
+    return ask(name, path)
+
+
+def expect_equal(name: str, found: Answer, expected: Answer, times: float = 1.0) -> None:
+    """Compare two answers within the tolerance of the function; same shapes, and no NaN."""
+    assert found.keys() == expected.keys()
+    for what, value in expected.items():
+        allowed = times * RESOLUTION.get(what, 0.0) if name == "thresholds" else times * TOLERANCE[name]
+        assert found[what].shape == value.shape, f"{name}: {what} is {found[what]}; expected {value}"
+        np.testing.assert_allclose(found[what], value, rtol=0.0, atol=allowed, err_msg=f"{name}: {what}")
+
+
+__all__ = ["ASKED", "PLAIN", "TOLERANCE", "Units", "ask", "expect_equal", "pair", "plain_answer", "replace"]
