@@ -18,7 +18,7 @@ from synchain.models.mechanics.components import TIME, Block, Edge, Node
 
 from .rates import eigenvalue_rates, turns
 
-__all__ = ["Paces", "Templates"]
+__all__ = ["Paces", "Templates", "fastest_rates"]
 
 NODES, LINKS = 50, 5000
 """Nodes of a large network whose slopes are computed, and links of one layer."""
@@ -198,6 +198,13 @@ class Templates:
             inverse = np.linalg.inv(masses)
             inverse[singular] = np.nan
             yield part, inverse
+
+
+def fastest_rates(equations: Equations, states: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """Return the fastest decay, growth or turning (states,) at states (states, dimension) with one row of numbers."""
+    count = len(states)
+    paces = Templates(equations).paces(states, np.tile(numbers, (count, 1)), np.zeros(count), np.ones(count), None)
+    return np.maximum(paces.fastest, paces.turning)
 
 
 def _node_parts(equations: Equations, slots: dict[str, int]) -> Iterator[Part]:

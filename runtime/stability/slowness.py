@@ -9,7 +9,7 @@ import numpy as np
 from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.keywords import warn
 
-from ..cells.paces import Templates
+from ..cells.paces import fastest_rates
 
 __all__ = ["warn_of_slow_motion"]
 
@@ -35,9 +35,7 @@ def warn_of_slow_motion(equations: Equations, states: np.ndarray, numbers: np.nd
     """
     if equations.forced:
         return
-    count = len(states)
-    paces = Templates(equations).paces(states, np.tile(numbers, (count, 1)), np.zeros(count), np.ones(count), None)
-    fastest = float(max(paces.fastest.max(), paces.turning.max()))
+    fastest = float(fastest_rates(equations, states, numbers).max())
     if 0.0 < fastest * averaged < TURN:
         warn(
             f"found an orbit that has neither turned nor settled in the average of {averaged:.3g} units of time, its fastest rate is "

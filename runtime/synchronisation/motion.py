@@ -16,8 +16,8 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.friction import SLIP
 from synchain.models.scenes.scene import Scene
 
+from ..cells.paces import fastest_rates
 from ..cells.plan import Plan
-from ..cells.rates import rates
 from ..support.status import Status
 from .trials import Outcome, Rows, Trials
 
@@ -119,7 +119,7 @@ def measure_motion(
     period = float(row.spans[0, Span.PERIOD])
 
     def inverse(state: np.ndarray) -> float:
-        fastest = max(rates(equations, state, row.numbers[0])[:2])
+        fastest = float(fastest_rates(equations, state[None], row.numbers[0])[0])
         return 1.0 / fastest if 0.0 < fastest < math.inf else math.inf
 
     radian = period / (2.0 * math.pi) if period else _radian(sample, columns, row.start[0], inverse)
