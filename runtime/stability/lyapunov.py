@@ -394,7 +394,7 @@ class TangentFrame:
         state = with_modes(variation.orbit, np.array([[*scene.y0, *(0.0 for _ in range(hidden))]]), numbers)
 
         def integrator_of(scaled: Variation, slow: float) -> VariationalIntegrator:
-            rows = scaled, state, numbers, np.zeros((0, count))
+            rows = scaled, state, numbers.copy(), np.zeros((0, count))
             method = chosen_for_modes(scene, *rows, slow)
             made = VariationalIntegrator.make(scene, *rows, 1, method=method)
             made.slow = slow
@@ -451,9 +451,7 @@ class TangentFrame:
         volume : float
             Logarithm of the growth of volumes; nan with set-valued friction.
         """
-        names = self.variation.orbit.parameters
-        if PHASE.name in names:
-            self.integrator.numbers[:, names.index(PHASE.name)] = self.phase * (self.unit / self.parts)
+        self._set_clock()
         self.phase = (self.phase + 1) % self.parts
         followed = self.followed()
         self.integrator.set_deviations(np.where(np.arange(self.count) < followed, self.basis, 0.0)[None])
@@ -469,6 +467,12 @@ class TangentFrame:
             shares[:] = 0.0
         with np.errstate(divide="ignore"):
             return whole_growth + np.log(lengths), lengths * np.exp(np.minimum(whole_growth, 0.0)), volume
+
+    def _set_clock(self) -> None:
+        """Let the next block begin at its phase of the drive."""
+        names = self.variation.orbit.parameters
+        if PHASE.name in names:
+            self.integrator.numbers[:, names.index(PHASE.name)] = self.phase * (self.unit / self.parts)
 
     def followed(self) -> int:
         """Number of directions that are integrated over the next block: not those that would be gone long before its end.
@@ -527,7 +531,8 @@ class TangentFrame:
         """
         size, count = self.variation.size, self.count
         carrier, travellers = self.carried = self.carried or self._carriers()
-        carrier.state = self.integrator.state
+        self._set_clock()
+        carrier.state, carrier.numbers = self.integrator.state, self.integrator.numbers
         carrier.set_deviations(np.eye(size)[None])
         lanes = travellers.registers.lanes
         registers = travellers.vectors.reshape(-1, size, lanes)
