@@ -328,9 +328,9 @@ def test_what_tells_and_what_works_is_checked_in_all_functions(tmp_path: Any) ->
 
 def test_seed_and_transient_of_a_skeleton_are_used(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[str, float]] = []
-    states, settle = skeletons.initial_states, skeletons.Orbits.settle
+    states, settle = skeletons.starts_of, skeletons.Orbits.settle
     monkeypatch.setattr(
-        skeletons, "initial_states", lambda s, n, seed: asked.append(("seed", seed)) or states(s, n, seed)
+        skeletons, "starts_of", lambda s, seed, box: asked.append(("seed", seed)) or states(s, seed, box)
     )
     monkeypatch.setattr(
         skeletons.Orbits, "settle", lambda own, length: asked.append(("transient", length)) or settle(own, length)

@@ -41,6 +41,7 @@ __all__ = [
     "PeriodicOrbit",
     "check_periods",
     "closed",
+    "expect_no_stop",
     "orbit_through",
     "periodic_orbit",
     "relative",
@@ -207,7 +208,9 @@ def periodic_orbit(
 ) -> PeriodicOrbit:
     """Find a periodic orbit of a scene's oscillator: of one, which all of a network follow in step.
 
-    Whether a network stays in step is told by `PeriodicOrbit.transversal_multipliers`.
+    Whether a network stays in step is told by `PeriodicOrbit.transversal_multipliers`.  Of the scene, model, parameters,
+    initial state, transient with its unit, integrator and max_steps count.  The tolerance is 1e-12, nothing is recorded,
+    and axes, draws and `stop` are refused.
 
     Parameters
     ----------
@@ -239,8 +242,9 @@ def periodic_orbit(
     ArithmeticError
         If Newton's method does not converge.
     """
+    expect_no_stop("periodic_orbit", scene)
     if start is None:
-        _warn_of_different_starts(a_scene(scene))
+        _warn_of_different_starts(scene)
     few = {name: "a few steps of Newton's method are soon done" for name in ("show_progress", "progress")}
     scene = coupled_cell(Given(periodic_orbit, parameters, more, {**NEWTON, **few}), scene, TOLERANCE)
     check_periods(periods)
@@ -404,6 +408,14 @@ def _driven(given: Given, scene: Scene) -> Scene:
             "periodic orbits are looked for on the stroboscopic map of a drive; found an oscillator without one"
         )
     return coupled_cell(Given(given.function), scene, TOLERANCE)
+
+
+def expect_no_stop(function: str, scene: Scene) -> None:
+    """Raise ValueError for a scene that ends its motion: an orbit goes on for ever."""
+    if a_scene(scene).stop is not None:
+        raise ValueError(
+            f"{function}: found stop = {scene.stop!r}; expected a scene whose motion goes on; write scene.replace(stop=None)"
+        )
 
 
 def _warn_of_different_starts(scene: Scene) -> None:

@@ -218,7 +218,7 @@ def skeleton(
     names = (component for component in scene.components if component != SLIP.name)
     return Skeleton(
         tuple(sorted(branches, key=lambda branch: (branch.orbits[0].periods, branch.values[0]))),
-        {component: ends for component, *ends in zip(names, low, high, strict=False)},
+        {component: (a, b) for component, a, b in zip(names, low, high, strict=True)},
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from synchain.models import Field
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.results.labels import DRIVE_PHASE
@@ -103,3 +104,18 @@ def test_what_is_refused(start: Any, error: type[Exception], words: str) -> None
     with pytest.raises(error, match=words) as caught:
         ran(DRIVEN, start=start())
     assert "\n" not in str(caught.value)
+
+
+def test_a_continued_sweep_refuses_a_drive_amid_its_period() -> None:
+    """Each cell begins at phase 0, as `run(start=...)` says of one cell."""
+    driven = Scene(Field({"x": "-x + b*cos(2*t)"}, parameters={"b": 1}), None, None, transient=0.0, window=10.0)
+    amid = driven.replace(time_unit="time", axes={"b": [1.0, 2.0, 3.0]}, continuation="up")
+    with pytest.raises(
+        ValueError, match=r"continuation: the drive is 0\.183099 into a period at the end of a cell; expected"
+    ):
+        run(amid, show_progress=False)
+    whole = amid.replace(window=3 * driven.period)
+    counted = amid.replace(time_unit="period", window=3.0)
+    ends = [run(each, show_progress=False).states("end") for each in (whole, counted)]
+    np.testing.assert_allclose(*ends, rtol=1e-12)
+    run(amid.replace(continuation="none"), show_progress=False)

@@ -1,0 +1,168 @@
+"""Orbits, branches and skeletons follow the units of states and of time, and are sought where the motion is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import synchain as sc
+from synchain.runtime.bifurcation.skeleton import near_returns, starts_of
+from synchain.runtime.seeing.draw import stretches
+
+DUFFING = sc.Field(
+    {"x": "k*s/r*v", "v": "k*r*(F*cos(k*w*t) - v/r/10 + (x - c)/s - ((x - c)/s)**3)"},
+    parameters={"s": 1, "c": 0, "k": 1, "r": 1, "w": 1.2, "F": 0.08},
+)
+UNITS = [(1e-9, 0, 1, 1e-9), (1e6, 0, 1e3, 1e3), (1e-4, 1, 1, 1e-4), (1, 0, 1e6, 1), (1e-6, 0, 1e-6, 1e5)]
+NODE = sc.Field(
+    {"x": "v", "v": "-d*v - a*x + b*x**2 - c*x**3 + u*cos(w*t)"}, parameters={"u": 1, **dict.fromkeys("abcdw", 1)}
+)
+
+
+def duffing(s: float = 1, c: float = 0, k: float = 1, r: float = 1) -> sc.Scene:
+    """Duffing's oscillator with x -> s x + c, v -> r v and t -> t/k."""
+    numbers = {"s": s, "c": c, "k": k, "r": r}
+    return sc.Scene(DUFFING, None, None, parameters=numbers, initial={"x": c + 1.2 * s, "v": 0.0}, transient=50)
+
+
+def in_units(state: np.ndarray, scene: sc.Scene) -> np.ndarray:
+    p = scene.parameters
+    return np.array([(state[0] - p["c"]) / p["s"], state[1] / p["r"]])
+
+
+@pytest.fixture(scope="module")
+def plain() -> tuple[sc.PeriodicOrbit, sc.Branch]:
+    orbit = sc.periodic_orbit(duffing())
+    return orbit, sc.follow(duffing(), "F", [0.08, 0.1, 0.12], orbit)
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_orbits_and_branches_follow_the_units_of_state_and_time(
+    units: tuple[float, float, float, float], plain: tuple[sc.PeriodicOrbit, sc.Branch]
+) -> None:
+    orbit, branch = plain
+    scene = duffing(*units)
+    found = sc.periodic_orbit(scene)
+    np.testing.assert_allclose(in_units(found.state, scene), orbit.state, atol=1e-9)
+    np.testing.assert_allclose(found.multipliers, orbit.multipliers, rtol=1e-8)
+    along = sc.follow(scene, "F", [0.08, 0.1, 0.12], found)
+    assert [turn.kind for turn in along.bifurcations] == ["fold"] == [turn.kind for turn in branch.bifurcations]
+    assert along.bifurcations[0].value == pytest.approx(branch.bifurcations[0].value, rel=1e-9)
+    assert len(along.orbits) == len(branch.orbits) == 2
+
+
+@pytest.mark.parametrize("units", [(1e-9, 0, 1, 1e-9), (1e-4, 1, 1e6, 1e-4)])
+def test_the_search_of_a_skeleton_follows_the_units(units: tuple[float, float, float, float]) -> None:
+    plain, scene = duffing(), duffing(*units)
+    np.testing.assert_allclose(in_units(starts_of(scene, 0).T, scene).T, starts_of(plain, 0), atol=1e-6)
+    orbits, expected = (near_returns(each, (1,)) for each in (scene, plain))
+    assert len(expected) > 1
+    states = sorted(in_units(orbit.state, scene).tolist() for orbit in orbits)
+    np.testing.assert_allclose(states, sorted(orbit.state.tolist() for orbit in expected), atol=1e-7)
+
+
+def test_a_stable_orbit_far_from_the_start_is_found_and_the_search_said() -> None:
+    """Where the search went 0.4 from the start in x at its own v, it was missed."""
+    numbers = {"d": 0.21, "a": 0.16, "b": 0.48, "c": 0.94, "w": 1.94, "u": 1.0011}
+    found = sc.skeleton(sc.Scene(NODE, None, None, parameters=numbers), "u", [1.0011], (1,), 1, show_progress=False)
+    states = [branch.orbits[0].state for branch in found if branch.orbits[0].stable]
+    assert any(np.allclose(state, [0.837, 3.854], atol=1e-3) for state in states)
+    assert found.searched["v"][1] > 3.0
+    assert dict(found.summary)["starts"].startswith("x from -")
+    near = sc.skeleton(
+        sc.Scene(NODE, None, None, parameters=numbers),
+        "u",
+        [1.0011],
+        (1,),
+        1,
+        ranges={"x": (-0.1, 0.1)},
+        show_progress=False,
+    )
+    assert near.searched["v"] == (0.0, 0.0)
+    for wrong, words in (
+        ({"y": (0, 1)}, "unknown key 'y'"),
+        ({"x": (1, 0)}, "expected two numbers, the lower one first"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            sc.skeleton(sc.Scene(NODE, None, None, parameters=numbers), "u", [1.0], (1,), ranges=wrong)
+
+
+def test_motions_that_escape_are_left_and_those_that_stay_are_found() -> None:
+    """x'' = -x/2 + x^2 - x'/5 + u cos 2t escapes from x > 1/2."""
+    numbers = {"d": 0.2, "a": 0.5, "b": 1.0, "c": 0.0, "w": 2.0, "u": 0.05}
+    scene = sc.Scene(NODE, None, None, parameters=numbers)
+    (branch,) = (b for b in sc.skeleton(scene, "u", [0.05], (1,), 1, show_progress=False) if b.orbits[0].stable)
+    assert np.abs(branch.orbits[0].state).max() < 0.1
+    for call in (
+        lambda: sc.periodic_orbit(scene, 1, [3.0, 3.0]),
+        lambda: sc.periodic_orbit(scene.replace(initial={"x": 3})),
+    ):
+        with pytest.raises(ArithmeticError):
+            call()
+
+
+def test_an_undriven_oscillator_is_told_what_is_possible() -> None:
+    lone = sc.Scene(sc.Field({"x": "v", "v": "(1 - x**2)*v - x*q"}, parameters={"q": 1}), None, None)
+    with pytest.raises(
+        ValueError, match=r"skeleton: found an oscillator without a drive; .*periodic_orbit\(scene\) finds the cycle"
+    ):
+        sc.skeleton(lone, "q", [1.0, 1.1])
+
+
+def test_lines_of_a_branch_end_at_its_bifurcations_and_are_of_one_stability(
+    plain: tuple[sc.PeriodicOrbit, sc.Branch],
+) -> None:
+    branch = plain[1]
+    (line,) = stretches(branch)
+    assert line[0] is True
+    np.testing.assert_array_equal(line[1], [0.08, 0.1, branch.bifurcations[0].value])
+    orbit = branch.orbits[0]
+    lost = sc.PeriodicOrbit(orbit.scene, 1, orbit.state, np.array([-1.5, 0.1]), 0.0, 1)
+    turn = branch.bifurcations[0]
+    crossed = sc.Branch("F", np.array([0.08, 0.1, 0.12, 0.14]), (orbit, orbit, lost, lost), (turn,))
+    first, second = stretches(crossed)
+    np.testing.assert_array_equal(first[1], [0.08, 0.1, turn.value])
+    np.testing.assert_array_equal(second[1], [turn.value, 0.12, 0.14])
+    assert (first[0], second[0]) == (True, False)
+    axes = crossed.plot()
+    styles = {line.get_linestyle() for line in axes.lines if len(line.get_xdata()) > 1}
+    assert styles == {"-", "--"}
+    assert {text.get_text() for text in axes.get_legend().get_texts()} == {
+        "1 drive period",
+        "stable",
+        "unstable",
+        "fold",
+    }
+
+
+FIELDS = {
+    "same": {
+        "title": "other", "record": ("trajectory",), "observe": {"m": "mean(x)"}, "section": "v_1 rising", "window": 7.0,
+        "sections": {"cut": sc.Section("x_1", "rising")}, "samples": 9, "rtol": 1e-4, "atol": 1e-3, "seed": 5, "rng": 5,
+        "nodes": [], "continuation": "up", "zipped": True,
+    },
+    "other": {"initial": {"x": -1.2, "v": 0.0}},
+    "refused": {"axes": {"F": [0.1, 0.2]}, "stop": "x_1 - 9"},
+}  # fmt: skip
+
+
+def test_every_field_of_a_scene_is_obeyed_refused_or_of_no_matter(plain: tuple[sc.PeriodicOrbit, sc.Branch]) -> None:
+    orbit, _ = plain
+    calls = {
+        "periodic_orbit": lambda scene: sc.periodic_orbit(scene).state,
+        "follow": lambda scene: sc.follow(scene, "F", [0.08], orbit).orbits[0].state,
+        "skeleton": lambda scene: sc.skeleton(scene, "F", [0.08], (1,), 1, show_progress=False),
+    }
+    for field, value in FIELDS["same"].items():
+        more = {"samples": 9} if field == "record" else {}
+        found = calls["periodic_orbit"](duffing().replace(**{field: value}, **more))
+        np.testing.assert_allclose(found, orbit.state, rtol=1e-12)
+    for field, value in FIELDS["refused"].items():
+        for name, call in calls.items():
+            if (field, name) not in {("axes", "follow"), ("axes", "skeleton")}:  # the parameter that they sweep
+                with pytest.raises(ValueError, match=f"{name}: found {field}"):
+                    call(duffing().replace(**{field: value}))
+    left = sc.periodic_orbit(duffing().replace(initial=FIELDS["other"]["initial"]))
+    assert left.state[0] == pytest.approx(-1.0, abs=0.3)
+    timed = duffing().replace(time_unit="time", transient=50 * duffing().period)
+    np.testing.assert_allclose(sc.periodic_orbit(timed).state, orbit.state, atol=1e-10)
