@@ -313,7 +313,7 @@ def _approaching(
     """Whether starts (samples,) that are not synchronous may only need more time.
 
     Errors fall at most by exp(2 stderr - exponent) in a unit of time, so that a short transient tells nothing.  After a
-    long one they are on their way if they fall at half of that pace at least; without an exponent, by a factor e.
+    long one they are on their way if they fall at half the pace of the exponent, or by a factor e; without one, by e.
     """
     if math.isnan(exponent):
         return np.asarray(error < earlier / math.e)
@@ -322,7 +322,7 @@ def _approaching(
         return np.zeros(len(error), dtype=bool)
     if fastest * length < math.log(max(used.size / used.tolerance, 1.0)):
         return np.ones(len(error), dtype=bool)
-    return np.asarray(error < earlier * math.exp(0.25 * min(exponent, 0.0) * length))
+    return np.asarray(error < earlier * math.exp(max(0.25 * min(exponent, 0.0) * length, -1.0)))
 
 
 def random_starts(scene: Scene, samples: int, ranges: Mapping[str, Range] | None = None, seed: int = 0) -> Scene:
