@@ -53,9 +53,11 @@ def test_edges_by_hand() -> None:
 )
 def test_nodes_are_labels(edges: Any, labels: list, tmp_path: Path) -> None:
     graph = from_edges(edges)
-    assert list(graph.labels) == labels and graph.components == 1
+    assert list(graph.labels) == labels
+    assert graph.components == 1
     found = from_graph(nx.Graph([*map(tuple, edges)]))
-    assert set(found.labels) == set(labels) and found.components == 1
+    assert set(found.labels) == set(labels)
+    assert found.components == 1
     again = from_graph(graph.to_networkx(), name=graph.name)
     assert again == graph
     scene = Scene("mass", "spring", graph)

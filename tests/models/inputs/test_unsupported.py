@@ -25,7 +25,7 @@ PAIR = sc.Scene("van_der_pol", "x->x", sc.chain(2))
     ],
 )
 def test_words_that_ask_for_other_things(call: Callable[[], object], words: str) -> None:
-    with pytest.raises((ValueError, TypeError), match="unknown|found") as error:
+    with pytest.raises((ValueError, TypeError), match=r"unknown|found") as error:
         call()
     assert words in str(error.value)
 
