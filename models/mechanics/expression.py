@@ -332,7 +332,7 @@ class _OfModels(Expressions):
 
     names: Mapping[str, sp.Symbol]
     whole = DIGITS
-    numbers = "finite real numbers"
+    numbers = "finite real numbers (of a complex state, real and imaginary part are two states)"
     functions = _CALLED
 
     def pieces(self) -> str:

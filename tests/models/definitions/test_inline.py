@@ -208,7 +208,10 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "state and parameter": (lambda: Field({X: X}, parameters={"x": 1}), "the name 'x' stands for two things"),
     "time": (lambda: Field({X: X * t}, parameters={t: 1}), "the name 't' of a parameter has another meaning"),
     "pi": (lambda: Field({X: X * sp.Symbol("pi")}), "rate of x: undeclared symbol 'pi'"),
-    "word of Python": (lambda: Field({X: sp.Symbol("lambda")}, parameters={"lambda": 1}), "'lambda' is no name"),
+    "word of Python": (
+        lambda: Field({X: sp.Symbol("lambda")}, parameters={"lambda": 1}),
+        "'lambda' is a word of Python",
+    ),
     "braces": (lambda: Field({sp.Symbol(r"\theta"): 1}), "is no name of a state"),
     "attribute": (lambda: Field({"model": 1}), "the state 'model' has the name of an attribute of nodes"),
     "integer": (
