@@ -42,7 +42,7 @@ class Averaging:
     precision : float
         The average ends if every standard error is below this value.
     periods : float
-        Longest average, in periods of the drive, or in units of 2 pi if there is none; a whole number.
+        Longest average, in periods of the drive, or in mean return times of undriven motion; a whole number.
     transient : float
         Transient before the average, in the same units; a whole number.
     seed : int

@@ -296,12 +296,12 @@ def exponents(
     precision : float
         Averaging stops if the standard error of every exponent is below this value.
     periods : float
-        Longest average, in periods of the drive, or in units of 2 pi if there is none; a whole number.
+        Longest average, in periods of the drive, or in mean return times of undriven motion; a whole number.
     transient : float
         Transient before the average, in the same units.
     starts : int
-        Number of initial states: that of the scene's first oscillator, and copies displaced at
-        random by up to 0.4 in the first component.
+        Number of initial states: that of the scene's first oscillator, and copies displaced at random in the first
+        component by up to 0.4 of the extent of the motion.
     rtol : float
         Relative tolerance of the integration. The friction law may require a smaller one.
     seed : int
@@ -320,6 +320,16 @@ def exponents(
     Returns
     -------
     Exponents
+
+    Warns
+    -----
+    RuntimeWarning
+        If starts reach another motion than the scene's own: the exponents are those of the scene's own start.
+
+    Notes
+    -----
+    Of the scene's fields count its model, parameters, first initial state, `contact`, `integrator`, `atol` and
+    `max_steps`; `rtol`, `transient` and `seed` are keywords here, and what a run records or stops by does not matter.
 
     Raises
     ------
