@@ -63,9 +63,8 @@ def _worked(scene: Scene, exact: Energy) -> tuple[np.ndarray, float]:
     whole = _with_work(scene.equations, exact)
     cells = plan(scene)
     start = np.hstack([cells.start, np.zeros((1, n))])
-    control = control_array(
-        *(float(own[0]) for own in tolerances(scene, scene.equations, cells.numbers)), math.inf, scene.max_steps
-    )
+    rtol, atol = (float(own[0]) for own in tolerances(scene, scene.equations, cells.numbers))
+    control = control_array(rtol, atol, math.inf, scene.max_steps)
     buffers = Buffers.empty(1, whole.dimension, 0, 0)
     load(emit(whole, integrator, ())).drive(0, 1, start, cells.numbers, cells.spans, control, *buffers.arrays())
     if buffers.counts[0, 0] != Status.FINISHED:
