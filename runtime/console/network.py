@@ -121,11 +121,8 @@ def scene_on(network: Topology | None, scene: Scene | None, arguments: Namespace
     start = scene.given["initial"] or {}
     lists = [name for name, at in start.items() if isinstance(at, tuple)]
     if network is not None and network.n != scene.n and lists:  # no option of a command gives other ones
-        warn(
-            [
-                f"{arguments.scene} lists initial {', '.join(lists)} of {scene.n} oscillators; {network.n} start by default"
-            ]
-        )
+        names = ", ".join(lists)
+        warn([f"{arguments.scene} lists initial {names} of {scene.n} oscillators; {network.n} start by default"])
         settings["initial"] = {name: at for name, at in start.items() if name not in lists}
     return scene.replace(**settings, axes=(), zipped=False, continuation="none", record=None, **frequency)
 
