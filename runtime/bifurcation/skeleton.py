@@ -37,10 +37,10 @@ __all__ = ["Skeleton", "near_returns", "skeleton", "starts_of"]
 Range = tuple[float, float]
 """Ends of an interval."""
 
-STARTS, LENGTH, DROPPED = 64, 200, 20
+STARTS, LENGTH, DROPPED = 96, 200, 20
 """Motions that are searched for returns, their length and their transient in drive periods."""
 
-SCALES = (1.0, 2.0, 4.0, 8.0)
+SCALES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 """Sizes of the boxes of their starts around the motion from the scene's own start, relative to the extent of that."""
 
 MOST_STEPS = 100_000
@@ -152,7 +152,7 @@ def skeleton(
         Number of values at which orbits are searched.
     ranges : mapping of str to (float, float), optional
         Components and the ends of the initial values between which motions are searched; other components start as the
-        scene does. By default all components start in boxes of 1, 2, 4 and 8 times the extent of the motion from the
+        scene does. By default all components start in boxes of 1, 2, 4 … 32 times the extent of the motion from the
         scene's own start, around it. `Skeleton.searched` says what was searched.
     transient : float
         Drive periods before the search.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from .arguments import above_zero, whole
 from .drive import at_frequency
-from .outcome import WrongUse
+from .outcome import WrongUse, warn
 
 if TYPE_CHECKING:
     from synchain.models.graphs.topology import Topology
@@ -118,6 +118,12 @@ def scene_on(network: Topology | None, scene: Scene | None, arguments: Namespace
     if moved:
         raise WrongUse(f"{arguments.scene} sweeps {', '.join(moved)}; expected a scene without these axes")
     settings: dict[str, object] = {} if network is None else {"topology": network}
+    start = scene.given["initial"] or {}
+    lists = [name for name, at in start.items() if isinstance(at, tuple)]
+    if network is not None and network.n != scene.n and lists:  # no option of a command gives other ones
+        names = ", ".join(lists)
+        warn([f"{arguments.scene} lists initial {names} of {scene.n} oscillators; {network.n} start by default"])
+        settings["initial"] = {name: at for name, at in start.items() if name not in lists}
     return scene.replace(**settings, axes=(), zipped=False, continuation="none", record=None, **frequency)
 
 

@@ -389,7 +389,8 @@ def test_report_of_a_map_over_alpha_and_a_parameter(
 def test_report_of_a_map_over_two_parameters(asked: list[dict[str, Any]], capsys: pytest.CaptureFixture[str]) -> None:
     words = "msf figure_8 --set sigma=0:2:5 kappa=0.5,1,1.5 --set a=2 --topology star --n 5"
     assert main(words.split()) == 0
-    text = capsys.readouterr().out
+    text, said = capsys.readouterr()
+    assert "figure_8 lists initial x of 4 oscillators; 5 start by default" in said
     assert "omega = 1.4: exponents per unit of time, the largest of 2 transversal modes of 5 nodes\n" in text
     assert [row.split("  ")[-1] for row in text.splitlines() if "largest for" in row] == [
         "gamma = -3, at 9 of 15 points",
