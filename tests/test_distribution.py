@@ -141,12 +141,13 @@ CONDA = {"matplotlib": "matplotlib-base"}
 def conda(line: str) -> tuple[str, str]:
     """A requirement of pyproject as conda writes it: name and versions."""
     need = Requirement(line)
-    return CONDA.get(need.name, need.name), str(need.specifier)
+    return CONDA.get(need.name, need.name), ",".join(sorted(str(need.specifier).split(","), reverse=True))
 
 
 def asked(lines: list[str]) -> set[tuple[str, str]]:
     """The requirements of a recipe, name and versions."""
-    return {(name, versions) for name, _, versions in (line.partition(" ") for line in lines)}
+    parted = (line.partition(" ") for line in lines)
+    return {(name, ",".join(sorted(versions.split(","), reverse=True))) for name, _, versions in parted}
 
 
 def test_the_recipe_asks_for_what_pyproject_asks_for() -> None:

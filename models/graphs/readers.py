@@ -323,17 +323,18 @@ def _label(node: object, what: str) -> Hashable:
     """A label of a node; a number that is whole, 1.0 or that of NumPy, is an int, to which it is equal."""
     if node is None or not isinstance(node, Hashable):
         raise TypeError(f"{what}: found {typed_repr(node)}; expected a label: a number, a text or a tuple")
-    if isinstance(node, Number) and not isinstance(node, bool) and node == (whole := _whole(node)):
+    if isinstance(node, Number) and not isinstance(node, bool) and (whole := _whole(node)) is not None:
         return whole
     return node
 
 
 def _whole(number: Any) -> int | None:
-    """The nearest int towards 0; None of what has none."""
+    """The int that a number is equal to; None of any other number."""
     try:
-        return int(number)
+        nearest = int(number)
     except (TypeError, ValueError, OverflowError):
         return None
+    return nearest if nearest == number else None
 
 
 def _graph(name: str, n: int, weights: Weights, labels: Sequence[object] | None = None) -> Topology:

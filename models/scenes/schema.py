@@ -182,7 +182,7 @@ def _graphs() -> list[Table]:
     matrix = {"matrix": rows, "name": TEXT, "n": WHOLE}
     label = {"type": ["integer", "string"]}
     edge = {"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 3}
-    edges = {
+    edges: dict[str, Table] = {
         "edges": {"type": "array", "items": edge},
         "labels": {"type": "array", "minItems": 1, "items": label},
         "directed": {"type": "boolean"},

@@ -93,9 +93,8 @@ class Buffers:
 
     def take(self, cells: np.ndarray) -> Buffers:
         """Return copies of the rows of some cells."""
-        return Buffers(
-            *(array[cells] for array in self.arrays()[:-1]), self.lanes[cells] if len(self.lanes) else self.lanes
-        )
+        taken = [array[cells] for array in (self.end, self.sums, self.counts, self.points, self.samples)]
+        return Buffers(*taken, self.lanes[cells] if len(self.lanes) else self.lanes)
 
     @property
     def finished(self) -> np.ndarray:

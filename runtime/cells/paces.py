@@ -162,7 +162,8 @@ class Templates:
         """The rates (cells, dimension), zero beyond the first nodes."""
         rates = np.zeros((len(state), self.dimension))
         for part in self.parts:
-            np.add.at(rates, (slice(None), part.own), part.values(part.rates, part.arguments(state, numbers, time)))
+            found = part.values(part.rates, part.arguments(state, numbers, time))
+            np.add.at(rates.T, part.own, np.moveaxis(found, 0, -1))
         for part, inverse in self._inverse_masses(state, numbers, time):
             rates[:, part.own] = np.einsum("cnij,cnj->cni", inverse, rates[:, part.own])
         return rates
@@ -175,7 +176,7 @@ class Templates:
             found = part.values(part.slopes, part.arguments(state, numbers, time))
             with np.errstate(all="ignore"):
                 found = (1.0 if part.source is None else 2.0) * found.reshape(len(state), -1, size, size)
-                np.add.at(blocks[:, :, :size, :size], (slice(None), part.targets), found)
+                np.add.at(np.moveaxis(blocks, 1, 0)[:, :, :size, :size], part.targets, np.moveaxis(found, 1, 0))
         rates = self._rates(state, numbers, time) if self.masses else np.empty(0)
         for part, inverse in self._inverse_masses(state, numbers, time):
             size = part.own.shape[1]

@@ -19,7 +19,7 @@ from synchain.codegen.kernels.sweep import emit
 from synchain.models.scenes import complete
 
 METHODS = {
-    name: m for name in integrators.names() if (m := integrators.integrator(name)).smooth is None and not m.series
+    name: m for name in integrators.names() if not (m := integrators.integrator(name)).series
 }
 ROUNDING = {"rosenbrock": 4e-14, "explicit": 2e-14}
 """What the rounding of coefficients to doubles may do to a sum; those of Rosenbrock methods go up to 165."""
