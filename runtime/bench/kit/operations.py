@@ -17,7 +17,7 @@ from synchain.codegen.simd import elementary
 
 __all__ = ["PRIMITIVE", "Counter", "operations"]
 
-PRIMITIVE = {"fma": 2, "sqrt": 1} | dict.fromkeys(
+PRIMITIVE = {"fma": 2, "multiply_add": 2, "sqrt": 1} | dict.fromkeys(
     (
         "absolute",
         "any_lane",

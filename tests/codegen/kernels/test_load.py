@@ -60,7 +60,7 @@ from synchain.codegen.simd import address, broadcast, njit
 @njit(error_model="numpy", nogil=True, cache=True)
 def drive(
     functions, dims, multiplicity, rule, network, first, last, start, numbers, spans, control, end, sums, counts, points,
-    samples,
+    samples, lanes,
 ):
     zero = broadcast(0.0, 1)
     for i in range(first, last):
