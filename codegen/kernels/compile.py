@@ -241,9 +241,7 @@ def load(source: KernelSource) -> Kernel:
     A kernel whose cache file is damaged is compiled anew.
     """
     _check_numba()
-    kernel = _load(source)
-    _warn_of_slowness()
-    return kernel
+    return _load(source)
 
 
 def load_shared(part: Driver | Recorder) -> Compiled:
@@ -298,6 +296,7 @@ def _load(source: KernelSource) -> Kernel:
             kernel = _held[source] = _kernel(source)
             if problem := kernel.compiled.problem or kernel.driver.problem:
                 warn(f"kernels are not kept on disk: {problem}")
+            _warn_of_slowness()
         return kernel
 
 

@@ -5,8 +5,9 @@ Another kind may round the last digit of a result differently.
 
 from __future__ import annotations
 
-import llvmlite.binding as llvm
 import numba
+
+from ..simd import lane_types
 
 __all__ = ["processor", "told_apart"]
 
@@ -19,11 +20,11 @@ def processor() -> str:
     NUMBA_CPU_NAME, NUMBA_CPU_FEATURES and NUMBA_ENABLE_AVX choose another kind, for which Numba
     then compiles.
     """
-    name = numba.config.CPU_NAME or llvm.get_host_cpu_name()
+    name = numba.config.CPU_NAME or lane_types.HOST_NAME
     if numba.config.CPU_FEATURES is not None:
         features = [word[1:] for word in numba.config.CPU_FEATURES.split(",") if word.startswith("+")]
     else:
-        known = llvm.get_host_cpu_features().items()
+        known = lane_types.HOST_FEATURES.items()
         features = [
             word for word, present in known if present and (numba.config.ENABLE_AVX or not word.startswith("avx"))
         ]

@@ -32,6 +32,9 @@ __all__ = [
 DOUBLE, INT32, INT64, BOOL = ir.DoubleType(), ir.IntType(32), ir.IntType(64), ir.IntType(1)
 WIDTHS = (1, 2, 4, 8, 16)
 
+HOST_NAME, HOST_FEATURES = llvm.get_host_cpu_name(), dict(llvm.get_host_cpu_features())
+"""The processor.  Read once: LLVM is locked meanwhile, and a process that forks in another thread then would have a child that hangs."""
+
 
 class Lane(types.Type):
     """Numba type of `width` doubles in one vector register."""
@@ -81,10 +84,9 @@ def native_width(registers: int = 1) -> int:
         if wish not in map(str, WIDTHS):
             raise ValueError(f"SYNCHAIN_WIDTH is {wish!r}; expected one of {', '.join(map(str, WIDTHS))}")
         return int(wish)
-    features = llvm.get_host_cpu_features()
-    if features.get("avx512f"):
+    if HOST_FEATURES.get("avx512f"):
         return 8 * registers
-    return (4 if features.get("avx") else 2) * registers
+    return (4 if HOST_FEATURES.get("avx") else 2) * registers
 
 
 def has_fma() -> bool:
@@ -93,7 +95,7 @@ def has_fma() -> bool:
         return True  # all that Numba compiles for besides x86 have it
     if numba.config.CPU_FEATURES is not None:
         return "+fma" in numba.config.CPU_FEATURES.split(",")
-    return bool(numba.config.ENABLE_AVX and llvm.get_host_cpu_features().get("fma"))
+    return bool(numba.config.ENABLE_AVX and HOST_FEATURES.get("fma"))
 
 
 def splat(builder: ir.IRBuilder, value: ir.Value, width: int) -> ir.Value:

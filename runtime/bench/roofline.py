@@ -86,7 +86,7 @@ def _peak(width: int) -> Callable[[int], object]:
     names = [f"x{i}" for i in range(CHAINS)]
     text = PEAK.format(
         first="\n    ".join(f"{name} = a*{i + 1}.0" for i, name in enumerate(names)),
-        body="\n".join(f"        {name} = fma({name}, b, a)" for name in names),
+        body="\n".join(f"        {name} = multiply_add({name}, b, a)" for name in names),
         total=" + ".join(names),
     )
     function = _function(text, width)
@@ -98,7 +98,7 @@ def _function(text: str, width: int) -> Callable[..., object]:
     """Compile the function `work` of a text."""
     from numba import njit
 
-    given = {name: getattr(lanes, name) for name in ("load", "store", "fma", "broadcast", "maximum")}
+    given = {name: getattr(lanes, name) for name in ("load", "store", "multiply_add", "broadcast", "maximum")}
     space: dict[str, Any] = {**given, "address": address, "njit": njit, "WIDTH": width}
     exec(compile(text, "<roofline benchmark>", "exec"), space)
     work: Callable[..., object] = space["work"]

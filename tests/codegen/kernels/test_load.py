@@ -34,7 +34,7 @@ from synchain.codegen.kernels import compile as loading
 from synchain.codegen.kernels.driver import Driver, KernelKind
 from synchain.codegen.kernels.modes import emit_modes
 from synchain.codegen.kernels.sweep import emit
-from synchain.codegen.simd import decorator, front_end, lanes, syntax
+from synchain.codegen.simd import decorator, front_end, lane_types, lanes, syntax
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import network_variation
 from synchain.models.mechanics.components import Node
@@ -60,7 +60,7 @@ from synchain.codegen.simd import address, broadcast, njit
 @njit(error_model="numpy", nogil=True, cache=True)
 def drive(
     functions, dims, multiplicity, rule, network, first, last, start, numbers, spans, control, end, sums, counts, points,
-    samples,
+    samples, lanes,
 ):
     zero = broadcast(0.0, 1)
     for i in range(first, last):
@@ -342,7 +342,6 @@ def test_digests_are_stable_and_tell_kernels_apart():
 
 def test_the_file_name_follows_everything_that_shapes_machine_code(monkeypatch):
     names = {loading._fingerprint(SOURCE.code)}
-    import llvmlite.binding as llvm
 
     def changed(*change) -> None:
         with monkeypatch.context() as m:
@@ -353,8 +352,8 @@ def test_the_file_name_follows_everything_that_shapes_machine_code(monkeypatch):
 
     changed(numba, "__version__", "9.9")
     changed(sys, "version", "4.0")
-    changed(llvm, "get_host_cpu_name", lambda: "abacus")
-    changed(llvm, "get_host_cpu_features", lambda: {"beads": True})
+    changed(lane_types, "HOST_NAME", "abacus")
+    changed(lane_types, "HOST_FEATURES", {"beads": True})
     changed(loading.importlib.metadata, "version", lambda name: "9.9")
     changed(loading.platform, "machine", lambda: "sun dial")
     for name in loading.FLAGS:
@@ -643,7 +642,7 @@ def test_what_threads_share_is_left_alone_while_kernels_compile(folder, tmp_path
 
 def test_another_processor_compiles_its_own(compiled_folder, folder, monkeypatch):
     copied(compiled_folder, folder)
-    monkeypatch.setattr("llvmlite.binding.get_host_cpu_name", lambda: "abacus")
+    monkeypatch.setattr(lane_types, "HOST_NAME", "abacus")
     loading._sources.cache_clear()
     try:
         compiled = fresh()

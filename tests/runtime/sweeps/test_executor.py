@@ -86,7 +86,7 @@ def test_a_stream_on_a_worker_with_another_installation_fails_in_words(tmp_path)
 
 def test_a_worker_with_another_processor_says_so(monkeypatch):
     packed = spec(MAP).packed()
-    monkeypatch.setattr("llvmlite.binding.get_host_cpu_name", lambda: "abacus")
+    monkeypatch.setattr("synchain.codegen.simd.lane_types.HOST_NAME", "abacus")
     with pytest.raises(
         InstallationError, match="this worker has the processor abacus; expected that of the main program"
     ):
