@@ -93,8 +93,10 @@ class Buffers:
 
     def take(self, cells: np.ndarray) -> Buffers:
         """Return copies of the rows of some cells."""
-        taken = [array[cells] for array in (self.end, self.sums, self.counts, self.points, self.samples)]
-        return Buffers(*taken, self.lanes[cells] if len(self.lanes) else self.lanes)
+        lanes = self.lanes[cells] if len(self.lanes) else self.lanes
+        return Buffers(
+            self.end[cells], self.sums[cells], self.counts[cells], self.points[cells], self.samples[cells], lanes
+        )
 
     @property
     def finished(self) -> np.ndarray:

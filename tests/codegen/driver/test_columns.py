@@ -10,7 +10,9 @@ from synchain.codegen.driver.columns import Control, Count, Sum
 
 @pytest.mark.parametrize(("columns", "prefixes"), [(Control, ("",)), (Sum, ("",)), (Count, ("", "N_"))])
 def test_columns_are_those_of_the_kernel_text(columns: type, prefixes: tuple[str, ...]) -> None:
-    for column in (column for column in columns if column != Count.BY_METHOD or columns is not Count):  # that is no kernel's
+    for column in (
+        column for column in columns if column != Count.BY_METHOD or columns is not Count
+    ):  # that is no kernel's
         names = [name for prefix in prefixes if hasattr(text, name := prefix + column.name)]
         assert names, column
         assert getattr(text, names[-1]) == column

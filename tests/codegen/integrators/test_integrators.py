@@ -18,9 +18,7 @@ from synchain.codegen.integrators import Integrator
 from synchain.codegen.kernels.sweep import emit
 from synchain.models.scenes import complete
 
-METHODS = {
-    name: m for name in integrators.names() if not (m := integrators.integrator(name)).series
-}
+METHODS = {name: m for name in integrators.names() if not (m := integrators.integrator(name)).series}
 ROUNDING = {"rosenbrock": 4e-14, "explicit": 2e-14}
 """What the rounding of coefficients to doubles may do to a sum; those of Rosenbrock methods go up to 165."""
 

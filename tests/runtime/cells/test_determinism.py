@@ -61,7 +61,9 @@ def chunks(size: int) -> list[tuple[int, int]]:
 
 def same(found: Outcome, expected: Outcome, order: np.ndarray | None = None) -> None:
     rows = slice(None) if order is None else order
-    for name, a, b in zip(("end", "sums", "counts", "points", "samples"), found.arrays[:5], expected.arrays[:5], strict=True):
+    for name, a, b in zip(
+        ("end", "sums", "counts", "points", "samples"), found.arrays[:5], expected.arrays[:5], strict=True
+    ):
         np.testing.assert_array_equal(a.view(np.int64), np.ascontiguousarray(b[rows]).view(np.int64), err_msg=name)
 
 
