@@ -172,6 +172,8 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
         del written["coupling"], written["topology"]
         written["links"] = [{"coupling": _coupling(own), "topology": graph_table(graph)} for own, graph in layers]
     written["nodes"] = [group.as_dict() for group in values["nodes"]]
+    if values["atol"] == values["rtol"] / 10:  # it follows rtol, in functions with a tolerance of their own too
+        del written["atol"]
     written["parameters"] = collected(values["parameters"], varied)
     written["initial"] = {name: list(states) for name, states in values["initial"].items()}
     written["record"] = [str(record) for record in values["record"]]

@@ -127,7 +127,8 @@ def measure_motion(
         radian * radians if time is None else time * unit for time, radians in zip(times, (1000.0, 100.0), strict=True)
     )
     early = window * np.arange(1, SAMPLES + 1) / SAMPLES
-    late = transient + window * (np.arange(1, SAMPLES + 1) * (math.sqrt(5.0) - 1.0) / 2.0 % 1.0)
+    turned = max(window, 4.0 * math.pi * radian)  # in less than a turn, what is seen depends on the phase
+    late = transient + turned * (np.arange(1, SAMPLES + 1) * (math.sqrt(5.0) - 1.0) / 2.0 % 1.0)
     found = sample(np.concatenate([early, late]))
     paces = np.where(found.status == Status.FINISHED, found.steps / np.concatenate([early, late]), 0.0)
     states = np.concatenate([row.start, found.end])[:, columns]

@@ -58,17 +58,12 @@ def test_cells_of_starts(values: list[float], seed: int) -> None:
     expect_own(AUTONOMOUS, "x_1", values, seed)
 
 
-A13 = pytest.mark.xfail(strict=True, reason="A13: the longest step and the tolerance are taken over all cells")
-
-
-@A13
 @settings(deadline=None, max_examples=5, derandomize=True)
 @given(values=RATES, seed=st.integers(0, 99))
 def test_cells_of_drives(values: list[float], seed: int) -> None:
     expect_own(PERIODIC, "w", values, seed)
 
 
-@A13
 def test_the_default_of_a_swept_parameter_plays_no_part() -> None:
     fast = PERIODIC.replace(parameters={"u": 0.3, "w": 400.0})
     np.testing.assert_array_equal(ends(fast, w=[0.7]), ends(PERIODIC, w=[0.7]))

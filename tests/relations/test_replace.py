@@ -60,12 +60,6 @@ def test_fields_that_need_one_another_are_put_back_together(names: tuple[str, ..
     assert changed.replace(**{name: getattr(SCENE, name) for name in names}) == SCENE
 
 
-A1 = pytest.mark.xfail(
-    strict=True, reason="A1: replace(topology=…) forgets initial states that fit any number of nodes"
-)
-
-
-@A1
 @pytest.mark.parametrize("value", [5.0, {"low": 1.0, "high": 2.0, "seed": 3}])
 def test_numbers_and_ranges_of_any_number_of_nodes_stay(value: Any) -> None:
     scene = sc.Scene("duffing", topology=sc.chain(3), initial={"x": value})
