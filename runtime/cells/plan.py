@@ -22,7 +22,7 @@ from .stays import shortest_stays
 __all__ = [
     "Plan",
     "Planner",
-    "by_node",
+    "by_place",
     "control_array",
     "control_of",
     "first_step",
@@ -232,15 +232,16 @@ def longest_steps(equations: Equations, numbers: np.ndarray, end: np.ndarray) ->
     """
     if not equations.forced or not len(numbers):
         return np.full(len(numbers), math.inf)
-    whole = _half_swings(equations, by_node(equations, numbers), np.tile(end, equations.n))
-    return np.asarray(whole.reshape(equations.n, -1).min(axis=0))
+    values = by_place(equations, numbers)
+    places = len(next(iter(values.values()), end)) // len(end)
+    return np.asarray(_half_swings(equations, values, np.tile(end, places)).reshape(places, -1).min(axis=0))
 
 
 def _half_swings(equations: Equations, values: Mapping[str, np.ndarray], end: np.ndarray) -> np.ndarray:
     """The longest step (rows,) of nodes with these parameters."""
     rows = len(end)
     drive = drive_of((*equations.nodes, *equations.edges), equations.differing)
-    fastest = np.max([np.zeros(rows), *(_sizes(pace, values, rows) for pace in drive.paces)], axis=0)
+    fastest = np.fmax.reduce([np.zeros(rows), *(_sizes(pace, values, rows) for pace in drive.paces)])
     with np.errstate(divide="ignore"):
         longest = np.where(fastest > 0.0, math.pi / fastest, math.inf)
     gaps, rises = (tuple(e for e in own if {*names_in(e)} <= {*values, TIME.name}) for own in (drive.gaps, drive.rises))
@@ -249,11 +250,28 @@ def _half_swings(equations: Equations, values: Mapping[str, np.ndarray], end: np
     return np.minimum(longest, shortest_stays(gaps, rises, values, _periods(drive, values, rows), end))
 
 
-def by_node(equations: Equations, numbers: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the parameters of cells (cells, parameters) by their names in a node, a row for each cell and node."""
+def by_place(equations: Equations, numbers: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the drive's parameters of cells (cells, parameters) by their names in templates: a row for each cell and place.
+
+    Places are the nodes and, beside them, the links; what a place does not have is nan.
+    """
+    drive = drive_of((*equations.nodes, *equations.edges), equations.differing)
+    names = {name for e in (*drive.paces, *drive.gaps, *drive.rises) for name in names_in(e)}
     columns = dict(zip(equations.parameters, numbers.T, strict=True))
-    own = {name: [columns[f"{name}_{i + 1}"] for i in range(equations.n)] for name in equations.varied}
-    return {name: np.concatenate(own.get(name) or [columns[name]] * equations.n) for name in (*columns, *own)}
+    own = {name: [f"{name}_{i + 1}" for i in range(equations.n)] for name in equations.varied}
+    own |= {name: list(layer.names(name)) for name, layer in equations.numbered.items()}
+    found = {name: own.get(name, [name]) for name in names}
+    found = {name: held for name, held in found.items() if any(each in columns for each in held)}
+    places, absent = max(map(len, found.values()), default=1), np.full(len(numbers), np.nan)
+    return {
+        name: np.concatenate([columns.get(each, absent) for each in _stretched(held, places)])
+        for name, held in found.items()
+    }
+
+
+def _stretched(held: list[str], places: int) -> list[str]:
+    """The name of one number for all places, or the names at the first places and none at the rest."""
+    return held * places if len(held) == 1 else held + [""] * (places - len(held))
 
 
 def _spread(count: int, most: int) -> np.ndarray:

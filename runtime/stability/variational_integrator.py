@@ -25,7 +25,7 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.choice import chosen_for_modes, warn_of_stiff_modes
 from ..cells.initial_modes import local_clock
-from ..cells.plan import by_node, control_array, first_step, half_swing, periods, tolerances
+from ..cells.plan import by_place, control_array, first_step, half_swing, periods, tolerances
 from ..cells.rates import mode_rates
 from ..support.status import Status
 from ..support.threads import worker_count
@@ -234,7 +234,7 @@ class VariationalIntegrator:
         where[order] = np.arange(count)
         rtol, atol = (float(own.min()) for own in tolerances(scene, variation.orbit, numbers))
         repeat = periods(kernel.equations, numbers)
-        longest = half_swing(kernel.equations, by_node(kernel.equations, numbers))
+        longest = half_swing(kernel.equations, by_place(kernel.equations, numbers))
         control = np.append(control_array(rtol, atol, longest, scene.max_steps, jumps=False), looseness)
         if method.implicit:
             growth = (at.growth for at in mode_rates(variation, state, numbers, strengths) if math.isfinite(at.growth))

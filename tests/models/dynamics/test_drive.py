@@ -10,6 +10,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from synchain.codegen.driver.columns import Span
+from synchain.models import Rates, ends
 from synchain.models.definitions.inline import Field
 from synchain.models.graphs.families import topology
 from synchain.models.inputs.plugins import allow_code
@@ -18,7 +19,7 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.bifurcation.branches import follow
 from synchain.runtime.bifurcation.periodic import periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton
-from synchain.runtime.cells.plan import by_node, half_swing, plan
+from synchain.runtime.cells.plan import by_place, half_swing, plan
 from synchain.runtime.stability.clusters import cluster_exponents
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum
@@ -231,7 +232,25 @@ def test_short_pulses_of_unequal_nodes_are_seen_by_sweeps_and_modes() -> None:
     )
     assert longest_step(made) == pytest.approx(2 * np.arccos(0.99), rel=1e-3)
     numbers = np.array([[made.parameters[name] for name in made.equations.parameters]])
-    assert half_swing(made.equations, by_node(made.equations, numbers)) == longest_step(made)
+    assert half_swing(made.equations, by_place(made.equations, numbers)) == longest_step(made)
+
+
+def test_the_fastest_drive_of_a_link_or_of_some_nodes_sets_the_longest_step() -> None:
+    w, still = sp.Symbol("w"), Field({"x": "-x"})
+    i, j, weight = ends(still)
+    links = Scene(
+        still,
+        Rates({i.x: weight * (j.x - i.x) * (1 + sp.cos(w * sp.Symbol("t")))}, {"w": 1.0}),
+        topology("chain", 3),
+        parameters={"w": [1.0, 40.0]},
+        time_unit="time",
+    )
+    driven = Field({"x": "-x + cos(w*t)"}, parameters={"w": 1.0})
+    kinds = [{"oscillator": still, "at": [1]}, {"oscillator": driven, "at": [2, 3]}]
+    own = {"w": [1.0, 40.0]}
+    nodes = Scene(nodes=kinds, coupling="x->x", topology=topology("chain", 3), parameters=own, time_unit="time")
+    for scene in (links, nodes):
+        np.testing.assert_allclose(plan(scene).spans[:, Span.LONGEST], np.pi / 40)
 
 
 @pytest.mark.parametrize("integrator", ["taylor", "dop853", "rodas5p"])
