@@ -113,7 +113,7 @@ class Ladder:
             return np.zeros(len(rows), int)
         paces = at_start(self.templates, rows)
         endless = ~np.isfinite(paces.size)
-        slow = np.maximum(paces.turning, paces.growth)
+        slow = np.maximum(np.maximum(paces.turning, paces.growth), math.pi / rows.spans[:, Span.LONGEST])
         stiff = (paces.parted > STIFF * slow) & (paces.parted * rows.spans[:, Span.END] > WORTH) & ~endless
         stiff |= ~endless & ~stiff & self._enters_layers(rows, slow)
         last = len(self.methods) - 1 if self.solvable else self._explicit

@@ -96,7 +96,7 @@ def test_equal_oscillators_that_burst_within_the_window_are_told_apart() -> None
     """Bubbling without a mismatch: starts whose mean error is below the limit and whose largest is a hundred times above."""
     near = pair(parameters={"omega": 1.4}, transient=100.0, window=400.0)
     starts = np.linspace(0.25, 0.299, 24)
-    found = run(near, sigma=[0.25, 0.295], x_2=starts, certified=True, show_progress=False)
+    found = run(near, sigma=[0.25, 0.293], x_2=starts, certified=True, show_progress=False)
     assert (found.transversal_exponent + 2 * found.transversal_stderr < 0.0).all()
     inside, edge = ([VERDICTS[k] for k in row] for row in found.verdict.values)
     assert set(inside) == {STABLE}

@@ -371,7 +371,7 @@ def test_scenes_with_drawn_graphs_can_be_changed(graphs: Any) -> None:
         ({"realisations": 4, "draws": {"topology": "erdos_renyi(2000000)"}}, "2000000 nodes; expected at most 1000000"),
         ({"realisations": 4, "draws": {"topology": {"name": "ring", "n": 10}}}, "or a random one as text"),
         (
-            {"realisations": 5000, "draws": {"topology": "erdos_renyi(200, p=0.9)"}},
+            {"realisations": 5000, "topology": ring(200), "draws": {"topology": "erdos_renyi(200, p=0.9)"}},
             "in the union of the first 1 graphs, each with a weight in each of 5000 realisations; expected at most 10000000",
         ),
         (

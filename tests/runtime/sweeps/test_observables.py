@@ -309,7 +309,7 @@ def test_a_resumed_run_keeps_what_was_observed(rotors: Result) -> None:
 @pytest.mark.parametrize(
     ("contact", "integrator"),
     [
-        *(pytest.param("atan", method, marks=pytest.mark.long) for method in ("rodas5p", "rodas6p")),
+        *(pytest.param("atan", method, marks=pytest.mark.long) for method in ("rodas5p", "auto")),
         ("set-valued", "rodas5p"),
         pytest.param("set-valued", "taylor", marks=pytest.mark.long),
     ],
