@@ -10,7 +10,7 @@ Source: Auerbach, Cvitanovic, Eckmann, Gunaratne & Procaccia, Phys. Rev. Lett. 5
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from numbers import Integral
 
 import numpy as np
@@ -18,6 +18,7 @@ import xarray as xr
 
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.inputs.checks import check_integer, check_keys, check_number, check_table, short_repr
+from synchain.models.inputs.frozen import Frozen
 from synchain.models.mechanics.friction import SLIP
 from synchain.models.scenes.scene import Scene, a_scene
 
@@ -66,7 +67,7 @@ class Skeleton(Labelled):
     """
 
     branches: tuple[Branch, ...]
-    searched: Mapping[str, Range] = field(default_factory=dict)
+    searched: Mapping[str, Range] = Frozen()
 
     def __len__(self) -> int:
         return len(self.branches)
@@ -218,7 +219,7 @@ def skeleton(
     names = (component for component in scene.components if component != SLIP.name)
     return Skeleton(
         tuple(sorted(branches, key=lambda branch: (branch.orbits[0].periods, branch.values[0]))),
-        {component: (a, b) for component, a, b in zip(names, low, high, strict=True)},
+        Frozen({component: (a, b) for component, a, b in zip(names, low, high, strict=True)}),
     )
 
 

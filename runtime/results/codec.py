@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from synchain.models.graphs.topology import Topology
+from synchain.models.inputs.frozen import Frozen
 from synchain.models.scenes.dictionary import graph_of, graph_table
 from synchain.models.scenes.scene import Scene
 
@@ -91,6 +92,8 @@ class _Writer:
         if isinstance(value, Scene):
             text = json.dumps(value.as_dict(), sort_keys=True)
             return {"scene": self.scenes.setdefault(text, len(self.scenes))}
+        if isinstance(value, Frozen):
+            return {"table": {name: self.tree(item, f"{path}_{name}") for name, item in value.items()}}
         if isinstance(value, Topology):
             return {"graph": graph_table(value)}
         if is_dataclass(value) and not isinstance(value, type):
@@ -137,4 +140,5 @@ class _Reader:
             "complex": lambda: complex(*part),
             "fraction": lambda: Fraction(part),
             "graph": lambda: graph_of(part),
+            "table": lambda: Frozen({name: self.value(item) for name, item in part.items()}),
         }.get(tag, lambda: self.scenes[part])()
