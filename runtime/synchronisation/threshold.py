@@ -404,7 +404,7 @@ def cells_of(scene: Scene, sigma: np.ndarray, criterion: AppliedCriterion) -> Sc
         transient=criterion.transient,
         window=criterion.window,
         rtol=criterion.rtol,
-        max_steps=criterion.max_steps,
+        max_steps=min(scene.max_steps, criterion.max_steps),
         atol=scene.given["atol"] if criterion.atol is None else criterion.atol,
     )
 
