@@ -161,7 +161,7 @@ CALLS = [
     (lambda: runtime.thresholds(PAIR, resolution="a"), "resolution: 'a'"),
     (lambda: runtime.thresholds(PAIR, criterion={"starts": 2}), "criterion: found {'starts': 2}"),
     (lambda: Criterion(starts=1.5), r"starts = 1\.5; expected a whole number"),
-    (lambda: Criterion(tolerance=None), "tolerance: found None"),
+    (lambda: Criterion(tolerance="a"), "tolerance: 'a'"),
     (lambda: Criterion(reach=NAN), "reach: found nan"),
     (lambda: Criterion(seed="a"), "seed = 'a'"),
     (lambda: runtime.universal_probe(3, 0, 0), A_SCENE),

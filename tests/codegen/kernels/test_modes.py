@@ -83,8 +83,8 @@ def test_modes_are_those_of_the_extended_system(name: str, coupling: str, state:
     start = np.tile([*state, *([1.0 / np.sqrt(size)] * size)], (3, 1))
     buffers = Buffers.empty(3, 2 * size, room=0, samples=0)
     limit = 0.5 * (s.period or np.inf)
-    kernel.drive(0, 3, start, numbers, np.tile([0.0, length, s.period or 0.0, 0.0], (3, 1)),
-                 control_array(1e-10, 1e-12, limit, 10**7), *buffers.arrays())  # fmt: skip
+    spans = np.tile([0.0, length, s.period or 0.0, 0.0, 1e-4, limit, np.inf], (3, 1))
+    kernel.drive(0, 3, start, numbers, spans, control_array(1e-10, 1e-12, limit, 10**7), *buffers.arrays())
     c = integrator(s, mode(s.equations), state, alphas[None])
     found = moved(c, length)
     np.testing.assert_allclose(c.state[0], buffers.end[0, :size], rtol=0, atol=1e-7)

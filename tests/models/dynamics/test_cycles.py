@@ -8,7 +8,7 @@ import sympy as sp
 from samples import TABLE, Outcome, blank, friction_chain, friction_scene, kernel, numbers
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.periodicity import angular_frequency
+from synchain.models.dynamics.periodicity import angular_frequency, common
 from synchain.models.mechanics.components import TIME, Node
 from synchain.runtime.cells.plan import control_array
 
@@ -94,13 +94,13 @@ a, b = sp.symbols("a b", real=True)
         (a * sp.cos(b * TIME), b),
         (sp.sin(2 * b * TIME + a) + x * sp.cos(4 * b * TIME), 2 * b),
         (sp.cos(2 * TIME), sp.Integer(2)),
-        (sp.cos(a * TIME) + sp.cos(b * TIME), None),
+        (sp.cos(a * TIME) + sp.cos(b * TIME), common(a, b)),
         (sp.cos(b * TIME**2), None),
         (TIME * sp.cos(b * TIME), None),
         (sp.cos(b * TIME + x), b),
         (sp.cos(2 * b * TIME) * sp.sin(3 * b * TIME), b),
         (sp.cos(b * TIME / 2) + sp.cos(b * TIME / 3), b / 6),
-        (sp.cos(TIME) + sp.cos(sp.sqrt(2) * TIME), None),
+        (sp.cos(TIME) + sp.cos(sp.sqrt(2) * TIME), common(1, sp.sqrt(2))),
         (sp.cos(x * TIME), None),
         (sp.cos(sp.Piecewise((0, TIME < 5), (1, True))), None),
         (sp.cos(b * TIME) * sp.exp(-TIME), None),

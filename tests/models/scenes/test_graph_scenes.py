@@ -52,8 +52,9 @@ def test_scenes_with_options_come_back(graph: synchain.models.Topology) -> None:
     assert pickle.loads(pickle.dumps(scene)) == scene
 
 
-def test_scenes_with_products_are_written_as_matrices() -> None:
+def test_scenes_with_products_are_written_as_edges() -> None:
     scene = Scene(topology=cartesian(chain(2), chain(3)))
     written = scene.as_dict()
-    assert len(written["topology"]["matrix"]) == 6
+    assert written["topology"]["n"] == 6
+    assert written["topology"]["edges"] == [[1, 2], [2, 3], [1, 4], [2, 5], [4, 5], [3, 6], [5, 6]]
     assert Scene.from_dict(written).topology.links == scene.topology.links

@@ -471,11 +471,16 @@ def test_every_shipped_scene_is_whole_and_written_back(name: str) -> None:
     assert scene.equations.n == scene.n
 
 
-def test_a_matrix_is_written_back() -> None:
+def test_a_matrix_is_written_back_as_its_links() -> None:
     scene = Scene(topology=from_matrix([["-1/3", "1/3"], [2, -2]], name="odd"), section=Section("x_2", "both", 0.1))
     again = Scene.from_dict(json.loads(json.dumps(scene.as_dict())))
     assert again == scene
-    assert scene.as_dict()["topology"] == {"name": "odd", "matrix": [["-1/3", "1/3"], ["2", "-2"]]}
+    assert scene.as_dict()["topology"] == {
+        "name": "odd",
+        "n": 2,
+        "directed": True,
+        "edges": [[2, 1, "1/3"], [1, 2, 2]],
+    }
     assert scene.as_dict()["section"] == "x_2 both 0.1"
 
 

@@ -113,7 +113,7 @@ def test_a_sweep_that_does_not_fit_is_refused_before_memory_is_taken():
     scene = PAIR.replace(axes=LARGE)
     with pytest.raises(ValueError, match=r"1000000000 cells, 128 GB in memory; expected at most 8 GB; .* with stream"):
         reduce_scene(scene, reduce=False).check_memory()
-    fewer = {name: values[:400] for name, values in LARGE.items()}
+    fewer = {name: values[:300] for name, values in LARGE.items()}
     reduce_scene(PAIR.replace(axes=fewer), reduce=False).check_memory()
     with pytest.raises(ValueError, match="expected at most 8 GB"):
         run(scene, reduce=False)

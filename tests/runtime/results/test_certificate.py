@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from synchain.runtime.results.certificate import NEAR, VERDICTS, Certificate
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.certify import certify
 from synchain.runtime.sweeps.errors import SweepInterrupted
+from synchain.runtime.sweeps.prepare import PreparedRun
 from synchain.runtime.sweeps.run import run
 
 SIGMA = np.array([0.05, 0.12, 0.3])
@@ -122,7 +124,13 @@ def test_cells_of_one_sweep_that_end_apart_have_exponents_of_their_own() -> None
 def test_an_interrupted_run_is_resumed_with_its_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from synchain.runtime.sweeps.job import SweepJob
 
-    work, calls = SweepJob.run, []
+    module = sys.modules[run.__module__]
+    work, certified, calls = SweepJob.run, module.with_certificate, []
+
+    def certificate(prepared: PreparedRun) -> PreparedRun:
+        found = certified(prepared)
+        monkeypatch.setattr(SweepJob, "run", stop)
+        return found
 
     def stop(shop: SweepJob, cells: np.ndarray, *more: np.ndarray) -> object:
         calls.append(cells)
@@ -131,10 +139,10 @@ def test_an_interrupted_run_is_resumed_with_its_certificate(tmp_path: Path, monk
         return work(shop, cells, *more)
 
     grid = np.linspace(0.02, 0.2, 40)
-    monkeypatch.setattr(SweepJob, "run", stop)
+    monkeypatch.setattr(module, "with_certificate", certificate)
     with pytest.raises(SweepInterrupted) as caught:
         run(scene(transient=60.0, window=5.0), sigma=grid, certified=True, workers=1, show_progress=False)
-    monkeypatch.setattr(SweepJob, "run", work)
+    monkeypatch.undo()
     caught.value.result.save(tmp_path / "part.nc")
     part = open_result(tmp_path / "part.nc")
     assert 0 < (part.status.values == 1).sum() < 40

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -346,7 +347,7 @@ def test_the_effort_of_the_exponents_can_be_chosen(monkeypatch):
     [
         (
             Scene(
-                Field({"x": "v", "v": "-x - v + cos(t) + cos(w*t)"}, parameters={"w": 1.3}),
+                Field({"x": "v", "v": "-x - v + cos(t) + cos(w*t)"}, parameters={"w": math.sqrt(2)}),
                 "x->v",
                 chain(2),
                 time_unit="time",
