@@ -11,6 +11,7 @@ import importlib
 import pkgutil
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
 from types import ModuleType
 
 __all__ = ["Integrator", "IntegratorKind", "integrator", "names"]
@@ -129,6 +130,7 @@ class Integrator:
         return len(self.b)
 
 
+@cache
 def names() -> tuple[str, ...]:
     """Names of all integrators: the files of this folder."""
     return tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
 
 from .. import driver, simd
 from ..simd.lanes import native_width
@@ -47,7 +47,7 @@ class Recorder:
     @property
     def text(self) -> str:
         """The module."""
-        return _module(str(self), {"WIDTH": self.width, "SERIES": self.series}, RECORDERS[self.entry])
+        return _module(str(self), (("WIDTH", self.width), ("SERIES", self.series)), tuple(RECORDERS[self.entry]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +99,8 @@ class Driver:
         contacts = ["contacts"] if self.contacts else []
         landings = ["landings"] if self.contacts else []
         last = ["propagators", *landings, "modes"] if modes else ["spread", "sweep"]
-        pieces = [f"driver.{name}" for name in ("dense", "cells", "control", *contacts, *last)]
-        return _module(str(self), constants, pieces)
+        pieces = (f"driver.{name}" for name in ("dense", "cells", "control", *contacts, *last))
+        return _module(str(self), tuple(constants.items()), tuple(pieces))
 
 
 def _list(subject: str, width: int, *traits: str) -> str:
@@ -108,9 +108,10 @@ def _list(subject: str, width: int, *traits: str) -> str:
     return ", ".join((subject, f"{width} lane{'s' * (width != 1)}", *traits))
 
 
-def _module(title: str, constants: Mapping[str, int | bool], pieces: Sequence[str]) -> str:
+@cache
+def _module(title: str, constants: tuple[tuple[str, int | bool], ...], pieces: tuple[str, ...]) -> str:
     """The text of a module of some files, specialised by constants."""
-    head = "\n".join(f"{name} = {value!r}" for name, value in constants.items())
+    head = "\n".join(f"{name} = {value!r}" for name, value in constants)
     body = "\n\n\n".join(map(driver.text, ("driver.names", *pieces))) + "\n"
     return "\n\n\n".join([f'"""{title[0].upper()}{title[1:]}."""', imports(body), head, body])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import sympy as sp
 
@@ -125,7 +126,13 @@ class KernelSource:
     @property
     def digest(self) -> str:
         """Hexadecimal SHA-256 of the text and of those of its driver and recorders."""
-        return hashlib.sha256("".join([self.text, *(m.text for m in self.shared)]).encode()).hexdigest()
+        return _digest(self.head, self.code, *(module.text for module in self.shared))
+
+
+@lru_cache(maxsize=64)
+def _digest(head: str, code: str, *shared: str) -> str:
+    """That of a kernel of these texts; runs ask for it again and again."""
+    return hashlib.sha256("".join([f"{head}\n\n\n{code}", *shared]).encode()).hexdigest()
 
 
 def emit(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pkgutil
 import sys
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,7 @@ LIMITS: Mapping[str, tuple[Any, Any]] = {
 """The range of each number that belongs to a keyword, both ends in it."""
 
 
+@cache
 def integrators() -> tuple[str, ...]:
     """Return the names of all integrators."""
     return tuple(sorted(m.name for m in pkgutil.iter_modules([str(METHODS)]) if not m.name.startswith("_")))

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import lru_cache
 
 import numpy as np
 
@@ -282,7 +283,7 @@ def _fold(scene: Scene, observed: set[str], fold_all: bool, skipped: list[str], 
         if (value != 0.0 and not fold_all) or name not in equations.parameters:
             continue
         try:
-            made = substitute_constants(equations, {name: Fraction(repr(value))})
+            made = _without(equations, name, Fraction(repr(value)))
         except ValueError as problem:
             kept.append(str(problem))
             continue
@@ -293,6 +294,12 @@ def _fold(scene: Scene, observed: set[str], fold_all: bool, skipped: list[str], 
         skipped.append(_consequence(equations, made, name, value))
         equations = made
     return equations
+
+
+@lru_cache(maxsize=64)
+def _without(equations: Equations, name: str, value: Fraction) -> Equations:
+    """The equations at one value of a parameter; runs of one model ask for it again and again."""
+    return substitute_constants(equations, {name: value})
 
 
 def _observed_parameters(scene: Scene, found: Watched) -> set[str]:

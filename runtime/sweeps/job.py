@@ -14,6 +14,7 @@ import math
 import pickle
 import threading
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -394,6 +395,7 @@ def hand_over(lanes: np.ndarray, cells: np.ndarray, length: np.ndarray, ladder: 
     lanes[cells] = lane
 
 
+@cache
 def versions() -> str:
     """Return the versions that a result depends on."""
     names = ("synchain", "numba", "numpy", "sympy")
