@@ -182,7 +182,7 @@ def of_equilibrium(units: Units, change: Change, path: Path) -> Answer:
 
 
 def of_orbit(units: Units, change: Change, path: Path) -> Answer:
-    scene = pair(units, x=(1.0, 1.0), v=(0.1, 0.1)).replace(transient=60.0 / units.k)
+    scene = pair(units, x=(1.0, 1.0), v=(0.1, 0.1)).replace(transient=60.0)  # mean return times
     found = sc.periodic_orbit(change(scene))
     return {"period": np.array(found.period * units.k), "multipliers": np.sort(np.abs(found.multipliers))}
 

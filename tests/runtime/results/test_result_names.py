@@ -27,7 +27,7 @@ def own(data: xr.Dataset) -> set[str]:
 def names_of(scene: Scene) -> set[str]:
     """The names in a result of a scene, without a run."""
     cells, size = scene.cells, len(scene.y0)
-    exponents = Certificate(*(np.zeros(cells) for _ in range(3)))
+    exponents = Certificate(*(np.zeros(cells) for _ in range(5)))
     buffers = Buffers.empty(cells, size, 3, scene.samples)
     return own(gather(scene, {}, np.ones((cells, len(Span))), buffers, exponents).data)
 

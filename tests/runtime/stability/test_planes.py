@@ -165,7 +165,7 @@ def test_propagators_of_two_strengths_by_scipy_and_by_interpolation() -> None:
     sides = np.linspace(0.0, 1.5, 60), np.linspace(-0.3, 1.2, 5)
     strengths = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2)
     orbits = rossler(strengths)
-    orbits.start(exact_interpolation(strengths), 0.5, 1.0)
+    orbits.start(exact_interpolation(strengths), 0.4, 0.8)
     state = orbits.integrator.state.copy()
     exact, _ = orbits.propagators()
     for which in (0, 37, 299):
@@ -179,12 +179,12 @@ def test_propagators_of_two_strengths_by_scipy_and_by_interpolation() -> None:
             return np.concatenate([flow, (jacobian @ columns).ravel()])
 
         whole = np.concatenate([state[0], np.eye(3).ravel()])
-        end = solve_ivp(rates, (0, np.pi), whole, method="DOP853", rtol=1e-12, atol=1e-13).y[3:, -1]
+        end = solve_ivp(rates, (0, 0.4 * orbits.unit), whole, method="DOP853", rtol=1e-12, atol=1e-13).y[3:, -1]
         np.testing.assert_allclose(exact[0, which], end.reshape(3, 3), atol=1e-8 * np.abs(end).max())
     growths = []
     for interpolation in (exact_interpolation(strengths), strength_interpolation(strengths, 13)):
         again = rossler(strengths)
-        again.start(interpolation, 0.5, 1.0)
+        again.start(interpolation, 0.4, 0.8)
         growths.append(again.growths(np.array([10])))
     assert len(interpolation.nodes) == 5 * (13 + 3)
     np.testing.assert_allclose(growths[1], growths[0], atol=1e-7)

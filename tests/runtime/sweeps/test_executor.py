@@ -65,7 +65,7 @@ def test_a_worker_with_other_versions_or_another_kernel_refuses(monkeypatch):
     packed = spec(MAP).packed()
     with pytest.raises(RuntimeError, match="makes the kernel"):
         replace(spec(MAP), digest="0" * 64).rebuilt()
-    monkeypatch.setattr("importlib.metadata.version", lambda name: "0.0.1")
+    monkeypatch.setattr("synchain.runtime.sweeps.job.versions", lambda: "synchain 0.0.1, numba 0.0.1")
     with pytest.raises(RuntimeError, match=r"this worker has synchain 0\.0\.1, .*; expected .*, synchain "):
         JobSpec.unpacked(packed)
 

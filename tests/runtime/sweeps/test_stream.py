@@ -504,7 +504,7 @@ def test_other_versions_do_not_go_on_with_a_run(tmp_path, monkeypatch, interrupt
     path = tmp_path / "a.nc"
     with pytest.raises(SweepInterrupted):
         stream(MAP, path, show_progress=False, progress=interrupt_at(1))
-    monkeypatch.setattr("importlib.metadata.version", lambda name: "0.0.1")
+    monkeypatch.setattr("synchain.runtime.sweeps.job.versions", lambda: "synchain 0.0.1, numba 0.0.1")
     with pytest.raises(ValueError, match=r"was begun with synchain .*; found synchain 0\.0\.1, numba"):
         stream(MAP, path, resume=True, show_progress=False)
 

@@ -23,6 +23,7 @@ from synchain.runtime.synchronisation import threshold
 from synchain.runtime.synchronisation.criterion import PAPER, Criterion, offsets
 from synchain.runtime.synchronisation.exponent_windows import ExponentWindows
 from synchain.runtime.synchronisation.threshold import (
+    PROBES,
     Sweep,
     cells_of,
     check_probe,
@@ -108,8 +109,7 @@ def test_the_probe_covers_every_mode_and_the_network_is_swept_as_asked(swept):
     (pair, half, options), (network, sigma, direct) = swept
     assert (pair.topology.n, network.topology.n) == (2, 3)
     assert (2 * half[0], 2 * half[-1]) == (pytest.approx(0.1), pytest.approx(0.9))
-    assert np.diff(2 * half).max() <= 0.01 + 1e-12
-    assert 81 <= len(half) <= 82
+    assert len(half) == PROBES
     assert sigma.tolist() == [0.1, 0.2, 0.3]
     assert options == direct == (SHORT, 1e-3, Execution(workers=1))
     assert found.probe.intervals == ((0.2, 0.4),)
@@ -119,22 +119,22 @@ def test_the_probe_covers_every_mode_and_the_network_is_swept_as_asked(swept):
 
 
 @pytest.mark.parametrize(
-    ("graph", "sigma", "low", "count"),
+    ("graph", "sigma", "low"),
     [
-        (chain(3), [0.0, 0.01], 0.0, 4),
-        (PARTS, [0.1, 0.11], 0.0, 23),
-        (chain(2), [0.1, 0.1 + 1e-9], 0.2, 2),
-        (chain(3), [-0.02, 0.01], -0.06, 10),
-        (chain(3), [-0.02, -0.01], -0.06, 6),
-        (PARTS, [-0.02, -0.01], -0.04, 5),
+        (chain(3), [0.0, 0.01], 0.0),
+        (PARTS, [0.1, 0.11], 0.0),
+        (chain(2), [0.1, 0.1 + 1e-9], 0.2),
+        (chain(3), [-0.02, 0.01], -0.06),
+        (chain(3), [-0.02, -0.01], -0.06),
+        (PARTS, [-0.02, -0.01], -0.04),
     ],
 )
-def test_the_grid_of_the_probe_begins_at_zero_where_zero_is_asked_for(swept, graph, sigma, low, count):
+def test_the_grid_of_the_probe_begins_at_zero_where_zero_is_asked_for(swept, graph, sigma, low):
     thresholds(Scene(topology=graph), sigma=sigma)
     assert 2 * swept[0][1][0] == pytest.approx(low)
-    assert len(swept[0][1]) == count
-    thresholds(Scene(topology=graph), sigma=np.linspace(sigma[0], sigma[1], 40))
-    assert len(swept[2][1]) == 40
+    assert len(swept[0][1]) == PROBES
+    thresholds(Scene(topology=graph), sigma=np.linspace(sigma[0], sigma[1], 400))
+    assert len(swept[2][1]) == 400
     assert swept[0][2][0] == PAPER
 
 
@@ -320,7 +320,7 @@ def test_windows_of_exponents_are_those_of_the_network():
     np.testing.assert_allclose(found.exponents.errors, [(0.0, 0.0)], atol=1e-9)
     np.testing.assert_allclose(found.data["window"], [(0.0, 1 / 3)], rtol=1e-9)
     assert found.data["window_error"].dims == found.data["window"].dims == ("window_number", "end")
-    assert dict(found.summary)["sigma, negative exponents"] == "0.0000 … 0.3333"
+    assert dict(found.summary)["sigma, negative exponents"].startswith("0.0000 … 0.3333")
     assert found.as_dict()["no_exponents"] is None
     axes = found.plot()
     assert "negative exponents" in [text.get_text() for text in axes.get_legend().get_texts()]
