@@ -9,7 +9,7 @@ from functools import cache, wraps
 from inspect import Parameter, currentframe, isfunction, signature
 from typing import Any
 
-from .checks import suggestion
+from .checks import short_repr, suggestion
 from .unsupported import unsupported
 
 __all__ = ["called_from_outside", "check_methods", "public", "warn"]
@@ -119,9 +119,13 @@ class _Taken:
         if strange is not None:
             if reason := unsupported(strange):
                 return f"unknown keyword {strange!r} of {self.name}: {reason}"
-            other = f"; a parameter is given as parameters={{{strange!r}: …}}" if "parameters" in self.names else ""
+            other = (
+                f"; a parameter is given as parameters={{{short_repr(strange)}: …}}"
+                if "parameters" in self.names
+                else ""
+            )
             return (
-                f"unknown keyword {strange!r} of {self.name}; known: {', '.join(self.names) or 'none'}"
+                f"unknown keyword {short_repr(strange)} of {self.name}; known: {', '.join(self.names) or 'none'}"
                 f"{suggestion(strange, self.names) or other}"
             )
         if given > len(self.places) and not self.any_place:
