@@ -180,10 +180,6 @@ CALLS = [
     (lambda: runtime.msf(PAIR, [math.nan]), "alpha: found nan; expected finite numbers"),
     (lambda: runtime.msf(PAIR, [0, 1e308]), r"alpha: found 1e\+308; expected numbers of at most 1e\+300 in size"),
     (lambda: runtime.exponents(PAIR, [complex(1e308, 1e308)]), r"alpha: found 1e\+308\+1e\+308j; expected"),
-    (
-        lambda: runtime.thresholds(PAIR, sigma=[0, 1e99]),
-        r"sigma: found strengths alpha over .e\+99; expected less than 100000",
-    ),
     (lambda: runtime.exponents(PAIR, 0.1, periods=math.inf), "periods: found inf"),
     (lambda: runtime.exponents(PAIR, 0.1, transient=-1), "transient: found -1"),
     (lambda: runtime.exponents(PAIR, 0.1, precision="a"), "precision: 'a'"),

@@ -220,7 +220,7 @@ def periodic_orbit(
         Number of drive periods after which the orbit repeats itself; 1 without a drive.
     start : array_like, shape (components,), optional
         Start of Newton's method; by default the scene's initial state after its transient.  Of an undriven oscillator it is a
-        state from which the orbit is reached, and the orbit must attract; its transient counts mean return times.
+        state from which the orbit is reached, and the orbit must attract; a period is then its mean return time.
     parameters : mapping of str to float, optional
         Parameters of the scene to set, for names that are keywords already.
     **more : float
@@ -309,14 +309,14 @@ def _limit_cycle(scene: Scene, periods: int, start: Sequence[float] | np.ndarray
         )
     state = _initial(scene) if start is None else _state(scene, start)
     orbit = Orbits.make(scene, np.zeros(1), state[None], 1)
-    orbit.settle(scene.transient)
+    _settle(orbit)
     if rests(orbit.rates, orbit.state[0], RETURN, orbit.extent):
         at = ", ".join(f"{name} = {x:.6g}" for name, x in zip(scene.components, orbit.state[0], strict=False))
         raise ArithmeticError(f"no cycle: the motion comes to rest at {at}; `equilibrium` finds such states")
     free, steps = limit_cycle(orbit, RETURN)
     if not free:
         raise ArithmeticError(
-            f"no attracting cycle near the motion after {scene.transient:g} units of 2 pi; start elsewhere, or settle longer"
+            f"no attracting cycle near the motion after a transient of {scene.transient:g}; start elsewhere, or settle longer"
         )
     state, extent = orbit.state[0], orbit.extent
     image, matrix = _strobe(scene, state, 1, 0.0, free, extent)
@@ -437,9 +437,14 @@ def _initial(scene: Scene) -> np.ndarray:
 def _settled(scene: Scene) -> np.ndarray:
     """State (components,) after the scene's transient from its initial one."""
     orbits = Orbits.make(scene, np.zeros(1), _initial(scene)[None], 1)
-    units = scene.transient if scene.time_unit == "period" else math.ceil(scene.transient / orbits.unit)
-    orbits.settle(units)
+    _settle(orbits)
     return np.asarray(orbits.state[0][: orbits.components])
+
+
+def _settle(orbits: Orbits) -> None:
+    """Pass the transient of the scene, in its unit."""
+    scene = orbits.scene
+    orbits.settle(scene.transient if scene.time_unit == "period" else math.ceil(scene.transient / orbits.unit))
 
 
 def _state(scene: Scene, start: Sequence[float] | np.ndarray) -> np.ndarray:

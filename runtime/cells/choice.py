@@ -162,9 +162,22 @@ class Ladder:
             found[looked] = np.where(stiff, len(self.methods) - 1, np.where(stalled, self._explicit, found[looked]))
         return found
 
+    def tolerances(self, rows: Plan) -> tuple[np.ndarray, np.ndarray]:
+        """Return (rtol, atol), each (cells,), with which cells are integrated.
+
+        A default atol is meant for motions of size 1: it shrinks with a smaller one, by powers of ten. The size is that of the
+        start, or how far the rates there carry the cell in its shortest time.
+        """
+        rtol, atol = tolerances(self.scene, self.equations, rows.numbers)
+        if self.scene.given["atol"] is None and len(rows):
+            size = np.maximum(np.abs(rows.start).max(axis=1), self.templates.reach(rows.start, rows.numbers))
+            small = (size > 0.0) & (size < 0.1)
+            atol = np.where(small, atol * 10.0 ** np.floor(np.log10(np.where(small, 10.0 * size, 1.0))), atol)
+        return rtol, atol
+
     def at(self, rows: Plan, state: np.ndarray, time: np.ndarray) -> Paces:
         """Return how fast cells move at some states and times, where states are known to the tolerances."""
-        rtol, atol = tolerances(self.scene, self.equations, rows.numbers)
+        rtol, atol = self.tolerances(rows)
         noise = rtol[:, None] * np.abs(state) + atol[:, None]
         return self.templates.paces(state, rows.numbers, time, rows.spans[:, Span.LONGEST], noise)
 

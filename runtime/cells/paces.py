@@ -146,6 +146,14 @@ class Templates:
             going = np.where(speed > 0.0, turn / speed, 0.0)
         return Paces(*eigenvalue_rates(blocks), going, size)
 
+    def reach(self, state: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+        """Return how far (cells,) the rates at the start carry cells in the shortest time of their motion."""
+        time = np.zeros(len(state))
+        with np.errstate(all="ignore"):
+            speed = np.abs(self._rates(state, numbers, time)).max(axis=1)
+            fastest = np.sqrt((self.blocks(state, numbers, time) ** 2).sum(axis=(2, 3))).max(axis=1)
+            return np.nan_to_num(speed / fastest, nan=0.0, posinf=0.0)
+
     def layers(self, state: np.ndarray, numbers: np.ndarray) -> Iterator[np.ndarray]:
         """Yield the blocks (cells, count, p, p) of nodes and links in the middle of each smoothed jump, and close by."""
         for part in self.parts:

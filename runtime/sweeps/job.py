@@ -57,7 +57,7 @@ from ..cells.buffers import Buffers
 from ..cells.choice import Ladder, first_steps
 from ..cells.kernels import ladder_of, write_kernel
 from ..cells.paces import Templates
-from ..cells.plan import FIRST_STEP, Plan, control_of, tolerances
+from ..cells.plan import FIRST_STEP, Plan, control_of
 from ..cells.reduce import Reduction
 from ..support.status import Status
 
@@ -282,7 +282,7 @@ class SweepJob:
     def _drive(self, method: int, cells: np.ndarray, rows: Plan, buffers: Buffers) -> None:
         """Run some cells by one method, those of the same tolerances at once."""
         kernel = self._kernel(self.ladder.methods[method])
-        rtol, atol = tolerances(self.reduction.scene, self.reduction.equations, rows.numbers[cells])
+        rtol, atol = self.ladder.tolerances(rows.take(cells))
         pairs, which = np.unique(np.stack([rtol, atol], axis=1), axis=0, return_inverse=True)
         for k, (own_rtol, own_atol) in enumerate(pairs):
             own, control = cells[which.reshape(-1) == k], self._control(float(own_rtol), float(own_atol))

@@ -25,7 +25,6 @@ from synchain.models.inputs.checks import check_number, check_positive
 from synchain.models.scenes.complete import TimeUnit
 from synchain.models.scenes.scene import Scene, a_scene
 from synchain.models.spectra.spectrum import Spectrum
-from synchain.models.sweeps.axis import LIMIT
 
 from ..cells.keywords import Given
 from ..cells.plan import Planner
@@ -60,6 +59,9 @@ __all__ = [
 
 RESOLUTION = 5e-4
 """Width in sigma to which the ends of ranges are refined."""
+
+PROBES = 257
+"""Least number of values of alpha that are probed."""
 
 Measure = Callable[[np.ndarray], np.ndarray]
 """Mean synchronisation errors (m, starts) at points (m,)."""
@@ -258,16 +260,11 @@ def default_grid(spectrum: Spectrum, step: float = 0.0025) -> np.ndarray:
 
 
 def _probe_grid(sigma: np.ndarray, spectrum: Spectrum) -> np.ndarray:
-    """Values of alpha that cover sigma |gamma| for every mode, as many as sigma has and at least
-    one every 0.01; ValueError if that is too many.
-    """
+    """Values of alpha that cover sigma |gamma| for every mode, as many as sigma has and at least PROBES."""
     sizes = [abs(value) for value in spectrum.values if abs(value) > 0.0]
     ends = np.outer(sigma[[0, -1]], [min(sizes), max(sizes), *([0.0] if spectrum.multiplicities[0] > 1 else [])])
     low, high = ends.min(), ends.max()
-    steps = math.ceil((high - low) / 0.01)
-    if steps >= LIMIT:
-        raise ValueError(f"sigma: found strengths alpha over {high - low:g}; expected less than {0.01 * LIMIT:g}")
-    return np.linspace(low, high, max(len(sigma), steps + 1, 2))
+    return np.linspace(low, high, max(len(sigma), PROBES))
 
 
 def check_probe(graph: Topology, spectrum: Spectrum) -> None:

@@ -115,9 +115,10 @@ def of_stream(units: Units, change: Change, path: Path) -> Answer:
 
 
 def of_basin(units: Units, change: Change, path: Path) -> Answer:
-    box = {name: (low, high) for name, (low, high) in units.put([-2, 2], [-2, 2]).items()}
+    scene = change(pair(units))
+    box = dict(zip(scene.components, map(tuple, units.put([-2, 2], [-2, 2]).values()), strict=True))
     times = {"transient": 36.0 / units.k, "window": 4.0 / units.k}
-    found = sc.basin(change(pair(units)), samples=8, ranges=box, **times, **QUIET)
+    found = sc.basin(scene, samples=8, ranges=box, **times, **QUIET)
     return {"share": np.array(found.share)}
 
 

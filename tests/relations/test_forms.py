@@ -56,6 +56,9 @@ QUICK = {
 }
 """What shares kernels with other tests, or needs few."""
 
+REFUSED = {("thresholds", "mirrored")}
+"""Functions that refuse, in a sentence, how a relation says the motion: a graph with a positive eigenvalue."""
+
 DEFECTS: dict[str, list[tuple[str, str]]] = {}
 """Defect -> pairs of (function, relation) that are wrong today."""
 KNOWN = {case: defect for defect, cases in DEFECTS.items() for case in cases}
@@ -65,7 +68,7 @@ def cases() -> list[object]:
     found = []
     for name in ASKED:
         for relation in SAID:
-            if name in ONE_NODE and relation in BETWEEN_NODES:
+            if (name in ONE_NODE and relation in BETWEEN_NODES) or (name, relation) in REFUSED:
                 continue
             marks = [] if (name, relation) in QUICK else [pytest.mark.long]
             if (name, relation) in KNOWN:
@@ -109,7 +112,17 @@ def test_two_copies_without_a_link_move_as_one_does(
     expect_equal(name, halves(found), expected)
 
 
-TURNED = [pytest.param(name, marks=[] if name in ("run", "equilibrium") else pytest.mark.long) for name in ASKED]
+SAME_ORBIT = pytest.mark.xfail(strict=True, reason="orbits that differ by whole turns of an angle count as several")
+TURNED = [
+    pytest.param(
+        name,
+        marks=[
+            *([] if name in ("run", "equilibrium") else [pytest.mark.long]),
+            *([SAME_ORBIT] if name == "skeleton" else []),
+        ],
+    )
+    for name in ASKED
+]
 
 
 @pytest.mark.parametrize("turns", [1, -1000])
