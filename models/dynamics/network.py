@@ -120,7 +120,9 @@ def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str)
     """Add the parameters of another part; the same name in two parts would silently be one number."""
     for name, parameter in more.items():
         if name in table:
-            raise ValueError(f"{what}: its parameter {name!r} has the name of one of another part; rename it")
+            other = 'a coupling with a free name is, e.g., Rates({"v": "k*W*(v_j - v_i)"}, {"k": 1})'
+            remedy = f"; {other}" if what.startswith("coupling") else ""
+            raise ValueError(f"{what}: its parameter {name!r} has the name of one of another part; rename it{remedy}")
         table[name] = parameter
 
 

@@ -296,7 +296,8 @@ def _put(
     """Add an edge; ValueError if it is a loop, has no weight or is there already."""
     if target == source:
         raise ValueError(
-            f"{called.edge(source, target)} joins a node to itself; it has no effect on a difference: leave it out"
+            f"{called.edge(source, target)} joins a node to itself; it has no effect on a difference: leave it out, or add "
+            "what else a node does to itself to the rates of the node"
         )
     if not value:
         raise ValueError(f"{called.edge(source, target)} has weight 0; leave it out or give it a weight")

@@ -9,10 +9,10 @@ from functools import cache, wraps
 from inspect import Parameter, currentframe, isfunction, signature
 from typing import Any
 
-from .checks import suggestion
+from .checks import short_repr, suggestion
 from .unsupported import unsupported
 
-__all__ = ["check_methods", "public", "warn"]
+__all__ = ["called_from_outside", "check_methods", "public", "warn"]
 
 
 def warn(message: str, kind: type[Warning] = RuntimeWarning) -> None:
@@ -29,6 +29,15 @@ def warn(message: str, kind: type[Warning] = RuntimeWarning) -> None:
     while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == package:
         level, frame = level + 1, frame.f_back
     warnings.warn(message, kind, stacklevel=level)
+
+
+def called_from_outside(*modules: str) -> bool:
+    """Return True if the function that asks was called from outside of this package, directly or through these modules."""
+    asking = currentframe()
+    frame = asking.f_back.f_back if asking and asking.f_back else None
+    while frame is not None and frame.f_globals.get("__name__") in (__name__, *modules):
+        frame = frame.f_back
+    return frame is None or frame.f_globals.get("__name__", "").partition(".")[0] != __name__.partition(".")[0]
 
 
 def public(value: Any, package: str) -> Any:
@@ -110,9 +119,13 @@ class _Taken:
         if strange is not None:
             if reason := unsupported(strange):
                 return f"unknown keyword {strange!r} of {self.name}: {reason}"
-            other = f"; a parameter is given as parameters={{{strange!r}: …}}" if "parameters" in self.names else ""
+            other = (
+                f"; a parameter is given as parameters={{{short_repr(strange)}: …}}"
+                if "parameters" in self.names
+                else ""
+            )
             return (
-                f"unknown keyword {strange!r} of {self.name}; known: {', '.join(self.names) or 'none'}"
+                f"unknown keyword {short_repr(strange)} of {self.name}; known: {', '.join(self.names) or 'none'}"
                 f"{suggestion(strange, self.names) or other}"
             )
         if given > len(self.places) and not self.any_place:

@@ -7,11 +7,14 @@ a model keeps, wherever it comes from.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from keyword import iskeyword
 
 import sympy as sp
+from sympy.codegen.cfunctions import expm1
 from sympy.logic.boolalg import Boolean
 
 from ..inputs.checks import short_repr, suggestion
@@ -40,21 +43,27 @@ RESERVED = frozenset({"pi", TIME.name, FRICTION_NAME})
 
 _CALLED = dict(sorted({**FUNCTIONS, FRICTION_NAME: FRICTION}.items()))
 _NAMES = {function: name for name, function in FUNCTIONS.items()}
-_QUOTIENTS: Mapping[type, Callable[[sp.Expr], sp.Expr]] = {
+_OTHERWISE: Mapping[type, Callable[..., sp.Basic]] = {
     sp.cot: lambda x: sp.cos(x) / sp.sin(x),
     sp.sec: lambda x: 1 / sp.cos(x),
     sp.csc: lambda x: 1 / sp.sin(x),
     sp.coth: lambda x: 1 / sp.tanh(x),
     sp.sech: lambda x: 1 / sp.cosh(x),
     sp.csch: lambda x: 1 / sp.sinh(x),
+    sp.Mod: lambda x, m: x - m * sp.floor(x / m),
+    expm1: lambda x: 2 * sp.sinh(x / 2) * sp.exp(x / 2),  # no difference of near numbers
+    sp.Ne: lambda a, b: sp.Or(a < b, a > b),
+    sp.Eq: lambda a, b: sp.And(a <= b, a >= b),
 }
-"""Functions that SymPy makes of others, as cot(x) of tan(pi/2 - x), by those that a model may call."""
+"""Functions and relations of SymPy, as cot(x) that it makes of tan(pi/2 - x), by those that a model may have."""
 _SIGNS: Mapping[type, str] = {
     sp.StrictLessThan: "<",
     sp.LessThan: "<=",
     sp.StrictGreaterThan: ">",
     sp.GreaterThan: ">=",
 }
+_WORDS = frozenset({"if", "else", "and", "or"})
+"""Words of Python that a text may have."""
 _RELATIONS = {sign: relation for relation, sign in _SIGNS.items()}
 
 
@@ -82,7 +91,7 @@ def exact(what: str, value: object, names: Mapping[str, sp.Symbol]) -> sp.Expr:
     if isinstance(value, bool) or not isinstance(value, int | float | Fraction | sp.Expr):
         kind = type(value).__name__
         raise TypeError(f"{what}: found {short_repr(value)} ({kind}); expected an expression")
-    given = _by_quotients(sp.sympify(value).replace(sp.Heaviside, _unit_step))
+    given = _otherwise(sp.sympify(value).replace(sp.Heaviside, _unit_step))
     strange = sorted({s.name for s in given.free_symbols} - {*names})
     if strange:
         raise ValueError(f"{what}: {_undeclared(strange[0], names)}")
@@ -111,10 +120,10 @@ def _settled(what: str, e: sp.Expr, names: Mapping[str, sp.Symbol]) -> sp.Expr:
     raise ValueError(f"{what}: found {short_repr(e)}, which SymPy changes each time it reads it; expected another form")
 
 
-def _by_quotients(e: sp.Expr) -> sp.Expr:
-    """An expression without cot, sec, csc and their hyperbolic counterparts."""
-    for function, quotient in _QUOTIENTS.items():
-        e = e.replace(function, quotient) if e.has(function) else e
+def _otherwise(e: sp.Expr) -> sp.Expr:
+    """An expression by functions and relations that a model may have."""
+    for function, written_otherwise in _OTHERWISE.items():
+        e = e.replace(function, written_otherwise) if e.has(function) else e
     return e
 
 
@@ -128,7 +137,7 @@ def _unit_step(x: sp.Expr, at_zero: sp.Expr = sp.S.Half) -> sp.Expr:
 
 
 def _undeclared(name: str, names: Mapping[str, sp.Symbol]) -> str:
-    return f"undeclared symbol {name!r}; declared: {', '.join(names)}{suggestion(name, names)}"
+    return f"undeclared symbol {short_repr(name)}; declared: {', '.join(names)}{suggestion(name, names)}"
 
 
 def _rational(what: str, number: sp.Float) -> sp.Rational:
@@ -318,9 +327,14 @@ def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
         raise ValueError(f"{what}: found {len(text)} characters; expected at most {LENGTH}")
     expression = parse(text)
     if expression is None:
+        word = next((w for w in re.findall(r"\w+", text) if iskeyword(w) and w not in _WORDS), None)
+        if word is not None:
+            raise ValueError(
+                f"{what}: {word!r} is a word of Python, which no text can use; call a parameter {word}_ or {word[:3]}"
+            )
         found = f"{short_repr(text)}{unpaired(text)}"
         raise ValueError(f"{what}: unreadable expression {found}; expected such as '-k*x + u*cos(omega*t)'")
-    found = _by_quotients(_OfModels(what, names).read(expression))
+    found = _otherwise(_OfModels(what, names).read(expression))
     if found.has(sp.I):
         raise ValueError(f"{what}: found the complex {short_repr(found)}; expected a real value; {COMPLEX}")
     return found

@@ -54,7 +54,7 @@ def load_scene(name_or_path: str | os.PathLike[str]) -> Scene:
         path = Path(name)
         return _scene(path.name, _read(path), path.parent)
     known = scene_names()
-    if name not in known and Path(name).exists():
+    if name not in known and os.path.exists(name):
         raise ValueError(
             f"scene {short_repr(name)}: found a file of another kind; expected a scene, whose name ends in .toml; "
             "the scene of a result is open_result(...).scene, which save('scene.toml') writes"

@@ -17,6 +17,7 @@ from ..dynamics.record import Record
 from ..graphs.topology import Topology
 from ..inputs.checks import check_instance, check_table, check_text, is_row, listed, suggestion
 from ..inputs.frozen import Frozen
+from ..inputs.keywords import called_from_outside, warn
 from ..inputs.names import NodeName
 from ..inputs.shown import Drawn, Written
 from ..inputs.unsupported import unsupported
@@ -34,7 +35,7 @@ from .complete import TimeUnit, complete
 from .dictionary import arguments, as_dict
 from .section import Section
 from .toml import write
-from .warnings import warnings
+from .warnings import asynchrony, warnings
 
 if TYPE_CHECKING:
     from ..spectra.spectrum import Spectrum
@@ -200,6 +201,8 @@ class Scene(Drawn, Written):
         for name, value in values.items():
             object.__setattr__(self, name, value)
         object.__setattr__(self, "given", _kept(given, values))
+        if called_from_outside():
+            _warn(self)
 
     @property
     def n(self) -> int:
@@ -349,7 +352,10 @@ class Scene(Drawn, Written):
             raise ValueError(
                 f"{self.varied[0]} has values for {self.n} nodes, or for their links; give `parameters` for another number"
             )
-        return Scene(**given)
+        scene = Scene(**given)
+        if called_from_outside() and (scene.model, scene.varied) != (self.model, self.varied):
+            _warn(scene)
+        return scene
 
     def _kept_start(self, changes: Mapping[str, object]) -> Mapping[str, object] | None:
         """The initial states that were given, without modes of contacts if the friction may be another."""
@@ -397,7 +403,10 @@ class Scene(Drawn, Written):
         ValueError, TypeError
             For unknown names, and for whatever `Scene` refuses.
         """
-        return cls(**arguments(values, KEYWORDS, folder))
+        scene = cls(**arguments(values, KEYWORDS, folder))
+        if called_from_outside(f"{__package__}.file"):
+            _warn(scene)
+        return scene
 
     def __repr__(self) -> str:
         oscillators = " and ".join(dict.fromkeys(kind.oscillator.name for kind in self.model.kinds))
@@ -410,6 +419,13 @@ class Scene(Drawn, Written):
             *map(repr, self.axes),
         ]
         return f"Scene({', '.join(words)})"
+
+
+def _warn(scene: Scene) -> None:
+    """Warn if the synchronisation error is recorded where neither graph nor links let it vanish."""
+    if Record.SYNC_ERROR in scene.record:
+        for words in filter(None, asynchrony(scene.model, scene.varied)):
+            warn(words)
 
 
 def _nodes(given: Mapping[str, Any]) -> int | None:

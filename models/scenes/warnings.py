@@ -12,7 +12,7 @@ from ..inputs.names import LinkName, NodeName
 from ..interactions.coupling import MatrixCoupling
 from ..networks.model import Model
 
-__all__ = ["warnings", "zero_multiplicity"]
+__all__ = ["asynchrony", "warnings", "zero_multiplicity"]
 
 STIFF = 100.0
 """Frequency of a mode and number of its swings above which springs are called stiff."""
@@ -53,9 +53,9 @@ def warnings(model: Model, varied: tuple[str, ...], values: Mapping[str, Any], d
     graph = model.topology
     of_nodes = tuple(name for name in varied if model.holders(name))
     alike = not varied and len(model.kinds) == 1
-    asynchronous = _without_synchrony(model, varied) if len(model.kinds) == 1 else ""
+    in_parts, asynchronous = asynchrony(model, varied)
     sentences = (
-        _in_parts(graph),
+        in_parts,
         *(_negative_weights(own) for _, own in model.linked),
         _different_nodes(graph, of_nodes),
         asynchronous,
@@ -63,6 +63,11 @@ def warnings(model: Model, varied: tuple[str, ...], values: Mapping[str, Any], d
         _equal_starts(values) if alike and not asynchronous else "",
     )
     return tuple(filter(None, sentences))
+
+
+def asynchrony(model: Model, varied: tuple[str, ...]) -> tuple[str, str]:
+    """Return why the graph and why the links of a network leave no complete synchronisation; "" if they do not."""
+    return _in_parts(model.topology), _without_synchrony(model, varied) if len(model.kinds) == 1 else ""
 
 
 def _in_parts(graph: Topology) -> str:

@@ -115,6 +115,13 @@ class Eigenvalue:
             return self.number.enclosure(bits)
         return enclose(self.number, bits)
 
+    def __float__(self) -> float:
+        if isinstance(self.value, complex):
+            raise TypeError(
+                f"eigenvalue {self}: found a complex number; expected a real one; take complex(eigenvalue.value)"
+            )
+        return self.value
+
     def __str__(self) -> str:
         text = self.text
         if len(text) <= 60 or not isinstance(self.number, Root):
