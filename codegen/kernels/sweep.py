@@ -126,13 +126,13 @@ class KernelSource:
     @property
     def digest(self) -> str:
         """Hexadecimal SHA-256 of the text and of those of its driver and recorders."""
-        return _digest(self.head, self.code, *(module.text for module in self.shared))
+        return _digest(self.text, *(module.text for module in self.shared))
 
 
 @lru_cache(maxsize=64)
-def _digest(head: str, code: str, *shared: str) -> str:
-    """That of a kernel of these texts; runs ask for it again and again."""
-    return hashlib.sha256("".join([f"{head}\n\n\n{code}", *shared]).encode()).hexdigest()
+def _digest(*texts: str) -> str:
+    """The SHA-256 of some texts; runs ask for that of one kernel again and again."""
+    return hashlib.sha256("".join(texts).encode()).hexdigest()
 
 
 def emit(

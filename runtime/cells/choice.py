@@ -169,10 +169,13 @@ class Ladder:
         start, or how far the rates there carry the cell in its shortest time.
         """
         rtol, atol = tolerances(self.scene, self.equations, rows.numbers)
-        if self.scene.given["atol"] is None and len(rows):
-            size = np.maximum(np.abs(rows.start).max(axis=1), self.templates.reach(rows.start, rows.numbers))
-            small = (size > 0.0) & (size < 0.1)
-            atol = np.where(small, atol * 10.0 ** np.floor(np.log10(np.where(small, 10.0 * size, 1.0))), atol)
+        if self.scene.given["atol"] is None:
+            small = np.flatnonzero(np.abs(rows.start).max(axis=1) < 0.1)
+            if len(small):
+                few = rows.take(small)
+                size = np.maximum(np.abs(few.start).max(axis=1), self.templates.reach(few.start, few.numbers))
+                size = np.where((size > 0.0) & (size < 0.1), 10.0 * size, 1.0)
+                atol[small] *= 10.0 ** np.floor(np.log10(size))
         return rtol, atol
 
     def at(self, rows: Plan, state: np.ndarray, time: np.ndarray) -> Paces:

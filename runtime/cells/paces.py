@@ -133,7 +133,7 @@ class Templates:
             return Paces(*map(np.concatenate, zip(*each, strict=True)))
         rates, blocks = self._rates(state, numbers, time), self.blocks(state, numbers, time)
         with np.errstate(all="ignore"):
-            size = np.sqrt((blocks**2).sum(axis=(2, 3))).max(axis=1)
+            size = _sizes(blocks)
             size = np.where(np.isnan(size), np.inf, size)
             size = np.where((size == np.inf) & ~np.isfinite(rates).all(axis=1), 0.0, size)  # there are no rates
             step = SHIFT * np.minimum(1.0 / np.maximum(size, 1e-300), shortest)
@@ -151,8 +151,7 @@ class Templates:
         time = np.zeros(len(state))
         with np.errstate(all="ignore"):
             speed = np.abs(self._rates(state, numbers, time)).max(axis=1)
-            fastest = np.sqrt((self.blocks(state, numbers, time) ** 2).sum(axis=(2, 3))).max(axis=1)
-            return np.nan_to_num(speed / fastest, nan=0.0, posinf=0.0)
+            return np.nan_to_num(speed / _sizes(self.blocks(state, numbers, time)), nan=0.0, posinf=0.0)
 
     def layers(self, state: np.ndarray, numbers: np.ndarray) -> Iterator[np.ndarray]:
         """Yield the blocks (cells, count, p, p) of nodes and links in the middle of each smoothed jump, and close by."""
@@ -207,6 +206,11 @@ class Templates:
             inverse = np.linalg.inv(masses)
             inverse[singular] = np.nan
             yield part, inverse
+
+
+def _sizes(blocks: np.ndarray) -> np.ndarray:
+    """Bounds (cells,) of the eigenvalues of blocks (cells, count, p, p): Frobenius norms."""
+    return np.asarray(np.sqrt((blocks**2).sum(axis=(2, 3))).max(axis=1))
 
 
 def fastest_rates(equations: Equations, states: np.ndarray, numbers: np.ndarray) -> np.ndarray:

@@ -258,20 +258,15 @@ def by_place(equations: Equations, numbers: np.ndarray) -> dict[str, np.ndarray]
     drive = drive_of((*equations.nodes, *equations.edges), equations.differing)
     names = {name for e in (*drive.paces, *drive.gaps, *drive.rises) for name in names_in(e)}
     columns = dict(zip(equations.parameters, numbers.T, strict=True))
-    own = {name: [f"{name}_{i + 1}" for i in range(equations.n)] for name in equations.varied}
-    own |= {name: list(layer.names(name)) for name, layer in equations.numbered.items()}
-    found = {name: own.get(name, [name]) for name in names}
-    found = {name: held for name, held in found.items() if any(each in columns for each in held)}
-    places, absent = max(map(len, found.values()), default=1), np.full(len(numbers), np.nan)
-    return {
-        name: np.concatenate([columns.get(each, absent) for each in _stretched(held, places)])
-        for name, held in found.items()
-    }
-
-
-def _stretched(held: list[str], places: int) -> list[str]:
-    """The name of one number for all places, or the names at the first places and none at the rest."""
-    return held * places if len(held) == 1 else held + [""] * (places - len(held))
+    nodes = {name: [f"{name}_{i + 1}" for i in range(equations.n)] for name in equations.varied}
+    links = {name: list(layer.names(name)) for name, layer in equations.numbered.items()}
+    differing = {name: single for name, single in (nodes | links).items() if name in names}
+    places, absent = max(map(len, differing.values()), default=1), np.full(len(numbers), np.nan)
+    values = {name: np.tile(columns[name], places) for name in names & {*columns}}
+    for name, single in differing.items():
+        padded = single + [""] * (places - len(single))
+        values[name] = np.concatenate([columns.get(parameter, absent) for parameter in padded])
+    return values
 
 
 def _spread(count: int, most: int) -> np.ndarray:

@@ -133,7 +133,8 @@ def words_of(
     """Return intervals in words, with the errors of their ends if they are known; dots at ends `beyond` which they may go on."""
 
     def end(x: float, error: float) -> str:
-        return f"{x:z.4f}" + ("..." if x in beyond else f" ± {error:.1g}" if error else "")
+        known = error > np.finfo(float).eps * abs(x)  # no error of rounding
+        return f"{x:z.4f}" + ("..." if x in beyond else f" ± {error:.1g}" if known else "")
 
     found = []
     for k, ends in enumerate(intervals[:most]):

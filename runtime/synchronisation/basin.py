@@ -114,7 +114,7 @@ class Basin(Labelled):
         """Scene, shares with their interval, how cells ended, and the criterion."""
         return (
             ("scene", repr(self.scene)),
-            *(("starts", words) for words in self.message.split("; ")),
+            *(("starts", words) for words in self._findings()),
             ("synchronous", self.criterion.words),
         )
 
@@ -171,6 +171,10 @@ class Basin(Labelled):
     @property
     def message(self) -> str:
         """Shares, interval, the exponent if it was needed, and how many cells ended how, in words."""
+        return "; ".join(self._findings())
+
+    def _findings(self) -> list[str]:
+        """The parts of the message."""
         low, high = self.interval
         first = f"{self.count} of {self.samples} starts synchronised: {self.share:.4g}"
         others = (f"{name}: {share:.4g}" for name, share in self.shares.items() if share and name != Fate.SYNCHRONOUS)
@@ -179,7 +183,7 @@ class Basin(Labelled):
         if self.exponent - 2.0 * self.stderr > 0.0:
             known.append("the synchronous state is unstable: starts that synchronised have not left it yet")
         ends = (f"{n} cell{'s' * (n > 1)}: {s.message}" for s, n in self.statuses.items())
-        return "; ".join([first, *others, sure, *known, *ends])
+        return [first, *others, sure, *known, *ends]
 
 
 def basin(

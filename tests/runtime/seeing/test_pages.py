@@ -106,7 +106,7 @@ def test_text_in_a_terminal_is_a_few_lines(name: str) -> None:
     value = run(Scene(transient=1, window=1)) if name == "Result" else KINDS[name]
     lines = repr(value).splitlines()
     assert lines[0] == name
-    assert 2 <= len(lines) <= 12
+    assert 2 <= len(lines) <= 10
     assert "array(" not in repr(value)
     assert max(map(len, lines)) < 200
 

@@ -165,7 +165,7 @@ def test_a_return_that_fails_leads_to_the_next_and_to_the_least_period(monkeypat
         (pair(1.0), {"start": [1.0]}, ValueError, "expected a number for each of x, v"),
         (Scene("rossler", "x->x", chain(2)), {}, ArithmeticError, "near the motion after 300 mean return times; start"),
         (Scene("pendulum", topology=chain(2)), {}, ArithmeticError, "no attracting cycle near the motion"),
-        (pair(-1.0), {}, ArithmeticError, r"no cycle: the motion comes to rest at x = [-\d.e]+, v = "),
+        (pair(-1.0), {}, ArithmeticError, "no cycle: the motion comes to rest at x = 0, v = "),
     ],
 )
 def test_what_has_no_attracting_cycle(scene: Scene, more: dict[str, Any], error: type, words: str) -> None:

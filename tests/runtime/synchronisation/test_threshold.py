@@ -320,7 +320,7 @@ def test_windows_of_exponents_are_those_of_the_network():
     np.testing.assert_allclose(found.exponents.errors, [(0.0, 0.0)], atol=1e-9)
     np.testing.assert_allclose(found.data["window"], [(0.0, 1 / 3)], rtol=1e-9)
     assert found.data["window_error"].dims == found.data["window"].dims == ("window_number", "end")
-    assert dict(found.summary)["sigma, negative exponents"].startswith("0.0000 … 0.3333")
+    assert dict(found.summary)["sigma, negative exponents"] == "0.0000 … 0.3333"
     assert found.as_dict()["no_exponents"] is None
     axes = found.plot()
     assert "negative exponents" in [text.get_text() for text in axes.get_legend().get_texts()]
