@@ -321,6 +321,11 @@ class Observed:
     def state(self, state: np.ndarray) -> None:
         self.integrator.state = np.pad(state, ((0, 0), (0, self.hidden)))
 
+    @property
+    def steps(self) -> int:
+        """Steps that were taken."""
+        return self.integrator.steps
+
     def advance(self, length: float) -> None:
         """Integrate over a length of time."""
         self.integrator.advance(length)

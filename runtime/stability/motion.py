@@ -32,6 +32,9 @@ __all__ = [
 SHARE = 8
 """Least number of steps of a path from one end of a component to the other."""
 
+FINE = 6
+"""Most steps of the integrator in a step of a path: a spike takes more, so that none hides between two states of a path."""
+
 FIRST = 1e-6
 """First step of a path, relative to the shortest time that the start lets guess."""
 
@@ -144,19 +147,20 @@ def rests(rates: Rates, state: np.ndarray, closed: float, extent: np.ndarray) ->
 
 
 def path(integrator: VariationalIntegrator, shortest: float) -> Iterator[tuple[np.ndarray, float, np.ndarray]]:
-    """Advance a single orbit by steps in which no component moves by more than a share of its extent so far.
+    """Advance a single orbit by steps in which no component moves by more than a share of its extent so far, nor there and back.
 
     Yield, after each step, the state before it, its length and the extent (p,) so far.  Steps of the shortest length may
     move by more, as the first ones do.  The absolute tolerance follows the extent.
     """
     step, low, high = shortest, integrator.state[0].copy(), integrator.state[0].copy()
     while True:
-        before = integrator.state
+        before, taken = integrator.state, integrator.steps
         integrator.advance(step)
         after = integrator.state[0]
         lower, higher = np.minimum(low, after), np.maximum(high, after)
         moved, extent = SHARE * np.abs(after - before[0]), higher - lower
-        if step > shortest and np.any(moved > extent):
+        hides = integrator.steps - taken > FINE
+        if step > shortest and (hides or np.any(moved > extent)):
             integrator.state, step = before, max(shortest, 0.5 * step)
             continue
         low, high = lower, higher
