@@ -132,7 +132,7 @@ def certify(
     begun = places.table(starts if states is None else states)[:, :, 0]
     table = {name: np.empty(scene.cells) for name in ("exponent", "stderr", "diffusion", "margin", "size")}
     for group in shared_orbits(scene, planner.columns(cells)):
-        single = with_numbers(scene, group.numbers, axes=(), zipped=False, continuation="none")
+        single = with_numbers(scene, group.numbers, axes=(), zipped=False, continuation="none", stop=None)
         cell = coupled_cell(Given(certify), single, RTOL)
         orbits = Orbits.make(cell, group.strengths, begun[group.cells[:1]], averaging.execution.size)
         orbits = orbits.begun_at(begun[group.cells])

@@ -134,8 +134,8 @@ def universal_probe(
     Raises
     ------
     ValueError
-        If strengths are missing or not finite, if the scene has no coupling, draws, or axes but that of
-        sigma, or if its coupling is not proportional to sigma and to the weight of a link.
+        If strengths are missing or not finite, if the scene has no coupling, a stop, draws, or axes but
+        that of sigma, or if its coupling is not proportional to sigma and to the weight of a link.
     """
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     real, imaginary = _broadcast(alpha, beta)

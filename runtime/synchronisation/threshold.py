@@ -175,7 +175,7 @@ def thresholds(
     Parameters
     ----------
     scene : Scene
-        The network; its records, observables, sections and stop are not used.
+        The network; its records, observables and sections are not used.
     sigma : sequence of float, optional
         An increasing grid on which ranges are looked for (default: `default_grid`); narrower ranges
         are not seen.  The probe's grid in alpha covers every sigma abs(gamma).
@@ -202,8 +202,8 @@ def thresholds(
     ------
     ValueError
         For a network without links, for one-way links whose eigenvalues are complex, for unequal
-        nodes, for links with inertia, and for a scene with draws or axes, but for one of sigma, which
-        is not used.
+        nodes, for links with inertia, and for a scene with a stop, draws or axes, but for one of sigma,
+        which is not used.
     """
     a_scene(scene).equations.expect_alike("thresholds")
     expect_vanishing("thresholds", scene.equations)

@@ -143,9 +143,9 @@ def test_the_prediction_ends_with_the_grid_of_sigma(swept):
     assert thresholds(Scene(topology=chain(2)), sigma=[0.05, 0.5]).predicted == ((0.1, 0.2),)
 
 
-def test_what_a_scene_observes_and_where_it_stops_is_not_used(swept):
-    thresholds(Scene(topology=chain(3), observe={"e": "mean(nodes.mean(v))"}, stop="x_1 - 9"), sigma=[0.1, 0.2])
-    assert [(dict(scene.observe), scene.stop) for scene, *_ in swept] == [({}, None)] * 2
+def test_what_a_scene_observes_is_not_used(swept):
+    thresholds(Scene(topology=chain(3), observe={"e": "mean(nodes.mean(v))"}), sigma=[0.1, 0.2])
+    assert [dict(scene.observe) for scene, *_ in swept] == [{}, {}]
 
 
 def test_negative_sigma_is_predicted_as_it_is_simulated(swept, monkeypatch):
