@@ -109,7 +109,7 @@ def test_the_probe_covers_every_mode_and_the_network_is_swept_as_asked(swept):
     (pair, half, options), (network, sigma, direct) = swept
     assert (pair.topology.n, network.topology.n) == (2, 3)
     assert (2 * half[0], 2 * half[-1]) == (pytest.approx(0.1), pytest.approx(0.9))
-    assert len(half) == PROBES
+    assert 2 * PROBES / 3 < len(half) < 4 * PROBES / 3
     assert sigma.tolist() == [0.1, 0.2, 0.3]
     assert options == direct == (SHORT, 1e-3, Execution(workers=1))
     assert found.probe.intervals == ((0.2, 0.4),)
@@ -131,11 +131,51 @@ def test_the_probe_covers_every_mode_and_the_network_is_swept_as_asked(swept):
 )
 def test_the_grid_of_the_probe_begins_at_zero_where_zero_is_asked_for(swept, graph, sigma, low):
     thresholds(Scene(topology=graph), sigma=sigma)
-    assert 2 * swept[0][1][0] == pytest.approx(low)
-    assert len(swept[0][1]) == PROBES
+    probed = 2 * swept[0][1]
+    assert probed[0] == pytest.approx(low)
+    assert np.all(np.diff(probed) > 0.0)
+    assert 2 * PROBES / 3 < len(probed) < 4 * PROBES / 3
     thresholds(Scene(topology=graph), sigma=np.linspace(sigma[0], sigma[1], 400))
-    assert len(swept[2][1]) == 400
+    assert len(swept[2][1]) >= 400
     assert swept[0][2][0] == PAPER
+
+
+@pytest.mark.parametrize("graph", [chain(2), chain(4), star(5)])
+def test_the_grid_of_the_probe_has_the_spacing_of_that_of_sigma(swept, graph):
+    """As long as the values of sigma reach it, no mode is probed more coarsely than the network, in ratios."""
+    sigma = np.logspace(-4, 3, 50)
+    thresholds(Scene(topology=graph), sigma=sigma)
+    ratios = swept[0][1][1:] / swept[0][1][:-1]
+    assert ratios.min() > 1.0
+    assert ratios.max() <= sigma[1] / sigma[0] * (1 + 1e-12)
+    sizes = [abs(value) for value in graph.spectrum.values if value]
+    assert 2 * swept[0][1][[0, -1]] == pytest.approx([1e-4 * min(sizes), 1e3 * max(sizes)])
+
+
+def test_ends_are_refined_as_far_as_the_grid_is_wide(swept):
+    """By default 5e-4, a fifth of a shorter step, a thousandth of a larger sigma."""
+    for x, resolution, widths in (
+        ([0.0, 0.0025, 0.1], None, [5e-4, 5e-4]),
+        ([0.0, 1e-6], None, [2e-7]),
+        ([-9e6, -8e6, 0.0, 10.0, 20.0], None, [8e3, 5e-4, 5e-4, 1e-2]),
+        ([0.0, 1e-6, 10.0], 0.1, [0.1, 0.1]),
+    ):
+        np.testing.assert_allclose(threshold._widths(np.array(x), resolution), widths, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("sigma", "options", "words"),
+    [
+        ([0.0, 1e99], {}, r"a step of 1e\+99, from 0 to 1e\+99, and ends refined to 0\.0005; .*give more values"),
+        ([0.0, 0.1, 0.2], {"resolution": 1e-12}, r"a step of 0\.1, from 0 to 0\.1, and ends refined to 1e-12"),
+    ],
+)
+def test_steps_that_cannot_be_refined_are_refused_before_the_work(swept, sigma, options, words):
+    with pytest.raises(ValueError, match=f"^sigma: found {words}") as caught:
+        thresholds(Scene(topology=chain(2)), sigma=sigma, **options)
+    assert swept == []
+    assert "\n" not in str(caught.value)
+    thresholds(Scene(topology=chain(2)), sigma=[0.0, 1e99], resolution=1e92)
 
 
 def test_the_prediction_ends_with_the_grid_of_sigma(swept):
