@@ -15,6 +15,7 @@ from synchain.models.inputs.checks import check_instance, check_integer, check_n
 from synchain.models.scenes.complete import TimeUnit
 from synchain.models.scenes.scene import Scene
 
+from ..cells.plan import scale_of_atol
 from .motion import Motion, columns_of
 from .trials import Outcome
 
@@ -200,10 +201,10 @@ def applied(criterion: Criterion, motion: Motion, scene: Scene) -> AppliedCriter
 
 
 def _atol(motion: Motion, scene: Scene, rtol: float) -> float | None:
-    """The absolute tolerance of a motion below 1: a tenth of rtol times the power of ten next to its smallest extent."""
+    """The absolute tolerance for the smallest extent of a small motion, in place of a default one; else None."""
     moves = motion.extent[motion.extent > 0.0]
-    power = round(math.log10(moves.min())) if len(moves) else 0
-    return float(0.1 * rtol * 10.0**power) if scene.given["atol"] is None and power < 0 else None
+    scale = float(scale_of_atol(moves.min(initial=1.0)))
+    return 0.1 * rtol * scale if scene.given["atol"] is None and scale < 1.0 else None
 
 
 def resolved(criterion: Criterion, scene: Scene, measure: Callable[[float | None], Motion]) -> AppliedCriterion:
