@@ -130,12 +130,18 @@ class Thresholds(Labelled):
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Scene and ranges."""
+        sigma, alpha = ({float(x[0]), float(x[-1])} - {0.0} for x in (self.direct.x, self.probe.x))
+        ranges = (
+            ("sigma, negative exponents", self.exponents.words),
+            ("sigma, simulated", words_of(self.direct.intervals, beyond=sigma)),
+            ("sigma, predicted by the probe", words_of(self.predicted, beyond=sigma)),
+            ("alpha, probe", words_of(self.probe.intervals, beyond=alpha)),
+        )
+        goes_on = any("..." in words for _, words in ranges)
         return (
             ("scene", repr(self.scene)),
-            ("sigma, negative exponents", self.exponents.words),
-            ("sigma, simulated", words_of(self.direct.intervals)),
-            ("sigma, predicted by the probe", words_of(self.predicted)),
-            ("alpha, probe", words_of(self.probe.intervals)),
+            *ranges,
+            *((("...", "the grid ends here, the range may go on"),) if goes_on else ()),
             ("grid of sigma", ends_of(self.direct.x)),
             ("simulated and probe", f"after a transient: {self.criterion.words}"),
             *(("warning", words) for words in self.warnings),

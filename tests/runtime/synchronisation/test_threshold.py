@@ -368,6 +368,41 @@ def test_windows_of_exponents_are_those_of_the_network():
     np.testing.assert_allclose(ends, [0.0, 1 / 3], rtol=1e-9)
 
 
+def test_ranges_that_end_with_the_grid_may_go_on():
+    """Of x' = -x, y' = -y with links across, a mode of strength alpha grows at alpha - 1: nothing grows below sigma = 1/3."""
+    scene = Scene(Field({"x": "-x", "y": "-y"}), "x->y, y->x", chain(3), time_unit="time")
+    rows = dict(thresholds(scene, sigma=[0.0, 0.1, 0.2], **ASKED).summary)
+    assert rows["sigma, negative exponents"] == "0.0000 … 0.2000..."
+    assert rows["..."] == "the grid ends here, the range may go on"
+    found = Sweep(np.array([0.1, 0.2]), np.zeros(2), np.ones(2), ((0.1, 0.15), (0.18, 0.2)))
+    whole = thresholds(scene, sigma=[0.0, 0.1, 0.2], **ASKED)
+    rows = dict(replace(whole, direct=found, probe=found, predicted=found.intervals).summary)
+    for name in ("sigma, simulated", "sigma, predicted by the probe", "alpha, probe"):
+        assert rows[name] == "0.1000... … 0.1500; 0.1800 … 0.2000..."
+
+
+@pytest.mark.parametrize(("drive", "unit"), [("", 1.0), (" + cos(t/2)", 4 * math.pi)])
+def test_ends_that_come_of_the_transient_are_named(drive, unit):
+    """Errors grow at alpha - 1 = 2 sigma - 1: after 20 units of time they have fallen enough up to sigma = 0.39, not 1/2."""
+    scene = Scene(
+        Field({"x": f"-x{drive}", "y": "-y"}), "x->y, y->x", chain(2), time_unit="period" if drive else "time",
+        initial={"x": [0.5, 0.4], "y": [0.5, 0.5]},
+    )  # fmt: skip
+    criterion = Criterion(starts=1, transient=20.0 / unit, window=0.1 / unit)
+    asked = {"sigma": np.linspace(0.0, 0.6, 13), "show_progress": False}
+    found = thresholds(scene, criterion=criterion, **asked)
+    ((_, high),) = found.direct.intervals
+    assert 0.3 < high < 0.45 < found.exponents.intervals[0][1] == pytest.approx(0.5)
+    assert [words[: words.index(" come of")] for words in found.warnings] == [
+        f"the ends of what is {what} at sigma = {end:.4f} (exponent {2 * end - 1:.2g})"
+        for what, end in (("simulated", high), ("predicted by the probe", found.predicted[0][1]))
+    ]
+    assert all("20 units of time are given; trust the exponents" in words for words in found.warnings)
+    assert set(found.warnings) <= {words for name, words in found.summary if name == "warning"}
+    # an end of the grid is none of the transient
+    assert thresholds(scene, criterion=criterion, **{**asked, "sigma": [0.0, 0.1, 0.2]}).warnings == ()
+
+
 def test_the_effort_of_the_exponents_can_be_chosen(monkeypatch):
     asked = []
     monkeypatch.setattr(threshold, "exponent_windows", lambda *all_: asked.append(all_[3:]) or ExponentWindows())
