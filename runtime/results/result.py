@@ -206,9 +206,9 @@ class Result(Labelled):
             for name, column in columns.items():
                 if name in data:
                     table[:, column] = data[name].values.reshape(cells)
-        for column, name in enumerate(TOLERANCES):
+        for k, name in enumerate(TOLERANCES):
             if name in data:
-                buffers.tolerances[:, column] = data[name].values.reshape(cells)
+                buffers.tolerances[:, k] = data[name].values.reshape(cells)
         if "method_steps" in data:
             by_method = data.method_steps.values.reshape(cells, -1)
             buffers.counts[:, Count.BY_METHOD : Count.BY_METHOD + by_method.shape[1]] = by_method
