@@ -40,7 +40,7 @@ from ..support.progress import Hook
 from .criterion import IN_CRITERION, AppliedCriterion, Criterion, checked, errors, offsets, preset, resolved
 from .exponent_windows import ExponentWindows, exponent_windows
 from .hidden_modes import hidden_modes
-from .motion import Motion, alike, first_starts, measure_motion, spread_of
+from .synchronous_motion import SynchronousMotion, alike, first_starts, measure_motion, spread_of
 from .trials import Trials
 
 __all__ = [
@@ -391,7 +391,7 @@ def fitted(scene: Scene, sigma: np.ndarray, criterion: Criterion, execution: Exe
         return criterion
     known, apart = preset(criterion, scene), spread_of(scene.equations, np.array([scene.y0]))
 
-    def measure(atol: float | None) -> Motion:
+    def measure(atol: float | None) -> SynchronousMotion:
         rtol = known.rtol or scene.rtol
         unit = AppliedCriterion(1.0, known.starts, 0.0, 1.0, 1.0, rtol, 0, (), max_steps=scene.max_steps, atol=atol)
         reduction = reduce_scene(cells_of(scene, sigma, unit))
