@@ -14,6 +14,7 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
+from .averages import ROUNDING
 from .variational_integrator import VariationalIntegrator
 
 __all__ = [
@@ -46,9 +47,6 @@ ENOUGH = 12
 
 REST = 1e-9
 """Rates are zero if they are below what they change by over this part of the extent of the motion."""
-
-ROUNDING = 100.0 * float(np.finfo(float).eps)
-"""Part of the size of its terms below which a sum is rounding."""
 
 DIGITS = 1e-10
 """Part of its terms below which a rate is zero, and of its size below which a component stays: steps leave such traces."""
