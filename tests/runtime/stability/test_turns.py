@@ -9,7 +9,8 @@ from synchain.models import Field, Scene
 from synchain.runtime.stability.orbits import Orbits
 
 ROSSLER = Field(
-    {"x": "k*(-y - z)", "y": "k*(x + a*y)", "z": "k*(b + z*(x - c))"}, parameters={"a": 0.2, "b": 0.2, "c": 5.7, "k": 1.0}
+    {"x": "k*(-y - z)", "y": "k*(x + a*y)", "z": "k*(b + z*(x - c))"},
+    parameters={"a": 0.2, "b": 0.2, "c": 5.7, "k": 1.0},
 )
 LORENZ = Field({"x": "k*10*(y - x)", "y": "k*(x*(28 - z) - y)", "z": "k*(x*y - 8*z/3)"}, parameters={"k": 1.0})
 NEURON = Field(
