@@ -6,14 +6,21 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 import sympy as sp
-from sympy.codegen.cfunctions import expm1
+from scipy import special
+from sympy.codegen.cfunctions import expm1, log1p
 
-from synchain import Field, Rates, Scene, chain, from_edges, load_scene, run
+from synchain import Field, Rates, Scene, chain, exprel, from_edges, load_scene, run
 
 x = sp.Symbol("x")
 NODE = Field({"x": "-x"})
+
+
+def _rate_of(field: Any) -> tuple[sp.Symbol, sp.Expr]:
+    node = Scene(field, None).equations.node
+    return node.state[0], node.rhs[0]
 
 
 @pytest.mark.parametrize(
@@ -23,13 +30,25 @@ NODE = Field({"x": "-x"})
         (sp.Piecewise((2, sp.Ne(x, 1)), (5, True)), 1.0, 5.0),
         (sp.Piecewise((2, sp.Eq(x, 1)), (5, True)), 1.0, 2.0),
         (expm1(x), 1e-12, 1.0000000000005e-12),
+        (log1p(x), 1e-12, 9.999999999995e-13),
+        (exprel(x), 0.0, 1.0),
+        ("x % 3 + (2 if x != 1 else 5)", -0.5, 4.5),
+        ("mod(x, 3) + (2 if x == 1 else 5)", 1.0, 3.0),
     ],
     ids=str,
 )
-def test_functions_of_sympy_are_written_by_others(given: sp.Expr, at: float, right: float) -> None:
-    (rate,) = Scene(Field({"x": given}), None).equations.node.rhs
-    (state,) = rate.free_symbols
-    assert sp.lambdify(state, rate)(at) == pytest.approx(right, rel=1e-15)
+def test_other_functions_are_written_by_those_of_kernels(given: sp.Expr | str, at: float, right: float) -> None:
+    assert sp.lambdify(*_rate_of(Field({"x": given})))(at) == pytest.approx(right, rel=1e-15)
+
+
+@pytest.mark.parametrize("name", ["expm1", "exprel", "log1p"])
+def test_functions_near_zero_have_all_digits(name: str) -> None:
+    f, exact = sp.lambdify(*_rate_of(Field({"x": f"{name}(x)"}))), getattr(special, name)
+    small = 10.0 ** np.arange(-300.0, 0.0, 7.0)
+    places = [0.0, 1.0, -0.999, 2.54, 30.0, 700.0, *small, *-small, *np.linspace(-0.99, 3.0, 100)]
+    places += [] if name == "log1p" else [-1.0, -40.0, -1e5]
+    for at in places:
+        assert f(at) == pytest.approx(float(exact(at)), rel=1e-15, abs=0.0), at
 
 
 def test_a_remainder_runs() -> None:

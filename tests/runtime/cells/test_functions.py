@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.special import erf
+from scipy.special import erf, exprel
 
 import synchain as sc
 from synchain.models.inputs.expressions import FUNCTIONS
@@ -48,6 +48,23 @@ def test_angles_of_numbers_run() -> None:
     found = sc.run(sc.Scene(field, **settings), show_progress=False)
     exact = solve_ivp(lambda _, x: np.arctan2(1, x) + np.pi / 2, (0.0, 1.0), [0.4], rtol=1e-12, atol=1e-13).y[:, -1]
     np.testing.assert_allclose(found.end.values.ravel(), exact, rtol=0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853", "rodas5p"])
+def test_functions_without_a_value_by_their_formula_run_from_there(integrator: str) -> None:
+    """From 0, where (exp(x) - 1)/x is 0/0, over both ends of its power series; on links as on nodes."""
+    node = sc.Field({"x": "-expm1(x)/2 + 3*cos(t)"})
+    link = sc.Rates({"x": "W*(1/exprel(x_i) - log1p(x_j**2) + mod(k, 2))"}, {"k": 3.5})
+    settings = {"transient": 0.0, "window": 6.0, "time_unit": "time", "rtol": 1e-10, "integrator": integrator}
+    settings["initial"] = {"x": 0.0}
+    found = sc.run(sc.Scene(node, link, sc.chain(2), **settings), show_progress=False)
+
+    def rate(t: float, x: np.ndarray) -> np.ndarray:
+        return -np.expm1(x) / 2 + 3 * np.cos(t) + 1 / exprel(x) - np.log1p(x[::-1] ** 2) + 1.5
+
+    solution = solve_ivp(rate, (0.0, 6.0), [0.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-13)
+    assert solution.y.min() < -1.0 < 1.0 < solution.y.max()
+    np.testing.assert_allclose(found.end.values.ravel(), solution.y[:, -1], rtol=0.0, atol=1e-8)
 
 
 def test_no_function_is_left_out() -> None:
