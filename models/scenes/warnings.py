@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 from ..dynamics.synchrony import NoSynchrony, synchronous_node
@@ -70,6 +71,7 @@ def asynchrony(model: Model, varied: tuple[str, ...]) -> tuple[str, str]:
     return _in_parts(model.topology), _without_synchrony(model, varied) if len(model.kinds) == 1 else ""
 
 
+@lru_cache(maxsize=16)
 def _in_parts(graph: Topology) -> str:
     """A sentence if some nodes cannot reach one another."""
     multiplicity = zero_multiplicity(graph)
