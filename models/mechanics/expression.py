@@ -20,7 +20,7 @@ from sympy.logic.boolalg import Boolean
 from ..inputs.checks import short_repr, suggestion
 from ..inputs.expressions import COMPOSED, FUNCTIONS, Expressions
 from ..inputs.reader import NoMeaning, parse, unpaired
-from ..inputs.unsupported import COMPLEX
+from ..inputs.unsupported import COMPLEX, unsupported
 from .components import TIME
 from .oscillator import FRICTION
 
@@ -352,6 +352,11 @@ class _OfModels(Expressions):
 
     def pieces(self) -> str:
         return f"pi, + - * / **, {' '.join((*FUNCTIONS, *COMPOSED))} friction, a if x > 0 else b, and {', '.join(self.names)}"
+
+    def function(self, name: str) -> Callable[..., sp.Expr] | None:
+        if reason := unsupported(name):
+            raise NoMeaning(reason)
+        return self.functions.get(name)
 
     def name(self, name: str) -> sp.Basic:
         if name in self.names:
