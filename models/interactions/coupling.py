@@ -53,7 +53,9 @@ _NAME = r"[^\W\d]\w*"
 
 _ENTRY = re.compile(rf"\s*([+-]?)\s*(?:({_NUMBER})\s*\*?\s*)?({_NAME})\s*->\s*({_NAME})\s*")
 
-_EXPECTED = "expected 'a->b', the difference of a into the rate of b, with a rational factor or none: '1/2 x->y', '1e-3 x->y'"
+_EXPECTED = (
+    "expected 'a->b', the difference of a into the rate of b, with a rational factor or none: '1/2 x->y', '1e-3 x->y'"
+)
 
 _CHOSEN = re.compile(r"(?P<name>\S.*?)\s+on\s+(?P<coordinates>[^\W\d]\w*(?:\s*,\s*[^\W\d]\w*)*)\s*")
 

@@ -155,7 +155,9 @@ class Eigenvalue:
             return float(self) - float(other)
         for e in (self, number):
             if isinstance(e.value, complex):
-                raise TypeError(f"eigenvalue {e}: found a complex number; complex numbers have no order; take e.value.real")
+                raise TypeError(
+                    f"eigenvalue {e}: found a complex number; complex numbers have no order; take e.value.real"
+                )
         gap = float(self) - float(number)
         return gap if abs(gap) > NEAR * abs(float(self)) else sign((self.number,), (number.number,))
 

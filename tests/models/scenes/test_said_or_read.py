@@ -12,7 +12,7 @@ import sympy as sp
 from scipy import special
 from sympy.codegen.cfunctions import expm1, log1p
 
-from synchain import Field, Rates, Scene, chain, exprel, from_edges, load_scene, run
+from synchain import Field, Potential, Rates, Scene, chain, exprel, from_edges, load_scene, run
 
 x = sp.Symbol("x")
 NODE = Field({"x": "-x"})
@@ -65,8 +65,18 @@ def test_eigenvalues_are_floats() -> None:
     ("made", "words"),
     [
         (lambda: Rates({"x": "lambda*W*(x_j - x_i)"}, {}), "'lambda' is a word of Python"),
-        (lambda: Scene(Field({"x": "-sigma*x"}, parameters={"sigma": 1}), "x->x", chain(2)), "Rates("),
-        (lambda: Scene("duffing", links=[("spring", chain(3)), ("damper", chain(3))]), "Rates("),
+        (
+            lambda: Scene(Field({"x": "-sigma*x"}, parameters={"sigma": 1}), "x->x", chain(2)),
+            "write Rates({'x': 'k*W*(x_j - x_i)'}, {'k': 1})",
+        ),
+        (
+            lambda: Scene("duffing", links=[("spring", chain(3)), ("damper", chain(3))]),
+            "write Rates({'v': 'k*W*(v_j - v_i)'}",
+        ),
+        (
+            lambda: Scene("duffing", links=[("damper", chain(3)), ("spring", chain(3))]),
+            "write Potential('k*W*(x_j - x_i)**2/2'",
+        ),
         (lambda: from_edges([(1, 1), (1, 2)]), "to the rates of the node"),
     ],
 )
@@ -89,3 +99,18 @@ def test_messages_are_short_for_long_names(made: Callable[[str], Any]) -> None:
     with pytest.raises((ValueError, TypeError)) as caught:
         made("q" * 9000)
     assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize(
+    ("node", "coupling", "other"),
+    [
+        ("duffing", "spring", Potential("k*W*(x_j - x_i)**2/2", {"k": 1})),
+        ("duffing", "damper", Rates({"v": "k*W*(v_j - v_i)"}, {"k": 1})),
+        ("rossler", "x->x, 1/2 y->x", Rates({"x": "k*W*(x_j - x_i) + k*1/2*W*(y_j - y_i)"}, {"k": 1})),
+    ],
+)
+def test_couplings_with_a_free_name_are_those_that_are_shipped(node: str, coupling: str, other: Any) -> None:
+    sigma, k = sp.symbols("sigma k", real=True)
+    rates = Scene(node, coupling, chain(2)).equations.edge.rhs  # type: ignore[union-attr]
+    renamed = Scene(node, other, chain(2)).equations.edge.rhs  # type: ignore[union-attr]
+    assert all(sp.expand(a - b.xreplace({k: sigma})) == 0 for a, b in zip(rates, renamed, strict=True))
