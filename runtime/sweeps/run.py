@@ -84,7 +84,8 @@ def run(
     Returns
     -------
     Result
-        Labelled arrays of all cells.  `workers`, `width` and `executor` do not change them.
+        Labelled arrays of all cells.  `workers`, `width` and `executor` do not change them; the attributes `lanes` and
+        `kernel` of the data name the kernel, which depends on `width`.
 
     Raises
     ------
