@@ -125,7 +125,23 @@ def _otherwise(e: sp.Expr) -> sp.Expr:
     """An expression by functions and relations that a model may have."""
     for function, written_otherwise in _OTHERWISE.items():
         e = e.replace(function, written_otherwise) if e.has(function) else e
-    return e
+    return e.replace(lambda part: part.is_Mul and part.has(sp.Abs), _with_limit)
+
+
+def _with_limit(product: sp.Mul) -> sp.Expr:
+    """x/sqrt(|x|) as sign(x) sqrt(|x|), and other products x**k |x|**a of positive degree, which are 0/0 at x = 0."""
+    for size in product.args:
+        base, degree = size.as_base_exp()
+        if not (isinstance(base, sp.Abs) and degree.is_Rational and degree < 0):
+            continue
+        for factor in product.args:
+            x, k = factor.as_base_exp()
+            ratio = sp.cancel(x / base.args[0]) if k.is_Integer and k + degree > 0 and k > 0 else sp.nan
+            if ratio.is_Rational:
+                others = [each for each in product.args if each not in (size, factor)]
+                sign = sp.sign(base.args[0]) if k % 2 else sp.S.One
+                return sp.Mul(*others, ratio**k, sign, base ** (k + degree))
+    return product
 
 
 def _unit_step(x: sp.Expr, at_zero: sp.Expr = sp.S.Half) -> sp.Expr:
