@@ -11,9 +11,10 @@ _DIGITS = 9
 """Most digits of the number of a node."""
 
 TAKEN = frozenset(
-    {"cell", "component", "drive_phase", "end", "end_time", "ended_early", "integrator", "method_steps", "methods",
-     "node", "part", "periods_skipped", "point", "realisation", "rejected", "sample", "section", "section_count",
-     "section_time", "start", "start_time", "status", "steps", "sync_error", "sync_error_end", "sync_error_max", "time", "trajectory",
+    {"atol_used", "cell", "component", "drive_phase", "end", "end_time", "ended_early", "integrator", "method_steps", "methods",
+     "node", "part", "periods_skipped", "point", "realisation", "rejected", "rtol_used", "sample", "section", "section_count",
+     "section_time", "start", "start_time", "status", "steps", "sync_error", "sync_error_end", "sync_error_max", "time",
+     "trajectory",
      "transversal_exponent", "transversal_stderr", "verdict"}
 )  # fmt: skip
 """What data of results have under these names already."""
