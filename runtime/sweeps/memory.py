@@ -23,7 +23,7 @@ from .scheduler import BlockScheduler
 __all__ = ["Memory"]
 
 
-START = "start"
+START = "start_state"
 """Variable of the states that the cells started from, if those are not the scene's."""
 
 

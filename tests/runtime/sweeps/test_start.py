@@ -89,7 +89,7 @@ def test_each_cell_of_a_sweep_goes_on_from_its_own(tmp_path: Path) -> None:
     sigma, omega = [0.05, 0.1, 0.2], [1.15, 0.9]
     first = ran(DRIVEN, sigma=sigma, omega=omega)
     second = ran(DRIVEN.replace(transient=0.0), start=first, sigma=sigma, omega=omega)
-    np.testing.assert_array_equal(second.start, first.end)
+    np.testing.assert_array_equal(second.start_state, first.end)
     np.testing.assert_array_equal(second.start_time, first.end_time)
     for k, strength in enumerate(sigma):
         alone = ran(DRIVEN.replace(transient=0.0), start=first.end.isel(sigma=k, omega=1), sigma=strength, omega=0.9)
@@ -104,7 +104,7 @@ def test_an_axis_that_a_start_lacks_begins_at_one_cell() -> None:
     first = ran(DRIVEN, sigma=[0.05, 0.1])
     second = ran(DRIVEN, start=first, delta=[0.1, 0.2], sigma=[0.05, 0.1])
     for k in range(2):
-        np.testing.assert_array_equal(second.start.isel(delta=k), first.end)
+        np.testing.assert_array_equal(second.start_state.isel(delta=k), first.end)
     alone = ran(DRIVEN, start=first.end.isel(sigma=1), sigma=0.1, delta=0.2)
     np.testing.assert_array_equal(second.end.isel(sigma=1, delta=1), alone.end)
 
