@@ -28,6 +28,7 @@ from .graphs.symbolic import from_symbols as from_symbols
 from .graphs.topology import Topology as Topology
 from .graphs.topology import from_matrix as from_matrix
 from .graphs.topology import read_matrix as read_matrix
+from .inputs.expressions import exprel as exprel
 from .inputs.options import integer_option as integer_option
 from .inputs.options import integers_option as integers_option
 from .inputs.options import probability_option as probability_option

@@ -16,8 +16,10 @@ from math import isqrt
 
 import sympy as sp
 from flint import acb, arb, fmpq, fmpz_poly
+from sympy.printing.precedence import PRECEDENCE
+from sympy.printing.pretty.stringpict import prettyForm
 
-from .balls import Ball, precision
+from .balls import Ball, nearest, precision
 from .isolation import Disc, discs, dyadic, sharpened, sign
 from .rationals import to_flint, to_fraction
 
@@ -56,8 +58,8 @@ class Root:
 
     @property
     def expression(self) -> sp.Expr:
-        """This number as SymPy's CRootOf."""
-        return _expression(self.polynomial, self.index)
+        """This number as SymPy's CRootOf, which prints a decimal."""
+        return _expression(self)
 
     def enclosure(self, bits: int) -> Ball:
         """Return a ball that holds this number, of radius below 2**-bits times its modulus."""
@@ -130,21 +132,45 @@ def _short(x: Fraction) -> str:
     return str(x) if longest < 100 else f"a fraction of {longest} bits"
 
 
-class _LongRoot(sp.CRootOf):  # type: ignore[misc]  # SymPy has no types
-    """SymPy's CRootOf of a polynomial whose coefficients Python refuses to write."""
+class ComplexRootOf(sp.CRootOf):  # type: ignore[misc]  # SymPy has no types
+    """SymPy's CRootOf, equal to it, printed as a decimal: polynomials fill pages."""
 
-    __slots__ = ()
+    __slots__ = ("shown",)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, sp.CRootOf) and (self.poly, self.index) == (other.poly, other.index)
+
+    __hash__ = sp.CRootOf.__hash__
+
+    @property
+    def precedence(self) -> int:
+        """How tightly the printed text holds together: that of a sum, -1.5 - 0.9*I."""
+        return int(PRECEDENCE["Add"])
 
     def _sympystr(self, printer: object) -> str:
-        return f"CRootOf({polynomial_text(tuple(int(c) for c in self.poly.all_coeffs()[::-1]))}, {self.index})"
+        # SymPy makes such roots anew, without their decimal, where it rebuilds an expression.
+        if not hasattr(self, "shown"):
+            coefficients = tuple(int(c) for c in self.poly.all_coeffs()[::-1])
+            return f"CRootOf({polynomial_text(coefficients)}, {self.index})"
+        return str(self.shown)
 
-    _sympyrepr = _latex = _pretty = _sympystr
+    _latex = _sympystr
+
+    def _pretty(self, printer: object) -> prettyForm:
+        return prettyForm(self._sympystr(printer))
 
 
 @lru_cache(maxsize=512)
-def _expression(polynomial: Polynomial, index: int) -> sp.Expr:
-    kind = _LongRoot if max(abs(c).bit_length() for c in polynomial) > _WRITTEN else sp.CRootOf
-    return kind(sp.Poly(list(polynomial[::-1]), _X), index)
+def _expression(root: Root) -> sp.Expr:
+    found = ComplexRootOf(sp.Poly(list(root.polynomial[::-1]), _X), root.index)
+    # SymPy takes a factor out of some polynomials: their root is a number times that of another one.
+    factor, part = found.as_coeff_Mul()
+    if isinstance(part, ComplexRootOf):
+        value = nearest(root.enclosure) / float(factor)
+        part.shown = f"{value.real:.16g}"
+        if isinstance(value, complex):
+            part.shown += f" {'-' if value.imag < 0 else '+'} {abs(value.imag):.16g}*I"
+    return found
 
 
 @lru_cache(maxsize=4096)

@@ -26,7 +26,7 @@ from ..mechanics.components import WEIGHT_NUMBER, Block, Edge, Node
 from ..mechanics.friction import KAPPA, SLIDING, SLIP, ContactModel, FrictionLaw, regularise, set_valued
 from ..mechanics.lagrangian import LARGEST_BY_MINORS, Mechanics, check_masses_exist, coupled, solve_masses
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
-from ..mechanics.oscillator import FieldModel, Oscillator
+from ..mechanics.oscillator import FieldModel, LagrangianModel, Oscillator
 from ..mechanics.parameter import Parameter
 from .equations import Equations, Layer
 
@@ -65,7 +65,7 @@ def parameters(
         if contact == ContactModel.ATAN and regularise(friction.force, SLIDING, sp.Symbol("kappa")) != friction.force:
             _join(table, {"kappa": KAPPA}, f"contact {str(contact)!r}")
     for coupling in couplings:
-        _join(table, coupling.parameters, f"coupling {str(coupling)!r}")
+        _join(table, coupling.parameters, f"coupling {str(coupling)!r}", _free_spelling(coupling, oscillator))
     return {name: replace(p, scale=str(scale(oscillator, p.unit))) for name, p in table.items()}
 
 
@@ -116,14 +116,35 @@ def _sticking(
     return Node((place, velocity, SLIP), rates, parameters, contact, coefficient(SLIDING))
 
 
-def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str) -> None:
+def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str, remedy: str = "rename it") -> None:
     """Add the parameters of another part; the same name in two parts would silently be one number."""
     for name, parameter in more.items():
         if name in table:
-            other = 'a coupling with a free name is, e.g., Rates({"v": "k*W*(v_j - v_i)"}, {"k": 1})'
-            remedy = f"; {other}" if what.startswith("coupling") else ""
-            raise ValueError(f"{what}: its parameter {name!r} has the name of one of another part; rename it{remedy}")
+            raise ValueError(f"{what}: its parameter {name!r} has the name of one of another part; {remedy}")
         table[name] = parameter
+
+
+def _free_spelling(coupling: Coupling, oscillator: Oscillator) -> str:
+    """What to write for a coupling whose parameter has the name of another one."""
+    if isinstance(coupling, MatrixCoupling):
+        rates: dict[str, str] = {}
+        for source, target, factor in coupling.entries:
+            front = "" if factor == 1 else f"{factor}*"
+            rates[target] = f"{rates[target]} + " if target in rates else ""
+            rates[target] += f"k*{front}W*({source}_j - {source}_i)"
+        return f"write Rates({rates}, {{'k': 1}}), whose parameter may have any name"
+    if not isinstance(coupling, LagrangianCoupling) or not isinstance(oscillator.model, LagrangianModel):
+        return "rename it"
+    # The energies of a link are those of the coordinates that it joins, each by itself.
+    joined = [c for c in oscillator.model.coordinates if coupling.coordinates is None or c.name in coupling.coordinates]
+    if coupling.name == "spring":
+        energy = " + ".join(f"k*W*({c.name}_j - {c.name}_i)**2/2" for c in joined)
+        return f"write Potential({energy!r}, {{'k': 1}}), whose parameter may have any name"
+    if coupling.name == "damper" and len(oscillator.model.coordinates) == 1:
+        speed = joined[0].velocity
+        rate = f"k*W*({speed}_j - {speed}_i)"
+        return f"write Rates({{{speed!r}: {rate!r}}}, {{'k': 1}}), a force per mass, whose parameter may have any name"
+    return "write it in a file with another name of the parameter (docs/plugins.md)"
 
 
 def _check_parts(oscillator: Oscillator, friction: FrictionLaw | None, contact: str) -> None:

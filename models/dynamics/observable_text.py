@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ..inputs.checks import check_text, short_repr
-from ..inputs.expressions import FUNCTIONS, Expressions
+from ..inputs.expressions import COMPOSED, FUNCTIONS, Expressions
 from ..inputs.reader import Algebra, Expression, NoMeaning, parse, unpaired
 from .observable import Observable, Window, nodes, rate, real
 
@@ -21,13 +21,14 @@ LENGTH = 4000
 
 KNOWN: Mapping[str, Callable[..., sp.Expr]] = {
     **FUNCTIONS,
+    **COMPOSED,
     "rate": rate,
     **{f"nodes.{name}": getattr(nodes, name) for name in ("sum", "mean", "maximum", "minimum", "std")},
     "nodes[3]": nodes[3],
 }
 """The functions of observables, by their names in text."""
 
-SPELLINGS = {"Abs": "abs", "Max": "max", "Min": "min"}
+SPELLINGS = {"Abs": "abs", "Max": "max", "Min": "min", "Mod": "mod"}
 """How SymPy spells some of them."""
 
 _ONE_NODE = re.compile(r"nodes\[(\d+)\]")

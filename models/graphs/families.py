@@ -192,8 +192,9 @@ class Family:
             )
         size = self._size(sizes[0])
         settled = self._settled(size, options)
-        if self.expected is not None:
-            self.limit_links(size, self.links_of_edge * self.expected(size, **dict(settled)))
+        number = self.count if self.expected is None and "seed" in self.options else self.expected
+        if number is not None:  # of graphs by chance, which are drawn to be used at once
+            self.limit_links(size, self.links_of_edge * number(size, **dict(settled)))
         return Topology(self.name, size, None, settled, FamilyRule(self, size, settled))
 
     def __eq__(self, other: object) -> bool:
@@ -319,7 +320,7 @@ def topology(name: str, n: int, **options: object) -> Topology:
         If n is no integer.
     ValueError
         On an unknown name or option, on n below the family's minimum, and on more than LINK_LIMIT
-        links before any is built: at once if chance decides on their number, else when they are
+        links before any is built: at once if the graph is drawn by chance, else when they are
         first asked for.
     """
     return family(name)(n, **options)

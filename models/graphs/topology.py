@@ -193,6 +193,10 @@ class Topology(Exact, Drawn):
         """
         if self.all_to_all is not None:
             return 1
+        # Node 0 reaches all nodes if each later one feels an earlier one, as in most families; links are sorted.
+        earliest = {target: source for target, source, _ in reversed(self.links)}
+        if all(earliest.get(i, i) < i for i in range(1, self.n)):
+            return 1
         followers: list[list[int]] = [[] for _ in range(self.n)]
         for target, source, _ in self.links:
             followers[source].append(target)
@@ -210,7 +214,8 @@ class Topology(Exact, Drawn):
                         waiting += new
             return found
 
-        return len(starts(reversed(starts(range(self.n)))))
+        first = starts(range(self.n))
+        return len(starts(reversed(first))) if len(first) > 1 else 1
 
     @property
     def diagonalisable(self) -> bool:

@@ -12,7 +12,7 @@ import sympy as sp
 from .checks import short_repr, suggestion
 from .reader import Algebra, Expression, NoMeaning
 
-__all__ = ["EXPONENT", "FUNCTIONS", "MAGNITUDE", "Expressions"]
+__all__ = ["COMPOSED", "EXPONENT", "FUNCTIONS", "MAGNITUDE", "Expressions", "exprel"]
 
 EXPONENT, MAGNITUDE = 16, 1e100
 """Largest exponent of a power that is a number, largest constant."""
@@ -25,7 +25,65 @@ FUNCTIONS: Mapping[str, Any] = {
 }  # fmt: skip
 """The functions that a model may call, by their names in text; generated code knows the same ones."""
 
-_COUNTS: Mapping[Any, int | None] = {sp.atan2: 2, sp.Max: None, sp.Min: None}
+
+def _expm1(x: sp.Expr) -> sp.Expr:
+    """exp(x) - 1 without a difference of near numbers; the product overflows only where exp(x) does."""
+    return sp.tanh(x / 2) * (sp.exp(x) + 1)
+
+
+def _log1p(x: sp.Expr) -> sp.Expr:
+    """log(1 + x) = 2 log(w) = 2 asinh((w - 1/w)/2) with w = sqrt(1 + x): accurate near 0, no value below -1."""
+    return 2 * sp.asinh(x / (2 * sp.sqrt(1 + x)))
+
+
+def exprel(x: sp.Expr | float) -> sp.Expr:
+    """Return (exp(x) - 1)/x, which is 1 at x = 0, as an expression with a value and full digits everywhere.
+
+    Rates of ion channels have it: (x/(1 - exp(-x))) is 1/exprel(-x). Text calls it by the same name.
+
+    Parameters
+    ----------
+    x : Expr or number
+        Any expression of the states, parameters and time of a model.
+
+    Returns
+    -------
+    Expr
+        An expression of exp, tanh, max and abs.
+
+    Examples
+    --------
+    >>> import sympy as sp
+    >>> from synchain.models import Field, exprel
+    >>> V = sp.Symbol("V")
+    >>> Field({V: 1/exprel(-V) - V}) == Field({"V": "1/exprel(-V) - V"})
+    True
+
+    See Also
+    --------
+    Field : A vector field of such expressions.
+    """
+    # With m = max(1, |x|), c = x/m and d = x - c: exp(x) - 1 = (exp(c) - 1) + exp(c) (exp(d) - 1); d is 0 for |x| <= 1.
+    # (exp(c) - 1)/c = exp(c/2) sinh(c/2)/(c/2) is a power series in c**2 (error 5e-17).  Both terms have one sign.
+    x = sp.sympify(x)
+    m = sp.Max(1, sp.Abs(x))
+    c = x / m
+    z = c**2 / 4
+    series: sp.Expr = sp.S.Zero
+    for k in range(6, -1, -1):
+        series = series * z + sp.Rational(1, sp.factorial(2 * k + 1))
+    return sp.exp(c / 2) / m * (series + sp.exp(c / 2) * c * _expm1(x - c))
+
+
+def _modulo(x: sp.Expr, m: sp.Expr) -> sp.Expr:
+    """The remainder of x/m, with the sign of m."""
+    return x - m * sp.floor(x / m)
+
+
+COMPOSED: Mapping[str, Callable[..., sp.Expr]] = {"expm1": _expm1, "exprel": exprel, "log1p": _log1p, "mod": _modulo}
+"""Further functions that text may call, each as an expression of `FUNCTIONS`."""
+
+_COUNTS: Mapping[Any, int | None] = {sp.atan2: 2, _modulo: 2, sp.Max: None, sp.Min: None}
 """Numbers of arguments other than one; None is any number from two."""
 
 
@@ -130,6 +188,11 @@ class Expressions(Algebra[sp.Basic]):
         if b == 0:
             raise NoMeaning(f"found a division by zero; expected {self.numbers}")
         return self.value(a) / self.value(b)
+
+    def remainder(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
+        if b == 0:
+            raise NoMeaning(f"found a division by zero; expected {self.numbers}")
+        return _modulo(self.value(a), self.value(b))
 
     def power(self, base: sp.Basic, exponent: sp.Basic) -> sp.Basic:
         lower, upper = self.value(base), self.value(exponent)

@@ -13,7 +13,8 @@ _DIGITS = 9
 TAKEN = frozenset(
     {"atol_used", "cell", "component", "drive_phase", "end", "end_time", "ended_early", "integrator", "method_steps", "methods",
      "node", "part", "periods_skipped", "point", "realisation", "rejected", "rtol_used", "sample", "section", "section_count",
-     "section_time", "status", "steps", "sync_error", "sync_error_end", "sync_error_max", "time", "trajectory",
+     "section_time", "start_state", "start_time", "status", "steps", "sync_error", "sync_error_end", "sync_error_max", "time",
+     "trajectory",
      "transversal_exponent", "transversal_stderr", "verdict"}
 )  # fmt: skip
 """What data of results have under these names already."""

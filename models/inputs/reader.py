@@ -21,7 +21,14 @@ V = TypeVar("V")
 _ARITHMETIC = re.compile(r"[0-9A-Za-z_.+\-*/() \t]*")
 
 
-_SIGNS: Mapping[type[ast.cmpop], str] = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="}
+_SIGNS: Mapping[type[ast.cmpop], str] = {
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+    ast.Eq: "==",
+    ast.NotEq: "!=",
+}
 
 
 _PARTNERS: Mapping[str, str] = {")": "(", "]": "["}
@@ -99,6 +106,10 @@ class Algebra(Generic[V]):
         """a / b."""
         raise NoMeaning
 
+    def remainder(self, a: V, b: V) -> V:
+        """a % b."""
+        raise NoMeaning
+
     def power(self, base: V, exponent: V) -> V:
         """base ** exponent."""
         raise NoMeaning
@@ -131,7 +142,7 @@ class Algebra(Generic[V]):
         raise NoMeaning
 
     def compare(self, sign: str, a: V, b: V) -> V:
-        """A condition a < b, a <= b, a > b or a >= b, by its sign."""
+        """A condition a < b, a <= b, a > b, a >= b, a == b or a != b, by its sign."""
         raise NoMeaning
 
     def junction(self, word: str, conditions: Sequence[V]) -> V:
@@ -206,7 +217,7 @@ class Expression:
     def _operation(self, node: ast.BinOp, algebra: Algebra[V], depth: int) -> V:
         if isinstance(node.op, ast.BitXor):
             raise NoMeaning("found the sign ^; expected powers as x**2")
-        if not isinstance(node.op, (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow)):
+        if not isinstance(node.op, (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Mod, ast.Pow)):
             raise NoMeaning
         a = self._value(node.left, algebra, depth)
         match node.op, node.right:
@@ -222,6 +233,8 @@ class Expression:
                 return algebra.multiply(a, b)
             case ast.Div():
                 return algebra.divide(a, b)
+            case ast.Mod():
+                return algebra.remainder(a, b)
         return algebra.power(a, b)
 
     def _logic(self, node: ast.expr, algebra: Algebra[V], depth: int) -> V:

@@ -12,6 +12,10 @@ _RESETS = "resets of the state are not supported; Brian 2 and callbacks of Diffe
 _CONSTRAINTS = "constraints are not supported; take coordinates without them, or a solver of DAEs such as SUNDIALS IDA"
 _TRIADS = "links of more than two nodes are not supported; XGI holds such networks, SciPy integrates them"
 _MAPS = "maps are not supported, time is continuous; DynamicalSystems.jl iterates them"
+_SUMS = (
+    "a function of the sum of inputs is not supported, what links add is summed; docs/links.md writes S(sum of W*x_j) "
+    "as links W*S(u_j), or with a state for the sum"
+)
 COMPLEX = "complex states are not supported; write real and imaginary part as two states"
 
 _WORDS: Mapping[str, str] = {
@@ -21,6 +25,7 @@ _WORDS: Mapping[str, str] = {
     **dict.fromkeys(("constraint", "constraints"), _CONSTRAINTS),
     **dict.fromkeys(("triad", "triads", "triangles", "hyperedges", "simplices", "higher_order"), _TRIADS),
     **dict.fromkeys(("map", "maps", "discrete"), _MAPS),
+    **dict.fromkeys(("sum", "summed_input", "input_sum", "inputs", "activation"), _SUMS),
     **dict.fromkeys(("complex", "complex_states"), COMPLEX),
 }
 

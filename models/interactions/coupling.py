@@ -18,6 +18,7 @@ from fractions import Fraction
 import sympy as sp
 
 from ..inputs.checks import check_text, short_repr, suggestion
+from ..inputs.expressions import MAGNITUDE
 from ..inputs.frozen import Frozen
 from ..mechanics.components import Node
 from ..mechanics.parameter import Parameter
@@ -46,13 +47,15 @@ _POSITIONS = sp.symbols("q_i q_j", real=True)
 _SPEEDS = sp.symbols("v_i v_j", real=True)
 """Their velocities."""
 
-_NUMBER = r"[0-9]{1,9}(?:/[0-9]{1,9}|\.[0-9]{1,9})?"
+_NUMBER = r"[0-9]{1,120}(?:/[0-9]{1,120}|(?:\.[0-9]{1,120})?(?:[eE][+-]?[0-9]{1,3}(?=[\s*]))?)"
 
 _NAME = r"[^\W\d]\w*"
 
 _ENTRY = re.compile(rf"\s*([+-]?)\s*(?:({_NUMBER})\s*\*?\s*)?({_NAME})\s*->\s*({_NAME})\s*")
 
-_EXPECTED = "expected 'a->b', the difference of a into the rate of b, with a rational factor or none: '1/2 x->y'"
+_EXPECTED = (
+    "expected 'a->b', the difference of a into the rate of b, with a rational factor or none: '1/2 x->y', '1e-3 x->y'"
+)
 
 _CHOSEN = re.compile(r"(?P<name>\S.*?)\s+on\s+(?P<coordinates>[^\W\d]\w*(?:\s*,\s*[^\W\d]\w*)*)\s*")
 
@@ -341,6 +344,11 @@ def _read(coupling: str) -> Iterator[tuple[str, str, Fraction]]:
             raise ValueError(
                 f"coupling {short_repr(coupling)}: {number} divides by zero; {_EXPECTED}; correct it"
             ) from None
+        if max(abs(factor.numerator), factor.denominator) > MAGNITUDE:
+            raise ValueError(
+                f"coupling {short_repr(coupling)}: the factor {short_repr(number)} is too large, or has too many digits; expected "
+                f"whole numbers up to {MAGNITUDE:g} above and below the line; write it shorter"
+            )
         if factor == 0:
             raise ValueError(
                 f"coupling {short_repr(coupling)}: the factor of '{source}->{target}' is 0; expected another; leave it out"

@@ -14,13 +14,13 @@ from fractions import Fraction
 from keyword import iskeyword
 
 import sympy as sp
-from sympy.codegen.cfunctions import expm1
+from sympy.codegen.cfunctions import expm1, log1p
 from sympy.logic.boolalg import Boolean
 
 from ..inputs.checks import short_repr, suggestion
-from ..inputs.expressions import FUNCTIONS, Expressions
+from ..inputs.expressions import COMPOSED, FUNCTIONS, Expressions
 from ..inputs.reader import NoMeaning, parse, unpaired
-from ..inputs.unsupported import COMPLEX
+from ..inputs.unsupported import COMPLEX, unsupported
 from .components import TIME
 from .oscillator import FRICTION
 
@@ -41,7 +41,7 @@ FRICTION_NAME = "friction"
 RESERVED = frozenset({"pi", TIME.name, FRICTION_NAME})
 """Names that text has for other things than states and parameters."""
 
-_CALLED = dict(sorted({**FUNCTIONS, FRICTION_NAME: FRICTION}.items()))
+_CALLED = dict(sorted({**FUNCTIONS, **COMPOSED, FRICTION_NAME: FRICTION}.items()))
 _NAMES = {function: name for name, function in FUNCTIONS.items()}
 _OTHERWISE: Mapping[type, Callable[..., sp.Basic]] = {
     sp.cot: lambda x: sp.cos(x) / sp.sin(x),
@@ -50,8 +50,9 @@ _OTHERWISE: Mapping[type, Callable[..., sp.Basic]] = {
     sp.coth: lambda x: 1 / sp.tanh(x),
     sp.sech: lambda x: 1 / sp.cosh(x),
     sp.csch: lambda x: 1 / sp.sinh(x),
-    sp.Mod: lambda x, m: x - m * sp.floor(x / m),
-    expm1: lambda x: 2 * sp.sinh(x / 2) * sp.exp(x / 2),  # no difference of near numbers
+    sp.Mod: COMPOSED["mod"],
+    expm1: COMPOSED["expm1"],
+    log1p: COMPOSED["log1p"],
     sp.Ne: lambda a, b: sp.Or(a < b, a > b),
     sp.Eq: lambda a, b: sp.And(a <= b, a >= b),
 }
@@ -64,7 +65,7 @@ _SIGNS: Mapping[type, str] = {
 }
 _WORDS = frozenset({"if", "else", "and", "or"})
 """Words of Python that a text may have."""
-_RELATIONS = {sign: relation for relation, sign in _SIGNS.items()}
+_RELATIONS = {**{sign: relation for relation, sign in _SIGNS.items()}, "==": sp.Eq, "!=": sp.Ne}
 
 
 def exact(what: str, value: object, names: Mapping[str, sp.Symbol]) -> sp.Expr:
@@ -124,7 +125,23 @@ def _otherwise(e: sp.Expr) -> sp.Expr:
     """An expression by functions and relations that a model may have."""
     for function, written_otherwise in _OTHERWISE.items():
         e = e.replace(function, written_otherwise) if e.has(function) else e
-    return e
+    return e.replace(lambda part: part.is_Mul and part.has(sp.Abs), _with_limit)
+
+
+def _with_limit(product: sp.Mul) -> sp.Expr:
+    """x/sqrt(|x|) as sign(x) sqrt(|x|), and other products x**k |x|**a of positive degree, which are 0/0 at x = 0."""
+    for size in product.args:
+        base, degree = size.as_base_exp()
+        if not (isinstance(base, sp.Abs) and degree.is_Rational and degree < 0):
+            continue
+        for factor in product.args:
+            x, k = factor.as_base_exp()
+            ratio = sp.cancel(x / base.args[0]) if k.is_Integer and k + degree > 0 and k > 0 else sp.nan
+            if ratio.is_Rational:
+                others = [each for each in product.args if each not in (size, factor)]
+                sign = sp.sign(base.args[0]) if k % 2 else sp.S.One
+                return sp.Mul(*others, ratio**k, sign, base ** (k + degree))
+    return product
 
 
 def _unit_step(x: sp.Expr, at_zero: sp.Expr = sp.S.Half) -> sp.Expr:
@@ -295,7 +312,7 @@ def _call(e: sp.Basic) -> tuple[str, int]:
     if name is None:
         kind = "the function" if isinstance(e, sp.Function) else "the piece"
         raise ValueError(
-            f"found {kind} {short_repr(e)}; known: {', '.join(FUNCTIONS)}, friction, powers, Piecewise with <, <=, >, >="
+            f"found {kind} {short_repr(e)}; known: {', '.join((*FUNCTIONS, *COMPOSED))}, friction, powers, Piecewise with <, <=, >, >=, Eq, Ne"
         )
     arguments = sorted(e.args, key=sp.default_sort_key) if e.func in (sp.Max, sp.Min) else e.args
     return f"{name}({', '.join(map(written, arguments))})", _ATOM
@@ -313,7 +330,7 @@ def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
         The subject of errors.
     text : str
         Numbers, names, ``+ - * / **``, parentheses, functions of `FUNCTIONS`, ``friction(velocity)``, and
-        ``a if x > 0 else b`` with ``< <= > >= and or not``.
+        ``a if x > 0 else b`` with ``< <= > >= == != and or not``.
     names : mapping of str to Symbol
         What each name stands for.
 
@@ -350,7 +367,12 @@ class _OfModels(Expressions):
     functions = _CALLED
 
     def pieces(self) -> str:
-        return f"pi, + - * / **, {' '.join(FUNCTIONS)} friction, a if x > 0 else b, and {', '.join(self.names)}"
+        return f"pi, + - * / **, {' '.join((*FUNCTIONS, *COMPOSED))} friction, a if x > 0 else b, and {', '.join(self.names)}"
+
+    def function(self, name: str) -> Callable[..., sp.Expr] | None:
+        if reason := unsupported(name):
+            raise NoMeaning(reason)
+        return self.functions.get(name)
 
     def name(self, name: str) -> sp.Basic:
         if name in self.names:

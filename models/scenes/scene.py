@@ -35,7 +35,7 @@ from .complete import TimeUnit, complete
 from .dictionary import arguments, as_dict
 from .section import Section
 from .toml import write
-from .warnings import asynchrony, warnings
+from .warnings import asynchrony, function_of_inputs, warnings
 
 if TYPE_CHECKING:
     from ..spectra.spectrum import Spectrum
@@ -422,7 +422,9 @@ class Scene(Drawn, Written):
 
 
 def _warn(scene: Scene) -> None:
-    """Warn if the synchronisation error is recorded where neither graph nor links let it vanish."""
+    """Warn of functions of single inputs, and if the synchronisation error is recorded where it cannot vanish."""
+    for words in filter(None, (function_of_inputs(coupling, graph) for coupling, graph in scene.model.linked)):
+        warn(words)
     if Record.SYNC_ERROR in scene.record:
         for words in filter(None, asynchrony(scene.model, scene.varied)):
             warn(words)

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
+
+import sympy as sp
 
 from ..dynamics.synchrony import NoSynchrony, synchronous_node
 from ..graphs.topology import Topology
 from ..inputs.names import LinkName, NodeName
-from ..interactions.coupling import MatrixCoupling
+from ..interactions.coupling import Coupling, MatrixCoupling, Rates
+from ..interactions.ends import WEIGHT
 from ..networks.model import Model
 
-__all__ = ["asynchrony", "warnings", "zero_multiplicity"]
+__all__ = ["asynchrony", "function_of_inputs", "warnings", "zero_multiplicity"]
 
 STIFF = 100.0
 """Frequency of a mode and number of its swings above which springs are called stiff."""
@@ -59,6 +63,7 @@ def warnings(model: Model, varied: tuple[str, ...], values: Mapping[str, Any], d
         *(_negative_weights(own) for _, own in model.linked),
         _different_nodes(graph, of_nodes),
         asynchronous,
+        *(function_of_inputs(coupling, own) for coupling, own in model.linked),
         _stiff_springs(model, values, duration),
         _equal_starts(values) if alike and not asynchronous else "",
     )
@@ -70,6 +75,7 @@ def asynchrony(model: Model, varied: tuple[str, ...]) -> tuple[str, str]:
     return _in_parts(model.topology), _without_synchrony(model, varied) if len(model.kinds) == 1 else ""
 
 
+@lru_cache(maxsize=16)
 def _in_parts(graph: Topology) -> str:
     """A sentence if some nodes cannot reach one another."""
     multiplicity = zero_multiplicity(graph)
@@ -126,6 +132,23 @@ def _without_synchrony(model: Model, varied: tuple[str, ...]) -> str:
         )
     except ValueError:  # of a node with a mass matrix it is not known
         pass
+    return ""
+
+
+def function_of_inputs(coupling: Coupling, graph: Topology) -> str:
+    """A sentence if a link is S(W x_j) where a node has several: S of their sum, a firing rate, is another model."""
+    if not isinstance(coupling, Rates) or graph.link_count <= graph.n:
+        return ""
+    for rate in coupling.rates.values():
+        for call in sorted(rate.atoms(sp.Function) - rate.atoms(sp.Piecewise), key=sp.default_sort_key):
+            slope = call.args[0].diff(WEIGHT)
+            ends = {s.name[-2:] for s in call.free_symbols}
+            if "_i" not in ends and not slope.has(WEIGHT) and any(s.name.endswith("_j") for s in slope.free_symbols):
+                text = str(call).replace(WEIGHT.name, "W")
+                return (
+                    f"coupling '{coupling}': {text} is a function of each link's input, and the links are added; a function of "
+                    "the sum of inputs is another model, which docs/links.md writes by other links"
+                )
     return ""
 
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal, localcontext
+from fractions import Fraction
 from functools import cmp_to_key
 from itertools import pairwise
 from typing import TypeAlias
@@ -14,6 +15,7 @@ import sympy as sp
 from flint import acb, fmpq
 
 from ..algebra.balls import Ball, accurate, decimals, disjoint, enclose, nearest, precision
+from ..algebra.equality import equal, sign
 from ..algebra.rationals import to_fraction
 from ..algebra.roots import ComplexRoot, RealRoot, Root
 
@@ -29,6 +31,9 @@ __all__ = [
     "times",
     "words",
 ]
+
+NEAR = 1e-12
+"""Relative difference of floats below which numbers are compared exactly."""
 
 Number: TypeAlias = sp.Expr | Root
 
@@ -115,6 +120,50 @@ class Eigenvalue:
             return self.number.enclosure(bits)
         return enclose(self.number, bits)
 
+    def __eq__(self, other: object) -> bool:
+        """Compare numbers and multiplicities of eigenvalues; of a number the number alone."""
+        if isinstance(other, Eigenvalue):
+            return (self.number, self.multiplicity) == (other.number, other.multiplicity)
+        if isinstance(other, bool) or not isinstance(other, int | float | complex | Fraction | sp.Expr):
+            return NotImplemented
+        if self.exact == other:
+            return True
+        number = _number(other)
+        near = number is not None and abs(self.value - number.value) <= NEAR * abs(self.value)
+        return number is not None and near and equal(self.number, number.number)
+
+    def __hash__(self) -> int:
+        number = self.number
+        return hash(Fraction(number.p, number.q) if isinstance(number, sp.Rational) else number)
+
+    def __lt__(self, other: Eigenvalue | float) -> bool:
+        return self._difference(other) < 0
+
+    def __le__(self, other: Eigenvalue | float) -> bool:
+        return self._difference(other) <= 0
+
+    def __gt__(self, other: Eigenvalue | float) -> bool:
+        return self._difference(other) > 0
+
+    def __ge__(self, other: Eigenvalue | float) -> bool:
+        return self._difference(other) >= 0
+
+    def _difference(self, other: Eigenvalue | float) -> float:
+        """A number with the sign of the difference from another real number; exact where floats cannot decide."""
+        number = other if isinstance(other, Eigenvalue) else _number(other)
+        if number is None:
+            return float(self) - float(other)
+        for e in (self, number):
+            if isinstance(e.value, complex):
+                raise TypeError(
+                    f"eigenvalue {e}: found a complex number; complex numbers have no order; take e.value.real"
+                )
+        gap = float(self) - float(number)
+        return gap if abs(gap) > NEAR * abs(float(self)) else sign((self.number,), (number.number,))
+
+    def __complex__(self) -> complex:
+        return complex(self.value)
+
     def __float__(self) -> float:
         if isinstance(self.value, complex):
             raise TypeError(
@@ -127,6 +176,18 @@ class Eigenvalue:
         if len(text) <= 60 or not isinstance(self.number, Root):
             return text
         return f"{decimal(self.value)} (degree {len(self.number.polynomial) - 1})"
+
+
+def _number(value: float | complex | Fraction | sp.Expr) -> Eigenvalue | None:
+    """A number with its float; None for one that is not finite."""
+    if isinstance(value, complex):
+        real, imaginary = _number(value.real), _number(value.imag)
+        return None if real is None or imaginary is None else Eigenvalue(real.number + sp.I * imaginary.number, 1)
+    if not isinstance(value, sp.Expr):
+        if not math.isfinite(value):
+            return None
+        value = sp.Rational(Fraction(value))
+    return Eigenvalue(value, 1)
 
 
 def distinct(claims: Sequence[Eigenvalue]) -> bool:

@@ -97,18 +97,22 @@ def plan(scene: Scene, near: np.ndarray | None = None) -> Plan:
 
 
 class Planner:
-    """Lays out any cells of a scene, so that the rows of all cells need not be in memory at once."""
+    """Lays out any cells of a scene, so that the rows of all cells need not be in memory at once.
 
-    def __init__(self, scene: Scene) -> None:
+    starts (cells, dimension): states of all cells to start from in place of the scene's, which axes of states overwrite.
+    """
+
+    def __init__(self, scene: Scene, starts: np.ndarray | None = None) -> None:
         self.scene = scene
+        self.starts = starts
         self.equations = scene.equations
         self.values = {axis.name: np.array(axis.values) for axis in scene.axes}
         self.drawn = {axis.name: np.array(axis.values) for axis in scene.drawn}
         self.slots = {name: k for k, name in enumerate(self.equations.parameters)}
         self.places = {name: k for k, name in enumerate(self.equations.state)}
 
-    def __reduce__(self) -> tuple[type[Planner], tuple[Scene]]:
-        return Planner, (self.scene,)
+    def __reduce__(self) -> tuple[type[Planner], tuple[Scene, np.ndarray | None]]:
+        return Planner, (self.scene, self.starts)
 
     def columns(self, cells: np.ndarray) -> dict[str, np.ndarray]:
         """Return the value of each axis, and of what is drawn, in each of these cells."""
@@ -126,7 +130,7 @@ class Planner:
         columns = self.columns(cells)
         numbers = self._numbers(columns, len(cells))
         start = np.empty((len(cells), len(self.scene.y0)))
-        start[:] = self.scene.y0
+        start[:] = self.scene.y0 if self.starts is None else self.starts[cells]
         for name, values in columns.items():
             if name not in self.slots:
                 start[:, self.places[name]] = values

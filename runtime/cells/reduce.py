@@ -185,23 +185,27 @@ class Reduction:
         return self.merge.expand(buffers)
 
 
-def as_reduction(scene: Scene, reduce: bool | Reduction) -> Reduction:
+def as_reduction(scene: Scene, reduce: bool | Reduction, starts: np.ndarray | None = None) -> Reduction:
     """Return the reduction of a scene that the argument `reduce` of `run` asks for.
 
     Raises
     ------
     ValueError
-        If it is the reduction of another scene.
+        If it is the reduction of another scene, or of other starts.
     """
     a_scene(scene)
     if not isinstance(reduce, Reduction):
-        return reduce_scene(scene, check_flag("reduce", reduce))
+        return reduce_scene(scene, check_flag("reduce", reduce), starts=starts)
+    if starts is not None:
+        raise ValueError("reduce: found a Reduction beside a start of several cells; expected True or False")
     if reduce.scene != scene:
         raise ValueError("reduce: found the reductions of another scene; make them with reduce_scene(scene)")
     return reduce
 
 
-def reduce_scene(scene: Scene, reduce: bool = True, fold_all: bool = False) -> Reduction:
+def reduce_scene(
+    scene: Scene, reduce: bool = True, fold_all: bool = False, starts: np.ndarray | None = None
+) -> Reduction:
     """Return what is left of a scene to integrate.
 
     Parameters
@@ -212,6 +216,8 @@ def reduce_scene(scene: Scene, reduce: bool = True, fold_all: bool = False) -> R
     fold_all : bool
         Substitute all parameters that have one value in every cell, by their shortest decimals.  By
         default only zeros are substituted, so that scenes that differ in numbers share a kernel.
+    starts : ndarray, shape (cells, dimension), optional
+        States of all cells to start from in place of the scene's.
     """
     whole, found = scene.equations, watched(scene)
     skipped: list[str] = []
@@ -219,7 +225,10 @@ def reduce_scene(scene: Scene, reduce: bool = True, fold_all: bool = False) -> R
     equations, classes = whole, tuple(range(scene.n))
     if reduce:
         equations = _fold(scene, _observed_parameters(scene, found), fold_all, skipped, kept)
-        equations, classes = _merge(scene, equations, skipped, kept)
+        if starts is None:
+            equations, classes = _merge(scene, equations, skipped, kept)
+        else:
+            kept.append("quotient: each cell starts from other states")
         kept += _present(scene, equations)
     else:
         kept.append("everything is integrated as it stands, as asked for")
@@ -230,7 +239,7 @@ def reduce_scene(scene: Scene, reduce: bool = True, fold_all: bool = False) -> R
     first = [seen[k] for k in range(equations.n)]
     return Reduction(
         scene,
-        Planner(scene),
+        Planner(scene, starts),
         equations,
         tuple(r for r in scene.record if not (together and r == "sync_error")),
         _node_merge(whole, equations, classes, together),

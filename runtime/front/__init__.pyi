@@ -31,6 +31,7 @@ from synchain.models import end as end
 from synchain.models import ends as ends
 from synchain.models import energy as energy
 from synchain.models import erdos_renyi as erdos_renyi
+from synchain.models import exprel as exprel
 from synchain.models import feed_forward as feed_forward
 from synchain.models import friction as friction
 from synchain.models import friction_law as friction_law

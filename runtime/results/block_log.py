@@ -116,14 +116,19 @@ class BlockLog:
             return _about(file, path)
 
     @staticmethod
+    def expect_idle(path: str | os.PathLike[str]) -> None:
+        """Raise BlockingIOError if another process writes to the log."""
+        with open_regular(path, writing=True) as file:
+            _lock(file, path)
+
+    @staticmethod
     def create(path: str | os.PathLike[str], about: Description) -> None:
         """Create a log without blocks; `about` is what JSON can hold and says how many `blocks`
         there are.
         """
         text = json.dumps(about).encode()
         if os.path.exists(path):
-            with open_regular(path, writing=True) as old:
-                _lock(old, path)
+            BlockLog.expect_idle(path)
         first = MAGIC + LINE.pack(len(text), zlib.crc32(text)) + text
         with whole_file(path) as temporary, open(temporary, "wb") as file:
             file.write(first + bytes(_second(len(first)) - len(first)) + first)

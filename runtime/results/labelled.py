@@ -66,7 +66,7 @@ class Labelled(Shown):
 
         return drawn(self, ax, **options)
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         """Write a file that opens in xarray and in `open_result`; it appears whole or not at all.
 
         Parameters
@@ -74,11 +74,15 @@ class Labelled(Shown):
         path : str or path
             Its ending chooses the form: .nc is netCDF-3, .nc4 netCDF-4 (needs h5netcdf), .zarr a Zarr
             folder (needs zarr).
+        overwrite : bool
+            Replace what is there already.
 
         Raises
         ------
         ValueError
             For another ending.
+        FileExistsError
+            If a file is there and `overwrite` is not given.
         ModuleNotFoundError
             If the package of the form is not installed.
         OSError
@@ -88,7 +92,7 @@ class Labelled(Shown):
         tree, further = encode(self, data)
         data = data.assign(further)
         data.attrs = {**data.attrs, KIND: type(self).__name__, VALUE: json.dumps(tree)}
-        write_data(data, path)
+        write_data(data, path, overwrite)
 
     def __repr__(self) -> str:
         rows = self.summary

@@ -135,9 +135,9 @@ class Result(Labelled):
         """
         return self._drawn(ax, kind=kind)
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         """Write the data as they are: a result is its dataset (see `Labelled.save` for the forms)."""
-        write_data(self.data, path)
+        write_data(self.data, path, overwrite)
 
     def states(self, name: str = "end") -> np.ndarray:
         """Return the states (…, states) of a variable in the order of the equations: x_1 … x_n, v_1 …

@@ -8,6 +8,7 @@ compressed whole, are copied from such a file beside them, chunk by chunk.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -22,7 +23,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import xarray as xr
 
-from synchain.models.inputs.checks import check_path
+from synchain.models.inputs.checks import check_flag, check_path
 from synchain.models.inputs.keywords import warn
 from synchain.models.inputs.regular_file import open_regular
 
@@ -44,6 +45,9 @@ __all__ = [
 
 PARTS = ("real", "imaginary")
 """The values of the dimension `part`, by which complex numbers are stored as pairs of real ones."""
+
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Errors of a system that has no room for a file."""
 
 CHUNK = 2**15
 """Numbers of a chunk, 256 kB of doubles, which are in memory together."""
@@ -109,10 +113,24 @@ def form_of(path: str | os.PathLike[str]) -> Form:
     return FORMS[ending]
 
 
-def write_data(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
+def write_data(data: xr.Dataset, path: str | os.PathLike[str], overwrite: bool = False) -> None:
     """Write a dataset; its ending chooses the form (see `Labelled.save`)."""
-    with _new(path) as (form, temporary):
-        form.write(_without_complex(data), temporary)
+    form_of(path).check(Path(path))
+    if not check_flag("overwrite", overwrite) and Path(path).exists():
+        raise FileExistsError(
+            f"{os.fspath(path)} is there already; give overwrite=True to replace it, or choose another path"
+        )
+    try:
+        with _new(path) as (form, temporary):
+            form.write(_without_complex(data), temporary)
+    except OSError as problem:
+        if problem.errno not in NO_ROOM:
+            raise
+        raise OSError(
+            problem.errno,
+            f"cannot write: {problem.strerror}; free space there, or choose another path",
+            os.fspath(path),
+        ) from problem
 
 
 @contextmanager
@@ -263,7 +281,12 @@ def _seal_netcdf4(path: Path) -> None:
 
 
 def _open_netcdf4(path: Path) -> xr.Dataset:
+    import h5py
+
     open_regular(path).close()
+    # h5netcdf reads this attribute before its File can be closed: one that is damaged leaves a traceback on stderr.
+    with _readable(path), h5py.File(path, "r") as file:
+        file.attrs.get("_nc3_strict")
     return _intact(path, "h5netcdf")
 
 

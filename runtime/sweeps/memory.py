@@ -10,6 +10,7 @@ from ..cells.buffers import Buffers
 from ..cells.choice import warn_of_steps
 from ..cells.layout import Layout
 from ..cells.observed import Sections
+from ..results.labels import STATE, States, dimensions
 from ..results.result import Result, gather
 from ..support.progress import Reporter
 from ..support.status import tally
@@ -20,6 +21,10 @@ from .prepare import PreparedRun
 from .scheduler import BlockScheduler
 
 __all__ = ["Memory"]
+
+
+START = "start_state"
+"""Variable of the states that the cells started from, if those are not the scene's."""
 
 
 @dataclass(slots=True)
@@ -35,6 +40,8 @@ class Memory:
         """Return arrays for all cells, with those of an earlier result that finished."""
         reduction = prepared.reduction
         cells = reduction.scene.cells
+        if earlier is not None:
+            _expect_starts(earlier, reduction.planner.starts)
         if earlier is None:
             return cls(prepared, prepared.layout(), reduction.empty(cells, 0))
         dimension = len(reduction.scene.y0)
@@ -105,4 +112,22 @@ class Memory:
         """Return the cells so far."""
         prepared, scene = self.prepared, self.prepared.scene
         spans = prepared.reduction.planner.spans(np.arange(scene.cells))
-        return gather(scene, prepared.attributes, spans, prepared.reduction.expand(self.buffers), prepared.certificate)
+        result = gather(
+            scene, prepared.attributes, spans, prepared.reduction.expand(self.buffers), prepared.certificate
+        )
+        starts = prepared.reduction.planner.starts
+        if starts is None:
+            return result
+        table = States.of(scene).table(starts.reshape(*scene.shape, -1))
+        about = {"long_name": "states that the cells started from"}
+        return Result(result.data.assign({START: ((*dimensions(scene), *STATE), table, about)}), scene)
+
+
+def _expect_starts(earlier: Result, starts: np.ndarray | None) -> None:
+    """Raise ValueError if an earlier result started from other states than those of all cells, None for the scene's."""
+    begun = earlier.states(START).reshape(earlier.scene.cells, -1) if START in earlier.data else None
+    alike = begun is starts if begun is None or starts is None else np.array_equal(begun, starts)
+    if not alike:
+        raise ValueError(
+            "the result to resume started from other states; give the start of that run, or run without resume"
+        )

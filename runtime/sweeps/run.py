@@ -5,18 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import Executor
 
+import numpy as np
+
 from synchain.models.inputs.checks import check_flag, check_instance
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import Given
 from ..cells.reduce import Reduction, as_reduction
+from ..results.labels import dimensions
 from ..results.result import Result
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .certify import certified as with_certificate
 from .memory import Memory
 from .prepare import prepare
-from .start import Start, started
+from .start import START_TIME, Start, several, started, starts_of_cells
 
 __all__ = ["run"]
 
@@ -49,9 +52,11 @@ def run(
     start : Result, DataArray, mapping, or sequence of numbers, optional
         Start from the states at the end of one cell: a result of one cell, or
         `result.end.isel(sigma=-1)`; or from a table as `initial` of `Scene` takes, or all states in
-        the order of the equations.  Components and nodes must be those of the scene.  Time counts
-        from 0 again, so the drive must have been at the beginning of a period; the attribute
-        `start_time` of the data says which time of the earlier run that was.
+        the order of the equations.  A result of several cells starts each cell from the cell with
+        the same values of the axes; an axis that the result lacks starts all its values from one
+        cell.  Components and nodes must be those of the scene.  Time counts from 0 again, so the
+        drive must have been at the beginning of a period; the attribute `start_time` of the data,
+        a coordinate if there were several cells, says which time of the earlier run that was.
     width : int, optional
         Number of lanes: 1, 2, 4, 8 or 16 (default: what the processor has, one for a single cell).
     reduce : bool or Reduction
@@ -79,28 +84,34 @@ def run(
     Returns
     -------
     Result
-        Labelled arrays of all cells.  `workers`, `width` and `executor` do not change them.
+        Labelled arrays of all cells.  `workers`, `width` and `executor` do not change them; the attributes `lanes` and
+        `kernel` of the data name the kernel, which depends on `width`.
 
     Raises
     ------
     ValueError
         If a name is unknown, given twice, or that of a field of the scene (see `Scene.replace`), if
-        `resume` or `reduce` belongs to another scene, if `start` has other labels or the drive was
-        amid a period, or if the sweep does not fit into memory.
+        `resume` or `reduce` belongs to another scene, if `start` has other labels, cells of other
+        values of the axes or a drive amid a period, or if the sweep does not fit into memory.
     SweepInterrupted
         On Ctrl-C; its `result` has the cells that had finished.
     SweepFailed
         If the workers are lost; its `result` has the cells that had finished.
     """
-    begun = None
-    if start is not None:
+    begun: float | np.ndarray | None = None
+    starts = None
+    if start is not None and not several(start):
         scene, begun = started(a_scene(scene), start)
     scene = Given(run, parameters, axes).sweep(scene, realisations=realisations, draws=draws, rng=rng)
+    if start is not None and several(start):
+        starts, begun = starts_of_cells(scene, start)
+        if check_flag("certified", certified):
+            raise ValueError("certified: found a start of several cells; expected that of one; leave one of them out")
     if resume is not None:
         check_instance("resume", resume, Result, "an earlier Result, e.g. from open_result")
     execution = Execution(workers, executor, show_progress, progress)
     reporter = execution.reporter(scene.cells)
-    reduction = as_reduction(scene, reduce)
+    reduction = as_reduction(scene, reduce, starts)
     reduction.check_memory()
     prepared = prepare(reduction, execution, width=width)
     if check_flag("certified", certified):
@@ -108,4 +119,8 @@ def run(
     memory = Memory.of(prepared, resume)
     memory.run(reporter)
     result = memory.result()
-    return result if begun is None else Result(result.data.assign_attrs(start_time=begun), result.scene)
+    if begun is None:
+        return result
+    if starts is None:
+        return Result(result.data.assign_attrs({START_TIME: begun}), result.scene)
+    return Result(result.data.assign_coords({START_TIME: (dimensions(result.scene), begun)}), result.scene)

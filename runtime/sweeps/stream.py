@@ -27,7 +27,7 @@ from ..results.labelled import Labelled
 from ..results.labels import alike, changed, scene_of
 from ..results.partial import certificate_of, describe_sweep, layout_of, partial_path, verdicts_in, write_result
 from ..results.result import Result, read_result
-from ..results.store import attributes_of, form_of, opened
+from ..results.store import NO_ROOM, attributes_of, form_of, opened
 from ..support.execution import Execution
 from ..support.files import drop_leftovers, understood
 from ..support.progress import Hook, Progress, Reporter
@@ -69,9 +69,9 @@ class Streamed(Labelled):
         verdicts = "; ".join(f"{count} {words}" for words, count in self.verdicts.items())
         return ("file", str(self.path)), ("cells", ended), *([("verdicts", verdicts)] if verdicts else [])
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         """Write the result to another file (see `Result.save`); all of it is read into memory."""
-        self.result.save(path)
+        self.result.save(path, overwrite=overwrite)
 
     @property
     def success(self) -> bool:
@@ -131,6 +131,8 @@ def stream(
         If the result or an unfinished run is there and neither `resume` nor `overwrite` is given.
     FileNotFoundError
         If there is nothing to resume.
+    BlockingIOError
+        If another process writes there.
     ModuleNotFoundError
         If the package of the form is not installed.
     SweepInterrupted
@@ -157,7 +159,12 @@ def stream(
         prepared = prepare(reduction, execution, width=width)
         prepared = with_certificate(prepared) if certified else prepared
         about = describe_sweep(reduction, prepared.layout(), prepared.attributes, prepared.certificate)
-        BlockLog.create(partial, about)
+        try:
+            BlockLog.create(partial, about)
+        except OSError as problem:
+            if problem.errno not in NO_ROOM:
+                raise
+            raise SweepFailed(f"cannot write {partial}: {problem.strerror}", 0, scene.cells) from problem
     log = BlockLog.open(partial, writing=True)
     try:
         verdicts = _run_blocks(prepared, log, reporter, path)
@@ -187,6 +194,8 @@ def claim(
         If a run there was not finished and `resume` is not given.
     FileNotFoundError
         If there is nothing to resume.
+    BlockingIOError
+        If another process writes there.
     """
     for name, value in (("resume", resume), ("overwrite", overwrite), ("certified", certified)):
         check_flag(name, value)
@@ -196,6 +205,8 @@ def claim(
     if resume and overwrite:
         raise ValueError("found both resume and overwrite; expected one of them")
     form.check(target)
+    if partial.exists():
+        BlockLog.expect_idle(partial)
     if overwrite:
         return "begin"
     if partial.exists() and (resume or not target.exists()):

@@ -143,6 +143,12 @@ def test_too_many_links_are_refused() -> None:
     random, complete = (replace(family(name), link_limit=100) for name in ("erdos_renyi", "complete"))
     with pytest.raises(ValueError, match="erdos_renyi: n = 30 has too many links, 434 or more; expected at most 100"):
         random(30)
+    regular = replace(family("random_regular"), link_limit=100)
+    with pytest.raises(
+        ValueError, match="random_regular: n = 30 has too many links, 120 or more; expected at most 100"
+    ):
+        regular(30, degree=4)
+    assert len(regular(25, degree=4).links) == 100
     assert len(complete(10).links) == 90
     with pytest.raises(ValueError, match="complete: n = 11 has too many links, 110 or more; expected at most 100"):
         complete(11).links  # noqa: B018

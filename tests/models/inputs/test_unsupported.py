@@ -21,11 +21,13 @@ PAIR = sc.Scene("van_der_pol", "x->x", sc.chain(2))
         (lambda: sc.Scene.from_dict({"triads": 1}), "links of more than two nodes are not supported; XGI"),
         (lambda: sc.Scene(parameters={"delay": 1}), "delays are not supported"),
         (lambda: sc.equilibrium(PAIR, maps=1), "maps are not supported"),
+        (lambda: sc.Rates({"x": "tanh(sum(W*x_j))"}), "a function of the sum of inputs is not supported"),
+        (lambda: sc.Field({"x": "-x + delay(x, 1)"}), "delays are not supported"),
         (lambda: sc.Field({"z": "sqrt(-1)*z"}), "real and imaginary part are two states"),
     ],
 )
 def test_words_that_ask_for_other_things(call: Callable[[], object], words: str) -> None:
-    with pytest.raises((ValueError, TypeError), match=r"unknown|found") as error:
+    with pytest.raises((ValueError, TypeError), match=r"unknown|found|rate of") as error:
         call()
     assert words in str(error.value)
 

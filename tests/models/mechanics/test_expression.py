@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 import sympy as sp
 from hypothesis import HealthCheck, given, settings
@@ -64,3 +65,18 @@ def test_signs_before_sums(text: str) -> None:
 def test_a_model_that_runs_can_be_saved() -> None:
     scene = sc.Scene(sc.Field({"x": "cos(x) - (1 - z)*sin(x)", "z": "1 - z"}), None)
     assert sc.Scene.from_dict(scene.as_dict()) == scene
+
+
+def test_limits_of_quotients_are_equal_elsewhere() -> None:
+    x, k = sp.symbols("x k", real=True)
+    for text in (
+        "k*x/sqrt(abs(x))",
+        "(2*x - 2)**3/abs(1 - x)**1.5",
+        "x**2/abs(x)**0.5",
+        "x*abs(x)**-1.5",
+        "k*x/sqrt(abs(k))",
+    ):
+        kept = exact("e", text, {"x": x, "k": k})
+        for at in (0.3, -0.7, 2.5):
+            value = eval(text, {"x": at, "k": -1.7, "sqrt": np.sqrt, "abs": abs})
+            assert float(kept.subs({x: at, k: -1.7})) == pytest.approx(value, rel=1e-14), text

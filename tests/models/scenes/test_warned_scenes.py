@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
-from synchain import Field, Rates, Scene, chain, from_edges, load_scene, ring
+from synchain import Field, Rates, Scene, Topology, chain, from_edges, load_scene, ring
 
 NODE = Field({"x": "-x"})
 PAIRS = from_edges([(1, 2), (3, 4)])
@@ -46,3 +47,19 @@ def test_files_warn_and_changes_of_numbers_do_not(tmp_path: Path) -> None:
 def test_scenes_that_record_no_error_do_not_warn() -> None:
     assert told(lambda: Scene(NODE, VANISHING, PAIRS, record=())) == []
     assert told(lambda: Scene(NODE, ACTING, ring(4))) == []  # equal sums of weights: there is a synchronous motion
+
+
+@pytest.mark.parametrize("text", ["K*tanh(W*x_j)", "K*exp(-1 - W*x_j)", "K*tanh(2*W*x_j + 1)"])
+def test_a_function_of_single_inputs_warns(text: str) -> None:
+    link = Rates({"x": text}, {"K": 0.1})
+    (sentence,) = told(lambda: Scene(NODE, link, ring(4)))
+    assert "the sum of inputs is another model" in sentence
+    assert (
+        told(lambda: Scene(NODE, link, Topology("one_way", 3, ((1, 0, Fraction(1)), (2, 1, Fraction(1)))), record=()))
+        == []
+    )
+
+
+@pytest.mark.parametrize("text", ["K*W*tanh(x_j)", "K*tanh(W*(x_j - x_i))", "K*sin(x_j - W)"])
+def test_functions_of_other_things_do_not_warn(text: str) -> None:
+    assert told(lambda: Scene(NODE, Rates({"x": text}, {"K": 0.1}), ring(4), record=())) == []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 import random
 from collections import Counter
 from collections.abc import Callable
@@ -598,13 +599,52 @@ def test_coefficients_that_python_refuses_to_write_are_abbreviated() -> None:
     assert found.verified
     assert "(degree 4)" in repr(found)
     assert "root 0 of a polynomial of degree 4" in table(found)
-    for shown in (str(found.largest), repr(found.largest), found[1].text):
-        assert shown.startswith("CRootOf(polynomial of degree 4 with coefficients of up to ")
-        assert len(shown) < 100
+    assert found[1].text.startswith("CRootOf(polynomial of degree 4 with coefficients of up to ")
+    assert len(found[1].text) < 100
+    assert float(str(found.largest)) == float(found.largest) == found[-1].value
     listed = json.loads(json.dumps(found.as_dict()))
     coefficients = [int(text, 0) for text in listed["polynomials"][0]]
     assert coefficients == list(found[1].number.polynomial)
     assert max(coefficients) > 10**4300
+
+
+def test_roots_print_decimals_and_are_those_of_sympy() -> None:
+    found = integer_graph(12, 0.4, 1).spectrum
+    root = next(e for e in found if isinstance(e.number, RealRoot))
+    plain = sp.CRootOf(root.exact.poly, root.exact.index)
+    assert str(root.exact) == f"{root.value:.16g}" == repr(root.exact) == sp.latex(root.exact) == sp.pretty(root.exact)
+    assert root.exact == plain
+    assert plain == root.exact
+    assert root.exact - plain == 0
+    assert root.exact != sp.CRootOf(root.exact.poly, root.exact.index - 1)
+    assert pickle.loads(pickle.dumps(root.exact)) == plain
+    one_way = from_matrix([[-3, 1, 2, 0], [1, -1, 0, 0], [0, 1, -3, 2], [3, 0, 0, -3]]).spectrum
+    turned = next(e for e in one_way if isinstance(e.number, ComplexRoot))
+    assert complex(str(turned.exact).replace("*I", "j").replace(" ", "")) == turned.value
+
+
+def test_eigenvalues_are_compared_as_numbers() -> None:
+    found = topology("star", 4).spectrum  # 0, -1 twice, -4
+    assert found[0] == 0 == found[0]
+    assert found[1] == -1.0 != found[2]
+    assert found[2] < found[1] < found[0] <= 0 < 1
+    assert found[1] >= sp.Rational(-3, 2) >= -1.5 > found[2]
+    assert hash(found[1]) == hash(-1)
+    assert sorted(found) == list(found)[::-1]
+    assert max(found) == 0
+    tiny = sp.Rational(1, 10**40)
+    a, b = Eigenvalue(-sp.sqrt(2), 1), Eigenvalue(-sp.sqrt(2) + tiny, 1)
+    assert a < b
+    assert not b <= a
+    assert a != -(2.0**0.5)
+    assert a == -sp.sqrt(2)
+    assert Eigenvalue(-sp.sqrt(2), 2) != a
+    assert found[0] != "0"
+    whole = integer_graph(12, 0.4, 1).spectrum
+    assert all(b < a for a, b in pairwise(whole))
+    with pytest.raises(TypeError, match=r"found a complex number; .* have no order"):
+        sorted(one_way_ring(3).spectrum)
+    assert complex(one_way_ring(3).spectrum[1]) == one_way_ring(3).spectrum[1].value
 
 
 def test_the_table() -> None:

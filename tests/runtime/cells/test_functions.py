@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.special import erf
+from scipy.special import erf, exprel
 
 import synchain as sc
 from synchain.models.inputs.expressions import FUNCTIONS
@@ -50,6 +50,23 @@ def test_angles_of_numbers_run() -> None:
     np.testing.assert_allclose(found.end.values.ravel(), exact, rtol=0.0, atol=1e-8)
 
 
+@pytest.mark.parametrize("integrator", ["taylor", "dop853", "rodas5p"])
+def test_functions_without_a_value_by_their_formula_run_from_there(integrator: str) -> None:
+    """From 0, where (exp(x) - 1)/x is 0/0, over both ends of its power series; on links as on nodes."""
+    node = sc.Field({"x": "-expm1(x)/2 + 9*cos(t) - 3"})
+    link = sc.Rates({"x": "W*(1/exprel(x_i) - log1p(x_j**2) + mod(k, 2))"}, {"k": 3.5})
+    settings = {"transient": 0.0, "window": 6.0, "time_unit": "time", "rtol": 1e-10, "integrator": integrator}
+    settings["initial"] = {"x": 0.0}
+    found = sc.run(sc.Scene(node, link, sc.chain(2), **settings), show_progress=False)
+
+    def rate(t: float, x: np.ndarray) -> np.ndarray:
+        return -np.expm1(x) / 2 + 9 * np.cos(t) - 3 + 1 / exprel(x) - np.log1p(x[::-1] ** 2) + 1.5
+
+    solution = solve_ivp(rate, (0.0, 6.0), [0.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-13)
+    assert solution.y.min() < -1.0 < 1.0 < solution.y.max()
+    np.testing.assert_allclose(found.end.values.ravel(), solution.y[:, -1], rtol=0.0, atol=1e-8)
+
+
 def test_no_function_is_left_out() -> None:
     called = set(re.findall(r"([a-z0-9]+)\(", f"{SMOOTH} {KINKED} {ROUGH}"))
     assert called == set(FUNCTIONS)
@@ -68,3 +85,19 @@ def test_powers_of_sizes_are_numbers_at_rest(text: str) -> None:
 
     exact = solve_ivp(rates, (0.0, 2.0), [0.3, 0.0], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
     np.testing.assert_allclose(found.end.values.ravel(), exact, rtol=0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    "text", ["v*abs(v)**-0.5", "2*v/sqrt(abs(4*v))", "v**2*abs(v)**(-3/2)*sign(v)", "(v - 0)/sqrt(abs(v))"]
+)
+def test_quotients_with_a_limit_have_it(text: str) -> None:
+    """x/sqrt(|x|) is 0/0 at rest, where sqrt(|x|) sign(x) is 0."""
+    node = sc.Lagrangian("v**2/2", "x**2/2", Q={"x": f"-0.6*{text}"}, coordinates=["x"])
+    settings = {"transient": 0.0, "window": 2.0, "time_unit": "time", "rtol": 1e-10, "integrator": "dop853"}
+    found = sc.run(sc.Scene(node, initial={"x": 0.3, "v": 0.0}, **settings), show_progress=False)
+
+    def rates(t: float, y: np.ndarray) -> list[float]:
+        return [y[1], -y[0] - 0.6 * np.sign(y[1]) * abs(y[1]) ** 0.5]
+
+    exact = solve_ivp(rates, (0.0, 2.0), [0.3, 0.0], method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
+    np.testing.assert_allclose(found.end.values.ravel(), exact, rtol=0.0, atol=1e-7)

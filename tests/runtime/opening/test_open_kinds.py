@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import subprocess
 import sys
@@ -124,7 +125,12 @@ def test_states_have_the_dimensions_component_and_node(result: Any) -> None:
 def test_a_result_comes_back_in_every_form(result: Any, ending: str, tmp_path: Path) -> None:
     path = tmp_path / f"a{ending}"
     result.save(path)
-    result.save(path)  # over an earlier one
+    before = path.stat().st_mtime_ns
+    for wrong, words in ((False, r"is there already; give overwrite=True to replace it"), (1, "overwrite")):
+        with pytest.raises((FileExistsError, TypeError), match=words):
+            result.save(path, overwrite=wrong)
+    assert path.stat().st_mtime_ns == before
+    result.save(path, overwrite=True)
     again = open_result(path)
     assert again.data.identical(result.data)
     assert again.scene == result.scene
@@ -225,6 +231,21 @@ def test_an_absent_package_is_named_in_one_line_before_anything_runs(tmp_path: P
     expected = [words.format(package) for package in packages.values() for _ in range(3)]
     assert all(line.endswith(end) for line, end in zip(lines, expected, strict=True))
     assert sorted(part.name for part in tmp_path.iterdir()) == sorted(f"there{ending}" for ending in packages)
+
+
+def test_a_damaged_file_leaves_no_traceback(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    pytest.importorskip("h5netcdf")
+    path, ignored = tmp_path / "a.nc4", []
+    monkeypatch.setattr(sys, "unraisablehook", lambda found: ignored.append(found.exc_value))
+    KINDS["Plane"].save(path)
+    whole = path.read_bytes()
+    place = whole.index(b"OHDR") + 20  # the object header of the root group, which has a checksum
+    for damaged in (whole[:300], whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :]):
+        path.write_bytes(damaged)
+        with pytest.raises(OSError, match="the file is damaged"):
+            open_result(path)
+        gc.collect()
+    assert not ignored
 
 
 def test_another_folder_is_not_replaced(tmp_path: Path) -> None:

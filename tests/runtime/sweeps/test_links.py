@@ -10,7 +10,7 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from synchain.models import Potential, Rates, Scene, Topology, complete, ends, ring, star
+from synchain.models import Field, Potential, Rates, Scene, Topology, complete, ends, ring, star
 from synchain.models.inputs.frozen import Frozen
 from synchain.models.mechanics.oscillator import Coordinate, FieldModel, LagrangianModel, Oscillator
 from synchain.models.mechanics.parameter import Parameter
@@ -193,3 +193,21 @@ def test_choices_by_the_weight_run(n: int) -> None:
 
     expected = solve_ivp(rates, (0.0, 2.0), start, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
     np.testing.assert_allclose(run(scene, show_progress=False).end.values.ravel(), expected, rtol=0.0, atol=1e-8)
+
+
+def test_functions_of_summed_inputs_by_sums_of_links() -> None:
+    """x' = -x + tanh(W x + I) of docs/links.md: in its inputs exactly, and with a fast state for the sum."""
+    felt, start = weights(ring(4)), np.array([0.5, 0.1, -0.3, 0.2])
+    exact = solve_ivp(lambda _, x: -x + np.tanh(felt @ x + 0.2), (0, 5), start, rtol=1e-10, atol=1e-12).y[:, -1]
+    settings = {"transient": 0.0, "window": 5.0, "time_unit": "time", "rtol": 1e-9, "record": ()}
+
+    unit = Field({"u": "I - u"}, parameters={"I": 0.2})
+    inputs = Scene(unit, Rates({"u": "W*tanh(u_j)"}), ring(4), initial={"u": list(felt @ start + 0.2)}, **settings)
+    np.testing.assert_allclose(run(inputs).end.squeeze(), felt @ exact + 0.2, rtol=0.0, atol=1e-7)
+
+    unit = Field({"x": "-x + tanh(s + I)", "s": "-s/tau"}, parameters={"I": 0.2, "tau": 1e-3})
+    i, j, w = ends(unit)
+    begin = {"x": list(start), "s": list(felt @ start)}
+    fast = run(Scene(unit, Rates({i.s: w * j.x / i.tau}), ring(4), initial=begin, **settings))
+    error = abs(fast.end.sel(component="x").squeeze() - exact).max()
+    assert 1e-5 < error < 1e-3

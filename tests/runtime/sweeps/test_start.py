@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ import xarray as xr
 from synchain.models import Field
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
+from synchain.runtime.cells.reduce import reduce_scene
+from synchain.runtime.opening.open import open_result
 from synchain.runtime.results.labels import DRIVE_PHASE
 from synchain.runtime.results.result import Result
 from synchain.runtime.sweeps.run import run
@@ -80,6 +83,73 @@ def test_states_in_a_row_and_tables_are_starts(first: Result) -> None:
         again = ran(DRIVEN, start=start)
         np.testing.assert_array_equal(again.end, whole.end)
         assert again.data.attrs["start_time"] == 0.0
+
+
+def test_each_cell_of_a_sweep_goes_on_from_its_own(tmp_path: Path) -> None:
+    sigma, omega = [0.05, 0.1, 0.2], [1.15, 0.9]
+    first = ran(DRIVEN, sigma=sigma, omega=omega)
+    second = ran(DRIVEN.replace(transient=0.0), start=first, sigma=sigma, omega=omega)
+    np.testing.assert_array_equal(second.start_state, first.end)
+    np.testing.assert_array_equal(second.start_time, first.end_time)
+    for k, strength in enumerate(sigma):
+        alone = ran(DRIVEN.replace(transient=0.0), start=first.end.isel(sigma=k, omega=1), sigma=strength, omega=0.9)
+        np.testing.assert_array_equal(second.end.isel(sigma=k, omega=1), alone.end)
+    other_order = ran(DRIVEN.replace(transient=0.0), start=first.end.transpose(..., "sigma"), sigma=sigma, omega=omega)
+    np.testing.assert_array_equal(other_order.end, second.end)
+    second.save(tmp_path / "second.nc")
+    assert open_result(tmp_path / "second.nc").data.identical(second.data)
+
+
+def test_an_axis_that_a_start_lacks_begins_at_one_cell() -> None:
+    first = ran(DRIVEN, sigma=[0.05, 0.1])
+    second = ran(DRIVEN, start=first, delta=[0.1, 0.2], sigma=[0.05, 0.1])
+    for k in range(2):
+        np.testing.assert_array_equal(second.start_state.isel(delta=k), first.end)
+    alone = ran(DRIVEN, start=first.end.isel(sigma=1), sigma=0.1, delta=0.2)
+    np.testing.assert_array_equal(second.end.isel(sigma=1, delta=1), alone.end)
+
+
+def test_equal_starts_of_a_scene_are_not_merged_if_cells_start_apart() -> None:
+    alike = DRIVEN.replace(initial={"x": 0.1})
+    first = ran(DRIVEN, sigma=[0.05, 0.1])
+    second = ran(alike, start=first, sigma=[0.05, 0.1])
+    np.testing.assert_array_equal(second.end, ran(DRIVEN, start=first, sigma=[0.05, 0.1]).end)
+
+
+def test_starts_of_cells_are_resumed_with_them() -> None:
+    swept = DRIVEN.replace(axes={"sigma": [0.05, 0.1]})
+    first = ran(swept)
+    second = ran(swept, start=first)
+    assert ran(swept, start=first, resume=second).end.identical(second.end)
+    for more in ({"resume": second}, {"resume": first, "start": first}):
+        with pytest.raises(ValueError, match="started from other states; give the start of that run"):
+            ran(swept, **more)
+
+
+def test_modes_of_contacts_of_each_cell_follow_from_the_other_states() -> None:
+    scene = Scene(topology=topology("chain", 2), contact="set-valued", transient=5.0, window=5.0)
+    first = ran(scene, sigma=[0.1, 0.2])
+    second = ran(scene.replace(transient=0.0, window=1.0), start=first, sigma=[0.1, 0.2])
+    alone = ran(scene.replace(transient=0.0, window=1.0), start=first.end.isel(sigma=1), sigma=0.2)
+    np.testing.assert_array_equal(second.end.isel(sigma=1), alone.end)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"sigma": [0.05, 0.2]}, r"found cells of sigma = 0\.05, 0\.1; expected those of the sweep, 0\.05, 0\.2"),
+        ({"delta": [0.1, 0.2]}, r"several cells, along sigma \(2\)"),
+        ({"sigma": [0.05, 0.1], "certified": True}, "certified: found a start of several cells"),
+        ({"sigma": [0.05, 0.1], "reduce": reduce_scene(DRIVEN)}, "a Reduction beside a start of several cells"),
+    ],
+)
+def test_cells_of_another_sweep_are_refused(more: dict[str, Any], words: str) -> None:
+    first = ran(DRIVEN, sigma=[0.05, 0.1])
+    with pytest.raises(ValueError, match=words) as caught:
+        ran(DRIVEN, start=first, **more)
+    assert "\n" not in str(caught.value)
+    with pytest.raises(ValueError, match="set continuation = 'none'"):
+        ran(DRIVEN.replace(axes={"sigma": [0.05, 0.1]}, continuation="up"), start=first)
 
 
 @pytest.mark.parametrize(

@@ -261,6 +261,21 @@ def test_two_processes_do_not_write_to_one_store(store):
     assert "is being written by another run" in done.stderr
 
 
+def test_a_second_writer_is_told_of_the_first(tmp_path):
+    path = tmp_path / "a.nc"
+    BlockLog.create(partial(path), ABOUT)
+    held = BlockLog.open(partial(path), writing=True)
+    code = "import sys\nfrom streams import MAP\nfrom synchain.runtime.sweeps.stream import stream\n"
+    here = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    for more in ("", "resume=True", "overwrite=True"):
+        words = [sys.executable, "-c", f"{code}stream(MAP, sys.argv[1], {more})", str(path)]
+        done = subprocess.run(words, env=here, capture_output=True, text=True, timeout=120)
+        last = done.stderr.splitlines()[-1]
+        assert "is being written by another run; wait for it" in last
+        assert "overwrite" not in last
+    held.close()
+
+
 # -- what stops a sweep --------------------------------------------------------------------------------------
 
 
@@ -314,6 +329,32 @@ def test_a_disk_that_fills_up(files, tmp_path):
     assert 0 < int((open_result(partial(path)).status == Status.FINISHED).sum()) < MAP.cells
     stream(MAP, path, resume=True, show_progress=False)
     assert path.read_bytes() == files[MAP]
+
+
+FULL_AT_ONCE = """
+import resource, sys
+from streams import MAP, PAIR
+from synchain import run
+from synchain.runtime.sweeps.errors import SweepFailed
+from synchain.runtime.sweeps.stream import stream
+result = run(PAIR, show_progress=False)
+resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+for call in (lambda: result.save(sys.argv[1]), lambda: stream(MAP, sys.argv[1], workers=1, show_progress=False)):
+    try:
+        call()
+    except (OSError, SweepFailed) as problem:
+        print(type(problem).__name__, problem)
+"""
+
+
+def test_a_disk_that_is_full_at_once(tmp_path):
+    path, here = tmp_path / "a.nc", {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    done = subprocess.run([sys.executable, "-c", FULL_AT_ONCE, str(path)], env=here, capture_output=True, text=True)
+    saved, streamed = done.stdout.splitlines()
+    assert saved.startswith("OSError")
+    assert "cannot write: File too large; free space there, or choose another path" in saved
+    assert streamed == f"SweepFailed cannot write {partial(path)}: File too large; 0 of {MAP.cells} cells had finished"
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_disk_that_is_full_when_the_result_is_written(files, tmp_path, monkeypatch):
