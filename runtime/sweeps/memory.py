@@ -105,4 +105,6 @@ class Memory:
         """Return the cells so far."""
         prepared, scene = self.prepared, self.prepared.scene
         spans = prepared.reduction.planner.spans(np.arange(scene.cells))
-        return gather(scene, prepared.attributes, spans, prepared.reduction.expand(self.buffers), prepared.certificate)
+        return gather(
+            scene, lambda: prepared.attributes, spans, prepared.reduction.expand(self.buffers), prepared.certificate
+        )
