@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .graph import is_analytic, is_linear, jump, outlives_series
+from .leaps import unpassed
 from .looped import write_looped
 from .order import order_for
 from .rolled import is_large, write_rolled
@@ -19,6 +20,7 @@ __all__ = [
     "jump",
     "order_for",
     "outlives_series",
+    "unpassed",
     "write_looped",
     "write_rolled",
     "write_step",
