@@ -40,7 +40,7 @@ both = sc.Scene(cell, links=layers, initial=start, rtol=1e-12, **settings)
 result = sc.run(both)
 pair = sc.Scene(cell, chemical, sc.chain(2), time_unit="time")
 modes = np.linspace(0.25, 2, 8)  # -γ/k of the modes of undirected graphs lies between 0 and 2
-exponents = {gk: sc.exponents(pair, gk * modes, g=gk, starts=1, periods=10000) for gk in (1, 1.2, 1.3, 1.5)}
+exponents = {gk: sc.exponents(pair, gk * modes, g=gk, starts=1, periods=2000) for gk in (1, 1.2, 1.3, 1.5)}
 six = both.replace(links=[(electrical, sc.ring(6)), (chemical, sc.complete(6))], initial=None)
 region = sc.plane(six, k=np.linspace(0, 1, 21), g=np.linspace(0, 0.3, 16), starts=1)
 

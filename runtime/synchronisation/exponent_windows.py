@@ -33,6 +33,8 @@ class ExponentWindows:
         Why exponents say nothing about the network; empty if they do.
     strengths, values : tuple of float
         Strengths alpha and exponents at them.
+    beyond : tuple of float
+        Ends of windows that are ends of the grid: the windows may go on.
     """
 
     intervals: tuple[Interval, ...] = ()
@@ -40,6 +42,7 @@ class ExponentWindows:
     absent: str = ""
     strengths: tuple[float, ...] = ()
     values: tuple[float, ...] = ()
+    beyond: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.errors) != len(self.intervals):
@@ -53,11 +56,13 @@ class ExponentWindows:
     def of(cls, function: MSF) -> ExponentWindows:
         """Return the windows of a master stability function for the network of its scene."""
         found = function.windows
+        ends = [end for w in found for end in ((w.low, w.low_mode), (w.high, w.high_mode))]
         return cls(
             tuple((window.low, window.high) for window in found),
             tuple((window.low_error, window.high_error) for window in found),
             strengths=tuple(map(float, function.alpha)),
             values=tuple(map(float, function.exponent)),
+            beyond=tuple(end for end, lost in ends if lost is None and end),
         )
 
     def at(self, alpha: np.ndarray) -> np.ndarray:
@@ -67,7 +72,8 @@ class ExponentWindows:
     @property
     def words(self) -> str:
         """The windows with their errors, or why there are none."""
-        return f"not computed: {self.absent}" if self.absent else words_of(self.intervals, self.errors)
+        known = words_of(self.intervals, self.errors, beyond=self.beyond)
+        return f"not computed: {self.absent}" if self.absent else known
 
 
 def exponent_windows(
