@@ -135,6 +135,7 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))
 
 
+@cache
 def integrator(name: str, order: int | None = None) -> Integrator:
     """Return the integrator of a name.
 

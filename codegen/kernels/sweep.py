@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
+import numpy as np
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
@@ -28,7 +29,7 @@ from ..steps.names import tidy
 from ..steps.program import FILL_LIMIT, Program, program, workspace
 from ..steps.step import Step, function_name, node_function, scaling
 from ..steps.unrolled import Unrolled
-from ..taylor import write_looped, write_step
+from ..taylor import TaylorStep, is_large, write_looped, write_rolled, write_step
 from .driver import RECORDERS, Driver, KernelKind, Recorder, imports
 from .observed import UNWATCHED, Watched, count_of, rule_of
 
@@ -191,7 +192,13 @@ def emit(
     equations, elimination = _planned(equations, method, unroll, fill)
     plain, looped = tidy(equations), elimination is not None
     names = free_names(plain)
-    functions, scratch, count = (_series if method.series else _stages)(plain, method, names, elimination)
+    if method.series:
+        series = _series(plain, method, elimination)
+        functions, scratch, count = [series.text], series.workspace, series.operations
+        if elimination is not None and series.table:
+            elimination = replace(elimination, arrays=(*elimination.arrays[:-1], np.array(series.table)))
+    else:
+        functions, scratch, count = _stages(plain, method, names, elimination)
     width = _suited(equations, method, count) if width is None else width
     chosen = Driver(KernelKind.SWEEP, width, looped, plain.sticks, method.series)
     cut = _cut(equations, section) if section is not None and "section" in ordered else UNWATCHED
@@ -302,7 +309,7 @@ def free_names(plain: Equations) -> Names:
 
 def _is_looped(equations: Equations, method: Integrator, unroll: int) -> bool:
     """True if the steps run in loops."""
-    alone = method.series and equations.inertial and not equations.link_count
+    alone = method.series and (is_large(equations) or (equations.inertial and not equations.link_count))
     return equations.n > unroll or alone or (not method.inexact and _of_links(equations) > MOST_OF_LINKS)
 
 
@@ -312,12 +319,11 @@ def _of_links(equations: Equations) -> int:
     return sum(size[edge] for _, edge in equations.linked()) if equations.n <= LARGEST_UNROLLED else 0
 
 
-def _series(
-    plain: Equations, method: Integrator, names: Names, elimination: Program | None
-) -> tuple[list[str], int, int]:
-    """The function of a Taylor step, the groups of scratch memory that it needs, and its operations."""
-    step = (write_step if elimination is None else write_looped)(plain, method.order)
-    return [step.text], step.workspace, step.operations
+def _series(plain: Equations, method: Integrator, elimination: Program | None) -> TaylorStep:
+    """The Taylor step of a method."""
+    if elimination is None:
+        return write_step(plain, method.order)
+    return (write_rolled if is_large(plain) else write_looped)(plain, method.order)
 
 
 def _stages(

@@ -60,14 +60,22 @@ class _InnerCompiler(_Compiler):
     front_end = "InnerCompiler"
 
 
+class _SeparateCompiler(_Compiler):
+    """The compiler of functions that kernels call without taking them in."""
+
+    front_end = "SeparateCompiler"
+
+
 ENTRY = {"pipeline_class": _Compiler}
 INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": _InnerCompiler}
 
 
-def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+def njit(*, cache: bool = False, separate: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Return `numba.njit(**options)`; a function without `cache` cannot be called from Python, only by kernels.
 
     A kernel has some eighty functions and one entry point; wrappers and machine code of them all are half of its compilation.
-    `cache` marks entry points, whose machine code `kernels.compile` keeps: Numba's own cache is not used.
+    `cache` marks entry points, whose machine code `kernels.compile` keeps: Numba's own cache is not used.  `separate` keeps
+    LLVM from inlining a function with many callers.
     """
-    return numba.njit(**{**options, **(ENTRY if cache else INNER)})
+    compiler = {"pipeline_class": _SeparateCompiler} if separate else {}
+    return numba.njit(**{**options, **(ENTRY if cache else INNER), **compiler})

@@ -13,7 +13,7 @@ from numba.core.typed_passes import NativeLowering, NoPythonBackend
 from . import syntax
 from .writing import Program
 
-__all__ = ["EntryCompiler", "InnerCompiler"]
+__all__ = ["EntryCompiler", "InnerCompiler", "SeparateCompiler"]
 
 
 class _Linked(JITCodeLibrary):
@@ -117,3 +117,25 @@ class InnerCompiler(EntryCompiler):
     """The compiler of functions that others link."""
 
     lowering = _LinkedLowering
+
+
+class _SeparateLower(_Lower):
+    """Lowering of a function that LLVM does not inline."""
+
+    def lower_normal_function(self, fndesc: Any) -> None:
+        super().lower_normal_function(fndesc)
+        self.function.attributes.add("noinline")
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _SeparateLowering(_LinkedLowering):
+    """Writes a function that LLVM does not inline into a `_Linked` library."""
+
+    _name = "separate_writing"
+    lowering_class = _SeparateLower
+
+
+class SeparateCompiler(InnerCompiler):
+    """The compiler of functions that others link and call."""
+
+    lowering = _SeparateLowering

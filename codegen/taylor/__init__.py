@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from .graph import is_analytic, is_linear, jump, outlives_series
+from .leaps import unpassed
 from .looped import write_looped
 from .order import order_for
+from .rolled import is_large, write_rolled
 from .step import TaylorStep
 from .tangent import TangentStep, write_tangent
 from .unrolled import write_step
@@ -13,11 +15,14 @@ __all__ = [
     "TangentStep",
     "TaylorStep",
     "is_analytic",
+    "is_large",
     "is_linear",
     "jump",
     "order_for",
     "outlives_series",
+    "unpassed",
     "write_looped",
+    "write_rolled",
     "write_step",
     "write_tangent",
 ]

@@ -16,6 +16,7 @@ import sympy as sp
 from sympy.functions.elementary.piecewise import Piecewise
 
 from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.calculus import derivative
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.jumps import JUMPING, KINKED
 
@@ -162,11 +163,11 @@ def is_analytic(equations: Equations) -> bool:
 
 def is_linear(equations: Equations) -> bool:
     """True if the rates are sums of states with constant coefficients and of terms of time."""
-    blocks = [(node.jacobian(), {TIME, *node.state}) for node in equations.nodes]
-    for edge in equations.edges:
-        blocks += [(block, {TIME, *edge.here, *edge.there}) for block in (edge.jacobian_here(), edge.jacobian_there())]
-    fixed = not any(e.free_symbols & moving for block, moving in blocks for row in block for e in row)
-    return fixed and equations.constant_mass
+    parts = [(node.rhs, node.state, {TIME, *node.state}) for node in equations.nodes]
+    parts += [(e.rhs, (*e.here, *e.there), {TIME, *e.here, *e.there}) for e in equations.edges]
+    # the first slope that moves is enough: those of large nodes take seconds
+    slopes = ((derivative(e, s), moving) for rates, own, moving in parts for e in rates for s in own)
+    return not any(slope.free_symbols & moving for slope, moving in slopes) and equations.constant_mass
 
 
 def _unserial(expressions: Sequence[sp.Expr], moving: Set[sp.Symbol]) -> set[sp.Expr]:

@@ -180,6 +180,12 @@ class Section(Part):
         used = {used for s in self.graph.series for used in s.convolved}
         return {*used, *self.graph.watched, *self.graph.positive, *self.lent} - {*self.outer}
 
+    def room(self) -> dict[str, int]:
+        """How many groups of memory stand under which name: coefficients, and what has one value for each turn."""
+        kept = {s.name for s in self.remembered}
+        found = {name: (self.order + 1) * self.count for name in sorted(kept - {"t", ""})}
+        return found | {name: self.count for name in (*self.kept, *self.hints)}
+
     def recall(self, what: str) -> Expression:
         return Load("dense", self.single(what))
 
@@ -344,7 +350,7 @@ def with_pushes(joint: Joint) -> list[sp.Expr]:
 class Looped(StepWriter):
     """Writes loops around the recurrences, with a part for what each of them makes."""
 
-    functions = (CONVOLUTION,)
+    functions: Sequence[str] = (CONVOLUTION,)
 
     def __init__(self, equations: Equations, order: int) -> None:
         eq = equations
@@ -594,6 +600,14 @@ class Looped(StepWriter):
 
     def bases(self) -> tuple[list[Statement], int]:
         """Where everything stands in the workspace, and how much it takes."""
+        found, size = list[Statement]([whole("TERMS", Number(self.order + 1))]), 0
+        for name, groups in self.room().items():
+            found.append(whole(f"at_{name}", Name("DENSE_ROWS") * "DIMENSION" + size))
+            size += groups
+        return found, size
+
+    def room(self) -> dict[str, int]:
+        """How many groups the parts of the workspace take, in their order."""
         eq, p = self.equations, self.order
         sizes = {"states": (p + 1) * eq.dimension, "rates": eq.dimension}
         if self.waves.lent:
@@ -601,18 +615,12 @@ class Looped(StepWriter):
         if eq.sticks:
             sizes |= {"gaps": (p + 1) * 2 * eq.n, "sizes": 2 * eq.n, "closing": p + 1}
         for section in self.parts:
-            kept = {s.name for s in section.remembered}
-            sizes |= {name: (p + 1) * section.count for name in sorted(kept - {"t", ""})}
-            sizes |= {name: section.count for name in (*section.kept, *section.hints)}
+            sizes |= section.room()
             if isinstance(section, Gathered):
                 sizes |= {name: (p + 1) * eq.n for name, _ in section.totals}
             if isinstance(section, Totals):
                 sizes |= {name: p + 1 for name, _ in section.totals}
-        found, size = list[Statement]([whole("TERMS", Number(p + 1))]), 0
-        for name, groups in sizes.items():
-            found.append(whole(f"at_{name}", Name("DENSE_ROWS") * "DIMENSION" + size))
-            size += groups
-        return found, size
+        return sizes
 
     def states(self, body: Callable[[Expression], Iterable[Statement]]) -> list[Statement]:
         """Loops over all states: what is done with the place of one."""

@@ -14,11 +14,14 @@ section 3.1, because the convolutions, whose number grows with the square of the
 
 HIGHEST = 24
 
+ORDERS_OF_LARGE = ((1e-10, 16), (0.0, 20))
+"""The same for large nodes, of which two kernels are enough: they take longer to compile than most runs take."""
+
 LINEAR = 1e-5
 """Tolerance from which linear equations take the highest order."""
 
 
-def order_for(rtol: float, atol: float, linear: bool = False) -> int:
+def order_for(rtol: float, atol: float, linear: bool = False, large: bool = False) -> int:
     """Return the order of the Taylor step for these tolerances.
 
     Parameters
@@ -28,6 +31,8 @@ def order_for(rtol: float, atol: float, linear: bool = False) -> int:
     linear : bool, optional
         True for equations without products of states: their orders cost alike, since nothing is convolved, so the highest
         is the fastest from moderate tolerances on.
+    large : bool, optional
+        True for a large node (`is_large`), which has one of two orders.
 
     Returns
     -------
@@ -37,4 +42,6 @@ def order_for(rtol: float, atol: float, linear: bool = False) -> int:
     tolerance = max(rtol, atol)
     if linear and tolerance <= LINEAR:
         return HIGHEST
+    if large:
+        return next(order for limit, order in ORDERS_OF_LARGE if tolerance >= limit)
     return next((order for limit, order in ORDERS if tolerance >= limit), HIGHEST)

@@ -12,7 +12,7 @@ from ..program.statements import Statement, let
 from .graph import Graph
 from .length import distant, last_orders, unseen
 from .passage import Stored, closed, told
-from .series import Exponential, Order, Series
+from .series import Exponential, Kink, Order, Series
 from .terms import absolute, largest, over, times
 
 __all__ = ["Gaps", "Part"]
@@ -130,11 +130,12 @@ class Part(Order):
 
     def sides(self) -> list[Statement]:
         """The statements that take note of those that the coefficients tell."""
-        found = list[Statement]()
-        for kink in self.graph.kinks:
-            note = self.note(f"hint_{kink.base.name}", call("side_or", self.hint(kink.base), "new"))
-            found.append(told(self.recall(kink.name), self.signs(kink.base), note))
-        return self.run(found)
+        return self.run([self.side(kink) for kink in self.graph.kinks])
+
+    def side(self, kink: Kink) -> Statement:
+        """The statement that takes note of one."""
+        note = self.note(f"hint_{kink.base.name}", call("side_or", self.hint(kink.base), "new"))
+        return told(self.recall(kink.name), self.signs(kink.base), note)
 
     # -- end of the step --------------------------------------------------------------------------------------------
 
@@ -152,12 +153,13 @@ class Part(Order):
 
     def distances(self) -> list[Statement]:
         """The statements that make it no longer than the way to where exponentials are seen that are too small now."""
-        found = list[Statement]()
-        for s in self.graph.series:
-            if isinstance(s, Exponential):
-                further = [times(Number(s.steepness), self.of_exponent(s, k)) for k in range(1, self.order)]
-                found += distant(self.recall(s.exponent), further)
-        return self.run(found)
+        exponentials = [s for s in self.graph.series if isinstance(s, Exponential)]
+        return self.run([statement for s in exponentials for statement in self.distance(s)])
+
+    def distance(self, s: Exponential) -> list[Statement]:
+        """The statements for one of them."""
+        further = [times(Number(s.steepness), self.of_exponent(s, k)) for k in range(1, self.order)]
+        return distant(self.recall(s.exponent), further)
 
     def of_exponent(self, series: Exponential, k: int) -> Expression:
         """Coefficient k > 0 of what a series is an exponential of."""
@@ -186,18 +188,26 @@ class Part(Order):
         """The statements that end the step where a series passes a kink or closes a contact."""
         found = list[Statement]()
         for kink in self.graph.kinks:
-            stores, (stored,) = self.stored([kink.base], [self.recall(f"size_{kink.name}")])
-            found += self.near(kink.base, [*stores, *kink.passages(self.recall(kink.name), stored)])
+            found += self.passage(kink)
         for gaps in self.contacts:
             stores, both = self.stored(gaps.series, gaps.sizes)
             found += [*stores, *closed(gaps.mode, exact, both, gaps.stuck, gaps.room)]
         return self.run(found)
 
+    def passage(self, kink: Kink) -> list[Statement]:
+        """The statements that end the step where a series passes one kink."""
+        stores, (stored,) = self.stored([kink.base], [self.recall(f"size_{kink.name}")])
+        return self.near(kink.base, [*stores, *kink.passages(self.recall(kink.name), stored)])
+
     def broken(self) -> list[Statement]:
         """The statements that make the step NaN where a series passes zero that cannot: a root of a polynomial may be one."""
         found = list[Statement]()
         for which, s in enumerate(self.graph.positive):
-            value, end = self.end_of(s, f"positive_{which}")
-            share = over(end, times(ONE, self.at(s, 0)))
-            found += [*value, let("total", Name("total") + 0.0 * call("log", share))]
+            found += self.breaks(s, f"positive_{which}")
         return self.run(found)
+
+    def breaks(self, s: Series, what: str) -> list[Statement]:
+        """The statements that make the step NaN where one series passes zero."""
+        value, end = self.end_of(s, what)
+        share = over(end, times(ONE, self.at(s, 0)))
+        return [*value, let("total", Name("total") + 0.0 * call("log", share))]

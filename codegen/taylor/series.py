@@ -394,7 +394,11 @@ class Kink(Series):
         return (self.base,)
 
     def begin(self, at: Order) -> Expression:
-        size = at.keep(f"size_{self.name}", magnitude(at, self.base))
+        return self.side(at, magnitude(at, self.base))
+
+    def side(self, at: Order, terms: Expression) -> Expression:
+        """The side just after the start, by the size of the terms that the series begins with."""
+        size = at.keep(f"size_{self.name}", terms)
         start = Call("side_of", (at.of(self.base), self.least(size)))
         hint = 0.0 * Name("scale") if isinstance(self.base, Constant) else at.hint(self.base)
         return at.keep(self.name, Call("side_or", (start, hint)))

@@ -40,13 +40,14 @@ class TaylorStep:
     """The function `step` and what a kernel must know of it.
 
     order: that of the series, and the number of rows of the dense output; workspace: the groups of memory that it needs
-    behind the dense output; called: the text of functions that it calls.
+    behind the dense output; called: the text of functions that it calls; table: what it reads in the array `where`.
     """
 
     function: Function
     order: int
     workspace: int
     called: tuple[str, ...] = ()
+    table: tuple[int, ...] = ()
 
     @property
     def text(self) -> str:

@@ -13,7 +13,8 @@ T = TypeVar("T")
 class Frozen(Mapping[str, T], Generic[T]):
     """A mapping that cannot change: reads like a dict and can be hashed, compared and pickled."""
 
-    __slots__ = ("_items",)
+    __slots__ = ("_hash", "_items")
+    _hash: int
     _items: dict[str, T]
 
     def __init__(self, items: Mapping[str, T] | Iterable[tuple[str, T]] = ()) -> None:
@@ -29,7 +30,11 @@ class Frozen(Mapping[str, T], Generic[T]):
         return len(self._items)
 
     def __hash__(self) -> int:
-        return hash(frozenset(self._items.items()))
+        try:
+            return self._hash
+        except AttributeError:
+            object.__setattr__(self, "_hash", hash(frozenset(self._items.items())))
+            return self._hash
 
     def __repr__(self) -> str:
         return repr(self._items)

@@ -13,7 +13,7 @@ from synchain.codegen.driver.columns import Count, Span, Sum
 from synchain.codegen.driver.names import WORTH
 from synchain.codegen.integrators import Integrator, integrator
 from synchain.codegen.kernels.sweep import AUTO
-from synchain.codegen.taylor import is_analytic, is_linear, jump, order_for, outlives_series
+from synchain.codegen.taylor import is_analytic, is_large, is_linear, jump, order_for, outlives_series, unpassed
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation
 from synchain.models.graphs.links import LINK_LIMIT
@@ -52,6 +52,9 @@ STALLED = 0.01
 """Part of the shortest time of a motion below which series are short for a reason of their own, such as a hidden pole."""
 
 
+SLIDE = 64.0
+"""Part of max_steps after which a slide along a jump ends, if the time that is left would take as many times max_steps."""
+
 AUTOMATIC = ("taylor", "dop853", AUTO)
 """What `auto` stands for, in the order in which cells try them."""
 
@@ -86,10 +89,10 @@ class Ladder:
     def methods(self) -> tuple[Integrator, ...]:
         """The integrators; one if the scene names it."""
         if self.scene.integrator == "taylor":
-            return (_taylor(self.scene, self.equations),)
+            return (_taylor(self.scene, self.equations, is_large(self.equations)),)
         if self.scene.integrator != "auto":
             return (integrator(self.scene.integrator),)
-        series = (_taylor(self.scene, self.equations),) if _has_series(self.equations) else ()
+        series = (_taylor(self.scene, self.equations, is_large(self.equations)),) if _has_series(self.equations) else ()
         return (*series, integrator("dop853"), *((integrator(AUTO),) if self.solvable else ()))
 
     @property
@@ -111,6 +114,20 @@ class Ladder:
         """Return which of the methods (cells,) each cell begins with."""
         if len(self.methods) == 1:
             return np.zeros(len(rows), int)
+        if self.scene.cells > 1:
+            return self._first(rows)
+        # a run asks for its only cell twice: which kernel to load, and how to begin
+        asked = b"".join(part.tobytes() for part in (rows.start, rows.numbers, rows.spans))
+        found = self._known.get(asked)
+        if found is None:
+            found = self._known[asked] = self._first(rows)
+        return found.copy()
+
+    @cached_property
+    def _known(self) -> dict[bytes, np.ndarray]:
+        return {}
+
+    def _first(self, rows: Plan) -> np.ndarray:
         paces = at_start(self.templates, rows)
         endless = ~np.isfinite(paces.size)
         slow = np.maximum(np.maximum(paces.turning, paces.growth), math.pi / rows.spans[:, Span.LONGEST])
@@ -161,6 +178,22 @@ class Ladder:
             stalled = series[looked] & finite & free & (np.maximum(at.size, at.going) * length < STALLED)
             found[looked] = np.where(stiff, len(self.methods) - 1, np.where(stalled, self._explicit, found[looked]))
         return found
+
+    @cached_property
+    def jumps(self) -> bool:
+        """True if motion may slide along a jump of a rate."""
+        return next(iter(unpassed(self.equations)), None) is not None
+
+    def sliding(self, rows: Plan, buffers: Buffers, lengths: np.ndarray, before: np.ndarray) -> np.ndarray:
+        """Return which of some paused cells (cells,) slide along a jump, so that max_steps will not do.
+
+        Explicit steps across a jump are as short as its error asks for, and alike: `lengths` (cells,) is their mean length
+        since the last pause, `before` that before it. A slide may end soon, so that it has 1/SLIDE of max_steps.
+        """
+        left = rows.spans[:, Span.END] - buffers.sums[:, Sum.STOPPED_AT]
+        steady = (lengths < 2.0 * before) & (before < 2.0 * lengths)
+        hopeless = left > SLIDE * self.scene.max_steps * lengths
+        return self.jumps & steady & hopeless & (SLIDE * buffers.steps > self.scene.max_steps)
 
     def tolerances(self, rows: Plan) -> tuple[np.ndarray, np.ndarray]:
         """Return (rtol, atol), each (cells,), with which cells are integrated.
@@ -261,8 +294,8 @@ def chosen_for_modes(
     return integrator(AUTO)
 
 
-def _taylor(scene: Scene, equations: Equations) -> Integrator:
-    return integrator("taylor", order_for(scene.rtol, scene.atol, is_linear(equations)))
+def _taylor(scene: Scene, equations: Equations, large: bool = False) -> Integrator:
+    return integrator("taylor", order_for(scene.rtol, scene.atol, is_linear(equations), large))
 
 
 def mode_stiffness(

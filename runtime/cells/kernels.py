@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from weakref import WeakKeyDictionary
 
 import sympy as sp
 
@@ -50,9 +51,15 @@ def kernel_source(scene: Scene, width: int | None = None, reduce: bool | Reducti
     return write_kernel(as_reduction(scene, reduce), width)
 
 
+_ladders: WeakKeyDictionary[Reduction, Ladder] = WeakKeyDictionary()
+
+
 def ladder_of(reduction: Reduction) -> Ladder:
-    """Return the integrators that the cells of what is left of a scene go through."""
-    return Ladder(reduction.scene, reduction.equations)
+    """Return the integrators that the cells of what is left of a scene go through; the same object each time."""
+    found = _ladders.get(reduction)
+    if found is None:
+        found = _ladders[reduction] = Ladder(reduction.scene, reduction.equations)
+    return found
 
 
 def chosen_integrator(reduction: Reduction) -> Integrator:

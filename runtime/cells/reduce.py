@@ -89,7 +89,7 @@ class NodeMerge:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Reduction:
     """What is left of a scene to integrate, and the way back.
 

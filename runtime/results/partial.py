@@ -134,7 +134,7 @@ def _so_far(reader: _Reader) -> Result:
     for block in np.flatnonzero(log.done).tolist():
         buffers.put(reader.layout.rows(block), reader.buffers(block))
     spans = reader.planner.spans(np.arange(scene.cells))
-    return gather(scene, log.about["attributes"], spans, buffers, reader.certificate)
+    return gather(scene, lambda: log.about["attributes"], spans, buffers, reader.certificate)
 
 
 def write_result(log: BlockLog, path: str | os.PathLike[str], scene: Scene) -> dict[str, int]:

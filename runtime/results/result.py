@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -34,8 +34,15 @@ if TYPE_CHECKING:
 __all__ = ["Result", "gather", "read_result", "result_of"]
 
 
+class _Deferred:
+    """`_make` returns the labelled data of a result that has none yet."""
+
+    __slots__ = ("_make",)
+    _make: Callable[[], xr.Dataset]
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Result(Labelled):
+class Result(_Deferred, Labelled):
     """Labelled arrays of a run; a variable `name` of the data is also an attribute:
     `result.sync_error`.
 
@@ -62,7 +69,23 @@ class Result(Labelled):
         check_instance("data", self.data, xr.Dataset, "an xarray.Dataset; open_result reads one from a file")
         a_scene(self.scene)
 
+    @classmethod
+    def _deferred(cls, make: Callable[[], xr.Dataset], scene: Scene) -> Result:
+        """Return a result whose data are made when they are first read: labels take longer than a short run."""
+        result = cls.__new__(cls)
+        object.__setattr__(result, "_make", make)
+        object.__setattr__(result, "scene", scene)
+        return result
+
     def __getattr__(self, name: str) -> xr.DataArray:
+        if name == "_make":
+            raise AttributeError(name)
+        if name == "data":
+            # `_make` stays: two threads may read `data` at the same time
+            data: Any = self._make()
+            object.__setattr__(self, "data", data)
+            object.__setattr__(self, "_make", lambda: data)
+            return data
         if name.startswith("_") or name not in self.data:
             known = ", ".join(sorted(map(str, self.data.data_vars)))
             raise AttributeError(f"this result has no {name!r}; it has: {known}")
@@ -252,7 +275,7 @@ def result_of(data: xr.Dataset, path: Path) -> Result:
 
 def gather(
     scene: Scene,
-    attributes: Mapping[str, object],
+    attributes: Callable[[], Mapping[str, object]],
     spans: np.ndarray,
     buffers: Buffers,
     certificate: Certificate | None = None,
@@ -262,12 +285,16 @@ def gather(
     Parameters
     ----------
     scene : Scene
-    attributes : mapping
-        How the result came about (`synchain.runtime.results.labels.provenance`).
+    attributes : callable
+        Returns how the result came about (`synchain.runtime.results.labels.provenance`).
     spans : ndarray, shape (cells, len(Span))
     buffers : Buffers
         Results of all cells, of the whole network.
     certificate : Certificate, optional
     """
-    found = list(variables(scene, spans, buffers, certificate, buffers.most_points))
-    return Result(labelled(scene, found, scene.shape, attributes), scene)
+
+    def make() -> xr.Dataset:
+        found = list(variables(scene, spans, buffers, certificate, buffers.most_points))
+        return labelled(scene, found, scene.shape, attributes())
+
+    return Result._deferred(make, scene)

@@ -254,12 +254,13 @@ class SweepJob:
             buffers.lanes = np.zeros((len(rows), lane_size(reduction.equations)))
         went = np.zeros(len(rows))  # steps and time at the last pause
         begun = np.zeros(len(rows))
+        before = np.zeros(len(rows))
         cells = np.arange(len(rows))
         while len(cells):
-            before = buffers.steps[cells]
+            earlier = buffers.steps[cells]
             for k in np.unique(method[cells]):
                 self._drive(int(k), cells[method[cells] == k], rows, buffers)
-            taken = buffers.steps[cells] - before
+            taken = buffers.steps[cells] - earlier
             buffers.counts[cells, Count.BY_METHOD + ladder.columns[method[cells]]] += taken
             cells = cells[np.isin(buffers.status[cells], (Status.PAUSED, Status.STEP_UNDERFLOW))]
             if self.control[Control.CANCEL] != 0.0:
@@ -270,7 +271,11 @@ class SweepJob:
             time, steps = buffers.sums[cells, Sum.STOPPED_AT], buffers.steps[cells]
             lengths = (time - begun[cells]) / np.maximum(steps - went[cells], 1.0)
             begun[cells], went[cells] = time, steps
-            following = ladder.further(rows.take(cells), buffers.take(cells), method[cells], lengths)
+            looked, found = rows.take(cells), buffers.take(cells)
+            following = ladder.further(looked, found, method[cells], lengths)
+            sliding = (following == method[cells]) & ladder.sliding(looked, found, lengths, before[cells])
+            buffers.counts[cells[sliding], Count.STATUS] = Status.STEP_BUDGET
+            following[sliding], before[cells] = -1, lengths
             cells, lengths, following = (own[following >= 0] for own in (cells, lengths, following))
             buffers.counts[cells, Count.STATUS] = Status.PAUSED
             handed = following != method[cells]

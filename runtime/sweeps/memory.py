@@ -113,7 +113,7 @@ class Memory:
         prepared, scene = self.prepared, self.prepared.scene
         spans = prepared.reduction.planner.spans(np.arange(scene.cells))
         result = gather(
-            scene, prepared.attributes, spans, prepared.reduction.expand(self.buffers), prepared.certificate
+            scene, lambda: prepared.attributes, spans, prepared.reduction.expand(self.buffers), prepared.certificate
         )
         starts = prepared.reduction.planner.starts
         if starts is None:

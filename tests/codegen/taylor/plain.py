@@ -14,7 +14,7 @@ from scipy import special
 
 from synchain.codegen.steps.names import tidy
 from synchain.codegen.steps.program import program
-from synchain.codegen.taylor import write_looped, write_step
+from synchain.codegen.taylor import write_looped, write_rolled, write_step
 from synchain.models.dynamics.equations import Equations
 
 BUDGET = 20_000
@@ -42,15 +42,20 @@ WORDS: dict[str, Any] = {
 class Text:
     """A step whose text is run; the states and the rows of dense output, (order, dimension), are those of the last one."""
 
-    def __init__(self, equations: Equations, order: int, looped: bool = False, dense: bool = False) -> None:
+    def __init__(
+        self, equations: Equations, order: int, looped: bool = False, dense: bool = False, rolled: bool = False
+    ) -> None:
         equations = tidy(equations)
-        plan, written = program(equations), (write_looped if looped else write_step)(equations, order)
+        write = write_rolled if rolled else write_looped if looped else write_step
+        plan, written = program(equations), write(equations, order)
         self.size = equations.dimension
         space = {
             **WORDS, "DIMENSION": self.size, "NODES": equations.n, "DENSE_ROWS": order, "DENSE": dense,
         }  # fmt: skip
         exec(written.text, space)
         self.function, self.graph = space["step"], (plan.arrays, plan.weights) if looped else ()
+        if rolled:
+            self.graph = ((*plan.arrays[:-1], np.array(written.table)), plan.weights)
         self.state, self.work = np.zeros(self.size), np.zeros(order * self.size + written.workspace)
         self.rows = self.work[: order * self.size].reshape(order, self.size)
 

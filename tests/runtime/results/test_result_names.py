@@ -29,7 +29,7 @@ def names_of(scene: Scene) -> set[str]:
     cells, size = scene.cells, len(scene.y0)
     exponents = Certificate(*(np.zeros(cells) for _ in range(5)))
     buffers = Buffers.empty(cells, size, 3, scene.samples)
-    return own(gather(scene, {}, np.ones((cells, len(Span))), buffers, exponents).data)
+    return own(gather(scene, dict, np.ones((cells, len(Span))), buffers, exponents).data)
 
 
 def test_no_result_of_a_run_has_other_names() -> None:

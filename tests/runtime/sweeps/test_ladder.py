@@ -118,3 +118,31 @@ def test_a_steep_law_in_one_cell_does_not_tighten_the_others() -> None:
     found, alone = run(scene, kappa=[1e2, 1e9], **QUIET), run(scene, kappa=1e2, **QUIET)
     np.testing.assert_array_equal(found.end.isel(kappa=0), alone.end)
     assert found.steps.values[0] == alone.steps
+
+
+@pytest.mark.parametrize(
+    ("rates", "start"),
+    [
+        ({"x": "v", "v": "0.3*cos(t/10) - 0.5*sign(v) - 0.1*x"}, {"x": 0.0, "v": 1.0}),
+        ({"x": "1 - 2*sign(x)"}, {"x": 1.0}),
+        ({"x": "y", "y": "0.2 - floor(y + 1/2)"}, {"x": 0.0, "y": 0.6}),
+    ],
+)
+def test_a_slide_along_a_jump_ends_long_before_max_steps(rates, start) -> None:
+    """10^7 steps of 5e-9 had to pass before a run said that it slides."""
+    with pytest.warns(RuntimeWarning, match="slides along a jump"):
+        result = run(Scene(Field(rates), None, None, initial=start, window=200.0, **SHORT), **QUIET)
+    assert result.status == Status.STEP_BUDGET
+    assert int(result.steps + result.rejected) < 300_000
+    assert steps_of(result).keys() <= {"dop853"}
+
+
+def test_a_slide_that_max_steps_will_do_for_goes_on() -> None:
+    """And a cell beside it that slides for longer: each is judged alone."""
+    scene = Scene(
+        Field({"x": "1 - 2*sign(x)"}), None, None, initial={"x": 1.0}, max_steps=2_000_000, window=1.01, **SHORT
+    )
+    result = run(scene, x_1=[1.0, 0.001, 2.0], **QUIET)
+    assert result.status.values.tolist() == [Status.FINISHED, Status.STEP_BUDGET, Status.FINISHED]
+    assert int((result.steps + result.rejected)[0]) > 300_000
+    assert int((result.steps + result.rejected)[1]) < 300_000

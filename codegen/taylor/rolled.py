@@ -1,0 +1,403 @@
+"""A Taylor step of one large node: loops over series of one kind, which tables of places tell apart.
+
+A step that is written out has a statement for each coefficient of each series; from a hundred series on it takes some ten
+seconds to compile.  Here series are ranked by what they need of the same order, and those of one rank and kind are one
+loop around one recurrence.  All coefficients are in memory, and the array `where` says at which places, so that the text
+grows with the number of ranks alone.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Sequence
+from copy import copy
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property, lru_cache
+from itertools import accumulate
+
+import sympy as sp
+from sympy.functions.elementary.piecewise import Piecewise
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.jumps import JUMPING, KINKED
+
+from ..program.expressions import ZERO, Expression, Load, Name, Number, call, plus
+from ..program.statements import Assign, Do, Loop, Statement, Store, let, mentioned, whole
+from ..steps.places import Kind, span
+from ..steps.step import lane
+from .graph import Graph, check_jumps
+from .length import unseen
+from .looped import CONVOLUTION, START, Hoisted, Looped, Outer, Section, Track
+from .series import Constant, Exponential, Kink, Linear, Product, Series, Square
+from .step import TaylorStep
+from .terms import absolute
+
+__all__ = ["is_large", "write_rolled"]
+
+LARGE = 200
+"""Operations in the rates of a node from which its step is rolled; a choice between two values counts as CHOICE."""
+
+CHOICE = 10
+
+PLAIN, APART = "@njit(error_model='numpy')", "@njit(error_model='numpy', separate=True)"
+"""The decorators of a function that may become a part of each loop that calls it, and of one that does not."""
+
+SUMS = """
+@njit(error_model='numpy', separate=True)
+def products(dense, where, states, first, count, k):
+    \"\"\"Coefficients k of products: each row of three entries has the places of the product and of its factors.\"\"\"
+    for row in range(first, first + 3*count, 3):
+        total = convolution(dense, states + where[row + 1], states + where[row + 2], k, 0, k + 1)
+        store(dense, states + where[row] + k, total)
+
+
+@njit(error_model='numpy', separate=True)
+def sums(dense, where, states, places, ends, terms, count, k):
+    \"\"\"Coefficients k of sums: terms ends[row] to ends[row + 1] are of a row, each the places of a factor and a series.\"\"\"
+    for row in range(count):
+        total = broadcast(0.0, WIDTH)
+        begin, end = where[ends + row], where[ends + row + 1]
+        for term in range(terms + 2*begin, terms + 2*end, 2):
+            factor = load(dense, states + where[term], WIDTH)
+            total = total + factor*load(dense, states + where[term + 1] + k, WIDTH)
+        store(dense, states + where[places + row] + k, total)
+""".strip()
+
+SIZES = """
+@njit(error_model='numpy', separate=True)
+def sizes(dense, where, states, places, ends, terms, count):
+    \"\"\"How large the terms are with which sums begin; rows and terms are those of `sums`.\"\"\"
+    for row in range(count):
+        total = broadcast(0.0, WIDTH)
+        begin, end = where[ends + row], where[ends + row + 1]
+        for term in range(terms + 2*begin, terms + 2*end, 2):
+            factor = load(dense, states + where[term], WIDTH)
+            total = total + absolute(factor*load(dense, states + where[term + 1], WIDTH))
+        store(dense, states + where[places + row], total)
+""".strip()
+
+MEMORY = (Name("dense"), Name("where"), Name("at_states"))
+"""The workspace, the table, and where the places that the table says count from."""
+
+ROW = "at_row"
+"""The variable of loops; no symbol of a model begins like that."""
+
+FOUND = ("name", "inverse", "beyond")
+"""Fields that a recurrence sets."""
+
+Place = tuple[str, int]
+"""A group of the workspace: the name of a part, and how far behind its beginning the group stands."""
+
+
+@dataclass(eq=False)
+class Run:
+    """Series of one rank and kind, and `model`, which stands for any of them in their loop.
+
+    columns: by name, where the members have their own coefficients and find those that they read; kept: what the model
+    computes once in a step.
+    """
+
+    members: list[Series]
+    model: Series
+    columns: dict[str, list[Place]]
+    kept: dict[str, None] = field(default_factory=dict)
+
+
+@dataclass(eq=False)
+class RolledSection(Section):
+    """The series of a node, in runs; slots: which state a series is; table: what `where` holds."""
+
+    slots: dict[Series, int] = field(default_factory=dict)
+    table: list[int | Place] = field(default_factory=list)
+    entered: dict[tuple[int | Place, ...], int] = field(default_factory=dict)
+    factors: dict[Expression, int] = field(default_factory=dict)
+    current: Run | None = None
+
+    @cached_property
+    def remembered(self) -> set[Series]:
+        """All series: each loop finds in memory what it reads."""
+        return set(self.graph.series)
+
+    @cached_property
+    def runs(self) -> list[Run]:
+        """The series by rank and kind, in an order in which each finds what it needs."""
+        rank: dict[Series, int] = {}
+        groups = defaultdict[tuple[object, ...], list[Series]](list)
+        for s in self.graph.series:
+            rank[s] = 1 + max((rank.get(other, 0) for other in _read(s)), default=0)
+            groups[rank[s], *_statics(s)].append(s)
+        return [self.run_of(groups[key]) for key in sorted(groups, key=lambda key: int(str(key[0])))]
+
+    def run_of(self, members: list[Series]) -> Run:
+        """The run of some series."""
+        model = copy(members[0])
+        model.name = self.graph.fresh(type(model).__name__.lower())
+        columns = {"out": [(s.name, 0) for s in members]}
+        for part in () if isinstance(model, Linear | Product | Square) else fields(model):
+            if _moves(getattr(model, part.name)):
+                name = f"{model.name}_{part.name}"
+                columns[part.name] = [self.place_of(getattr(s, part.name)) for s in members]
+                setattr(model, part.name, Outer(Track(name, None), name=f"value_{name}"))
+        if isinstance(model, Kink):
+            columns["size"] = [self.size_of(getattr(s, "base")) for s in members]  # noqa: B009
+        return Run(members, model, columns)
+
+    def place_of(self, series: Series) -> Place:
+        """Where the coefficients of a series begin."""
+        if series in self.slots:
+            return "states", self.slots[series] * (self.order + 1)
+        return (series.track.name if isinstance(series, Outer) else series.name), 0
+
+    def size_of(self, base: Series) -> Place:
+        """Where the size of the terms stands that a series begins with; a single term is as large as its value."""
+        return (f"size_{base.name}", 0) if isinstance(base, Linear) else self.place_of(base)
+
+    @property
+    def kinked(self) -> set[Series]:
+        """The series in which kinks are looked for."""
+        return {kink.base for kink in self.graph.kinks}
+
+    # -- memory ---------------------------------------------------------------------------------------------------
+
+    def track(self, series: Series) -> Track:
+        if self.current is not None and series is self.current.model:
+            return Track(f"{series.name}_out", None)
+        return super().track(series)
+
+    def single(self, what: str) -> Expression:
+        return plus(Name(f"at_{what}"), Name(ROW))
+
+    def keep(self, what: str, value: Expression) -> Name:
+        if self.current is not None:
+            self.current.kept[what] = None
+        return super().keep(what, value)
+
+    def factor(self, e: Expression) -> Place:
+        """Where a factor of terms stands."""
+        return "factors", self.factors.setdefault(e, len(self.factors))
+
+    def room(self) -> dict[str, int]:
+        found = {s.name: self.order + 1 for s in self.graph.series}
+        for run in self.runs:
+            hints = [f"hint_{run.model.base.name}"] if isinstance(run.model, Kink) else []
+            found |= dict.fromkeys([*run.kept, *hints], len(run.members))
+        found |= {f"size_{s.name}": 1 for s in self.graph.series if isinstance(s, Linear)} if self.graph.kinks else {}
+        return found | {"factors": len(self.factors), "one": 1}
+
+    # -- loops ----------------------------------------------------------------------------------------------------
+
+    def rows(self, name: str, columns: dict[str, list[Place]], body: Iterable[Statement]) -> list[Statement]:
+        """A loop that names the places of one row at_<name>_<column> in each turn."""
+        table, width = list(zip(*columns.values(), strict=True)), len(columns)
+        first = self.enter([place for row in table for place in row])
+        loads = [_at(f"{name}_{column}", first + k + width * Name(ROW)) for k, column in enumerate(columns)]
+        return [Loop(ROW, START, Number(len(table)), (*loads, *body))] if table else []
+
+    def enter(self, entries: Sequence[int | Place]) -> int:
+        """Where entries begin in the table; equal ones stand there once."""
+        if (key := tuple(entries)) not in self.entered:
+            self.entered[key] = len(self.table)
+            self.table += entries
+        return self.entered[key]
+
+    def over_run(self, run: Run, body: Iterable[Statement]) -> list[Statement]:
+        """A loop over the members of a run."""
+        return self.rows(run.model.name, run.columns, body)
+
+    def over(self, series: Sequence[Series], name: str, body: Callable[[Series], list[Statement]]) -> list[Statement]:
+        """A loop that reads some series, one after another."""
+        found = body(Outer(Track(f"{name}_read", None), name=f"value_{name}")) if series else []
+        return self.rows(name, {"read": [self.place_of(s) for s in series]}, found) if found else []
+
+    def run(self, statements: list[Statement]) -> list[Statement]:
+        return statements
+
+    # -- coefficients ---------------------------------------------------------------------------------------------
+
+    def coefficients(self, order: Expression) -> list[Statement]:
+        self.k, found = order, list[Statement]()
+        for run in self.runs:
+            self.current = run
+            match run.model:
+                case Linear():
+                    found += self.sums_of(run)
+                case Product() | Square():
+                    found += self.products_of(run)
+                case _:
+                    found += self.recurrence(run)
+        self.current = None
+        moving = {k: e for k, (_, e) in enumerate(self.rates) if not isinstance(e, Constant)}
+        columns = {"from": [self.place_of(e) for e in moving.values()], "to": [("rates", k) for k in moving]}
+        found += self.rows("rate", columns, [Store("dense", Name("at_rate_to"), self.here("rate_from"))])
+        for place, rate in self.rates:
+            if isinstance(rate, Constant):
+                found.append(Store("dense", plus(Name("at_rates"), place), lane(self.of(rate))))
+        if order != START:
+            return found
+        numbers = [Store("dense", plus(Name("at_factors"), Number(k)), lane(e)) for e, k in self.factors.items()]
+        return [*numbers, Store("dense", Name("at_one"), lane(Number(1.0))), *found]
+
+    def here(self, name: str) -> Expression:
+        """The coefficient of the order that is written, at a place with a name."""
+        return Track(name, None).load(self.k)
+
+    def recurrence(self, run: Run) -> list[Statement]:
+        """The loop that makes the coefficients of a run."""
+        model, first = run.model, self.k == START
+        self.statements = []
+        read = dict.fromkeys(s for s in (_read(model) if first else model.linear) if isinstance(s, Outer))
+        self.put(*(let(name, self.recall(name)) for name in (() if first else run.kept)))
+        self.put(*(let(s.name, s.track.load(self.k)) for s in read))
+        self.values = {s: Name(s.name) for s in read}
+        if first and isinstance(model, Kink):
+            value = model.side(self, absolute(Load("dense", Name(f"at_{model.name}_size"))))
+        else:
+            value = model.begin(self) if first else model.coefficient(self)
+        self.put(self.track(model).store(self.k, lane(value)))
+        return self.over_run(run, self.statements)
+
+    def sums_of(self, run: Run) -> list[Statement]:
+        """The call that makes sums of terms; the constant of a sum is a last term of order 0."""
+        first, terms, ends = self.k == START, list[tuple[Place, Place]](), [0]
+        for s in run.members:
+            assert isinstance(s, Linear)
+            terms += [(self.factor(e), self.place_of(inner)) for e, inner in s.terms]
+            terms += [(self.factor(s.constant), ("one", 0))] if first and s.constant != ZERO else []
+            ends.append(len(terms))
+        places = [self.enter(run.columns["out"]), self.enter(ends), self.enter([e for pair in terms for e in pair])]
+        found: list[Statement] = [Do(call("sums", *MEMORY, *map(Number, places), Number(len(run.members)), self.k))]
+        if first and not self.kinked.isdisjoint(run.members):
+            sizes = self.enter([(f"size_{s.name}", 0) for s in run.members])
+            found.append(Do(call("sizes", *MEMORY, Number(sizes), *map(Number, places[1:]), Number(len(run.members)))))
+        return found
+
+    def products_of(self, run: Run) -> list[Statement]:
+        """The call that makes products and squares."""
+        entries = [
+            place
+            for s, out in zip(run.members, run.columns["out"], strict=True)
+            for place in (out, *([self.place_of(e) for e in s.convolved] * (2 // len(s.convolved))))
+        ]
+        return [Do(call("products", *MEMORY, Number(self.enter(entries)), Number(len(run.members)), self.k))]
+
+    # -- end of the step ------------------------------------------------------------------------------------------
+
+    def over_kinks(self, body: Callable[[Kink], Iterable[Statement]]) -> list[Statement]:
+        """Loops over all kinks."""
+        return [
+            s
+            for run in self.runs
+            for kink in [run.model]
+            if isinstance(kink, Kink)
+            for s in self.over_run(run, body(kink))
+        ]
+
+    def unknown(self) -> list[Statement]:
+        return self.over_kinks(lambda kink: [self.note(f"hint_{kink.base.name}", self.zeros)])
+
+    def sides(self) -> list[Statement]:
+        return self.over_kinks(lambda kink: [self.side(kink)])
+
+    def passages(self, exact: bool) -> list[Statement]:
+        return self.over_kinks(self.passage)
+
+    def lengths(self) -> list[Statement]:
+        gaps = self.over(self.graph.gaps, "gap", self.counted)
+        watch = self.over(self.graph.watched, "watched", lambda s: unseen([self.at(s, k) for k in range(self.order)]))
+        return [*gaps, *watch]
+
+    def distances(self) -> list[Statement]:
+        models = [(run, run.model) for run in self.runs]
+        return [s for run, e in models if isinstance(e, Exponential) for s in self.over_run(run, self.distance(e))]
+
+    def broken(self) -> list[Statement]:
+        return self.over(self.graph.positive, "positive", lambda s: self.breaks(s, ""))
+
+
+class Rolled(Looped):
+    """Writes the step of one node without links."""
+
+    functions = (CONVOLUTION.replace(PLAIN, APART), SUMS)
+    section: RolledSection
+
+    def node(self, kind: Kind, found: Hoisted) -> Section:
+        node = kind.node
+        self.section = section = RolledSection(Graph(self.names), self.order)
+        self.end(section, node.state, node, ("", "0"), node.state)
+        section.slots = {section.moving[s]: c for c, s in enumerate(node.state) if s in section.moving}
+        series = self.read(section, found, node.inertia)
+        section.rates = [(Number(c), rate) for c, rate in enumerate(series)]
+        self.node_part, self.lent = section, []
+        return section
+
+    def opening(self) -> list[Statement]:
+        return [*super().opening(), *self.section.setting]
+
+    def states(self, body: Callable[[Expression], Iterable[Statement]]) -> list[Statement]:
+        return [span("i", "DIMENSION").over(body(Name("i")))]
+
+    def statements(self) -> list[Statement]:
+        """What the step does, without names of places that it finds in the table."""
+        found = super().statements()
+        used = mentioned(s for s in found if not _part(s))
+        return [s for s in found if not _part(s) or _part(s) in used]
+
+    def step(self, *more: str) -> TaylorStep:
+        made = super().step(*more)
+        # LLVM takes a minute for dozens of passages within a function
+        called = [text.replace(f"{PLAIN}\ndef passage", f"{APART}\ndef passage") for text in made.called]
+        called += [SIZES] if self.section.graph.kinks else []
+        begin = dict(zip(self.room(), accumulate(self.room().values(), initial=0), strict=False))
+        table = self.section.table
+        return replace(
+            made, called=tuple(called), table=tuple(e if isinstance(e, int) else begin[e[0]] + e[1] for e in table)
+        )
+
+
+def _part(s: Statement) -> str:
+    """The part of the workspace that a statement gives a name, "" for another statement."""
+    return s.targets[0] if isinstance(s, Assign) and s.whole and s.targets[0].startswith("at_") else ""
+
+
+def _at(name: str, entry: Expression) -> Statement:
+    """The place of the workspace that an entry of the table says, named at_<name>."""
+    return whole(f"at_{name}", Name("at_states") + Load("where", entry, None))
+
+
+def _moves(part: object) -> bool:
+    """True for a part of a series that has coefficients of its own."""
+    return isinstance(part, Series) and not isinstance(part, Constant)
+
+
+def _read(series: Series) -> list[Series]:
+    """The series that the recurrence of another one reads."""
+    if isinstance(series, Linear):
+        return [inner for _, inner in series.terms]
+    return [getattr(series, part.name) for part in fields(series) if _moves(getattr(series, part.name))]
+
+
+def _statics(series: Series) -> tuple[object, ...]:
+    """What members of a run have in common: the kind, and all that is no series with coefficients."""
+    if isinstance(series, Linear):
+        return (Linear,)
+    if isinstance(series, Product | Square):
+        return (Product,)
+    parts = [(part.name, getattr(series, part.name)) for part in fields(series) if part.name not in FOUND]
+    return (type(series), *(e.value if isinstance(e, Constant) else e for name, e in parts if not _moves(e)))
+
+
+@lru_cache(maxsize=64)
+def is_large(equations: Equations) -> bool:
+    """True for one node without links whose step would take long to compile if it were written out."""
+    if equations.n > 1 or equations.link_count or equations.sticks or equations.varied:
+        return False
+    rates = equations.nodes[0].rhs
+    choices = (part for e in rates for part in e.atoms(*KINKED, Piecewise))
+    size = sum(int(sp.count_ops(e)) for e in rates) + CHOICE * sum(max(len(part.args) - 1, 1) for part in choices)
+    return size > LARGE and not any(e.has(*JUMPING) for e in rates)
+
+
+def write_rolled(equations: Equations, order: int) -> TaylorStep:
+    """Return the Taylor step of some order of a node for which `is_large` holds; see `write_step`."""
+    check_jumps(equations)
+    return Rolled(equations, order).step("graph", "weights")
