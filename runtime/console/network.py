@@ -7,7 +7,6 @@ from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from .arguments import above_zero, whole
-from .drive import at_frequency
 from .outcome import WrongUse, warn
 
 if TYPE_CHECKING:
@@ -93,13 +92,13 @@ def scene_on(network: Topology | None, scene: Scene | None, arguments: Namespace
     Returns
     -------
     Scene
-        The scene without axes.
+        The scene without axes and without its title, which may name another frequency.
 
     Raises
     ------
     WrongUse
         If the scene has draws, several layers of links, or no single frequency of the drive that
-        fits `omega`, see `at_frequency`, or if it sweeps more than this frequency and the strength.
+        fits `omega`, or if it sweeps more than this frequency and the strength.
     """
     from synchain.models.scenes.scene import Scene
 
@@ -112,7 +111,7 @@ def scene_on(network: Topology | None, scene: Scene | None, arguments: Namespace
             f"found {len(scene.links)} layers of links in the scene; expected one; their strengths can be the axes "
             "of a map: synchain msf SCENE --set NAME=LO:HI:N NAME=LO:HI:N"
         )
-    frequency = at_frequency(scene, arguments.omega, arguments.scene, given)
+    frequency = _at_frequency(scene, arguments.omega, arguments.scene, given)
     chosen = {*frequency, *scene.strengths, *given} if network is not None else {*frequency, *given}
     moved = [axis.name for axis in scene.axes if axis.name not in chosen]
     if moved:
@@ -124,7 +123,32 @@ def scene_on(network: Topology | None, scene: Scene | None, arguments: Namespace
         names = ", ".join(lists)
         warn([f"{arguments.scene} lists initial {names} of {scene.n} oscillators; {network.n} start by default"])
         settings["initial"] = {name: at for name, at in start.items() if name not in lists}
-    return scene.replace(**settings, axes=(), zipped=False, continuation="none", record=None, **frequency)
+    return scene.replace(**settings, title="", axes=(), zipped=False, continuation="none", record=None, **frequency)
+
+
+def _at_frequency(scene: Scene, omega: float | None, where: str | None, given: Collection[str]) -> dict[str, float]:
+    """Return the parameter that --omega sets, with its value; empty without --omega."""
+    frequency = scene.drive.frequency
+    names = set() if frequency is None else {s.name for s in frequency.free_symbols}
+    if names & set(given):
+        if omega is not None:
+            raise WrongUse(f"found --omega beside --set {' '.join(sorted(names & set(given)))}; expected one of them")
+        return {}
+    if omega is not None:
+        if frequency is None:
+            raise WrongUse(f"--omega: the oscillator of {where} {scene.drive.problem}; leave it out")
+        if not frequency.is_Symbol:
+            raise WrongUse(
+                f"--omega: the drive of {where} has the frequency {frequency}; expected one that is a parameter; "
+                "leave it out"
+            )
+        return {frequency.name: omega}
+    if where is None:
+        raise WrongUse("expected a frequency of the drive, e.g. --omega 1.4, or a SCENE")
+    swept = next((axis.name for axis in scene.axes if axis.name in names), None)
+    if swept is not None:
+        raise WrongUse(f"{where} sweeps {swept}; expected one frequency of the drive, e.g. --omega 1.4")
+    return {}
 
 
 def named_graph(arguments: Namespace) -> Topology:
