@@ -20,9 +20,7 @@ FILES = ("matrix", "edges", "graphml")
 
 
 def add_network(parser: ArgumentParser) -> None:
-    """Add --n, --topology and --matrix, which `named_network` reads, and --omega, which `scene_on`
-    reads.
-    """
+    """Add --n, --topology, --matrix for `named_network` and --omega for `scene_on`."""
     parser.add_argument("--n", metavar="N", type=whole, help="number of oscillators (default: the scene's)")
     parser.add_argument(
         "--topology",
@@ -36,27 +34,7 @@ def add_network(parser: ArgumentParser) -> None:
 
 
 def named_network(arguments: Namespace, scene: Scene | None) -> Topology | None:
-    """Return the network of --matrix, or of --topology and --n.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        Holds `matrix`, `topology` and `n`, each None if it is not given.
-    scene : Scene or None
-        Supplies a family or a size that is not given.
-
-    Returns
-    -------
-    Topology or None
-        None if no argument names a network.
-
-    Raises
-    ------
-    WrongUse
-        If the arguments contradict one another, or if the size is missing.
-    ValueError, OSError
-        If the file or the family cannot make the network.
-    """
+    """Return the network of --matrix, or of --topology and --n."""
     from synchain.models.graphs.families import names, topology
     from synchain.models.graphs.topology import read_matrix
 
@@ -76,30 +54,7 @@ def named_network(arguments: Namespace, scene: Scene | None) -> Topology | None:
 
 
 def scene_on(network: Topology | None, scene: Scene | None, arguments: Namespace, given: Collection[str] = ()) -> Scene:
-    """Return one cell of a scene on a network, without records, at the frequency of --omega.
-
-    Parameters
-    ----------
-    network : Topology or None
-        The network of the returned scene; None for that of a scene with several layers of links.
-    scene : Scene or None
-        The oscillators and their parameters; the default scene if None.
-    arguments : Namespace
-        Holds `omega`, a frequency or None, and `scene`, the user's word for the scene or None.
-    given : collection of str
-        The parameters that --set gives.
-
-    Returns
-    -------
-    Scene
-        The scene without axes and without its title, which may name another frequency.
-
-    Raises
-    ------
-    WrongUse
-        If the scene has draws, several layers of links, or no single frequency of the drive that
-        fits `omega`, or if it sweeps more than this frequency and the strength.
-    """
+    """Return one cell at the frequency of --omega, on a network or on the scene's own links."""
     from synchain.models.scenes.scene import Scene
 
     if scene is None:
@@ -123,6 +78,7 @@ def scene_on(network: Topology | None, scene: Scene | None, arguments: Namespace
         names = ", ".join(lists)
         warn([f"{arguments.scene} lists initial {names} of {scene.n} oscillators; {network.n} start by default"])
         settings["initial"] = {name: at for name, at in start.items() if name not in lists}
+    # the title may name another frequency or network
     return scene.replace(**settings, title="", axes=(), zipped=False, continuation="none", record=None, **frequency)
 
 
@@ -152,21 +108,7 @@ def _at_frequency(scene: Scene, omega: float | None, where: str | None, given: C
 
 
 def named_graph(arguments: Namespace) -> Topology:
-    """Return the graph of a family and a size, of a product, or of one of the files.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        Holds `topology` (a family or the text of a product), `n`, `option`, the names of the files
-        `matrix`, `edges` and `graphml`, and `directed`.
-
-    Raises
-    ------
-    WrongUse
-        If the arguments name no graph or more than one.
-    ValueError, OSError
-        If the graph cannot be made or read.
-    """
+    """Return the graph of a family and a size, of a product, or of one of the files."""
     files = [key for key in FILES if getattr(arguments, key) is not None]
     if arguments.directed and files != ["edges"]:
         raise WrongUse("found --directed without --edges; GraphML files and matrices say themselves what is one-way")

@@ -311,24 +311,7 @@ def probe(
     resolution: float = RESOLUTION,
     execution: Execution | None = None,
 ) -> Sweep:
-    """Sweep the two-oscillator probe over alpha = 2 sigma.
-
-    Parameters
-    ----------
-    scene : Scene
-        Oscillator, coupling and parameters; the pair starts as the first two oscillators (`first_starts`).
-    alpha : sequence of float
-        An increasing grid.
-    criterion : Criterion
-    resolution : float
-        Ends of ranges are refined to this width in sigma, twice as much in alpha.
-    execution : Execution, optional
-
-    Returns
-    -------
-    Sweep
-        Its `x` and intervals are values of alpha.
-    """
+    """Sweep the two-oscillator probe over alpha = 2 sigma."""
     pair = _pair(scene)
     sweep = simulate(pair, 0.5 * np.asarray(alpha, dtype=float), criterion, resolution, execution)
     return Sweep(2.0 * sweep.x, sweep.error, sweep.share, tuple(scale(sweep.intervals, 2.0)))
@@ -349,16 +332,6 @@ def simulate(
     """Sweep sigma by direct simulation of a scene's network.
 
     One kernel and one pool of workers run the grid and all rounds that refine the ends of ranges.
-
-    Parameters
-    ----------
-    scene : Scene
-    sigma : sequence of float
-        An increasing grid; ranges between two of its points are not seen.
-    criterion : Criterion
-    resolution : float
-        Ends of ranges are refined to this width in sigma.
-    execution : Execution, optional
     """
     x, execution = row("sigma", sigma, rising=True), execution or Execution()
     used = fitted(scene, x, criterion, execution)
@@ -392,17 +365,7 @@ def fitted(scene: Scene, sigma: np.ndarray, criterion: Criterion, execution: Exe
 
 
 def judge(measure: Measure, x: np.ndarray, resolution: float, criterion: AppliedCriterion) -> Sweep:
-    """Return the verdicts on a grid and the synchronous ranges, with ends refined to `resolution`.
-
-    Parameters
-    ----------
-    measure : callable
-        Returns the mean synchronisation errors (m, starts) at points (m,).
-    x : ndarray
-        An increasing grid.
-    resolution : float
-    criterion : Criterion
-    """
+    """Return the verdicts on an increasing grid and the synchronous ranges, with ends refined to `resolution` in sigma."""
 
     def share(errors: np.ndarray) -> np.ndarray:
         return np.asarray((errors < criterion.tolerance).mean(axis=1))
