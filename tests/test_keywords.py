@@ -13,9 +13,11 @@ import pytest
 
 from synchain import runtime
 from synchain.models import Field, Rates, Scene, chain
+from synchain.models.scenes.scene import KEYWORDS
 from synchain.runtime.bifurcation import skeleton as skeletons
 from synchain.runtime.cells.keywords import Given
 from synchain.runtime.support.progress import Progress
+from synchain.runtime.support.status import Status
 from synchain.runtime.synchronisation.agreement import agreement
 from synchain.runtime.synchronisation.threshold import Criterion
 
@@ -169,6 +171,13 @@ def test_one_cell_stands_for_no_sweep(name: str, n: int, changes: dict[str, Any]
     with pytest.raises(ValueError, match=f"^{name}: found {remedy}") as caught:
         calls(swept, tmp_path / "a.nc")[name]()
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("name", "n"), [(name, n) for name, n in ONE_CELL if name != "basin"])
+def test_a_stop_is_refused_where_nothing_stops(name: str, n: int, tmp_path: Any) -> None:
+    stopped = DRIVEN.replace(topology=chain(n), stop="x_1 - 9")
+    with pytest.raises(ValueError, match=rf"^{name}: found stop = 'x_1 - 9'; .*replace\(stop=None\)$"):
+        calls(stopped, tmp_path / "a.nc")[name]()
 
 
 def test_a_parameter_fixes_an_axis() -> None:
@@ -342,7 +351,7 @@ def test_seed_and_transient_of_a_skeleton_are_used(monkeypatch: pytest.MonkeyPat
 FIELDS: dict[str, Any] = {"rtol": 1e-5, "transient": 3.0, "window": 2.5, "seed": 3}
 OPEN = Criterion(starts=2, tolerance=1.0, reach=0.1)
 SIMULATIONS = {
-    "basin": lambda scene: runtime.basin(scene, samples=2, show_progress=False),
+    "basin": lambda scene: runtime.basin(scene, samples=2, ranges={"x": (-1.0, 1.0)}, show_progress=False),
     "thresholds": lambda scene: runtime.thresholds(
         scene, sigma=[0.1, 0.2], criterion=OPEN, resolution=1.0, periods=2, show_progress=False
     ),
@@ -360,6 +369,55 @@ def test_simulations_obey_the_times_tolerance_and_seed_of_a_scene(name: str) -> 
         assert getattr(found, field) == value != getattr(plain, field), field
         for other in {"transient", "window"} - {field}:
             assert getattr(found, other) == getattr(short, other)
+
+
+OBEYED: dict[str, Any] = {
+    **FIELDS,
+    "atol": 1e-4,
+    "max_steps": 20,
+    "integrator": "dop853",
+    "initial": {"x": [0.2, 0.3], "v": 0.2},
+    "time_unit": "time",
+}
+RECORDED: dict[str, Any] = {
+    "title": "another",
+    "record": ("trajectory",),
+    "samples": 7,
+    "observe": {"e": "mean(x_1)"},
+    "section": "v_1 rising",
+    "sections": {"passed": {"function": "x_1"}},
+}
+SWEPT = {"axes", "zipped", "continuation", "realisations", "draws", "rng"}
+MODEL = {"oscillator", "coupling", "topology", "friction", "contact", "nodes", "links", "parameters"}
+ANSWERS: dict[str, Callable[[Any], tuple[Any, ...]]] = {
+    "basin": lambda found: (found.error, found.status),
+    "thresholds": lambda found: (found.direct.error, found.probe.error),
+    "universal_probe": lambda found: (found.error, found.status),
+    "agreement": lambda found: tuple(cell.error for cell in found.cells),
+}
+
+
+@pytest.mark.parametrize("name", SIMULATIONS)
+def test_simulations_obey_or_refuse_every_field_of_a_scene(name: str) -> None:
+    """What is swept, and a stop, is refused above; parts of the model make the equations."""
+    assert sorted((*OBEYED, *RECORDED, *SWEPT, *MODEL, "stop")) == sorted(KEYWORDS)
+    short = DRIVEN.replace(transient=5.0, window=2.0)
+
+    def answer(**changes: Any) -> list[float]:
+        try:
+            found = ANSWERS[name](SIMULATIONS[name](short.replace(**changes)))
+        except FloatingPointError:  # the exponents ran out of steps
+            return []
+        return np.concatenate([np.ravel(part) for part in found]).tolist()
+
+    plain = answer()
+    assert answer(**RECORDED) == plain
+    assert [field for field, value in OBEYED.items() if answer(**{field: value}) == plain] == []
+
+
+def test_basins_end_where_a_scene_stops() -> None:
+    found = SIMULATIONS["basin"](DRIVEN.replace(transient=5.0, window=2.0, stop="x_1 - 1/10"))
+    assert Status.STOPPED in found.statuses
 
 
 def test_an_executor_runs_the_cells_of_the_probe_and_parameters_reach_it() -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-__all__ = ["COUNTS", "MOST_METHODS", "Control", "Count", "Point", "Span", "Sum", "Tally"]
+__all__ = ["COUNTS", "MOST_METHODS", "TOLERANCES", "Control", "Count", "Point", "Span", "Sum", "Tally"]
 
 
 class Control(IntEnum):
@@ -76,7 +76,7 @@ class Tally(IntEnum):
 
 
 class Count(IntEnum):
-    """Columns of `counts` (cells, 8)."""
+    """Columns of `counts` (cells, COUNTS)."""
 
     STATUS = 0
     ACCEPTED = 1
@@ -91,7 +91,10 @@ class Count(IntEnum):
 MOST_METHODS = 3
 """Integrators that one cell may go through."""
 
-COUNTS = Count.BY_METHOD + MOST_METHODS
+TOLERANCES = slice(Count.BY_METHOD + MOST_METHODS, Count.BY_METHOD + MOST_METHODS + 2)
+"""Columns of `counts` behind those: the bits of rtol and atol, with which the cell was integrated."""
+
+COUNTS = TOLERANCES.stop
 """Columns of `counts`."""
 
 

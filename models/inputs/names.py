@@ -11,8 +11,8 @@ _DIGITS = 9
 """Most digits of the number of a node."""
 
 TAKEN = frozenset(
-    {"cell", "component", "drive_phase", "end", "end_time", "ended_early", "integrator", "method_steps", "methods",
-     "node", "part", "periods_skipped", "point", "realisation", "rejected", "sample", "section", "section_count",
+    {"atol_used", "cell", "component", "drive_phase", "end", "end_time", "ended_early", "integrator", "method_steps", "methods",
+     "node", "part", "periods_skipped", "point", "realisation", "rejected", "rtol_used", "sample", "section", "section_count",
      "section_time", "status", "steps", "sync_error", "sync_error_end", "sync_error_max", "time", "trajectory",
      "transversal_exponent", "transversal_stderr", "verdict"}
 )  # fmt: skip

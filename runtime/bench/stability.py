@@ -66,7 +66,7 @@ def row(case: Case) -> Row:
     expected = end_state(case.scene, case.reference) if status == Status.FINISHED else np.full(len(end), math.nan)
     error = float(np.abs(end[: len(expected)] - expected).max())
     size = float(np.abs(expected).max())
-    rtol, atol = found.data.attrs["rtol_used"], found.data.attrs["atol_used"]
+    rtol, atol = float(found.data["rtol_used"]), float(found.data["atol_used"])
     allowed = SAFETY * (atol + rtol * size) + FLOOR[case.reference] * max(size, 1.0)
     twice = case.group not in UNBALANCED and case.scene.n <= TWICE
     balanced = status == Status.FINISHED and twice

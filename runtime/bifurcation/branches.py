@@ -29,7 +29,7 @@ from ..support.execution import Execution
 from ..support.progress import Hook
 from .bifurcations import Bifurcation, bifurcations_at_end, bifurcations_between
 from .continuation import Arc
-from .periodic import NEWTON, PeriodicOrbit, expect_no_stop, periodic_orbit, relative
+from .periodic import NEWTON, PeriodicOrbit, periodic_orbit, relative
 from .phases import Phases
 
 __all__ = ["Branch", "checked_values", "follow", "others", "traced"]
@@ -226,7 +226,6 @@ def others(given: Given, scene: Scene, name: str) -> Scene:
     """
     if name in given.values:
         raise ValueError(f"{given.function.__name__}: {name!r} takes its values one after the other; expected others")
-    expect_no_stop(given.function.__name__, scene)
     return given.scene(scene)
 
 

@@ -24,7 +24,7 @@ from synchain.models.dynamics.reduction import without_drive
 from synchain.models.inputs.checks import short_repr
 from synchain.models.inputs.keywords import warn
 from synchain.models.mechanics.friction import SLIP
-from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.scenes.scene import Scene
 
 from ..cells.keywords import Given
 from ..results.labelled import Labelled, dataset, scene_text
@@ -41,7 +41,6 @@ __all__ = [
     "PeriodicOrbit",
     "check_periods",
     "closed",
-    "expect_no_stop",
     "orbit_through",
     "periodic_orbit",
     "relative",
@@ -242,7 +241,6 @@ def periodic_orbit(
     ArithmeticError
         If Newton's method does not converge.
     """
-    expect_no_stop("periodic_orbit", scene)
     if start is None:
         _warn_of_different_starts(scene)
     few = {name: "a few steps of Newton's method are soon done" for name in ("show_progress", "progress")}
@@ -408,14 +406,6 @@ def _driven(given: Given, scene: Scene) -> Scene:
             "periodic orbits are looked for on the stroboscopic map of a drive; found an oscillator without one"
         )
     return coupled_cell(Given(given.function), scene, TOLERANCE)
-
-
-def expect_no_stop(function: str, scene: Scene) -> None:
-    """Raise ValueError for a scene that ends its motion: an orbit goes on for ever."""
-    if a_scene(scene).stop is not None:
-        raise ValueError(
-            f"{function}: found stop = {scene.stop!r}; expected a scene whose motion goes on; write scene.replace(stop=None)"
-        )
 
 
 def _warn_of_different_starts(scene: Scene) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from synchain.codegen.driver.columns import COUNTS, Count, Point, Sum
+from synchain.codegen.driver.columns import COUNTS, TOLERANCES, Count, Point, Sum
 
 from ..support.status import Status
 
@@ -34,7 +34,7 @@ class Buffers:
     sums : ndarray, shape (cells, len(Sum) + observed)
         Synchronisation errors, the time at which each cell stopped, and what was observed.
     counts : ndarray of int64, shape (cells, COUNTS)
-        Status, steps and numbers of section points.
+        Status, steps, numbers of section points, and tolerances.
     points : ndarray, shape (cells, room, 1 + kept)
         Time and state of the section points, or time, number of the section and what it keeps; NaN
         if a cell has fewer.
@@ -85,6 +85,11 @@ class Buffers:
     def status(self) -> np.ndarray:
         """Status (cells,) of each cell; a view of `counts`."""
         return self.counts[:, Count.STATUS]
+
+    @property
+    def tolerances(self) -> np.ndarray:
+        """Relative and absolute tolerance (cells, 2) with which each cell was integrated; a view of `counts`."""
+        return self.counts[:, TOLERANCES].view(np.float64)
 
     @property
     def steps(self) -> np.ndarray:

@@ -23,7 +23,7 @@ from synchain.models.scenes.scene import Scene
 from ..support.status import Status
 from .buffers import Buffers
 from .paces import Paces, Templates
-from .plan import Plan, first_step, tolerances
+from .plan import Plan, first_step, scale_of_atol, tolerances
 from .rates import eigenvalue_rates, mode_rates
 
 __all__ = [
@@ -165,8 +165,8 @@ class Ladder:
     def tolerances(self, rows: Plan) -> tuple[np.ndarray, np.ndarray]:
         """Return (rtol, atol), each (cells,), with which cells are integrated.
 
-        A default atol is meant for motions of size 1: it shrinks with a smaller one, by powers of ten. The size is that of the
-        start, or how far the rates there carry the cell in its shortest time.
+        A default atol shrinks for small motions (`scale_of_atol`). Their size is that of the start, or how far the rates there
+        carry the cell in its shortest time.
         """
         rtol, atol = tolerances(self.scene, self.equations, rows.numbers)
         if self.scene.given["atol"] is None:
@@ -174,8 +174,7 @@ class Ladder:
             if len(small):
                 few = rows.take(small)
                 size = np.maximum(np.abs(few.start).max(axis=1), self.templates.reach(few.start, few.numbers))
-                size = np.where((size > 0.0) & (size < 0.1), 10.0 * size, 1.0)
-                atol[small] *= 10.0 ** np.floor(np.log10(size))
+                atol[small] *= scale_of_atol(size)
         return rtol, atol
 
     def at(self, rows: Plan, state: np.ndarray, time: np.ndarray) -> Paces:

@@ -81,9 +81,10 @@ class Given:
         TypeError
             If `scene` is no Scene.
         ValueError
-            If a name is no parameter of the scene, or is given twice, for a list; as `expect_one_cell`.
+            If a name is no parameter of the scene, or is given twice, for a list; as `expect_one_cell`, but for a stop that
+            is among the settings.
         """
-        self.expect_one_cell(scene, free)
+        self.expect_one_cell(scene, free, stops="stop" in settings)
         numbers = self.checked(scene)
         listed = next((name for name, value in numbers.items() if is_row(value)), None)
         if listed is not None:
@@ -93,10 +94,11 @@ class Given:
             )
         return with_numbers(scene, numbers, **{**ONE_CELL, **settings})
 
-    def expect_one_cell(self, scene: Scene, free: Collection[str] = ()) -> None:
+    def expect_one_cell(self, scene: Scene, free: Collection[str] = (), *, stops: bool = False) -> None:
         """Raise ValueError for a scene with draws, or with axes that no parameter fixes: one cell would stand for all.
 
-        Axes of what is `free`, on which the function does not depend, are no choice between answers.
+        Axes of what is `free`, on which the function does not depend, are no choice between answers.  A stop ends the
+        motion; it is refused too, unless the function `stops` there.
         """
         swept = [axis.name for axis in a_scene(scene).axes if axis.name not in {*self.values, *free}]
         for what, names, remedy in (("axes", swept, "axes=()"), ("draws", scene.draws, "realisations=0, draws=None")):
@@ -105,6 +107,11 @@ class Given:
                     f"{self.function.__name__}: found {what} of {', '.join(names)}; expected a scene without them; "
                     f"write scene.replace({remedy})"
                 )
+        if scene.stop is not None and not stops:
+            raise ValueError(
+                f"{self.function.__name__}: found stop = {scene.stop!r}; expected a scene whose motion goes on; "
+                "write scene.replace(stop=None)"
+            )
 
     def sweep(self, scene: Scene, **settings: object) -> Scene:
         """Return a scene with parameters and initial states fixed, by a number, or swept, by a

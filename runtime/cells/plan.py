@@ -31,6 +31,7 @@ __all__ = [
     "parameter_names",
     "periods",
     "plan",
+    "scale_of_atol",
     "tolerances",
 ]
 
@@ -360,3 +361,14 @@ def tolerances(scene: Scene, equations: Equations, numbers: np.ndarray) -> tuple
         width = 1.0 / np.maximum(numbers[:, columns].max(axis=1), 1e-300)
         rtol, atol = np.minimum(rtol, np.maximum(width, 1e-13)), np.minimum(atol, np.maximum(0.1 * width, 1e-13))
     return rtol, atol
+
+
+def scale_of_atol(size: np.ndarray) -> np.ndarray:
+    """Return by what a default atol, a tenth of rtol, is multiplied for motions of some sizes: a power of ten, at most 1.
+
+    Below size 1 atol is between a tenth of rtol times the size and all of it, in decades that end at 0.1, 0.01 and so on.
+    The bound 0.1 is the last of these ends, not a size that is small by itself.  Motions above it keep the atol of size 1:
+    for a motion of size 1e9 it is next to nothing beside rtol times the size, so that steps are as exact as rtol says
+    and only a little shorter.  A size of 0 is unknown.
+    """
+    return np.asarray(10.0 ** np.floor(np.log10(np.where((size > 0.0) & (size < 0.1), 10.0 * size, 1.0))))

@@ -24,8 +24,8 @@ EXAMPLES = (
     "synchain thresholds --matrix G.txt --omega 1.55 --quick",
 )
 
-RESOLUTION, COARSE = 5e-4, 2e-3
-"""How closely the ends of the ranges are located in sigma."""
+COARSE = 2e-3
+"""How closely a first look locates the ends of the ranges in sigma."""
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -73,7 +73,7 @@ def execute(arguments: Namespace) -> int:
     result = thresholds(
         scene,
         sigma=sigma,
-        resolution=COARSE if arguments.quick else RESOLUTION,
+        resolution=COARSE if arguments.quick else None,
         criterion=criterion,
         workers=arguments.workers,
     )

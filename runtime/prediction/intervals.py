@@ -13,6 +13,9 @@ Interval = tuple[float, float]
 Predicate = Callable[[np.ndarray], np.ndarray]
 """Maps an array of points to an array of truth values."""
 
+ROUNDING = 8.0 * float(np.finfo(float).eps)
+"""Least width of a bracket relative to its ends: points inside a narrower one are no longer apart."""
+
 
 def grid_intervals(x: np.ndarray, good: np.ndarray) -> list[Interval]:
     """Find the maximal runs of good points of an increasing grid.
@@ -37,7 +40,9 @@ def grid_intervals(x: np.ndarray, good: np.ndarray) -> list[Interval]:
     return intervals
 
 
-def find(judge: Predicate, x: np.ndarray, resolution: float, fan: int = 7) -> tuple[list[Interval], np.ndarray]:
+def find(
+    judge: Predicate, x: np.ndarray, resolution: float | np.ndarray, fan: int = 7
+) -> tuple[list[Interval], np.ndarray]:
     """Find the intervals on which a predicate holds.
 
     Between neighbours of the grid that differ, `fan` equally spaced points are evaluated, and the
@@ -50,8 +55,9 @@ def find(judge: Predicate, x: np.ndarray, resolution: float, fan: int = 7) -> tu
         Property of a point.
     x : array_like, shape (k,)
         Increasing grid.
-    resolution : float
-        Largest width of a bracket.
+    resolution : float or ndarray, shape (k - 1,)
+        Largest width of a bracket, in all steps of the grid or in each; a few units in the last place of its ends if that
+        is more.
     fan : int
         Points in each bracket and round.
 
@@ -70,21 +76,26 @@ def find(judge: Predicate, x: np.ndarray, resolution: float, fan: int = 7) -> tu
     x = np.asarray(x, dtype=float)
     if x.ndim != 1 or len(x) < 1 or np.any(np.diff(x) <= 0):
         raise ValueError("the grid must be one increasing row of numbers")
-    if not resolution > 0:
+    if not np.all(np.asarray(resolution) > 0.0):
         raise ValueError(f"resolution = {resolution}; expected a positive number")
     verdict = np.asarray(judge(x), dtype=bool)
     return refine(judge, x, verdict, resolution, fan), verdict
 
 
 def refine(
-    judge: Callable[[np.ndarray], np.ndarray], x: np.ndarray, verdict: np.ndarray, resolution: float, fan: int = 7
+    judge: Predicate, x: np.ndarray, verdict: np.ndarray, resolution: float | np.ndarray, fan: int = 7
 ) -> list[Interval]:
     """Return the intervals of `find`, if the verdict (m,) on the grid `x` is known already."""
     changes = np.flatnonzero(verdict[1:] != verdict[:-1])
     good = np.where(verdict[changes], x[changes], x[changes + 1])
     bad = np.where(verdict[changes], x[changes + 1], x[changes])
-    while len(changes) and np.max(np.abs(bad - good)) > resolution:
-        good, bad = _narrow(judge, good, bad, fan)
+    wanted = np.broadcast_to(resolution, len(x) - 1)[changes]
+    while True:
+        finest = ROUNDING * np.maximum(np.abs(good), np.abs(bad))
+        wide = np.flatnonzero(np.abs(bad - good) > np.maximum(wanted, finest))
+        if not len(wide):
+            break
+        good[wide], bad[wide] = _narrow(judge, good[wide], bad[wide], fan)
     ends = list(0.5 * (good + bad))
     if verdict[0]:
         ends.insert(0, x[0])

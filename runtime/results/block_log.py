@@ -34,7 +34,7 @@ from ..support.status import CODES, tally
 __all__ = ["BlockLog", "Description", "is_block_log"]
 
 KIND = b"synchain blocks "
-MAGIC = KIND + b"2\n"
+MAGIC = KIND + b"3\n"
 PAGE = 4096
 """Bytes that a disk loses together."""
 LINE = struct.Struct("<QI")

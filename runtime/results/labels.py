@@ -30,6 +30,7 @@ __all__ = [
     "MEANINGS",
     "STATE",
     "SUMS",
+    "TOLERANCES",
     "States",
     "Variable",
     "alike",
@@ -77,6 +78,8 @@ MEANINGS = {
     "transversal_exponent": "largest transversal exponent of the synchronous state",
     "transversal_stderr": "standard error of the transversal exponent",
     "ended_early": "1 where the cell ended before its window did, certain to stay synchronous",
+    "rtol_used": "relative tolerance of the steps",
+    "atol_used": "absolute tolerance of the steps",
     "methods": "integrators that the cell went through",
     "method_steps": "accepted and rejected steps by each integrator",
     "verdict": "; ".join(f"{k} {words}" for k, words in enumerate(VERDICTS)),
@@ -97,6 +100,9 @@ SUMS = {
     "end_time": Sum.STOPPED_AT,
 }
 """The columns of `counts` and of `sums` by the names of their variables."""
+
+TOLERANCES = ("rtol_used", "atol_used")
+"""The names of the columns of `Buffers.tolerances`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +163,9 @@ def variables(
     """
     for name in ("status", "steps", "rejected", "periods_skipped"):
         yield name, (), buffers.counts[:, COUNTS[name]].astype(np.int32)
+    ran = buffers.status != Status.NOT_RUN
+    for name, values in zip(TOLERANCES, buffers.tolerances.T, strict=True):
+        yield name, (), np.where(ran, values, np.nan)
     if scene.integrator == "auto":
         by_method = buffers.counts[:, Count.BY_METHOD : Count.BY_METHOD + len(method_names(scene))]
         yield "methods", (), ((by_method > 0) @ _masks(scene)).astype(np.int32)
@@ -341,7 +350,6 @@ def changed(attributes: Mapping[str, Any], scene: Scene) -> bool:
 def provenance(
     scene: Scene,
     kernel: Kernel,
-    tolerances: tuple[float, float],
     skipped: tuple[str, ...],
     versions: str,
     processor: str,
@@ -356,8 +364,6 @@ def provenance(
         "equations": kernel.equations.digest,
         "kernel": kernel.digest,
         "lanes": kernel.origin.width,
-        "rtol_used": tolerances[0],
-        "atol_used": tolerances[1],
         "seed": scene.seed,
         "versions": versions,
         "processor": processor,

@@ -21,7 +21,7 @@ from ..support.files import understood
 from ..support.status import Status
 from .certificate import Certificate
 from .labelled import Labelled
-from .labels import COUNTS, STATE, SUMS, States, alike, changed, dimensions, labelled, scene_of, variables
+from .labels import COUNTS, STATE, SUMS, TOLERANCES, States, alike, changed, dimensions, labelled, scene_of, variables
 from .store import read_data, write_data
 
 if TYPE_CHECKING:
@@ -206,6 +206,9 @@ class Result(Labelled):
             for name, column in columns.items():
                 if name in data:
                     table[:, column] = data[name].values.reshape(cells)
+        for k, name in enumerate(TOLERANCES):
+            if name in data:
+                buffers.tolerances[:, k] = data[name].values.reshape(cells)
         if "method_steps" in data:
             by_method = data.method_steps.values.reshape(cells, -1)
             buffers.counts[:, Count.BY_METHOD : Count.BY_METHOD + by_method.shape[1]] = by_method

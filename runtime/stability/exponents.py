@@ -347,13 +347,13 @@ def exponents(
     Notes
     -----
     Of the scene's fields count its model, parameters, first initial state, `contact`, `integrator`, `atol` and
-    `max_steps`; `rtol`, `transient` and `seed` are keywords here, and what a run records or stops by does not matter.
+    `max_steps`; `rtol`, `transient` and `seed` are keywords here, and what a run records does not matter.
 
     Raises
     ------
     ValueError
         If the network has no coupling, if the coupling has no synchronous state, if time enters
-        without a known period, and for a scene with draws, or with axes on which the orbit depends: for
+        without a known period, for a scene with a stop, and with draws, or axes on which the orbit depends: for
         their cells there is no one answer.  An axis of the strength of links that vanish between equal
         states is no such axis.
     FloatingPointError

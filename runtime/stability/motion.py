@@ -121,14 +121,19 @@ def _size(e: sp.Expr) -> sp.Expr:
     return sp.Abs(e)
 
 
-def extent_of(states: np.ndarray, settled: np.ndarray) -> np.ndarray:
-    """Return how far each component (p,) moves in settled states (k, p), or in all states if it has come to rest."""
+def extent_of(
+    states: np.ndarray, settled: np.ndarray, still: float = STILL, rounding: np.ndarray | float = 0.0
+) -> np.ndarray:
+    """Return how far each component (…) moves in settled states (k, …), or in all states if it has come to rest.
+
+    It rests if it moves by less than rounding, or by less than a part `still` of all its motion.
+    """
     later, whole = np.ptp(settled, axis=0), np.ptp(states, axis=0)
-    return np.where(later > STILL * whole, later, whole)
+    return np.where(later > np.maximum(still * whole, rounding), later, whole)
 
 
 def above(extent: np.ndarray, rounding: np.ndarray) -> np.ndarray:
-    """Return the extents (p,), 0 for those that may be rounding."""
+    """Return the extents (…), 0 for those that may be rounding."""
     return np.where(extent > rounding, extent, 0.0)
 
 

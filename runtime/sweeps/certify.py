@@ -31,8 +31,10 @@ from ..stability.exponents import along, coupled_cell
 from ..stability.network import shared_orbits, transversal_modes
 from ..stability.orbits import Orbits, unit_of_time, within
 from ..support.execution import Execution
+from .errors import SweepFailed, SweepInterrupted
 from .job import Start
-from .pool import Task
+from .memory import Memory
+from .pool import Task, worker_lost
 from .prepare import PreparedRun
 from .scheduler import BlockScheduler
 
@@ -83,6 +85,8 @@ def certified(prepared: PreparedRun) -> PreparedRun:
     ------
     ValueError
         As `certify`.
+    SweepInterrupted, SweepFailed
+        On Ctrl-C, or if the workers are lost; no cell has finished.
     """
     scene, layout = prepared.scene, prepared.layout()
     check_certifiable(scene)
@@ -91,10 +95,18 @@ def certified(prepared: PreparedRun) -> PreparedRun:
     ends = _Ends(layout, prepared.reduction, np.empty(shape[0]), np.empty(shape[1]), finished)
     quiet = replace(prepared.execution, show_progress=False, progress=None)
     reporter = quiet.reporter(scene.cells)
-    BlockScheduler(layout, np.zeros(layout.blocks, dtype=bool), ends, prepared, reporter).run()
     workers = quiet.workers if quiet.executor is None else None
-    states = np.where(finished[:, None], ends.whole, Planner(scene).rows(np.arange(scene.cells)).start)
-    return replace(prepared, certificate=certify(scene, states, workers=workers))
+    try:
+        BlockScheduler(layout, np.zeros(layout.blocks, dtype=bool), ends, prepared, reporter).run()
+        states = np.where(finished[:, None], ends.whole, Planner(scene).rows(np.arange(scene.cells)).start)
+        return replace(prepared, certificate=certify(scene, states, workers=workers))
+    except (Exception, KeyboardInterrupt) as problem:
+        if isinstance(problem, KeyboardInterrupt):
+            raise SweepInterrupted(0, scene.cells, Memory.of(prepared, None).result()) from None
+        if not worker_lost(problem):
+            raise
+        nothing = Memory.of(prepared, None).result()
+        raise SweepFailed(f"the workers are lost ({problem})", 0, scene.cells, nothing) from problem
 
 
 def certify(
@@ -132,7 +144,7 @@ def certify(
     begun = places.table(starts if states is None else states)[:, :, 0]
     table = {name: np.empty(scene.cells) for name in ("exponent", "stderr", "diffusion", "margin", "size")}
     for group in shared_orbits(scene, planner.columns(cells)):
-        single = with_numbers(scene, group.numbers, axes=(), zipped=False, continuation="none")
+        single = with_numbers(scene, group.numbers, axes=(), zipped=False, continuation="none", stop=None)
         cell = coupled_cell(Given(certify), single, RTOL)
         orbits = Orbits.make(cell, group.strengths, begun[group.cells[:1]], averaging.execution.size)
         orbits = orbits.begun_at(begun[group.cells])

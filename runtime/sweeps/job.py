@@ -247,6 +247,7 @@ class SweepJob:
         """Run rows with room for so many section points of each, each with the integrators that suit it."""
         reduction, ladder = self.reduction, self.ladder
         buffers = reduction.empty(len(rows), room, reduction.observed.tallies)
+        buffers.tolerances[:] = np.stack(ladder.tolerances(rows), axis=1)
         method = ladder.first(rows)
         rows = replace(rows, spans=ladder.steps(rows, method))
         if len(ladder.methods) > 1:
@@ -282,8 +283,7 @@ class SweepJob:
     def _drive(self, method: int, cells: np.ndarray, rows: Plan, buffers: Buffers) -> None:
         """Run some cells by one method, those of the same tolerances at once."""
         kernel = self._kernel(self.ladder.methods[method])
-        rtol, atol = self.ladder.tolerances(rows.take(cells))
-        pairs, which = np.unique(np.stack([rtol, atol], axis=1), axis=0, return_inverse=True)
+        pairs, which = np.unique(buffers.tolerances[cells], axis=0, return_inverse=True)
         for k, (own_rtol, own_atol) in enumerate(pairs):
             own, control = cells[which.reshape(-1) == k], self._control(float(own_rtol), float(own_atol))
             if len(own) == len(rows):

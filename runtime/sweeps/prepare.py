@@ -7,7 +7,6 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-from synchain.codegen.driver.columns import Control
 from synchain.codegen.kernels.compile import load
 from synchain.models.scenes.scene import Scene
 
@@ -57,8 +56,7 @@ class PreparedRun:
     def attributes(self) -> dict[str, object]:
         """How the result came about."""
         job, spec = self.job, self.job.spec
-        tolerances = float(job.control[Control.RTOL]), float(job.control[Control.ATOL])
-        return provenance(self.scene, job.kernel, tolerances, self.reduction.skipped, spec.versions, spec.processor)
+        return provenance(self.scene, job.kernel, self.reduction.skipped, spec.versions, spec.processor)
 
     def layout(self) -> Layout:
         """Return the blocks of the sweep, of a size that suits the workers."""

@@ -146,7 +146,7 @@ def agreement(
     ------
     ValueError
         If the line lacks a strength, or if sigma is negative, not finite or does not increase, and for
-        a scene with draws or axes, but for one of sigma; as `strengths` does.
+        a scene with a stop, draws or axes, but for one of sigma; as `strengths` does.
     """
     scene = Given(agreement, parameters, more, IN_CRITERION).scene(scene, unused_axes(scene))
     expect_vanishing("agreement", scene.equations)

@@ -35,7 +35,7 @@ from ..support.progress import Hook
 from ..support.status import Status
 from ..sweeps.certify import certify
 from .criterion import AppliedCriterion, Criterion, errors, preset, resolved
-from .motion import Motion, alike, measure_motion, spread_of
+from .synchronous_motion import SynchronousMotion, alike, measure_motion, spread_of
 from .trials import Outcome, Trials
 
 __all__ = ["Basin", "Fate", "basin", "random_starts"]
@@ -287,7 +287,7 @@ def _whole(scene: Scene) -> Reduction:
     return replace(reduce_scene(scene, reduce=False), jumps=True)
 
 
-def _motion(scene: Scene, known: Criterion, atol: float | None, execution: Execution) -> Motion:
+def _motion(scene: Scene, known: Criterion, atol: float | None, execution: Execution) -> SynchronousMotion:
     """The motion from the state of the scene's first oscillator."""
     unit = scene.replace(transient=1.0, window=1.0, atol=atol or scene.given["atol"])
     planner, equations = Planner(unit), scene.equations

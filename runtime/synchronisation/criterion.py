@@ -15,7 +15,8 @@ from synchain.models.inputs.checks import check_instance, check_integer, check_n
 from synchain.models.scenes.complete import TimeUnit
 from synchain.models.scenes.scene import Scene
 
-from .motion import Motion, columns_of
+from ..cells.plan import scale_of_atol
+from .synchronous_motion import SynchronousMotion, columns_of
 from .trials import Outcome
 
 __all__ = [
@@ -178,7 +179,7 @@ def preset(criterion: Criterion, scene: Scene) -> Criterion:
     return replace(criterion, **{name: value for name, value in said.items() if getattr(criterion, name) is None})
 
 
-def applied(criterion: Criterion, motion: Motion, scene: Scene) -> AppliedCriterion:
+def applied(criterion: Criterion, motion: SynchronousMotion, scene: Scene) -> AppliedCriterion:
     """Return a criterion (`preset`) with the numbers that follow from the synchronous motion."""
     found: dict[str, Any] = {own.name: getattr(criterion, own.name) for own in fields(Criterion)}
     for name, radians in TIMES.items():
@@ -199,14 +200,16 @@ def applied(criterion: Criterion, motion: Motion, scene: Scene) -> AppliedCriter
     )
 
 
-def _atol(motion: Motion, scene: Scene, rtol: float) -> float | None:
-    """The absolute tolerance of a motion below 1: a tenth of rtol times the power of ten next to its smallest extent."""
+def _atol(motion: SynchronousMotion, scene: Scene, rtol: float) -> float | None:
+    """The absolute tolerance for the smallest extent of a small motion, in place of a default one; else None."""
     moves = motion.extent[motion.extent > 0.0]
-    power = round(math.log10(moves.min())) if len(moves) else 0
-    return float(0.1 * rtol * 10.0**power) if scene.given["atol"] is None and power < 0 else None
+    scale = float(scale_of_atol(moves.min(initial=1.0)))
+    return 0.1 * rtol * scale if scene.given["atol"] is None and scale < 1.0 else None
 
 
-def resolved(criterion: Criterion, scene: Scene, measure: Callable[[float | None], Motion]) -> AppliedCriterion:
+def resolved(
+    criterion: Criterion, scene: Scene, measure: Callable[[float | None], SynchronousMotion]
+) -> AppliedCriterion:
     """Return a criterion (`preset`) for the motion that is measured with an absolute tolerance which resolves it."""
     used = applied(criterion, measure(None), scene)
     for _ in range(PASSES):

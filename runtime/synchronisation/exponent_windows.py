@@ -34,6 +34,8 @@ class ExponentWindows:
         Why exponents say nothing about the network; empty if they do.
     strengths, values : tuple of float
         Strengths alpha and exponents at them.
+    beyond : tuple of float
+        Ends of windows that are ends of the grid: the windows may go on.
     """
 
     intervals: tuple[Interval, ...] = ()
@@ -41,6 +43,7 @@ class ExponentWindows:
     absent: str = ""
     strengths: tuple[float, ...] = ()
     values: tuple[float, ...] = ()
+    beyond: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.errors) != len(self.intervals):
@@ -54,11 +57,13 @@ class ExponentWindows:
     def of(cls, function: MSF) -> ExponentWindows:
         """Return the windows of a master stability function for the network of its scene."""
         found = function.windows
+        ends = [end for w in found for end in ((w.low, w.low_mode), (w.high, w.high_mode))]
         return cls(
             tuple((window.low, window.high) for window in found),
             tuple((window.low_error, window.high_error) for window in found),
             strengths=tuple(map(float, function.alpha)),
             values=tuple(map(float, function.exponent)),
+            beyond=tuple(end for end, lost in ends if lost is None and end),
         )
 
     def at(self, alpha: np.ndarray) -> np.ndarray:
@@ -67,7 +72,8 @@ class ExponentWindows:
 
     def text(self, grid_ends: Collection[float] = ()) -> str:
         """Return the windows with their errors and dots at ends of the grid, or why there are none."""
-        return f"not computed: {self.absent}" if self.absent else interval_text(self.intervals, self.errors, grid_ends)
+        ends = (*self.beyond, *grid_ends)
+        return f"not computed: {self.absent}" if self.absent else interval_text(self.intervals, self.errors, ends)
 
 
 def exponent_windows(

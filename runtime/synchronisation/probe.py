@@ -38,7 +38,7 @@ from ..support.execution import Execution
 from ..support.progress import Hook
 from ..sweeps.job import RowsSpec
 from .criterion import IN_CRITERION, AppliedCriterion, Criterion, checked, errors, offsets, preset, resolved
-from .motion import Motion, alike, first_starts, measure_motion, spread_of
+from .synchronous_motion import SynchronousMotion, alike, first_starts, measure_motion, spread_of
 from .trials import Trials
 
 __all__ = ["MODE_ALPHA", "MODE_BETA", "Probe", "ring_of_three", "universal_probe"]
@@ -135,8 +135,8 @@ def universal_probe(
     Raises
     ------
     ValueError
-        If strengths are missing or not finite, if the scene has no coupling, draws, or axes but that of
-        sigma, or if its coupling is not proportional to sigma and to the weight of a link.
+        If strengths are missing or not finite, if the scene has no coupling, a stop, draws, or axes but
+        that of sigma, or if its coupling is not proportional to sigma and to the weight of a link.
     """
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     real, imaginary = _broadcast(alpha, beta)
@@ -162,7 +162,7 @@ def universal_probe(
         problem = RowsSpec(equations, method, control_of(Planner(scene), True))
         return Trials(scene, problem, source, execution)
 
-    def measure(atol: float | None) -> Motion:
+    def measure(atol: float | None) -> SynchronousMotion:
         one = alike(equations, _rows(planner, equations.parameters, np.zeros(1), np.zeros(1), np.zeros(1)))
         with trials(ring if atol is None else ring.replace(atol=atol)) as few:
             times, apart = (known.transient, known.window), spread_of(equations, plain.start[:1])

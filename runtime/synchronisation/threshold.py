@@ -41,7 +41,7 @@ from ..support.progress import Hook
 from .criterion import IN_CRITERION, AppliedCriterion, Criterion, checked, errors, offsets, preset, resolved
 from .exponent_windows import ExponentWindows, exponent_windows
 from .hidden_modes import hidden_modes
-from .motion import Motion, alike, first_starts, measure_motion, spread_of
+from .synchronous_motion import SynchronousMotion, alike, first_starts, measure_motion, spread_of
 from .trials import Trials
 
 __all__ = [
@@ -58,11 +58,15 @@ __all__ = [
 ]
 
 
-RESOLUTION = 5e-4
-"""Width in sigma to which the ends of ranges are refined."""
+RESOLUTION, CLOSER, RELATIVE = 5e-4, 5.0, 1e-3
+"""Width in sigma to which ends of ranges are refined by default: it is less where a step of the grid is less than so many
+times as wide, and more where sigma is so large that this part of it is more."""
+
+LONGEST = 1e9
+"""Longest step of a grid, in widths to which ends are refined: ten rounds refine it."""
 
 PROBES = 257
-"""Least number of values of alpha that are probed."""
+"""About how many values of alpha are probed at least."""
 
 Measure = Callable[[np.ndarray], np.ndarray]
 """Mean synchronisation errors (m, starts) at points (m,)."""
@@ -183,7 +187,7 @@ def thresholds(
     scene: Scene,
     *,
     sigma: Sequence[float] | np.ndarray | None = None,
-    resolution: float = RESOLUTION,
+    resolution: float | None = None,
     criterion: Criterion | None = None,
     precision: float = 1e-3,
     periods: float = 5000,
@@ -200,13 +204,14 @@ def thresholds(
     Parameters
     ----------
     scene : Scene
-        The network; its records, observables, sections and stop are not used.
+        The network; its records, observables and sections are not used.
     sigma : sequence of float, optional
         An increasing grid on which ranges are looked for (default: `default_grid`); narrower ranges
-        are not seen.  The probe's grid in alpha covers every sigma abs(gamma).
-    resolution : float
+        are not seen.  The probe's grid in alpha covers every sigma abs(gamma), with the spacing of this one.
+    resolution : float, optional
         Ends of ranges are refined to this width in sigma, those of the probe to twice as much in
-        alpha.
+        alpha.  By default it is 5e-4 or, if that is more, a thousandth of sigma, and at most a fifth of the step
+        of the grid.
     criterion : Criterion, optional
         When a value of sigma counts as synchronous; it holds rtol, seed and transient of all cells, and follows scene
         and motion in what it leaves open.
@@ -227,8 +232,8 @@ def thresholds(
     ------
     ValueError
         For a network without links, for one-way links whose eigenvalues are complex, for unequal
-        nodes, for links with inertia, and for a scene with draws or axes, but for one of sigma, which
-        is not used.
+        nodes, for links with inertia, and for a scene with a stop, draws or axes, but for one of sigma,
+        which is not used; if a step of the grid is above 1e9 times the resolution.
     """
     a_scene(scene).equations.expect_alike("thresholds")
     expect_vanishing("thresholds", scene.equations)
@@ -238,7 +243,8 @@ def thresholds(
     check_probe(scene.topology, spectrum)
     scene = scene.replace(record=("sync_error",))
     grid = default_grid(spectrum) if sigma is None else row("sigma", sigma, 2, rising=True)
-    resolution = check_positive("resolution", resolution)
+    resolution = None if resolution is None else check_positive("resolution", resolution)
+    _check_steps(grid, resolution)
     precision = check_number("precision", precision, 0.0)
     periods = check_whole("periods", check_positive("periods", periods))
     alpha = _probe_grid(grid, spectrum)
@@ -285,11 +291,36 @@ def default_grid(spectrum: Spectrum, step: float = 0.0025) -> np.ndarray:
 
 
 def _probe_grid(sigma: np.ndarray, spectrum: Spectrum) -> np.ndarray:
-    """Values of alpha that cover sigma |gamma| for every mode, as many as sigma has and at least PROBES."""
-    sizes = [abs(value) for value in spectrum.values if abs(value) > 0.0]
-    ends = np.outer(sigma[[0, -1]], [min(sizes), max(sizes), *([0.0] if spectrum.multiplicities[0] > 1 else [])])
-    low, high = ends.min(), ends.max()
-    return np.linspace(low, high, max(len(sigma), PROBES))
+    """Values of alpha that cover sigma |gamma| for every mode: sigma times the largest |gamma|, then where others reach further.
+
+    Each step is divided so often that there are about PROBES values.
+    """
+    sizes = sorted({abs(value) for value in spectrum.values if abs(value) > 0.0}, reverse=True)
+    grid = sigma * sizes[0]
+    for size in (*sizes[1:], *([0.0] if spectrum.multiplicities[0] > 1 else [])):
+        more = np.unique(sigma * size)
+        grid = np.concatenate([more[more < grid[0]], grid, more[more > grid[-1]]])
+    parts = max(1, round((PROBES - 1) / (len(grid) - 1)))
+    return np.unique(np.interp(np.arange((len(grid) - 1) * parts + 1) / parts, np.arange(len(grid)), grid))
+
+
+def _widths(x: np.ndarray, resolution: float | None) -> np.ndarray:
+    """To what width ends of ranges are refined in each step of a grid (m - 1,)."""
+    if resolution is not None:
+        return np.full(len(x) - 1, resolution)
+    nearer = np.minimum(np.abs(x[1:]), np.abs(x[:-1]))
+    return np.asarray(np.minimum(np.maximum(RESOLUTION, RELATIVE * nearer), np.diff(x) / CLOSER))
+
+
+def _check_steps(x: np.ndarray, resolution: float | None) -> None:
+    """Raise ValueError for a step of a grid that is too long to refine."""
+    steps, widths = np.diff(x), _widths(x, resolution)
+    k = int(np.argmax(steps / widths))
+    if not steps[k] <= LONGEST * widths[k]:
+        raise ValueError(
+            f"sigma: found a step of {steps[k]:.3g}, from {x[k]:.6g} to {x[k + 1]:.6g}, and ends refined to {widths[k]:.3g}; "
+            f"expected at most {LONGEST:g} times as much; give more values of sigma, or a larger resolution"
+        )
 
 
 def check_probe(graph: Topology, spectrum: Spectrum) -> None:
@@ -308,7 +339,7 @@ def probe(
     scene: Scene,
     alpha: Sequence[float] | np.ndarray,
     criterion: Criterion,
-    resolution: float = RESOLUTION,
+    resolution: float | None = None,
     execution: Execution | None = None,
 ) -> Sweep:
     """Sweep the two-oscillator probe over alpha = 2 sigma."""
@@ -326,7 +357,7 @@ def simulate(
     scene: Scene,
     sigma: Sequence[float] | np.ndarray,
     criterion: Criterion,
-    resolution: float = RESOLUTION,
+    resolution: float | None = None,
     execution: Execution | None = None,
 ) -> Sweep:
     """Sweep sigma by direct simulation of a scene's network.
@@ -352,7 +383,7 @@ def fitted(scene: Scene, sigma: np.ndarray, criterion: Criterion, execution: Exe
         return criterion
     known, apart = preset(criterion, scene), spread_of(scene.equations, np.array([scene.y0]))
 
-    def measure(atol: float | None) -> Motion:
+    def measure(atol: float | None) -> SynchronousMotion:
         rtol = known.rtol or scene.rtol
         unit = AppliedCriterion(1.0, known.starts, 0.0, 1.0, 1.0, rtol, 0, (), max_steps=scene.max_steps, atol=atol)
         reduction = reduce_scene(cells_of(scene, sigma, unit))
@@ -364,7 +395,7 @@ def fitted(scene: Scene, sigma: np.ndarray, criterion: Criterion, execution: Exe
     return resolved(known, scene, measure)
 
 
-def judge(measure: Measure, x: np.ndarray, resolution: float, criterion: AppliedCriterion) -> Sweep:
+def judge(measure: Measure, x: np.ndarray, resolution: float | None, criterion: AppliedCriterion) -> Sweep:
     """Return the verdicts on an increasing grid and the synchronous ranges, with ends refined to `resolution` in sigma."""
 
     def share(errors: np.ndarray) -> np.ndarray:
@@ -372,7 +403,7 @@ def judge(measure: Measure, x: np.ndarray, resolution: float, criterion: Applied
 
     found = measure(x)
     on_grid = share(found)
-    ranges = refine(lambda points: share(measure(points)) >= 0.5, x, on_grid >= 0.5, resolution)
+    ranges = refine(lambda points: share(measure(points)) >= 0.5, x, on_grid >= 0.5, _widths(x, resolution))
     return Sweep(x, np.asarray(np.median(found, axis=1)), on_grid, tuple(ranges))
 
 

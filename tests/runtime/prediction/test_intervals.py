@@ -57,6 +57,31 @@ def test_a_bracket_narrows_to_the_change_next_to_its_good_end():
     assert verdict.tolist() == [True, False]
 
 
+def test_each_step_of_a_grid_has_its_own_resolution():
+    asked = []
+
+    def judge(x):
+        asked.append(len(x))
+        return (x > 0.3) & (x < 70.0)
+
+    ((low, high),), _ = find(judge, np.array([0.0, 1.0, 100.0]), np.array([1e-3, 1.0]))
+    assert (low, high) == (pytest.approx(0.3, abs=5e-4), pytest.approx(70.0, abs=0.5))
+    assert asked == [3, 14, 14, 14, 7]  # 1/512 and 100/512 after three rounds
+
+
+@pytest.mark.parametrize("end", [1e98, 1.0, 1e-300])
+def test_brackets_end_at_the_rounding_of_their_ends(end):
+    rounds = []
+
+    def judge(x):
+        rounds.append(len(x))
+        assert len(rounds) < 1000
+        return x < end
+
+    ((_, high),), _ = find(judge, np.array([0.0, 1e99]), 1e-320)
+    assert high == pytest.approx(end, rel=4 * np.finfo(float).eps)
+
+
 @pytest.mark.parametrize("x", [[], [1.0, 0.5], [0.0, 0.0], [[0.0, 1.0]]])
 def test_grids_that_do_not_increase_are_refused(x):
     with pytest.raises(ValueError, match="increasing"):

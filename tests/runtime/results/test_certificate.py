@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,10 +16,13 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.opening.open import open_result
 from synchain.runtime.results.certificate import NEAR, VERDICTS, Certificate
 from synchain.runtime.stability.exponents import exponents
+from synchain.runtime.support.status import Status
+from synchain.runtime.sweeps import certify as certification
 from synchain.runtime.sweeps.certify import certify
-from synchain.runtime.sweeps.errors import SweepInterrupted
+from synchain.runtime.sweeps.errors import SweepFailed, SweepInterrupted
 from synchain.runtime.sweeps.prepare import PreparedRun
 from synchain.runtime.sweeps.run import run
+from synchain.runtime.sweeps.stream import stream
 
 SIGMA = np.array([0.05, 0.12, 0.3])
 
@@ -156,3 +160,24 @@ def test_what_has_no_certificate() -> None:
         certify(Scene(topology=topology("chain", 1)))
     with pytest.raises(ValueError, match="found omega = 0 in the sweep"):
         certify(scene(axes={"omega": [0.0, 1.0]}, time_unit="time"))
+
+
+@pytest.mark.parametrize(
+    ("problem", "error", "words"),
+    [
+        (KeyboardInterrupt(), SweepInterrupted, "interrupted with 0 of 2 cells finished"),
+        (BrokenProcessPool("gone"), SweepFailed, r"the workers are lost \(gone\); 0 of 2 cells had finished"),
+    ],
+)
+@pytest.mark.parametrize("step", ["BlockScheduler", "certify"])
+def test_an_interrupted_certification_says_what_is_done(monkeypatch, tmp_path, step, problem, error, words):
+    def fail(*_, **__):
+        raise problem
+
+    monkeypatch.setattr(certification, step, fail)
+    asked = {"sigma": [0.1, 0.2], "certified": True, "show_progress": False}
+    for call in (lambda: run(scene(), **asked), lambda: stream(scene(), tmp_path / "a.nc", **asked)):
+        with pytest.raises(error, match=f"^{words}$") as caught:
+            call()
+        assert set(caught.value.result.status.values.tolist()) == {Status.NOT_RUN}
+        assert list(tmp_path.iterdir()) == []

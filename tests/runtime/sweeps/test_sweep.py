@@ -24,6 +24,7 @@ from synchain.runtime.sweeps.errors import SweepInterrupted
 from synchain.runtime.sweeps.memory import Memory
 from synchain.runtime.sweeps.prepare import prepare
 from synchain.runtime.sweeps.run import run
+from synchain.runtime.sweeps.stream import stream
 
 PAIR = Scene(topology=chain(2), transient=5, window=10, parameters={"sigma": 0.1})
 SECTIONS = PAIR.replace(record=("sync_error", "section", "trajectory"), samples=2)
@@ -243,7 +244,7 @@ def test_the_jump_is_looked_up_in_the_equations_that_the_numbers_belong_to(off):
 def test_loose_tolerance_is_not_silently_wrong():
     """With rtol = 1e-3 taken literally the oscillator slips through its stick phase and the error is of order 0.1."""
     loose, tight = (run(SECTIONS.replace(rtol=rtol, window=40)) for rtol in (1e-3, 1e-9))
-    assert loose.data.attrs["rtol_used"] == pytest.approx(1e-5)
+    assert loose.data["rtol_used"].item() == pytest.approx(1e-5)
     assert float(np.abs(loose.end - tight.end).max()) < 1e-4
 
 
@@ -277,3 +278,22 @@ def test_errors_of_tiny_states_are_not_lost_in_their_squares(size: float, n: int
     ends = run(scene, show_progress=False).states("end") / size
     expected = np.repeat([np.cos(10.0), -np.sin(10.0)], n).reshape(ends.shape)
     np.testing.assert_allclose(ends, expected, rtol=0, atol=1e-8)
+
+
+def test_a_result_holds_the_tolerances_of_each_cell(tmp_path):
+    """A default atol is a tenth of rtol, less by powers of ten for starts below 0.1; a jump of friction 1/kappa wide is resolved."""
+    oscillator = Scene("harmonic", None, record=(), transient=0, window=1, time_unit="time", initial={"v": 0.0})
+    starts = [2e-9, 0.02, 0.2, 2.0, 2e9]
+    found = run(oscillator, x_1=starts, show_progress=False).data
+    np.testing.assert_allclose(found["atol_used"], [1e-17, 1e-10, 1e-9, 1e-9, 1e-9], rtol=1e-12)
+    assert set(found["rtol_used"].values) == {1e-8}
+    assert not {"rtol_used", "atol_used"} & set(found.attrs)
+    for start in starts:
+        alone = run(oscillator, x_1=start, show_progress=False).data
+        assert alone["atol_used"] == found["atol_used"].sel(x_1=start)
+    assert set(run(oscillator.replace(atol=1e-7), x_1=starts, show_progress=False).data["atol_used"].values) == {1e-7}
+    streamed = stream(oscillator, tmp_path / "a.nc", x_1=starts, show_progress=False).data
+    np.testing.assert_array_equal(streamed["atol_used"], found["atol_used"])
+    rubbing = run(SECTIONS.replace(rtol=1e-4, window=1, transient=0), kappa=[1e3, 1e5], show_progress=False).data
+    np.testing.assert_allclose(rubbing["rtol_used"], [1e-4, 1e-5])
+    np.testing.assert_allclose(rubbing["atol_used"], [1e-5, 1e-6])

@@ -109,7 +109,7 @@ def test_the_probe_covers_every_mode_and_the_network_is_swept_as_asked(swept):
     (pair, half, options), (network, sigma, direct) = swept
     assert (pair.topology.n, network.topology.n) == (2, 3)
     assert (2 * half[0], 2 * half[-1]) == (pytest.approx(0.1), pytest.approx(0.9))
-    assert len(half) == PROBES
+    assert 2 * PROBES / 3 < len(half) < 4 * PROBES / 3
     assert sigma.tolist() == [0.1, 0.2, 0.3]
     assert options == direct == (SHORT, 1e-3, Execution(workers=1))
     assert found.probe.intervals == ((0.2, 0.4),)
@@ -131,11 +131,51 @@ def test_the_probe_covers_every_mode_and_the_network_is_swept_as_asked(swept):
 )
 def test_the_grid_of_the_probe_begins_at_zero_where_zero_is_asked_for(swept, graph, sigma, low):
     thresholds(Scene(topology=graph), sigma=sigma)
-    assert 2 * swept[0][1][0] == pytest.approx(low)
-    assert len(swept[0][1]) == PROBES
+    probed = 2 * swept[0][1]
+    assert probed[0] == pytest.approx(low)
+    assert np.all(np.diff(probed) > 0.0)
+    assert 2 * PROBES / 3 < len(probed) < 4 * PROBES / 3
     thresholds(Scene(topology=graph), sigma=np.linspace(sigma[0], sigma[1], 400))
-    assert len(swept[2][1]) == 400
+    assert len(swept[2][1]) >= 400
     assert swept[0][2][0] == PAPER
+
+
+@pytest.mark.parametrize("graph", [chain(2), chain(4), star(5)])
+def test_the_grid_of_the_probe_has_the_spacing_of_that_of_sigma(swept, graph):
+    """As long as the values of sigma reach it, no mode is probed more coarsely than the network, in ratios."""
+    sigma = np.logspace(-4, 3, 50)
+    thresholds(Scene(topology=graph), sigma=sigma)
+    ratios = swept[0][1][1:] / swept[0][1][:-1]
+    assert ratios.min() > 1.0
+    assert ratios.max() <= sigma[1] / sigma[0] * (1 + 1e-12)
+    sizes = [abs(value) for value in graph.spectrum.values if value]
+    assert 2 * swept[0][1][[0, -1]] == pytest.approx([1e-4 * min(sizes), 1e3 * max(sizes)])
+
+
+def test_ends_are_refined_as_far_as_the_grid_is_wide(swept):
+    """By default 5e-4, a fifth of a shorter step, a thousandth of a larger sigma."""
+    for x, resolution, widths in (
+        ([0.0, 0.0025, 0.1], None, [5e-4, 5e-4]),
+        ([0.0, 1e-6], None, [2e-7]),
+        ([-9e6, -8e6, 0.0, 10.0, 20.0], None, [8e3, 5e-4, 5e-4, 1e-2]),
+        ([0.0, 1e-6, 10.0], 0.1, [0.1, 0.1]),
+    ):
+        np.testing.assert_allclose(threshold._widths(np.array(x), resolution), widths, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("sigma", "options", "words"),
+    [
+        ([0.0, 1e99], {}, r"a step of 1e\+99, from 0 to 1e\+99, and ends refined to 0\.0005; .*give more values"),
+        ([0.0, 0.1, 0.2], {"resolution": 1e-12}, r"a step of 0\.1, from 0 to 0\.1, and ends refined to 1e-12"),
+    ],
+)
+def test_steps_that_cannot_be_refined_are_refused_before_the_work(swept, sigma, options, words):
+    with pytest.raises(ValueError, match=f"^sigma: found {words}") as caught:
+        thresholds(Scene(topology=chain(2)), sigma=sigma, **options)
+    assert swept == []
+    assert "\n" not in str(caught.value)
+    thresholds(Scene(topology=chain(2)), sigma=[0.0, 1e99], resolution=1e92)
 
 
 def test_the_prediction_ends_with_the_grid_of_sigma(swept):
@@ -143,9 +183,9 @@ def test_the_prediction_ends_with_the_grid_of_sigma(swept):
     assert thresholds(Scene(topology=chain(2)), sigma=[0.05, 0.5]).predicted == ((0.1, 0.2),)
 
 
-def test_what_a_scene_observes_and_where_it_stops_is_not_used(swept):
-    thresholds(Scene(topology=chain(3), observe={"e": "mean(nodes.mean(v))"}, stop="x_1 - 9"), sigma=[0.1, 0.2])
-    assert [(dict(scene.observe), scene.stop) for scene, *_ in swept] == [({}, None)] * 2
+def test_what_a_scene_observes_is_not_used(swept):
+    thresholds(Scene(topology=chain(3), observe={"e": "mean(nodes.mean(v))"}), sigma=[0.1, 0.2])
+    assert [dict(scene.observe) for scene, *_ in swept] == [{}, {}]
 
 
 def test_negative_sigma_is_predicted_as_it_is_simulated(swept, monkeypatch):
@@ -326,6 +366,41 @@ def test_windows_of_exponents_are_those_of_the_network():
     assert "negative exponents" in [text.get_text() for text in axes.get_legend().get_texts()]
     ends = next(line.get_xdata(orig=False) for line in axes.lines if line.get_color() == GREEN)
     np.testing.assert_allclose(ends, [0.0, 1 / 3], rtol=1e-9)
+
+
+def test_ranges_that_end_with_the_grid_may_go_on():
+    """Of x' = -x, y' = -y with links across, a mode of strength alpha grows at alpha - 1: nothing grows below sigma = 1/3."""
+    scene = Scene(Field({"x": "-x", "y": "-y"}), "x->y, y->x", chain(3), time_unit="time")
+    rows = dict(thresholds(scene, sigma=[0.0, 0.1, 0.2], **ASKED).summary)
+    assert rows["sigma, negative exponents"] == "0.0000 … 0.2000..."
+    assert rows["..."] == "the grid ends here, the range may go on"
+    found = Sweep(np.array([0.1, 0.2]), np.zeros(2), np.ones(2), ((0.1, 0.15), (0.18, 0.2)))
+    whole = thresholds(scene, sigma=[0.0, 0.1, 0.2], **ASKED)
+    rows = dict(replace(whole, direct=found, probe=found, predicted=found.intervals).summary)
+    for name in ("sigma, simulated", "sigma, predicted by the probe", "alpha = sigma |gamma|, probe"):
+        assert rows[name] == "0.1000... … 0.1500; 0.1800 … 0.2000..."
+
+
+@pytest.mark.parametrize(("drive", "unit"), [("", 1.0), (" + cos(t/2)", 4 * math.pi)])
+def test_ends_that_come_of_the_transient_are_named(drive, unit):
+    """Errors grow at alpha - 1 = 2 sigma - 1: after 20 units of time they have fallen enough up to sigma = 0.39, not 1/2."""
+    scene = Scene(
+        Field({"x": f"-x{drive}", "y": "-y"}), "x->y, y->x", chain(2), time_unit="period" if drive else "time",
+        initial={"x": [0.5, 0.4], "y": [0.5, 0.5]},
+    )  # fmt: skip
+    criterion = Criterion(starts=1, transient=20.0 / unit, window=0.1 / unit)
+    asked = {"sigma": np.linspace(0.0, 0.6, 13), "show_progress": False}
+    found = thresholds(scene, criterion=criterion, **asked)
+    ((_, high),) = found.direct.intervals
+    assert 0.3 < high < 0.45 < found.exponents.intervals[0][1] == pytest.approx(0.5)
+    assert [words[: words.index(" come of")] for words in found.warnings] == [
+        f"the ends of what is {what} at sigma = {end:.4f} (exponent {2 * end - 1:.2g})"
+        for what, end in (("simulated", high), ("predicted by the probe", found.predicted[0][1]))
+    ]
+    assert all("20 units of time are given; trust the exponents" in words for words in found.warnings)
+    assert set(found.warnings) <= {words for name, words in found.summary if name == "warning"}
+    # an end of the grid is none of the transient
+    assert thresholds(scene, criterion=criterion, **{**asked, "sigma": [0.0, 0.1, 0.2]}).warnings == ()
 
 
 def test_the_effort_of_the_exponents_can_be_chosen(monkeypatch):

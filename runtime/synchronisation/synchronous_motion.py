@@ -1,6 +1,8 @@
 """The synchronous motion of a network: how far it moves, how fast it turns, and how many steps it takes.
 
-Tolerances and times follow it, so that results depend neither on the units of states nor on that of time.
+Tolerances and times follow it, so that results depend neither on the units of states nor on that of time.  It is measured
+by the kernel that runs the cells, at states far apart: contacts, jumps and unequal nodes have no orbit with deviations, of
+which `stability.motion` looks at every step.
 """
 
 from __future__ import annotations
@@ -18,10 +20,11 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.paces import fastest_rates
 from ..cells.plan import Plan
+from ..stability.motion import above, extent_of
 from ..support.status import Status
 from .trials import Outcome, Rows, Trials
 
-__all__ = ["Motion", "alike", "columns_of", "first_starts", "measure_motion", "spread_of"]
+__all__ = ["SynchronousMotion", "alike", "columns_of", "first_starts", "measure_motion", "spread_of"]
 
 SAMPLES = 64
 """States at which a stretch of the motion is looked at."""
@@ -37,7 +40,7 @@ TURNS, ROUNDS, LONGER = 2.0, 20, 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class SynchronousMotion:
     """What is measured of a synchronous motion.
 
     extent (components,): what each compared component moves, less its drift; of one that comes to rest, what it moved from
@@ -89,7 +92,7 @@ def measure_motion(
     row: Plan,
     times: tuple[float | None, float | None],
     apart: np.ndarray,
-) -> Motion:
+) -> SynchronousMotion:
     """Measure the motion that begins with a row of the whole network.
 
     Parameters
@@ -133,7 +136,7 @@ def measure_motion(
     paces = np.where(found.status == Status.FINISHED, found.steps / np.concatenate([early, late]), 0.0)
     states = np.concatenate([row.start, found.end])[:, columns]
     extent = _extent(np.concatenate([[0.0], early, late]), states, SAMPLES)
-    return Motion(np.where(extent > 0.0, extent, apart), radian, max(float(paces.max()), 1.0 / radian), unit)
+    return SynchronousMotion(np.where(extent > 0.0, extent, apart), radian, max(float(paces.max()), 1.0 / radian), unit)
 
 
 def _radian(
@@ -179,7 +182,5 @@ def _extent(time: np.ndarray, states: np.ndarray, late: int) -> np.ndarray:
     late = int(good[-late:].sum())
     if late < 3:
         return np.zeros(states.shape[1])
-    moved = _without_drift(time[good], states[good], -late)
-    now, ever, least = np.ptp(moved[-late:], axis=0), np.ptp(moved, axis=0), SEEN * np.abs(states[good]).max(axis=0)
-    moves, came = now > np.maximum(REST * ever, least), ever > least
-    return np.asarray(np.where(moves, now, np.where(came, ever, 0.0)).max(axis=-1))
+    moved, least = _without_drift(time[good], states[good], -late), SEEN * np.abs(states[good]).max(axis=0)
+    return above(extent_of(moved, moved[-late:], REST, least), least).max(axis=-1)
