@@ -380,20 +380,10 @@ class Interpreted:
         return found[0]
 
 
-def take_step(
-    kernel: Interpreted,
-    t: Any,
-    h: Any,
-    y: list,
-    p: list,
-    rtol: Any = 0,
-    atol: Any = 1,
-    *graph: Any,
-    name: str = "step",
-) -> Step:
+def take_step(kernel: Interpreted, t: Any, h: Any, y: list, p: list, rtol: Any = 0, atol: Any = 1, *graph: Any) -> Step:
     """One step of a kernel that runs as plain Python; a looped one needs its graph and weights."""
     sizes = kernel.source.dimensions
     room = sizes.dense_rows * len(y)
     y_new, dense = [None] * len(y), [None] * (room + sizes.workspace)
-    error = kernel.names[name](t, h, y, [*y, *p], y_new, dense, rtol, atol, *graph)
+    error = kernel.names["step"](t, h, y, [*y, *p], y_new, dense, rtol, atol, *graph)
     return Step(y, y_new, dense[:room], error)

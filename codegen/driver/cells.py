@@ -398,12 +398,3 @@ def finish(which, status, clock, y, i, spans, end, sums, counts, lanes, dims):
     counts[i, N_ACCEPTED] = int(clock[ACCEPTED * WIDTH + which])
     counts[i, N_REJECTED] = int(clock[REJECTED * WIDTH + which])
     counts[i, N_SKIPPED] = int(clock[SKIPPED * WIDTH + which])
-
-
-@njit(error_model="numpy")
-def occupied(cell):
-    """Number of lanes that hold a cell."""
-    count = 0
-    for which in range(WIDTH):
-        count += cell[which] >= 0
-    return count

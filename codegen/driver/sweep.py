@@ -23,7 +23,6 @@ from .cells import aligned
 from .cells import come_back
 from .cells import fill
 from .cells import finish
-from .cells import occupied
 from .cells import outcome
 from .cells import put
 from .cells import settle_down
@@ -154,18 +153,6 @@ def attempt(clock, y, dense, y_new, middle, out, control, dims, functions, netwo
     return t, h, accept
 
 
-@njit(error_model="numpy", forceinline=True)
-def conclude(t, h, accept, clock, y, y_new, out, control, dims, pushes, network):
-    """Move the accepted lanes on; returns the lanes that need a look, as bits."""
-    t_new = arrive(clock, t, h)
-    largest = advance(clock, y, t, t_new, accept, y_new, dims)
-    if CONTACTS:
-        change_modes(accept, t_new, y, out, network, dims, pushes)
-    if SERIES:
-        wrap(clock)
-    return ALL if control[CANCEL] != 0.0 else lane_bits(pause(clock, largest))
-
-
 @njit(error_model="numpy", nogil=True, cache=True)
 def drive(
     functions, dims, multiplicity, rule, network, first, last, start, numbers, spans, control, end, sums, counts, points,
@@ -214,11 +201,17 @@ def drive(
                 look, queue, last, clock, y, cell, start, numbers, spans, control, end, sums, counts, lanes, members,
                 dims,
             )  # fmt: skip
-            if occupied(cell) == 0:
+            # stop once no lane holds a cell
+            busy = False
+            for which in range(WIDTH):
+                busy = busy or cell[which] >= 0
+            if not busy:
                 break
         t, h, accept = attempt(clock, y, dense, y_new, middle, out, steering, dims, functions, network)
         if dims.stops:
             h = functions.halt(accept, t, h, clock, y, y_new, dense, found, steering, rule, dims, functions.section)
+        # record what the step passed
+        t_new = arrive(clock, t, h)
         counted, now = accept & (t >= load(clock, START, WIDTH)), load(clock, BASE, WIDTH) + t
         if dims.components > 0:
             functions.observe(counted, accept, h, clock, y, y_new, dense, middle, members, dims)
@@ -231,8 +224,12 @@ def drive(
                 lane_bits(counted), now, h, y, y_new, dense, seen, cell, sums, steering, rule, dims, functions.values
             )
         if dims.sampled and any_lane(accept):
-            functions.sample(
-                lane_bits(accept), arrive(clock, t, h), h, clock, y, y_new, dense, cell, spans, samples, dims
-            )
-        look = conclude(t, h, accept, clock, y, y_new, out, steering, dims, functions.pushes, network)
+            functions.sample(lane_bits(accept), t_new, h, clock, y, y_new, dense, cell, spans, samples, dims)
+        # move the accepted lanes on
+        largest = advance(clock, y, t, t_new, accept, y_new, dims)
+        if CONTACTS:
+            change_modes(accept, t_new, y, out, network, dims, functions.pushes)
+        if SERIES:
+            wrap(clock)
+        look = ALL if steering[CANCEL] != 0.0 else lane_bits(pause(clock, largest))
     block[0] = 0.0  # the memory behind the addresses is held until here

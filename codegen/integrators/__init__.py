@@ -12,7 +12,6 @@ import pkgutil
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
-from types import ModuleType
 
 __all__ = ["Integrator", "IntegratorKind", "integrator", "names"]
 
@@ -157,11 +156,6 @@ def integrator(name: str, order: int | None = None) -> Integrator:
     if data.KIND == IntegratorKind.TAYLOR:
         order = data.ORDER if order is None else order
         return Integrator(name, IntegratorKind.TAYLOR, order, order, order, data.SOURCE, (), (), (), (), ())
-    return _read(name, data)
-
-
-def _read(name: str, data: ModuleType) -> Integrator:
-    """The integrator that a file of this folder describes."""
     return Integrator(
         name=name,
         kind=IntegratorKind(data.KIND),

@@ -139,7 +139,7 @@ def _stages(variation: Variation, method: Integrator, names: Names) -> tuple[lis
         "The same step of the modes in one register: writes them, returns their error and their size.",
         tuple(_mode_step(variation, parts, method)),
     )
-    made = map(LANES.function, [*node_functions([writer], blocks), *functions.values()])
+    made = map(LANES.function, [*node_functions(writer, blocks), *functions.values()])
     return (
         [*made, scaling(method), LANES.function(orbit), LANES.function(modes), CARRY],
         (parts.size, 0),

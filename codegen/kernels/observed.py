@@ -50,8 +50,7 @@ def rule_of(method: Integrator) -> tuple[tuple[float, ...], ...]:
     Stegun, *Handbook of Mathematical Functions*, 1964, 25.4.32).  Steps of high order are long, and the rule has more
     points for them.
     """
-    order = method.order
-    return _lobatto(11 if method.series else max(5, order - 1))
+    return _lobatto(11 if method.series else max(5, method.order - 1))
 
 
 @cache

@@ -188,7 +188,7 @@ def emit(
     method = integrator(method) if isinstance(method, str) else method
     _check_records(equations, records, section, watched, multiplicity)
     ordered = tuple(r for r in Record if r in records)
-    equations, method, elimination = _planned(equations, method, unroll, fill)
+    equations, elimination = _planned(equations, method, unroll, fill)
     plain, looped = tidy(equations), elimination is not None
     names = free_names(plain)
     functions, scratch, count = (_series if method.series else _stages)(plain, method, names, elimination)
@@ -278,15 +278,19 @@ def _suited(equations: Equations, method: Integrator, count: int) -> int:
     return lanes.native_width(2 if moving <= most and count <= MOST_DECODED else 1)
 
 
-def _planned(
-    equations: Equations, method: Integrator, unroll: int, fill: float
-) -> tuple[Equations, Integrator, Program | None]:
-    """Equations and method as they are stepped, and the elimination that steps in loops run through."""
+def _planned(equations: Equations, method: Integrator, unroll: int, fill: float) -> tuple[Equations, Program | None]:
+    """Return the equations as they are stepped, and the elimination that steps in loops run through."""
     if not _is_looped(equations, method, unroll):
-        return equations, method, None
-    method = _for_many(method, equations, unroll)
+        return equations, None
+    if method.inexact:
+        raise ValueError(f"integrator {method.name}: steps at most {unroll} nodes, found {equations.n}; use rodas5p")
+    if method.implicit and any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
+        raise ValueError(
+            f"integrator {method.name}: found a mean field of {equations.n} nodes, whose Jacobian has an entry for each pair; "
+            f"expected at most {LINK_LIMIT} pairs; use dop853 or taylor"
+        )
     equations = equations.without_fields() if method.implicit else equations
-    return equations, method, program(equations, fill, method.implicit or equations.inertial)
+    return equations, program(equations, fill, method.implicit or equations.inertial)
 
 
 def free_names(plain: Equations) -> Names:
@@ -319,17 +323,26 @@ def _series(
 def _stages(
     plain: Equations, method: Integrator, names: Names, elimination: Program | None
 ) -> tuple[list[str], int, int]:
-    """The functions of a step in stages, the groups of scratch memory that they need, and the operations of the steps."""
+    """Write a step in stages; return its functions, the groups of scratch memory that it needs, and its operations."""
     blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
-    steps = _steps(plain, blocks, method, elimination)
-    looped = elimination is not None
-    functions = [f for k in range(len(blocks)) for f in node_functions(list(steps.values()), blocks[k], k)]
-    functions += dict.fromkeys(f for writer in steps.values() for f in writer.functions)
-    stepping = [_step(name, writer, looped) for name, writer in steps.items()]
-    made = [*map(LANES.function, functions), *dict.fromkeys(scaling(writer.method) for writer in steps.values())]
-    made += [driver.text("driver.sparse")] if looped and steps["step"].solves else []
-    scratch = workspace(steps["step"], elimination) if elimination is not None else 0
-    return [*made, *map(LANES.function, stepping)], scratch, sum(operations(f.body) for f in stepping)
+    arguments = ["t", "h", "y", "p", "y_new", "dense", "rtol", "atol"]
+    scratch = 0
+    writer: Step
+    if elimination is None:
+        writer = Unrolled(plain, blocks, method)
+        writer.write()
+    else:
+        writer = Looped(plain, blocks, method, elimination)
+        writer.write()
+        scratch = workspace(writer, elimination)
+        arguments += ["graph", "weights"]
+    about = "One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."
+    step = Function("step", tuple(arguments), about, tuple(writer.statements), role=Role.ENTRY)
+    functions = [f for k in range(len(blocks)) for f in node_functions(writer, blocks[k], k)]
+    functions += dict.fromkeys(writer.functions)
+    texts = [*map(LANES.function, functions), scaling(method)]
+    texts += [driver.text("driver.sparse")] if elimination is not None and writer.solves else []
+    return [*texts, LANES.function(step)], scratch, operations(step.body)
 
 
 def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimensions:
@@ -352,43 +365,18 @@ def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimension
     )
 
 
-def _for_many(method: Integrator, equations: Equations, unroll: int) -> Integrator:
-    """The method as looped kernels have it; ValueError for what only written-out kernels can."""
-    if method.inexact:
-        raise ValueError(f"integrator {method.name}: steps at most {unroll} nodes, found {equations.n}; use rodas5p")
-    if method.implicit and any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
-        raise ValueError(
-            f"integrator {method.name}: found a mean field of {equations.n} nodes, whose Jacobian has an entry for each pair; "
-            f"expected at most {LINK_LIMIT} pairs; use dop853 or taylor"
-        )
-    return method
-
-
-def _steps(
-    plain: Equations, blocks: Sequence[NodeBlocks], method: Integrator, elimination: Program | None
-) -> dict[str, Step]:
-    """The steps of a kernel by the name of their function, written."""
-    if elimination is not None:
-        steps: dict[str, Step] = {"step": Looped(plain, blocks, method, elimination)}
-    else:
-        steps = {"step": Unrolled(plain, blocks, method)}
-    for writer in steps.values():
-        writer.write()
-    return steps
-
-
-def node_functions(steps: Sequence[Step], blocks: NodeBlocks, kind: int = 0) -> list[Function]:
-    """The right-hand side of one node of some kind, and the linearisations that the steps call."""
+def node_functions(step: Step, blocks: NodeBlocks, kind: int = 0) -> list[Function]:
+    """Write the right-hand side of one node of some kind and, for an implicit step, its linearisation."""
+    functions = [("node", "Right-hand side of one oscillator.", blocks.rhs)]
+    if step.method.implicit:
+        about = "Right-hand side of one oscillator and the parts of its Jacobian that move."
+        functions.append(("node_linear", about, blocks.linear))
     made = []
-    first = [writer.first_of(blocks) for writer in steps]
-    for name, doc, body in (
-        ("node", "Right-hand side of one oscillator.", blocks.rhs),
-        ("node_linear", "Right-hand side of one oscillator and the parts of its Jacobian that move.", blocks.linear),
-    ):
-        results = [e for e in body.results if not steps[0].is_plain(e)]
-        if results and (name == "node" or any(body is b for b in first)):
-            arguments = [s.name for s in steps[0].arguments(body, results)]
-            made.append(node_function(function_name(name, kind), doc, body, arguments, results))
+    for name, about, body in functions:
+        results = [e for e in body.results if not step.is_plain(e)]
+        if results:
+            arguments = [s.name for s in step.arguments(body, results)]
+            made.append(node_function(function_name(name, kind), about, body, arguments, results))
     return made
 
 
@@ -424,12 +412,6 @@ def _listed(names: tuple[str, ...]) -> str:
     if len(names) <= 40:
         return ", ".join(names)
     return f"{', '.join(names[:6])}, … {', '.join(names[-3:])} ({len(names)} variables)"
-
-
-def _step(name: str, writer: Step, looped: bool) -> Function:
-    arguments = ("t", "h", "y", "p", "y_new", "dense", "rtol", "atol", *(("graph", "weights") if looped else ()))
-    about = "One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."
-    return Function(name, arguments, about, tuple(writer.statements), role=Role.ENTRY)
 
 
 def _cut(equations: Equations, section: sp.Expr) -> Watched:

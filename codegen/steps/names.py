@@ -28,7 +28,7 @@ RESERVED = frozenset(
      "ENTRIES", "STATE", "SLOPE", "TIME_SLOPE", "MATRIX", *(f"K{i}" for i in range(1, 32)),
      "MASS", "RATES", "where", "t", "h", "y", "y_new", "dense",
      "shift", "reach", "rate", "error", "size", "rtol", "atol", "node", "node_linear",
-     "node_local", "bound", "bank", "estimate", "step", "section", "theta", "now",
+     "bank", "estimate", "step", "section", "theta", "now",
      "njit", "p", "drive", "scaled", "inside", "total", "e3", "e5", "np", "math",
      "WIDTH", "DENSE", "LANES", "MODE_SIZE", "STRENGTHS", "SHARED", "shared", "steady", "moving", "bent", "lag",
      "strengths", "which", "mode_step", "march", "pushes", "out", "network", "release",

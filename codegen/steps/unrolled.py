@@ -7,7 +7,7 @@ from functools import cached_property
 
 import sympy as sp
 
-from ..program.expressions import ZERO, Call, Expression, Load, Name, Number, Product, call, linear, plus
+from ..program.expressions import ZERO, Expression, Load, Name, Number, Product, call, linear, plus
 from ..program.lowering import lower
 from ..program.passes import real
 from ..program.statements import If, Return, let, store
@@ -93,17 +93,14 @@ class Unrolled(Step):
             self.time_slopes[k] = lower(e) if self.time_slopes[k] == ZERO else plus(self.time_slopes[k], lower(e))
 
     def linear_nodes(self) -> list[dict[str, sp.Expr]]:
-        """Write right-hand side and Jacobian at the start, and the time derivative where the method wants it.
-
-        Returns what stands for each, by node.
-        """
+        """Write right-hand side, Jacobian and time derivative at the start; return the value of each entry, by node."""
         eq = self.equations
         self.note("right-hand side, Jacobian and time derivative at the start")
-        self.timed("t", self.wanted([self.first_of(blocks) for blocks in self.kinds]))
+        self.timed("t", self.wanted([blocks.linear for blocks in self.kinds]))
         kept = self.keep_times()
         own: list[dict[str, sp.Expr]] = []
         for i in range(eq.n):
-            states, body, at = eq.node_at(i).state, self.first_of(self.of(i)), self.at(i, "y")
+            states, body, at = eq.node_at(i).state, self.of(i).linear, self.at(i, "y")
             words = linearised(states)[: len(body.results)]
             names = [f"{word}_{i + 1}" for word in words]
             self.put(*self.node_call("node_linear", eq.kind_of[i], body, names, at))
@@ -119,7 +116,7 @@ class Unrolled(Step):
 
     def keep_times(self) -> dict[sp.Symbol, sp.Symbol]:
         """Keep time terms that stand for themselves in the linearisation, where stages give these names other values."""
-        results = [e for blocks in self.kinds for e in self.first_of(blocks).results if self.is_plain(e)]
+        results = [e for blocks in self.kinds for e in blocks.linear.results if self.is_plain(e)]
         moved = self.wanted([blocks.rhs for blocks in self.kinds]) & {s for e in results for s in e.free_symbols}
         kept = {s: real(f"at_{s.name}") for s in sorted(moved, key=lambda s: s.name)}
         self.put(*(let(there.name, here.name) for here, there in kept.items()))
@@ -224,19 +221,3 @@ def stage_state(row: Sequence[float], previous: Sequence[float], name: str) -> E
     if len(previous) > 0 and tuple(row) == (*previous, 1.0):
         return Name(f"u_{name}") + names[-1]
     return linear(row, names, name)
-
-
-def size(e: sp.Expr) -> Expression:
-    """The absolute value."""
-    return lower(sp.Abs(e)) if e.is_number else call("absolute", lower(e))
-
-
-def largest(rows: list[list[Expression]]) -> Expression:
-    """The largest of some sums, zero without any; equal ones count once."""
-    first, *others = list(dict.fromkeys(plus(*row) for row in rows if row)) or [ZERO]
-    if not others and not any(isinstance(part, Call) for part in first.walk()):
-        return call("broadcast", first, "WIDTH")
-    found = first
-    for other in others:
-        found = call("maximum", found, other)
-    return found
