@@ -85,7 +85,7 @@ SIDE = 60
 say the same again.
 """
 RTOL = 1e-6
-SETTLED = 300
+SETTLED, LONGEST = 300, 1e6
 PRECISION = 5e-3
 LOOSE = 5e-2
 BY_ORBIT = 1e12
@@ -265,7 +265,7 @@ def _own_row(case: Case, values: Sequence[float] | np.ndarray, quick: bool) -> R
     found = []
     for scene in _starts(case, quick):
         begin = time.process_time()
-        one = exponents(scene, values, precision=_bar(quick), periods=1e6, **options)  # type: ignore[arg-type]
+        one = exponents(scene, values, precision=_bar(quick), periods=LONGEST, **options)  # type: ignore[arg-type]
         unit = unit_of_time(scene)
         found.append((time.process_time() - begin, one.time / unit, float(one.exponent[0]), float(one.stderr.max())))
     return _timed(case, "synchain", values, found)
@@ -290,10 +290,11 @@ def _averaged(growths: jitcode.Growths, case: Case, scene: Scene, alpha: float, 
     unit = unit_of_time(scene)
     start = np.array([numbers[0] for numbers in scene.initial.values()])
     batches = Batches(unit, case.block)
-    for growth in growths(alpha, start, case.block * unit, SETTLED // case.block):
-        batches.add(np.array([[growth]]))
-        if batches.due and np.all(batches.error() <= bar):
-            break
+    blocks = growths(alpha, start, case.block * unit, SETTLED // case.block)
+    averaging = Averaging(bar, LONGEST, 0.0, 0, Execution(1, show_progress=False))
+    with averaging.reporter() as reporter:
+        for _ in averaging.rounds(batches, batches.error, reporter):
+            batches.add(np.array([[next(blocks)]]))
     return batches
 
 

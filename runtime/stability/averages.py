@@ -17,18 +17,19 @@ from ..support.progress import Reporter
 
 __all__ = ["SLACK", "TRIED", "Averaging", "Batches", "check_whole", "error_of_steps", "errors_for"]
 
-BATCHES = 64
-"""Most batches that are kept."""
-CHECKED = 8
-"""Fewest batches between two checks of the error."""
-FEWEST, MOST = 3, 16
-"""Fewest degrees of freedom of an error that is known, and most that are used."""
-NARROW = 0.2
-"""Degrees of freedom are NARROW n^(2/3) after n periods.
+BATCHES, TOGETHER = 64, 8
+"""Most batches that are kept, and most that are added in one call: an average listens to Ctrl-C between calls."""
+FEWEST, MOST = 2, 8
+"""Fewest frequencies of an error that is known, and most that are used; each has two degrees of freedom."""
+NARROW = 0.1
+"""Frequencies of an error are NARROW n^(2/3) after n periods.
 
-Lazarus et al. take 0.4 for noise that is correlated over a few samples; chaos is over several periods.
+Lazarus et al. take twice as many for noise that is correlated over a few samples; chaos is over several periods.
 """
-ALL = slice(None)
+FIRST, PART = 128, 0.5
+"""Periods before the first look at the errors, and the part of the length it asks for before the second look."""
+ROUNDING = 100.0 * float(np.finfo(float).eps)
+"""Part of a sum of terms that may be rounding."""
 SLACK, TRIED = 4.0, 8
 """How many times the tolerance the growth over a block is compared with, and over how many blocks."""
 
@@ -72,27 +73,39 @@ class Averaging:
         """Return the reporter of the transients and the longest averages along orbits in turn; its time begins now."""
         return self.execution.reporter(round(orbits * (self.transient + self.periods)), "period")
 
-    def rounds(self, batches: Batches, error: Callable[[], np.ndarray | float], reporter: Reporter) -> Iterator[int]:
-        """Yield how many blocks are left until the average is long or precise enough; one of them at least must be added.
+    def rounds(self, batches: Batches, error: Callable[[], np.ndarray], reporter: Reporter) -> Iterator[int]:
+        """Yield how many blocks remain until the average is long or precise enough; one of them at least must be added.
+
+        Triple sampling: the errors after FIRST periods choose half of the length, those after it the whole. The average
+        ends there if the errors still are below `precision`, and else goes on as long as they ask for. Few looks, and
+        errors that are no smaller than the planned one, leave no chance to end where an error is small by chance.
 
         Parameters
         ----------
         batches : Batches
             The average.
         error : callable
-            Returns the standard errors that must become small, or the largest, or another one that is too large.
+            Returns the standard errors that must become small.
         reporter : Reporter
             Counts the periods.
+
+        References
+        ----------
+        Hall, Ann. Stat. 9, 1229 (1981); the planned error: Stein, Ann. Math. Stat. 16, 243 (1945).
         """
+        part = PART
         while batches.periods < self.periods:
             before = batches.blocks
             yield math.ceil(self.periods / batches.block) - before
             reporter.advance(batches.block * (batches.blocks - before))
-            if batches.due:
-                worst = float(np.max(error(), initial=0.0))
+            # the second look may come where the first one was
+            while batches.due:
+                worst = float(np.fmax.reduce(error(), initial=0.0))
                 if worst <= self.precision:
                     return
-                batches.defer(worst / self.precision if self.precision else math.inf)
+                batches.plan(part * (worst / self.precision) ** 2 if self.precision else math.inf, part == 1.0)
+                part = 1.0
+        batches.planned = None
 
 
 def check_whole(what: str, periods: float) -> float:
@@ -130,11 +143,11 @@ class Batches:
     When BATCHES batches are full, they are joined in pairs, so that memory does not grow.
 
     The error of a mean over a time T is sqrt(S/T), where S is the spectral density of the rate at frequency 0. The
-    cosine transform of the batch means has one value for each of the frequencies 1/(2T), 2/(2T) …; the mean of the
-    lowest few squares estimates S, with one degree of freedom for each. Their number grows as n^(2/3) with n periods, so
-    that the band narrows and correlations of any finite length are seen in the end. Few squares may be small together by
-    chance; Student's quantile makes up for it, so that the mean lies within two errors of the truth as often as a
-    normal variable, in 95 of 100 runs. An error of fewer than FEWEST squares is unknown: it has no variance.
+    periodogram of the batch means at the lowest few of the frequencies 1/T, 2/T … estimates S, with two degrees of freedom
+    for each. Their number grows as n^(2/3) with n periods, so that the band narrows and correlations of any finite length
+    are seen in the end. Few squares may be small together by chance; Student's quantile makes up for it, so that the mean
+    lies within two errors of the truth as often as a normal variable, in 95 of 100 runs. An error of fewer than FEWEST
+    frequencies is unknown: it has no variance.
 
     Parameters
     ----------
@@ -150,16 +163,15 @@ class Batches:
         Growth over each batch; behind the first `count` nothing that counts.
     count : int
         Number of batches, the last of which may be incomplete.
-    enough : int
-        Blocks before the next check of the error.
-    worst : int
-        The strength with the largest error when all were looked at.
+    enough : float
+        Blocks before the next look at the errors.
+    planned : ndarray, shape (starts, m), optional
+        Errors times the root of the blocks at the look that chose the length of the average.
 
     References
     ----------
-    Batches joined in pairs: Flyvbjerg & Petersen, J. Chem. Phys. 91, 461 (1989). Cosine transform and Student's
-    distribution: Müller, J. Econometrics 141, 1331 (2007). Number of frequencies: Lazarus, Lewis, Stock & Watson, J.
-    Bus. Econ. Stat. 36, 541 (2018).
+    Batches joined in pairs: Flyvbjerg & Petersen, J. Chem. Phys. 91, 461 (1989). Averaged periodogram, Student's
+    distribution and number of frequencies: Lazarus, Lewis, Stock & Watson, J. Bus. Econ. Stat. 36, 541 (2018).
     """
 
     unit: float
@@ -168,8 +180,11 @@ class Batches:
     per_batch: int = 1
     sums: np.ndarray = field(default_factory=lambda: np.zeros((BATCHES, 0, 0)))
     count: int = 0
-    enough: int = BATCHES
-    worst: int = 0
+    enough: float = field(init=False)
+    planned: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        self.enough = FIRST / self.block
 
     @property
     def periods(self) -> float:
@@ -182,30 +197,31 @@ class Batches:
         return self.blocks * (self.block * self.unit)
 
     @property
-    def freedom(self) -> int:
-        """Degrees of freedom of the standard errors: NARROW n^(2/3) after n periods, within what the batches allow."""
-        return min(round(NARROW * self.periods ** (2.0 / 3.0)), MOST, self.blocks // self.per_batch - 1)
+    def frequencies(self) -> int:
+        """Number of frequencies that the standard errors are seen at, within what the batches allow."""
+        return min(_frequencies(self.periods), (self.blocks // self.per_batch - 1) // 2)
 
     @property
     def due(self) -> bool:
-        """True if enough new batches are complete for another check of the error."""
-        return self._due(self.blocks, self.count, self.per_batch)
+        """True if enough batches are complete for the next look at the errors."""
+        return self.blocks >= self.enough and self.blocks % self.per_batch == 0
 
-    def _due(self, blocks: int, count: int, per_batch: int) -> bool:
-        return blocks >= self.enough and blocks % per_batch == 0 and count % CHECKED == 0
-
-    def defer(self, ratio: float) -> None:
-        """Put off the next check of the error until a quarter of the time is done that it asks for, or twice the present one.
+    def plan(self, ratio: float, final: bool) -> None:
+        """Put off the next look at the errors until a ratio of the present length is done.
 
         Parameters
         ----------
         ratio : float
-            The largest error over the one that is asked for.
+            Length at the next look over the present one; below 1 the next look comes at once.
+        final : bool
+            True if the average may end there: no error is then smaller than the present one lets expect.
         """
-        self.enough = math.ceil(self.blocks * min(2.0, max(1.0, 0.25 * ratio**2)))
+        if final:
+            self.planned = self.error_by_start() * math.sqrt(self.blocks)
+        self.enough = self.blocks * max(1.0, ratio)
 
     def ahead(self, most: int) -> np.ndarray:
-        """Return the blocks of the batches until the error is due.
+        """Return the blocks of the next batches: TOGETHER of them, or fewer until the next look at the errors.
 
         Parameters
         ----------
@@ -218,13 +234,10 @@ class Batches:
             The last batch may stay incomplete.
         """
         blocks, count, per_batch, parts = self.blocks, self.count, self.per_batch, list[int]()
-        while most > 0 and not (parts and self._due(blocks, count, per_batch)):
+        while most > 0 and len(parts) < TOGETHER and not (parts and blocks >= self.enough):
             count, per_batch = _with_room(count, per_batch)
-            new = min(most, per_batch * (CHECKED - count % CHECKED))  # no check comes before
-            more = -(-new // per_batch)
-            parts += [per_batch] * more
-            parts[-1] -= per_batch * more - new
-            blocks, count, most = blocks + new, count + more, most - new
+            parts.append(min(most, per_batch))
+            blocks, count, most = blocks + parts[-1], count + 1, most - parts[-1]
         return np.array(parts, dtype=np.int64)
 
     def add(self, growth: np.ndarray) -> None:
@@ -268,50 +281,40 @@ class Batches:
         """Return the growth per unit of time, an ndarray of shape (starts, m)."""
         return np.asarray(np.sum(self.sums[: self.count], axis=0) / self.time)
 
-    def error_by_start(self, strengths: slice = ALL) -> np.ndarray:
+    def error_by_start(self) -> np.ndarray:
         """Estimate the standard error of each start: half of what the mean is within in 95 of 100 runs.
-
-        Parameters
-        ----------
-        strengths : slice
-            Which strengths to look at.
 
         Returns
         -------
-        ndarray, shape (starts, strengths)
-            The estimates; inf if the average has fewer than FEWEST degrees of freedom; 45 periods have them.
+        ndarray, shape (starts, m)
+            The estimates; inf if the average has fewer than FEWEST frequencies; 59 periods have them.
         """
-        whole, freedom = self.blocks // self.per_batch, self.freedom
-        sums = self.sums[:whole, :, strengths]
-        if freedom < FEWEST:
+        whole, frequencies = self.blocks // self.per_batch, self.frequencies
+        sums = self.sums[:whole]
+        if frequencies < FEWEST:
             return np.full(sums.shape[1:], np.inf)
-        parts = _waves(freedom, whole) @ sums.reshape(whole, -1)
-        length = self.per_batch * self.block * self.unit
-        spread = np.sqrt(np.einsum("ij,ij->j", parts, parts) / (freedom * whole))
-        return np.asarray(_wide(freedom) / length * spread.reshape(sums.shape[1:]))
+        freedom = 2 * frequencies
+        waves = _waves(frequencies, whole) @ sums.reshape(whole, -1)
+        spread = np.sqrt(np.einsum("ij,ij->j", waves, waves) / (freedom * whole)).reshape(sums.shape[1:])
+        # a sum of equal terms has no scatter, but rounding
+        error = np.maximum(_wide(freedom) * spread, ROUNDING * np.abs(sums).mean(axis=0))
+        error /= self.per_batch * self.block * self.unit
+        return np.asarray(error if self.planned is None else np.maximum(error, self.planned / math.sqrt(self.blocks)))
 
-    def error(self, strengths: slice = ALL) -> np.ndarray:
-        """Return the standard errors (strengths,) of the mean over the starts, as `error_by_start`."""
-        each = self.error_by_start(strengths)
+    def error(self) -> np.ndarray:
+        """Return the standard errors (m,) of the mean over the starts, as `error_by_start`."""
+        each = self.error_by_start()
         return np.asarray(np.sqrt((each**2).sum(axis=0)) / len(each))
-
-    def largest_error(self, enough: float) -> float:
-        """Return the largest standard error, or another one that exceeds `enough`.
-
-        The strength with the largest error the last time is looked at first: a thousand of them take longer than the
-        orbit itself.
-        """
-        first = float(self.error(slice(self.worst, self.worst + 1))[0])
-        if not first <= enough:
-            return first
-        error = self.error()
-        self.worst = int(np.argmax(error))
-        return float(error[self.worst])
 
 
 def _with_room(count: int, per_batch: int) -> tuple[int, int]:
     """How many batches of how many blocks there are when a further one begins: BATCHES are joined in pairs."""
     return (BATCHES // 2, 2 * per_batch) if count == BATCHES else (count, per_batch)
+
+
+def _frequencies(periods: float) -> int:
+    """Number of frequencies that an error is seen at after some periods."""
+    return min(round(NARROW * periods ** (2.0 / 3.0)), MOST)
 
 
 @lru_cache(maxsize=MOST)
@@ -325,12 +328,12 @@ def errors_for(gaussian: float, periods: float) -> float:
 
     The few squares of a short average have the long tails of Student's distribution.
     """
-    freedom = max(1, min(round(NARROW * periods ** (2.0 / 3.0)), MOST))
+    freedom = 2 * max(1, _frequencies(periods))
     return float(stdtrit(freedom, ndtr(gaussian))) / _wide(freedom)
 
 
 @lru_cache(maxsize=8)
 def _waves(count: int, batches: int) -> np.ndarray:
-    """The lowest terms (count, batches) of the orthonormal cosine transform of some batches, but the mean."""
-    angles = np.outer(np.arange(1, count + 1), np.arange(batches) + 0.5) * (math.pi / batches)
-    return math.sqrt(2.0 / batches) * np.cos(angles)
+    """Cosines and sines (2 count, batches) of the lowest frequencies of some batches, orthonormal."""
+    angles = np.outer(np.arange(1, count + 1), np.arange(batches)) * (2.0 * math.pi / batches)
+    return math.sqrt(2.0 / batches) * np.concatenate([np.cos(angles), np.sin(angles)])

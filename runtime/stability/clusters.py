@@ -8,6 +8,7 @@ Source: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -15,11 +16,14 @@ from enum import StrEnum
 import numpy as np
 import xarray as xr
 
+from synchain.codegen.driver.columns import Control
+from synchain.models.dynamics.reduction import without_drive
 from synchain.models.dynamics.variational import Variation, clustered
 from synchain.models.inputs.keywords import warn
 from synchain.models.scenes.scene import Scene
 from synchain.models.symmetries.clusters import Clusters, clusters
 
+from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import with_modes
 from ..cells.keywords import ONE_ORBIT, Given
 from ..results.labelled import Labelled, as_json, dataset
@@ -28,7 +32,8 @@ from ..support.execution import Execution
 from ..support.progress import Hook
 from .averages import Averaging, Batches
 from .exponents import single_cell
-from .orbits import unit_of_time
+from .motion import Turns, rates_of, turns_of
+from .orbits import OF_EXTENT, unit_of_time
 from .variational_integrator import VariationalIntegrator
 
 __all__ = ["BlockVerdict", "ClusterExponents", "cluster_exponents"]
@@ -72,6 +77,8 @@ class ClusterExponents(Labelled):
     approaching : tuple of (int, int)
         Pairs of clusters that have not merged and whose distance still falls; the exponents may be
         those of a coarser state.
+    unit : str
+        Unit in which transient and average are counted.
     """
 
     state: Clusters
@@ -82,6 +89,7 @@ class ClusterExponents(Labelled):
     separation: np.ndarray
     time: float
     approaching: tuple[tuple[int, int], ...] = ()
+    unit: str = ""
 
     @property
     def data(self) -> xr.Dataset:
@@ -114,6 +122,7 @@ class ClusterExponents(Labelled):
             *((f"block {k}", words) for k, words in enumerate(blocks, 1)),
             ("own motion", with_error(self.motion, self.motion_error)),
             *((name, _words(found)) for name, found in pairs if found),
+            *((("unit", self.unit),) if self.unit else ()),
         )
 
     @property
@@ -194,7 +203,7 @@ def cluster_exponents(
     precision : float
         Averaging stops if every standard error is below this value.
     periods : float
-        Longest average, in periods of the drive, or in units of 2 pi if there is none; a whole number.
+        Longest average, in periods of the drive, or in mean return times of undriven motion; a whole number.
     transient : float
         Transient before the average, in the same units.
     rtol : float
@@ -232,9 +241,10 @@ def cluster_exponents(
     averaging = Averaging(precision, periods, transient, seed, Execution(1, None, show_progress, progress))
     scene = single_cell(Given(cluster_exponents, parameters, more, ONE_ORBIT), scene, rtol)
     partition = _of_graph(scene, state)
-    variation, unit = clustered(scene.equations, partition), unit_of_time(scene)
+    variation = clustered(without_drive(scene.equations, scene.parameters), partition)
     reporter = averaging.reporter()
-    integrator = _integrator(scene, partition, variation, averaging.seed)
+    integrator, turns = _integrator(scene, partition, variation, averaging.seed)
+    unit = turns.time
     batches, dropped = Batches(unit), round(averaging.transient)
     gaps: list[np.ndarray] = []
 
@@ -258,7 +268,9 @@ def cluster_exponents(
             f"the exponents may be those of fewer clusters; raise transient = {averaging.transient:g}"
         )
     mean, error, time = batches.mean()[0], np.hypot(batches.error_by_start(), steps)[0], batches.time
-    return ClusterExponents(partition, mean[1:], error[1:], float(mean[0]), float(error[0]), apart, time, approaching)
+    return ClusterExponents(
+        partition, mean[1:], error[1:], float(mean[0]), float(error[0]), apart, time, approaching, str(turns)
+    )
 
 
 def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
@@ -275,23 +287,38 @@ def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
     return partition
 
 
-def _integrator(scene: Scene, partition: Clusters, variation: Variation, seed: int) -> VariationalIntegrator:
-    """Set up the quotient's orbit with one deviation along it and one in each block."""
+def _integrator(
+    scene: Scene, partition: Clusters, variation: Variation, seed: int
+) -> tuple[VariationalIntegrator, Turns]:
+    """Set up the quotient's orbit with one deviation along it and one in each block, and the unit of time of its motion."""
     firsts = [members[0] for members in partition.members]
     state = np.array([[values[i] for values in scene.initial.values() for i in firsts]])
     numbers = np.array([[scene.parameters[name] for name in variation.orbit.parameters]])
     state = with_modes(variation.orbit, state, numbers)
     components = _deviating(variation)
     parts = list(_parts(partition, components))
-    integrator = VariationalIntegrator.make(
-        scene, variation, state, numbers, np.full((1, len(parts)), scene.parameters[scene.strength]), 1
-    )
+    rows = variation, state, numbers, np.full((1, len(parts)), scene.parameters[scene.strength])
+
+    def integrator_of(slow: float) -> VariationalIntegrator:
+        made = VariationalIntegrator.make(scene, *rows, 1, method=chosen_for_modes(scene, *rows, slow))
+        made.slow = slow
+        return made
+
+    turns = Turns(unit_of_time(scene), np.zeros(0), "period of the drive")
+    if not variation.orbit.forced:
+        observer = integrator_of(math.inf)
+        observer.observes = True
+        turns = turns_of(observer, rates_of(variation.orbit, dict(scene.parameters)))
+    integrator = integrator_of(2.0 * math.pi / turns.time)
+    moving = turns.extent[turns.extent > 0.0]
+    least = OF_EXTENT * integrator.control[Control.RTOL] * float(moving.min(initial=np.inf))
+    integrator.control[Control.ATOL] = min(integrator.control[Control.ATOL], least)
     random = np.random.default_rng(seed)
     deviations = np.zeros((1, variation.size, len(parts)))
     for k, part in enumerate(parts):
         deviations[0, part, k] = random.normal(size=part.stop - part.start)
     integrator.set_deviations(deviations)
-    return integrator
+    return integrator, turns
 
 
 def _deviating(variation: Variation) -> int:

@@ -76,7 +76,7 @@ class Exponents(Labelled):
         Exponents per unit of non-dimensional time.
     stderr : ndarray, shape (m,)
         Standard errors. On fixed points and periodic orbits, the difference of two cycles, or of two tolerances;
-        elsewhere half of what the truth lies within in 95 of 100 runs, inf below 45 periods, with the error of the
+        elsewhere half of what the truth lies within in 95 of 100 runs, inf below 59 periods, with the error of the
         steps (docs/accuracy.md).
     time : float
         Time averaged over for each start.
@@ -589,7 +589,7 @@ def average(orbits: Orbits, averaging: Averaging, reporter: Reporter) -> tuple[n
         Time averaged over.
     """
     batches, steps = Batches(orbits.unit, orbits.block), np.zeros(())
-    for left in averaging.rounds(batches, lambda: batches.largest_error(averaging.precision), reporter):
+    for left in averaging.rounds(batches, batches.error, reporter):
         if batches.blocks == 0:
             growths, steps = orbits.tried(left)
             parts = np.ones(len(growths), dtype=np.int64)

@@ -101,7 +101,7 @@ def _returns(orbit: Orbits, rates: Rates, start: np.ndarray) -> Iterator[tuple[f
     def side(state: np.ndarray) -> float:
         return float(normal @ (state[0] - start))
 
-    for before, step, extent in islice(path(integrator, shortest_time(rates, start)), SAMPLES):
+    for before, step, extent in islice(path(integrator, rates, shortest_time(rates, start)), SAMPLES):
         if side(before) < 0.0 <= side(integrator.state):
             yield time + _passage(integrator, before, step, side), np.maximum(extent, NEAR * orbit.extent)
         time += step
@@ -116,7 +116,7 @@ def _integrator(orbit: Orbits, state: np.ndarray) -> VariationalIntegrator:
     """An integrator from a state, which does not warn of short steps: its stretches are too short to have a mean."""
     orbit.state = state[None]
     integrator = orbit.integrator_of(orbit.strengths)
-    integrator.warned = True
+    integrator.observes = True
     return integrator
 
 

@@ -412,7 +412,7 @@ class TangentFrame:
             turns = turns._replace(extent=looked.extent_of_driven(hidden))
         else:
             observed = Observed(integrator_of(variation, math.inf), hidden)
-            observed.integrator.warned = True
+            observed.integrator.observes = True
             turns = turns_of(cast("VariationalIntegrator", observed), rates_of(network.orbit, dict(scene.parameters)))
         variation = variation if sticks else _scaled(variation, turns.extent)
         integrator = integrator_of(variation, 2.0 * math.pi / turns.time)

@@ -5,6 +5,7 @@ All lengths here follow the motion under x -> s x + c for each component, and al
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
@@ -14,6 +15,7 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
+from .averages import ROUNDING
 from .variational_integrator import VariationalIntegrator
 
 __all__ = [
@@ -33,7 +35,12 @@ SHARE = 8
 """Least number of steps of a path from one end of a component to the other."""
 
 FINE = 6
-"""Most steps of the integrator in a step of a path: a spike takes more, so that none hides between two states of a path."""
+"""Most steps of the integrator by which a step of a path exceeds twice those of the one before: a spike between two states of a
+path takes more."""
+
+TURNED, JUMP = 0.5, 32
+"""Least cosine of the angle by which the motion turns in a step of a path, and how many times shorter than the last one a step is
+that may turn by more."""
 
 FIRST = 1e-6
 """First step of a path, relative to the shortest time that the start lets guess."""
@@ -41,14 +48,14 @@ FIRST = 1e-6
 SAMPLES, LOOKED = 4096, 64
 """Most steps of a path in which turns are counted, and steps between two counts."""
 
+CLEAR = 1 / 32
+"""Least rise of a turn, relative to the extent of its component."""
+
 ENOUGH = 12
 """Turns whose mean is taken."""
 
 REST = 1e-9
 """Rates are zero if they are below what they change by over this part of the extent of the motion."""
-
-ROUNDING = 100.0 * float(np.finfo(float).eps)
-"""Part of the size of its terms below which a sum is rounding."""
 
 DIGITS = 1e-10
 """Part of its terms below which a rate is zero, and of its size below which a component stays: steps leave such traces."""
@@ -151,26 +158,37 @@ def rests(rates: Rates, state: np.ndarray, closed: float, extent: np.ndarray) ->
     return bool(np.all(here <= np.nan_to_num(closed * changes) + DIGITS * rates.sizes(state)))
 
 
-def path(integrator: VariationalIntegrator, shortest: float) -> Iterator[tuple[np.ndarray, float, np.ndarray]]:
-    """Advance a single orbit by steps in which no component moves by more than a share of its extent so far, nor there and back.
+def path(
+    integrator: VariationalIntegrator, rates: Rates, shortest: float
+) -> Iterator[tuple[np.ndarray, float, np.ndarray]]:
+    """Advance a single orbit by steps in which no component moves by more than a share of its extent, and the motion does not turn round.
 
     Yield, after each step, the state before it, its length and the extent (p,) so far.  Steps of the shortest length may
-    move by more, as the first ones do.  The absolute tolerance follows the extent.
+    move by more, as the first ones do, and so may turns at a jump of the rates.  The absolute tolerance follows the extent.
     """
     step, low, high = shortest, integrator.state[0].copy(), integrator.state[0].copy()
+    speed, last, few = rates.values(low), shortest, math.inf
     while True:
-        before, taken = integrator.state, integrator.steps
+        before, done = integrator.state, integrator.steps
         integrator.advance(step)
         after = integrator.state[0]
         lower, higher = np.minimum(low, after), np.maximum(high, after)
         moved, extent = SHARE * np.abs(after - before[0]), higher - lower
-        hides = integrator.steps - taken > FINE
-        if step > shortest and (hides or np.any(moved > extent)):
+        taken, velocity = integrator.steps - done, rates.values(after)
+        turned = step * JUMP > last and _cosine(speed, velocity, extent) < TURNED
+        if step > shortest and (taken > 2 * few + FINE or turned or np.any(moved > extent)):
             integrator.state, step = before, max(shortest, 0.5 * step)
             continue
-        low, high = lower, higher
+        low, high, speed, last, few = lower, higher, velocity, step, taken
         yield before, step, extent
         step *= 1.5 if np.all(2.0 * moved <= extent) else 1.0
+
+
+def _cosine(first: np.ndarray, second: np.ndarray, extent: np.ndarray) -> float:
+    """Cosine of the angle between two rates (p,), each component in units of its extent; NaN if one of them is zero."""
+    with np.errstate(all="ignore"):
+        a, b = (np.where(extent > 0.0, rate / extent, 0.0) for rate in (first, second))
+        return float(a @ b / np.sqrt((a @ a) * (b @ b)))
 
 
 def shortest_time(rates: Rates, state: np.ndarray) -> float:
@@ -188,16 +206,15 @@ def shortest_time(rates: Rates, state: np.ndarray) -> float:
 def turns_of(integrator: VariationalIntegrator, rates: Rates) -> Turns:
     """Return the mean return time of an undriven orbit, or the slowest rate of the equilibrium that it comes to.
 
-    A turn of a component is a passage upwards through the middle of its extent, after it has been an eighth of that
-    below and before it is as much above.  The component with most turns counts; they are looked for in the later three
-    quarters of a path.
+    A turn of a component lasts from one top to the next, with a fall and a rise by CLEAR of its extent at least between
+    them.  The component with most turns counts; they are looked for in the later three quarters of a path.
     """
     start = integrator.state[0].copy()
     times, states, time = [0.0], [start], 0.0
     extent = np.zeros_like(start)
     if not rests(rates, start, REST, extent):
         try:
-            for k, (_, step, extent) in enumerate(path(integrator, shortest_time(rates, start)), 1):
+            for k, (_, step, extent) in enumerate(path(integrator, rates, shortest_time(rates, start)), 1):
                 time += step
                 times.append(time)
                 states.append(integrator.state[0])
@@ -222,20 +239,34 @@ def turns_of(integrator: VariationalIntegrator, rates: Rates) -> Turns:
 
 
 def _mean_turn(times: np.ndarray, states: np.ndarray, fewest: int) -> float:
-    """Mean time between upward passages of the component with most of them; 0 if there are fewer than `fewest` turns."""
+    """Mean time between tops of the component with most of them; 0 if there are fewer than `fewest` turns."""
     best, mean = fewest, 0.0
-    low, high = states.min(axis=0), states.max(axis=0)
-    for x, middle, extent in zip(states.T, 0.5 * (low + high), high - low, strict=True):
+    for x in states.T:
+        extent = np.ptp(x)
         if not extent > DIGITS * np.abs(x).max():
             continue
-        side = np.where(x > middle + extent / 8, 1, np.where(x < middle - extent / 8, -1, 0))
-        (clear,) = np.nonzero(side)
-        (up,) = np.nonzero((side[clear[1:]] > 0) & (side[clear[:-1]] < 0))
-        if len(up) > best:
-            after = clear[up + 1]  # the first state that is clearly above
-            passed = [np.interp(middle, x[a : b + 1], times[a : b + 1]) for a, b in zip(clear[up], after, strict=True)]
-            best, mean = len(up), float(passed[-1] - passed[0]) / (len(up) - 1)
+        tops = _tops(x, CLEAR * extent)
+        if len(tops) > best:
+            best, mean = len(tops), float(times[tops[-1]] - times[tops[0]]) / (len(tops) - 1)
     return mean
+
+
+def _tops(x: np.ndarray, least: float) -> list[int]:
+    """Where a component (k,) is largest between a rise and a fall by more than `least`; the first rise comes after a fall."""
+    steps = np.diff(x)
+    extremes = [*(np.flatnonzero(steps[1:] * steps[:-1] <= 0.0) + 1), len(x) - 1]
+    tops, low, high, rising = list[int](), 0, 0, False
+    for k in extremes:
+        if rising and x[k] > x[high]:
+            high = k
+        elif rising and x[high] - x[k] > least:
+            tops += [high] if low else []
+            low, rising = k, False
+        elif not rising and x[k] < x[low]:
+            low = k
+        elif not rising and x[k] - x[low] > least:
+            high, rising = k, True
+    return tops
 
 
 def _slowest(rates: Rates, state: np.ndarray, extent: np.ndarray) -> float:

@@ -170,7 +170,7 @@ class Orbits:
     def _observer(self) -> VariationalIntegrator:
         """An integrator of the first orbit, whose steps are too short and too few to warn of."""
         integrator = self.part([0]).integrator_of(np.zeros_like(self.strengths[:1]))
-        integrator.warned = True
+        integrator.observes = True
         return integrator
 
     @property

@@ -170,6 +170,8 @@ class VariationalIntegrator:
         Steps taken so far.
     warned : bool
         Whether it was said that the steps are short because the modes are stiff.
+    observes : bool
+        Whether stretches are so short that steps begin as long as those before, and that their length is no cause to warn.
     slow : float
         Rate of the motion that steps must follow anyway.
     watch : GrowthWatch
@@ -188,6 +190,7 @@ class VariationalIntegrator:
     workers: int
     steps: int = 0
     warned: bool = False
+    observes: bool = False
     slow: float = 1.0
     watch: GrowthWatch = field(default_factory=GrowthWatch)
 
@@ -429,11 +432,14 @@ class VariationalIntegrator:
             modes = f" of strengths up to {largest:g}" if largest else ""
             raise FloatingPointError(f"the orbit with its deviations{modes} cannot be integrated: {status.message}")
         taken = int(counts[:, 1:3].sum())
-        if self.kernel.origin.method.series and taken:
+        series = self.kernel.origin.method.series
+        if taken and (series or self.observes):
             step = float(panels[0].sum()) * float(spans[:, 1].sum()) / taken
-            self.control[Control.FIRST_STEP] = step  # any scale finds its length, only the first few steps gain
-            self.warned = self.warned or warn_of_stiff_modes(
-                self.variation, end, self.numbers, self.strengths, step, self.slow
+            self.control[Control.FIRST_STEP] = step  # only a hint: step control corrects it within a few steps
+            self.warned = self.warned or (
+                series
+                and not self.observes
+                and warn_of_stiff_modes(self.variation, end, self.numbers, self.strengths, step, self.slow)
             )
         self.state = end
         self.steps += taken

@@ -105,7 +105,7 @@ def test_the_peers_average_ends_at_the_error_bar(bar: float) -> None:
     assert batches.error()[0] <= bar
     assert batches.mean()[0, 0] == pytest.approx(-0.3, abs=4 * bar)
     needed = (1.0 / (4 * unit * bar)) ** 2  # blocks, from the deviation of a mean
-    assert max(64, 0.8 * needed) <= batches.blocks <= max(64, 2.5 * needed)
+    assert max(32, 0.8 * needed) <= batches.blocks <= max(32, 2.5 * needed)  # 128 periods at least
 
 
 def row(program: str, alpha: str, count: int, seconds: float) -> tuple[object, ...]:

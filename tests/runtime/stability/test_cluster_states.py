@@ -182,8 +182,8 @@ def neurons(sigma: float) -> Scene:
 def test_clusters_that_still_approach_each_other_are_said() -> None:
     """Coupling that repels for sigma > 0 brings all neurons together for sigma < 0, at 0.0044 per unit of time."""
     pairs = tuple((a, b) for a in range(4) for b in range(a + 1, 4))
-    with pytest.warns(RuntimeWarning, match=r"clusters that approach each other, 1 and 2; .*; raise transient = 300$"):
-        found = cluster_exponents(neurons(-0.05), (0, 1, 0, 2, 3, 2), periods=100)
+    with pytest.warns(RuntimeWarning, match=r"clusters that approach each other, 1 and 2; .*; raise transient = 168$"):
+        found = cluster_exponents(neurons(-0.05), (0, 1, 0, 2, 3, 2), transient=168, periods=56)
     assert 1e-6 < found.separation.max() < 1e-4
     assert (found.merged, found.approaching) == ((), pairs)
     assert "approaching  1 and 2; 1 and 3" in repr(found)
@@ -193,7 +193,7 @@ def test_clusters_that_still_approach_each_other_are_said() -> None:
 def test_clusters_that_have_merged_or_stay_apart_do_not_approach_each_other() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        merged = cluster_exponents(neurons(-0.05), (0, 1, 0, 2, 3, 2), transient=1000, periods=100)
+        merged = cluster_exponents(neurons(-0.05), (0, 1, 0, 2, 3, 2), transient=560, periods=56)
         apart = cluster_exponents(neurons(0.05), (0, 1, 0, 2, 3, 2), periods=1)
     assert (len(merged.merged), merged.approaching) == (6, ())
     assert (apart.merged, apart.approaching) == (((0, 3), (1, 2)), ())

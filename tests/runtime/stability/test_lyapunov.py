@@ -30,7 +30,7 @@ def lone(name: str, **parameters: float) -> Scene:
 
 @pytest.fixture(scope="module")
 def lorenz() -> Lyapunov:
-    return lyapunov_spectrum(lone("lorenz"), transient=20, periods=250)
+    return lyapunov_spectrum(lone("lorenz"), transient=20, periods=2100)
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,51 @@
+"""The unit of time of undriven motion: its mean return time, whatever its form, its unit and the start."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from synchain.models import Field, Scene
+from synchain.runtime.stability.orbits import Orbits
+
+ROSSLER = Field(
+    {"x": "k*(-y - z)", "y": "k*(x + a*y)", "z": "k*(b + z*(x - c))"},
+    parameters={"a": 0.2, "b": 0.2, "c": 5.7, "k": 1.0},
+)
+LORENZ = Field({"x": "k*10*(y - x)", "y": "k*(x*(28 - z) - y)", "z": "k*(x*y - 8*z/3)"}, parameters={"k": 1.0})
+NEURON = Field(
+    {
+        "x": "k*(y - s**-2*x**3 + 3*x**2/s - z + i*s)",
+        "y": "k*(s - 5*x**2/s - y)",
+        "z": "k*0.006*(4*(x + 1.6*s) - z)",
+    },
+    parameters={"i": 3.2, "s": 1.0, "k": 1.0},
+)
+"""Hindmarsh & Rose, Proc. R. Soc. Lond. B 221, 87 (1984), in units of s."""
+
+
+def unit(node: Field, start: tuple[float, ...], **parameters: float) -> float:
+    initial = dict(zip("xyz", start, strict=True))
+    scene = Scene(node, None, initial=initial, parameters=parameters)
+    return Orbits.make(scene, np.zeros(1), np.array([start]), 1).unit
+
+
+@pytest.mark.parametrize("start", [(1.0, 1.0, 0.1), (3.0, -2.0, 0.5), (0.1, 0.0, 0.0)])
+@pytest.mark.parametrize(("c", "mean"), [(5.7, 5.856), (9.0, 5.790)])
+def test_small_loops_beside_large_ones_are_turns(c: float, mean: float, start: tuple[float, ...]) -> None:
+    """Means over 3000 units by SciPy; loops at c = 9 are as small as 2 % of the extent, and steps from one to the next miss some."""
+    assert unit(ROSSLER, start, c=c) == pytest.approx(mean, rel=0.06)
+
+
+@pytest.mark.parametrize("k", [1e-6, 1.0, 1e6])
+def test_loops_around_two_points_are_turns(k: float) -> None:
+    assert k * unit(LORENZ, (1.0, 1.0, 20.0), k=k) == pytest.approx(0.755, rel=0.05)
+
+
+@pytest.mark.parametrize(("i", "mean"), [(1.5, 73.7), (3.2, 33.7)])
+def test_bursts_of_a_neuron_are_turns_in_any_unit(i: float, mean: float) -> None:
+    """Mean times between spikes over 5000 units by SciPy; a dozen spikes fluctuate."""
+    plain = unit(NEURON, (-1.0, 0.1, 3.0), i=i)
+    assert plain == pytest.approx(mean, rel=0.25)
+    for s, k in ((1.0, 1e-6), (1e-3, 1e6), (1e4, 1.0)):
+        assert k * unit(NEURON, (-s, 0.1 * s, 3.0 * s), i=i, s=s, k=k) == pytest.approx(plain, rel=1e-3)
