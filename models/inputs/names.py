@@ -20,7 +20,7 @@ TAKEN = frozenset(
 """What data of results have under these names already."""
 
 ATTRIBUTES = frozenset(
-    {"belongs_to", "data", "integrators", "kind", "link", "message", "name", "names", "plot", "restore", "save", "scene", "state",
+    {"as_dict", "belongs_to", "data", "integrators", "kind", "link", "message", "name", "names", "plot", "restore", "save", "scene", "state",
      "states", "stepped", "success", "summary"}
 )  # fmt: skip
 """Attributes of results and of their data, which would hide variables of these names."""

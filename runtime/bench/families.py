@@ -27,6 +27,7 @@ from synchain.models.scenes.scene import Scene
 from ..prediction.families import CLOSED, LargestNetwork, largest_network
 from ..prediction.synchronisability import Verdict, verdict
 from ..stability.msf import MSF, msf
+from ..support.error_text import interval_text
 from ..support.execution import Execution
 from ..synchronisation.criterion import Criterion
 from ..synchronisation.threshold import simulate
@@ -90,7 +91,15 @@ def _row(omega: float, contact: str, found: MSF, graph: Topology, quick: bool) -
     said = verdict(found.open_ranges, graph, found.uncertainties)
     sigma = sigma_of(found, said)
     window = "; ".join(f"{w.low:.4g} … {w.high:.4g}" for w in said.windows) or "none"
-    told = (_ranges(found), f"{graph.name}({graph.n})", said.ratio_value, said.allowed, said.answer, window, sigma)
+    told = (
+        interval_text(found.intervals, found.uncertainties),
+        f"{graph.name}({graph.n})",
+        said.ratio_value,
+        said.allowed,
+        said.answer,
+        window,
+        sigma,
+    )
     return (omega, contact, *told, *_simulated(found.scene, graph, sigma, quick))
 
 
@@ -119,22 +128,13 @@ def _simulated(scene: Scene, graph: Topology, sigma: float, quick: bool) -> tupl
     return float(found.share[0]), float(found.error[0])
 
 
-def _ranges(found: MSF) -> str:
-    """The stable ranges of alpha with the errors of their ends."""
-    ends = [
-        " … ".join(f"{end:.5g}" + (f" ± {error:.1g}" if error else "") for end, error in zip(pair, errors, strict=True))
-        for pair, errors in zip(found.intervals, found.uncertainties, strict=True)
-    ]
-    return "; ".join(ends) or "none"
-
-
 def summary(rows: Sequence[Sequence[object]]) -> str:
     """A second table in Markdown: the largest size of each family, from the same exponents."""
     made = []
     for omega, contact in dict.fromkeys((float(str(row[0])), str(row[1])) for row in rows):
         found = function_of(omega, contact)
         sizes = [_size(largest_network(name, found.open_ranges, found.uncertainties)) for name in sorted(CLOSED)]
-        made.append((f"{omega:g}", contact, _ranges(found), *sizes))
+        made.append((f"{omega:g}", contact, interval_text(found.intervals, found.uncertainties), *sizes))
     names = [f"{name} (dimension)" if name == "hypercube" else name for name in sorted(CLOSED)]
     return markdown(("omega", "contact", "ranges of alpha", *names), made)
 

@@ -23,7 +23,8 @@ from synchain.models.inputs.names import expect_free
 from synchain.models.scenes.scene import Scene
 
 from ..cells.keywords import Given
-from ..results.labelled import Labelled, dataset, ends_of
+from ..results.labelled import Labelled, dataset
+from ..support.error_text import range_text
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .bifurcations import Bifurcation, bifurcations_at_end, bifurcations_between
@@ -130,7 +131,7 @@ class Branch(Labelled):
                 "orbits",
                 f"{len(self.orbits)} of {self.orbits[0].periods} drive periods, {stable} stable for one oscillator",
             ),
-            (self.name, ends_of(self.values)),
+            (self.name, range_text(self.values)),
             ("bifurcations", turns or "none"),
             *((("lost", f"at {numbers(self.lost)}"),) if self.lost else ()),
         )

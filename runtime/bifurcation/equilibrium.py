@@ -31,7 +31,7 @@ from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
 from ..cells.keywords import Given
-from ..results.labelled import Labelled, dataset
+from ..results.labelled import Labelled, dataset, scene_text
 from ..results.labels import STATE, States
 from ..sweeps.start import Start, started
 from .linearised import Linearised
@@ -151,7 +151,7 @@ class Equilibrium(Labelled):
         largest = [f"{value:.6g}" for value in self.eigenvalues[:6]]
         moves = [f"{name} of all nodes, at the speed {v:.6g}" for name, v in zip(self.shifts, self.speeds, strict=True)]
         return (
-            ("scene", repr(self.scene)),
+            ("scene", scene_text(self.scene)),
             ("state", ", ".join([*shown, *(["…"] if len(names) > len(shown) else [])])),
             ("eigenvalues", ", ".join([*largest, *(["…"] if len(self.eigenvalues) > len(largest) else [])])),
             ("verdict", self.verdict),

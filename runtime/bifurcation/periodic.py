@@ -27,7 +27,7 @@ from synchain.models.mechanics.friction import SLIP
 from synchain.models.scenes.scene import Scene
 
 from ..cells.keywords import Given
-from ..results.labelled import Labelled, dataset
+from ..results.labelled import Labelled, dataset, scene_text
 from ..stability.attractor import RETURN, cycle_propagators
 from ..stability.exponents import coupled_cell, single_cell
 from ..stability.limit_cycle import limit_cycle
@@ -141,7 +141,7 @@ class PeriodicOrbit(Labelled):
         state = ", ".join(f"{name} = {x:.10g}" for name, x in zip(self.components, self.state, strict=True))
         sizes = ", ".join(f"{value:.6g}" for value in self.multipliers)
         return (
-            ("scene", repr(self.scene)),
+            ("scene", scene_text(self.scene)),
             ("orbit", "of one oscillator, alone or in step with the others"),
             ("period", f"{self.period:.12g} units of time") if self.free else ("drive periods", str(self.periods)),
             ("state", state),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from ..console.outcome import FINE, Failed, sentence
+from ..support.error_text import counted
 
 SUMMARY = "show, empty or fill the folder of compiled kernels"
 EXAMPLES = ("synchain cache info", "synchain cache clear", "synchain cache warm")
@@ -33,7 +34,7 @@ def execute(arguments: Namespace) -> int:
             print(f"size     {_size(int(info['bytes']))}")
         else:
             counts = clear()
-            found = " and ".join(_counted(counts[f"{kind}s"], kind) for kind in ("kernel", "driver"))
+            found = " and ".join(counted(counts[f"{kind}s"], kind) for kind in ("kernel", "driver"))
             print(f"deleted {found} from {info['folder']}")
     except PermissionError as problem:
         raise Failed(f"the kernel cache cannot be read or emptied: {sentence(problem)}") from problem
@@ -59,7 +60,3 @@ def _size(count: int) -> str:
     if count < 1000:
         return f"{count} bytes"
     return f"{count / 1e3:.0f} kB" if count < 1e6 else f"{count / 1e6:.1f} MB"
-
-
-def _counted(number: int, kind: str) -> str:
-    return f"{number} {kind}{'s' * (number != 1)}"

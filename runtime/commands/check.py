@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 from ..console.outcome import FAILED, FINE, WrongUse, discard_output, print_json, wrong_use
+from ..support.error_text import counted
 
 if TYPE_CHECKING:
     from synchain.models.claims.verdict import Verdict
@@ -84,7 +85,7 @@ def _print(arguments: Namespace, judged: Sequence[Sequence[Verdict]], undecided:
     else:
         for verdicts in judged:
             print("\n".join(_report(verdicts)))
-        print(f"{len(judged)} claim{'s' * (len(judged) != 1)}: {len(judged) - wrong} right, {wrong} wrong")
+        print(f"{counted(len(judged), 'claim')}: {len(judged) - wrong} right, {wrong} wrong")
     if sys.stdout is not None:
         sys.stdout.flush()
 

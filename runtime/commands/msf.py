@@ -28,8 +28,7 @@ if TYPE_CHECKING:
 
     from synchain.models.scenes.scene import Scene
 
-    from ..console.line_report import LineReport
-    from ..console.plane_report import PlaneReport
+    from ..stability.msf import MSF, Plane
 
 Rows: TypeAlias = "dict[str, tuple[float, ...]]"
 """The values of parameters that are axes."""
@@ -76,54 +75,58 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Compute the function on a line or over a plane; print what it says, and write files where
-    asked to.
-    """
+    """Compute the function on a line or over a plane, print its summary, write its files."""
+    import numpy as np
+
+    from ..stability.msf import msf, plane
     from ..support.files import output_folder
 
     with wrong_use():
         numbers, rows = _parted(arguments)
-        scene, network = _scene(arguments, numbers, rows)
-        _check(scene, network, arguments, rows)
+        scene = _scene(arguments, numbers, rows)
+        alpha = np.linspace(*LINE) if arguments.alpha is None else np.array(arguments.alpha)
+        complex_modes = _check(scene, arguments, rows, alpha)
         target = None if arguments.out is None else output_folder(arguments.out)
-    warn(scene.warnings)
+    warn([*scene.warnings, *complex_modes])
     options: dict[str, Any] = {"workers": arguments.workers, "show_progress": None}
     effort = {name: getattr(arguments, name) for name in ("precision", "periods", "starts")}
     options.update({name: value for name, value in effort.items() if value is not None})
+    found: MSF | Plane
     try:
-        report = _report(scene, network, arguments, rows, options)
+        if rows:
+            with wrong_use():  # what cannot be an axis is known when the orbits and the modes of the network are
+                found = plane(scene, None if len(rows) == 2 else alpha, parameters=rows, **options)
+        elif arguments.beta is not None:
+            found = plane(scene, alpha, np.array(arguments.beta), **options)
+        else:
+            found = msf(scene, alpha, **options)
     except FloatingPointError as problem:
         raise Failed(sentence(problem)) from problem
-    _tell(report, arguments.json, [] if target is None else report.write(target))
+    files = [] if target is None else _write(found, target)
+    if arguments.json:
+        print_json({**found.as_dict(), **({"files": list(map(str, files))} if files else {})})
+    else:
+        print(found, *(f"  {file}" for file in files), sep="\n")
     return FINE
 
 
-def _report(
-    scene: Scene, network: bool, arguments: Namespace, rows: Rows, options: dict[str, Any]
-) -> LineReport | PlaneReport:
-    """The exponents on a line, over complex strengths, or over the axes of --set."""
-    import numpy as np
+def _write(found: MSF | Plane, folder: Path) -> list[Path]:
+    """Write numbers and plot, over complex strengths with the rays of modes; return both paths."""
+    from ..figures.plane import draw_rays
+    from ..figures.style import context
+    from ..figures.tables import Table, as_csv
+    from ..stability.msf import Plane
+    from ..support.files import whole_file, write_text
 
-    from ..console.line_report import LineReport, complex_modes
-    from ..console.plane_report import PlaneReport
-    from ..stability.msf import msf, plane
-
-    alpha = _alpha(arguments)
-    if rows:
-        with wrong_use():  # what cannot be an axis is known when the orbits and the modes of the network are
-            return PlaneReport(plane(scene, None if len(rows) == 2 else alpha, parameters=rows, **options), False)
-    if arguments.beta is not None:
-        return PlaneReport(plane(scene, alpha, np.array(arguments.beta), **options), network)
-    if network:
-        warn(complex_modes(scene.topology, float(alpha[-1])))
-    return LineReport(msf(scene, alpha, **options), network)
-
-
-def _alpha(arguments: Namespace) -> np.ndarray:
-    """The strengths of --alpha, or those that it has by default."""
-    import numpy as np
-
-    return np.linspace(*LINE) if arguments.alpha is None else np.array(arguments.alpha)
+    paths = [folder / f"{type(found).__name__.lower()}{ending}" for ending in (".csv", ".png")]
+    numbers = found.data[["exponent", "stderr"]].to_dataframe().reset_index()
+    write_text(paths[0], as_csv(Table(tuple(numbers.columns), tuple(numbers.itertuples(index=False, name=None)))))
+    with context(), whole_file(paths[1]) as temporary:
+        axes, scene = found.plot(), found.scene
+        if isinstance(found, Plane) and found.has_windows:
+            draw_rays(axes, found, scene.parameters[scene.strength] or None)
+        axes.figure.figure.savefig(temporary, dpi=200)
+    return paths
 
 
 def _parted(arguments: Namespace) -> tuple[dict[str, float], Rows]:
@@ -145,20 +148,8 @@ def _parted(arguments: Namespace) -> tuple[dict[str, float], Rows]:
     return numbers, rows
 
 
-def _tell(report: LineReport | PlaneReport, json: bool, files: list[Path]) -> None:
-    """Print the report and the files' names, as text or as one JSON value."""
-    if json:
-        print_json({**report.as_dict(), **({"files": [str(file) for file in files]} if files else {})})
-        return
-    print(report.text())
-    for file in files:
-        print(f"  {file}")
-
-
-def _scene(arguments: Namespace, numbers: dict[str, float], rows: Rows) -> tuple[Scene, bool]:
-    """The oscillator with its network and its parameters, and whether it has a network; without
-    one, two oscillators stand for it.
-    """
+def _scene(arguments: Namespace, numbers: dict[str, float], rows: Rows) -> Scene:
+    """The oscillator with its network and its parameters; a lone oscillator without a network."""
     from synchain.models.graphs.families import topology
     from synchain.models.scenes.file import load_scene
 
@@ -171,40 +162,47 @@ def _scene(arguments: Namespace, numbers: dict[str, float], rows: Rows) -> tuple
             f"{network.name}({network.n}) has no links; expected a network of at least two coupled oscillators"
         )
     given = {**numbers, **{name: values[0] for name, values in rows.items()}}
-    if scene is not None and scene.links is not None and network is None and len(rows) == 2:
-        return with_numbers(scene_on(None, scene, arguments, given), _known(scene, given)), True
-    if network is None and scene is not None and scene.topology.link_count:
-        network = scene.topology
-    stand_in = scene.topology if scene is not None else topology("chain", 2)
-    placed = scene_on(network or stand_in, scene, arguments, given)
-    return with_numbers(placed, _known(placed, given)), network is not None
-
-
-def _known(scene: Scene, given: dict[str, float]) -> dict[str, float]:
-    """The values of --set; ValueError for a name that is no parameter of the scene."""
+    layered = scene is not None and scene.links is not None and len(rows) == 2
+    if network is None and not layered:
+        network = topology("chain", 1) if scene is None else scene.topology
+    placed = scene_on(network, scene, arguments, given)
     for name in given:
-        if not scene.takes(name):
-            raise WrongUse(f"--set: {scene.model.unknown(name, 'parameter', tuple(scene.parameters))}")
-    return given
+        if not placed.takes(name):
+            raise WrongUse(f"--set: {placed.model.unknown(name, 'parameter', tuple(placed.parameters))}")
+    return with_numbers(placed, given)
 
 
-def _check(scene: Scene, network: bool, arguments: Namespace, rows: Rows) -> None:
-    """Raise ValueError for what cannot be computed, before anything is."""
+def _check(scene: Scene, arguments: Namespace, rows: Rows, alpha: np.ndarray) -> list[str]:
+    """Raise ValueError for what cannot be computed; return warnings of complex eigenvalues."""
     import numpy as np
 
-    from ..console.line_report import complex_modes
+    from ..prediction.modes import transversal_modes
     from ..prediction.synchronisability import windows
     from ..stability.orbits import Orbits, pair_of
 
-    axes = (*rows.values(), *(() if len(rows) == 2 else (_alpha(arguments), arguments.beta or (0.0,))))
+    axes = (*rows.values(), *(() if len(rows) == 2 else (alpha, arguments.beta or (0.0,))))
     if math.prod(map(len, axes)) > POINTS:
         raise WrongUse(f"the axes make more than {POINTS} points; expected fewer: take coarser grids")
     if scene.coupling is None and not scene.model.linked:
         raise WrongUse("the scene has no coupling, by which modes differ; expected one, e.g. coupling = 'spring'")
     if rows:
-        return
-    one = scene if scene.topology.link_count else pair_of(scene)
+        return []
+    graph = scene.topology
+    one = scene if graph.link_count else pair_of(scene)
     strength = np.zeros(1, dtype=float if arguments.beta is None else complex)
     Orbits.make(one, strength, np.zeros((1, len(one.components))), None)
-    if network and not complex_modes(scene.topology, 1.0):
-        windows((), scene.topology)
+    if not graph.link_count:
+        return []
+    gammas = [complex(mode.eigenvalue.value) for mode in transversal_modes(graph)]
+    if not any(gamma.imag for gamma in gammas):
+        windows((), graph)
+        return []
+    top = max((abs(g.imag / g.real) for g in gammas if g.imag and g.real), default=1.0) * float(alpha[-1])
+    return (
+        []
+        if arguments.beta is not None
+        else [
+            f"{graph.name}({graph.n}) has complex eigenvalues, for which a line of alpha says nothing; "
+            f"no windows of sigma are given: add --beta, e.g. --beta 0:{top:.2g}:61"
+        ]
+    )

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from ..console.arguments import add_scene, add_set, add_workers, folder, settings, tolerance
 from ..console.outcome import FAILED, FINE, Failed, WrongUse, sentence, warn, wrong_use
+from ..support.error_text import counted
 from ..support.files import output_folder, whole_file
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
     from ..cells.reduce import Reduction
     from ..sweeps.errors import SweepFailed, SweepInterrupted
-    from ..sweeps.stream import Streamed
 
 SUMMARY = "run a scene; write its results (netCDF or Zarr) and a figure"
 EXAMPLES = (
@@ -91,6 +91,7 @@ def execute(arguments: Namespace) -> int:
     """Explain the scene where asked to; run it to a file, draw, and say how the cells ended."""
     from ..cells.kernels import kernel
     from ..cells.reduce import explain, reduce_scene
+    from ..support.status import Status
     from ..sweeps.errors import SweepFailed, SweepInterrupted
     from ..sweeps.stream import claim, stream
 
@@ -101,7 +102,7 @@ def execute(arguments: Namespace) -> int:
         skip = reduce_scene(scene, not arguments.no_skip)
         name = Path(arguments.scene).stem if arguments.scene.endswith(".toml") else arguments.scene
         if arguments.explain:
-            print(f"{name}: {_count(scene.cells, 'cell')} of {_count(scene.n, 'oscillator')}\n{explain(skip)}")
+            print(f"{name}: {counted(scene.cells, 'cell')} of {counted(scene.n, 'oscillator')}\n{explain(skip)}")
         target = None if arguments.out is None else _target(Path(arguments.out, f"{name}.{arguments.format}"))
         _check(skip, arguments)
         if target is None:
@@ -118,7 +119,10 @@ def execute(arguments: Namespace) -> int:
             done = stream(scene, target, reduce=skip, workers=arguments.workers, executor=executor, **options)
         except (SweepInterrupted, SweepFailed) as stop:
             raise _stopped(stop, target, arguments) from None
-    _summary(name, scene, done, target)
+    print(done)
+    for status, count in done.progress.statuses.items():
+        if status != Status.FINISHED:
+            print(f"synchain run: {counted(count, 'cell')}: {status.message}", file=sys.stderr)
     print(f"  {_drawn(target)}")
     return FINE if done.success else FAILED
 
@@ -284,30 +288,3 @@ def _draw(target: Path) -> Path:
         with whole_file(path) as temporary:
             axes.figure.figure.savefig(temporary, dpi=150)
     return path
-
-
-def _summary(name: str, scene: Scene, done: Streamed, target: Path) -> None:
-    """Say how many cells ended how, failures on stderr, and where the result is."""
-    from ..support.status import Status
-
-    progress = done.progress
-    times = f"{progress.running:.1f} s, after {progress.compiling:.1f} s for the kernel"
-    earlier = f", {progress.kept} of them in an earlier run" if progress.kept else ""
-    print(f"{name}: {_count(scene.cells, 'cell')} of {_count(scene.n, 'oscillator')} in {times}{earlier}")
-    for status, count in progress.statuses.items():
-        words = f"{_count(count, 'cell')}: {status.message}"
-        if status == Status.FINISHED:
-            print(f"  {words}")
-        else:
-            print(f"synchain run: {words}", file=sys.stderr)
-    early = done.verdicts.get("ended early")
-    if early is not None:
-        print(f"  {_count(early, 'cell')} of these ended early, certain to stay synchronous")
-    for verdict, count in done.verdicts.items():
-        if verdict != "ended early":
-            print(f"  {_count(count, 'cell')} {verdict}")
-    print(f"  {target}")
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'s' * (number != 1)}"

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..console.arguments import above_zero, add_scene, add_workers, positive, spaced
-from ..console.drive import drive_words
 from ..console.network import add_network, named_network, scene_on
 from ..console.outcome import FINE, WrongUse, print_json, warn, wrong_use
 
 if TYPE_CHECKING:
     from synchain.models.scenes.scene import Scene
 
-    from ..prediction.intervals import Interval
     from ..synchronisation.criterion import Criterion
-    from ..synchronisation.threshold import Thresholds
 
 SUMMARY = (
     "measure for which coupling a network synchronises, beside the exponents of its modes and the two-oscillator probe"
@@ -60,7 +55,7 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Print the synchronous ranges as a table or as JSON."""
+    """Print the summary of the synchronous ranges, or JSON."""
     from ..cells.kernels import kernel_source
     from ..synchronisation.hidden_modes import hidden_modes
     from ..synchronisation.threshold import check_probe, default_grid, thresholds
@@ -74,8 +69,7 @@ def execute(arguments: Namespace) -> int:
         criterion = _criterion(arguments)
         sigma = arguments.sigma or default_grid(scene.topology.spectrum, 0.005 if arguments.quick else 0.0025)
         scene.replace(axes={scene.strength: sigma})
-    said = (*scene.warnings, *hidden_modes(scene))
-    warn(said)
+    warn((*scene.warnings, *hidden_modes(scene)))
     result = thresholds(
         scene,
         sigma=sigma,
@@ -83,11 +77,10 @@ def execute(arguments: Namespace) -> int:
         criterion=criterion,
         workers=arguments.workers,
     )
-    warn(result.warnings[len(said) :])
     if arguments.json:
         print_json(result.as_dict())
     else:
-        print(report(result))
+        print(result)
     return FINE
 
 
@@ -112,67 +105,3 @@ def _scene(arguments: Namespace) -> Scene:
             raise WrongUse("expected a network, e.g. --n 4, --matrix FILE or a SCENE")
         network = scene.topology
     return scene_on(network, scene, arguments)
-
-
-def report(result: Thresholds) -> str:
-    """The ranges as a table."""
-    scene = result.scene
-    grid, alpha = ((float(x[0]), float(x[-1])) for x in (result.direct.x, result.probe.x))
-    steepest = max(abs(value) for value in scene.topology.spectrum.values)
-    reach = (*grid, *(end / steepest for end in alpha))
-    unit, criterion = "drive periods" if scene.time_unit == "period" else "units of time", result.criterion
-    rows = [
-        (f"{scene.strength}, negative exponents", _with_errors(result, reach)),
-        (f"{scene.strength}, simulated", _written(result.direct.intervals, grid)),
-        (f"{scene.strength}, predicted by the probe", _written(result.predicted, reach)),
-        *_wu_chua(result),
-        (f"alpha = {scene.strength} |gamma|, probe", _written(result.probe.intervals, alpha)),
-    ]
-    wide = max(len(name) for name, _ in rows)
-    return "\n".join(
-        [
-            f"{scene.topology.name}({scene.n}){drive_words(scene)}: where all oscillators synchronise",
-            *(f"  {name:<{wide}}  {ranges}" for name, ranges in rows),
-            f"synchronous, simulated and probe: mean error below {criterion.tolerance:.3g} over {criterion.window:.6g} "
-            f"{unit} after {criterion.transient:.6g}, from at least half of {criterion.starts} starts",
-            *(["...: the grid ends here, the range may go on"] if any("..." in ranges for _, ranges in rows) else []),
-        ]
-    )
-
-
-def _wu_chua(result: Thresholds) -> list[tuple[str, str]]:
-    """The conjecture's row, if a range of the probe holds no coupling and ends inside the grid."""
-    from synchain.models.graphs.families import topology
-
-    from ..synchronisation.threshold import wu_chua
-
-    high = next((high for low, high in result.probe.intervals if low <= 0.0 < high), math.inf)
-    if high >= result.probe.x[-1]:
-        return []
-    end = wu_chua(high / 2.0, topology("chain", 2).spectrum, result.scene.topology.spectrum)
-    return [(f"{result.scene.strength}, Wu-Chua conjecture", _written([(0.0, end)], (0.0, math.inf)))]
-
-
-def _with_errors(result: Thresholds, grid: Sequence[float]) -> str:
-    """The windows of the exponents with the errors of their ends, or why there are none."""
-    found = result.exponents
-    if found.absent:
-        return found.words
-    words = [_interval(ends, grid, errors) for ends, errors in zip(found.intervals, found.errors, strict=True)]
-    return ", ".join(words) or "none"
-
-
-def _written(ranges: Sequence[Interval], grid: Sequence[float]) -> str:
-    return ", ".join(_interval(ends, grid) for ends in ranges) or "none"
-
-
-def _interval(ends: Interval, grid: Sequence[float], errors: Interval = (0.0, 0.0)) -> str:
-    """A range with the errors of its ends, and dots where it ends with the grid, pairs of ends.
-
-    A range from 0 up begins where couplings do.
-    """
-    words = []
-    for end, error, lasts in zip(ends, errors, (grid[::2] if ends[0] else (), grid[1::2]), strict=True):
-        onwards = any(math.isclose(end, last, rel_tol=1e-12) for last in lasts)
-        words.append(f"{end:z.4f}{'...' if onwards else f' ± {error:.1g}' if error else ''}")
-    return f"[{', '.join(words)}]"

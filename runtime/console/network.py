@@ -7,7 +7,6 @@ from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from .arguments import above_zero, whole
-from .drive import at_frequency
 from .outcome import WrongUse, warn
 
 if TYPE_CHECKING:
@@ -21,9 +20,7 @@ FILES = ("matrix", "edges", "graphml")
 
 
 def add_network(parser: ArgumentParser) -> None:
-    """Add --n, --topology and --matrix, which `named_network` reads, and --omega, which `scene_on`
-    reads.
-    """
+    """Add --n, --topology, --matrix for `named_network` and --omega for `scene_on`."""
     parser.add_argument("--n", metavar="N", type=whole, help="number of oscillators (default: the scene's)")
     parser.add_argument(
         "--topology",
@@ -37,27 +34,7 @@ def add_network(parser: ArgumentParser) -> None:
 
 
 def named_network(arguments: Namespace, scene: Scene | None) -> Topology | None:
-    """Return the network of --matrix, or of --topology and --n.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        Holds `matrix`, `topology` and `n`, each None if it is not given.
-    scene : Scene or None
-        Supplies a family or a size that is not given.
-
-    Returns
-    -------
-    Topology or None
-        None if no argument names a network.
-
-    Raises
-    ------
-    WrongUse
-        If the arguments contradict one another, or if the size is missing.
-    ValueError, OSError
-        If the file or the family cannot make the network.
-    """
+    """Return the network of --matrix, or of --topology and --n."""
     from synchain.models.graphs.families import names, topology
     from synchain.models.graphs.topology import read_matrix
 
@@ -77,30 +54,7 @@ def named_network(arguments: Namespace, scene: Scene | None) -> Topology | None:
 
 
 def scene_on(network: Topology | None, scene: Scene | None, arguments: Namespace, given: Collection[str] = ()) -> Scene:
-    """Return one cell of a scene on a network, without records, at the frequency of --omega.
-
-    Parameters
-    ----------
-    network : Topology or None
-        The network of the returned scene; None for that of a scene with several layers of links.
-    scene : Scene or None
-        The oscillators and their parameters; the default scene if None.
-    arguments : Namespace
-        Holds `omega`, a frequency or None, and `scene`, the user's word for the scene or None.
-    given : collection of str
-        The parameters that --set gives.
-
-    Returns
-    -------
-    Scene
-        The scene without axes.
-
-    Raises
-    ------
-    WrongUse
-        If the scene has draws, several layers of links, or no single frequency of the drive that
-        fits `omega`, see `at_frequency`, or if it sweeps more than this frequency and the strength.
-    """
+    """Return one cell at the frequency of --omega, on a network or on the scene's own links."""
     from synchain.models.scenes.scene import Scene
 
     if scene is None:
@@ -112,7 +66,7 @@ def scene_on(network: Topology | None, scene: Scene | None, arguments: Namespace
             f"found {len(scene.links)} layers of links in the scene; expected one; their strengths can be the axes "
             "of a map: synchain msf SCENE --set NAME=LO:HI:N NAME=LO:HI:N"
         )
-    frequency = at_frequency(scene, arguments.omega, arguments.scene, given)
+    frequency = _at_frequency(scene, arguments.omega, arguments.scene, given)
     chosen = {*frequency, *scene.strengths, *given} if network is not None else {*frequency, *given}
     moved = [axis.name for axis in scene.axes if axis.name not in chosen]
     if moved:
@@ -124,25 +78,37 @@ def scene_on(network: Topology | None, scene: Scene | None, arguments: Namespace
         names = ", ".join(lists)
         warn([f"{arguments.scene} lists initial {names} of {scene.n} oscillators; {network.n} start by default"])
         settings["initial"] = {name: at for name, at in start.items() if name not in lists}
-    return scene.replace(**settings, axes=(), zipped=False, continuation="none", record=None, **frequency)
+    # the title may name another frequency or network
+    return scene.replace(**settings, title="", axes=(), zipped=False, continuation="none", record=None, **frequency)
+
+
+def _at_frequency(scene: Scene, omega: float | None, where: str | None, given: Collection[str]) -> dict[str, float]:
+    """Return the parameter that --omega sets, with its value; empty without --omega."""
+    frequency = scene.drive.frequency
+    names = set() if frequency is None else {s.name for s in frequency.free_symbols}
+    if names & set(given):
+        if omega is not None:
+            raise WrongUse(f"found --omega beside --set {' '.join(sorted(names & set(given)))}; expected one of them")
+        return {}
+    if omega is not None:
+        if frequency is None:
+            raise WrongUse(f"--omega: the oscillator of {where} {scene.drive.problem}; leave it out")
+        if not frequency.is_Symbol:
+            raise WrongUse(
+                f"--omega: the drive of {where} has the frequency {frequency}; expected one that is a parameter; "
+                "leave it out"
+            )
+        return {frequency.name: omega}
+    if where is None:
+        raise WrongUse("expected a frequency of the drive, e.g. --omega 1.4, or a SCENE")
+    swept = next((axis.name for axis in scene.axes if axis.name in names), None)
+    if swept is not None:
+        raise WrongUse(f"{where} sweeps {swept}; expected one frequency of the drive, e.g. --omega 1.4")
+    return {}
 
 
 def named_graph(arguments: Namespace) -> Topology:
-    """Return the graph of a family and a size, of a product, or of one of the files.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        Holds `topology` (a family or the text of a product), `n`, `option`, the names of the files
-        `matrix`, `edges` and `graphml`, and `directed`.
-
-    Raises
-    ------
-    WrongUse
-        If the arguments name no graph or more than one.
-    ValueError, OSError
-        If the graph cannot be made or read.
-    """
+    """Return the graph of a family and a size, of a product, or of one of the files."""
     files = [key for key in FILES if getattr(arguments, key) is not None]
     if arguments.directed and files != ["edges"]:
         raise WrongUse("found --directed without --edges; GraphML files and matrices say themselves what is one-way")

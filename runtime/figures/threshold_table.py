@@ -13,6 +13,7 @@ from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 
 from ..prediction.intervals import Interval, intersect
+from ..support.error_text import with_error
 from ..synchronisation.criterion import Criterion
 from ..synchronisation.exponent_windows import ExponentWindows
 from . import projection
@@ -109,7 +110,7 @@ class Row:
         if not self.measured and not self.predicted:
             words.append("none predicted, none measured")
         if self.windows.absent:
-            words.append(f"exponents {self.windows.words}")
+            words.append(f"exponents {self.windows.text()}")
         if self.failed:
             words.append(failures(self.failed, self.cells))
         return "; ".join(words)
@@ -246,7 +247,7 @@ def _with_errors(row: Row, ends: tuple[float | None, float | None]) -> str:
     if row.windows.absent:
         return "not computed"
     pairs = zip(ends, row.errors, strict=True)
-    words = [f"{end:z.4f}" + (f" ± {error:.1g}" if error else "") for end, error in pairs if end is not None]
+    words = [with_error(end, error or 0.0) for end, error in pairs if end is not None]
     return f"[{', '.join(words)}]" if words else "none"
 
 

@@ -10,7 +10,7 @@ from synchain.models.graphs.topology import Topology
 from synchain.models.spectra.eigenvalue import Eigenvalue
 from synchain.models.spectra.jordan import geometric_multiplicity
 
-__all__ = ["NetworkMode", "has_loose_parts", "transversal_modes"]
+__all__ = ["NetworkMode", "defective_rows", "has_loose_parts", "transversal_modes"]
 
 VECTOR_LIMIT = 2000
 """Most nodes for which an eigenvector is computed, since the matrix is dense."""
@@ -91,6 +91,12 @@ def transversal_modes(graph: Topology) -> tuple[NetworkMode, ...]:
             modes.append(NetworkMode(graph, number, eigenvalue))
         number += eigenvalue.multiplicity
     return tuple(modes)
+
+
+def defective_rows(graph: Topology) -> list[tuple[str, str]]:
+    """Return a row for each eigenvalue that lacks eigenvectors: how errors grow if its exponent is lambda."""
+    powers = [(e, e.blocks[0][0] - 1 if e.blocks else 0) for e in graph.spectrum.defective]
+    return [("defective", f"gamma = {e}: growth t{f'^{p}' if p > 1 else ''} e^(lambda t)") for e, p in powers]
 
 
 def has_loose_parts(graph: Topology) -> bool:

@@ -30,6 +30,7 @@ import sympy as sp
 from synchain.models.graphs.topology import Topology
 from synchain.models.spectra.order import compare
 
+from ..support.error_text import interval_text
 from .intervals import find
 from .modes import NetworkMode, has_loose_parts, transversal_modes
 from .stable_ranges import StableRange, exact_ranges, widen
@@ -53,6 +54,7 @@ class Answer(StrEnum):
     NO = "no"
     UNDECIDED = "undecided within the error"
     YES = "yes"
+    GRID_ENDS = "undecided: the function is negative where the grid of alpha ends"
 
 
 Region = Callable[[np.ndarray], np.ndarray]
@@ -86,6 +88,20 @@ class Window:
     low_mode: NetworkMode | None
     high_mode: NetworkMode | None
 
+    def text(self, errors: bool = True) -> str:
+        """Return the ends, with their errors, and the modes lost there; dots follow an end of a grid, where none is lost."""
+        ends = ((self.low, self.low_mode, "below"), (self.high, self.high_mode, "above"))
+        cut = [sigma for sigma, mode, _ in ends if mode is None and 0.0 < abs(sigma) < math.inf]
+        lost = [f"lost {side}: gamma = {mode.eigenvalue}" for _, mode, side in ends if mode is not None]
+        spread = [(self.low_error, self.high_error)] if errors else None
+        return "; ".join([interval_text([(self.low, self.high)], spread, cut), *lost])
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the window for JSON; a mode is its exact eigenvalue, or None."""
+        names = ("low", "high", "low_error", "high_error")
+        modes = {name: _exact(getattr(self, name)) for name in ("low_mode", "high_mode")}
+        return {**{name: getattr(self, name) for name in names}, **modes}
+
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
@@ -114,6 +130,31 @@ class Verdict:
     slowest: NetworkMode | None
     fastest: NetworkMode | None
     windows: tuple[Window, ...]
+
+    @property
+    def text(self) -> str:
+        """The answer, with the eigenratio and the one that the ranges allow."""
+        if math.isnan(self.ratio_value):
+            return str(self.answer)
+        exact = "" if self.ratio is None or self.ratio.is_Rational else f"{self.ratio} = "
+        allowed = "any" if self.allowed == math.inf else f"{self.allowed:.6g}" if self.allowed > 0 else "none"
+        return f"{self.answer} (largest over smallest |gamma|: {exact}{self.ratio_value:.6g}; allowed: {allowed})"
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the verdict for JSON, without its windows; a mode is its exact eigenvalue."""
+        return {
+            "answer": str(self.answer),
+            "ratio": None if self.ratio is None else str(self.ratio),
+            "ratio_value": self.ratio_value,
+            "allowed": self.allowed,
+            "slowest": _exact(self.slowest),
+            "fastest": _exact(self.fastest),
+        }
+
+
+def _exact(mode: NetworkMode | None) -> str | None:
+    """The eigenvalue of a mode as exact text."""
+    return None if mode is None else mode.eigenvalue.text
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -20,14 +21,12 @@ if TYPE_CHECKING:
 
     from synchain.models.scenes.scene import Scene
 
-__all__ = ["KIND", "VALUE", "Labelled", "dataset", "ends_of", "words_of"]
-
 KIND, VALUE = "kind", "value"
 """Attributes of a file: the class of the value, and its fields as JSON."""
 
 
 class Labelled(Shown):
-    """A frozen value with `data`, `plot`, `save` and a summary.
+    """A frozen value with `data`, `summary`, `as_dict`, `plot` and `save`.
 
     A subclass is a frozen dataclass that defines `data` and `summary`.  Its fields are written and
     read by `synchain.runtime.results.codec`, so a subclass has no reader or writer of its own.
@@ -43,7 +42,18 @@ class Labelled(Shown):
 
         @property
         def summary(self) -> tuple[tuple[str, str], ...]:
-            """Names and words of what a reader wants to know first."""
+            """Names and words of what a reader wants to know first; `print` and the command line show them."""
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the value for JSON.
+
+        Returns
+        -------
+        dict
+            By default the variables and coordinates of `data`.  Numbers that are not finite are None, complex ones
+            [real part, imaginary part].
+        """
+        return as_json({str(name): variable.values for name, variable in self.data.variables.items()})
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the value.
@@ -122,27 +132,32 @@ def dataset(
     return xr.Dataset(made, coordinates, about)
 
 
-def ends_of(values: np.ndarray) -> str:
-    """Return the smallest and the largest number in words."""
-    low, high = (f"{x:.6g}" for x in (values.min(), values.max()))
-    return f"from {low} to {high}"
+def as_json(table: Mapping[str, object]) -> dict[str, object]:
+    """Return a table in JSON types: None for numbers that are not finite, [real part, imaginary part] for complex ones."""
+    return {name: _json(value) for name, value in table.items()}
 
 
-def words_of(
-    intervals: Sequence[tuple[float, float]],
-    errors: Sequence[tuple[float, float]] | None = None,
-    most: int = 8,
-    beyond: Collection[float] = (),
-) -> str:
-    """Return intervals in words, with the errors of their ends if they are known; dots at ends `beyond` which they may go on."""
+def _json(value: object) -> object:
+    if isinstance(value, np.ndarray | np.generic):
+        return _json(value.tolist())
+    if isinstance(value, Mapping):
+        return as_json(value)
+    if isinstance(value, list | tuple):
+        return [_json(item) for item in value]
+    if isinstance(value, complex):
+        return [_json(value.real), _json(value.imag)]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
-    def end(x: float, error: float) -> str:
-        known = error > np.finfo(float).eps * abs(x)  # no error of rounding
-        return f"{x:z.4f}" + ("..." if x in beyond else f" ± {error:.1g}" if known else "")
 
-    found = []
-    for k, ends in enumerate(intervals[:most]):
-        spread = errors[k] if errors else (0.0, 0.0)
-        found.append(" … ".join(map(end, ends, spread)))
-    more = [f"{len(intervals) - most} more"] if len(intervals) > most else []
-    return "; ".join([*found, *more]) or "none"
+def scene_text(scene: Scene, axes: Collection[str] = ()) -> str:
+    """Return a scene and the frequency of its drive for a summary, unless one of `axes` changes the frequency."""
+    drive = drive_text(scene, axes)
+    return f"{scene!r}, {drive}" if drive else repr(scene)
+
+
+def drive_text(scene: Scene, axes: Collection[str] = ()) -> str:
+    """Return the frequency of a drive, such as "omega = 1.4"; empty without one, or if one of `axes` changes it."""
+    frequency, value = scene.drive.frequency, scene.angular_frequency
+    if frequency is None or value is None or {s.name for s in frequency.free_symbols} & set(axes):
+        return ""
+    return f"{frequency} = {value:g}" if frequency.free_symbols else f"drive frequency {value:g}"

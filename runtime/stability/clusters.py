@@ -26,7 +26,8 @@ from synchain.models.symmetries.clusters import Clusters, clusters
 from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import with_modes
 from ..cells.keywords import ONE_ORBIT, Given
-from ..results.labelled import Labelled, dataset
+from ..results.labelled import Labelled, as_json, dataset
+from ..support.error_text import with_error
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .averages import Averaging, Batches
@@ -110,7 +111,7 @@ class ClusterExponents(Labelled):
         """The clusters, each block with its verdict, what has merged and what is about to."""
         members = [", ".join(str(i + 1) for i in nodes) for nodes in self.state.members]
         blocks = [
-            f"{verdict} ({exponent:z.4f} ± {error:.1g}): clusters {', '.join(str(c + 1) for c in block.clusters)}"
+            f"{verdict} ({with_error(exponent, error)}): clusters {', '.join(str(c + 1) for c in block.clusters)}"
             for block, exponent, error, verdict in zip(
                 self.state.blocks, self.exponent, self.stderr, self.verdicts, strict=True
             )
@@ -119,7 +120,7 @@ class ClusterExponents(Labelled):
         return (
             ("clusters", "; ".join(f"{k}: {nodes}" for k, nodes in enumerate(members, 1))),
             *((f"block {k}", words) for k, words in enumerate(blocks, 1)),
-            ("own motion", f"{self.motion:z.4f} ± {self.motion_error:.1g}"),
+            ("own motion", with_error(self.motion, self.motion_error)),
             *((name, _words(found)) for name, found in pairs if found),
             *((("unit", self.unit),) if self.unit else ()),
         )
@@ -153,24 +154,27 @@ class ClusterExponents(Labelled):
             merged, approaching, time.
         """
         rows = zip(self.state.blocks, self.exponent, self.stderr, self.verdicts, strict=True)
-        return {
-            "classes": list(self.state.classes),
-            "blocks": [
-                {
-                    "clusters": list(block.clusters),
-                    "nodes": sorted({i for pair in block.pairs for i in pair}),
-                    "exponent": float(exponent),
-                    "stderr": float(error),
-                    "verdict": verdict.value,
-                }
-                for block, exponent, error, verdict in rows
-            ],
-            "motion": self.motion,
-            "motion_stderr": self.motion_error,
-            "merged": [list(pair) for pair in self.merged],
-            "approaching": [list(pair) for pair in self.approaching],
-            "time": self.time,
-        }
+        blocks = [
+            {
+                "clusters": block.clusters,
+                "nodes": sorted({i for pair in block.pairs for i in pair}),
+                "exponent": exponent,
+                "stderr": error,
+                "verdict": verdict.value,
+            }
+            for block, exponent, error, verdict in rows
+        ]
+        return as_json(
+            {
+                "classes": self.state.classes,
+                "blocks": blocks,
+                "motion": self.motion,
+                "motion_stderr": self.motion_error,
+                "merged": self.merged,
+                "approaching": self.approaching,
+                "time": self.time,
+            }
+        )
 
 
 def cluster_exponents(

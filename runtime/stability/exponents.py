@@ -12,6 +12,8 @@ Strelcyn, Meccanica 15, 9 (1980).
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -25,9 +27,10 @@ from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import ONE_CELL, ORBITS, Given
 from ..prediction.intervals import Interval
-from ..results.labelled import Labelled, dataset, ends_of, words_of
+from ..results.labelled import Labelled, dataset
 from ..support.arrays import numbers
 from ..support.arrays import row as row_of
+from ..support.error_text import interval_text, range_text
 from ..support.execution import Execution
 from ..support.progress import Hook, Reporter
 from .attractor import Attractor, Motion, find_attractor
@@ -124,22 +127,26 @@ class Exponents(Labelled):
         """Strengths, stable ranges, motion and the length of the average."""
         stable: tuple[tuple[str, str], ...] = ()
         if self.on_a_line:
-            stable = (("negative for alpha", words_of(self.intervals, beyond=self.ends)),)
+            stable = (("negative for alpha", self.negative),)
         return (
-            ("strengths", f"{len(self.alpha)}, {ends_of(self.alpha)}"),
+            ("strengths", f"{len(self.alpha)}, {range_text(self.alpha)}"),
             *stable,
-            ("smallest, largest", f"{self.exponent.min():z.4f}, {self.exponent.max():z.4f}"),
-            ("motion", ", ".join(dict.fromkeys(a.kind for a in self.attractors))),
-            ("average", f"{self.time:.6g} units of time for each of {self.starts} starts"),
+            *exponent_rows(self.exponent, self.stderr, [a.kind for a in self.attractors], self.time),
             *self.accuracy,
         )
+
+    @property
+    def negative(self) -> str:
+        """Ranges of alpha with a negative exponent as text; dots where one ends with the grid."""
+        errors = [(low, high) for (_, low), (_, high) in self.ranges]
+        return interval_text(self.intervals, errors, (self.alpha.min(), self.alpha.max()))
 
     @property
     def accuracy(self) -> tuple[tuple[str, str], ...]:
         """The largest error beside the one that was asked for, undecided signs, and the unit of time, for a summary."""
         rows: list[tuple[str, str]] = []
         if self.undecided:
-            rows.append(("undecided for alpha", words_of(self.undecided)))
+            rows.append(("undecided for alpha", interval_text(self.undecided)))
         worst = float(np.max(self.stderr, initial=0.0))
         if self.precision and worst > self.precision:
             rows.append(("errors", f"up to {worst:.2g}; precision = {self.precision:g} was not reached; raise periods"))
@@ -151,11 +158,6 @@ class Exponents(Labelled):
     def on_a_line(self) -> bool:
         """True if the strengths are real, one for each mode."""
         return self.alpha.ndim == 1 and not np.iscomplexobj(self.alpha)
-
-    @property
-    def ends(self) -> frozenset[float]:
-        """The ends of the grid but 0, beyond which a range may go on."""
-        return frozenset({float(self.alpha.min()), float(self.alpha.max())} - {0.0})
 
     @property
     def averaged(self) -> int:
@@ -222,6 +224,22 @@ class Exponents(Labelled):
                 changed.append((first, last))
                 stable[inside] = gap
         return y, stable, tuple(changed)
+
+
+def exponent_rows(
+    exponent: np.ndarray, stderr: np.ndarray, attractors: Sequence[str], time: float, period: float | None = None
+) -> tuple[tuple[str, str], ...]:
+    """Return the rows of a summary on the sizes of exponents, on the attractor of each start, and on the average."""
+    kinds = (f"{kind} ({n} of {len(attractors)} starts)" for kind, n in Counter(attractors).most_common())
+    drive = f" ({time / period:.0f} drive periods)" if period else ""
+    length = f"{time:.6g} units of time{drive} for each start" if time else "not needed"
+    worst = float(np.max(stderr, initial=0.0))
+    error = f"largest standard error {worst:.2g}" if math.isfinite(worst) else "too short for an error: raise periods"
+    return (
+        ("smallest, largest", f"{exponent.min():z.4f}, {exponent.max():z.4f} per unit of time"),
+        ("attractor", "; ".join(kinds)),
+        ("average", f"{length}, {error}"),
+    )
 
 
 def _uncertain(y: np.ndarray, error: np.ndarray) -> list[tuple[int, int]]:

@@ -35,6 +35,7 @@ from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import with_modes
 from ..cells.keywords import ONE_ORBIT, Given
 from ..results.labelled import Labelled, dataset
+from ..support.error_text import with_error
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .averages import SLACK, TRIED, Averaging, Batches, error_of_steps
@@ -139,8 +140,7 @@ class Lyapunov(Labelled):
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
         """The exponents with errors, their sum, the dimension and the length of the average."""
-        known = zip(self.exponent[:8], self.stderr[:8], strict=True)
-        shown = [f"{x:.5g}" if math.isnan(e) else f"{x:.5g} ± {e:.1g}" for x, e in known]
+        shown = [with_error(x, e) for x, e in zip(self.exponent[:8], self.stderr[:8], strict=True)]
         low, high = self.dimension_range
         dimension = f"{self.dimension:.4g}, from {low:.4g} to {high:.4g} within two errors"
         lost = int((~self.resolved).sum())
@@ -148,7 +148,7 @@ class Lyapunov(Labelled):
         return (
             ("exponents", ", ".join([*shown, *(["…"] if len(self.exponent) > len(shown) else [])])),
             *((("not followed", fast),) if lost and len(self.exponent) == self.components else ()),
-            ("divergence", f"{self.divergence:.5g} ± {self.divergence_error:.1g}"),
+            ("divergence", with_error(self.divergence, self.divergence_error)),
             ("Kaplan-Yorke dimension", f"above {len(self.exponent)}" if math.isnan(self.dimension) else dimension),
             ("average", f"{self.time:.6g} units of time"),
             *((("unit", self.unit),) if self.unit else ()),

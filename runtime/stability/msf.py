@@ -25,13 +25,16 @@ from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import ORBITS, Given, with_numbers
 from ..prediction.intervals import Interval
-from ..prediction.synchronisability import Window, windows
-from ..results.labelled import Labelled, dataset, ends_of, words_of
+from ..prediction.modes import defective_rows
+from ..prediction.modes import transversal_modes as network_modes
+from ..prediction.synchronisability import Answer, Verdict, Window, verdict, windows, windows_complex
+from ..results.labelled import Labelled, as_json, dataset, drive_text, scene_text
 from ..support.arrays import row
+from ..support.error_text import range_text
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .averages import Averaging
-from .exponents import Exponents, along, coupled_cell, orbits_of, transversal, with_partner
+from .exponents import Exponents, along, coupled_cell, exponent_rows, orbits_of, transversal, with_partner
 from .network import SharedOrbit, shared_orbits, still_strengths, transversal_modes
 
 __all__ = ["MSF", "Plane", "StabilityClass", "classify", "msf", "plane"]
@@ -39,8 +42,16 @@ __all__ = ["MSF", "Plane", "StabilityClass", "classify", "msf", "plane"]
 STRENGTHS = ("alpha", "beta")
 """What the axes of a plane are called that are strengths of a mode; a parameter may have such a name too."""
 
-NAMES = frozenset({"attractor", "attractors", "contours", "exponent", "mode", "modes", "number", "start", "stderr"})
+NAMES = frozenset(
+    {"attractor", "attractors", "contours", "exponent", "mode", "modes", "number", "start", "stderr", "windows"}
+)
 """What a plane has under these names beside those of all results."""
+
+MOST_MODES = 6
+"""Modes that a summary lists."""
+
+LOOKED_UP = 2001
+"""Values of sigma at which the modes of a network are looked up in a plane."""
 
 FINE = 1001
 """Least number of strengths at which the function is computed; ends of ranges are interpolated."""
@@ -101,22 +112,23 @@ class MSF(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """Scene, class, stable ranges of alpha and of sigma, motion."""
-        known = self._known_windows
-        lost = [pair for w in known for pair in ((w.low, w.low_mode), (w.high, w.high_mode))]
-        beyond = [x for x, mode in lost if mode is None and x]
-        alpha = words_of(self.intervals, self.errors, beyond=self.fine.ends)
-        sigma = self._without_windows or words_of([(w.low, w.high) for w in known], beyond=beyond)
-        return (
-            ("scene", repr(self.scene)),
-            ("class", f"{self.kind}{f' ({self.gamma})' if self.gamma else ''}, for alpha {ends_of(self.fine.alpha)}"),
-            ("negative for alpha", alpha),
-            ("sigma", sigma),
-            *((("...", "the grid of alpha ends here, the range may go on"),) if "..." in alpha + sigma else ()),
-            ("motion", ", ".join(dict.fromkeys(self.attractors))),
-            ("average", f"{self.fine.time:.6g} units of time for each of {self.fine.starts} starts"),
-            *self.fine.accuracy,
-        )
+        """Scene, class, stable ranges of alpha and of sigma, whether the network can synchronise, sizes, motion."""
+        fine, graph = self.fine, self.scene.topology
+        sigma = [self._without_windows] if self._without_windows else [window.text() for window in self.windows]
+        possible = [] if self._without_windows else [("possible", self.verdict.text), *defective_rows(graph)]
+        rows = [
+            ("scene", scene_text(self.scene)),
+            ("strength", f"alpha = -sigma gamma{_coupling(self.scene)}, {range_text(fine.alpha)}"),
+            ("class", f"{self.kind}{f' ({self.gamma})' if self.gamma else ''}"),
+            ("negative for alpha", fine.negative),
+            *[("sigma", text) for text in sigma or ["none"]],
+            *possible,
+            *exponent_rows(fine.exponent, fine.stderr, self.attractors, fine.time, self.scene.period),
+            *fine.accuracy,
+        ]
+        if any("..." in text for _, text in rows):
+            rows.append(("...", "the grid of alpha ends here, the range may go on"))
+        return tuple(rows)
 
     @property
     def _known_windows(self) -> tuple[Window, ...]:
@@ -129,8 +141,22 @@ class MSF(Labelled):
         graph = self.scene.topology
         if not graph.link_count:
             return "not known: no links"
-        real = graph.undirected or not any(isinstance(value, complex) for value in graph.spectrum.values)
-        return "" if real else f"not known: {graph.name}({graph.n}) has complex eigenvalues, which need `plane`"
+        if not graph.undirected and any(isinstance(value, complex) for value in graph.spectrum.values):
+            return f"not known: {graph.name}({graph.n}) has complex eigenvalues, which need `plane`"
+        try:
+            windows((), graph)
+        except ValueError as problem:
+            return f"not known: {problem}"
+        return ""
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the network can synchronise for some sigma > 0; GRID_ENDS if a longer line of alpha may change the answer."""
+        found = verdict(self.intervals, self.scene.topology, self.errors)
+        first, last = self.fine.alpha[[0, -1]]
+        longer = [(0.0 if a == first else a, math.inf if b == last else b) for a, b in self.intervals]
+        same = verdict(longer, self.scene.topology, self.errors).answer == found.answer
+        return found if same else replace(found, answer=Answer.GRID_ENDS)
 
     @property
     def exponent(self) -> np.ndarray:
@@ -227,19 +253,25 @@ class MSF(Labelled):
         Returns
         -------
         dict
-            alpha, exponent, stderr, intervals, uncertainties, class, attractors, time and starts.
+            alpha, exponent, stderr, intervals, uncertainties, class, attractors, time, starts, windows and verdict; windows and
+            verdict are None without links and for complex eigenvalues.
         """
-        return {
-            "alpha": self.alpha.tolist(),
-            "exponent": self.exponent.tolist(),
-            "stderr": self.stderr.tolist(),
-            "intervals": [list(interval) for interval in self.intervals],
-            "uncertainties": [list(pair) for pair in self.uncertainties],
-            "class": self.kind.value,
-            "attractors": list(self.attractors),
-            "time": self.fine.time,
-            "starts": self.fine.starts,
-        }
+        judged = not self._without_windows
+        return as_json(
+            {
+                "alpha": self.alpha,
+                "exponent": self.exponent,
+                "stderr": self.stderr,
+                "intervals": self.intervals,
+                "uncertainties": self.uncertainties,
+                "class": self.kind.value,
+                "attractors": self.attractors,
+                "time": self.fine.time,
+                "starts": self.fine.starts,
+                "windows": [window.as_dict() for window in self.windows] if judged else None,
+                "verdict": self.verdict.as_dict() if judged else None,
+            }
+        )
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -303,15 +335,72 @@ class Plane(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """Scene, grid, share of stable strengths, motion."""
-        axes = zip(self.names, (self.across, self.up), strict=True)
-        return (
-            ("scene", repr(self.scene)),
-            ("grid", ", ".join(f"{len(values)} {self._called(name)} {ends_of(values)}" for name, values in axes)),
-            ("negative", f"{float((self.exponent < 0).mean()):.1%} of the grid"),
-            ("motion", ", ".join(dict.fromkeys(map(str, self.attractors.flat)))),
-            ("average", f"{self.time:.6g} units of time for each start"),
-        )
+        """Scene, grid, zero contours, stable points, the largest modes, stable ranges of sigma, sizes, motion."""
+        axes, stable = list(zip(self.names, (self.across, self.up), strict=True)), self.exponent < 0
+        strength = "alpha = -sigma gamma" if self.parameters else "alpha + i beta = -sigma gamma"
+        modes = f"the largest of {len(self.modes)} transversal modes of {self.scene.n} nodes"
+        contours = [
+            ", ".join(
+                f"{name} {part.min():z.4f} … {part.max():z.4f}" for name, part in zip(self.names, line.T, strict=True)
+            )
+            for line in self.contours
+        ]
+        rows = [
+            ("scene", scene_text(self.scene, self.parameters)),
+            ("exponents", modes if self.modes else f"{strength}{_coupling(self.scene)}"),
+            ("grid", ", ".join(f"{len(values)} {self._called(name)} {range_text(values)}" for name, values in axes)),
+            *[("zero contour", text) for text in contours or ["none"]],
+            ("negative", f"at {stable.sum()} of {stable.size} points, {stable.mean():.1%}"),
+        ]
+        if self.mode is not None:  # the most frequent modes first
+            counts = np.bincount(self.mode.ravel(), minlength=len(self.modes))
+            gammas = [text if ", " in text else text[1:-1] for text in self.modes]  # of one layer without brackets
+            most = [k for k in np.argsort(-counts, kind="stable")[:MOST_MODES] if counts[k]]
+            rows += [("largest for", f"gamma = {gammas[k]}, at {counts[k]} of {stable.size} points") for k in most]
+        if self.has_windows:
+            rows += [("sigma", window.text(errors=False)) for window in self.windows] or [
+                ("sigma", "none in this plane")
+            ]
+            rows += defective_rows(self.scene.topology)
+        attractors = self.attractors.reshape(-1).tolist()
+        period = self.scene.period if drive_text(self.scene, self.parameters) else None
+        rows += exponent_rows(self.exponent, self.stderr, attractors, self.time, period)
+        if any("..." in text for _, text in rows):
+            rows.append(("...", "a mode leaves the plane here, the range may go on"))
+        return tuple(rows)
+
+    @property
+    def has_windows(self) -> bool:
+        """True if the plane is that of complex strengths and the scene has a network."""
+        return not self.parameters and self.scene.topology.link_count > 0
+
+    @property
+    def windows(self) -> tuple[Window, ...]:
+        """Ranges of sigma in which every mode of the scene's network is stable, if both axes are strengths.
+
+        The exponent is interpolated between the strengths; beyond the plane it counts as unstable.
+        """
+        from scipy.interpolate import RegularGridInterpolator
+
+        # rays -sigma gamma of the modes, up to the first that leaves the plane, less a rounding error
+        graph, units = self.scene.topology, [-complex(m.eigenvalue.value) for m in network_modes(self.scene.topology)]
+        beta = max(-self.up[0], self.up[-1]) if self.up[0] < 0 else self.up[-1]
+        across = [
+            (self.across[-1] if unit.real > 0 else -self.across[0]) / abs(unit.real) for unit in units if unit.real
+        ]
+        limits = [*across, *(beta / abs(unit.imag) for unit in units if unit.imag)]
+        top = (1 - 1e-12) * float(min(limits, default=0.0))
+        if top <= 0.0:
+            return ()
+        size = np.max(np.abs(self.exponent[np.isfinite(self.exponent)]), initial=1e-300)
+        value = np.nan_to_num(self.exponent, nan=size, posinf=size, neginf=-size)
+        at = RegularGridInterpolator((self.across, self.up), value, bounds_error=False, fill_value=math.inf)
+
+        def stable(points: np.ndarray) -> np.ndarray:
+            pairs = [at(np.stack([points.real, sign * points.imag], axis=1)) for sign in (1.0, -1.0)]
+            return np.asarray(np.minimum(*pairs) < 0)
+
+        return windows_complex(stable, graph, np.linspace(0.0, top, LOOKED_UP), 1e-6 * top).windows
 
     def _called(self, name: str) -> str:
         """What an axis is."""
@@ -337,20 +426,23 @@ class Plane(Labelled):
         Returns
         -------
         dict
-            Both axes by their names, exponent and stderr (rows of the first), contours, attractors and time; over two
-            parameters "modes" and "mode" too.
+            Both axes by their names, exponent and stderr (rows of the first), contours, attractors, time and windows, None
+            unless both axes are strengths and the scene has links; over two parameters "modes" and "mode" too.
         """
-        of_modes = {} if self.mode is None else {"modes": list(self.modes), "mode": self.mode.tolist()}
-        return {
-            self.names[0]: self.across.tolist(),
-            self.names[1]: self.up.tolist(),
-            "exponent": self.exponent.tolist(),
-            "stderr": self.stderr.tolist(),
-            "contours": [line.tolist() for line in self.contours],
-            "attractors": self.motion.tolist(),
-            "time": self.time,
-            **of_modes,
-        }
+        of_modes = {} if self.mode is None else {"modes": self.modes, "mode": self.mode}
+        return as_json(
+            {
+                self.names[0]: self.across,
+                self.names[1]: self.up,
+                "exponent": self.exponent,
+                "stderr": self.stderr,
+                "contours": self.contours,
+                "attractors": self.motion,
+                "time": self.time,
+                **of_modes,
+                "windows": [window.as_dict() for window in self.windows] if self.has_windows else None,
+            }
+        )
 
 
 def msf(
@@ -500,6 +592,11 @@ def plane(
     half_plane = transversal(given, scene, (across[:, None] + 1j * heights).reshape(-1), starts, rtol, averaging)
     table, error = (row.reshape(len(across), -1)[:, place] for row in (half_plane.exponent, half_plane.stderr))
     return Plane(known, across, up, table, error, _kinds(half_plane)[None, None], half_plane.time)
+
+
+def _coupling(scene: Scene) -> str:
+    """Return the coupling of a scene with a single one, also of a lone oscillator, for a summary."""
+    return f" (coupling: {scene.coupling})" if scene.coupling else ""
 
 
 def _check_parameters(cell: Scene, rows: Mapping[str, np.ndarray], beside_alpha: bool) -> None:

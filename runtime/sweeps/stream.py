@@ -28,6 +28,7 @@ from ..results.labels import alike, changed, scene_of
 from ..results.partial import certificate_of, describe_sweep, layout_of, partial_path, verdicts_in, write_result
 from ..results.result import Result, read_result
 from ..results.store import NO_ROOM, attributes_of, form_of, opened
+from ..support.error_text import counted
 from ..support.execution import Execution
 from ..support.files import drop_leftovers, understood
 from ..support.progress import Hook, Progress, Reporter
@@ -49,6 +50,7 @@ class Streamed(Labelled):
     """
 
     path: Path
+    scene: Scene
     progress: Progress
     verdicts: Mapping[str, int]
 
@@ -64,10 +66,18 @@ class Streamed(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """File, cells and verdicts."""
-        ended = "; ".join(f"{count} cells: {status.message}" for status, count in self.progress.statuses.items())
-        verdicts = "; ".join(f"{count} {words}" for words, count in self.verdicts.items())
-        return ("file", str(self.path)), ("cells", ended), *([("verdicts", verdicts)] if verdicts else [])
+        """Scene, file, time, how cells ended, verdicts."""
+        done, scene = self.progress, self.scene
+        times = f"{done.running:.1f} s, after {done.compiling:.1f} s for the kernel"
+        earlier = f", {done.kept} of them in an earlier run" if done.kept else ""
+        verdicts, certain = self.verdicts.items(), ", certain to stay synchronous"
+        return (
+            ("scene", scene.title or repr(scene)),
+            ("cells", f"{counted(scene.cells, 'cell')} of {counted(scene.n, 'oscillator')} in {times}{earlier}"),
+            *(("ended", f"{counted(count, 'cell')}: {status.message}") for status, count in done.statuses.items()),
+            *(("verdict", f"{counted(n, 'cell')} {name}{certain * (name == 'ended early')}") for name, n in verdicts),
+            ("file", str(self.path)),
+        )
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         """Write the result to another file (see `Result.save`); all of it is read into memory."""
@@ -150,7 +160,7 @@ def stream(
                 f"{os.fspath(path)} holds the result of this scene already; give resume (--resume) to take it, or "
                 "overwrite (--overwrite) to run it again"
             )
-        return _finished(Path(path), reporter)
+        return _finished(Path(path), scene, reporter)
     partial = partial_path(path)
     if state == "continue":
         certificate = certificate_of(BlockLog.describe(partial))
@@ -172,7 +182,7 @@ def stream(
         log.close()
         reporter.close()
     partial.unlink()
-    return Streamed(Path(path), reporter.now, verdicts)
+    return Streamed(Path(path), scene, reporter.now, verdicts)
 
 
 def claim(
@@ -254,13 +264,13 @@ def _check_same(
         raise ValueError(f"{path} was run {certificate} a certificate (certified, --certify); {again}")
 
 
-def _finished(path: Path, reporter: Reporter) -> Streamed:
+def _finished(path: Path, scene: Scene, reporter: Reporter) -> Streamed:
     """The run whose result is there already."""
     with understood(path), opened(path) as file:
         reporter.start(tally(file["status"].values.ravel()))
         verdicts = verdicts_in(file)
     reporter.close()
-    return Streamed(path, reporter.now, verdicts)
+    return Streamed(path, scene, reporter.now, verdicts)
 
 
 @dataclass(slots=True)

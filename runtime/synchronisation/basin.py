@@ -26,9 +26,10 @@ from synchain.models.scenes.scene import Scene, a_scene
 from ..cells.keywords import Given
 from ..cells.plan import Planner
 from ..cells.reduce import Reduction, reduce_scene
-from ..results.labelled import Labelled, dataset
+from ..results.labelled import Labelled, dataset, scene_text
 from ..results.labels import STATE, States
 from ..support.arrays import row
+from ..support.error_text import with_error
 from ..support.execution import Execution
 from ..support.progress import Hook
 from ..support.status import Status
@@ -113,9 +114,9 @@ class Basin(Labelled):
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Scene, shares with their interval, how cells ended, and the criterion."""
         return (
-            ("scene", repr(self.scene)),
+            ("scene", scene_text(self.scene)),
             *(("starts", words) for words in self._findings()),
-            ("synchronous", self.criterion.words),
+            ("synchronous", self.criterion.text(self.scene)),
         )
 
     @property
@@ -179,7 +180,7 @@ class Basin(Labelled):
         first = f"{self.count} of {self.samples} starts synchronised: {self.share:.4g}"
         others = (f"{name}: {share:.4g}" for name, share in self.shares.items() if share and name != Fate.SYNCHRONOUS)
         sure = f"with confidence {self.confidence:g} {low:.4g} … {high:.4g}"
-        known = [] if math.isnan(self.exponent) else [f"exponent {self.exponent:.2g} ± {self.stderr:.1g}"]
+        known = [] if math.isnan(self.exponent) else [f"exponent {with_error(self.exponent, self.stderr)}"]
         if self.exponent - 2.0 * self.stderr > 0.0:
             known.append("the synchronous state is unstable: starts that synchronised have not left it yet")
         ends = (f"{n} cell{'s' * (n > 1)}: {s.message}" for s, n in self.statuses.items())

@@ -133,13 +133,13 @@ class AppliedCriterion(Criterion):
         """What the synchronous motion moves in all components, as a synchronisation error."""
         return math.hypot(*self.extent)
 
-    @property
-    def words(self) -> str:
-        """The numbers, for people."""
-        relative = ", a thousandth of what the motion moves" if self.relative else ""
+    def text(self, scene: Scene) -> str:
+        """Return the numbers as text, with the unit of time of a scene."""
+        relative = " (a thousandth of what the motion moves)" if self.relative else ""
+        unit = "drive periods" if scene.time_unit == TimeUnit.PERIOD else "units of time"
         return (
-            f"mean error below {self.tolerance:.3g}{relative}, over {self.window:.6g} after a transient of {self.transient:.6g}, "
-            f"rtol {self.rtol:g}, at most {self.max_steps:.3g} steps"
+            f"mean error below {self.tolerance:.3g}{relative} over {self.window:.6g} {unit} after "
+            f"{self.transient:.6g}, rtol {self.rtol:g}, at most {self.max_steps:.3g} steps"
         )
 
 

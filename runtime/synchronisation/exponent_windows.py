@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,10 +10,10 @@ import numpy as np
 from synchain.models.scenes.scene import Scene
 
 from ..prediction.intervals import Interval
-from ..results.labelled import words_of
 from ..stability.exponents import initial_states
 from ..stability.msf import MSF, msf
 from ..stability.orbits import Orbits
+from ..support.error_text import interval_text
 from ..support.execution import Execution
 
 __all__ = ["ExponentWindows", "exponent_windows"]
@@ -69,11 +70,10 @@ class ExponentWindows:
         """Return exponents at strengths of any shape, by linear interpolation."""
         return np.interp(alpha, self.strengths, self.values)
 
-    @property
-    def words(self) -> str:
-        """The windows with their errors, or why there are none."""
-        known = words_of(self.intervals, self.errors, beyond=self.beyond)
-        return f"not computed: {self.absent}" if self.absent else known
+    def text(self, grid_ends: Collection[float] = ()) -> str:
+        """Return the windows with their errors and dots at ends of the grid, or why there are none."""
+        ends = (*self.beyond, *grid_ends)
+        return f"not computed: {self.absent}" if self.absent else interval_text(self.intervals, self.errors, ends)
 
 
 def exponent_windows(

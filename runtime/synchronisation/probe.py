@@ -30,9 +30,10 @@ from synchain.models.scenes.scene import Scene
 from ..cells.choice import chosen_for_rows
 from ..cells.keywords import Given
 from ..cells.plan import Plan, Planner, control_of
-from ..results.labelled import Labelled, dataset, ends_of
+from ..results.labelled import Labelled, dataset, scene_text
 from ..stability.network import unused_axes
 from ..support.arrays import numbers
+from ..support.error_text import range_text
 from ..support.execution import Execution
 from ..support.progress import Hook
 from ..sweeps.job import RowsSpec
@@ -82,10 +83,10 @@ class Probe(Labelled):
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Scene, strengths and how many synchronise."""
         return (
-            ("scene", repr(self.scene)),
-            ("strengths", f"{self.alpha.size}: alpha {ends_of(self.alpha)}, beta {ends_of(self.beta)}"),
+            ("scene", scene_text(self.scene)),
+            ("strengths", f"{self.alpha.size}: alpha {range_text(self.alpha)}, beta {range_text(self.beta)}"),
             ("synchronous", f"{int(self.synchronous.sum())} of {self.synchronous.size}"),
-            ("criterion", self.criterion.words),
+            ("criterion", self.criterion.text(self.scene)),
         )
 
     @property

@@ -31,10 +31,11 @@ from ..cells.plan import Planner
 from ..cells.reduce import reduce_scene
 from ..prediction.intervals import Interval, intersect, refine, scale
 from ..prediction.synchronisability import expect_no_repulsion
-from ..results.labelled import Labelled, dataset, ends_of, words_of
+from ..results.labelled import Labelled, as_json, dataset, scene_text
 from ..stability.averages import check_whole
 from ..stability.network import unused_axes
 from ..support.arrays import row
+from ..support.error_text import interval_text, range_text
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .criterion import IN_CRITERION, AppliedCriterion, Criterion, checked, errors, offsets, preset, resolved
@@ -109,7 +110,7 @@ class Thresholds(Labelled):
             "interval": (self.direct.intervals, "synchronous sigma, simulated"),
             "predicted": (self.predicted, "synchronous sigma, from the probe"),
             "probe_interval": (self.probe.intervals, "synchronous alpha of the probe"),
-            "window": (found.intervals, f"sigma with negative exponents{found.absent and f', {found.words}'}"),
+            "window": (found.intervals, f"sigma with negative exponents{found.absent and f', {found.text()}'}"),
         }
         return dataset(
             {
@@ -129,39 +130,57 @@ class Thresholds(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """Scene and ranges."""
-        sigma, alpha = ({float(x[0]), float(x[-1])} - {0.0} for x in (self.direct.x, self.probe.x))
-        ranges = (
-            ("sigma, negative exponents", self.exponents.words),
-            ("sigma, simulated", words_of(self.direct.intervals, beyond=sigma)),
-            ("sigma, predicted by the probe", words_of(self.predicted, beyond=sigma)),
-            ("alpha, probe", words_of(self.probe.intervals, beyond=alpha)),
-        )
-        goes_on = any("..." in words for _, words in ranges)
-        return (
-            ("scene", repr(self.scene)),
-            *ranges,
-            *((("...", "the grid ends here, the range may go on"),) if goes_on else ()),
-            ("grid of sigma", ends_of(self.direct.x)),
-            ("simulated and probe", f"after a transient: {self.criterion.words}"),
-            *(("warning", words) for words in self.warnings),
-        )
+        """Scene, ranges of the coupling and of alpha, grid, criterion, warnings."""
+        name, used = self.scene.strength, self.criterion
+        steepest = max(abs(value) for value in self.scene.topology.spectrum.values)
+        grid, alpha = ((float(x[0]), float(x[-1])) for x in (self.direct.x, self.probe.x))
+        reach = (*grid, *(end / steepest for end in alpha))
+        rows = [
+            ("scene", scene_text(self.scene)),
+            (f"{name}, negative exponents", self.exponents.text(reach)),
+            (f"{name}, simulated", interval_text(self.direct.intervals, grid_ends=grid)),
+            (f"{name}, predicted by the probe", interval_text(self.predicted, grid_ends=reach)),
+            *(
+                []
+                if self.conjecture is None
+                else [(f"{name}, Wu-Chua conjecture", interval_text([(0.0, self.conjecture)]))]
+            ),
+            (f"alpha = {name} |gamma|, probe", interval_text(self.probe.intervals, grid_ends=alpha)),
+            (f"grid of {name}", range_text(self.direct.x)),
+            ("simulated and probe", f"{used.text(self.scene)}, at least half of {used.starts} starts"),
+        ]
+        if any("..." in text for _, text in rows):
+            rows.append(("...", "the grid ends here, the range may go on"))
+        return (*rows, *(("warning", sentence) for sentence in self.warnings))
+
+    @property
+    def conjecture(self) -> float | None:
+        """The end of the range from no coupling up by the Wu-Chua conjecture; None if the probe's range has no such end."""
+        high = next((high for low, high in self.probe.intervals if low <= 0.0 < high), math.inf)
+        if high >= self.probe.x[-1]:
+            return None
+        return wu_chua(high / 2.0, topology("chain", 2).spectrum, self.scene.topology.spectrum)
 
     def as_dict(self) -> dict[str, object]:
-        """JSON-ready: {"intervals", "probe", "predicted", "exponents", "exponent_errors",
-        "no_exponents", "warnings"}, alpha for the probe, sigma for the others; an unknown error is
-        None, and so is "no_exponents" if there are exponents.
+        """Return the ranges for JSON.
+
+        Returns
+        -------
+        dict
+            intervals, probe (in alpha), predicted, exponents, exponent_errors, no_exponents and warnings.  An unknown error
+            is None, and so is no_exponents if there are exponents.
         """
-        errors = [[error if math.isfinite(error) else None for error in pair] for pair in self.exponents.errors]
-        return {
-            "intervals": [list(i) for i in self.direct.intervals],
-            "probe": [list(i) for i in self.probe.intervals],
-            "predicted": [list(i) for i in self.predicted],
-            "exponents": [list(i) for i in self.exponents.intervals],
-            "exponent_errors": errors,
-            "no_exponents": self.exponents.absent or None,
-            "warnings": list(self.warnings),
-        }
+        return as_json(
+            {
+                "intervals": self.direct.intervals,
+                "probe": self.probe.intervals,
+                "predicted": self.predicted,
+                "exponents": self.exponents.intervals,
+                "exponent_errors": self.exponents.errors,
+                "no_exponents": self.exponents.absent or None,
+                "warnings": self.warnings,
+            }
+        )
 
 
 def thresholds(
@@ -323,24 +342,7 @@ def probe(
     resolution: float | None = None,
     execution: Execution | None = None,
 ) -> Sweep:
-    """Sweep the two-oscillator probe over alpha = 2 sigma.
-
-    Parameters
-    ----------
-    scene : Scene
-        Oscillator, coupling and parameters; the pair starts as the first two oscillators (`first_starts`).
-    alpha : sequence of float
-        An increasing grid.
-    criterion : Criterion
-    resolution : float, optional
-        Ends of ranges are refined to this width in sigma, twice as much in alpha; by default as in `thresholds`.
-    execution : Execution, optional
-
-    Returns
-    -------
-    Sweep
-        Its `x` and intervals are values of alpha.
-    """
+    """Sweep the two-oscillator probe over alpha = 2 sigma."""
     pair = _pair(scene)
     sweep = simulate(pair, 0.5 * np.asarray(alpha, dtype=float), criterion, resolution, execution)
     return Sweep(2.0 * sweep.x, sweep.error, sweep.share, tuple(scale(sweep.intervals, 2.0)))
@@ -361,16 +363,6 @@ def simulate(
     """Sweep sigma by direct simulation of a scene's network.
 
     One kernel and one pool of workers run the grid and all rounds that refine the ends of ranges.
-
-    Parameters
-    ----------
-    scene : Scene
-    sigma : sequence of float
-        An increasing grid; ranges between two of its points are not seen.
-    criterion : Criterion
-    resolution : float, optional
-        Ends of ranges are refined to this width in sigma; by default as in `thresholds`.
-    execution : Execution, optional
     """
     x, execution = row("sigma", sigma, rising=True), execution or Execution()
     used = fitted(scene, x, criterion, execution)
@@ -404,17 +396,7 @@ def fitted(scene: Scene, sigma: np.ndarray, criterion: Criterion, execution: Exe
 
 
 def judge(measure: Measure, x: np.ndarray, resolution: float | None, criterion: AppliedCriterion) -> Sweep:
-    """Return the verdicts on a grid and the synchronous ranges, with ends refined to `resolution`.
-
-    Parameters
-    ----------
-    measure : callable
-        Returns the mean synchronisation errors (m, starts) at points (m,).
-    x : ndarray
-        An increasing grid.
-    resolution : float, optional
-    criterion : Criterion
-    """
+    """Return the verdicts on an increasing grid and the synchronous ranges, with ends refined to `resolution` in sigma."""
 
     def share(errors: np.ndarray) -> np.ndarray:
         return np.asarray((errors < criterion.tolerance).mean(axis=1))

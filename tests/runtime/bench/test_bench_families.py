@@ -53,7 +53,7 @@ def test_largest_sizes_by_hand(monkeypatch) -> None:
     header, _, line = families.summary([(1.4, "atan"), (1.4, "atan")]).splitlines()
     assert header.split(" | ")[3:] == ["chain", "complete", "hypercube (dimension)", "ring", "star |"]
     cells = line.strip("| ").split(" | ")
-    assert cells == ["1.4", "atan", "1 ± 0.01 … 6.98 ± 0.01", "4", "any", "6 (6 … 7)", "8", "6 (6 … 7)"]
+    assert cells == ["1.4", "atan", "1.000 ± 0.010 … 6.980 ± 0.010", "4", "any", "6 (6 … 7)", "8", "6 (6 … 7)"]
 
 
 def test_large_networks_with_set_valued_friction_are_left_out_and_named(monkeypatch) -> None:

@@ -6,6 +6,7 @@ import functools
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -24,7 +25,6 @@ from synchain.models.scenes.schema import schema
 from synchain.runtime import commands
 from synchain.runtime.cells import kernels
 from synchain.runtime.cli import main
-from synchain.runtime.commands.thresholds import report
 from synchain.runtime.console.outcome import print_json
 from synchain.runtime.opening.open import open_result
 from synchain.runtime.sweeps import job, stream
@@ -237,11 +237,14 @@ def test_run_writes_a_result_and_a_figure(scene: str, tmp_path: Path, capsys: py
     assert main(["run", scene, "--out", str(out), "--rtol", "1e-6", "--set", "omega=1.4", "sigma=0:0.5:3"]) == 0
     captured = capsys.readouterr()
     assert captured.err == ""
-    assert captured.out.splitlines()[0].startswith("short: 3 cells of 2 oscillators in ")
-    assert captured.out.splitlines()[1:] == [
-        "  3 cells: reached the end of the window",
-        f"  {out / 'short.nc'}",
-        f"  {out / 'short.png'}",
+    rows = [re.split(r"\s{2,}", row.strip(), maxsplit=1) for row in captured.out.splitlines()]
+    assert rows[0] == ["Streamed"]
+    assert rows[1] == ["scene", "short, changed: omega, sigma"]
+    assert rows[2][1].startswith("3 cells of 2 oscillators in ")
+    assert rows[3:] == [
+        ["ended", "3 cells: reached the end of the window"],
+        ["file", str(out / "short.nc")],
+        [str(out / "short.png")],
     ]
     assert sorted(path.name for path in out.iterdir()) == ["short.nc", "short.png"]
     assert (out / "short.png").read_bytes().startswith(b"\x89PNG")
@@ -381,6 +384,11 @@ def fake_thresholds(found: list[dict[str, Any]]) -> Any:
     return thresholds
 
 
+def printed(capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
+    """The rows of the summary on stdout."""
+    return dict(re.split(r"\s{2,}", row.strip(), maxsplit=1) for row in capsys.readouterr().out.splitlines()[1:])
+
+
 def test_thresholds_below_zero_end_with_the_grid_at_zero() -> None:
     """A range from 0 up begins where couplings do; one from below up to 0 may go on."""
     nothing = np.zeros(2)
@@ -388,11 +396,11 @@ def test_thresholds_below_zero_end_with_the_grid_at_zero() -> None:
     pair, direct = (threshold.Sweep(x, nothing, nothing, ((x[0], -0.1), (-0.05, 0.0))) for x in below)
     windows = ExponentWindows(((-0.2, 0.0),), ((0.001, 0.0),))
     found = threshold.Thresholds(Scene(topology=chain(3)), pair, ((-0.02, 0.0),), direct, PAPER, windows)
-    ranges = [line.split("  ")[-1].strip() for line in report(found).splitlines()[1:5]]
-    assert ranges[0] == "[-0.2000 ± 0.001, 0.0000...]"
-    assert ranges[1] == "[-1.2000..., -0.1000], [-0.0500, 0.0000...]"
-    assert ranges[2] == "[-0.0200, 0.0000...]"
-    assert ranges[3] == "[-0.4000..., -0.1000], [-0.0500, 0.0000...]"
+    rows = dict(found.summary)
+    assert rows["sigma, negative exponents"] == "-0.2000 ± 0.0010 … 0.0000..."
+    assert rows["sigma, simulated"] == "-1.2000... … -0.1000; -0.0500 … 0.0000..."
+    assert rows["sigma, predicted by the probe"] == "-0.0200 … 0.0000..."
+    assert rows["alpha = sigma |gamma|, probe"] == "-0.4000... … -0.1000; -0.0500 … 0.0000..."
 
 
 def test_thresholds_as_json_and_as_a_table(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
@@ -410,17 +418,19 @@ def test_thresholds_as_json_and_as_a_table(monkeypatch: pytest.MonkeyPatch, caps
         "warnings": ["a warning"],
     }
     assert main(words) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "chain(3), omega = 1.15: where all oscillators synchronise"
-    assert lines[2].split(maxsplit=2)[2] == "[0.0000, 0.1500], [0.3000, 0.6000...]"
-    assert lines[3].endswith("[0.0000, 0.1550], [0.3000, 0.4000...]")  # the probe ends at 1.2 / 3
-    assert next(line for line in lines if "Wu-Chua" in line).endswith(" [0.0000, 0.1553]")  # 0.466 / 3
-    exponents = lines[1]
-    assert "negative exponents" in exponents
-    assert exponents.endswith("  [0.0000, 0.1551 ± 0.0002], [0.3000 ± inf, 0.4000...]")
+    found = printed(capsys)
+    assert found["scene"] == "Scene(friction/exponential/spring, chain(3)), omega = 1.15"
+    assert found["sigma, negative exponents"] == "0.0000 … 0.15510 ± 0.00020; 0.3000 ± unknown … 0.4000..."
+    assert found["sigma, simulated"] == "0.0000 … 0.1500; 0.3000 … 0.6000..."
+    assert found["sigma, predicted by the probe"] == "0.0000 … 0.1550; 0.3000 … 0.4000..."  # it ends at 1.2 / 3
+    assert found["sigma, Wu-Chua conjecture"] == "0.0000 … 0.1553"  # 0.466 / 3
+    assert found["alpha = sigma |gamma|, probe"] == "0.0000 … 0.4660; 0.9000 … 1.2000..."
+    assert "over 100 drive periods after 1000" in found["simulated and probe"]
+    assert found["simulated and probe"].endswith("at least half of 8 starts")
+    assert found["..."] == "the grid ends here, the range may go on"
+    assert found["warning"] == "a warning"
     assert main([*words, "--topology", "ring"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert next(line for line in lines if "exponents" in line).endswith("  not computed: a contact without a jump")
+    assert printed(capsys)["sigma, negative exponents"] == "not computed: a contact without a jump"
     assert asked[0]["sigma"] == (0.0, 0.1, 0.2, 0.3, 0.4)
     assert asked[0]["workers"] == 2
     assert asked[0]["scene"].topology == chain(3)

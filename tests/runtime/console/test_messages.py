@@ -5,6 +5,7 @@ as formulas.
 from __future__ import annotations
 
 import logging
+import math
 from argparse import ArgumentTypeError
 from types import SimpleNamespace
 
@@ -22,9 +23,8 @@ from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.cli import main
 from synchain.runtime.commands.run import _nothing_to_do
 from synchain.runtime.console.arguments import spaced
-from synchain.runtime.console.words import measured, window_text
 from synchain.runtime.prediction.synchronisability import Window
-from synchain.runtime.results.labelled import words_of
+from synchain.runtime.support.error_text import interval_text, with_error
 from synchain.runtime.sweeps import job
 from synchain.runtime.sweeps.certify import check_certifiable
 from synchain.runtime.sweeps.run import run
@@ -36,11 +36,34 @@ LARGE = {"sigma": np.linspace(0, 1, 1000), "x_1": np.linspace(0, 1, 1000), "x_2"
 
 def test_what_rounds_to_zero_has_no_sign():
     tiny, window = -2.7e-05, Window(-2.7e-05, 0.3, 3e-05, 0.0, None, None)
-    written = [words_of([(tiny, 0.3)], [(3e-05, 0.0)]), words_of([(-1e-9, -0.0)]), measured(tiny, 1e-3)]
-    written += [measured(-0.0, 0.0, at_end=True), measured(tiny, 0.0), window_text(window)]
-    assert written == [
-        "0.0000 ± 3e-05 … 0.3000", "0.0000 … 0.0000", "0.0000 ± 0.0010", "0", "0.0000", "0.0000... … 0.3000...",
+    written = [interval_text([(tiny, 0.3)], [(3e-03, 0.0)]), interval_text([(-1e-9, -0.0)]), with_error(tiny, 1e-3)]
+    assert [*written, with_error(-0.0), with_error(tiny), window.text()] == [
+        "0.0000 ± 0.0030 … 0.3000", "0.0000 … 0.0000", "0.0000 ± 0.0010", "0.0000", "0.0000", "0.0000... … 0.3000...",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "expected"),
+    [
+        (0.177216, 0.00052, "0.17722 ± 0.00052"),
+        (0.177216, 0.0996, "0.18 ± 0.10"),
+        (0.2326345, 5.5e-07, "0.23263450 ± 5.5e-07"),
+        (123456.0, 1234.0, "123500 ± 1200"),
+        (7.3, 1.0, "7.3 ± 1.0"),
+        (0.3, 1e-17, "0.3000"),
+        (0.3, math.inf, "0.3000 ± unknown"),
+        (0.3, math.nan, "0.3000 ± unknown"),
+        (-math.inf, math.nan, "-inf"),
+    ],
+)
+def test_a_value_has_the_decimal_place_of_its_error(value, error, expected):
+    assert with_error(value, error) == expected
+
+
+def test_dots_follow_the_ends_of_a_grid_but_not_a_lower_end_at_zero():
+    assert interval_text([(0.0, 0.1), (0.2, 0.4)], grid_ends=(0.0, 0.4)) == "0.0000 … 0.1000; 0.2000 … 0.4000..."
+    assert interval_text([(-0.4, 0.0)], [(math.inf, 0.0)], grid_ends=(-0.4, 0.0)) == "-0.4000... … 0.0000..."
+    assert interval_text([(k, k + 0.5) for k in range(10)], most=1) == "0.0000 … 0.5000; 9 more"
 
 
 def test_compiling_is_told_and_loading_is_not(tmp_path, monkeypatch, caplog):

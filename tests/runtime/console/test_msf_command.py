@@ -22,8 +22,7 @@ from synchain.models.graphs.topology import Topology, read_matrix
 from synchain.models.inputs.plugins import allow_code
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cli import main
-from synchain.runtime.console.line_report import GRID_ENDS, LineReport
-from synchain.runtime.console.plane_report import plane_windows
+from synchain.runtime.prediction.synchronisability import Answer
 from synchain.runtime.stability import orbits
 from synchain.runtime.stability.attractor import Attractor, Motion
 from synchain.runtime.stability.exponents import Exponents
@@ -101,12 +100,12 @@ def value(text: str, name: str) -> str:
 def test_report_of_a_chain(asked: list[dict[str, Any]], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["msf", "figure_8"]) == 0
     text = capsys.readouterr().out
-    assert text.startswith("friction oscillator, spring coupling, omega = 1.4: exponents per unit of time")
-    assert value(text, "class").startswith("bounded interval, for alpha from 0 to 1.2")
+    assert value(text, "scene") == "Scene(friction/exponential/spring, chain(4)), omega = 1.4"
+    assert value(text, "strength") == "alpha = -sigma gamma (coupling: spring), from 0 to 1.2"
+    assert value(text, "class") == "bounded interval (Γ2)"
     assert value(text, "negative for alpha") == "0.1000 ± 0.0020 … 0.6000 ± 0.0020"  # 0.001 over the slope 0.5
     assert value(text, "attractor") == "aperiodic (2 of 3 starts); periodic (1 of 3 starts)"
     assert "500 units of time (111 drive periods) for each start" in value(text, "average")  # 500 * 1.4 / 2 pi
-    assert "chain(4): every mode dies out for" in text
     low, high = LOW / (2 - math.sqrt(2)), HIGH / (2 + math.sqrt(2))
     sigma = value(text, "sigma")
     assert sigma.startswith(f"{low:.4f} ± 0.0034 … {high:.5f} ± 0.00060; ")  # 0.002 over |gamma|
@@ -207,7 +206,7 @@ def test_the_option_omega_sets_the_frequency_of_the_drive_whatever_its_name(
     file = own_drive(tmp_path, "sp.cos(Omega * t)")
     assert main(["msf", str(file), "--omega", "1.4"]) == 0
     assert asked[0]["scene"].parameters == {"omega": 1.0, "Omega": 1.4, "sigma": asked[0]["scene"].parameters["sigma"]}
-    assert "spring coupling, Omega = 1.4: exponents" in capsys.readouterr().out
+    assert value(capsys.readouterr().out, "scene").endswith("spring, chain(2)), Omega = 1.4")
     file.write_text(file.read_text() + "[sweep]\nomega = [1.0, 2.0]\n")
     assert main(["msf", str(file)]) == 2
     assert "sweeps omega; expected a scene without these axes" in capsys.readouterr().err
@@ -217,16 +216,16 @@ def test_the_option_omega_sets_the_frequency_of_the_drive_whatever_its_name(
 
 
 @pytest.mark.parametrize(
-    ("wave", "words", "headline"),
+    ("wave", "words", "drive"),
     [
-        ("sp.cos(2 * Omega * t)", "2*Omega", ", 2*Omega = 2:"),
-        ("sp.cos(2 * t)", "the frequency 2;", ", drive frequency 2:"),
+        ("sp.cos(2 * Omega * t)", "2*Omega", ", 2*Omega = 2"),
+        ("sp.cos(2 * t)", "the frequency 2;", ", drive frequency 2"),
     ],
 )
 def test_a_frequency_that_is_no_parameter_is_told_but_cannot_be_set(
     wave: str,
     words: str,
-    headline: str,
+    drive: str,
     asked: list[dict[str, Any]],
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
@@ -237,31 +236,31 @@ def test_a_frequency_that_is_no_parameter_is_told_but_cannot_be_set(
     assert words in error
     assert "expected one that is a parameter" in error
     assert main(["msf", str(file)]) == 0
-    assert headline in capsys.readouterr().out
+    assert value(capsys.readouterr().out, "scene").endswith(drive)
 
 
 def test_where_the_grid_ends_no_mode_is_lost_and_no_is_not_said() -> None:
     scene = Scene(topology=chain(4))
-    cut = LineReport(function(scene, end=0.4), True)
-    assert cut.verdict[0] == GRID_ENDS
-    assert cut.function.windows == ()
-    assert "0.1000 ± 0.0020 … 0.4..." in cut.text()
-    pair = LineReport(function(Scene(topology=chain(2)), end=0.4), True)
-    assert pair.verdict[0] == "yes"
-    (window,) = pair.function.windows
+    cut = function(scene, end=0.4)
+    assert cut.verdict.answer == Answer.GRID_ENDS
+    assert cut.windows == ()
+    assert dict(cut.summary)["negative for alpha"] == "0.1000 ± 0.0020 … 0.4000..."
+    pair = function(Scene(topology=chain(2)), end=0.4)
+    assert pair.verdict.answer == "yes"
+    (window,) = pair.windows
     assert window.low_mode is not None
     assert window.high_mode is None
-    assert "0.2000..." in pair.text()
-    assert LineReport(function(scene), True).verdict[0] == "yes"
-    assert LineReport(function(scene, high=0.3), True).verdict[0] == "no"
-    assert LineReport(function(scene, low=-0.1), True).function.windows[0].low == 0.0
+    assert dict(pair.summary)["sigma"] == "0.0500 ± 0.0010 … 0.2000...; lost below: gamma = -2"
+    assert function(scene).verdict.answer == "yes"
+    assert function(scene, high=0.3).verdict.answer == "no"
+    assert function(scene, low=-0.1).windows[0].low == 0.0
 
 
 def test_windows_in_python_are_those_of_the_command() -> None:
     for end, error in ((0.4, 1e-3), (1.2, math.inf)):
         found = function(Scene(topology=chain(2)), end=end, error=error)
         (window,) = found.windows
-        (told,) = LineReport(found, True).as_dict()["windows"]
+        (told,) = found.as_dict()["windows"]
         assert window.low_mode is not None
         assert told["low_mode"] == window.low_mode.eigenvalue.text
         assert (window.high_mode is None) == (told["high_mode"] is None) == (end < HIGH)
@@ -271,22 +270,22 @@ def test_windows_in_python_are_those_of_the_command() -> None:
 def test_a_ratio_within_the_error_is_undecided() -> None:
     scene = Scene(topology=chain(4))
     high = LOW * (3 + 2 * math.sqrt(2)) + 1e-4
-    assert LineReport(function(scene, high=high, error=1e-3), True).verdict[0] == "undecided within the error"
+    assert function(scene, high=high, error=1e-3).verdict.answer == "undecided within the error"
 
 
 def test_numbers_that_are_not_finite_are_null_in_json() -> None:
-    report = LineReport(function(Scene(topology=chain(3)), error=math.inf), True)
-    report.function.fine.exponent[60] = -math.inf
-    found = report.as_dict()
+    result = function(Scene(topology=chain(3)), error=math.inf)
+    result.fine.exponent[60] = -math.inf
+    found = result.as_dict()
     assert found["exponent"][60] is None
     assert set(found["stderr"]) == {None}
     json.dumps(found, allow_nan=False)
-    assert "too short for an error: raise --periods" in report.text()
+    assert "too short for an error: raise periods" in dict(result.summary)["average"]
     assert len(found["windows"]) == 1
 
 
 def test_a_network_without_stable_range_is_said_to_have_none() -> None:
-    text = LineReport(function(Scene(topology=chain(3)), low=2.0, high=3.0), True).text()
+    text = repr(function(Scene(topology=chain(3)), low=2.0, high=3.0))
     assert value(text, "negative for alpha") == "none"
     assert value(text, "sigma") == "none"
     assert value(text, "possible").startswith("no")
@@ -335,7 +334,7 @@ def test_report_of_a_plane(asked: list[dict[str, Any]], tmp_path: Path, capsys: 
 def test_windows_in_the_plane_are_those_of_the_line_for_real_eigenvalues() -> None:
     scene = Scene(topology=chain(4))
     alpha, beta = np.linspace(0.0, 1.2, 241), np.linspace(-0.1, 0.3, 9)
-    (window,) = plane_windows(disc(scene, alpha, beta))
+    (window,) = disc(scene, alpha, beta).windows
     (expected,) = function(scene).windows
     assert (window.low, window.high) == pytest.approx((expected.low, expected.high), abs=1e-4)
     assert window.high_mode is not None
@@ -345,14 +344,14 @@ def test_windows_in_the_plane_are_those_of_the_line_for_real_eigenvalues() -> No
 def test_a_mode_that_leaves_the_plane_ends_the_search_and_not_the_window(tmp_path: Path) -> None:
     scene = Scene(topology=read_matrix(matrix(tmp_path)))
     alpha, wide, low = np.linspace(0.0, 1.2, 121), np.linspace(0.0, 0.7, 71), np.linspace(0.0, 0.1, 11)
-    (whole,) = plane_windows(disc(scene, alpha, wide))
-    (cut,) = plane_windows(disc(scene, alpha, low))
+    (whole,) = disc(scene, alpha, wide).windows
+    (cut,) = disc(scene, alpha, low).windows
     assert cut.low == pytest.approx(whole.low, abs=1e-4)
     assert cut.high == pytest.approx(0.1 / (math.sqrt(3) / 2))
     assert whole.high > cut.high
     assert cut.high_mode is None
     assert whole.high_mode is not None
-    mirrored = plane_windows(disc(scene, alpha, -wide[::-1]))
+    mirrored = disc(scene, alpha, -wide[::-1]).windows
     assert (mirrored[0].low, mirrored[0].high) == pytest.approx((whole.low, whole.high), abs=1e-6)
 
 
@@ -366,14 +365,12 @@ def test_report_of_a_map_over_alpha_and_a_parameter(
     words = f"msf figure_8 --alpha 0:2:5 --set omega=0.5:1.5:3 kappa=1e4 --starts 1 --out {tmp_path}"
     assert main(words.split()) == 0
     text = capsys.readouterr().out
-    assert text.startswith(
-        "friction oscillator, spring coupling: exponents per unit of time, alpha = -sigma gamma\n"
-    )  # without a frequency
-    assert value(text, "plane") == "alpha 0 … 2, omega 0.5 … 1.5"
+    assert value(text, "exponents") == "alpha = -sigma gamma (coupling: spring)"
+    assert value(text, "grid") == "5 alpha from 0 to 2, 3 omega from 0.5 to 1.5"
     assert value(text, "zero contour") == "alpha 0.5000 … 1.5000, omega 0.5000 … 1.5000"
-    assert value(text, "negative") == "at 6 of 15 points"
+    assert value(text, "negative") == "at 6 of 15 points, 40.0%"
     assert value(text, "attractor") == "aperiodic (2 of 3 starts); periodic (1 of 3 starts)"
-    assert "drive periods" not in text  # omega is an axis
+    assert "drive" not in text  # omega is an axis
     assert "sigma  " not in text
     (given,) = asked
     assert given["parameters"] == {"omega": (0.5, 1.0, 1.5)}
@@ -391,7 +388,8 @@ def test_report_of_a_map_over_two_parameters(asked: list[dict[str, Any]], capsys
     assert main(words.split()) == 0
     text, said = capsys.readouterr()
     assert "figure_8 lists initial x of 4 oscillators; 5 start by default" in said
-    assert "omega = 1.4: exponents per unit of time, the largest of 2 transversal modes of 5 nodes\n" in text
+    assert value(text, "scene") == "Scene(friction/exponential/spring, star(5)), omega = 1.4"
+    assert value(text, "exponents") == "the largest of 2 transversal modes of 5 nodes"
     assert [row.split("  ")[-1] for row in text.splitlines() if "largest for" in row] == [
         "gamma = -3, at 9 of 15 points",
         "gamma = -1, at 6 of 15 points",

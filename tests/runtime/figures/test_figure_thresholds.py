@@ -119,7 +119,7 @@ def test_table_of_thresholds(simulation: Simulation, tmp_path: Path) -> None:
     assert (first["tolerance"], first["starts"], first["transient"]) == ("0.001", "1", "1000")
     text = (tmp_path / "thresholds.md").read_text()
     assert (
-        "| 3 | 1.55 | [0.1760, 0.1980] | [0.1760, 0.1980] | [0.1760 ± 0.002, 0.1980 ± 0.0008] | [0.1760, 0.1960] |"
+        "| 3 | 1.55 | [0.1760, 0.1980] | [0.1760, 0.1980] | [0.1760 ± 0.0024, 0.19800 ± 0.00080] | [0.1760, 0.1960] |"
         in text
     )
     assert "at least half of 1 starts" in text

@@ -13,7 +13,6 @@ from scipy.integrate import solve_ivp
 from synchain.models import Rates, Scene, Topology, chain, circulant, complete, ends, from_matrix, ring, star, topology
 from synchain.models.definitions.loader import load_oscillator
 from synchain.runtime import exponents, msf, open_result, plane, run
-from synchain.runtime.console.plane_report import PlaneReport
 from synchain.runtime.stability.interpolation import exact_interpolation, strength_interpolation
 from synchain.runtime.stability.orbits import Orbits
 
@@ -215,7 +214,7 @@ def test_a_parameter_may_be_named_as_a_strength(tmp_path: Path) -> None:
         np.testing.assert_array_equal(found.exponent[:, j], own.exponent)
     assert found.attractors.shape == (1, 2, 1)
     assert found.plot().get_ylabel() == r"$\beta$"
-    assert ", alpha = -sigma gamma" in PlaneReport(found, False).text()
+    assert dict(found.summary)["exponents"] == "alpha = -sigma gamma (coupling: rates of v)"
     found.save(tmp_path / "map.nc")
     assert open_result(tmp_path / "map.nc").parameters == ("beta",)
     both = plane(ALONE, parameters={"beta": [0.5, 2], "delta": [0.1, 0.2]}, **few)

@@ -377,7 +377,7 @@ def test_ranges_that_end_with_the_grid_may_go_on():
     found = Sweep(np.array([0.1, 0.2]), np.zeros(2), np.ones(2), ((0.1, 0.15), (0.18, 0.2)))
     whole = thresholds(scene, sigma=[0.0, 0.1, 0.2], **ASKED)
     rows = dict(replace(whole, direct=found, probe=found, predicted=found.intervals).summary)
-    for name in ("sigma, simulated", "sigma, predicted by the probe", "alpha, probe"):
+    for name in ("sigma, simulated", "sigma, predicted by the probe", "alpha = sigma |gamma|, probe"):
         assert rows[name] == "0.1000... … 0.1500; 0.1800 … 0.2000..."
 
 

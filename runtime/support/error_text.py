@@ -1,0 +1,66 @@
+"""Numbers, ranges and intervals as text: one rule of digits for all summaries, figures and benchmarks."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Collection, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+
+
+def with_error(value: float, error: float = 0.0) -> str:
+    """Return a number with its error: the error to two significant digits, the value to the same decimal place.
+
+    A number without an error has four decimals; so has one whose error is below its rounding.  An error that is infinite or
+    nan is "unknown".  Zero has no sign.
+
+    >>> with_error(0.17722, 5.2e-4), with_error(0.3), with_error(0.3, math.inf)
+    ('0.17722 ± 0.00052', '0.3000', '0.3000 ± unknown')
+    """
+    value, error = float(value), float(error)
+    if not math.isfinite(value):
+        return f"{value:g}"
+    if not math.isfinite(error):
+        return f"{value:z.4f} ± unknown"
+    if error <= sys.float_info.epsilon * abs(value):
+        return f"{value:z.4f}"
+    # the decimal place of the error's second digit, after rounding: 0.0996 is 0.10
+    rounded = f"{error:.1e}"
+    place = 1 - int(rounded.partition("e")[2])
+    decimals = max(place, 0)
+    spread = f"{float(rounded):.{decimals}f}" if place <= 6 else rounded
+    return f"{round(value, place):z.{decimals}f} ± {spread}"
+
+
+def interval_text(
+    intervals: Sequence[tuple[float, float]],
+    errors: Sequence[tuple[float, float]] | None = None,
+    grid_ends: Collection[float] = (),
+    most: int = 8,
+) -> str:
+    """Return intervals as "low … high; low … high" with the errors of their ends, or "none".
+
+    Dots follow an end that is an end of the grid: the interval may go on.  A lower end at 0 has none: couplings begin there.
+    """
+
+    def end(value: float, error: float, lower: bool) -> str:
+        cut = any(math.isclose(value, limit, rel_tol=1e-12) for limit in grid_ends) and not (lower and value == 0.0)
+        return f"{with_error(value)}..." if cut else with_error(value, error)
+
+    pairs = zip(intervals[:most], errors or [(0.0, 0.0)] * len(intervals), strict=False)
+    texts = [f"{end(low, a, True)} … {end(high, b, False)}" for (low, high), (a, b) in pairs]
+    more = [f"{len(intervals) - most} more"] if len(intervals) > most else []
+    return "; ".join([*texts, *more]) or "none"
+
+
+def range_text(values: np.ndarray) -> str:
+    """Return the smallest and the largest of some numbers as "from low to high"."""
+    return f"from {values.min():.6g} to {values.max():.6g}"
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number of things, as "1 cell" or "3 cells"."""
+    return f"{number} {noun}{'s' * (number != 1)}"
