@@ -77,5 +77,5 @@ def njit(*, cache: bool = False, separate: bool = False, **options: Any) -> Call
     `cache` marks entry points, whose machine code `kernels.compile` keeps: Numba's own cache is not used.  `separate` keeps
     LLVM from inlining a function with many callers.
     """
-    compiler = {"pipeline_class": _SeparateCompiler} if separate else {}
-    return numba.njit(**{**options, **(ENTRY if cache else INNER), **compiler})
+    pipeline = {"pipeline_class": _SeparateCompiler} if separate else {}
+    return numba.njit(**{**options, **(ENTRY if cache else INNER), **pipeline})
