@@ -15,13 +15,7 @@ MARK = "# --- kernel text below ---\n"
 
 @functools.cache
 def text(name: str) -> str:
-    """Return the part of a file that a generated module contains.
-
-    Parameters
-    ----------
-    name
-        Room and name of the file, such as "driver.dense".
-    """
+    """Return the part of a file that a generated module contains."""
     room, _, file = name.partition(".")
     whole = files(__name__.rpartition(".")[0]).joinpath(room, f"{file}.py").read_text(encoding="utf-8")
     return whole.split(MARK, 1)[1].strip("\n")

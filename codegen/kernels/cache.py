@@ -71,18 +71,11 @@ def _user_folder(variable: str, linux: str, mac: str) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Folder:
-    """An open cache folder.
+    """An open cache folder."""
 
-    Attributes
-    ----------
-    path
-        Where the folder is.
-    descriptor
-        The open folder, through which its files are reached.  Windows has no such descriptors: there
-        it is None, and files are reached by their paths.
-    """
-
-    path: Path
+    path: Path  # where the folder is
+    # the open folder, through which its files are reached. Windows has no such descriptors: there it is None, and
+    # files are reached by their paths
     descriptor: int | None
 
     def __enter__(self) -> Folder:
@@ -95,15 +88,7 @@ class Folder:
             os.close(self.descriptor)
 
     def read(self, name: str) -> bytes | None:
-        """Return the content of a file, None if there is no such file.
-
-        Raises
-        ------
-        PermissionError
-            If the file belongs to another user, or if others may write to it.
-        OSError
-            If it is no regular file.
-        """
+        """Return the content of a file, None if there is no such file."""
         try:
             file = open_regular(self._at(name), flags=getattr(os, "O_NOFOLLOW", 0), folder=self.descriptor)
         except FileNotFoundError:
@@ -238,20 +223,7 @@ def _warn_of_refusal(folder: Path, problem: str) -> None:
 
 
 def open_folder(folder: Path) -> Folder:
-    """Create the folder if it is missing and open it.
-
-    Parameters
-    ----------
-    folder
-        Absolute path, for example `cache_folder()`.
-
-    Raises
-    ------
-    PermissionError
-        If the folder belongs to another user, or if others may write to it or replace it.
-    OSError
-        If it cannot be made.
-    """
+    """Create the folder if it is missing and open it."""
     for place in reversed(folder.parents):
         if not place.exists():
             place.mkdir(mode=0o700, exist_ok=True)

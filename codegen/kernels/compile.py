@@ -136,24 +136,12 @@ class EntryPoint(Protocol):
 
 @dataclass(frozen=True, slots=True, weakref_slot=True)
 class Compiled:
-    """The compiled functions of one module.
+    """The compiled functions of one module."""
 
-    Attributes
-    ----------
-    functions
-        The functions by name.
-    path
-        The file that holds the text; one of a folder `<memory>` if it is kept nowhere.
-    from_cache
-        True if the machine code was loaded from the cache, False if it was compiled.
-    problem
-        Why the machine code is not kept on disk; empty if it is.
-    """
-
-    functions: dict[str, Any]
-    path: str
-    from_cache: bool
-    problem: str = ""
+    functions: dict[str, Any]  # the functions by name
+    path: str  # the file that holds the text; one of a folder `<memory>` if it is kept nowhere
+    from_cache: bool  # True if the machine code was loaded from the cache, False if it was compiled
+    problem: str = ""  # why the machine code is not kept on disk; empty if it is
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,15 +173,7 @@ class Kernel:
         return self.compiled.from_cache
 
     def drive(self, first: int, last: int, *arrays: np.ndarray) -> None:
-        """Run the cells first … last-1.
-
-        Parameters
-        ----------
-        first, last
-            Rows of the arrays to run.
-        *arrays
-            start, numbers, spans, control, …, as the docstring of the driver's last function describes them.
-        """
+        """Run the cells first … last-1."""
         self.entry(*self.own, first, last, *arrays)
 
     @property
@@ -215,27 +195,6 @@ class Kernel:
 def load(source: KernelSource) -> Kernel:
     """Compile a kernel, or load its machine code from the cache.
 
-    Parameters
-    ----------
-    source
-        The text of the kernel, and what its arrays mean.
-
-    Returns
-    -------
-    Kernel
-        The same object for the same source within a process.
-
-    Raises
-    ------
-    InstallationError
-        If Numba is told not to compile.
-
-    Warns
-    -----
-    RuntimeWarning
-        If the cache folder cannot be used; the kernel is then compiled for this process alone.  Once a process, if Numba's
-        own pipeline had to compile a function in place of the front end, and if the processor has no fused multiply-add.
-
     Notes
     -----
     A kernel whose cache file is damaged is compiled anew.
@@ -245,24 +204,7 @@ def load(source: KernelSource) -> Kernel:
 
 
 def load_shared(part: Driver | Recorder) -> Compiled:
-    """Compile a driver or a recorder, or load its machine code from the cache.
-
-    Parameters
-    ----------
-    part
-        What the text depends on.
-
-    Returns
-    -------
-    Compiled
-        The same object for the same part within a process.  No warning is given if it is not kept on disk: `problem`
-        says why.
-
-    Raises
-    ------
-    InstallationError
-        If Numba is told not to compile.
-    """
+    """Compile a driver or a recorder, or load its machine code from the cache."""
     _check_numba()
     with _lock:
         return _shared(part)

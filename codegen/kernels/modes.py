@@ -62,29 +62,7 @@ Place = tuple[int, int]
 
 
 def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int | None = None) -> KernelSource:
-    """Write the kernel that carries deviations along an orbit.
-
-    Parameters
-    ----------
-    variation
-        The orbit, and the equations of a mode along it.
-    method
-        A Rosenbrock or a Taylor method, or its name.
-    width
-        Modes that step together; by default those of one register.
-
-    Returns
-    -------
-    KernelSource
-        The text, and what is needed to compile and to call it.
-
-    Raises
-    ------
-    ValueError
-        If the orbit has more than eight oscillators, or for a method of another kind.
-    UnprintableError
-        If the equations cannot be printed.
-    """
+    """Write the kernel that carries deviations along an orbit."""
     equations = variation.orbit
     if equations.n > LARGEST_UNROLLED:
         raise ValueError(

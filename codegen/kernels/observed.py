@@ -81,24 +81,14 @@ def count_of(equations: Equations, values: Sequence[sp.Expr]) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """Functions of the state that a kernel watches beside its records.
+    """Functions of the state that a kernel watches beside its records."""
 
-    Parameters
-    ----------
-    observed
-        Values that the kernel tallies over the window (`synchain.models.dynamics.observable`).
-    sections
-        Functions of which points are taken when they pass zero, each followed by the values that its points keep.
-    stop
-        A function that ends a cell when it passes zero.
-    sums
-        The rows that are summed in them (`RowSum`).
-    """
-
+    # values that the kernel tallies over the window (`synchain.models.dynamics.observable`)
     observed: tuple[sp.Expr, ...] = ()
+    # functions of which points are taken when they pass zero, each followed by the values that its points keep
     sections: tuple[tuple[sp.Expr, ...], ...] = ()
-    stop: sp.Expr | None = None
-    sums: tuple[Rows, ...] = ()
+    stop: sp.Expr | None = None  # a function that ends a cell when it passes zero
+    sums: tuple[Rows, ...] = ()  # the rows that are summed in them (`RowSum`)
 
     @property
     def kept(self) -> int:

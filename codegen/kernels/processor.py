@@ -32,18 +32,7 @@ def processor() -> str:
 
 
 def told_apart(one: str, other: str) -> tuple[str, str]:
-    """Describe two kinds of processor in few words, for a message that compares them.
-
-    Parameters
-    ----------
-    one, other
-        Texts of `processor()`.
-
-    Returns
-    -------
-    tuple of str
-        Their names; if these are equal, each with the features that the other one lacks.
-    """
+    """Describe two kinds of processor in few words, for a message that compares them."""
     (name, _, features), (other_name, _, other_features) = one.partition(": "), other.partition(": ")
     if name != other_name:
         return name, other_name

@@ -148,43 +148,7 @@ def emit(
     unroll: int = LARGEST_UNROLLED,
     fill: float = FILL_LIMIT,
 ) -> KernelSource:
-    """Write the kernel of these equations for one integrator, one set of records and one lane width.
-
-    Parameters
-    ----------
-    equations
-        What the kernel integrates.
-    method
-        An integrator or its name; "auto" is "rodas5p", which steps whatever can be stepped (a scene's "auto" chooses).
-    records
-        What the kernel records besides the final state, each a `Record`.
-    section
-        An expression in the state symbols (x_1 …), the parameters and t, whose zeros the record "section" needs.
-    width
-        Cells that one register holds; by default what suits the processor.
-    multiplicity
-        How many oscillators each node stands for in the synchronisation error; by default one.
-    watched
-        Functions of the state that the kernel watches beside its records.
-    unroll
-        Nodes up to which a step is written out; the steps of a larger network, or of more than MOST_OF_LINKS operations in
-        its links, run in loops.
-    fill
-        Entries of the exact factors for each entry of the matrix, above which loops use incomplete factors.
-
-    Returns
-    -------
-    KernelSource
-        The text, and what is needed to compile and to call it.
-
-    Raises
-    ------
-    ValueError
-        If a record or the integrator is unknown, if the section function has other symbols, or if the integrator cannot
-        step so many nodes.
-    UnprintableError
-        If the equations cannot be printed.
-    """
+    """Write the kernel of these equations for one integrator, one set of records and one lane width."""
     method = AUTO if method == "auto" else method
     method = integrator(method) if isinstance(method, str) else method
     _check_records(equations, records, section, watched, multiplicity)

@@ -46,13 +46,7 @@ class Lowering:
     names: Mapping[str, str] = functions.LANES
 
     def __call__(self, e: sp.Expr) -> Expression:
-        """Return the expression as a tree.
-
-        Raises
-        ------
-        UnprintableError
-            If it has an unknown function, a floating-point number or a non-real constant.
-        """
+        """Return the expression as a tree."""
         if e.is_Symbol:
             return Name(e.name)
         if e.is_Float:
@@ -188,13 +182,7 @@ lower = Lowering()
 
 
 def number(e: sp.Expr | Fraction) -> Number:
-    """Return the double nearest to an exact number.
-
-    Raises
-    ------
-    UnprintableError
-        If it is beyond the range of doubles or not real.
-    """
+    """Return the double nearest to an exact number."""
     try:
         if isinstance(e, Fraction) or e.is_Rational:
             value = float(Fraction(e.numerator, e.denominator))

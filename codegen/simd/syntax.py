@@ -72,26 +72,7 @@ def tree_of(function: Any) -> ast.FunctionDef:
 
 
 def read(context: Any, function: Any, args: Sequence[types.Type], result: types.Type | None) -> Program:
-    """Read a function.
-
-    Parameters
-    ----------
-    context : numba.core.typing.Context
-        What Numba knows of types.
-    function : function
-        The function, at the top of a module.
-    args : sequence of numba.types.Type
-        The types of its arguments.
-    result : numba.types.Type, optional
-        The type of what it returns; by default that of the values themselves.
-
-    Raises
-    ------
-    UnreadError
-        If it has syntax that is not read.
-    numba.core.errors.TypingError
-        If an operator or a function has no meaning for the types of its operands.
-    """
+    """Read a function."""
     return _Reader(context, function.__globals__).function(tree_of(function), args, result)
 
 

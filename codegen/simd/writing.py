@@ -33,27 +33,13 @@ class Typed:
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """A function that was read.
+    """A function that was read."""
 
-    Attributes
-    ----------
-    statements : tuple of callable
-        What writes its statements.
-    result : numba.types.Type
-        The type of what it returns.
-    local : frozenset of str
-        The variables of one block alone.
-    arrays : dict
-        The variables that keep arrays alive, and their types.
-    calls : tuple of numba.core.typing.Signature
-        What it calls.
-    """
-
-    statements: tuple[Write, ...]
-    result: types.Type
-    local: frozenset[str]
-    arrays: dict[str, types.Type]
-    calls: tuple[Any, ...]
+    statements: tuple[Write, ...]  # what writes its statements
+    result: types.Type  # the type of what it returns
+    local: frozenset[str]  # the variables of one block alone
+    arrays: dict[str, types.Type]  # the variables that keep arrays alive, and their types
+    calls: tuple[Any, ...]  # what it calls
 
     def write(self, lower: lowering.Lower, arguments: Sequence[Value]) -> None:
         """Write the code of the function, whose arguments have these values."""

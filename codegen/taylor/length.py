@@ -88,13 +88,6 @@ def distant(start: Expression, further: Sequence[Expression]) -> list[Statement]
     """Shorten a step that might go on to where an exponential is seen that is not, because it is far too small.
 
     Zero to every digit, with all its coefficients, it says nothing of where it rises; its exponent does.
-
-    Parameters
-    ----------
-    start : Expression
-        The exponent at the beginning of the step.
-    further : sequence of Expression
-        Its other coefficients.
     """
     bound = bounded(further)
     if not bound:

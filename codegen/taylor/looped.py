@@ -663,13 +663,7 @@ class Looped(StepWriter):
 
 
 def write_looped(equations: Equations, order: int) -> TaylorStep:
-    """Return the looped Taylor step of some order; see `write_step`.
-
-    Raises
-    ------
-    ValueError
-        As `write_step`, and for a mass matrix beside links: the loop over nodes solves before links are added.
-    """
+    """Return the looped Taylor step of some order; see `write_step`."""
     if equations.inertial and equations.link_count:
         found = "links with inertia" if equations.inertial_links else "links of nodes with a mass matrix"
         raise ValueError(f"taylor: found {found} in a network that is stepped in loops; use dop853 or rodas5p")

@@ -30,17 +30,7 @@ def _moved(part: Node | Edge) -> list[bool]:
 
 
 def solved(graph: Graph, masses: Mapping[Entry, Series], right: Mapping[int, Series]) -> dict[int, Series]:
-    """Return the series of the rates.
-
-    Parameters
-    ----------
-    graph : Graph
-        Takes up the series of the elimination.
-    masses : mapping of (row, column) to Series
-        The entries of M; those left out are zero.
-    right : mapping of int to Series
-        The right-hand sides r by row.  A row of the identity, whose rate no other row needs, is its own rate.
-    """
+    """Return the series of the rates."""
     entries = {key: found for key, s in masses.items() if (found := _factor(s))[0] != ZERO}
     coupled = sorted({k for key, e in entries.items() if not (key[0] == key[1] and e == (ONE, _UNIT)) for k in key})
     place = {slot: number for number, slot in enumerate(coupled)}

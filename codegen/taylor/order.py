@@ -22,23 +22,7 @@ LINEAR = 1e-5
 
 
 def order_for(rtol: float, atol: float, linear: bool = False, large: bool = False) -> int:
-    """Return the order of the Taylor step for these tolerances.
-
-    Parameters
-    ----------
-    rtol, atol : float
-        Tolerances relative to the states and absolute; states are taken to be of the order of one.
-    linear : bool, optional
-        True for equations without products of states: their orders cost alike, since nothing is convolved, so the highest
-        is the fastest from moderate tolerances on.
-    large : bool, optional
-        True for a large node (`is_large`), which has one of two orders.
-
-    Returns
-    -------
-    int
-        One of a few even numbers from 8 to 24, so that few kernels are compiled.
-    """
+    """Return the order of the Taylor step for these tolerances."""
     tolerance = max(rtol, atol)
     if linear and tolerance <= LINEAR:
         return HIGHEST

@@ -201,20 +201,7 @@ class ModeWriter(Lines):
 
 
 def write_tangent(variation: Variation, order: int) -> TangentStep:
-    """Return the Taylor step of some order of an orbit and of deviations along it.
-
-    Parameters
-    ----------
-    variation : Variation
-        The orbit, in names that a kernel can use (`tidy`), and the matrix A of the deviations.
-    order : int
-        The order of the series, at least 6.
-
-    Raises
-    ------
-    ValueError
-        As `write_step`, and for equations with kinks or with a mass matrix.
-    """
+    """Return the Taylor step of some order of an orbit and of deviations along it."""
     if variation.orbit.inertial:
         raise ValueError("taylor: found a mass matrix beside deviations along an orbit; expected the identity")
     if not is_analytic(variation.orbit):

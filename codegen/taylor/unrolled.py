@@ -305,20 +305,7 @@ def _horner(found: list[Statement], name: str, coefficients: Sequence[Expression
 
 
 def write_step(equations: Equations, order: int) -> TaylorStep:
-    """Return the Taylor step of some order for equations with names that a kernel can use (`tidy`).
-
-    Parameters
-    ----------
-    equations : Equations
-        What the step integrates.
-    order : int
-        The order of the series, at least 6.
-
-    Raises
-    ------
-    ValueError
-        For an order that is too small, and for functions that jump.
-    """
+    """Return the Taylor step of some order for equations with names that a kernel can use (`tidy`)."""
     check_order(order)
     check_jumps(equations)
     return Unrolled(equations, order).step()

@@ -35,20 +35,7 @@ def precision(bits: int) -> Iterator[None]:
 
 
 def enclose(expression: sp.Expr, bits: int) -> Ball:
-    """Return a ball that holds the value of an expression; real arithmetic stays real.
-
-    Parameters
-    ----------
-    expression : sympy.Expr
-        Made of rationals, roots, pi, I, sin, cos and exp.
-    bits : int
-        Precision of the arithmetic.
-
-    Raises
-    ------
-    TypeError
-        On any other function or symbol.
-    """
+    """Return a ball that holds the value of an expression; real arithmetic stays real."""
     with precision(bits):
         return _ball(expression)
 
@@ -59,20 +46,7 @@ def cotangent(turn: fmpq) -> arb:
 
 
 def accurate(ball_at: Callable[[int], Ball], bits: int) -> Ball:
-    """Return a ball of radius below 2**-bits times its modulus.
-
-    Parameters
-    ----------
-    ball_at : callable
-        Gives a ball around the number at any precision in bits.
-    bits : int
-        Relative accuracy.
-
-    Raises
-    ------
-    ValueError
-        If the number cannot be told from zero at a million bits.
-    """
+    """Return a ball of radius below 2**-bits times its modulus."""
     working = bits + 16
     while working < _MOST:
         ball = ball_at(working)

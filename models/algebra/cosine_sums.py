@@ -176,18 +176,6 @@ def box(sizes: Sequence[int], closed: Sequence[bool]) -> LazyEigenvalues[tuple[s
 
     Directions of one kind and size are taken in one order only.  Only numbers whose floats are too
     near to each other are compared exactly.
-
-    Parameters
-    ----------
-    sizes : sequence of int
-        Number of nodes in each direction.
-    closed : sequence of bool
-        Whether a direction is a ring.
-
-    Returns
-    -------
-    LazyEigenvalues
-        Pairs of an eigenvalue and its multiplicity, made when they are asked for.
     """
     kinds = Counter(zip(sizes, closed, strict=True))
     unit = lcm(*(size if ring else 2 * size for size, ring in kinds))

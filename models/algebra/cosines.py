@@ -110,17 +110,7 @@ def linear_exponential(expression: sp.Expr) -> tuple[Fraction, Fraction, int, in
 
 
 def minimal_polynomial(a: Fraction, b: Fraction, m: int, conjugates: fmpz_poly | None = None) -> fmpq_poly:
-    """Return the monic polynomial whose roots are a + 2 b cos(2πk/m) for all k prime to m.
-
-    Parameters
-    ----------
-    a, b : Fraction
-        b is not 0.
-    m : int
-        The number of parts of a full turn.
-    conjugates : fmpz_poly, optional
-        With it, the roots are a + b r for its roots r instead.
-    """
+    """Return the monic polynomial whose roots are a + 2 b cos(2πk/m) for all k prime to m."""
     psi = fmpq_poly(fmpz_poly.cos_minpoly(m) if conjugates is None else conjugates)
     scale = to_flint(b)
     inner = fmpq_poly([-to_flint(a) / scale, 1 / scale])

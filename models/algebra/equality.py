@@ -45,38 +45,14 @@ class _Field:
 
 
 def equal(a: Number, b: Number) -> bool:
-    """Return whether two algebraic numbers are the same, without any tolerance.
-
-    Raises
-    ------
-    ValueError
-        If the bound needs more than MOST_BITS bits.
-    TypeError
-        On numbers of another kind.
-    """
+    """Return whether two algebraic numbers are the same, without any tolerance."""
     if a is b or (isinstance(a, sp.Expr) and isinstance(b, sp.Expr) and a == b):
         return True
     return bool(_compared((a,), (b,)) == 0)
 
 
 def sign(a: tuple[Number, ...], b: tuple[Number, ...]) -> int:
-    """Return the sign of a difference of two products, without any tolerance.
-
-    Parameters
-    ----------
-    a, b : tuple of Number
-        The factors of each product, real algebraic numbers.
-
-    Returns
-    -------
-    int
-        The sign of the product of `a` less that of `b`; 0 if they are equal.
-
-    Raises
-    ------
-    ValueError, TypeError
-        As `equal`.
-    """
+    """Return the sign of a difference of two products, without any tolerance."""
     gap = _compared(a, b)
     if isinstance(gap, acb) and not gap.imag.contains(0):
         raise ValueError(f"{_shown(a[0])} or {_shown(b[0])} is complex; expected real numbers")
@@ -109,15 +85,7 @@ def _product_ball(factors: tuple[Number, ...], bits: int) -> acb:
 
 
 def check_size(number: sp.Expr) -> None:
-    """Check that a number is simple enough to be compared.
-
-    Raises
-    ------
-    ValueError
-        If its bound needs more than MOST_BITS bits.
-    TypeError
-        If it is of another kind.
-    """
+    """Check that a number is simple enough to be compared."""
     _bits(((number,),))
 
 

@@ -54,11 +54,6 @@ def discs(f: fmpz_poly) -> list[Disc] | None:
     """Return one disc for each root of a polynomial, real roots first; None if this finds none.
 
     No two discs touch, not even at four times their size.
-
-    Parameters
-    ----------
-    f : fmpz_poly
-        A polynomial without multiple roots.
     """
     # values of the polynomial cancel least about the mean of its roots
     mean = -f[f.degree() - 1] // (f.degree() * f[f.degree()])
@@ -76,24 +71,7 @@ def discs(f: fmpz_poly) -> list[Disc] | None:
 
 
 def sharpened(f: fmpz_poly, disc: Disc, room: fmpq, bits: int) -> acb:
-    """Return a ball around a root, of radius below 2**-bits times its modulus.
-
-    Parameters
-    ----------
-    f : fmpz_poly
-        The polynomial.
-    disc : Disc
-        Its centre is near the root.
-    room : fmpq
-        Distance from the centre within which there is no other root.
-    bits : int
-        Relative accuracy.
-
-    Raises
-    ------
-    ValueError
-        If there is no root within `room`: the disc was wrong.
-    """
+    """Return a ball around a root, of radius below 2**-bits times its modulus."""
     with precision(2 * f.degree() + f.height_bits() + 2 * bits + 64):
         start = acb(disc.x, disc.y)
         found = _sharp(acb_poly(f), acb_poly(f.derivative()), start, bits + 4)

@@ -16,20 +16,11 @@ class LazyEigenvalues(Sequence[T]):
     """The distinct real eigenvalues of a graph, the largest first, each made when it is asked for.
 
     A slice is a list of its items.
-
-    Attributes
-    ----------
-    length : int
-        Number of items.
-    n : int
-        Number of nodes of the graph.
-    make : callable
-        Gives the item at a place, from 0.
     """
 
-    length: int
-    n: int
-    make: Callable[[int], T]
+    length: int  # number of items
+    n: int  # number of nodes of the graph
+    make: Callable[[int], T]  # gives the item at a place, from 0
 
     def __len__(self) -> int:
         return self.length

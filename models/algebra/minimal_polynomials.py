@@ -24,18 +24,7 @@ _X = sp.Symbol("x")
 
 
 def multiplied(numbers: Iterable[tuple[AngleSum, int]]) -> fmpq_poly | None:
-    """Return the product of (z - number)^times.
-
-    Parameters
-    ----------
-    numbers : iterable of (AngleSum, int)
-        The same number may be listed several times.
-
-    Returns
-    -------
-    fmpq_poly or None
-        None if a number has several cosines, or not all conjugates as often as itself.
-    """
+    """Return the product of (z - number)^times."""
     rationals: dict[Fraction, int] = {}
     classes: dict[tuple[Fraction, Fraction, int], dict[int, int]] = {}
     for number, times in numbers:

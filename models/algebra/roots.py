@@ -36,19 +36,12 @@ _WRITTEN = 14_000
 
 @dataclass(frozen=True, slots=True)
 class Root:
-    """One root of an irreducible polynomial of degree >= 2.
+    """One root of an irreducible polynomial of degree >= 2."""
 
-    Attributes
-    ----------
-    polynomial : tuple of int
-        Integer coefficients, constant first; primitive, the leading one positive.
-    index : int
-        Place of the root among SymPy's CRootOf: real roots ascending, then complex ones.  It
-        stands in the text of the number, and so in tables and JSON.  `complex_order` finds it
-        without SymPy's own isolation, which takes minutes where Aberth's method takes a second.
-    """
-
-    polynomial: Polynomial
+    polynomial: Polynomial  # integer coefficients, constant first; primitive, the leading one positive
+    # place of the root among SymPy's CRootOf: real roots ascending, then complex ones. It stands in the text of the
+    # number, and so in tables and JSON. `complex_order` finds it without SymPy's own isolation, which takes minutes
+    # where Aberth's method takes a second
     index: int
 
     @property
@@ -68,13 +61,7 @@ class Root:
 
 @dataclass(frozen=True, slots=True)
 class RealRoot(Root):
-    """The only root of `polynomial` between `low` and `high`.
-
-    Raises
-    ------
-    ValueError
-        If the polynomial does not change its sign between the ends.
-    """
+    """The only root of `polynomial` between `low` and `high`."""
 
     low: Fraction
     high: Fraction
@@ -192,18 +179,7 @@ def _by_arb(f: fmpz_poly) -> list[Disc]:
 
 
 def roots(polynomial: Polynomial) -> tuple[Root, ...]:
-    """Return all roots of a polynomial, each isolated by a disc that is proved to hold it alone.
-
-    Parameters
-    ----------
-    polynomial : tuple of int
-        Irreducible, of degree >= 2.
-
-    Returns
-    -------
-    tuple of Root
-        Real ones come first, ascending; conjugates are neighbours.
-    """
+    """Return all roots of a polynomial, each isolated by a disc that is proved to hold it alone."""
     f = fmpz_poly(list(polynomial))
     isolated = discs(f) or _by_arb(f)
     reals = [disc for disc in isolated if disc.y == 0]
@@ -256,15 +232,7 @@ def _refined(root: RealRoot, bits: int) -> tuple[fmpq, fmpq]:
 
 
 def complex_order(polynomial: tuple[int, ...], upper: Sequence[acb]) -> list[int]:
-    """Return the positions of the roots above the real axis in SymPy's order.
-
-    Parameters
-    ----------
-    polynomial : tuple of int
-        The polynomial.
-    upper : sequence of acb
-        Balls around its roots above the real axis.
-    """
+    """Return the positions of the roots above the real axis in SymPy's order."""
     if len(upper) < 2:
         return list(range(len(upper)))
     given = sp.Poly(list(polynomial[::-1]), sp.Symbol("x"))

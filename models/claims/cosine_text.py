@@ -71,41 +71,13 @@ def _even(a: Fraction, b: Fraction) -> Linear:
 
 
 def angle_number(text: str, values: Mapping[str, int]) -> AngleSum | None:
-    """Return a number as a sum of cosines.
-
-    Parameters
-    ----------
-    text : str
-        An expression such as ``"-2+2*cos(2*pi*k/n)"``.
-    values : mapping of str to int
-        Whole numbers for the letters.
-
-    Returns
-    -------
-    AngleSum or None
-        None if the text is not a short sum of products of rationals, sines and cosines.
-    """
+    """Return a number as a sum of cosines."""
     wave = angle_wave(text, values)
     return None if wave is None else wave.at(0, 0)[0]
 
 
 def angle_wave(text: str, values: Mapping[str, int], letter: str = "") -> Wave | None:
-    """Return a number for all values of an open letter.
-
-    Parameters
-    ----------
-    text : str
-        An expression such as ``"-2+2*cos(2*pi*k/n)"``.
-    values : mapping of str to int
-        Whole numbers for the other letters.
-    letter : str, optional
-        The open letter.
-
-    Returns
-    -------
-    Wave or None
-        None as `angle_number`, and if the letter stands outside sines and cosines.
-    """
+    """Return a number for all values of an open letter."""
     expression = _parsed(text.strip())
     try:
         return None if expression is None else expression.evaluate(_Waves(values, letter))

@@ -42,27 +42,13 @@ _FORMS = "expected 'chain 4: …', 'star n=3..12: …', 'torus 9 shape=3x3: …'
 
 @dataclass(frozen=True, slots=True)
 class Claimed:
-    """A number as it was written.
+    """A number as it was written."""
 
-    Attributes
-    ----------
-    text : str
-        The number as it was written.
-    count : int
-        How often it is claimed.
-    exact : sympy.Expr, optional
-        The number, if it is neither a sum of cosines nor an approximation.
-    interval : pair of Fraction, optional
-        The numbers that round to an approximation.
-    angle : AngleSum, optional
-        The number, if it is a sum of cosines.
-    """
-
-    text: str
-    count: int
-    exact: sp.Expr | None = None
-    interval: tuple[Fraction, Fraction] | None = None
-    angle: AngleSum | None = None
+    text: str  # the number as it was written
+    count: int  # how often it is claimed
+    exact: sp.Expr | None = None  # the number, if it is neither a sum of cosines nor an approximation
+    interval: tuple[Fraction, Fraction] | None = None  # the numbers that round to an approximation
+    angle: AngleSum | None = None  # the number, if it is a sum of cosines
 
     @property
     def number(self) -> sp.Expr | None:
@@ -91,52 +77,18 @@ class Claimed:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """The claimed spectrum of one graph, or parts of it.
+    """The claimed spectrum of one graph, or parts of it."""
 
-    Attributes
-    ----------
-    line : int
-        Number of the line in the file.
-    text : str
-        The line.
-    graph : Topology
-        The graph.
-    numbers : tuple of Claimed
-        The claimed eigenvalues; none if parts are claimed.
-    n : int, optional
-        The size, if the line has a range of sizes.
-    parts : tuple of Part
-        The claims about parts of the spectrum.
-    """
-
-    line: int
-    text: str
-    graph: Topology
-    numbers: tuple[Claimed, ...]
-    n: int | None = None
-    parts: tuple[Part, ...] = ()
+    line: int  # number of the line in the file
+    text: str  # the line
+    graph: Topology  # the graph
+    numbers: tuple[Claimed, ...]  # the claimed eigenvalues; none if parts are claimed
+    n: int | None = None  # the size, if the line has a range of sizes
+    parts: tuple[Part, ...] = ()  # the claims about parts of the spectrum
 
 
 def read_claims(path: str | Path) -> list[tuple[Claim, ...]]:
-    """Return the claims of a text file; nothing in the file is run.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file; matrix files are looked up beside it.
-
-    Returns
-    -------
-    list of tuple of Claim
-        The claims of a line stand together: one for each size of a range.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        With the number of the line, on anything that cannot be read.
-    """
+    """Return the claims of a text file; nothing in the file is run."""
     place = Path(path)
     if not place.exists():
         raise FileNotFoundError(f"claims {short_repr(str(place))}: no such file; expected a text file; check the path")

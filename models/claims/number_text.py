@@ -29,26 +29,7 @@ _DECIMAL = re.compile(r"(?<![A-Za-z_])(?:[0-9]+\.[0-9]*|\.[0-9]+|[0-9]+(?=[eE][+
 
 
 def exact_number(text: str, values: Mapping[str, int] | None = None) -> sp.Expr:
-    """Return the value of an exact expression.
-
-    Parameters
-    ----------
-    text : str
-        The expression, such as ``"-2-sqrt(2)"`` or ``"-4*sin(k*pi/n)**2"``.
-    values : mapping of str to int, optional
-        Whole numbers for letters such as n.
-
-    Returns
-    -------
-    sympy.Expr
-        The number, without floats.
-
-    Raises
-    ------
-    ValueError
-        On anything outside GRAMMAR, decimals, a division by zero, more than LENGTH characters,
-        DEPTH nested operations or DIGITS digits, and on rationals beyond BITS bits.
-    """
+    """Return the value of an exact expression."""
     stripped = text.strip()
     if len(stripped) > LENGTH:
         raise ValueError(f"number written as {len(stripped)} characters; expected at most {LENGTH}; shorten it")
@@ -70,18 +51,7 @@ def exact_number(text: str, values: Mapping[str, int] | None = None) -> sp.Expr:
 
 
 def whole_number(text: str, values: Mapping[str, int] | None = None) -> int:
-    """Return the value of an expression such as ``"n-2"`` that is a whole number.
-
-    Parameters
-    ----------
-    text, values
-        As `exact_number` has them.
-
-    Raises
-    ------
-    ValueError
-        As `exact_number`, and if the value is not whole.
-    """
+    """Return the value of an expression such as ``"n-2"`` that is a whole number."""
     number = exact_number(text, values)
     if not number.is_Integer:
         raise ValueError(f"{text.strip()!r} is {number}; expected a whole number")

@@ -59,30 +59,14 @@ _DECIMAL = re.compile(r"[+-]?[0-9]{1,40}\.[0-9]{1,60}")
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """The claim about one part of a spectrum.
+    """The claim about one part of a spectrum."""
 
-    Attributes
-    ----------
-    text : str
-        The claim as it was written.
-    word : str
-        One of WORDS.
-    relation : str
-        One of = < > <= >=.
-    number : AngleSum or sympy.Expr, optional
-        The number behind the relation.
-    interval : pair of Fraction, optional
-        The numbers that round to an approximation in its place.
-    of : AngleSum or sympy.Expr, optional
-        The number whose multiplicity is claimed.
-    """
-
-    text: str
-    word: str
-    relation: str
-    number: Exact | None = None
-    interval: tuple[Fraction, Fraction] | None = None
-    of: Exact | None = None
+    text: str  # the claim as it was written
+    word: str  # one of WORDS
+    relation: str  # one of = < > <= >=
+    number: Exact | None = None  # the number behind the relation
+    interval: tuple[Fraction, Fraction] | None = None  # the numbers that round to an approximation in its place
+    of: Exact | None = None  # the number whose multiplicity is claimed
 
 
 def is_part(text: str) -> bool:
@@ -91,20 +75,7 @@ def is_part(text: str) -> bool:
 
 
 def read_part(text: str, values: Mapping[str, int]) -> Part:
-    """Return the claim in a text such as "ratio < 37.9".
-
-    Parameters
-    ----------
-    text : str
-        The claim.
-    values : mapping of str to int
-        Whole numbers for letters such as n.
-
-    Raises
-    ------
-    ValueError
-        If the text is no such claim.
-    """
+    """Return the claim in a text such as "ratio < 37.9"."""
     found = _PART.fullmatch(text)
     if found is None:
         raise ValueError(f"found {text[:60]!r}; expected e.g. largest = -4, ratio < 37.9 or multiplicity(-2) = 3")
@@ -137,13 +108,7 @@ def exact(text: str, values: Mapping[str, int]) -> Exact:
 
 
 def interval(text: str) -> tuple[Fraction, Fraction]:
-    """Return the ends of the interval of numbers that round to an approximation such as ~-3.414.
-
-    Raises
-    ------
-    ValueError
-        If the text is no approximation.
-    """
+    """Return the ends of the interval of numbers that round to an approximation such as ~-3.414."""
     rounded = _ROUNDED.fullmatch(text)
     if not rounded:
         raise ValueError(f"unreadable approximation {text[:60]!r}; expected ~ and a real decimal, e.g. ~-3.414")
@@ -162,20 +127,6 @@ def verify_parts(graph: Topology, parts: Sequence[Part]) -> tuple[tuple[str, ...
     A chain, a ring, and grids, tori and Cartesian products of families need no list of their
     eigenvalues: the extreme ones are sums of those of the factors.  Other closed forms are listed
     up to LISTED nodes.
-
-    Returns
-    -------
-    problems : tuple of str
-        A sentence for each part that is wrong.
-    proved : bool
-        Whether the spectrum was proved.
-    right : str
-        The parts as they are, in words.
-
-    Raises
-    ------
-    ValueError
-        If a part is not known for the graph.
     """
     known = _Known(graph)
     problems, right = [], []

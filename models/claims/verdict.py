@@ -25,24 +25,12 @@ __all__ = ["Verdict", "verify"]
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """The result of the comparison of a claim.
+    """The result of the comparison of a claim."""
 
-    Attributes
-    ----------
-    claim : Claim
-        The claim.
-    problems : tuple of str
-        A sentence for each error.
-    proved : bool
-        Whether the spectrum was proved; False if a closed form was taken on trust.
-    parts : str
-        The claimed parts as they are, in words.
-    """
-
-    claim: Claim
-    problems: tuple[str, ...]
-    proved: bool = True
-    parts: str = ""
+    claim: Claim  # the claim
+    problems: tuple[str, ...]  # a sentence for each error
+    proved: bool = True  # whether the spectrum was proved; False if a closed form was taken on trust
+    parts: str = ""  # the claimed parts as they are, in words
 
     @property
     def right(self) -> bool:
@@ -61,25 +49,7 @@ class Verdict:
 
 
 def verify(claim: Claim) -> Verdict:
-    """Compare a claim with the proved spectrum of its graph.
-
-    Parameters
-    ----------
-    claim : Claim
-        A claim of `read_claims`.
-
-    Returns
-    -------
-    Verdict
-        What is wrong with it.
-
-    Raises
-    ------
-    ValueError
-        If a number is too involved to be compared.
-    ProofError
-        If the proof of the spectrum fails.
-    """
+    """Compare a claim with the proved spectrum of its graph."""
     if claim.parts:
         return Verdict(claim, *verify_parts(claim.graph, claim.parts))
     if _multiplies_out(claim):

@@ -28,18 +28,7 @@ USUAL_LAW = "exponential"
 
 
 def load_oscillator(name: str) -> Oscillator:
-    """Return the oscillator of a plug-in.
-
-    Parameters
-    ----------
-    name : str
-        The name of a file of the folder `oscillators`, of an entry point, or the path of a file that was allowed.
-
-    Raises
-    ------
-    ValueError
-        If there is no such plug-in, or its file is wrong.
-    """
+    """Return the oscillator of a plug-in."""
     return _oscillator(name, load(OSCILLATOR, name))
 
 
@@ -49,18 +38,7 @@ def load_friction_law(name: str) -> FrictionLaw:
 
 
 def read_coupling(words: str) -> Coupling:
-    """Return the coupling of a text.
-
-    Parameters
-    ----------
-    words : str
-        The name of a plug-in ("spring"), a name with coordinates ("spring on x"), or components ("x->x, 1/2 y->z").
-
-    Raises
-    ------
-    ValueError
-        If the text cannot be read, there is no such plug-in, or its file is wrong.
-    """
+    """Return the coupling of a text."""
     matrix = MatrixCoupling.parse(words)
     if matrix is not None:
         return matrix

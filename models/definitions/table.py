@@ -26,20 +26,7 @@ _LAW = ("name", "parameters", "force", "static", "order", "self_exciting")
 
 
 def oscillator_of_table(table: Mapping[object, Any]) -> Oscillator:
-    """Return the oscillator of a table in a scene file.
-
-    Parameters
-    ----------
-    table : mapping
-        `rates` of a vector field; or `coordinates`, `kinetic` and, as wanted, `potential`, `forces`, `dissipation`,
-        `friction` and `contact` of a Lagrangian; with `parameters`, `initial` and `name`.  Expressions are text or
-        numbers.
-
-    Raises
-    ------
-    ValueError, TypeError
-        For unknown keys, and as `Lagrangian` and `Field` do.
-    """
+    """Return the oscillator of a table in a scene file."""
     first_order = "rates" in table
     check_keys("oscillator", table, _FIELD if first_order else _LAGRANGIAN)
     given = {str(key): value for key, value in table.items()}
@@ -61,19 +48,7 @@ def oscillator_of_table(table: Mapping[object, Any]) -> Oscillator:
 
 
 def law_of_table(table: Mapping[object, Any]) -> FrictionLaw:
-    """Return the friction law of a table in a scene file.
-
-    Parameters
-    ----------
-    table : mapping
-        `force`, a text in the sliding velocity w, and, as wanted, `static`, `parameters`, `order`, `self_exciting`
-        and `name`.
-
-    Raises
-    ------
-    ValueError, TypeError
-        For unknown keys, and as `friction_law` does.
-    """
+    """Return the friction law of a table in a scene file."""
     check_keys("friction", table, _LAW)
     given = {str(key): value for key, value in table.items()}
     if "force" not in given:
@@ -121,12 +96,6 @@ def as_name_or_table(part: Oscillator | FrictionLaw) -> str | dict[str, Any]:
     """Return the name of an oscillator or friction law that is a plug-in's, else its table.
 
     A file outside the package is a plug-in too, named by its path.
-
-    Raises
-    ------
-    ValueError
-        For what no table can say: an oscillator with scales that is no plug-in's, and expressions in a form that no
-        text has.
     """
     if part.name.endswith(".py"):
         return str(part.name)

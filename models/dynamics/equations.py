@@ -38,25 +38,15 @@ class _Cached:
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """The links of one coupling on one graph.
+    """The links of one coupling on one graph."""
 
-    Parameters
-    ----------
-    edge_of : tuple of ((int, int), Edge)
-        The templates of the links, by the kinds of their targets and sources.
-    links : tuple of (int, int, Fraction), or AllPairs
-        Target and source (0-based) and weight of each link.  Links of all pairs make a mean field
-        of an edge that separates (`synchain.models.interactions.separation`).
-    varied : tuple of str
-        Parameters of the templates that have one number for each link, k_1_2 where node 1 feels node 2.
-    mutual : bool
-        True if a link and the one that runs back have one number, that of their edge.
-    """
-
-    edge_of: tuple[tuple[Ends, Edge], ...]
+    edge_of: tuple[tuple[Ends, Edge], ...]  # the templates of the links, by the kinds of their targets and sources
+    # target and source (0-based) and weight of each link. Links of all pairs make a mean field of an edge that
+    # separates (`synchain.models.interactions.separation`)
     links: Links
+    # parameters of the templates that have one number for each link, k_1_2 where node 1 feels node 2
     varied: tuple[str, ...] = ()
-    mutual: bool = False
+    mutual: bool = False  # True if a link and the one that runs back have one number, that of their edge
 
     def map(self, change: Callable[[Edge], Edge], renamed: Mapping[sp.Symbol, sp.Symbol] | None = None) -> Layer:
         """The same links with changed templates; parameters in `varied` that no template has any more leave it."""
@@ -82,29 +72,12 @@ class Equations(_Cached, Written):
 
     M is the identity unless nodes or links have inertia.  The state is ordered by components, x_1 … x_n,
     v_1 … v_n; components that all kinds of nodes have come first.
-
-    Parameters
-    ----------
-    nodes : tuple of Node
-        The templates of the nodes, by kind.  A network of equal nodes has one.
-    kind_of : tuple of int
-        The kind of each node; its length is the number of nodes n.
-    layers : tuple of Layer
-        The links, coupling by coupling.
-    varied : tuple of str
-        Parameters of nodes that have one value for each node: a_1 … a_n.
-
-    Raises
-    ------
-    ValueError
-        If a link is repeated in its layer, has no template, joins a node to itself or leaves the network, if
-        templates and kinds do not fit together, or if one name stands for two things.
     """
 
-    nodes: tuple[Node, ...]
-    kind_of: tuple[int, ...]
-    layers: tuple[Layer, ...] = ()
-    varied: tuple[str, ...] = ()
+    nodes: tuple[Node, ...]  # the templates of the nodes, by kind. A network of equal nodes has one
+    kind_of: tuple[int, ...]  # the kind of each node; its length is the number of nodes n
+    layers: tuple[Layer, ...] = ()  # the links, coupling by coupling
+    varied: tuple[str, ...] = ()  # parameters of nodes that have one value for each node: a_1 … a_n
 
     def __post_init__(self) -> None:
         check(self)
@@ -118,19 +91,7 @@ class Equations(_Cached, Written):
     def of_equal_nodes(
         cls, node: Node, edge: Edge | None, n: int, links: Links = (), varied: tuple[str, ...] = ()
     ) -> Equations:
-        """Return the equations of a network of equal nodes.
-
-        Parameters
-        ----------
-        node : Node
-            The template of all nodes.
-        edge : Edge or None
-            The template of all links; None for nodes without links.
-        n : int
-            The number of nodes.
-        links, varied
-            As in `Equations`.
-        """
+        """Return the equations of a network of equal nodes."""
         if edge is None and links:
             raise ValueError(f"{len(links)} links but no edge equations; give a coupling")
         return cls((node,), (0,) * n, () if edge is None else (Layer((((0, 0), edge),), links),), varied)
@@ -218,20 +179,7 @@ class Equations(_Cached, Written):
         of_edge: Callable[[Edge], Edge],
         renamed: Mapping[sp.Symbol, sp.Symbol] | None = None,
     ) -> Equations:
-        """Return the same network of changed templates.
-
-        Parameters
-        ----------
-        of_node, of_edge : callable
-            What becomes of each node and edge template.
-        renamed : mapping of Symbol to Symbol, optional
-            The new symbols of parameters of which nodes or links have numbers of their own.
-
-        Returns
-        -------
-        Equations
-            Parameters in `varied` that no node has any more leave it.
-        """
+        """Return the same network of changed templates."""
         nodes = tuple(map(of_node, self.nodes))
         names = {s.name for node in nodes for s in node.parameters}
         return replace(
@@ -244,19 +192,7 @@ class Equations(_Cached, Written):
     def expect_alike(
         self, what: str, *, varied_too: bool = False, inertia_too: bool = False, layers_too: bool = False
     ) -> None:
-        """Raise ValueError unless the nodes are equal, the links are of one layer and M is the identity.
-
-        Parameters
-        ----------
-        what : str
-            What is for such networks alone; the message begins with it.
-        varied_too : bool
-            Allow parameters that differ from node to node, or from link to link.
-        inertia_too : bool
-            Allow links with inertia.
-        layers_too : bool
-            Allow several layers of links.
-        """
+        """Raise ValueError unless the nodes are equal, the links are of one layer and M is the identity."""
         if not varied_too:
             self.expect_exact_links(what)
         problems = {

@@ -17,26 +17,7 @@ __all__ = ["effective_slope", "inertia_of_modes"]
 
 
 def inertia_of_modes(equations: Equations) -> tuple[sp.Matrix, sp.Expr]:
-    """Return the inertia of links as modes feel it.
-
-    Parameters
-    ----------
-    equations : Equations
-        Equations of a network of equal nodes.
-
-    Returns
-    -------
-    inertia : Matrix
-        B, a square matrix over the components of a node; zero without inertia.
-    share : Expr
-        The number b with B B = b B; zero without inertia.
-
-    Raises
-    ------
-    ValueError
-        If modes have no single strength: the inertia does not vanish between nodes that move alike,
-        is not proportional to sigma, or joins coordinates by different masses.
-    """
+    """Return the inertia of links as modes feel it."""
     node = equations.node
     size = len(node.state)
     edge = equations.edge if equations.inertial_links else None
@@ -69,25 +50,7 @@ def inertia_of_modes(equations: Equations) -> tuple[sp.Matrix, sp.Expr]:
 
 
 def effective_slope(equations: Equations, slope: sp.Matrix) -> sp.Matrix:
-    """Return the matrix that multiplies the strength of a mode.
-
-    Parameters
-    ----------
-    equations : Equations
-        Equations of a network of equal nodes.
-    slope : Matrix
-        The derivative H of a link over sigma at equal states.
-
-    Returns
-    -------
-    Matrix
-        H + B J, which multiplies tau; H itself without inertia.
-
-    Raises
-    ------
-    ValueError
-        As `inertia_of_modes`, and if a link pushes coordinates that its inertia does not move.
-    """
+    """Return the matrix that multiplies the strength of a mode."""
     b_matrix, share = inertia_of_modes(equations)
     if share == 0:
         return slope

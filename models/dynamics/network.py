@@ -39,25 +39,7 @@ def parameters(
     contact: str = ContactModel.ATAN,
     couplings: Sequence[Coupling] = (),
 ) -> dict[str, Parameter]:
-    """Return every parameter with default, unit, meaning and range, in the order of Equations.parameters.
-
-    Parameters
-    ----------
-    oscillator : Oscillator
-        The node.
-    friction : FrictionLaw, optional
-        Its friction law.
-    contact : str
-        How a jump of the law at rest is treated, a `ContactModel`.
-    couplings : sequence of Coupling
-        What joins the nodes, layer by layer.
-
-    Raises
-    ------
-    ValueError
-        For an unknown contact, if the oscillator takes no friction law but is given one, or takes one but is given
-        none, and if two of them have a parameter of the same name.
-    """
+    """Return every parameter with default, unit, meaning and range, in the order of Equations.parameters."""
     _check_parts(oscillator, friction, contact)
     table: dict[str, Parameter] = dict(oscillator.parameters)
     if friction is not None:
@@ -165,17 +147,6 @@ Layers = Sequence[tuple[Coupling, Topology]]
 def network(single: Node, link: Edge | None, graph: Topology, varied: tuple[str, ...] = ()) -> Equations:
     """Return the equations of equal nodes that the links of a graph join.
 
-    Parameters
-    ----------
-    single : Node
-        The template of the nodes.
-    link : Edge or None
-        The template of the links; None leaves the nodes uncoupled.
-    graph : Topology
-        The graph.
-    varied : tuple of str
-        Parameters of nodes that have one value for each node.
-
     Notes
     -----
     If a link tells its ends apart, its weight becomes the sign of its direction
@@ -230,26 +201,7 @@ def layered_network(
     layers: Layers,
     varied: tuple[str, ...] = (),
 ) -> Equations:
-    """Return the equations of nodes of one or several kinds that layers of links join.
-
-    Parameters
-    ----------
-    oscillators : sequence of Oscillator
-        The oscillators, by kind.
-    singles : sequence of Node
-        Their templates.
-    kinds : sequence of int
-        The kind of each node.
-    layers : sequence of (Coupling, Topology)
-        Couplings and their graphs.  Of a coupling every pair of kinds that a link joins gets its own edge.
-    varied : tuple of str
-        Parameters that have one value for each node, or for each link; "W" is the weight of a single layer.
-
-    Raises
-    ------
-    ValueError
-        If a coupling does not fit a pair of kinds.
-    """
+    """Return the equations of nodes of one or several kinds that layers of links join."""
     names = {s.name for single in singles for s in single.parameters}
     apart = Equations(tuple(singles), tuple(kinds), (), tuple(name for name in varied if name in names))
     of_links = [name for name in varied if name not in names]
@@ -330,11 +282,6 @@ def oriented_links(graph: Topology) -> tuple[Link, ...]:
     A link runs from the smaller to the larger number.  On a graph that looks alike from every node,
     such as a ring, it runs the shorter way round, so the last link runs from the last node to the
     first.
-
-    Raises
-    ------
-    ValueError
-        For one-way links and for weights other than 1: strength and direction share one number.
     """
     if not graph.symmetric or any(weight != 1 for _, _, weight in graph.links):
         raise ValueError(

@@ -112,21 +112,12 @@ class RowSum(Reduction):
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """A value at each of some nodes or links.
+    """A value at each of some nodes or links."""
 
-    Parameters
-    ----------
-    value : Expr
-        An expression of the symbols in `at`, of parameters that all share, and of t.
-    at : tuple of (Symbol, tuple)
-        What a symbol is in each row: names of states, or of parameters, or numbers.
-    count : int
-        The number of rows.
-    """
-
-    value: sp.Expr
+    value: sp.Expr  # an expression of the symbols in `at`, of parameters that all share, and of t
+    # what a symbol is in each row: names of states, or of parameters, or numbers
     at: tuple[tuple[sp.Symbol, tuple[str, ...] | tuple[float, ...]], ...]
-    count: int
+    count: int  # the number of rows
 
     @classmethod
     def of(cls, value: sp.Expr, places: Sequence[Mapping[sp.Symbol, sp.Expr]]) -> Rows:
@@ -238,15 +229,7 @@ def _exact(number: sp.Float) -> sp.Rational:
 
 
 def real(value: object) -> sp.Expr:
-    """Return an expression with real symbols and exact numbers.
-
-    Raises
-    ------
-    TypeError
-        If the value is no expression.
-    ValueError
-        If it is complex, or has numbers that are not finite.
-    """
+    """Return an expression with real symbols and exact numbers."""
     own = _made_real(value)
     if own.has(sp.I):
         own = sp.expand_complex(own)

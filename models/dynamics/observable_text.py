@@ -35,22 +35,7 @@ _ONE_NODE = re.compile(r"nodes\[(\d+)\]")
 
 
 def as_observable(what: str, value: object) -> Observable:
-    """Return an observable in the form that its text says, from an observable or from a text.
-
-    Parameters
-    ----------
-    what : str
-        The subject of errors.
-    value : Observable or str
-        Such as ``mean(nodes.mean(v**2/2))``.
-
-    Raises
-    ------
-    TypeError
-        If the value is neither.
-    ValueError
-        For unreadable text and for functions that generated code does not know.
-    """
+    """Return an observable in the form that its text says, from an observable or from a text."""
     if isinstance(value, Observable):
         return _read(what, str(value))
     if not isinstance(value, str):

@@ -27,31 +27,20 @@ LARGEST, ROUNDING = 1000, 1e-14
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """The drive of a network, derived from its equations.
+    """The drive of a network, derived from its equations."""
 
-    Attributes
-    ----------
-    waves : tuple of Expr
-        Angular frequencies of the sines and cosines of time, expressions of the parameters.
-    bends : tuple of Expr
-        pi over the lengths in which other functions of time can rise and fall again, expressions of
-        the parameters: sqrt(pi)/w for exp(-(t/w)**2).
-    frequency : Expr or None
-        The angular frequency whose period 2 pi over its absolute value is the least one of the right-hand side; None if
-        there is no such frequency. Where the values of parameters decide, it is their function `common`.
-    problem : str
-        Why there is none, or may be none at some values, as a predicate of the oscillator.
-    gaps : tuple of Expr
-        Expressions of time and the parameters at whose zeros the drive jumps or has a kink.
-    rises : tuple of Expr
-        Those at whose zeros a part of the drive rises once, as tanh, within the time in which they change by about one.
-    """
-
+    # angular frequencies of the sines and cosines of time, expressions of the parameters
     waves: tuple[sp.Expr, ...] = ()
+    # the angular frequency whose period 2 pi over its absolute value is the least one of the right-hand side; None if
+    # there is no such frequency. Where the values of parameters decide, it is their function `common`
     frequency: sp.Expr | None = None
-    problem: str = ""
+    problem: str = ""  # why there is none, or may be none at some values, as a predicate of the oscillator
+    # pi over the lengths in which other functions of time can rise and fall again, expressions of the parameters:
+    # sqrt(pi)/w for exp(-(t/w)**2)
     bends: tuple[sp.Expr, ...] = ()
+    # expressions of time and the parameters at whose zeros the drive jumps or has a kink
     gaps: tuple[sp.Expr, ...] = ()
+    # those at whose zeros a part of the drive rises once, as tanh, within the time in which they change by about one
     rises: tuple[sp.Expr, ...] = ()
 
     @property
@@ -89,15 +78,7 @@ def angular_frequency(equations: Equations) -> sp.Expr | None:
 
 @lru_cache(maxsize=64)
 def drive_of(templates: tuple[Node | Edge, ...], varied: tuple[str, ...] = ()) -> Drive:
-    """Return the drive of a network.
-
-    Parameters
-    ----------
-    templates : tuple of Node or Edge
-        The templates of the nodes and links.
-    varied : tuple of str
-        Names of parameters that differ from node to node or from link to link.
-    """
+    """Return the drive of a network."""
     if not any(template.forced for template in templates):
         return Drive(problem="is not driven")
     sided, risen = (set[sp.Expr]().union(*map(of, templates)) for of in (gaps, rises))

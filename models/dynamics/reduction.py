@@ -35,28 +35,7 @@ class NoQuotient(ValueError):
 
 
 def substitute_constants(equations: Equations, values: Mapping[str, int | Fraction]) -> Equations:
-    """Return the equations with some parameters replaced by exact numbers.
-
-    Parameters
-    ----------
-    equations : Equations
-        Equations of a network of equal nodes.
-    values : mapping of str to int or Fraction
-        Numbers by the names of parameters that are the same for all nodes.
-
-    Returns
-    -------
-    Equations
-        Parameters that occur no more are left out, and so are links that have no effect.
-
-    Raises
-    ------
-    TypeError
-        If a number is not exact.
-    ValueError
-        If a parameter is unknown or differs from node to node, nodes are of several kinds, or an
-        expression is undefined at the numbers.
-    """
+    """Return the equations with some parameters replaced by exact numbers."""
     _check_constants(equations, values)
     if not values:
         return equations
@@ -80,15 +59,7 @@ def substitute_constants(equations: Equations, values: Mapping[str, int | Fracti
 
 
 def without_drive(equations: Equations, values: Mapping[str, float]) -> Equations:
-    """Return the equations without a drive whose strength is 0; the same equations if there is none, or another drive.
-
-    Parameters
-    ----------
-    equations : Equations
-        Equations of a network.
-    values : mapping of str to float
-        Numbers by the names of all parameters.
-    """
+    """Return the equations without a drive whose strength is 0; the same equations if there is none, or another drive."""
     if not equations.forced or equations.mixed:
         return equations
     common = set(equations.parameters) - equations.single
@@ -120,30 +91,7 @@ def _check_constants(equations: Equations, values: Mapping[str, int | Fraction])
 
 
 def quotient(equations: Equations, colours: Sequence[Hashable]) -> tuple[Equations, tuple[int, ...]]:
-    """Return the smallest network with the same motion if nodes of equal colour start equal.
-
-    Parameters
-    ----------
-    equations : Equations
-        The network.
-    colours : sequence of hashable
-        One entry for each node, such as its initial state.
-
-    Returns
-    -------
-    equations : Equations
-        The quotient network.
-    classes : tuple of int
-        The class of each node; classes are numbered by their first nodes.
-
-    Raises
-    ------
-    NoQuotient
-        If the coupling does not vanish between equal states or is not proportional to the weight of
-        a link; then no exact quotient is known.
-    ValueError
-        If there is not one colour for each node.
-    """
+    """Return the smallest network with the same motion if nodes of equal colour start equal."""
     if any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
         raise NoQuotient(f"quotient: the {equations.link_count} links of all pairs are too many to be listed")
     classes = _balanced(equations, colours)
@@ -162,28 +110,7 @@ def _balanced(equations: Equations, colours: Sequence[Hashable]) -> tuple[int, .
 
 
 def collapse(equations: Equations, classes: Sequence[int]) -> Equations:
-    """Return the network with one node for each class.
-
-    Parameters
-    ----------
-    equations : Equations
-        The network.
-    classes : sequence of int
-        The class of each node, out of 0 … k-1.
-
-    Returns
-    -------
-    Equations
-        The quotient network; its links are those of any node of a class to the other classes.
-
-    Raises
-    ------
-    NoQuotient
-        For a coupling that `quotient` refuses.
-    ValueError
-        If the classes are not 0 … k-1, or if two nodes of a class feel another class with different
-        total weights.
-    """
+    """Return the network with one node for each class."""
     if len(classes) != equations.n:
         raise ValueError(f"partition: found {len(classes)} classes for {equations.n} nodes; expected one for each node")
     count = len(set(classes))

@@ -37,18 +37,11 @@ Entry = tuple[tuple[int, int], sp.Expr]
 
 @dataclass(frozen=True, slots=True)
 class Events:
-    """The rows of a deviation that are velocities, and what the start of slip makes of them.
+    """The rows of a deviation that are velocities, and what the start of slip makes of them."""
 
-    Attributes
-    ----------
-    owners : tuple of int, one for each row
-        The contact that the row is a velocity of, -1 for a position.
-    exits : tuple of pairs
-        For each contact the entries of the matrix that the start of slip with w > 0, and with
-        w < 0, multiplies its rows by; empty if friction sets in without a jump.
-    """
-
-    owners: tuple[int, ...]
+    owners: tuple[int, ...]  # the contact that the row is a velocity of, -1 for a position
+    # for each contact the entries of the matrix that the start of slip with w > 0, and with w < 0, multiplies its
+    # rows by; empty if friction sets in without a jump
     exits: tuple[tuple[tuple[Entry, ...], tuple[Entry, ...]], ...] = ()
 
     def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Events:
@@ -64,21 +57,11 @@ class Events:
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """The start of slip of one contact in one direction, in the symbols of a network.
+    """The start of slip of one contact in one direction, in the symbols of a network."""
 
-    Attributes
-    ----------
-    gradient : tuple of Expr, (n,)
-        Derivatives of the event function by the positions.
-    own : Expr
-        Its derivative by the position of the contact without the links.
-    lead : Expr
-        Change of the velocity for each unit that the event function is ahead.
-    """
-
-    gradient: tuple[sp.Expr, ...]
-    own: sp.Expr
-    lead: sp.Expr
+    gradient: tuple[sp.Expr, ...]  # derivatives of the event function by the positions
+    own: sp.Expr  # its derivative by the position of the contact without the links
+    lead: sp.Expr  # change of the velocity for each unit that the event function is ahead
 
 
 def _releases(orbit: Equations) -> tuple[tuple[Release, Release], ...]:

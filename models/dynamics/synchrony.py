@@ -24,24 +24,6 @@ def synchronous_node(equations: Equations) -> Node:
 
     Links that vanish between equal states add nothing.  Others add k h(s, s), k the sum of weights at a node, which must
     be that of every other node.
-
-    Parameters
-    ----------
-    equations : Equations
-        Equations of a network of equal nodes.
-
-    Returns
-    -------
-    Node
-        Its parameters are those of the nodes, and those of links that act between equal states.
-
-    Raises
-    ------
-    NoSynchrony
-        If a link acts between equal states and the sums of weights, or parameters of links, differ from place to place,
-        and if a link has no value between equal states.
-    ValueError
-        For nodes that differ.
     """
     apart = replace(equations, layers=())
     apart.expect_alike("complete synchronisation")

@@ -55,34 +55,15 @@ LOG_VOLUME = sp.Symbol("log_volume", real=True)
 
 @dataclass(frozen=True, slots=True)
 class Variation:
-    """A linear system d' = A d of small deviations along an orbit.
+    """A linear system d' = A d of small deviations along an orbit."""
 
-    Parameters
-    ----------
-    orbit : Equations
-        The equations of the orbit.
-    size : int
-        The number of deviations; slip states of contacts do not deviate.
-    matrix : tuple of ((int, int), Expr)
-        The non-zero entries of A by (row, column), in the symbols of the orbit (x_1 …), its
-        parameters, t and `parameters`.
-    parameters : tuple of Symbol
-        Numbers that differ from mode to mode; A is linear in them.
-    events : Events or None
-        What stick and slip do to a deviation; None for smooth equations.
-
-    Raises
-    ------
-    ValueError
-        For an entry outside the matrix, with an unknown symbol, or not linear in `parameters`, and for rates of the orbit that
-        jump in its state: a deviation jumps there too (saltation), which is known for set-valued friction alone.
-    """
-
-    orbit: Equations
-    size: int
+    orbit: Equations  # the equations of the orbit
+    size: int  # the number of deviations; slip states of contacts do not deviate
+    # the non-zero entries of A by (row, column), in the symbols of the orbit (x_1 …), its parameters, t and
+    # `parameters`
     matrix: tuple[Entry, ...]
-    parameters: tuple[sp.Symbol, ...] = ()
-    events: Events | None = None
+    parameters: tuple[sp.Symbol, ...] = ()  # numbers that differ from mode to mode; A is linear in them
+    events: Events | None = None  # what stick and slip do to a deviation; None for smooth equations
 
     def __post_init__(self) -> None:
         names = {*self.orbit.state, *self.orbit.parameters, "t"}
@@ -133,25 +114,6 @@ def mode(equations: Equations, plane: bool = False) -> Variation:
     s' = F(s) + sigma k h(s, s) with k the sum of weights at every node, and J is the Jacobian of that: the deviation obeys
     d' = (DF + sigma k D1h + sigma lambda D2h) d with the eigenvalue lambda = gamma + k of the matrix of weights.
 
-    Parameters
-    ----------
-    equations : Equations
-        Equations of a network of equal nodes.
-    plane : bool
-        Let the strengths be complex, alpha + i beta; the deviation has its real parts first.
-
-    Returns
-    -------
-    Variation
-        The variational equation, its orbit one node.  Its parameters are the real parts of the strengths, one for each layer,
-        and then their imaginary parts.
-
-    Raises
-    ------
-    ValueError
-        As `source_slopes` and `synchronous_node`, and for links that act between equal states and have inertia, or join
-        nodes with set-valued friction.
-
     References
     ----------
     Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); several layers: Sorrentino, New J. Phys. 14, 033035 (2012).
@@ -188,23 +150,7 @@ def _strengths(layers: int) -> tuple[tuple[sp.Symbol, sp.Symbol], ...]:
 
 
 def network_variation(equations: Equations) -> Variation:
-    """Return the variational equation of the whole network, d' = J d.
-
-    Parameters
-    ----------
-    equations : Equations
-        Equations of a network of nodes of one kind.
-
-    Returns
-    -------
-    Variation
-        Deviations in state order, without the slip states of contacts.
-
-    Raises
-    ------
-    ValueError
-        For nodes of several kinds and for links with inertia.
-    """
+    """Return the variational equation of the whole network, d' = J d."""
     equations.expect_alike("variational equation of the whole network", varied_too=True, layers_too=True)
     size = equations.n * len(equations.node.continuous)
     matrix = tuple((key, e) for key, e in equations.jacobian().items() if max(key) < size)
@@ -216,25 +162,6 @@ def clustered(equations: Equations, found: Clusters) -> Variation:
 
     The orbit is that of the quotient network.  Coordinate k of a block lives on the orbit of its
     cluster c and obeys d_k' = J(s_c) d_k + sigma sum_l B_kl H d_l; B is the matrix of the block.
-
-    Parameters
-    ----------
-    equations : Equations
-        Equations of a network of equal nodes.
-    found : Clusters
-        The clusters and the blocks of their variational equation.
-
-    Returns
-    -------
-    Variation
-        First the motion of the clusters, then the blocks in turn, b rows for each component of a
-        block of b coordinates; `STRENGTH` stands for sigma.
-
-    Raises
-    ------
-    ValueError
-        As `source_slopes`, for links that act between equal states, for a link whose derivative depends on the state, and for a partition
-        that is not balanced.
 
     References
     ----------
@@ -315,12 +242,6 @@ def with_volume(equations: Equations) -> Equations:
 
     The sum of `LOG_VOLUME` over the nodes is the logarithm of a volume of states that moves with the
     flow (Liouville's formula).
-
-    Raises
-    ------
-    ValueError
-        For set-valued friction, under which volumes vanish in stick, for nodes of several kinds and
-        for links with inertia.
     """
     if equations.sticks:
         raise ValueError("volumes of states: found set-valued friction, whose stick makes them zero")
@@ -350,22 +271,6 @@ def source_slopes(equations: Equations) -> tuple[sp.Matrix, ...]:
     """Return H of each layer, the derivative of a link of weight 1 by the state at its source, over the strength of the links.
 
     The strength is sigma, or the one parameter that is a factor of the whole link.
-
-    Parameters
-    ----------
-    equations : Equations
-        Equations of a network of equal nodes.
-
-    Returns
-    -------
-    tuple of Matrix
-        H at equal states, (components, components), layer by layer; H + B J for links with inertia.
-
-    Raises
-    ------
-    ValueError
-        If nodes differ, there is no coupling, several layers have inertia, links are not proportional to their weight and
-        to one strength, or have no derivative between equal states.
     """
     several = len(equations.layers) > 1
     equations.expect_alike("transversal modes of complete synchronisation", inertia_too=not several, layers_too=True)

@@ -31,30 +31,14 @@ _ENTRY = re.compile(r"[0-9]{1,9}|[a-hj-wyz][0-9]?")
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """Eigenvalues of one form.
+    """Eigenvalues of one form."""
 
-    Parameters
-    ----------
-    value : SymPy expression
-        The eigenvalue.
-    times : SymPy expression, optional
-        Its multiplicity.
-    indices : tuple of (symbol, low, high), optional
-        There is an eigenvalue for every value low … high of these indices.
-    vector : SymPy expression, optional
-        Entry NODE of an eigenvector.
-    numbered : tuple of (symbol, low, high), optional
-        Numbers of the eigenvectors of a multiple eigenvalue.
-    where : SymPy condition, optional
-        The numbers that give independent eigenvectors obey it.
-    """
-
-    value: sp.Expr
-    times: sp.Expr = sp.S.One
-    indices: tuple[Index, ...] = ()
-    vector: sp.Expr | None = None
-    numbered: tuple[Index, ...] = ()
-    where: sp.Basic = sp.true
+    value: sp.Expr  # the eigenvalue
+    times: sp.Expr = sp.S.One  # its multiplicity
+    indices: tuple[Index, ...] = ()  # there is an eigenvalue for every value low … high of these indices
+    vector: sp.Expr | None = None  # entry NODE of an eigenvector
+    numbered: tuple[Index, ...] = ()  # numbers of the eigenvectors of a multiple eigenvalue
+    where: sp.Basic = sp.true  # the numbers that give independent eigenvectors obey it
 
     @property
     def text(self) -> str:
@@ -119,44 +103,19 @@ def _with_indices(indices: tuple[Index, ...], numbers: dict[sp.Symbol, int]) -> 
 
 @dataclass(frozen=True, slots=True)
 class ClosedForm:
-    """The spectrum of a family or product in symbols.
+    """The spectrum of a family or product in symbols."""
 
-    Parameters
-    ----------
-    terms : tuple of Term
-        The eigenvalues.
-    size : SymPy expression, optional
-        The number of nodes.
-    options : mapping, optional
-        Options of the family, in the symbols.
-    least : int, optional
-        Smallest number for each symbol that is not in `lowest`.
-    note : str, optional
-        What else a reader must know.
-    blocks : str, optional
-        The Jordan blocks that are larger than 1; it does not hold for products.
-    degree : SymPy expression, optional
-        The in-degree of every node; None if it is not one for all.
-    where : SymPy condition, optional
-        What the numbers must obey.
-    lowest : mapping of symbol to int, optional
-        Smallest numbers of single symbols.
-    name : str, optional
-        Name of the family with its options.
-    build : callable, optional
-        Makes the graph for numbers by symbols.
-    """
-
-    terms: tuple[Term, ...]
-    size: sp.Expr = N
-    options: Mapping[str, object] = field(default_factory=dict)
-    least: int = 1
-    note: str = ""
-    blocks: str = ""
-    degree: sp.Expr | None = None
-    where: sp.Basic = sp.true
-    lowest: Mapping[sp.Symbol, int] = field(default_factory=dict)
-    name: str = ""
+    terms: tuple[Term, ...]  # the eigenvalues
+    size: sp.Expr = N  # the number of nodes
+    options: Mapping[str, object] = field(default_factory=dict)  # options of the family, in the symbols
+    least: int = 1  # smallest number for each symbol that is not in `lowest`
+    note: str = ""  # what else a reader must know
+    blocks: str = ""  # the Jordan blocks that are larger than 1; it does not hold for products
+    degree: sp.Expr | None = None  # the in-degree of every node; None if it is not one for all
+    where: sp.Basic = sp.true  # what the numbers must obey
+    lowest: Mapping[sp.Symbol, int] = field(default_factory=dict)  # smallest numbers of single symbols
+    name: str = ""  # name of the family with its options
+    # makes the graph for numbers by symbols
     build: Callable[[Mapping[sp.Symbol, int]], Topology] | None = field(default=None, compare=False)
 
     @property
@@ -172,11 +131,6 @@ class ClosedForm:
         """Return eigenvalues and multiplicities for numbers such as n=5 or p=3, q=4.
 
         Equal eigenvalues are not merged.
-
-        Raises
-        ------
-        ValueError
-            If a number is missing, not known or too small.
         """
         by_symbol = self.by_symbol(numbers)
         return [(value, count) for term in self.terms for value, count, _ in term.at(by_symbol)]
@@ -263,20 +217,7 @@ def formulas() -> tuple[str, ...]:
 
 
 def closed_form(name: str, **options: object) -> ClosedForm:
-    """Return the spectrum of a family with symbols for its size.
-
-    Parameters
-    ----------
-    name : str
-        Name of the family.
-    **options
-        Options of the family as numbers or letters, e.g. ``shape="pxqxr"``.
-
-    Raises
-    ------
-    ValueError
-        If the family has no closed form with symbols, or not with these options.
-    """
+    """Return the spectrum of a family with symbols for its size."""
     made = family(name)
     name, formula = made.name, made.formula
     if formula is None:

@@ -32,13 +32,7 @@ def cartesian(first: ClosedForm, second: ClosedForm) -> ClosedForm:
 
 
 def kronecker(first: ClosedForm, second: ClosedForm) -> ClosedForm:
-    """Return (a + d)(b + e) - d e for eigenvalues a, b and in-degrees d, e.
-
-    Raises
-    ------
-    ValueError
-        If nodes of a graph differ in their in-degrees.
-    """
+    """Return (a + d)(b + e) - d e for eigenvalues a, b and in-degrees d, e."""
     first, second = _apart(first, second)
     d, e = first.degree, second.degree
     if d is None or e is None:
@@ -62,17 +56,7 @@ def union(first: ClosedForm, second: ClosedForm) -> ClosedForm:
 
 
 def box(part: ClosedForm, sizes: Sequence[sp.Expr], indices: Sequence[sp.Symbol]) -> ClosedForm:
-    """Return the Cartesian product of chains or rings of these sizes.
-
-    Parameters
-    ----------
-    part : ClosedForm
-        The chain or the ring.
-    sizes : sequence of SymPy expressions
-        Nodes in each direction; node i is in place i mod the last size of the last direction.
-    indices : sequence of SymPy symbols
-        The index of the eigenvalues of each direction.
-    """
+    """Return the Cartesian product of chains or rings of these sizes."""
     (n,) = part.symbols
     ((old, _, _),) = part.terms[0].indices
     parts = [renamed(part, {n: size, old: k}) for size, k in zip(sizes, indices, strict=True)]

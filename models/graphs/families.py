@@ -41,17 +41,7 @@ def _defaults(module: ModuleType) -> dict[str, object]:
 
 
 def check_topology(module: ModuleType, where: str, text: bytes) -> None:
-    """Raise ValueError if a module is no topology.
-
-    Parameters
-    ----------
-    module : module
-        What the file defines.
-    where : str
-        The name of the file in messages.
-    text : bytes
-        What stands in the file.
-    """
+    """Raise ValueError if a module is no topology."""
     file = PluginFile.of("topology", KNOWN, module, where, text)
     file.check_names(("SUMMARY", "MINIMUM", "edges"))
     file.check_values()
@@ -123,64 +113,35 @@ class Family:
 
     Families are equal if their names are; that of a file outside the package stands for one text
     of that file.  A family pickles as its name.
-
-    Parameters
-    ----------
-    name : str
-        The name of the plug-in.
-    summary : str
-        One line for lists.
-    minimum : int
-        Smallest number of nodes.
-    edges : callable
-        ``edges(n, **options)`` yields (i, j, weight) once for each edge, i < j; of a directed
-        family (target, source, weight) once for each link.
-    source : str, optional
-        Where the graph comes from.
-    too_small : str, optional
-        What to do if n is below the minimum.
-    directed : bool, optional
-        True if links are one-way.
-    connected : bool, optional
-        False if a graph may fall into parts.
-    all_to_all : bool, optional
-        True if every pair of nodes is joined by an edge of weight 1.
-    options : mapping, optional
-        The options with their defaults; None if an option is not stored unless it is set.
-    settle : callable, optional
-        ``settle(n, **options)`` checks the options, and n if the family has not all numbers of
-        nodes, and returns the options as they are stored.
-    count, expected : callable, optional
-        ``count(n, **options)`` is the number of edges; ``expected(n, **options)`` is their mean
-        number if chance decides.
-    spectrum : callable, optional
-        ``spectrum(n, **options)`` is a sequence of (eigenvalue of G, multiplicity) without
-        repetition, or None for an n without a closed form.
-    formula : callable, optional
-        The closed form with symbols for the sizes.
-    sides : callable, optional
-        ``sides(n)`` is the number of nodes in each direction of a grid.
-    link_limit : int, optional
-        Greatest number of links of a graph.
     """
 
-    name: str
-    summary: str
-    minimum: int
+    name: str  # the name of the plug-in
+    summary: str  # one line for lists
+    minimum: int  # smallest number of nodes
+    # ``edges(n, **options)`` yields (i, j, weight) once for each edge, i < j; of a directed family (target, source,
+    # weight) once for each link
     edges: Edges
-    source: str = ""
-    too_small: str = "choose a larger n"
-    directed: bool = False
-    connected: bool = True
-    all_to_all: bool = False
+    source: str = ""  # where the graph comes from
+    too_small: str = "choose a larger n"  # what to do if n is below the minimum
+    directed: bool = False  # True if links are one-way
+    connected: bool = True  # False if a graph may fall into parts
+    all_to_all: bool = False  # True if every pair of nodes is joined by an edge of weight 1
+    # the options with their defaults; None if an option is not stored unless it is set
     options: Mapping[str, object] = field(default_factory=dict)
+    # ``settle(n, **options)`` checks the options, and n if the family has not all numbers of nodes, and returns the
+    # options as they are stored
     settle: Callable[..., object] | None = None
+    # ``count(n, **options)`` is the number of edges; ``expected(n, **options)`` is their mean number if chance
+    # decides
     count: Callable[..., int] | None = None
     expected: Callable[..., int] | None = None
+    # ``spectrum(n, **options)`` is a sequence of (eigenvalue of G, multiplicity) without repetition, or None for an n
+    # without a closed form
     spectrum: Callable[..., Eigenvalues] | None = None
-    formula: Callable[..., Any] | None = None
+    formula: Callable[..., Any] | None = None  # the closed form with symbols for the sizes
+    # ``sides(n)`` is the number of nodes in each direction of a grid
     sides: Callable[[int], tuple[int, ...]] | None = None
-    link_limit: int = LINK_LIMIT
+    link_limit: int = LINK_LIMIT  # greatest number of links of a graph
     __signature__ = _Signature()
 
     def __call__(self, *n: object, **options: object) -> Topology:
@@ -332,15 +293,7 @@ def names() -> tuple[str, ...]:
 
 
 def family(name: str) -> Family:
-    """Return a family of graphs by its name, or by a path that `allow_code` has allowed.
-
-    Raises
-    ------
-    TypeError
-        If the name is no text.
-    ValueError
-        If there is no such family or its file is wrong.
-    """
+    """Return a family of graphs by its name, or by a path that `allow_code` has allowed."""
     if not isinstance(name, str):
         raise TypeError(f"topology name {name!r} is no text; expected one of {', '.join(names())}")
     known = plugins.named(TOPOLOGY, name)

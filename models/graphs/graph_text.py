@@ -36,40 +36,12 @@ def is_composed(text: str) -> bool:
 
 
 def read_graph(text: str, largest: int | None = None, seeds: Iterator[int] | None = None) -> Topology:
-    """Return the graph of a text; families have their size as first argument, then their options by name.
-
-    Parameters
-    ----------
-    text : str
-        cartesian, kronecker and union of two graphs, complement, weighted(graph, number), or a family with its size.
-    largest : int, optional
-        Most nodes of a graph; larger ones are refused before their links are made.
-    seeds : iterator of int, optional
-        Seeds of the random families in the text, from left to right; the text has none then.
-
-    Returns
-    -------
-    Topology
-        The graph.
-
-    Raises
-    ------
-    ValueError
-        On anything else, on a graph of more than `largest` nodes, and on a seed beside `seeds`.
-    """
+    """Return the graph of a text; families have their size as first argument, then their options by name."""
     return _value(_Graphs(text, largest, seeds))
 
 
 def checked_name(what: str, graph: Topology) -> Topology:
-    """Return a graph; ValueError if it has the name of a family or of an operation on graphs, and not its links.
-
-    Parameters
-    ----------
-    what : str
-        The subject of the error.
-    graph : Topology
-        The graph; one with a rule has the name of its rule.  Families have the defaults of their options.
-    """
+    """Return a graph; ValueError if it has the name of a family or of an operation on graphs, and not its links."""
     composed = is_composed(graph.name)
     if graph.rule is not None or not (composed or graph.name in (*names(), *TOPOLOGY.also)):
         return graph
@@ -88,13 +60,7 @@ def checked_name(what: str, graph: Topology) -> Topology:
 
 
 def read_form(text: str) -> ClosedForm:
-    """Return the closed form of a text without sizes: cartesian, kronecker and union of families, options with letters.
-
-    Raises
-    ------
-    ValueError
-        On anything else, and if no closed form with symbols is known.
-    """
+    """Return the closed form of a text without sizes: cartesian, kronecker and union of families, options with letters."""
     return _value(_Forms(text))
 
 

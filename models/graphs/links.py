@@ -21,23 +21,10 @@ Link: TypeAlias = tuple[int, int, Fraction]
 
 @dataclass(frozen=True, slots=True)
 class AllPairs:
-    """The links between each node and every other one, all of one weight, sorted; they take no memory.
+    """The links between each node and every other one, all of one weight, sorted; they take no memory."""
 
-    Parameters
-    ----------
-    n : int
-        Number of nodes.
-    weight : Fraction
-        The weight of every link.
-
-    Raises
-    ------
-    ValueError
-        When more than LINK_LIMIT links are run through.
-    """
-
-    n: int
-    weight: Fraction
+    n: int  # number of nodes
+    weight: Fraction  # the weight of every link
 
     def __len__(self) -> int:
         return self.n * (self.n - 1)
@@ -72,18 +59,6 @@ def one_degree(n: int, links: Iterable[Link]) -> Fraction | None:
 
 def join(n: int, pairs: Iterable[tuple[int, int]]) -> tuple[int, ...]:
     """Return the class of each node in the finest partition with every pair in one class.
-
-    Parameters
-    ----------
-    n : int
-        Number of nodes.
-    pairs : iterable of (int, int)
-        Nodes of one class.
-
-    Returns
-    -------
-    tuple of int
-        The class of each node, numbered by the first members.
 
     References
     ----------

@@ -101,25 +101,10 @@ class Graph(Matrix, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class GraphMatrix(Exact):
-    """A matrix of a graph beside its connectivity matrix G.
+    """A matrix of a graph beside its connectivity matrix G."""
 
-    Parameters
-    ----------
-    graph : Topology
-        The graph.
-    kind : MatrixKind
-        The matrix.
-
-    Raises
-    ------
-    ValueError
-        If the matrix is one of undirected graphs and the graph is not, and if a node has links of
-        both signs so that its degree, by which the random-walk Laplacian is divided, is not
-        positive.
-    """
-
-    graph: Graph
-    kind: MatrixKind
+    graph: Graph  # the graph
+    kind: MatrixKind  # the matrix
 
     def __post_init__(self) -> None:
         if self.kind in (MatrixKind.ADJACENCY, MatrixKind.LAPLACIAN):

@@ -25,22 +25,7 @@ Weights = dict[tuple[int, int], Fraction]
 
 
 def as_topology(what: str, value: object) -> Topology:
-    """Return the graph that a value is, or stands for.
-
-    Parameters
-    ----------
-    what : str
-        The subject of the error.
-    value : Topology, networkx graph, SciPy sparse matrix, NumPy array or SymPy matrix
-        A matrix is the connectivity matrix G, every row of which sums to zero.
-
-    Raises
-    ------
-    TypeError
-        If the value is nothing of these.
-    ValueError
-        On what `from_graph`, `from_sparse` and `from_matrix` refuse.
-    """
+    """Return the graph that a value is, or stands for."""
     if isinstance(value, Topology):
         return value
     if is_graph(value):

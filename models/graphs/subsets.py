@@ -13,13 +13,7 @@ __all__ = ["ground_set", "multiplicity", "numbered", "size"]
 
 
 def ground_set(n: int, k: int) -> int:
-    """Return the number of elements of a set that has n subsets of k elements.
-
-    Raises
-    ------
-    ValueError
-        If there is none.
-    """
+    """Return the number of elements of a set that has n subsets of k elements."""
     low, high = k, k + 1
     while comb(high, k) < n:
         low, high = high, 2 * high

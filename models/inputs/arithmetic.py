@@ -29,24 +29,7 @@ GRAMMAR = "numbers, pi, + - * / **, parentheses and " + " ".join(FUNCTIONS)
 
 
 def constant(text: str) -> float:
-    """Return the value of a constant expression in floating point.
-
-    Parameters
-    ----------
-    text : str
-        The expression, such as ``"2*pi/1.15"``.
-
-    Returns
-    -------
-    float
-        A finite number.
-
-    Raises
-    ------
-    ValueError
-        On anything but a finite constant of GRAMMAR, on more than LENGTH characters or DEPTH nested
-        operations, and on an exponent beyond EXPONENT or an intermediate value beyond MAGNITUDE.
-    """
+    """Return the value of a constant expression in floating point."""
     if len(text) > LENGTH:
         raise ValueError(f"number written as {len(text)} characters; expected at most {LENGTH}; give its value")
     stray = stray_character(text)

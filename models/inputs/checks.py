@@ -66,22 +66,7 @@ T = TypeVar("T")
 
 
 def suggestion(found: object, known: Iterable[str], other: Mapping[str, str] | None = None) -> str:
-    """Return the question whether a known name was meant.
-
-    Parameters
-    ----------
-    found : object
-        The unknown name; other types than str have no suggestion.
-    known : iterable of str
-        The names to choose from.
-    other : mapping of str to str, optional
-        Names used elsewhere and the known name of each, which is suggested for them.
-
-    Returns
-    -------
-    str
-        ``"; did you mean 'x'?"``, of a name that begins as the unknown one if there is one; "" if none is close.
-    """
+    """Return the question whether a known name was meant."""
     if not isinstance(found, str):
         return ""
     meant = {name: name for name in known}
@@ -117,24 +102,7 @@ def is_row(value: object) -> TypeGuard[Iterable[Any]]:
 
 
 def check_keys(what: str, given: Mapping[object, object], known: Iterable[str]) -> None:
-    """Check that all keys of a mapping are text, and known.
-
-    Parameters
-    ----------
-    what : str
-        The subject of the error.
-    given : mapping
-        The mapping of the user.
-    known : iterable of str
-        The keys that it may have.
-
-    Raises
-    ------
-    TypeError
-        If a key is no text.
-    ValueError
-        If a key is unknown; the error suggests a known one.
-    """
+    """Check that all keys of a mapping are text, and known."""
     known = tuple(known)
     for key in given:
         if not isinstance(key, str):
@@ -154,24 +122,7 @@ def check_table(what: str, value: object) -> Mapping[object, object]:
 
 
 def check_text(what: str, value: object, limit: int = 200) -> str:
-    """Return a value that is a short text without control characters.
-
-    Parameters
-    ----------
-    what : str
-        The subject of the error.
-    value : object
-        What the user gave.
-    limit : int, optional
-        Most characters.
-
-    Raises
-    ------
-    TypeError
-        If the value is no text.
-    ValueError
-        If it is too long, or has a control character.
-    """
+    """Return a value that is a short text without control characters."""
     if not isinstance(value, str):
         raise TypeError(f"{what}: found {typed_repr(value)}; expected text in quotation marks")
     if len(value) > limit:
@@ -194,24 +145,7 @@ def check_printable(what: str, value: str) -> str:
 
 
 def check_choice(what: str, value: object, known: tuple[str, ...]) -> str:
-    """Return a value that is one of the known names.
-
-    Parameters
-    ----------
-    what : str
-        The subject of the error.
-    value : object
-        What the user gave.
-    known : tuple of str
-        The names.
-
-    Raises
-    ------
-    TypeError
-        If the value is no text.
-    ValueError
-        If it is another text; the error suggests a known name.
-    """
+    """Return a value that is one of the known names."""
     name = check_text(what, value)
     if name not in known:
         raise ValueError(f"unknown {what} {short_repr(name)}; known: {', '.join(known)}{suggestion(name, known)}")
@@ -219,25 +153,7 @@ def check_choice(what: str, value: object, known: tuple[str, ...]) -> str:
 
 
 def check_number(what: str, value: object, low: float | None = None, high: float | None = None) -> float:
-    """Return a finite float.
-
-    Parameters
-    ----------
-    what : str
-        The subject of the error.
-    value : object
-        A real number, an array of one without dimensions, a SymPy number, or the text of a constant expression such as
-        ``"2*pi/1.15"``.
-    low, high : float, optional
-        The range, both ends in it.
-
-    Raises
-    ------
-    TypeError
-        If the value is neither a real number nor text.
-    ValueError
-        If it is not finite, out of range, or a text that is no constant.
-    """
+    """Return a finite float."""
     if getattr(value, "ndim", None) == 0:
         value = value.item()  # type: ignore[attr-defined]
     if isinstance(value, str):
@@ -279,24 +195,7 @@ def typed_repr(value: object) -> str:
 
 
 def check_instance(what: str, value: object, kind: type[T] | tuple[type[T], ...], expected: str) -> T:
-    """Return a value that is of a type.
-
-    Parameters
-    ----------
-    what : str
-        The subject of the error.
-    value : object
-        What the user gave.
-    kind : type or tuple of types
-        The types that it may have.
-    expected : str
-        The types in words.
-
-    Raises
-    ------
-    TypeError
-        If the value is of another type.
-    """
+    """Return a value that is of a type."""
     if not isinstance(value, kind):
         raise TypeError(f"{what}: found {typed_repr(value)}; expected {expected}")
     return value
@@ -315,29 +214,7 @@ def check_flag(what: str, value: object) -> bool:
 
 
 def check_integer(what: str, value: object, low: int, high: int | None = None) -> int:
-    """Return a whole number as an int; a float is refused even if it is whole.
-
-    Parameters
-    ----------
-    what : str
-        The thing that the number is for, the subject of the error.
-    value : object
-        What the user gave.
-    low, high : int, optional
-        The range, both ends in it.
-
-    Returns
-    -------
-    int
-        The number.
-
-    Raises
-    ------
-    TypeError
-        If the value is no whole number.
-    ValueError
-        If it is out of range.
-    """
+    """Return a whole number as an int; a float is refused even if it is whole."""
     if isinstance(value, bool) or not isinstance(value, numbers.Integral):
         raise TypeError(f"{what} = {short_repr(value)}; expected a whole number, e.g. {max(low, 1)}")
     result = operator.index(value)
@@ -357,22 +234,7 @@ def check_positive(what: str, value: object) -> float:
 
 
 def check_path(what: str, value: object) -> Path:
-    """Return a path.
-
-    Parameters
-    ----------
-    what : str
-        The subject of the error.
-    value : object
-        Text, or an object that is a path.
-
-    Raises
-    ------
-    TypeError
-        If the value is no path.
-    ValueError
-        If the path is empty, or has a null character.
-    """
+    """Return a path."""
     if not isinstance(value, str | os.PathLike) or not isinstance(os.fspath(value), str):
         raise TypeError(f"{what}: found {typed_repr(value)}; expected a path, e.g. 'data/G.txt'")
     if not os.fspath(value).strip() or "\0" in os.fspath(value):

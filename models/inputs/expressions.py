@@ -96,36 +96,16 @@ class Expressions(Algebra[sp.Basic]):
     """Expressions as SymPy makes them; operands are checked, so that no constant grows.
 
     A subclass says what names and functions there are.
-
-    Parameters
-    ----------
-    what : str
-        The subject of errors.
-
-    Attributes
-    ----------
-    whole : number
-        Largest whole number, above and below a line.
-    numbers : str
-        What constants must be, in words.
-    functions : mapping of str to callable
-        The functions by their names, as messages list them.
     """
 
-    what: str
+    what: str  # the subject of errors
     deepest = 100
-    whole: ClassVar[float] = MAGNITUDE
-    numbers: ClassVar[str] = "finite numbers"
-    functions: ClassVar[Mapping[str, Callable[..., sp.Expr]]]
+    whole: ClassVar[float] = MAGNITUDE  # largest whole number, above and below a line
+    numbers: ClassVar[str] = "finite numbers"  # what constants must be, in words
+    functions: ClassVar[Mapping[str, Callable[..., sp.Expr]]]  # the functions by their names, as messages list them
 
     def read(self, expression: Expression) -> sp.Expr:
-        """Return the value of an expression.
-
-        Raises
-        ------
-        ValueError
-            In one line, for what has no meaning or no finite value, and for powers beyond EXPONENT.
-        """
+        """Return the value of an expression."""
         try:
             found = self.value(expression.evaluate(self))
         except _Refusal as refusal:

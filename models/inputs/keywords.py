@@ -16,15 +16,7 @@ __all__ = ["called_from_outside", "check_methods", "public", "warn"]
 
 
 def warn(message: str, kind: type[Warning] = RuntimeWarning) -> None:
-    """Warn at the line that called this package, through however many of its functions.
-
-    Parameters
-    ----------
-    message : str
-        What was found, and what was expected.
-    kind : type
-        The category of the warning.
-    """
+    """Warn at the line that called this package, through however many of its functions."""
     package, level, frame = __name__.partition(".")[0], 1, currentframe()
     while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == package:
         level, frame = level + 1, frame.f_back
@@ -41,15 +33,7 @@ def called_from_outside(*modules: str) -> bool:
 
 
 def public(value: Any, package: str) -> Any:
-    """Return what a package offers by a name: its call refuses what does not fit, unknown keywords with a suggestion.
-
-    Parameters
-    ----------
-    value : object
-        A function, a class, whose instances are then made so from anywhere, or anything else, which stays as it is.
-    package : str
-        The package, where pickles look for the function.
-    """
+    """Return what a package offers by a name: its call refuses what does not fit, unknown keywords with a suggestion."""
     if isinstance(value, type):
         made = vars(value).get("__init__")
         if isfunction(made) and not hasattr(made, "__wrapped__"):
@@ -67,30 +51,14 @@ def check_methods(kind: type) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Taken:
-    """What a function takes.
+    """What a function takes."""
 
-    Attributes
-    ----------
-    name : str
-        What it is called; a class in place of its `__init__`.
-    places : tuple of str
-        Arguments that may be given without their names, `self` among them.
-    names : tuple of str
-        Arguments that have a name, but for `self`.
-    needed : tuple of str
-        Those without a default.
-    enough : range
-        How many arguments without a name do without any that has one.
-    any_place, any_name : bool
-        Whether it takes further arguments, as the function itself decides.
-    """
-
-    name: str
-    places: tuple[str, ...]
-    names: tuple[str, ...]
-    needed: tuple[str, ...]
-    enough: range
-    any_place: bool
+    name: str  # what it is called; a class in place of its `__init__`
+    places: tuple[str, ...]  # arguments that may be given without their names, `self` among them
+    names: tuple[str, ...]  # arguments that have a name, but for `self`
+    needed: tuple[str, ...]  # those without a default
+    enough: range  # how many arguments without a name do without any that has one
+    any_place: bool  # whether it takes further arguments, as the function itself decides
     any_name: bool
 
     @classmethod

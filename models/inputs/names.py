@@ -28,18 +28,10 @@ ATTRIBUTES = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class NodeName:
-    """The name of a state or a parameter of one node.
+    """The name of a state or a parameter of one node."""
 
-    Parameters
-    ----------
-    base : str
-        The state or parameter: "x" of "x_2".
-    index : int
-        The node, counted from 0: 1 of "x_2".
-    """
-
-    base: str
-    index: int
+    base: str  # the state or parameter: "x" of "x_2"
+    index: int  # the node, counted from 0: 1 of "x_2"
 
     @classmethod
     def parse(cls, name: str) -> NodeName | None:
@@ -54,18 +46,10 @@ class NodeName:
 
 @dataclass(frozen=True, slots=True)
 class LinkName:
-    """The name of a parameter of one link: "k_1_2" is k where node 1 feels node 2.
+    """The name of a parameter of one link: "k_1_2" is k where node 1 feels node 2."""
 
-    Parameters
-    ----------
-    base : str
-        The parameter: "k" of "k_1_2".
-    target, source : int
-        The two ends, counted from 0: 0 and 1 of "k_1_2".
-    """
-
-    base: str
-    target: int
+    base: str  # the parameter: "k" of "k_1_2"
+    target: int  # the two ends, counted from 0: 0 and 1 of "k_1_2"
     source: int
 
     @classmethod

@@ -23,27 +23,14 @@ _TEXTS = ("SUMMARY", "SOURCE", "TOO_SMALL")
 
 @dataclass(frozen=True, slots=True)
 class PluginFile:
-    """A plug-in file from outside, and the checks that hold for every kind.
+    """A plug-in file from outside, and the checks that hold for every kind."""
 
-    Parameters
-    ----------
-    kind : str
-        What a file of its kind is called in messages: "oscillator".
-    known : tuple of str
-        The public names that such a file may define; imports and names with an underscore in front are its own.
-    module : module
-        What its text defines.
-    where : str
-        The name of the file in messages.
-    lines : mapping of str to int
-        The line of each public name that the file defines.
-    """
-
-    kind: str
+    kind: str  # what a file of its kind is called in messages: "oscillator"
+    # the public names that such a file may define; imports and names with an underscore in front are its own
     known: tuple[str, ...]
-    module: ModuleType
-    where: str
-    lines: Mapping[str, int]
+    module: ModuleType  # what its text defines
+    where: str  # the name of the file in messages
+    lines: Mapping[str, int]  # the line of each public name that the file defines
 
     @classmethod
     def of(cls, kind: str, known: tuple[str, ...], module: ModuleType, where: str, text: bytes) -> Self:

@@ -50,31 +50,19 @@ PACKAGE = "synchain.models"
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of plug-in, defined by the room that knows what such a file must hold.
+    """A kind of plug-in, defined by the room that knows what such a file must hold."""
 
-    Parameters
-    ----------
-    name : str
-        What a file of the kind is called in messages: "oscillator".
-    folder : str
-        The folder of `synchain.models` that holds the shipped files; it names the group of entry points too.
-    check : callable
-        Called with the module of a file from outside, its name in messages and its text; raises ValueError if the
-        module is not what the kind must be.
-    also : mapping of str to str
-        Other names of shipped files: what they name is what the file's own name names, unless there
-        is a file of that name.
-    near : mapping of str to str
-        Names of other things that are close to a shipped file; they serve suggestions only.
-    otherwise : str
-        What a name can be besides that of a file, for the message that refuses a name.
-    """
-
-    name: str
-    folder: str
+    name: str  # what a file of the kind is called in messages: "oscillator"
+    folder: str  # the folder of `synchain.models` that holds the shipped files; it names the group of entry points too
+    # called with the module of a file from outside, its name in messages and its text; raises ValueError if the
+    # module is not what the kind must be
     check: Callable[[ModuleType, str, bytes], None] = field(compare=False, repr=False)
+    # other names of shipped files: what they name is what the file's own name names, unless there is a file of that
+    # name
     also: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
+    # names of other things that are close to a shipped file; they serve suggestions only
     near: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
+    # what a name can be besides that of a file, for the message that refuses a name
     otherwise: str = field(default="", compare=False, repr=False)
 
 
@@ -163,22 +151,7 @@ def named(kind: Kind, name: str) -> str:
 
 
 def load(kind: Kind, name: str) -> ModuleType:
-    """Return the module of a plug-in.
-
-    Parameters
-    ----------
-    kind : Kind
-        The kind of plug-in.
-    name : str
-        The name of a shipped file or of an entry point, or a path that ends in ".py" and was allowed by `allow_code`,
-        whose text is taken as it is now.  An `OwnFile` gives the text that it was made of.
-
-    Raises
-    ------
-    ValueError
-        If there is no such plug-in, with the known names; if a file is not what its kind must be, with the line; and if
-        the text of an `OwnFile` is neither known nor in the file.
-    """
+    """Return the module of a plug-in."""
     own = named(kind, name)
     if own in _own(kind):
         return import_module(f"{PACKAGE}.{kind.folder}.{own}")
@@ -198,14 +171,7 @@ def part(what: str, value: object) -> str:
 
 
 def call(function: Callable[..., object], symbols: Mapping[str, object]) -> Any:
-    """Call a plug-in's function with those of `symbols` that its signature names.
-
-    Raises
-    ------
-    ValueError
-        If the function asks for a name that is not among them, and if a function from outside the package fails, with
-        its file and line.
-    """
+    """Call a plug-in's function with those of `symbols` that its signature names."""
     wanted = inspect.signature(function).parameters
     for name in wanted:
         if name not in symbols:

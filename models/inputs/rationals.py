@@ -28,27 +28,7 @@ _EXPECTED = "expected a rational number such as 1/2, -3 or 0.25"
 
 
 def rational(entry: Any, where: str) -> Fraction:
-    """Return one exact number.
-
-    Parameters
-    ----------
-    entry : int, float, Fraction, Decimal, str or SymPy number
-        A float means its shortest decimal; a text is such as ``"1/2"`` or ``"0.25"``.
-    where : str
-        The subject of the error.
-
-    Returns
-    -------
-    Fraction
-        The number.
-
-    Raises
-    ------
-    TypeError
-        If the entry is no number.
-    ValueError
-        If it is not finite, real and rational.
-    """
+    """Return one exact number."""
     if isinstance(entry, bool):
         raise TypeError(f"{where} is {entry}, a bool; {_EXPECTED}")
     if isinstance(entry, str):
@@ -87,27 +67,7 @@ def _from_text(text: str, where: str) -> Fraction:
 
 
 def rational_rows(rows: Any, name: str) -> list[list[Fraction]]:
-    """Return a square table of exact numbers.
-
-    Parameters
-    ----------
-    rows : iterable of iterables, or matrix
-        Entries as in `rational`.
-    name : str
-        The subject of the error.
-
-    Returns
-    -------
-    list of list of Fraction
-        The rows.
-
-    Raises
-    ------
-    TypeError
-        If `rows` is no table, or an entry no number.
-    ValueError
-        If the table is empty or not square, or an entry is not rational.
-    """
+    """Return a square table of exact numbers."""
     return [[_entry(entry, name, i, j) for j, entry in enumerate(line)] for i, line in enumerate(square(rows, name))]
 
 
@@ -124,22 +84,7 @@ def total(numbers: Iterable[Fraction]) -> Fraction:
 
 
 def square(rows: Any, name: str) -> list[list[Any]]:
-    """Return the rows of a square table, its entries as they are.
-
-    Parameters
-    ----------
-    rows : iterable of iterables, or matrix
-        At most ROWS rows; a sparse matrix is refused.
-    name : str
-        The subject of the error.
-
-    Raises
-    ------
-    TypeError
-        If `rows` is no table.
-    ValueError
-        If the table is empty, not square or too large.
-    """
+    """Return the rows of a square table, its entries as they are."""
     # SymPy lists a matrix entry by entry
     symbolic = hasattr(rows, "tolist") and not hasattr(rows, "dtype")
     listed = rows.tolist() if symbolic else rows
@@ -172,26 +117,7 @@ def _too_large(name: str) -> ValueError:
 
 
 def file_text(path: str | Path, what: str, expected: str = "a text file") -> tuple[str, str]:
-    """Return the text of a small file, and the name of the file.
-
-    Parameters
-    ----------
-    path : str or Path
-        A file of at most FILE_LIMIT bytes in UTF-8.
-    what : str
-        The subject of the error.
-    expected : str, optional
-        The kind of file in words, for errors.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is none.
-    TypeError
-        If `path` is no path.
-    ValueError
-        If it is a folder or device, too large, or in another encoding.
-    """
+    """Return the text of a small file, and the name of the file."""
     place = check_path(what, path)
     check_printable(what, place.name)
     if not place.exists():
@@ -213,18 +139,6 @@ def parse_rows(text: str, name: str) -> list[list[str]]:
     """Return the entries of a matrix text, with blanks or commas between them.
 
     Comments begin with `#`; empty lines are skipped.
-
-    Parameters
-    ----------
-    text : str
-        The text.
-    name : str
-        The subject of the error.
-
-    Raises
-    ------
-    ValueError
-        On an empty entry, and on more than ROWS rows or columns.
     """
     rows: list[list[str]] = []
     for number, line in enumerate(text.splitlines(), 1):

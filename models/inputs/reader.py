@@ -59,15 +59,7 @@ class Algebra(Generic[V]):
     deepest: int
 
     def refuse(self, node: ast.expr, reason: str) -> NoReturn:
-        """Raise the error for a piece of the expression that has no meaning here.
-
-        Parameters
-        ----------
-        node : ast.expr
-            The piece.
-        reason : str
-            The reason that NoMeaning was raised with, "" for none.
-        """
+        """Raise the error for a piece of the expression that has no meaning here."""
         raise NoMeaning(reason)
 
     def refuse_depth(self) -> NoReturn:
@@ -119,22 +111,7 @@ class Algebra(Generic[V]):
         return self.power(base, self.number(exponent))
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[Any] | None]:
-        """The algebras that read the arguments of a call; a wrong call is refused here.
-
-        Parameters
-        ----------
-        function : str
-            What is called: a name, or ``name.own``, or ``name[3]``.
-        count : int
-            Number of arguments without a name.
-        options : sequence of str
-            The names of the other arguments.
-
-        Returns
-        -------
-        sequence of Algebra or None
-            One for each argument without a name; None takes the argument as it is written, a str.
-        """
+        """The algebras that read the arguments of a call; a wrong call is refused here."""
         raise NoMeaning
 
     def call(self, function: str, arguments: Sequence[Any], options: Mapping[str, str]) -> V:
@@ -285,18 +262,7 @@ def _called(node: ast.expr) -> str | None:
 
 
 def parse(text: str) -> Expression | None:
-    """Return a text as an expression.
-
-    Parameters
-    ----------
-    text : str
-        The text; the caller bounds its length.
-
-    Returns
-    -------
-    Expression or None
-        None if the text is no expression of Python.
-    """
+    """Return a text as an expression."""
     stripped = text.strip()
     try:
         with warnings.catch_warnings():

@@ -18,27 +18,6 @@ def open_regular(
 
     The kind of the file is asked of what was opened, so that nothing put in its place meanwhile is
     read.
-
-    Parameters
-    ----------
-    path : str or path object
-        The file.
-    writing : bool, optional
-        Whether to open it for changes too.
-    flags : int, optional
-        More flags of `os.open`.
-    folder : int, optional
-        Descriptor of the open folder from which a relative path counts.
-
-    Returns
-    -------
-    io.FileIO
-        The open file.
-
-    Raises
-    ------
-    OSError
-        If there is none, if it cannot be opened, or if it is a folder, a pipe or a device.
     """
     flags |= os.O_RDWR if writing else os.O_RDONLY
     flags |= getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)

@@ -18,23 +18,5 @@ class Word(StrEnum):
 
     @classmethod
     def parse(cls, what: str, value: object) -> Self:
-        """Return the word of a text.
-
-        Parameters
-        ----------
-        what : str
-            The keyword in messages.
-        value : object
-            What was given for it.
-
-        Returns
-        -------
-        Word
-            The word with this text.
-
-        Raises
-        ------
-        ValueError, TypeError
-            If the value is another text, or no text.
-        """
+        """Return the word of a text."""
         return cls(check_choice(what, value, tuple(cls)))

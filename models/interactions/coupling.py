@@ -62,19 +62,9 @@ _CHOSEN = re.compile(r"(?P<name>\S.*?)\s+on\s+(?P<coordinates>[^\W\d]\w*(?:\s*,\
 
 @dataclass(frozen=True, slots=True)
 class MatrixCoupling:
-    """A coupling that is linear in the states: the entries of its matrix H.
+    """A coupling that is linear in the states: the entries of its matrix H."""
 
-    Parameters
-    ----------
-    entries : tuple of (str, str, Fraction)
-        Source component, target component, and the factor with which the difference enters the target's rate.
-
-    Raises
-    ------
-    ValueError
-        If an entry occurs twice.
-    """
-
+    # source component, target component, and the factor with which the difference enters the target's rate
     entries: tuple[tuple[str, str, Fraction], ...]
 
     def __post_init__(self) -> None:
@@ -88,13 +78,7 @@ class MatrixCoupling:
 
     @classmethod
     def parse(cls, words: str) -> MatrixCoupling | None:
-        """Return the coupling of a text such as "x->x, 1/2 y->z"; None if the text names a coupling instead.
-
-        Raises
-        ------
-        ValueError
-            If the text is no list of entries, or an entry repeats or has the factor 0.
-        """
+        """Return the coupling of a text such as "x->x, 1/2 y->z"; None if the text names a coupling instead."""
         return cls(tuple(_read(words))) if "->" in words else None
 
     @property
@@ -137,13 +121,7 @@ class MatrixCoupling:
         _expect_known(self, "component", "states", names, state)
 
     def canonical(self, state: tuple[str, ...], coordinates: tuple[str, ...] = ()) -> MatrixCoupling:
-        """Return the same coupling with its entries ordered by target and source as in `state`.
-
-        Raises
-        ------
-        ValueError
-            If a component is outside `state`, and if the text of the result is too long for a scene.
-        """
+        """Return the same coupling with its entries ordered by target and source as in `state`."""
         self.check(state)
         ordered = MatrixCoupling(tuple(sorted(self.entries, key=lambda e: (state.index(e[1]), state.index(e[0])))))
         check_text("coupling", str(ordered))
@@ -159,41 +137,20 @@ class LagrangianCoupling:
 
     The ends are the real symbols q_i, q_j of `potential` and v_i, v_j of `kinetic` and `dissipation`, target first;
     of a coupling `between` two named oscillators they are the states of these.  `WEIGHT` is the weight of the link.
-
-    Parameters
-    ----------
-    name : str
-        What messages and scene files call it.
-    parameters : mapping of str to Parameter
-        Its parameters.
-    potential, dissipation, kinetic : Expr
-        The energy stored, Rayleigh's function and the kinetic energy of a link.
-    between : (str, str), optional
-        The names of the two oscillators that it joins, if it joins no others.
-    coordinates : tuple of str, optional
-        The coordinates that it joins, all of them if left out.
-    summary, source : str
-        What it is, and where it was published.
     """
 
-    name: str
-    parameters: Frozen[Parameter]
-    potential: sp.Expr = sp.S.Zero
+    name: str  # what messages and scene files call it
+    parameters: Frozen[Parameter]  # its parameters
+    potential: sp.Expr = sp.S.Zero  # the energy stored, Rayleigh's function and the kinetic energy of a link
     dissipation: sp.Expr = sp.S.Zero
     kinetic: sp.Expr = sp.S.Zero
-    between: tuple[str, str] | None = None
-    coordinates: tuple[str, ...] | None = None
-    summary: str = field(default="", compare=False)
+    between: tuple[str, str] | None = None  # the names of the two oscillators that it joins, if it joins no others
+    coordinates: tuple[str, ...] | None = None  # the coordinates that it joins, all of them if left out
+    summary: str = field(default="", compare=False)  # what it is, and where it was published
     source: str = field(default="", compare=False)
 
     def places(self, known: tuple[str, ...]) -> tuple[int, ...]:
-        """Return the numbers of the joined coordinates among those of a node, in ascending order.
-
-        Raises
-        ------
-        ValueError
-            For an unknown coordinate, and for one that is named twice.
-        """
+        """Return the numbers of the joined coordinates among those of a node, in ascending order."""
         if self.coordinates is None:
             return tuple(range(len(known)))
         if not known:
@@ -209,13 +166,7 @@ class LagrangianCoupling:
         return tuple(k for k, name in enumerate(known) if name in self.coordinates)
 
     def canonical(self, state: tuple[str, ...], coordinates: tuple[str, ...]) -> LagrangianCoupling:
-        """Return the same coupling with its coordinates in the order of the nodes', none if it joins them all.
-
-        Raises
-        ------
-        ValueError
-            As `places` does.
-        """
+        """Return the same coupling with its coordinates in the order of the nodes', none if it joins them all."""
         if self.coordinates is None:
             return self
         places = self.places(coordinates)

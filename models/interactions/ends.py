@@ -98,18 +98,10 @@ class Terms:
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """The nodes at both ends of a link, target first, and the symbols of their states.
+    """The nodes at both ends of a link, target first, and the symbols of their states."""
 
-    Parameters
-    ----------
-    nodes : pair of Node
-        The templates of target and source.
-    oscillators : pair of Oscillator
-        Their models; None for nodes whose masses are 1.
-    """
-
-    nodes: tuple[Node, Node]
-    oscillators: tuple[Oscillator | None, Oscillator | None]
+    nodes: tuple[Node, Node]  # the templates of target and source
+    oscillators: tuple[Oscillator | None, Oscillator | None]  # their models; None for nodes whose masses are 1
     here: Symbols = field(init=False)
     there: Symbols = field(init=False)
 

@@ -346,13 +346,7 @@ def _table(parameter: Parameter) -> dict[str, object]:
 
 
 def from_table(what: str, given: Mapping[object, object]) -> Rates | Potential:
-    """Return the coupling of a table of a scene file, {rates = {x = "…"}, parameters = {…}} or {potential = "…", …}.
-
-    Raises
-    ------
-    ValueError, TypeError
-        For other keys, texts that are no expression, and whatever `Rates` and `Potential` refuse.
-    """
+    """Return the coupling of a table of a scene file, {rates = {x = "…"}, parameters = {…}} or {potential = "…", …}."""
     kinds = sorted(str(key) for key in given if key in ("rates", "potential"))
     strange = next((key for key in given if key not in ("rates", "potential", "parameters")), None)
     if strange is not None or len(kinds) != 1:

@@ -45,25 +45,6 @@ def edge(
     An undirected edge is two links, and the template is symmetric, so the two forces are those of the potential.  A
     one-way link has no potential: the force that the template gives its target acts there, and nothing acts back on
     the source.  Set-valued friction takes up the force of a link while its target sticks.
-
-    Parameters
-    ----------
-    coupling : Coupling
-        What joins the nodes.
-    single : Node
-        The target, and the source if there is no `other`.
-    oscillator : Oscillator, optional
-        The model of the target, whose mass matrix turns forces into accelerations; without it the masses are 1, as
-        they are in the units of every oscillator with one mass.
-    other : Node, optional
-        A source of another kind: components of equal names are joined.
-    partner : Oscillator, optional
-        The model of that source.
-
-    Raises
-    ------
-    ValueError
-        If the coupling cannot join the nodes.
     """
     if single.contact is not None:
         plain = Node(single.state[:2], (single.state[1], sp.S.Zero), single.parameters)
@@ -80,20 +61,7 @@ def edge(
 
 
 def strength(edge: Edge, parameters: Iterable[sp.Symbol] = ()) -> sp.Symbol:
-    """Return the parameter that is the strength of a link: sigma, or the only one that is a factor of the whole link.
-
-    Parameters
-    ----------
-    edge : Edge
-        What a link adds.
-    parameters : iterable of Symbol
-        The parameters of nodes, which are no strength.
-
-    Raises
-    ------
-    ValueError
-        If there is no such parameter, or more than one.
-    """
+    """Return the parameter that is the strength of a link: sigma, or the only one that is a factor of the whole link."""
     of_nodes = set(parameters)
     own = [s for s in edge.parameters if s not in of_nodes]
     named = [s for s in own if s.name == "sigma"]

@@ -41,22 +41,14 @@ Products = dict[tuple[sp.Expr, sp.Expr], sp.Expr]
 
 @dataclass(frozen=True, slots=True)
 class Separated:
-    """A link as sums of products.
+    """A link as sums of products."""
 
-    Parameters
-    ----------
-    products : tuple of tuple of (Expr, Expr, Expr)
-        For each state of the target the terms of its rate: what all nodes share, a function of the target, and one of the
-        source.
-    own : tuple of Expr
-        What the link would add between a node and itself: a sum over all nodes has it too much.
-    shifted : tuple of int
-        States of which the link feels differences alone.  All values of such a state may be counted from that of one node,
-        so that sums of powers and of exponentials keep their digits however far all nodes have moved together.
-    """
-
+    # for each state of the target the terms of its rate: what all nodes share, a function of the target, and one of
+    # the source
     products: tuple[tuple[tuple[sp.Expr, sp.Expr, sp.Expr], ...], ...]
-    own: tuple[sp.Expr, ...]
+    own: tuple[sp.Expr, ...]  # what the link would add between a node and itself: a sum over all nodes has it too much
+    # states of which the link feels differences alone. All values of such a state may be counted from that of one
+    # node, so that sums of powers and of exponentials keep their digits however far all nodes have moved together
     shifted: tuple[int, ...]
 
     @property
@@ -67,19 +59,12 @@ class Separated:
 
 @dataclass(frozen=True, slots=True)
 class Summed:
-    """A link as products that are summed over the links of a node, and a rest that is not.
+    """A link as products that are summed over the links of a node, and a rest that is not."""
 
-    Parameters
-    ----------
-    products : tuple of tuple of (Expr, Expr, Expr, Expr)
-        For each state of the target the terms of its rate: what all links share, what each link has for itself, a
-        function of the target, and one of the source.
-    rest : tuple of Expr
-        What is added to these, a function of both ends.
-    """
-
+    # for each state of the target the terms of its rate: what all links share, what each link has for itself, a
+    # function of the target, and one of the source
     products: tuple[tuple[tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr], ...], ...]
-    rest: tuple[sp.Expr, ...]
+    rest: tuple[sp.Expr, ...]  # what is added to these, a function of both ends
 
     @property
     def sources(self) -> tuple[sp.Expr, ...]:
@@ -93,15 +78,6 @@ def summed(edge: Edge, varied: tuple[str, ...] = (), numbered: tuple[str, ...] =
 
     Sines and cosines are bounded, so that their addition theorems cost a rounding error of the rate at most.  Powers and
     exponentials of differences stay as they are: far from the origin their products are larger than their sum.
-
-    Parameters
-    ----------
-    edge : Edge
-        What a link adds.
-    varied : tuple of str
-        Parameters that have a value for each node.
-    numbered : tuple of str
-        Parameters that have a value for each link.
     """
     if edge.inertia or edge.oriented or edge.forced:
         return None
@@ -127,15 +103,7 @@ def summed(edge: Edge, varied: tuple[str, ...] = (), numbered: tuple[str, ...] =
 
 @lru_cache(maxsize=64)
 def separated(edge: Edge, varied: tuple[str, ...] = ()) -> Separated | None:
-    """Return a link as sums of products, None if none is found; the expanded difference is proved to be zero.
-
-    Parameters
-    ----------
-    edge : Edge
-        What a link adds.
-    varied : tuple of str
-        Parameters that have a value for each node.
-    """
+    """Return a link as sums of products, None if none is found; the expanded difference is proved to be zero."""
     if edge.inertia or edge.oriented:
         return None
     theirs = dict(edge.theirs)

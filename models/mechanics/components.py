@@ -34,37 +34,16 @@ def _vanishes(e: sp.Expr) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """One uncoupled oscillator: M d(state)/dt = rhs(state, t; parameters).
+    """One uncoupled oscillator: M d(state)/dt = rhs(state, t; parameters)."""
 
-    Parameters
-    ----------
-    state : tuple of Symbol
-        The states.  With set-valued friction the third state is the mode, which only events change.
-    rhs : tuple of Expr
-        The right-hand side of each state: its rate where M is the identity.
-    parameters : tuple of Symbol
-        The parameters.
-    contact : Contact, optional
-        What decides between stick and slip.
-    law : Expr, optional
-        The friction coefficient as a function of `SLIDING`; it is for printing alone.
-    inertia : tuple of tuple of Expr, optional
-        M(state; parameters), a row and a column for each state; empty if M is the identity.
-
-    Raises
-    ------
-    ValueError
-        If a rate uses a symbol that is not declared or contains a floating-point number (numbers are parameters or
-        rationals), if there is not one rate for each state, if two names are the same, and for an M that depends on time
-        or belongs to a node with a contact.
-    """
-
+    # the states. With set-valued friction the third state is the mode, which only events change
     state: tuple[sp.Symbol, ...]
-    rhs: tuple[sp.Expr, ...]
-    parameters: tuple[sp.Symbol, ...]
-    contact: Contact | None = None
+    rhs: tuple[sp.Expr, ...]  # the right-hand side of each state: its rate where M is the identity
+    parameters: tuple[sp.Symbol, ...]  # the parameters
+    contact: Contact | None = None  # what decides between stick and slip
+    # the friction coefficient as a function of `SLIDING`; it is for printing alone
     law: sp.Expr | None = field(default=None, compare=False)
-    inertia: Block = ()
+    inertia: Block = ()  # m(state; parameters), a row and a column for each state; empty if M is the identity
 
     def __post_init__(self) -> None:
         _differ("node", (TIME, *self.state, *self.parameters))
@@ -114,19 +93,7 @@ class Node:
         return not any(e.free_symbols & set(self.state) for row in self.inertia for e in row)
 
     def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Node:
-        """Return the node with every symbol and expression changed.
-
-        Parameters
-        ----------
-        change : callable
-            Maps an expression, or the symbol of a state or parameter, to another one.
-
-        Returns
-        -------
-        Node
-            The changed node.  A parameter that becomes a number is no parameter any more.  The `law`, which serves
-            printing alone, is left out.
-        """
+        """Return the node with every symbol and expression changed."""
         state, rhs, parameters = (tuple(map(change, part)) for part in (self.state, self.rhs, self.parameters))
         contact = None if self.contact is None else self.contact.map(change)
         inertia = tuple(tuple(map(change, row)) for row in self.inertia)
@@ -208,19 +175,7 @@ class Edge:
         return not any(e.free_symbols & states for block in self.inertia for row in block for e in row)
 
     def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Edge:
-        """Return the edge with every symbol and expression changed.
-
-        Parameters
-        ----------
-        change : callable
-            Maps an expression, or the symbol of a state, the weight or a parameter, to another one.
-
-        Returns
-        -------
-        Edge
-            The changed edge.  A parameter that becomes a number is no parameter any more, and an inertia that becomes
-            zero is left out.
-        """
+        """Return the edge with every symbol and expression changed."""
         here, there, rhs, parameters = (
             tuple(map(change, part)) for part in (self.here, self.there, self.rhs, self.parameters)
         )

@@ -69,24 +69,7 @@ _RELATIONS = {**{sign: relation for relation, sign in _SIGNS.items()}, "==": sp.
 
 
 def exact(what: str, value: object, names: Mapping[str, sp.Symbol]) -> sp.Expr:
-    """Return an expression in the form that a model keeps: real symbols, rational numbers, known functions.
-
-    Parameters
-    ----------
-    what : str
-        The subject of errors.
-    value : Expr, number or str
-        An expression, decimals in it are what they say (0.1 is 1/10); a text is parsed by `read`.
-    names : mapping of str to Symbol
-        What each name stands for.
-
-    Raises
-    ------
-    TypeError
-        If the value is none of these.
-    ValueError
-        For unknown functions and symbols, and for numbers that are not finite and real.
-    """
+    """Return an expression in the form that a model keeps: real symbols, rational numbers, known functions."""
     if isinstance(value, str):
         return _settled(what, read(what, value, names), names)
     if isinstance(value, bool) or not isinstance(value, int | float | Fraction | sp.Expr):
@@ -174,18 +157,7 @@ _LONGEST = 8
 
 
 def written(e: sp.Basic) -> str:
-    """Return an expression as text that `read` turns into it again.
-
-    Parameters
-    ----------
-    e : Expr
-        An expression of real symbols and exact numbers.
-
-    Raises
-    ------
-    ValueError
-        For a piece that no model may have.
-    """
+    """Return an expression as text that `read` turns into it again."""
     return _inside(e, _CHOICE)
 
 
@@ -322,24 +294,7 @@ def _call(e: sp.Basic) -> tuple[str, int]:
 
 
 def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
-    """Return the expression of a text; nothing in it is run.
-
-    Parameters
-    ----------
-    what : str
-        The subject of errors.
-    text : str
-        Numbers, names, ``+ - * / **``, parentheses, functions of `FUNCTIONS`, ``friction(velocity)``, and
-        ``a if x > 0 else b`` with ``< <= > >= == != and or not``.
-    names : mapping of str to Symbol
-        What each name stands for.
-
-    Raises
-    ------
-    ValueError
-        For unknown names and functions, more than LENGTH characters, constants that are not real, and whatever
-        `Expressions` refuses.
-    """
+    """Return the expression of a text; nothing in it is run."""
     if len(text) > LENGTH:
         raise ValueError(f"{what}: found {len(text)} characters; expected at most {LENGTH}")
     expression = parse(text)

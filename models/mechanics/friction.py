@@ -175,29 +175,7 @@ def set_valued(
     place: sp.Symbol,
     velocity: sp.Symbol,
 ) -> tuple[sp.Expr, Contact]:
-    """Return the acceleration in all modes and the contact conditions.
-
-    Parameters
-    ----------
-    acceleration : Expr
-        The acceleration, with the friction coefficient as `friction(w)`.
-    friction : Function
-        The coefficient as an unknown function.
-    law : Expr
-        That coefficient as an expression in `argument` with sign and Abs.
-    argument : Symbol
-        The sliding velocity in `law`.
-    static : Expr or None
-        The static coefficient; None for the limit of the law at 0+.
-    place, velocity : Symbol
-        Where the body is, and its velocity.
-
-    Raises
-    ------
-    ValueError
-        If friction does not occur exactly once or acts nonlinearly, if the ground's velocity is not a constant, and for
-        a law that is not odd, has no jump at w = 0, or has a kink there that is not known to turn with the sign of w.
-    """
+    """Return the acceleration in all modes and the contact conditions."""
     applied = sorted(acceleration.atoms(friction), key=str)
     if len(applied) != 1:
         raise ValueError(f"set-valued contact: friction acts {len(applied)} times in {acceleration}; expected once")

@@ -71,23 +71,6 @@ def equations_of_motion(
 ) -> tuple[sp.Expr, ...]:
     """Solve d/dt dL/dv - dL/dq = Q with L = T - V for the accelerations dv/dt.
 
-    Parameters
-    ----------
-    kinetic, potential : Expr
-        The energies T(q, v, t) and V(q, t).
-    forces : sequence of Expr
-        A generalised force Q for each coordinate.
-    q, v : sequence of Symbol
-        Coordinates and velocities.
-    time : Symbol
-        The time.
-
-    Raises
-    ------
-    ValueError
-        If the numbers of coordinates, velocities and forces differ, and if the mass matrix is singular: some velocity
-        has no kinetic energy.
-
     References
     ----------
     Goldstein, Poole & Safko, Classical Mechanics, 3rd ed. (Addison-Wesley, 2002), sect. 1.4.

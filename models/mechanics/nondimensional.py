@@ -36,25 +36,7 @@ def magnitude(unit: str) -> sp.Expr:
 
 
 def scale(oscillator: Oscillator, unit: str) -> sp.Expr:
-    """Return the amount of a quantity that the value 1 stands for, in the physical symbols of an oscillator.
-
-    Parameters
-    ----------
-    oscillator : Oscillator
-        The oscillator that fixes the scales.
-    unit : str
-        The unit of the quantity, such as "m".
-
-    Returns
-    -------
-    Expr
-        The amount, such as g*m/k; 1 if the oscillator is non-dimensional from the start.
-
-    Raises
-    ------
-    ValueError
-        If the oscillator's scales do not turn each quantity of its units into 1.
-    """
+    """Return the amount of a quantity that the value 1 stands for, in the physical symbols of an oscillator."""
     scaling = oscillator.model.scaling if isinstance(oscillator.model, LagrangianModel) else None
     if scaling is None:
         return sp.S.One
@@ -67,13 +49,7 @@ def scale(oscillator: Oscillator, unit: str) -> sp.Expr:
 
 
 def physical(oscillator: Oscillator) -> Mechanics:
-    """Return the Lagrangian system of an oscillator in physical symbols (eq. 2), with `FRICTION` for its friction law.
-
-    Raises
-    ------
-    ValueError
-        If the oscillator is a vector field, and if it has not one force for each coordinate.
-    """
+    """Return the Lagrangian system of an oscillator in physical symbols (eq. 2), with `FRICTION` for its friction law."""
     model = oscillator.model
     if not isinstance(model, LagrangianModel):
         raise ValueError(f"oscillator {oscillator.name!r} is a vector field; expected one with a Lagrangian")
@@ -89,13 +65,7 @@ def physical(oscillator: Oscillator) -> Mechanics:
 
 
 def nondimensional(oscillator: Oscillator) -> Mechanics:
-    """Return the Lagrangian system in non-dimensional symbols (eq. 3), with `FRICTION` for its friction law.
-
-    Raises
-    ------
-    ValueError
-        As `physical` does, and if units do not cancel.
-    """
+    """Return the Lagrangian system in non-dimensional symbols (eq. 3), with `FRICTION` for its friction law."""
     system, model = physical(oscillator), oscillator.model
     if not isinstance(model, LagrangianModel) or model.scaling is None:
         return system
@@ -132,18 +102,6 @@ def friction_coefficient(law: FrictionLaw, contact: str) -> Callable[[sp.Expr], 
 
     The parameters of a law have units too, so they scale with the rest: a rate of decay a = 2.5 of unit s/m decays
     with 2.5 |w| only when w is measured in L/T.  If none has a unit, w is a number as they are.
-
-    Parameters
-    ----------
-    law : FrictionLaw
-        The law.
-    contact : str
-        How its jump at rest is treated, a `ContactModel`.
-
-    Raises
-    ------
-    ValueError
-        If the units of a law do not cancel, and for an unknown contact.
     """
     treatment = ContactModel.parse("contact", contact)
     w = sp.Dummy("w", real=True)

@@ -53,20 +53,12 @@ class Coordinate:
 
 @dataclass(frozen=True, slots=True)
 class Scaling:
-    """How the physical quantities of a Lagrangian become numbers.
+    """How the physical quantities of a Lagrangian become numbers."""
 
-    Parameters
-    ----------
-    units : mapping of str to str
-        Unit of each quantity that fixes the scales.
-    physical : mapping of str to str
-        Physical quantity behind each parameter.
-    scales : mapping of str to Expr
-        The units of mass, length and time (keys kg, m, s), made of the quantities of `units`, which are positive symbols.
-    """
-
-    units: Frozen[str]
-    physical: Frozen[str]
+    units: Frozen[str]  # unit of each quantity that fixes the scales
+    physical: Frozen[str]  # physical quantity behind each parameter
+    # the units of mass, length and time (keys kg, m, s), made of the quantities of `units`, which are positive
+    # symbols
     scales: Frozen[sp.Expr]
 
 
@@ -76,27 +68,15 @@ class LagrangianModel:
 
     Coordinates, velocities and parameters are real symbols.  With a `scaling` all quantities are physical and the
     parameters go by their physical names; without one they are the numbers of the non-dimensional equations.
-
-    Parameters
-    ----------
-    coordinates : tuple of Coordinate
-        The generalised coordinates.
-    kinetic, potential : Expr
-        The energies.
-    forces : tuple of Expr
-        A generalised force for each coordinate, without those of `dissipation`.
-    dissipation : Expr
-        Rayleigh's function, half the power lost; its negative derivatives are added to the forces.
-    scaling : Scaling, optional
-        The units of physical quantities.
     """
 
-    coordinates: tuple[Coordinate, ...]
-    kinetic: sp.Expr
+    coordinates: tuple[Coordinate, ...]  # the generalised coordinates
+    kinetic: sp.Expr  # the energies
     potential: sp.Expr
-    forces: tuple[sp.Expr, ...]
+    forces: tuple[sp.Expr, ...]  # a generalised force for each coordinate, without those of `dissipation`
+    # rayleigh's function, half the power lost; its negative derivatives are added to the forces
     dissipation: sp.Expr = sp.S.Zero
-    scaling: Scaling | None = None
+    scaling: Scaling | None = None  # the units of physical quantities
 
     @property
     def expressions(self) -> tuple[sp.Expr, ...]:

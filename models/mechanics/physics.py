@@ -19,15 +19,7 @@ SPEEDS = tuple(side * 10.0 ** (k / 4) for k in range(-24, 9) for side in (1.0, -
 
 
 def check_power(law: FrictionLaw, values: Mapping[str, float]) -> None:
-    """Raise ValueError if friction pushes against the ground's motion, w f(w) < 0, and so feeds energy.
-
-    Parameters
-    ----------
-    law : FrictionLaw
-        The law; one that is self-exciting is meant to feed energy.
-    values : mapping of str to float
-        The values of its parameters.
-    """
+    """Raise ValueError if friction pushes against the ground's motion, w f(w) < 0, and so feeds energy."""
     if law.self_exciting:
         return
     coefficient, names = _coefficient(law)
@@ -59,13 +51,6 @@ def check_masses(oscillator: Oscillator, values: Mapping[str, float]) -> None:
     """Raise ValueError if the kinetic energy of an oscillator is not positive for every velocity (Sylvester).
 
     A mass that depends on the state is not looked at.
-
-    Parameters
-    ----------
-    oscillator : Oscillator
-        The oscillator; a vector field has no masses.
-    values : mapping of str to float
-        The values of its parameters.
     """
     found = _masses(oscillator)
     if found is None:

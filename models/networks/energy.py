@@ -92,20 +92,7 @@ class Energy:
 
 @lru_cache(maxsize=16)
 def energy_of(model: Model, varied: tuple[str, ...] = ()) -> Energy:
-    """Return the energy of a model's network.
-
-    Parameters
-    ----------
-    model : Model
-    varied : tuple of str
-        Parameters that have a value for each node or link.
-
-    Raises
-    ------
-    ValueError
-        For a vector field or a coupling by components, which have no energy, for links that are one-way or have another
-        weight back, which have no potential, and for set-valued friction, whose force in stick is no function of the state.
-    """
+    """Return the energy of a model's network."""
     kinds = model.kinds
     for kind in kinds:
         if isinstance(kind.oscillator.model, FieldModel):

@@ -71,38 +71,16 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """What decides on the equations of a network.
+    """What decides on the equations of a network."""
 
-    Parameters
-    ----------
-    kinds : tuple of NodeKind
-        The kinds of nodes that there are, in the order of their first nodes.
-    kind_of : tuple of int
-        The kind of each node.
-    contact : ContactModel
-        How the jump of a friction law at rest is treated.
-    layers : tuple of (Coupling or None, Topology)
-        Couplings and their graphs, at least one, all of as many nodes.
-
-    Attributes
-    ----------
-    unlinked : Equations
-        The equations of the nodes without their links.
-    parameters : mapping of str to Parameter
-        The parameters of all kinds, and those of the couplings whose graphs have links; a name has the default of the
-        first kind that has it.
-
-    Raises
-    ------
-    ValueError
-        If an oscillator lacks a friction law or takes none, and if two parts have a parameter of the same name.
-    """
-
-    kinds: tuple[NodeKind, ...]
-    kind_of: tuple[int, ...]
-    contact: ContactModel
+    kinds: tuple[NodeKind, ...]  # the kinds of nodes that there are, in the order of their first nodes
+    kind_of: tuple[int, ...]  # the kind of each node
+    contact: ContactModel  # how the jump of a friction law at rest is treated
+    # couplings and their graphs, at least one, all of as many nodes
     layers: tuple[tuple[Coupling | None, Topology], ...]
-    unlinked: Equations = field(init=False, repr=False, compare=False)
+    unlinked: Equations = field(init=False, repr=False, compare=False)  # the equations of the nodes without their links
+    # the parameters of all kinds, and those of the couplings whose graphs have links; a name has the default of the
+    # first kind that has it
     parameters: Frozen[Parameter] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -121,22 +99,7 @@ class Model:
         contact: ContactModel,
         layers: tuple[tuple[Coupling | None, Topology], ...],
     ) -> Model:
-        """Return the model of nodes of one kind, apart from those of some groups, with its couplings in one spelling.
-
-        Parameters
-        ----------
-        kind : NodeKind
-            The kind of all nodes that no group names.
-        groups : tuple of Group
-            Nodes of other kinds.
-        contact, layers
-            As in `Model`.
-
-        Raises
-        ------
-        ValueError
-            As `Model` does, and if a coupling is missing or cannot join the nodes.
-        """
+        """Return the model of nodes of one kind, apart from those of some groups, with its couplings in one spelling."""
         graph = layers[0][1]
         if graph.n > MOST_NODES:
             raise ValueError(

@@ -40,15 +40,7 @@ def as_oscillator(value: object, what: str = "oscillator") -> Oscillator:
 
 
 def as_law(value: object, oscillator: Oscillator) -> FrictionLaw | None:
-    """Return a friction law as it is, or load the one of a name.
-
-    Parameters
-    ----------
-    value : object
-        A law, its table, a name, "default" (the one that an oscillator brings), "none" or None.
-    oscillator : Oscillator
-        The oscillator that "default" is meant for.
-    """
+    """Return a friction law as it is, or load the one of a name."""
     if value == "default":
         return oscillator.friction
     if value is None or isinstance(value, FrictionLaw):
@@ -95,22 +87,7 @@ def as_topology(value: object) -> Topology:
 
 
 def as_layers(links: object, coupling: Coupling | None, graph: object) -> tuple[tuple[Coupling | None, Topology], ...]:
-    """Return the layers of links of a scene.
-
-    Parameters
-    ----------
-    links : object
-        A list of pairs (coupling, graph); None for a single layer.
-    coupling : Coupling, optional
-        The coupling of a single layer.
-    graph : object
-        Its graph.
-
-    Raises
-    ------
-    ValueError, TypeError
-        If `links` is no list of pairs, if graphs have different numbers of nodes, and if a graph is given twice.
-    """
+    """Return the layers of links of a scene."""
     if links is None:
         return ((coupling, as_topology(graph)),)
     if graph is not None:
@@ -131,20 +108,7 @@ def as_layers(links: object, coupling: Coupling | None, graph: object) -> tuple[
 
 
 def as_groups(value: object, n: int) -> tuple[Group, ...]:
-    """Return the groups of nodes of a list of tables.
-
-    Parameters
-    ----------
-    value : object
-        Groups, or tables with `oscillator`, `friction` and `at`; None for none.
-    n : int
-        The number of nodes.
-
-    Raises
-    ------
-    ValueError, TypeError
-        If an entry is no such table, names no node or one that another group names.
-    """
+    """Return the groups of nodes of a list of tables."""
     if value is None:
         return ()
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):

@@ -53,20 +53,7 @@ LETTERS = {
 
 
 def formula(latex: str, display: bool = False) -> str:
-    """Return a formula in this package's LaTeX as a MathML element that keeps the LaTeX beside it.
-
-    Parameters
-    ----------
-    latex : str
-        LaTeX as `synchain.models.presentation.writer` and SymPy write it.
-    display : bool
-        Whether the formula stands on a line of its own.
-
-    Raises
-    ------
-    ValueError
-        On a command that has no form in MathML here.
-    """
+    """Return a formula in this package's LaTeX as a MathML element that keeps the LaTeX beside it."""
     style = ' display="block"' if display else ""
     source = f'<annotation encoding="application/x-tex">{escape(latex)}</annotation>'
     return f"<math{style}><semantics>{_Reader(TOKENS.findall(latex)).row()}{source}</semantics></math>"

@@ -177,21 +177,11 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class Writer:
-    """Writes expressions in one style.
+    """Writes expressions in one style."""
 
-    Attributes
-    ----------
-    style : Style
-        LaTeX or text.
-    letters : mapping of Symbol to str
-        The written forms of symbols; others have their names.
-    variables : frozenset of Symbol
-        The symbols that stand behind parameters in products.
-    """
-
-    style: Style
-    letters: Mapping[sp.Symbol, str]
-    variables: frozenset[sp.Symbol]
+    style: Style  # LaTeX or text
+    letters: Mapping[sp.Symbol, str]  # the written forms of symbols; others have their names
+    variables: frozenset[sp.Symbol]  # the symbols that stand behind parameters in products
 
     def total(self, terms: Iterable[sp.Expr]) -> str:
         """Return a sum in the order given, 0 if it is empty."""

@@ -63,23 +63,7 @@ def integrators() -> tuple[str, ...]:
 
 
 def complete(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values of a scene's keywords, and its model.
-
-    Parameters
-    ----------
-    given : mapping
-        Every keyword of `Scene` with what a user gave, or its default.
-
-    Returns
-    -------
-    dict
-        The same names with defaults filled in and values checked, and "model".
-
-    Raises
-    ------
-    ValueError, TypeError
-        For anything that the model does not know or cannot be given.
-    """
+    """Return the values of a scene's keywords, and its model."""
     values = dict(given)
     values["title"] = check_text("title", given["title"])
     values["seed"] = check_integer("seed", given["seed"], *LIMITS["seed"])

@@ -23,22 +23,7 @@ __all__ = ["arguments", "as_dict", "graph_of", "graph_table"]
 
 
 def arguments(values: object, keywords: Iterable[str], folder: Path | None = None) -> dict[str, Any]:
-    """Return the keywords of a scene from names and values as in a scene file.
-
-    Parameters
-    ----------
-    values : object
-        The table of a scene file.
-    keywords : iterable of str
-        The keywords that a scene takes.
-    folder : Path, optional
-        Where relative paths in the table start.
-
-    Raises
-    ------
-    ValueError, TypeError
-        For unknown names and values of a wrong form.
-    """
+    """Return the keywords of a scene from names and values as in a scene file."""
     found = check_table("scene", values)
     check_keys("scene", found, ["sweep" if name == "axes" else name for name in keywords])
     given: dict[str, Any] = {str(key): value for key, value in found.items()}
@@ -152,15 +137,7 @@ def _of_matrix(given: Mapping[object, Any]) -> Topology:
 
 
 def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
-    """Return a whole scene in JSON types, in the names of a scene file.
-
-    Parameters
-    ----------
-    values : mapping
-        The completed values of a scene's keywords.
-    varied : iterable of str
-        The parameters that have a value for each node.
-    """
+    """Return a whole scene in JSON types, in the names of a scene file."""
     written = dict(values)
     for name in ("contact", "time_unit", "continuation", "section"):
         written[name] = str(values[name])

@@ -25,21 +25,7 @@ ENDINGS = ("", "_time", "_count", "_kept")
 
 
 def observables(model: Model, numbers: Mapping[str, float], given: object) -> Frozen[Observable]:
-    """Return the observables of a scene by their names.
-
-    Parameters
-    ----------
-    model : Model
-    numbers : mapping of str to float
-        The parameters of the scene; a_1 … a_n of one that has a value for each node.
-    given : object
-        A mapping of names to observables or their texts; None for none.
-
-    Raises
-    ------
-    ValueError, TypeError
-        For names that results have for other things, and for whatever `as_observable` and the model refuse.
-    """
+    """Return the observables of a scene by their names."""
     if given is None:
         return Frozen()
     found: dict[str, Observable] = {}

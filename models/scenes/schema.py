@@ -50,11 +50,6 @@ def schema() -> Table:
     leaves to `Scene` what hangs on several keys, such as whether an oscillator has a parameter, and the
     grammar of texts.  It keeps to words that draft 4 and draft 7 share, since editors know either.
 
-    Raises
-    ------
-    ValueError
-        If a plug-in file is wrong.
-
     References
     ----------
     A. Wright, H. Andrews & G. Luff, JSON Schema Validation, draft-handrews-json-schema-validation-01, 2018.

@@ -18,29 +18,12 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def toml(table: Mapping[str, object]) -> str:
-    """Return a table as TOML text that `tomllib` reads as the same table.
-
-    Parameters
-    ----------
-    table : mapping
-        Names and values: text, booleans, finite numbers, lists, and tables of these.
-
-    Raises
-    ------
-    TypeError
-        For a value of another type.
-    """
+    """Return a table as TOML text that `tomllib` reads as the same table."""
     return "\n".join(_lines(table, ())).strip() + "\n"
 
 
 def write(table: Mapping[str, object], path: str | os.PathLike[str]) -> None:
-    """Write a table to a scene file.
-
-    Raises
-    ------
-    ValueError, TypeError
-        For a path that is none or does not end in .toml, a table that `toml` refuses, and more than BYTES bytes.
-    """
+    """Write a table to a scene file."""
     place = check_path("scene file", path)
     if place.suffix != ".toml":
         raise ValueError(f"scene file: found {short_repr(str(place))}; expected a name that ends in .toml")

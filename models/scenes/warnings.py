@@ -41,19 +41,7 @@ def zero_multiplicity(graph: Topology) -> int:
 
 
 def warnings(model: Model, varied: tuple[str, ...], values: Mapping[str, Any], duration: float) -> tuple[str, ...]:
-    """Return the sentences for one scene, none if all is well.
-
-    Parameters
-    ----------
-    model : Model
-        The model of the scene.
-    varied : tuple of str
-        The parameters that have a value for each node or link.
-    values : mapping
-        The scene's `parameters`, `axes`, `initial` and `record`.
-    duration : float
-        Non-dimensional time from the start to the end of the window.
-    """
+    """Return the sentences for one scene, none if all is well."""
     graph = model.topology
     of_nodes = tuple(name for name in varied if model.holders(name))
     alike = not varied and len(model.kinds) == 1

@@ -13,18 +13,7 @@ SMALL = 100
 
 
 def angle_sums(matrix: Matrix) -> list[tuple[AngleSum, int]] | None:
-    """Return the eigenvalues of a matrix and their multiplicities as sums of cosines.
-
-    Parameters
-    ----------
-    matrix : Matrix
-        A matrix with a closed form, or one of at most SMALL rows.
-
-    Returns
-    -------
-    list of (AngleSum, int) or None
-        None of a larger matrix without a closed form, and if an eigenvalue is no such sum.
-    """
+    """Return the eigenvalues of a matrix and their multiplicities as sums of cosines."""
     pairs = matrix.closed_form()
     if pairs is None and matrix.n > SMALL:
         return None

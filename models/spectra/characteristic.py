@@ -49,17 +49,7 @@ def characteristic(graph: Matrix) -> fmpq_poly:
 
 
 def sparse(n: int, entries: Entries, polynomial: Callable[[list[int]], Polynomial]) -> Polynomial | None:
-    """Return the characteristic polynomial of a band or a forest, None of any other matrix.
-
-    Parameters
-    ----------
-    n : int
-        Number of rows.
-    entries : mapping of (int, int) to int
-        Entries by row and column; the others are 0.
-    polynomial : callable
-        Makes a polynomial of its coefficients, the constant first.
-    """
+    """Return the characteristic polynomial of a band or a forest, None of any other matrix."""
     if banded(n, entries):
         return cyclic(n, entries, polynomial)
     return forest(n, entries, polynomial)

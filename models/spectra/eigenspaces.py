@@ -42,18 +42,10 @@ Vector: TypeAlias = tuple[Entry, ...]
 
 @dataclass(frozen=True, slots=True)
 class Eigenspace:
-    """All eigenvectors of one eigenvalue.
+    """All eigenvectors of one eigenvalue."""
 
-    Parameters
-    ----------
-    eigenvalue : Eigenvalue
-        The eigenvalue γ.
-    basis : tuple of tuple of tuple of int
-        Independent eigenvectors; each entry is the coefficients of 1, γ, γ² …
-    """
-
-    eigenvalue: Eigenvalue
-    basis: tuple[Vector, ...]
+    eigenvalue: Eigenvalue  # the eigenvalue γ
+    basis: tuple[Vector, ...]  # independent eigenvectors; each entry is the coefficients of 1, γ, γ² …
 
     @property
     def dimension(self) -> int:
@@ -99,26 +91,7 @@ class Eigenspace:
 
 
 def eigenspaces(matrix: Matrix) -> tuple[Eigenspace, ...]:
-    """Return the eigenspaces of a matrix in the order of its spectrum.
-
-    Parameters
-    ----------
-    matrix : Matrix
-        A `Topology` for its connectivity matrix, a `GraphMatrix`, or any other rational matrix.
-
-    Returns
-    -------
-    tuple of Eigenspace
-        One for each distinct eigenvalue.  Those of a defective matrix have fewer vectors than it
-        has rows.
-
-    Raises
-    ------
-    ValueError
-        On more than LARGEST nodes.
-    ProofError
-        If a vector is no eigenvector, or if some are missing.
-    """
+    """Return the eigenspaces of a matrix in the order of its spectrum."""
     if matrix.n > LARGEST:
         raise ValueError(f"eigenspaces of {matrix.name}: found {matrix.n} nodes; expected at most {LARGEST}")
     found: dict[tuple[fmpq, ...], tuple[Vector, ...]] = {}

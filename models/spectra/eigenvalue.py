@@ -47,33 +47,13 @@ class ProofError(RuntimeError):
 
 @dataclass(frozen=True, slots=True)
 class Eigenvalue:
-    """An exact number with its algebraic multiplicity.
+    """An exact number with its algebraic multiplicity."""
 
-    Parameters
-    ----------
-    number : SymPy expression, RealRoot or ComplexRoot
-        The exact number; a root if it is not written as radicals.
-    multiplicity : int
-        Algebraic multiplicity, at least 1.
-    blocks : tuple of (int, int), optional
-        Sizes of Jordan blocks with their numbers, the largest size first; None if they are not
-        known.
-
-    Attributes
-    ----------
-    value : float or complex
-        The nearest float.
-
-    Raises
-    ------
-    ValueError
-        If the multiplicity is no integer >= 1, or the blocks do not add up to it.
-    """
-
-    number: Number
-    multiplicity: int
+    number: Number  # the exact number; a root if it is not written as radicals
+    multiplicity: int  # algebraic multiplicity, at least 1
+    # sizes of Jordan blocks with their numbers, the largest size first; None if they are not known
     blocks: Blocks | None = field(default=None, compare=False)
-    value: float | complex = field(init=False, compare=False)
+    value: float | complex = field(init=False, compare=False)  # the nearest float
 
     def __post_init__(self) -> None:
         count = self.multiplicity
@@ -208,11 +188,6 @@ def ordered(claims: Sequence[Eigenvalue]) -> tuple[Eigenvalue, ...]:
     """Sort eigenvalues from 0 downwards by real part, conjugates side by side.
 
     Certified balls decide if floats cannot.
-
-    Raises
-    ------
-    ProofError
-        If two real eigenvalues agree to 4000 bits.
     """
     if any(isinstance(e.value, complex) for e in claims):
         return tuple(sorted(claims, key=cmp_to_key(_complex_order)))

@@ -38,18 +38,10 @@ Modes: TypeAlias = "tuple[tuple[tuple[Eigenvalue, ...], Eigenvalue], ...]"
 
 @dataclass(frozen=True, slots=True)
 class JointEigenvalue:
-    """The eigenvalues of several graphs on one common mode.
+    """The eigenvalues of several graphs on one common mode."""
 
-    Parameters
-    ----------
-    parts : tuple of Eigenvalue
-        The eigenvalue of each graph, with its own multiplicity there.
-    multiplicity : int
-        How often these eigenvalues occur together.
-    """
-
-    parts: tuple[Eigenvalue, ...]
-    multiplicity: int
+    parts: tuple[Eigenvalue, ...]  # the eigenvalue of each graph, with its own multiplicity there
+    multiplicity: int  # how often these eigenvalues occur together
 
     @property
     def values(self) -> tuple[float | complex, ...]:

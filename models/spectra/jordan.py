@@ -21,22 +21,7 @@ __all__ = ["blocks", "geometric_multiplicity", "nullity", "value_at"]
 
 
 def blocks(graph: Matrix, polynomial: fmpq_poly, multiplicity: int) -> Blocks:
-    """Return the Jordan blocks that every root of a factor of the characteristic polynomial has.
-
-    Parameters
-    ----------
-    graph : Matrix
-        The matrix G.
-    polynomial : flint.fmpq_poly
-        An irreducible factor of its characteristic polynomial.
-    multiplicity : int
-        How often the factor divides it.
-
-    Returns
-    -------
-    tuple of (int, int)
-        Sizes and numbers of blocks, the largest size first.
-    """
+    """Return the Jordan blocks that every root of a factor of the characteristic polynomial has."""
     if multiplicity == 1 or graph.diagonalisable:
         return ((1, multiplicity),)
     first = power = value_at(graph, polynomial)

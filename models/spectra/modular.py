@@ -44,24 +44,6 @@ def check_modulo(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]]) -> float |
     """Compare a closed form with the characteristic polynomial modulo PRIMES primes.
 
     A hash of the closed form picks the primes.
-
-    Parameters
-    ----------
-    graph : Matrix
-        The matrix.
-    pairs : sequence of (SymPy expression, int)
-        Its eigenvalues and their multiplicities.
-
-    Returns
-    -------
-    float or None
-        About the largest probability that as many random primes miss a difference; None if a number
-        is no sum of roots of unity.
-
-    Raises
-    ------
-    ProofError
-        If the polynomials differ.
     """
     numbers = [(_powers(sp.sympify(number)), times) for number, times in pairs]
     known = [(powers, times) for powers, times in numbers if powers is not None]

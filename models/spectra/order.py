@@ -19,25 +19,7 @@ __all__ = ["compare"]
 
 
 def compare(alpha: Fraction, gamma: Eigenvalue, other_alpha: Fraction, other_gamma: Eigenvalue) -> int:
-    """Compare the coupling strengths sigma = alpha / |gamma| of two modes exactly.
-
-    Parameters
-    ----------
-    alpha, other_alpha : Fraction
-        Strengths of the modes, at least 0.
-    gamma, other_gamma : Eigenvalue
-        Negative real eigenvalues.
-
-    Returns
-    -------
-    int
-        The sign (-1, 0, 1) of alpha / |gamma| - other_alpha / |other_gamma|.
-
-    Raises
-    ------
-    ValueError
-        If a strength is negative, or an eigenvalue is no negative real number.
-    """
+    """Compare the coupling strengths sigma = alpha / |gamma| of two modes exactly."""
     for strength, mode in ((alpha, gamma), (other_alpha, other_gamma)):
         if strength < 0 or isinstance(mode.value, complex) or not mode.value < 0:
             raise ValueError(

@@ -54,29 +54,7 @@ class Proof(StrEnum):
 
 @lru_cache(maxsize=32)
 def spectrum(graph: Matrix, proof: Proof | None = None) -> Spectrum:
-    """Return the exact spectrum of a rational matrix.
-
-    Parameters
-    ----------
-    graph : Matrix
-        A `Topology` for its connectivity matrix, a `GraphMatrix`, or any other rational matrix.
-    proof : Proof, optional
-        How a closed form is proved; ``Proof.of_size(n)`` without, which takes about a second at
-        most.  Eigenvalues without a closed form are always proved over the rationals.
-
-    Returns
-    -------
-    Spectrum
-        The distinct eigenvalues with multiplicities and Jordan blocks.
-
-    Raises
-    ------
-    ValueError
-        On more than DENSE_LIMIT nodes without a closed form, and if the closed form of a file
-        outside the package is wrong.
-    ProofError
-        If another proof fails.
-    """
+    """Return the exact spectrum of a rational matrix."""
     try:
         pairs = graph.closed_form()
         return _by_factors(graph) if pairs is None else _by_pairs(graph, pairs, proof or Proof.of_size(graph.n))

@@ -184,15 +184,7 @@ def _farthest(eigenvalues: Sequence[Eigenvalue], way: int) -> sp.Expr:
 
 
 def table(spectrum: Spectrum, limit: int | None = None) -> str:
-    """Return a spectrum as a table of text; long polynomials are cut short.
-
-    Parameters
-    ----------
-    spectrum : Spectrum
-        What is shown.
-    limit : int, optional
-        Greatest number of rows: of more distinct eigenvalues the first and the last are shown.
-    """
+    """Return a spectrum as a table of text; long polynomials are cut short."""
     head = ("exact", "decimal", "multiplicity")
     many = limit is not None and len(spectrum) > limit
     half = (limit or 0) // 2

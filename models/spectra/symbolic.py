@@ -55,20 +55,7 @@ class SymbolicSpectrum:
 
 
 def symbolic_spectrum(matrix: sp.ImmutableDenseMatrix, name: str) -> SymbolicSpectrum:
-    """Return the characteristic polynomial of a matrix of rational functions, factored.
-
-    Parameters
-    ----------
-    matrix : SymPy matrix
-        Square, of rational functions of symbols other than Z.
-    name : str
-        What errors call it.
-
-    Raises
-    ------
-    ProofError
-        If the factors do not multiply to the polynomial, a mistake of the program.
-    """
+    """Return the characteristic polynomial of a matrix of rational functions, factored."""
     given = DomainMatrix.from_Matrix(matrix)
     coefficients = [given.domain.to_sympy(c) for c in given.charpoly()]
     polynomial = sp.Poly(coefficients, Z)

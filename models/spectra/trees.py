@@ -31,12 +31,6 @@ def spanning_trees(graph: Graph) -> Fraction:
 
     Of a graph with weights of 1 it is the number of its spanning trees; it is 0 if the graph falls
     into parts.
-
-    Raises
-    ------
-    ValueError
-        If a link is one-way or has another weight back, or if the graph has more than DENSE_LIMIT
-        nodes.
     """
     first, _ = _lowest(graph, "spanning trees")
     return first / graph.n
@@ -47,12 +41,6 @@ def kirchhoff_index(graph: Graph) -> Fraction:
 
     It is n Σ 1/μ over the nonzero eigenvalues μ of -G (D. J. Klein, M. Randić, J. Math. Chem. 12,
     81, 1993; I. Gutman, B. Mohar, J. Chem. Inf. Comput. Sci. 36, 982, 1996).
-
-    Raises
-    ------
-    ValueError
-        If a link is one-way or has another weight back, or if the graph falls into parts or has more
-        than DENSE_LIMIT nodes.
     """
     first, second = _lowest(graph, "Kirchhoff index")
     if not first:

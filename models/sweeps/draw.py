@@ -58,13 +58,7 @@ class RandomGraph:
     text: str
 
     def graphs(self, count: int, rng: int) -> Graphs:
-        """Return the graphs of `count` realisations, whose seeds are drawn by `rng`; more of them begin with the same ones.
-
-        Raises
-        ------
-        ValueError
-            For a text that names no graph, or no random family, and for more than LIMIT weights.
-        """
+        """Return the graphs of `count` realisations, whose seeds are drawn by `rng`; more of them begin with the same ones."""
         return _random_graphs(self.text, count, rng)
 
     def __str__(self) -> str:
@@ -79,20 +73,7 @@ GRAPH = "topology"
 
 
 def draws(given: object, realisations: object) -> Frozen[Draws]:
-    """Return what is drawn, by the names of parameters and initial states.
-
-    Parameters
-    ----------
-    given : object
-        A mapping of names to distributions, their texts ("normal(0, 1)"), or lists; None for none.
-    realisations : object
-        The number of realisations; 0 for none.
-
-    Raises
-    ------
-    ValueError, TypeError
-        For other values, lists of another length, and draws without realisations.
-    """
+    """Return what is drawn, by the names of parameters and initial states."""
     count = check_integer("realisations", realisations, 0, LIMIT)
     table = {} if given is None else check_table("draws", given)
     if bool(table) != bool(count):
@@ -226,11 +207,6 @@ def drawn_axes(model: Model, drawn: Frozen[Draws], count: int, rng: int) -> tupl
     A distribution of a parameter or state of the nodes is drawn for each node by itself, that of a parameter of links, or
     of their weights "W", for each edge by itself: links there and back have one number.  Each name has a stream of its own,
     which depends on `rng` and the name alone: neither workers nor other draws change it.
-
-    Raises
-    ------
-    ValueError
-        For unknown names, and for lists that have neither one number nor one for each node or link.
     """
     axes: dict[str, Axis] = {}
     for name, how in drawn.items():

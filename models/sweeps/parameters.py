@@ -28,21 +28,6 @@ def parameters(model: Model, given: object, axes: Sequence[Axis]) -> Frozen[floa
     """Return every parameter with its value; those that differ from node to node, or are swept at one, as a_1 … a_n.
 
     Those that differ from link to link, or are swept at one, are k_1_2 where node 1 feels node 2.
-
-    Parameters
-    ----------
-    model : Model
-        The model that has the parameters.
-    given : object
-        A table of names and values: a number, one for each node or link, or the parameter of one node ("a_2") or one link
-        ("k_1_2"); None for none.
-    axes : sequence of Axis
-        The axes of the sweep.
-
-    Raises
-    ------
-    ValueError, TypeError
-        For unknown names, values out of range, and lists of another length.
     """
     read = _Given(model)
     for name, value in check_table("parameters", {} if given is None else given).items():
@@ -147,13 +132,7 @@ def _for_each_link(model: Model, name: str, value: Any) -> dict[Place, float]:
 def by_name(
     what: str, links: Mapping[tuple[int, int], LinkName], table: Mapping[tuple[int, int], float]
 ) -> dict[Place, float]:
-    """Return the numbers of links by the names of the links.
-
-    Raises
-    ------
-    ValueError
-        If a link that acts on both of its ends, which has one name, has two numbers.
-    """
+    """Return the numbers of links by the names of the links."""
     numbers: dict[Place, float] = {}
     for at, own in links.items():
         if numbers.setdefault(own, table[at]) != table[at]:
@@ -167,24 +146,7 @@ def by_name(
 def in_order(
     what: str, links: Mapping[tuple[int, int], LinkName], listed: Sequence[T], count: str
 ) -> dict[tuple[int, int], T]:
-    """Return numbers by target and source.
-
-    Parameters
-    ----------
-    what : str
-        What the numbers are, for errors.
-    links : mapping
-        The name of the parameter at each link.
-    listed : sequence
-        A number for each link in the order of the graph's links, or, if every link runs back too, one for each edge i < j.
-    count : str
-        How many there are, in words.
-
-    Raises
-    ------
-    ValueError
-        For another number of entries.
-    """
+    """Return numbers by target and source."""
     edges = [at for at in links if at[0] < at[1]] if all(at[::-1] in links for at in links) else []
     if len(listed) == len(edges) != 0:
         table = dict(zip(edges, listed, strict=True))
@@ -227,15 +189,7 @@ def varied(values: Mapping[str, float], known: Iterable[str]) -> tuple[str, ...]
 
 
 def at_nodes(model: Model, values: Mapping[str, T]) -> Iterator[tuple[NodeKind, dict[str, T]]]:
-    """Yield the kind and the parameters of every node that differs from those before.
-
-    Parameters
-    ----------
-    model : Model
-        The model of the scene.
-    values : mapping of str
-        What each parameter of the scene is (a, or a_1 … a_n); what is yielded has the node's own names (a).
-    """
+    """Yield the kind and the parameters of every node that differs from those before."""
     known = model.parameters
     own = {name: dict.fromkeys(model.holders(name)) for name in known if name not in values}
     seen = set()

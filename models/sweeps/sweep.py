@@ -37,21 +37,7 @@ SAMPLE_LIMIT = 10**9
 
 
 def check_sweep(model: Model, values: Mapping[str, Any]) -> Continuation:
-    """Check the axes of a scene and return its continuation.
-
-    Parameters
-    ----------
-    model : Model
-        The model of the scene.
-    values : mapping
-        The completed values of `axes`, `zipped`, `parameters`, `time_unit`, `record` and `samples`, and the
-        `continuation` that was given.
-
-    Raises
-    ------
-    ValueError, TypeError
-        If an axis is unknown, repeated or out of range, and for sweeps that are too large or cannot be continued.
-    """
+    """Check the axes of a scene and return its continuation."""
     zipped, axes = values["zipped"], values["axes"]
     if not isinstance(zipped, bool):
         raise TypeError(f"zipped: found {short_repr(zipped)}; expected true or false")

@@ -18,27 +18,7 @@ STEP_LIMIT = 2_000_000
 
 
 def automorphisms(graph: Topology, limit: int = 20_000, step_limit: int = STEP_LIMIT) -> tuple[Permutation, ...]:
-    """Return all automorphisms of a graph with weights and directions, the identity first.
-
-    Parameters
-    ----------
-    graph : Topology
-        The graph.
-    limit : int, optional
-        Greatest number of automorphisms.
-    step_limit : int, optional
-        Greatest number of steps of the search.
-
-    Returns
-    -------
-    tuple of tuple of int
-        The image of each node under each automorphism, sorted.
-
-    Raises
-    ------
-    ValueError
-        If there are more than `limit`, or the search takes more than `step_limit` steps.
-    """
+    """Return all automorphisms of a graph with weights and directions, the identity first."""
     permutations: list[Permutation] = []
     for permutation in _search(graph, step_limit):
         if len(permutations) == limit:

@@ -41,24 +41,12 @@ Rows = tuple[tuple[Fraction, ...], ...]
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Differences that influence each other and no others.
+    """Differences that influence each other and no others."""
 
-    Parameters
-    ----------
-    clusters : tuple of int
-        The intertwined clusters.
-    nodes : tuple of int
-        The cluster on whose orbit each of the b coordinates lives.
-    pairs : tuple of (int, int)
-        Coordinate k is x_i - x_j for ``pairs[k] = (i, j)``.
-    matrix : tuple of tuple of Fraction
-        b x b; takes the place of G in the variational equation.
-    """
-
-    clusters: tuple[int, ...]
-    nodes: tuple[int, ...]
-    pairs: tuple[tuple[int, int], ...]
-    matrix: Rows
+    clusters: tuple[int, ...]  # the intertwined clusters
+    nodes: tuple[int, ...]  # the cluster on whose orbit each of the b coordinates lives
+    pairs: tuple[tuple[int, int], ...]  # coordinate k is x_i - x_j for ``pairs[k] = (i, j)``
+    matrix: Rows  # b x b; takes the place of G in the variational equation
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,27 +13,7 @@ __all__ = ["class_links", "coarsest_balanced"]
 
 
 def class_links(n: int, links: Iterable[Link], classes: Sequence[int]) -> tuple[Link, ...]:
-    """Return the links between the classes of a balanced partition.
-
-    Parameters
-    ----------
-    n : int
-        Number of nodes.
-    links : iterable of (int, int, Fraction)
-        Target, source and weight of each link.
-    classes : sequence of int
-        The class of each node.
-
-    Returns
-    -------
-    tuple of (int, int, Fraction)
-        Target class, source class and the weight that each node of the target receives; sorted.
-
-    Raises
-    ------
-    ValueError
-        If nodes of a class receive different weights.
-    """
+    """Return the links between the classes of a balanced partition."""
     felt: list[dict[int, Fraction]] = [{} for _ in range(n)]
     for target, source, weight in links:
         k = classes[source]
@@ -54,25 +34,6 @@ def class_links(n: int, links: Iterable[Link], classes: Sequence[int]) -> tuple[
 
 def coarsest_balanced(n: int, links: Iterable[Link], colours: Sequence[Hashable]) -> tuple[int, ...]:
     """Return the class of each node in the coarsest balanced partition with classes of one colour.
-
-    Parameters
-    ----------
-    n : int
-        Number of nodes.
-    links : iterable of (int, int, Fraction)
-        Target, source and weight of each link.
-    colours : sequence of hashable
-        The colour of each node.
-
-    Returns
-    -------
-    tuple of int
-        The class of each node, numbered by the first members.
-
-    Raises
-    ------
-    ValueError
-        If there is not one colour for each node.
 
     Notes
     -----

@@ -62,45 +62,17 @@ REAL = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Bifurcation:
-    """A bifurcation on a branch of periodic orbits.
+    """A bifurcation on a branch of periodic orbits."""
 
-    Parameters
-    ----------
-    value : float
-        Value of the parameter.
-    kind : BifurcationKind
-        Kind of the bifurcation.
-    residual : float
-        Distance of the multiplier from -1, from 1 or from the unit circle, or from the other phase, at `orbit`.
-    orbit : PeriodicOrbit
-        Nearest orbit that was found.
-    """
-
-    value: float
-    kind: BifurcationKind
+    value: float  # value of the parameter
+    kind: BifurcationKind  # kind of the bifurcation
+    # distance of the multiplier from -1, from 1 or from the unit circle, or from the other phase, at `orbit`
     residual: float
-    orbit: PeriodicOrbit = field(repr=False)
+    orbit: PeriodicOrbit = field(repr=False)  # nearest orbit that was found
 
 
 def bifurcations_between(arc: Arc, value: float, orbit: PeriodicOrbit, phases: Phases | None) -> list[Bifurcation]:
-    """Locate the bifurcations between the last orbit of an arc and the next one on the branch.
-
-    Parameters
-    ----------
-    arc : Arc
-        Arc up to the last orbit.
-    value : float
-        Value of the parameter at the next orbit.
-    orbit : PeriodicOrbit
-        Next orbit.
-    phases : Phases or None
-        Phases of the next orbit.
-
-    Returns
-    -------
-    list of Bifurcation
-        In the order of the parameter.
-    """
+    """Locate the bifurcations between the last orbit of an arc and the next one on the branch."""
     before = arc.phases[-1]
     if before is None or phases is None or before.slip_states == phases.slip_states:
         both = arc.copy().take(value, orbit, phases)
@@ -119,18 +91,6 @@ def bifurcations_at_end(arc: Arc, beyond: float) -> list[Bifurcation]:
     """Locate the bifurcation at which a branch ends.
 
     The branch may be born of one of half as many periods, or end at a fold, at a branch point or at a graze.
-
-    Parameters
-    ----------
-    arc : Arc
-        Arc up to the last orbit.
-    beyond : float
-        Value of the parameter at which Newton's method finds no orbit of the branch.
-
-    Returns
-    -------
-    list of Bifurcation
-        One bifurcation, or none.
     """
     birth = _birth(arc, beyond)
     if birth is not None:
@@ -168,21 +128,11 @@ def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """Two orbits of the same phases on an arc, between which test functions of the orbit have zeros.
+    """Two orbits of the same phases on an arc, between which test functions of the orbit have zeros."""
 
-    Parameters
-    ----------
-    arc : Arc
-        Arc of the orbits.
-    values : tuple of float
-        Values of the parameter.
-    orbits : tuple of PeriodicOrbit
-        Orbit at each value.
-    """
-
-    arc: Arc
-    values: tuple[float, float]
-    orbits: tuple[PeriodicOrbit, PeriodicOrbit]
+    arc: Arc  # arc of the orbits
+    values: tuple[float, float]  # values of the parameter
+    orbits: tuple[PeriodicOrbit, PeriodicOrbit]  # orbit at each value
 
     def changes(self, test: Test) -> bool:
         """Return whether a test function changes its sign; zero counts as positive."""

@@ -217,13 +217,7 @@ def numbers(values: Sequence[float]) -> str:
 
 
 def others(given: Given, scene: Scene, name: str) -> Scene:
-    """Return a scene with parameters beside the one that is swept.
-
-    Raises
-    ------
-    ValueError
-        If the swept one is among them.
-    """
+    """Return a scene with parameters beside the one that is swept."""
     if name in given.values:
         raise ValueError(f"{given.function.__name__}: {name!r} takes its values one after the other; expected others")
     return given.scene(scene)
@@ -254,23 +248,7 @@ def traced(scene: Scene, name: str, values: Iterable[float], first: PeriodicOrbi
 
 
 def checked_values(scene: Scene, name: str, values: Sequence[float] | np.ndarray) -> list[float]:
-    """Convert the values of a parameter to floats.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with the parameter.
-    name : str
-        Name of the parameter.
-    values : array_like, shape (k,)
-        Monotonic values.
-
-    Raises
-    ------
-    ValueError
-        If the parameter is unknown, if results have its name for something else, or if the values are not
-        finite and monotonic.
-    """
+    """Convert the values of a parameter to floats. Shapes: values (k,)."""
     if name not in scene.parameters:
         raise ValueError(f"unknown parameter {name!r}; known: {', '.join(scene.parameters)}")
     expect_free("branch", [name], NAMES)
@@ -318,13 +296,7 @@ class BranchTracer:
         return orbit
 
     def on(self, value: float) -> PeriodicOrbit | None:
-        """Find the orbit at the next value, with intermediate orbits on a long step.
-
-        Returns
-        -------
-        PeriodicOrbit or None
-            None if the branch ends.
-        """
+        """Find the orbit at the next value, with intermediate orbits on a long step."""
         step = abs(value - self.arc.values[-1])
         ahead = [value]
         sought = False

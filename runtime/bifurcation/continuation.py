@@ -65,43 +65,18 @@ CLOSED = 1e-11
 
 @dataclass(slots=True)
 class Arc:
-    """Orbits along a parameter, in the order in which they were found.
+    """Orbits along a parameter, in the order in which they were found."""
 
-    Parameters
-    ----------
-    scene : Scene
-        Scene of the orbits.
-    name : str
-        Name of the parameter.
-    periods : int
-        Drive periods of each orbit.
-    values : list of float
-        Values of the parameter.
-    orbits : list of PeriodicOrbit
-        Orbit at each value.
-    phases : list of Phases or None
-        Phases of each orbit; None for friction that is not set-valued.
-    """
-
-    scene: Scene
-    name: str
-    periods: int
-    values: list[float] = field(default_factory=list)
-    orbits: list[PeriodicOrbit] = field(default_factory=list)
+    scene: Scene  # scene of the orbits
+    name: str  # name of the parameter
+    periods: int  # drive periods of each orbit
+    values: list[float] = field(default_factory=list)  # values of the parameter
+    orbits: list[PeriodicOrbit] = field(default_factory=list)  # orbit at each value
+    # phases of each orbit; None for friction that is not set-valued
     phases: list[Phases | None] = field(default_factory=list)
 
     def take(self, value: float, orbit: PeriodicOrbit, phases: Phases | None) -> Arc:
-        """Append an orbit and return the arc.
-
-        Parameters
-        ----------
-        value : float
-            Value of the parameter.
-        orbit : PeriodicOrbit
-            Orbit at the value.
-        phases : Phases or None
-            Phases of the orbit.
-        """
+        """Append an orbit and return the arc."""
         self.values.append(value)
         self.orbits.append(orbit)
         self.phases.append(phases)
@@ -120,29 +95,13 @@ class Arc:
         return _through(self.values, [orbit.state for orbit in self.orbits], value)
 
     def at(self, value: float) -> PeriodicOrbit:
-        """Find the orbit at a value of the parameter.
-
-        Raises
-        ------
-        ArithmeticError
-            If Newton's method does not find it.
-        """
+        """Find the orbit at a value of the parameter."""
         return periodic_orbit(self.scene, self.periods, self.guess(value), parameters={self.name: value})
 
     def image(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the state after the drive periods, and its derivative by the state.
 
-        Parameters
-        ----------
-        point : ndarray, shape (components + 1,)
-            State and parameter.
-
-        Returns
-        -------
-        image : ndarray, shape (components,)
-            State after the drive periods.
-        matrix : ndarray, shape (components, components)
-            Derivative of `image` by the state.
+        Shapes: point (components + 1,); returns image (components,), matrix (components, components).
         """
         return strobe(self.scene, point[:-1], self.periods, {self.name: float(point[-1])}, self.orbits[-1].extent)
 
@@ -157,13 +116,6 @@ class Arc:
 
         It cannot if it turns on the way, nor if the change of the state does not fit its derivative by
         the parameter at the other orbit, as that of an orbit on another branch does not.
-
-        Parameters
-        ----------
-        value : float
-            Value of the parameter.
-        orbit : PeriodicOrbit
-            Orbit at the value.
         """
         point, change, extent = np.append(orbit.state, value), orbit.state - self.orbits[-1].state, orbit.extent
         way, units = value - self.values[-1], np.where(extent > 0.0, extent, 1.0)
@@ -190,17 +142,7 @@ def det(orbit: PeriodicOrbit, point: float) -> float:
 
 
 def turns(arc: Arc, values: tuple[float, float], orbits: tuple[PeriodicOrbit, PeriodicOrbit]) -> bool:
-    """Return whether an arc turns back in its parameter between two orbits.
-
-    Parameters
-    ----------
-    arc : Arc
-        Arc of the orbits.
-    values : tuple of float
-        Values of the parameter.
-    orbits : tuple of PeriodicOrbit
-        Orbit at each value.
-    """
+    """Return whether an arc turns back in its parameter between two orbits."""
     if (det(orbits[0], 1.0) < 0.0) == (det(orbits[1], 1.0) < 0.0):
         return False
     start, end = (np.append(orbit.state, value) for value, orbit in zip(values, orbits, strict=True))
@@ -209,20 +151,7 @@ def turns(arc: Arc, values: tuple[float, float], orbits: tuple[PeriodicOrbit, Pe
 
 
 def find_turn(arc: Arc, beyond: float) -> tuple[BifurcationKind, float, PeriodicOrbit] | None:
-    """Find the fold or the branch point at which an arc turns back before a value of its parameter.
-
-    Parameters
-    ----------
-    arc : Arc
-        Arc with at least two orbits.
-    beyond : float
-        Value of the parameter past the turn.
-
-    Returns
-    -------
-    tuple of (BifurcationKind, float, PeriodicOrbit) or None
-        Kind, value of the parameter and orbit; None if the arc does not turn back.
-    """
+    """Find the fold or the branch point at which an arc turns back before a value of its parameter."""
     if len(arc.values) < 2:
         return None
     slip_states = None if arc.phases[-1] is None else arc.phases[-1].slip_states
@@ -262,21 +191,11 @@ def _slip_states(orbit: PeriodicOrbit) -> tuple[int, ...] | None:
 
 @dataclass(slots=True)
 class ArclengthStep:
-    """A step from a point (state, parameter) of an arc along a direction.
+    """A step from a point (state, parameter) of an arc along a direction."""
 
-    Parameters
-    ----------
-    arc : Arc
-        Arc that is continued.
-    start : ndarray, shape (components + 1,)
-        State and parameter at the start.
-    along : ndarray, shape (components + 1,)
-        Direction, of any length.
-    """
-
-    arc: Arc
-    start: np.ndarray
-    along: np.ndarray
+    arc: Arc  # arc that is continued
+    start: np.ndarray  # (components + 1,): state and parameter at the start
+    along: np.ndarray  # (components + 1,): direction, of any length
 
     def orbit(self, point: np.ndarray) -> PeriodicOrbit:
         """Return the periodic orbit at a point."""
@@ -297,17 +216,7 @@ class ArclengthStep:
     def point(self, length: float, guess: np.ndarray | None = None) -> np.ndarray | None:
         """Find the point of the arc at a length from the start, measured along the direction.
 
-        Parameters
-        ----------
-        length : float
-            Length.
-        guess : ndarray, shape (components + 1,), optional
-            Start of Newton's method at this length; by default on the direction.
-
-        Returns
-        -------
-        ndarray, shape (components + 1,), or None
-            State and parameter; None if Newton's method does not converge.
+        Shapes: guess (components + 1,); returns (components + 1,).
         """
         guess = self.start + length * self.along / self.length(self.along) if guess is None else guess
         slope = self._slope(guess)
@@ -328,13 +237,7 @@ class ArclengthStep:
         return kept if closed(rest, CLOSED * self.weights[:-1], kept[:-1]) else None
 
     def root(self, test: Callable[[np.ndarray], float], path: Sequence[np.ndarray]) -> tuple[float, PeriodicOrbit]:
-        """Locate the zero of a function of the point between the last two points of a path along the arc.
-
-        Raises
-        ------
-        ArithmeticError
-            If Newton's method loses the arc on the way.
-        """
+        """Locate the zero of a function of the point between the last two points of a path along the arc."""
         known = self._known(path)
         one, other = [*known][-2:]
         at = brentq(lambda at: test(self._between(known, at)), one, other, xtol=1e-13 * abs(other - one), rtol=1e-13)
@@ -344,11 +247,6 @@ class ArclengthStep:
         """Locate the turn at a branch point between the last two points of a path, where a function changes its sign.
 
         At a branch point Newton's method has no direction to go; a cubic through four points beside it leads there.
-
-        Raises
-        ------
-        ArithmeticError
-            If Newton's method loses the arc on the way.
         """
         known = self._known(path)
         one, other = [*known][-2:]

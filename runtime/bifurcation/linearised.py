@@ -20,26 +20,15 @@ __all__ = ["Linearised"]
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """What the nodes of one kind, or the links of one template, add.
+    """What the nodes of one kind, or the links of one template, add."""
 
-    Parameters
-    ----------
-    function : callable
-        Rates and entries of blocks, one after the other, as a function of states and parameters.
-    own : ndarray of int, shape (count, p)
-        Places of the states of each node, or of each link's target.
-    others : tuple of ndarray of int, shape (count, p)
-        Places by which rates are differentiated: `own`, and for links those of the source.
-    numbers : tuple of float or ndarray, shape (count,)
-        Values of the parameters.
-    sizes : callable
-        Sizes of the terms of the rates, as a function of states and parameters.
-    """
-
+    # rates and entries of blocks, one after the other, as a function of states and parameters
     function: Callable[..., list[float | np.ndarray]]
-    own: np.ndarray
+    own: np.ndarray  # (count, p): places of the states of each node, or of each link's target
+    # (count, p): places by which rates are differentiated: `own`, and for links those of the source
     others: tuple[np.ndarray, ...]
-    numbers: tuple[float | np.ndarray, ...]
+    numbers: tuple[float | np.ndarray, ...]  # (count,): values of the parameters
+    # sizes of the terms of the rates, as a function of states and parameters
     sizes: Callable[..., list[float | np.ndarray]]
 
     @classmethod
@@ -75,21 +64,11 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Linearised:
-    """The equations M d(state)/dt = r(state) of a network without a drive.
+    """The equations M d(state)/dt = r(state) of a network without a drive."""
 
-    Parameters
-    ----------
-    dimension : int
-        Number of states.
-    parts : tuple of Part
-        What nodes and links add to r and to its Jacobian.
-    masses : tuple of Part
-        What they add to M, as Jacobian blocks; empty if M is the identity.
-    """
-
-    dimension: int
-    parts: tuple[Part, ...]
-    masses: tuple[Part, ...]
+    dimension: int  # number of states
+    parts: tuple[Part, ...]  # what nodes and links add to r and to its Jacobian
+    masses: tuple[Part, ...]  # what they add to M, as Jacobian blocks; empty if M is the identity
 
     @classmethod
     def of(cls, equations: Equations, values: Mapping[str, float]) -> Linearised:

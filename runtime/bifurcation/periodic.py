@@ -327,36 +327,13 @@ def _nearly_sticks(image: np.ndarray, gap: np.ndarray, extent: np.ndarray) -> bo
 
 
 def check_periods(periods: object) -> None:
-    """Check a number of drive periods.
-
-    Raises
-    ------
-    ValueError
-        If it is no whole number between 1 and LONGEST.
-    """
+    """Check a number of drive periods."""
     if not isinstance(periods, Integral) or not 1 <= int(periods) <= LONGEST:
         raise ValueError(f"periods = {short_repr(periods)}; expected a whole number, at least 1, at most {LONGEST}")
 
 
 def orbit_through(scene: Scene, periods: int, state: np.ndarray, parameters: Mapping[str, float]) -> PeriodicOrbit:
-    """Return the orbit through a state that is known to return to itself.
-
-    Parameters
-    ----------
-    scene : Scene
-        Source of the driven oscillator.
-    periods : int
-        Number of drive periods.
-    state : ndarray, shape (components,)
-        State at the beginning of a period of the drive.
-    parameters : mapping of str to float
-        Parameters of the scene to set.
-
-    Returns
-    -------
-    PeriodicOrbit
-        Its residual says how well the state returns.
-    """
+    """Return the orbit through a state that is known to return to itself. Shapes: state (components,)."""
     scene = _driven(Given(orbit_through, parameters), scene)
     extent = _extent(scene, state, periods)
     image, matrix = _strobe(scene, state, periods, 0.0, extent=extent)
@@ -373,25 +350,7 @@ def strobe(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Evaluate the stroboscopic map and its derivative.
 
-    Parameters
-    ----------
-    scene : Scene
-        Source of the driven oscillator.
-    state : ndarray, shape (components,)
-        State at the beginning of a period of the drive.
-    periods : int
-        Number of drive periods.
-    parameters : mapping of str to float, optional
-        Parameters of the scene to set.
-    extent : ndarray, shape (components,), optional
-        How far each component moves; the absolute tolerance of the integration follows it.
-
-    Returns
-    -------
-    image : ndarray, shape (components,)
-        State after the drive periods.
-    matrix : ndarray, shape (components, components)
-        Derivative of `image` by `state`.
+    Shapes: state (components,), extent (components,); returns image (components,), matrix (components, components).
     """
     image, matrix = _strobe(_driven(Given(strobe, parameters), scene), state, periods, 0.0, extent=extent)
     return image[: len(state)], matrix
@@ -452,25 +411,7 @@ def _correction(matrix: np.ndarray, gap: np.ndarray) -> np.ndarray:
 
 
 def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:
-    """Find the strength at which the largest transversal multiplier has modulus 1, to rounding.
-
-    Parameters
-    ----------
-    orbit : PeriodicOrbit
-        Synchronous orbit.
-    low, high : float
-        Strengths alpha on different sides of the end.
-
-    Returns
-    -------
-    float
-        Strength alpha.
-
-    Raises
-    ------
-    ValueError
-        If `low` or `high` is no finite number, or if the modulus is on the same side of 1 at both.
-    """
+    """Find the strength at which the largest transversal multiplier has modulus 1, to rounding."""
 
     for name, value in (("low", low), ("high", high)):
         if not isinstance(value, Real) or not math.isfinite(value):

@@ -39,23 +39,16 @@ REACH = 3
 
 @dataclass(frozen=True, slots=True)
 class Phases:
-    """Phases of one cycle.
+    """Phases of one cycle."""
 
-    Parameters
-    ----------
-    slip_states : tuple of int
-        0 for stick, +1 and -1 for slip, in the order of time. The rotation that comes first in
-        lexicographic order is used.
-    gap : float
-        Least minimum, inside a phase, of the sliding speed in slip and of the distance of the load
-        from the limits of static friction in stick; inf if there is none.
-    landing : float
-        Distance of the load from those limits at the end of slip, at the landing nearest to them,
-        positive if it sticks; inf if slip never ends.
-    """
-
+    # 0 for stick, +1 and -1 for slip, in the order of time. The rotation that comes first in lexicographic order is
+    # used
     slip_states: tuple[int, ...]
+    # least minimum, inside a phase, of the sliding speed in slip and of the distance of the load from the limits of
+    # static friction in stick; inf if there is none
     gap: float
+    # distance of the load from those limits at the end of slip, at the landing nearest to them, positive if it
+    # sticks; inf if slip never ends
     landing: float
 
     @property
@@ -65,22 +58,7 @@ class Phases:
 
 
 def phases_of(scene: Scene, state: np.ndarray, periods: int) -> Phases | None:
-    """Determine the phases of a periodic orbit.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with the oscillator.
-    state : ndarray, shape (components,)
-        State at the beginning of a period of the drive.
-    periods : int
-        Drive periods of the orbit.
-
-    Returns
-    -------
-    Phases or None
-        None for friction that is not set-valued.
-    """
+    """Determine the phases of a periodic orbit. Shapes: state (components,)."""
     contact = scene.equations.node.contact
     if contact is None:
         return None

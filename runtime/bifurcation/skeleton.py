@@ -260,24 +260,7 @@ def starts_of(scene: Scene, seed: int, box: np.ndarray | None = None) -> np.ndar
 def near_returns(
     scene: Scene, periods: Sequence[int], transient: float = DROPPED, starts: np.ndarray | None = None
 ) -> list[PeriodicOrbit]:
-    """Find the periodic orbits to which motions from several starts nearly return.
-
-    Parameters
-    ----------
-    scene : Scene
-        Source of the driven oscillator.
-    periods : sequence of int
-        Numbers of drive periods of the orbits.
-    transient : float
-        Drive periods before the search.
-    starts : ndarray, shape (any, components), optional
-        Initial states; by default around the motion from the scene's own start.
-
-    Returns
-    -------
-    list of PeriodicOrbit
-        Each orbit once.
-    """
+    """Find the periodic orbits to which motions from several starts nearly return. Shapes: starts (any, components)."""
     path, extent = _paths(scene, transient, starts_of(scene, 0) if starts is None else starts)
     orbits: list[PeriodicOrbit] = []
     for count in periods:

@@ -26,48 +26,25 @@ def numbers_of_a_cell(dimension: int, room: int, samples: int, observed: int = 0
 class Buffers:
     """The arrays that a kernel fills, one row for each cell; the docstring of `drive` in a kernel
     describes them.
-
-    Attributes
-    ----------
-    end : ndarray, shape (cells, dimension)
-        States at which the cells stopped.
-    sums : ndarray, shape (cells, len(Sum) + observed)
-        Synchronisation errors, the time at which each cell stopped, and what was observed.
-    counts : ndarray of int64, shape (cells, COUNTS)
-        Status, steps, numbers of section points, and tolerances.
-    points : ndarray, shape (cells, room, 1 + kept)
-        Time and state of the section points, or time, number of the section and what it keeps; NaN
-        if a cell has fewer.
-    samples : ndarray, shape (cells, samples, dimension)
-        States at equally spaced times of the window.
-    lanes : ndarray, shape (cells, any)
-        What the lanes of cells held that paused or whose steps underflow; empty if no cell goes on from there.
     """
 
-    end: np.ndarray
+    end: np.ndarray  # (cells, dimension): states at which the cells stopped
+    # (cells, len(Sum): synchronisation errors, the time at which each cell stopped, and what was observed
     sums: np.ndarray
-    counts: np.ndarray
+    counts: np.ndarray  # (cells, COUNTS): status, steps, numbers of section points, and tolerances
+    # (cells, room, 1 + kept): time and state of the section points, or time, number of the section and what it keeps;
+    # NaN if a cell has fewer
     points: np.ndarray
-    samples: np.ndarray
+    samples: np.ndarray  # (cells, samples, dimension): states at equally spaced times of the window
+    # (cells, any): what the lanes of cells held that paused or whose steps underflow; empty if no cell goes on from
+    # there
     lanes: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
 
     @classmethod
     def empty(
         cls, cells: int, dimension: int, room: int, samples: int, observed: int = 0, kept: int | None = None
     ) -> Buffers:
-        """Return buffers of cells that have not run: numbers NaN, counts zero.
-
-        Parameters
-        ----------
-        cells, dimension : int
-            Numbers of cells and of states.
-        room, samples : int
-            Section points that there is room for, and points of a trajectory.
-        observed : int
-            Numbers of what is observed.
-        kept : int, optional
-            Numbers of a section point beside its time; those of the state if left out.
-        """
+        """Return buffers of cells that have not run: numbers NaN, counts zero."""
         kept = dimension if kept is None else kept
         return cls(
             end=np.full((cells, dimension), np.nan),

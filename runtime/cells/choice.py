@@ -73,17 +73,10 @@ class Ladder:
     are to come, and is handed on from there: to Rosenbrock steps if its steps are as short as its fastest decay while its
     motion is slow, to explicit stages if its series are far shorter than any time of its motion. A series without a next
     term ends in steps that underflow, and is handed on as well. Each decision depends on the cell alone.
-
-    Parameters
-    ----------
-    scene : Scene
-        Its integrator and its tolerances.
-    equations : Equations
-        What is integrated.
     """
 
-    scene: Scene
-    equations: Equations
+    scene: Scene  # its integrator and its tolerances
+    equations: Equations  # what is integrated
 
     @cached_property
     def methods(self) -> tuple[Integrator, ...]:
@@ -152,16 +145,7 @@ class Ladder:
     def further(self, rows: Plan, buffers: Buffers, method: np.ndarray, lengths: np.ndarray) -> np.ndarray:
         """Return which method (cells,) cells go on with that have paused or whose steps underflow; -1 for none.
 
-        Parameters
-        ----------
-        rows : Plan
-            The cells.
-        buffers : Buffers
-            How they ended.
-        method : ndarray of int, shape (cells,)
-            What they used.
-        lengths : ndarray, shape (cells,)
-            Mean length of their steps since they last paused.
+        Shapes: method (cells,), lengths (cells,).
         """
         paused = buffers.status == Status.PAUSED
         series = np.array([m.series for m in self.methods])[method]
@@ -270,21 +254,7 @@ def chosen_for_modes(
     """Return the integrator of orbits with deviations along them, Taylor or Rosenbrock steps: modes have no others.
 
     Power series where all functions are analytic, and neither the orbit nor the strongest mode is stiff at the start.
-
-    Parameters
-    ----------
-    scene : Scene
-        Its integrator, and the tolerances that the order follows.
-    variation : Variation
-        Orbit with its variational equation.
-    state : ndarray, shape (cells, dimension)
-        Initial states.
-    numbers : ndarray, shape (cells, parameters)
-        Values of the parameters of the orbit.
-    strengths : ndarray, shape (number of strengths, modes)
-        Strengths of the modes.
-    slow : float
-        Rate of the motion that steps must follow anyway, 2 pi over the time of a turn.
+    Shapes: state (cells, dimension), numbers (cells, parameters), strengths (number of strengths, modes).
     """
     if scene.integrator == "taylor":
         return _taylor(scene, variation.orbit)
@@ -346,14 +316,6 @@ BLOWN = 1e6
 def warn_of_steps(ladder: Ladder, buffers: Buffers, rows_of: Callable[[np.ndarray], Plan]) -> None:
     """Warn if no cell came to its end, if some made no step, if explicit steps were short because a cell is stiff, or if a
     motion has no bound.
-
-    Parameters
-    ----------
-    ladder : Ladder
-    buffers : Buffers
-        How the cells ended.
-    rows_of : callable
-        Gives the rows of some cells.
     """
     status, steps, times = buffers.status, buffers.steps, buffers.sums[:, Sum.STOPPED_AT]
     idle = np.isin(status, (Status.STEP_UNDERFLOW, Status.STEP_BUDGET)) & (times <= 0.0)

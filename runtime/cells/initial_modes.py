@@ -21,13 +21,7 @@ def with_modes(equations: Equations, start: np.ndarray, numbers: np.ndarray) -> 
     """Return initial states with the slip states that velocities and loads imply at the time 0.
 
     An oscillator at exactly the ground's velocity sticks if static friction can hold it.
-
-    Parameters
-    ----------
-    equations : Equations
-    start : ndarray, shape (cells, 3 n)
-        Positions, velocities and slip states; without contacts they are returned as they are.
-    numbers : ndarray, shape (cells, parameters)
+    Shapes: start (cells, 3 n), numbers (cells, parameters).
     """
     n = equations.n
     contact = equations.node.contact if equations.sticks else None

@@ -41,23 +41,12 @@ ONE_CELL: Mapping[str, Any] = {
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """Parameters of a scene as the caller of a public function gave them.
+    """Parameters of a scene as the caller of a public function gave them."""
 
-    Parameters
-    ----------
-    function : callable
-        The function; errors name it and know its keywords.
-    table : mapping, optional
-        What was given as `parameters`.
-    keywords : mapping
-        What was given as further keywords.
-    refused : mapping of str to str
-        Keywords of other functions that this one does not take, and why.
-    """
-
-    function: Callable[..., object]
-    table: Mapping[str, object] | None = None
-    keywords: Mapping[str, object] = field(default_factory=dict)
+    function: Callable[..., object]  # the function; errors name it and know its keywords
+    table: Mapping[str, object] | None = None  # what was given as `parameters`
+    keywords: Mapping[str, object] = field(default_factory=dict)  # what was given as further keywords
+    # keywords of other functions that this one does not take, and why
     refused: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -75,14 +64,6 @@ class Given:
         """Return the single cell of a scene that has these parameters, with settings that the function needs.
 
         The function does not depend on parameters that are `free`.
-
-        Raises
-        ------
-        TypeError
-            If `scene` is no Scene.
-        ValueError
-            If a name is no parameter of the scene, or is given twice, for a list; as `expect_one_cell`, but for a stop that
-            is among the settings.
         """
         self.expect_one_cell(scene, free, stops="stop" in settings)
         numbers = self.checked(scene)
@@ -117,13 +98,6 @@ class Given:
         """Return a scene with parameters and initial states fixed, by a number, or swept, by a
         sequence, which makes an axis after those of the scene, and with those settings that are
         not None.
-
-        Raises
-        ------
-        TypeError
-            If `scene` is no Scene.
-        ValueError
-            If a name is neither a parameter nor an initial state, or is given twice.
         """
         fixed: dict[str, object] = {}
         swept: dict[str, object] = {axis.name: axis.values for axis in a_scene(scene).axes}

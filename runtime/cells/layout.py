@@ -71,17 +71,6 @@ def block_size(scene: Scene, width: int, workers: int, cells: int | None = None)
     """Return the cells of a block, a multiple of the number of lanes.
 
     A block is large enough to keep the lanes busy and small enough to be lost.
-
-    Parameters
-    ----------
-    scene : Scene
-    width : int
-        Number of lanes.
-    workers : int
-        Blocks that run at a time.
-    cells : int, optional
-        Cells that can run at a time (default: those of the scene, of its first column if the sweep
-        is continued).
     """
     if cells is None:
         cells = scene.cells // (scene.shape[-1] if scene.continued else 1)

@@ -58,33 +58,19 @@ class Paces(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """The nodes of one kind, or the links of one template, as functions of arrays.
+    """The nodes of one kind, or the links of one template, as functions of arrays."""
 
-    Parameters
-    ----------
-    rates, slopes : callable
-        Rates, and the entries of their derivatives by the node's own states, row by row.
-    own, source : ndarray of int, shape (count, p)
-        Places of the states of each node or of each link's target; those of its source, None for nodes.
-    targets : ndarray of int, shape (count,)
-    columns : tuple of int or ndarray of int, shape (count,)
-        Columns of the parameters among the numbers of a cell.
-    weights : ndarray, shape (count,), optional
-        Weights of links.
-    share : float
-        Links that each of these stands for.
-    turned : tuple of (int, callable)
-        A state and the value of it at which a smoothed jump has its middle.
-    """
-
+    # rates, and the entries of their derivatives by the node's own states, row by row
     rates: Callable[..., list[float | np.ndarray]]
     slopes: Callable[..., list[float | np.ndarray]]
+    # (count, p): places of the states of each node or of each link's target; those of its source, None for nodes
     own: np.ndarray
     source: np.ndarray | None
-    targets: np.ndarray
-    columns: tuple[Column, ...]
-    weights: np.ndarray | None = None
-    share: float = 1.0
+    targets: np.ndarray  # (count,)
+    columns: tuple[Column, ...]  # (count,): columns of the parameters among the numbers of a cell
+    weights: np.ndarray | None = None  # (count,): weights of links
+    share: float = 1.0  # links that each of these stands for
+    # a state and the value of it at which a smoothed jump has its middle
     turned: tuple[tuple[int, Callable[..., list[float | np.ndarray]]], ...] = ()
 
     def arguments(self, state: np.ndarray, numbers: np.ndarray, time: np.ndarray) -> list[np.ndarray]:
@@ -119,15 +105,8 @@ class Templates:
     ) -> Paces:
         """Return how fast the cells of some rows move.
 
-        Parameters
-        ----------
-        state : ndarray, shape (cells, dimension)
-        numbers : ndarray, shape (cells, parameters)
-        time : ndarray, shape (cells,)
-        shortest : ndarray, shape (cells,)
-            No cell is followed for longer than a small part of this time.
-        noise : ndarray, shape (cells, dimension), optional
-            Errors that the states may have; None at the start, where they have none.
+        Shapes: state (cells, dimension), numbers (cells, parameters), time (cells,), shortest (cells,), noise (cells,
+        dimension).
         """
         if len(state) > BLOCK:
             each = [

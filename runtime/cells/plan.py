@@ -48,22 +48,13 @@ DIRECTIONS = {"falling": -1.0, "rising": 1.0, "both": 0.0}
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Rows of cells as a kernel takes them.
+    """Rows of cells as a kernel takes them."""
 
-    Attributes
-    ----------
-    start : ndarray, shape (cells, dimension)
-        Initial states.
-    numbers : ndarray, shape (cells, parameters)
-        Parameters, in the order of `Equations.parameters`.
-    spans : ndarray, shape (cells, len(Span))
-        Start and end of the window and the period of the equations, in non-dimensional time,
-        the synchronisation error below which a cell ends early (0: none does), the first step, the longest one, and the
-        steps after which the cell first pauses (inf: it never does).
-    """
-
-    start: np.ndarray
-    numbers: np.ndarray
+    start: np.ndarray  # (cells, dimension): initial states
+    numbers: np.ndarray  # (cells, parameters): parameters, in the order of `Equations.parameters`
+    # (cells, len(Span): start and end of the window and the period of the equations, in non-dimensional time, the
+    # synchronisation error below which a cell ends early (0: none does), the first step, the longest one, and the
+    # steps after which the cell first pauses (inf: it never does)
     spans: np.ndarray
 
     def __post_init__(self) -> None:
@@ -81,17 +72,7 @@ class Plan:
 def plan(scene: Scene, near: np.ndarray | None = None) -> Plan:
     """Return the rows of all cells of a scene, in C order over the axes (the last one fastest).
 
-    Parameters
-    ----------
-    scene : Scene
-    near : ndarray, shape (cells,), optional
-        Synchronisation errors below which the cells end early (default: 0, none does).
-
-    Raises
-    ------
-    ValueError
-        If a window in drive periods meets a drive of frequency 0, or if it is too long for double
-        precision.
+    Shapes: near (cells,).
     """
     return Planner(scene).rows(np.arange(scene.cells), near)
 
@@ -310,21 +291,7 @@ def _windows(scene: Scene, period: np.ndarray) -> np.ndarray:
 def control_array(
     rtol: float, atol: float, max_step: float, max_steps: float, direction: float = 0.0, jumps: bool = True
 ) -> np.ndarray:
-    """Return the array (Control.FURTHER,) that steers a kernel.
-
-    Parameters
-    ----------
-    rtol, atol : float
-        Relative and absolute tolerance of a step.
-    max_step : float
-        Longest step, in non-dimensional time.
-    max_steps : float
-        Steps after which a cell is given up.
-    direction : float
-        Direction in which the section function passes zero: -1 falling, 1 rising, 0 either.
-    jumps : bool
-        If False, a cell that repeats itself is integrated to its end all the same.
-    """
+    """Return the array (Control.FURTHER,) that steers a kernel."""
     control = np.zeros(Control.FURTHER)
     control[Control.RTOL], control[Control.ATOL] = rtol, atol
     control[Control.FIRST_STEP], control[Control.MAX_STEP] = FIRST_STEP, max_step

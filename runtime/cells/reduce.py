@@ -40,21 +40,11 @@ PERIODIC = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NodeMerge:
-    """Which oscillators are stepped as one, and the way back to the whole network.
+    """Which oscillators are stepped as one, and the way back to the whole network."""
 
-    Attributes
-    ----------
-    states : ndarray of int
-        Columns of the whole network's state that start the reduced one.
-    places : ndarray of int
-        Column of the reduced state in which each state of the whole network is found.
-    together : bool
-        True if all oscillators are stepped as one and their synchronisation error, which is 0, is a
-        record.
-    """
-
-    states: np.ndarray
-    places: np.ndarray
+    states: np.ndarray  # columns of the whole network's state that start the reduced one
+    places: np.ndarray  # column of the reduced state in which each state of the whole network is found
+    # True if all oscillators are stepped as one and their synchronisation error, which is 0, is a record
     together: bool
 
     @property
@@ -91,42 +81,20 @@ class NodeMerge:
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Reduction:
-    """What is left of a scene to integrate, and the way back.
-
-    Attributes
-    ----------
-    scene : Scene
-    planner : Planner
-        Lays out its cells.
-    equations : Equations
-        The equations that the kernel steps.
-    records : tuple of str
-        What the kernel records.
-    merge : NodeMerge
-        Which oscillators are stepped as one.
-    numbers : ndarray of int
-        Columns of the whole network's parameters that are left.
-    multiplicity : tuple of int, optional
-        How many oscillators each node stands for, if the synchronisation error needs it.
-    skipped, kept : tuple of str
-        Sentences: what was left out, and what was not and why.
-    jumps : bool
-        Whether a cell that repeats itself leaves out whole cycles.
-    watched : Watched
-        What the kernel watches: observables, sections and a stop.
-    """
+    """What is left of a scene to integrate, and the way back."""
 
     scene: Scene
-    planner: Planner = field(repr=False)
-    equations: Equations = field(repr=False)
-    records: tuple[str, ...]
-    merge: NodeMerge = field(repr=False)
-    numbers: np.ndarray = field(repr=False)
+    planner: Planner = field(repr=False)  # lays out its cells
+    equations: Equations = field(repr=False)  # the equations that the kernel steps
+    records: tuple[str, ...]  # what the kernel records
+    merge: NodeMerge = field(repr=False)  # which oscillators are stepped as one
+    numbers: np.ndarray = field(repr=False)  # columns of the whole network's parameters that are left
+    # how many oscillators each node stands for, if the synchronisation error needs it
     multiplicity: tuple[int, ...] | None
-    skipped: tuple[str, ...]
+    skipped: tuple[str, ...]  # sentences: what was left out, and what was not and why
     kept: tuple[str, ...]
-    jumps: bool
-    watched: Watched = field(repr=False)
+    jumps: bool  # whether a cell that repeats itself leaves out whole cycles
+    watched: Watched = field(repr=False)  # what the kernel watches: observables, sections and a stop
 
     @property
     def dimension(self) -> int:
@@ -186,13 +154,7 @@ class Reduction:
 
 
 def as_reduction(scene: Scene, reduce: bool | Reduction, starts: np.ndarray | None = None) -> Reduction:
-    """Return the reduction of a scene that the argument `reduce` of `run` asks for.
-
-    Raises
-    ------
-    ValueError
-        If it is the reduction of another scene, or of other starts.
-    """
+    """Return the reduction of a scene that the argument `reduce` of `run` asks for."""
     a_scene(scene)
     if not isinstance(reduce, Reduction):
         return reduce_scene(scene, check_flag("reduce", reduce), starts=starts)
@@ -206,19 +168,7 @@ def as_reduction(scene: Scene, reduce: bool | Reduction, starts: np.ndarray | No
 def reduce_scene(
     scene: Scene, reduce: bool = True, fold_all: bool = False, starts: np.ndarray | None = None
 ) -> Reduction:
-    """Return what is left of a scene to integrate.
-
-    Parameters
-    ----------
-    scene : Scene
-    reduce : bool
-        If False, everything is integrated as it stands.
-    fold_all : bool
-        Substitute all parameters that have one value in every cell, by their shortest decimals.  By
-        default only zeros are substituted, so that scenes that differ in numbers share a kernel.
-    starts : ndarray, shape (cells, dimension), optional
-        States of all cells to start from in place of the scene's.
-    """
+    """Return what is left of a scene to integrate. Shapes: starts (cells, dimension)."""
     whole, found = scene.equations, watched(scene)
     skipped: list[str] = []
     kept: list[str] = []

@@ -39,16 +39,7 @@ def shortest_stays(
 ) -> np.ndarray:
     """Return the shortest time (rows,) between two zeros of expressions of time; inf if there are no two.
 
-    Parameters
-    ----------
-    gaps, rises : tuple of Expr
-        Expressions of time and parameters.  Rises take WIDTH over their slope, and are no nearer to each other than that.
-    values : mapping of str to ndarray, shape (rows,)
-        Values of the parameters; each row is looked at.
-    periods : ndarray, shape (rows,)
-        Common period of the expressions in each row; 0 if there is none.
-    end : ndarray, shape (rows,)
-        Time up to which expressions without a period are looked at.
+    Shapes: values (rows,), periods (rows,), end (rows,).
 
     Notes
     -----

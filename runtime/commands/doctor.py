@@ -60,24 +60,12 @@ def execute(arguments: Namespace) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """The outcome of one check.
+    """The outcome of one check."""
 
-    Attributes
-    ----------
-    name : str
-        What was checked.
-    outcome : str
-        "fine", "doubtful" or "wrong".
-    found : str
-        What the check saw.
-    remedy : str
-        What the user can do; empty if the outcome is fine.
-    """
-
-    name: str
-    outcome: str
-    found: str
-    remedy: str = ""
+    name: str  # what was checked
+    outcome: str  # "fine", "doubtful" or "wrong"
+    found: str  # what the check saw
+    remedy: str = ""  # what the user can do; empty if the outcome is fine
 
     def as_dict(self) -> dict[str, str]:
         """The check in JSON types."""
@@ -85,18 +73,7 @@ class Check:
 
 
 def examine(checks: Mapping[str, Callable[[], Answer]] | None = None) -> Iterator[Check]:
-    """Run checks one after the other.
-
-    Parameters
-    ----------
-    checks : mapping of str to callable, optional
-        Name -> function that returns outcome, finding and remedy; CHECKS by default.
-
-    Yields
-    ------
-    Check
-        One for each function; an exception in it is the outcome "wrong".
-    """
+    """Run checks one after the other."""
     for name, check in (CHECKS if checks is None else checks).items():
         try:
             outcome, found, remedy = check()

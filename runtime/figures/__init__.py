@@ -35,18 +35,10 @@ __all__ = ["Drawing", "load", "names"]
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A figure and the module that makes it.
+    """A figure and the module that makes it."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the figure.
-    module : module
-        Module of this folder.
-    """
-
-    name: str
-    module: ModuleType
+    name: str  # name of the figure
+    module: ModuleType  # module of this folder
 
     @property
     def size(self) -> tuple[float, float]:
@@ -83,29 +75,12 @@ class Drawing:
 
 
 def names(extra: bool = False) -> tuple[str, ...]:
-    """List the names of the figures.
-
-    Parameters
-    ----------
-    extra : bool
-        Include those that are made only if asked for by name.
-
-    Returns
-    -------
-    tuple of str
-        In alphabetical order.
-    """
+    """List the names of the figures."""
     return tuple(sorted(name for name, (_, wanted) in _listing().items() if wanted or extra))
 
 
 def load(name: str) -> Drawing:
-    """Return a figure by its name.
-
-    Raises
-    ------
-    ValueError
-        If the name is unknown.
-    """
+    """Return a figure by its name."""
     known = _listing()
     if name not in known:
         raise ValueError(f"unknown figure {name!r}; known: {', '.join(names(extra=True))}{suggestion(name, known)}")

@@ -32,21 +32,11 @@ LABELS = {"omega": r"drive frequency $\omega$", "sigma": r"coupling $\sigma$"}
 
 @dataclass(frozen=True, slots=True)
 class Diagram:
-    """A swept result with section points.
+    """A swept result with section points."""
 
-    Parameters
-    ----------
-    result : Result
-        Result with one axis.
-    axis : str
-        Name of the axis.
-    published : tuple of Interval
-        Ranges of the axis that the paper calls synchronous.
-    """
-
-    result: Result
-    axis: str
-    published: tuple[tuple[float, float], ...]
+    result: Result  # result with one axis
+    axis: str  # name of the axis
+    published: tuple[tuple[float, float], ...]  # ranges of the axis that the paper calls synchronous
 
 
 def compute(name: str, runs: FigureRuns) -> Diagram:
@@ -62,20 +52,7 @@ def compute(name: str, runs: FigureRuns) -> Diagram:
 
 
 def points(data: Diagram) -> tuple[np.ndarray, np.ndarray]:
-    """Collect the section points of all finished cells.
-
-    Parameters
-    ----------
-    data : Diagram
-        Diagram.
-
-    Returns
-    -------
-    points : ndarray, shape (k, 2)
-        Value of the axis, and x_1 at the section.
-    cell : ndarray of int, shape (k,)
-        Cell of each point.
-    """
+    """Collect the section points of all finished cells. Shapes: returns points (k, 2), cell (k,)."""
     result = data.result
     values = result.data[data.axis].values
     x = result.section.sel(component="x", node=1).values

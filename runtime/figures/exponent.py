@@ -45,19 +45,7 @@ MARKED = 60
 
 
 def curve(scene: Scene, runs: FigureRuns) -> MSF:
-    """Return the master stability function of a scene's oscillator on 0 … HIGHEST.
-
-    Parameters
-    ----------
-    scene : Scene
-        Source of the oscillator and its parameters.
-    runs : FigureRuns
-        Figures with the same runs share the function.
-
-    Returns
-    -------
-    MSF
-    """
+    """Return the master stability function of a scene's oscillator on 0 … HIGHEST."""
     pair = scene.replace(topology=topology("chain", 2), initial=None, axes=(), record=None, title="", sigma=0.0)
     alpha = np.linspace(0.0, HIGHEST, min(runs.quality.points or 241, 241))
     return runs.once(("msf", pair), lambda: msf(pair, alpha, **effort(runs)))
@@ -127,17 +115,6 @@ def draw_exponent(axes: Axes, found: MSF) -> Axes:
     """Draw exponents over all strengths at which they were computed; dots mark the requested ones if they are few.
 
     A band shows two standard errors on either side, grey bands the ranges with a negative exponent.
-
-    Parameters
-    ----------
-    axes : Axes
-        Axes to draw into.
-    found : MSF
-        Master stability function.
-
-    Returns
-    -------
-    Axes
     """
     fine = found.fine
     value, error = finite(fine.exponent), finite(fine.stderr)

@@ -30,27 +30,13 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """Resolution of the figures.
+    """Resolution of the figures."""
 
-    Parameters
-    ----------
-    points : int, optional
-        Most values of a scene's axis if every value is run once; None for all.
-    grid : int, optional
-        Number of values on which synchronous ranges are searched; None for all.
-    criterion : AppliedCriterion
-        Criterion of synchronisation.
-    resolution : float
-        Width in sigma to which the ends of synchronous ranges are refined.
-    networks : tuple of int
-        Sizes above the paper's for which no synchronisation is expected.
-    """
-
-    points: int | None = None
-    grid: int | None = None
-    criterion: AppliedCriterion = PAPER
-    resolution: float = 5e-4
-    networks: tuple[int, ...] = (5, 6)
+    points: int | None = None  # most values of a scene's axis if every value is run once; None for all
+    grid: int | None = None  # number of values on which synchronous ranges are searched; None for all
+    criterion: AppliedCriterion = PAPER  # criterion of synchronisation
+    resolution: float = 5e-4  # width in sigma to which the ends of synchronous ranges are refined
+    networks: tuple[int, ...] = (5, 6)  # sizes above the paper's for which no synchronisation is expected
 
     def __post_init__(self) -> None:
         for name in ("points", "grid"):
@@ -129,21 +115,7 @@ class FigureRuns:
         return self.once(("network", scene), lambda: simulate(one, sigma, **self._options()))
 
     def after(self, scene: Scene, sigma: np.ndarray, transient: float) -> Sweep:
-        """Simulate a scene's network after a transient of another length.
-
-        Parameters
-        ----------
-        scene : Scene
-            Network.
-        sigma : ndarray, shape (k,)
-            Values of the coupling; the ends of ranges between them are not refined.
-        transient : float
-            Length of the transient in drive periods.
-
-        Returns
-        -------
-        Sweep
-        """
+        """Simulate a scene's network after a transient of another length. Shapes: sigma (k,)."""
         criterion = replace(self.quality.criterion, transient=transient)
         options = {**self._options(), "criterion": criterion, "resolution": math.inf}
         return simulate(scene.replace(axes=(), record=("sync_error",)), sigma, **options)
@@ -174,19 +146,7 @@ class FigureRuns:
 
 
 def thin(scene: Scene, points: int | None) -> Scene:
-    """Reduce the axes of a scene to a number of values.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with axes.
-    points : int or None
-        Most values of each axis, both ends among them; None keeps all.
-
-    Returns
-    -------
-    Scene
-    """
+    """Reduce the axes of a scene to a number of values."""
     if points is None:
         return scene
     axes = []

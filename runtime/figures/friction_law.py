@@ -26,24 +26,12 @@ Function = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """Friction coefficient at relative velocities.
+    """Friction coefficient at relative velocities."""
 
-    Parameters
-    ----------
-    w : ndarray, shape (k,)
-        Relative velocities.
-    sharp : ndarray, shape (k,)
-        Set-valued law, NaN at the jump.
-    smooth : ndarray, shape (k,)
-        Smoothed law.
-    kappa : float
-        Steepness of the smoothed law.
-    """
-
-    w: np.ndarray
-    sharp: np.ndarray
-    smooth: np.ndarray
-    kappa: float
+    w: np.ndarray  # (k,): relative velocities
+    sharp: np.ndarray  # (k,): set-valued law, NaN at the jump
+    smooth: np.ndarray  # (k,): smoothed law
+    kappa: float  # steepness of the smoothed law
 
 
 def compute(name: str, runs: FigureRuns) -> Law:

@@ -33,32 +33,6 @@ def make(
 
     Each figure gives `<name>.png`, `<name>.svg` and `<name>.csv`, some also `<name>_ranges.csv` or
     `<name>.md`.
-
-    Parameters
-    ----------
-    names : iterable of str or None
-        Names of the figures; all if None or empty.
-    out : path-like
-        Folder for the files.
-    quick : bool
-        Use coarse grids and a short transient.
-    workers : int, optional
-        Number of threads; all cores by default.
-    show_progress : bool or None
-        Whether to show a bar; by default a bar on terminals and in notebooks, a line a minute
-        elsewhere.
-
-    Returns
-    -------
-    list of Path
-        Files written.
-
-    Raises
-    ------
-    ValueError
-        If a name is unknown. Checked before any computation.
-    OSError
-        If the folder cannot be written to. Checked before any computation.
     """
     return [*written(names, out, quick, workers, show_progress)]
 

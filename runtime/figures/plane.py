@@ -52,34 +52,14 @@ DOT: dict[str, Any] = {
 
 @dataclass(frozen=True, slots=True)
 class Rays:
-    """A function over the plane with the modes of its scene's network.
+    """A function over the plane with the modes of its scene's network."""
 
-    Parameters
-    ----------
-    found : Plane
-        Master stability function.
-    sigma : float
-        Coupling at which the modes are marked.
-    """
-
-    found: Plane
-    sigma: float
+    found: Plane  # master stability function
+    sigma: float  # coupling at which the modes are marked
 
 
 def uneven_ring(n: int, back: Fraction = Fraction(1, 2)) -> Topology:
-    """Return a ring with weight 1 in one direction and another weight in the other.
-
-    Parameters
-    ----------
-    n : int
-        Number of nodes, at least 3.
-    back : Fraction
-        Weight in the other direction.
-
-    Returns
-    -------
-    Topology
-    """
+    """Return a ring with weight 1 in one direction and another weight in the other."""
     links = [(i, (i + 1) % n, Fraction(1)) for i in range(n)] + [(i, (i - 1) % n, back) for i in range(n)]
     return Topology("uneven ring", n, tuple(sorted(links)))
 
@@ -117,19 +97,7 @@ def draw(axes: Axes, data: Rays) -> Axes:
 
 
 def draw_plane(axes: Axes, found: Plane) -> Axes:
-    """Draw exponents in colours, blue if negative, with a line at zero.
-
-    Parameters
-    ----------
-    axes : Axes
-        Axes to draw into.
-    found : Plane
-        Master stability function.
-
-    Returns
-    -------
-    Axes
-    """
+    """Draw exponents in colours, blue if negative, with a line at zero."""
     value = finite(found.exponent)
     cmap, norm = _colours(value)
     painted = axes.pcolormesh(found.across, found.up, value.T, norm=norm, cmap=cmap, shading="nearest", rasterized=True)
@@ -166,19 +134,6 @@ def draw_rays(axes: Axes, found: Plane, sigma: float | None = None) -> Axes:
     """Draw the ray of every mode of the scene's network.
 
     Of conjugate modes only the one with beta >= 0 is seen if the plane ends at beta = 0.
-
-    Parameters
-    ----------
-    axes : Axes
-        Axes of the plane.
-    found : Plane
-        Master stability function.
-    sigma : float, optional
-        Coupling at which the modes are marked by dots.
-
-    Returns
-    -------
-    Axes
     """
     graph = found.scene.topology
     still: dict[str, Any] = {"scalex": False, "scaley": False}

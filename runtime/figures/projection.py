@@ -40,28 +40,14 @@ DARK = "#bdbdbd"
 
 @dataclass(frozen=True, slots=True)
 class Projection:
-    """Probe, network and ranges of one figure.
+    """Probe, network and ranges of one figure."""
 
-    Parameters
-    ----------
-    scene : Scene
-        Network.
-    probe : Sweep
-        Two-oscillator probe in alpha.
-    network : Sweep
-        Network in sigma.
-    predicted, published : tuple of Interval
-        Ranges of sigma predicted from the probe, and published.
-    exponent : MSF
-        Master stability function.
-    """
-
-    scene: Scene
-    probe: Sweep
-    network: Sweep
-    predicted: tuple[Interval, ...]
+    scene: Scene  # network
+    probe: Sweep  # two-oscillator probe in alpha
+    network: Sweep  # network in sigma
+    predicted: tuple[Interval, ...]  # ranges of sigma predicted from the probe, and published
     published: tuple[Interval, ...]
-    exponent: MSF
+    exponent: MSF  # master stability function
 
 
 def compute(name: str, runs: FigureRuns) -> Projection:

@@ -15,24 +15,12 @@ __all__ = ["NOT_PERIODIC", "PAIRS", "PUBLISHED", "Published", "published"]
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """Published synchronous ranges of a chain.
+    """Published synchronous ranges of a chain."""
 
-    Parameters
-    ----------
-    n : int
-        Number of oscillators.
-    omega : float
-        Drive frequency.
-    intervals : tuple of Interval
-        Synchronous ranges of sigma.
-    remark : str
-        Remark of the paper.
-    """
-
-    n: int
-    omega: float
-    intervals: tuple[Interval, ...]
-    remark: str
+    n: int  # number of oscillators
+    omega: float  # drive frequency
+    intervals: tuple[Interval, ...]  # synchronous ranges of sigma
+    remark: str  # remark of the paper
 
     def __post_init__(self) -> None:
         if self.n < 2 or not self.omega > 0:

@@ -35,27 +35,6 @@ def draw_result(result: Result, ax: Axes | None = None, kind: str | None = None)
     Axes in excess of those of the plot are kept at their first value, the leading ones first. A
     phase portrait shows the first cell. Cells that did not finish are omitted and counted above the
     axes.
-
-    Parameters
-    ----------
-    result : Result
-        Result to draw.
-    ax : Axes, optional
-        Axes to draw into; by default those of a new figure.
-    kind : {"error", "section", "map", "phase", "end"} or str, optional
-        Synchronisation error over one axis, section points over one axis or each over the one
-        before, colours over two axes, trajectories, final states, or the observable of that name
-        over one axis. By default the most specific kind that the axes and records of the result
-        allow.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    ValueError
-        If the kind is unknown, or if the result has no numbers for it.
     """
     if kind is not None and kind not in (known := (*KINDS, *result.scene.observe)):
         raise ValueError(f"unknown kind of plot {kind!r}; known: {', '.join(known)}{suggestion(kind, known)}")

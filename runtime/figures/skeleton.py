@@ -65,46 +65,22 @@ FULL = (901, 121, 16)
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """An orbit of a branch.
+    """An orbit of a branch."""
 
-    Parameters
-    ----------
-    value : float
-        Value of the parameter.
-    orbit : PeriodicOrbit
-        Orbit.
-    x : ndarray, shape (k,)
-        Positions at the section.
-    phases : str
-        Phases of stick and slip in words.
-    kind : BifurcationKind, optional
-        Kind of a bifurcation at this orbit.
-    residual : float
-        Residual of the bifurcation.
-    """
-
-    value: float
-    orbit: PeriodicOrbit
-    x: np.ndarray
-    phases: str = ""
-    kind: BifurcationKind | None = None
-    residual: float = 0.0
+    value: float  # value of the parameter
+    orbit: PeriodicOrbit  # orbit
+    x: np.ndarray  # (k,): positions at the section
+    phases: str = ""  # phases of stick and slip in words
+    kind: BifurcationKind | None = None  # kind of a bifurcation at this orbit
+    residual: float = 0.0  # residual of the bifurcation
 
 
 @dataclass(frozen=True, slots=True)
 class Skeleton:
-    """Bifurcation diagram with the branches of orbits.
+    """Bifurcation diagram with the branches of orbits."""
 
-    Parameters
-    ----------
-    diagram : Diagram
-        Motion.
-    branches : tuple of tuple of Place
-        Orbits of each branch in the order of the parameter.
-    """
-
-    diagram: Diagram
-    branches: tuple[tuple[Place, ...], ...]
+    diagram: Diagram  # motion
+    branches: tuple[tuple[Place, ...], ...]  # orbits of each branch in the order of the parameter
 
 
 def compute(name: str, runs: FigureRuns) -> Skeleton:
@@ -240,18 +216,7 @@ def _diagram(axes: Axes, data: Skeleton, size: float) -> None:
 
 
 def curves(branch: tuple[Place, ...]) -> list[tuple[bool, list[tuple[float, float]]]]:
-    """Cut a branch into curves at the section if its stability or the number of crossings changes.
-
-    Parameters
-    ----------
-    branch : tuple of Place
-        Orbits in the order of the parameter.
-
-    Returns
-    -------
-    list of (bool, list of (float, float))
-        Stability, and points (value, position), of each curve.
-    """
+    """Cut a branch into curves at the section if its stability or the number of crossings changes."""
     made: list[tuple[bool, list[tuple[float, float]]]] = []
     order, style = branch[0].x, None
     for before, after in pairwise(branch):

@@ -101,39 +101,14 @@ def symbol(name: str) -> str:
 
 
 def new_figure(size: tuple[float, float]) -> Figure:
-    """Return an empty figure without a window; use inside `context`.
-
-    Parameters
-    ----------
-    size : (float, float)
-        Width and height in inches.
-
-    Returns
-    -------
-    Figure
-    """
+    """Return an empty figure without a window; use inside `context`."""
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:
-    """Write `<name>.png` and `<name>.svg`, each completely or not at all; use inside `context`.
-
-    Parameters
-    ----------
-    figure : Figure
-        Figure.
-    folder : Path
-        Folder of the files.
-    name : str
-        Name of the files without their endings.
-
-    Returns
-    -------
-    list of Path
-        Files written.
-    """
+    """Write `<name>.png` and `<name>.svg`, each completely or not at all; use inside `context`."""
     written = []
     for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None, "Creator": None})):
         path = folder / f"{name}.{kind}"
@@ -144,40 +119,14 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
 
 
 def bands(axes: Axes, intervals: Sequence[Interval], *, horizontal: bool = False, **options: Any) -> None:
-    """Draw grey bands over intervals.
-
-    Parameters
-    ----------
-    axes : Axes
-        Axes.
-    intervals : sequence of Interval
-        Intervals of the x axis, or of the y axis if `horizontal`.
-    horizontal : bool
-        Whether the bands are horizontal.
-    **options
-        Properties of the patches.
-    """
+    """Draw grey bands over intervals."""
     span = axes.axhspan if horizontal else axes.axvspan
     for low, high in intervals:
         span(low, high, **{"color": GREY, "linewidth": 0.0, "zorder": 0.0, **options})
 
 
 def bracket(axes: Axes, intervals: Sequence[Interval], height: float, color: str, text: str = "") -> None:
-    """Draw thin bars with end strokes over intervals; the limits of x must be set before.
-
-    Parameters
-    ----------
-    axes : Axes
-        Axes.
-    intervals : sequence of Interval
-        Intervals of x.
-    height : float
-        Height as a part of the axes.
-    color : str
-        Colour.
-    text : str
-        Text at the last bar.
-    """
+    """Draw thin bars with end strokes over intervals; the limits of x must be set before."""
     place = axes.get_xaxis_transform()
     first, last = axes.get_xlim()
     for low, high in intervals:

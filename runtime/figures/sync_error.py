@@ -40,20 +40,7 @@ def compute(name: str, runs: FigureRuns) -> Errors:
 
 
 def synchronous(result: Result, tolerance: float = PAPER.tolerance) -> list[Interval]:
-    """Find the ranges of the first axis with an average error below a tolerance.
-
-    Parameters
-    ----------
-    result : Result
-        Result with one axis and synchronisation errors.
-    tolerance : float
-        Largest error.
-
-    Returns
-    -------
-    list of Interval
-        Half a grid step wider on both sides.
-    """
+    """Find the ranges of the first axis with an average error below a tolerance."""
     x = result.data[result.scene.axes[0].name].values
     good = (result.status.values == Status.FINISHED) & (result.sync_error.values < tolerance)
     middles = 0.5 * (x[1:] + x[:-1])

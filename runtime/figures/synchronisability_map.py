@@ -39,27 +39,13 @@ LOW, HIGH, SIGMA = 1.0, 1.8, 0.6
 
 @dataclass(frozen=True, slots=True)
 class Map:
-    """The function of one oscillator at several frequencies.
+    """The function of one oscillator at several frequencies."""
 
-    Parameters
-    ----------
-    omega : ndarray, shape (omegas,)
-        Frequencies.
-    alpha : ndarray, shape (strengths,)
-        Strengths.
-    sigma : ndarray, shape (sigmas,)
-        Couplings of the panels.
-    exponent : ndarray, shape (omegas, starts, strengths)
-        Exponents per unit of time.
-    attractors : tuple of str
-        Kinds of motion of the starts at each frequency.
-    """
-
-    omega: np.ndarray
-    alpha: np.ndarray
-    sigma: np.ndarray
-    exponent: np.ndarray
-    attractors: tuple[str, ...]
+    omega: np.ndarray  # (omegas,): frequencies
+    alpha: np.ndarray  # (strengths,): strengths
+    sigma: np.ndarray  # (sigmas,): couplings of the panels
+    exponent: np.ndarray  # (omegas, starts, strengths): exponents per unit of time
+    attractors: tuple[str, ...]  # kinds of motion of the starts at each frequency
 
 
 def compute(name: str, runs: FigureRuns) -> Map:
@@ -84,16 +70,7 @@ def _graphs() -> list[Topology]:
 def largest_exponent(data: Map, graph: Topology) -> np.ndarray:
     """Return the largest exponent of a network's modes, the median over the starts.
 
-    Parameters
-    ----------
-    data : Map
-        Function of one oscillator, interpolated between strengths.
-    graph : Topology
-        Network.
-
-    Returns
-    -------
-    ndarray, shape (omegas, sigmas)
+    Shapes: returns (omegas, sigmas).
     """
     strengths = [data.sigma * mode.size for mode in transversal_modes(graph)]
     worst = [[[np.interp(x, data.alpha, row) for x in strengths] for row in starts] for starts in data.exponent]

@@ -19,23 +19,10 @@ __all__ = ["Table", "as_csv", "status_names"]
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Columns of equal length.
+    """Columns of equal length."""
 
-    Parameters
-    ----------
-    columns : tuple of str
-        Names of the columns.
-    rows : tuple of tuple
-        Rows with one entry for each column.
-
-    Raises
-    ------
-    ValueError
-        If a row has another length.
-    """
-
-    columns: tuple[str, ...]
-    rows: tuple[tuple[Any, ...], ...]
+    columns: tuple[str, ...]  # names of the columns
+    rows: tuple[tuple[Any, ...], ...]  # rows with one entry for each column
 
     def __post_init__(self) -> None:
         for row in self.rows:

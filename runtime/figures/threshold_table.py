@@ -52,31 +52,15 @@ GAP = 0.001
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """Synchronous ranges of one chain at one frequency.
+    """Synchronous ranges of one chain at one frequency."""
 
-    Parameters
-    ----------
-    n : int
-        Number of oscillators.
-    omega : float
-        Drive frequency.
-    measured, predicted : tuple of Interval
-        Ranges of sigma.
-    windows : ExponentWindows
-        Ranges of sigma with negative exponents.
-    published : Published or None
-        Published ranges.
-    failed, cells : int
-        Number of values of sigma without an error measure, and of all.
-    """
-
-    n: int
-    omega: float
-    measured: tuple[Interval, ...]
+    n: int  # number of oscillators
+    omega: float  # drive frequency
+    measured: tuple[Interval, ...]  # ranges of sigma
     predicted: tuple[Interval, ...]
-    windows: ExponentWindows
-    published: Published | None
-    failed: int
+    windows: ExponentWindows  # ranges of sigma with negative exponents
+    published: Published | None  # published ranges
+    failed: int  # number of values of sigma without an error measure, and of all
     cells: int
 
     @property

@@ -32,21 +32,11 @@ LENGTHS = (1.0, 0.3, 0.1, 3.0)
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """Sweeps over the same values of sigma after transients of different length.
+    """Sweeps over the same values of sigma after transients of different length."""
 
-    Parameters
-    ----------
-    row : Published
-        Published row.
-    transients : tuple of float
-        Lengths in drive periods.
-    sweeps : tuple of Sweep
-        One sweep for each length.
-    """
-
-    row: Published
-    transients: tuple[float, ...]
-    sweeps: tuple[Sweep, ...]
+    row: Published  # published row
+    transients: tuple[float, ...]  # lengths in drive periods
+    sweeps: tuple[Sweep, ...]  # one sweep for each length
 
 
 def compute(name: str, runs: FigureRuns) -> tuple[Trial, ...]:

@@ -53,32 +53,15 @@ class LargestNetwork:
     """The largest network of a family that can synchronise for some sigma > 0.
 
     A size is None if every size can synchronise, and 0 if no network of two nodes or more can.
-
-    Parameters
-    ----------
-    family : str
-        Name of the family.
-    n : int or None
-        Largest size for the ranges as stated.
-    certain : int or None
-        Largest size for all ranges within their errors.
-    possible : int or None
-        Largest size for at least one choice of ranges within their errors.
-    counts : SizeUnit
-        What the size counts.
-    how : Method
-        How the size was determined.
-    limit : int, optional
-        Largest number of nodes that the search tried.
     """
 
-    family: str
-    n: int | None
-    certain: int | None
-    possible: int | None
-    counts: SizeUnit
-    how: Method
-    limit: int | None = None
+    family: str  # name of the family
+    n: int | None  # largest size for the ranges as stated
+    certain: int | None  # largest size for all ranges within their errors
+    possible: int | None  # largest size for at least one choice of ranges within their errors
+    counts: SizeUnit  # what the size counts
+    how: Method  # how the size was determined
+    limit: int | None = None  # largest number of nodes that the search tried
 
 
 def largest_network(
@@ -91,26 +74,6 @@ def largest_network(
 
     A single range with a closed form of the eigenratio (see CLOSED), or a range that starts at 0 or
     has no end, give a result for all sizes. Otherwise every network up to the limit is tried.
-
-    Parameters
-    ----------
-    family : str
-        Name of a family of graphs.
-    ranges : sequence of (float, float)
-        Stable ranges of alpha, see `windows`.
-    errors : sequence of (float, float), optional
-        Uncertainties of the ends of the ranges.
-    limit : int
-        Largest number of nodes that a search tries.
-
-    Returns
-    -------
-    LargestNetwork
-
-    Raises
-    ------
-    ValueError
-        If the family is unknown, the ranges are invalid, or the limit is below 2.
     """
     if limit < 2:
         raise ValueError(f"limit = {limit}; expected at least 2 nodes")
@@ -194,25 +157,7 @@ CLOSED: dict[str, tuple[int, Callable[[int], Ball] | None]] = {
 
 
 def eigenratio(family: str, n: int) -> Ball:
-    """Evaluate the eigenratio of a family in CLOSED.
-
-    Parameters
-    ----------
-    family : str
-        Name of the family.
-    n : int
-        Size, at least 3; for hypercubes the dimension, at least 1.
-
-    Returns
-    -------
-    int or flint.arb
-        Exact number or ball.
-
-    Raises
-    ------
-    ValueError
-        If the family has no closed form, or if the size is too small.
-    """
+    """Evaluate the eigenratio of a family in CLOSED."""
     if family not in CLOSED:
         raise ValueError(f"eigenratio of {family!r} has no closed form; known: {', '.join(CLOSED)}")
     least = 1 if family == "hypercube" else 3

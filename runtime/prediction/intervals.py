@@ -18,20 +18,7 @@ ROUNDING = 8.0 * float(np.finfo(float).eps)
 
 
 def grid_intervals(x: np.ndarray, good: np.ndarray) -> list[Interval]:
-    """Find the maximal runs of good points of an increasing grid.
-
-    Parameters
-    ----------
-    x : ndarray, shape (k,)
-        Grid.
-    good : ndarray of bool, shape (k,)
-        Property of each point.
-
-    Returns
-    -------
-    list of Interval
-        From the first to the last point of each run.
-    """
+    """Find the maximal runs of good points of an increasing grid. Shapes: x (k,), good (k,)."""
     intervals: list[Interval] = []
     for i in range(len(x)):
         if good[i]:
@@ -48,30 +35,7 @@ def find(
     Between neighbours of the grid that differ, `fan` equally spaced points are evaluated, and the
     bracket narrows to the change next to the good end, until it is narrower than `resolution`. The
     reported end is its middle. Intervals that fit between two grid points are not found.
-
-    Parameters
-    ----------
-    judge : Predicate
-        Property of a point.
-    x : array_like, shape (k,)
-        Increasing grid.
-    resolution : float or ndarray, shape (k - 1,)
-        Largest width of a bracket, in all steps of the grid or in each; a few units in the last place of its ends if that
-        is more.
-    fan : int
-        Points in each bracket and round.
-
-    Returns
-    -------
-    intervals : list of Interval
-        Intervals on which the predicate holds.
-    verdict : ndarray of bool, shape (k,)
-        The predicate on the grid.
-
-    Raises
-    ------
-    ValueError
-        If the grid does not increase, or if the resolution is not positive.
+    Shapes: x (k,), resolution (k - 1,); returns verdict (k,).
     """
     x = np.asarray(x, dtype=float)
     if x.ndim != 1 or len(x) < 1 or np.any(np.diff(x) <= 0):
@@ -116,42 +80,14 @@ def _narrow(judge: Predicate, good: np.ndarray, bad: np.ndarray, fan: int) -> tu
 
 
 def scale(intervals: Sequence[Interval], factor: float) -> list[Interval]:
-    """Multiply every interval by a positive factor.
-
-    Parameters
-    ----------
-    intervals : sequence of Interval
-        Intervals.
-    factor : float
-        Positive factor.
-
-    Returns
-    -------
-    list of Interval
-
-    Raises
-    ------
-    ValueError
-        If the factor is not positive.
-    """
+    """Multiply every interval by a positive factor."""
     if not factor > 0:
         raise ValueError(f"factor = {factor}; expected a positive number")
     return [(a * factor, b * factor) for a, b in intervals]
 
 
 def intersect(left: Sequence[Interval], right: Sequence[Interval]) -> list[Interval]:
-    """Intersect two sets.
-
-    Parameters
-    ----------
-    left, right : sequence of Interval
-        Disjoint intervals of each set.
-
-    Returns
-    -------
-    list of Interval
-        A single point counts only if one of the sets has it as an interval.
-    """
+    """Intersect two sets."""
     intervals = []
     for a, b in left:
         for c, d in right:

@@ -18,21 +18,11 @@ VECTOR_LIMIT = 2000
 
 @dataclass(frozen=True, slots=True)
 class NetworkMode:
-    """A distinct non-zero eigenvalue of a network.
+    """A distinct non-zero eigenvalue of a network."""
 
-    Parameters
-    ----------
-    graph : Topology
-        Network.
-    number : int
-        Position in the spectrum, counted with multiplicities; 0 is the synchronous motion.
-    eigenvalue : Eigenvalue
-        Eigenvalue gamma.
-    """
-
-    graph: Topology = field(repr=False)
-    number: int
-    eigenvalue: Eigenvalue
+    graph: Topology = field(repr=False)  # network
+    number: int  # position in the spectrum, counted with multiplicities; 0 is the synchronous motion
+    eigenvalue: Eigenvalue  # eigenvalue gamma
 
     @property
     def size(self) -> float:
@@ -55,11 +45,6 @@ class NetworkMode:
 
         Of a multiple eigenvalue, the vector most localised at a single oscillator, at the first of
         equals.
-
-        Raises
-        ------
-        ValueError
-            If the network has more than VECTOR_LIMIT nodes.
         """
         n = self.graph.n
         if n > VECTOR_LIMIT:
@@ -73,18 +58,7 @@ class NetworkMode:
 
 
 def transversal_modes(graph: Topology) -> tuple[NetworkMode, ...]:
-    """Return the modes of a network with an eigenvalue other than 0.
-
-    Parameters
-    ----------
-    graph : Topology
-        Network.
-
-    Returns
-    -------
-    tuple of NetworkMode
-        In the order of the spectrum.
-    """
+    """Return the modes of a network with an eigenvalue other than 0."""
     modes, number = [], 0
     for eigenvalue in graph.spectrum.eigenvalues:
         if eigenvalue.value != 0:

@@ -12,21 +12,11 @@ __all__ = ["StableRange", "exact_ranges", "widen"]
 
 @dataclass(frozen=True, slots=True)
 class StableRange:
-    """A closed range of stable alpha.
+    """A closed range of stable alpha."""
 
-    Parameters
-    ----------
-    low : Fraction
-        Lower end, at least 0.
-    high : Fraction or None
-        Upper end; None if there is none.
-    errors : (float, float)
-        Uncertainties of the ends.
-    """
-
-    low: Fraction
-    high: Fraction | None
-    errors: tuple[float, float] = (0.0, 0.0)
+    low: Fraction  # lower end, at least 0
+    high: Fraction | None  # upper end; None if there is none
+    errors: tuple[float, float] = (0.0, 0.0)  # uncertainties of the ends
 
     @property
     def ratio(self) -> float:
@@ -44,26 +34,7 @@ class StableRange:
 def exact_ranges(
     ranges: Sequence[tuple[float, float]], errors: Sequence[tuple[float, float]] | None = None
 ) -> list[StableRange]:
-    """Convert ranges of floats to exact ones, cut at alpha = 0.
-
-    Parameters
-    ----------
-    ranges : sequence of (float, float)
-        Ascending ranges, the last may end at infinity; those that touch are joined.
-    errors : sequence of (float, float), optional
-        Uncertainties of the ends.
-
-    Returns
-    -------
-    list of StableRange
-        An end that is cut, and one at infinity, has no error.
-
-    Raises
-    ------
-    ValueError
-        If the ranges are not ascending and disjoint, or if an error is negative, infinite or
-        missing.
-    """
+    """Convert ranges of floats to exact ones, cut at alpha = 0."""
     if errors is not None and len(errors) != len(ranges):
         raise ValueError(f"errors: found {len(errors)} pairs for {len(ranges)} ranges; expected one for each range")
     exact: list[StableRange] = []
@@ -96,20 +67,7 @@ def _exact(x: float) -> Fraction:
 
 
 def widen(ranges: Sequence[StableRange], sign: int) -> list[StableRange]:
-    """Widen or narrow ranges by their errors.
-
-    Parameters
-    ----------
-    ranges : sequence of StableRange
-        Ranges.
-    sign : {1, -1}
-        1 for the largest ranges that the errors allow, -1 for the smallest.
-
-    Returns
-    -------
-    list of StableRange
-        Ranges that meet are joined.
-    """
+    """Widen or narrow ranges by their errors."""
     widened: list[StableRange] = []
     for r in ranges:
         below, above = (sign * Fraction(e) for e in r.errors)

@@ -68,23 +68,15 @@ _EVERYTHING = StableRange(Fraction(0), None)
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """An interval of sigma on which every transversal mode is stable.
+    """An interval of sigma on which every transversal mode is stable."""
 
-    Parameters
-    ----------
-    low, high : float
-        Ends of the interval.
-    low_error, high_error : float
-        Uncertainties of the ends, in sigma: infinite at the end of a grid, beyond which nothing is known, 0 at sigma = 0.
-    low_mode, high_mode : NetworkMode or None
-        First mode that is lost beyond the end; None if the end is 0, infinite, or the end of a
-        grid.
-    """
-
-    low: float
+    low: float  # ends of the interval
     high: float
+    # uncertainties of the ends, in sigma: infinite at the end of a grid, beyond which nothing is known, 0 at sigma =
+    # 0
     low_error: float
     high_error: float
+    # first mode that is lost beyond the end; None if the end is 0, infinite, or the end of a grid
     low_mode: NetworkMode | None
     high_mode: NetworkMode | None
 
@@ -105,31 +97,15 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Whether a network can synchronise for some sigma > 0, and why.
+    """Whether a network can synchronise for some sigma > 0, and why."""
 
-    Parameters
-    ----------
-    answer : Answer
-        The decision.
-    ratio : sympy.Expr or None
-        Exact eigenratio if it is short.
-    ratio_value : float
-        Eigenratio; nan without coupled modes.
-    allowed : float
-        Largest ratio of the ends of a range.
-    slowest, fastest : NetworkMode or None
-        Modes of smallest and largest |gamma|.
-    windows : tuple of Window
-        Windows for the ranges as stated.
-    """
-
-    answer: Answer
-    ratio: sp.Expr | None
-    ratio_value: float
-    allowed: float
-    slowest: NetworkMode | None
+    answer: Answer  # the decision
+    ratio: sp.Expr | None  # exact eigenratio if it is short
+    ratio_value: float  # eigenratio; nan without coupled modes
+    allowed: float  # largest ratio of the ends of a range
+    slowest: NetworkMode | None  # modes of smallest and largest |gamma|
     fastest: NetworkMode | None
-    windows: tuple[Window, ...]
+    windows: tuple[Window, ...]  # windows for the ranges as stated
 
     @property
     def text(self) -> str:
@@ -159,17 +135,10 @@ def _exact(mode: NetworkMode | None) -> str | None:
 
 @dataclass(frozen=True, slots=True)
 class OneWay:
-    """Windows of a network with complex eigenvalues.
+    """Windows of a network with complex eigenvalues."""
 
-    Parameters
-    ----------
-    windows : tuple of Window
-        Windows of sigma.
-    defective : tuple of NetworkMode
-        Modes that lack eigenvectors: their errors may grow at first, but vanish in the end.
-    """
-
-    windows: tuple[Window, ...]
+    windows: tuple[Window, ...]  # windows of sigma
+    # modes that lack eigenvectors: their errors may grow at first, but vanish in the end
     defective: tuple[NetworkMode, ...]
 
 
@@ -202,26 +171,6 @@ def windows(
     """Find the intervals of sigma on which every transversal mode lies in a stable range.
 
     Ranges below alpha = 0 give intervals of negative sigma.
-
-    Parameters
-    ----------
-    ranges : sequence of (float, float)
-        Disjoint and ascending stable ranges of alpha; the last may end at math.inf.
-    graph : Topology
-        Network with real eigenvalues. If a part of it is not connected to the rest, alpha = 0 must
-        be stable.
-    errors : sequence of (float, float), optional
-        Uncertainties of the ends of the ranges, which those of sigma follow to first order.
-
-    Returns
-    -------
-    tuple of Window
-        In ascending order.
-
-    Raises
-    ------
-    ValueError
-        If the ranges or errors are invalid, or if an eigenvalue is complex or positive.
     """
     above = [_window(low, high) for low, high in _intersection(exact_ranges(ranges, errors), graph)]
     pairs = zip(ranges, [(0.0, 0.0)] * len(ranges) if errors is None else errors, strict=True)
@@ -255,28 +204,7 @@ def windows_complex(
     """Find the intervals of sigma on which every mode lies in a stable region of the complex plane.
 
     They are found on a grid and refined by bisection.
-
-    Parameters
-    ----------
-    stable : callable
-        Maps complex alpha (m,) with an imaginary part >= 0 to truth values (m,); conjugate modes
-        share their stability.
-    graph : Topology
-        Network.
-    sigma_grid : array_like, shape (k,)
-        Increasing grid of sigma. Windows that fit between two points are not found.
-    resolution : float
-        Width to which the ends are refined.
-
-    Returns
-    -------
-    OneWay
-
-    Raises
-    ------
-    ValueError
-        If the grid does not increase, the resolution is not positive, or `stable` does not return
-        one truth value for each point.
+    Shapes: sigma_grid (k,).
     """
     modes = tuple(mode for mode in transversal_modes(graph) if complex(mode.eigenvalue.value).imag <= 0)
     values = np.array([mode.eigenvalue.value for mode in modes] + [0.0] * has_loose_parts(graph), dtype=complex)
@@ -321,23 +249,7 @@ def _beyond(end: float) -> float:
 def verdict(
     ranges: Sequence[tuple[float, float]], graph: Topology, errors: Sequence[tuple[float, float]] | None = None
 ) -> Verdict:
-    """Decide exactly whether a network can synchronise for some sigma > 0.
-
-    Parameters
-    ----------
-    ranges, graph, errors
-        See `windows`.
-
-    Returns
-    -------
-    Verdict
-        The answer is YES if it holds for all ranges within the errors, NO if it holds for none.
-
-    Raises
-    ------
-    ValueError
-        As in `windows`.
-    """
+    """Decide exactly whether a network can synchronise for some sigma > 0."""
     stated = exact_ranges(ranges, errors)
     modes = sorted(_real_modes(graph), key=lambda mode: mode.size)
     slowest, fastest = (modes[0], modes[-1]) if modes else (None, None)
@@ -354,19 +266,7 @@ def verdict(
 
 
 def possible(ranges: Sequence[StableRange], graph: Topology) -> bool:
-    """Decide whether some sigma > 0 puts every mode of a graph into one of the exact ranges.
-
-    Parameters
-    ----------
-    ranges : sequence of StableRange
-        Stable ranges of alpha.
-    graph : Topology
-        Network.
-
-    Returns
-    -------
-    bool
-    """
+    """Decide whether some sigma > 0 puts every mode of a graph into one of the exact ranges."""
     return any(_follows(high) for _, high in _intersection(ranges, graph))
 
 

@@ -85,28 +85,15 @@ class Description(TypedDict):
 
 @dataclass(slots=True)
 class BlockLog:
-    """An open log of finished blocks.
-
-    Attributes
-    ----------
-    path : Path
-    about : mapping
-        Description of the sweep (`synchain.runtime.results.partial.describe_sweep`).
-    places : ndarray of int, shape (blocks,)
-        Offsets of the records of the blocks, -1 for none.
-    counts : ndarray, shape (CODES,)
-        How many cells of the stored blocks ended with each status.
-    most : int
-        Section points of the cell that has most.
-    """
+    """An open log of finished blocks."""
 
     path: Path
-    about: Description
-    places: np.ndarray
-    counts: np.ndarray
+    about: Description  # description of the sweep (`synchain.runtime.results.partial.describe_sweep`)
+    places: np.ndarray  # (blocks,): offsets of the records of the blocks, -1 for none
+    counts: np.ndarray  # (CODES,): how many cells of the stored blocks ended with each status
     _file: FileIO = field(repr=False)
     _end: int
-    most: int = 0
+    most: int = 0  # section points of the cell that has most
     _flushed: float = field(default_factory=time.monotonic)
 
     @staticmethod
@@ -137,15 +124,7 @@ class BlockLog:
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], writing: bool = False) -> BlockLog:
-        """Open a log and find its whole blocks; a record that is torn or damaged counts as none.
-
-        Raises
-        ------
-        ValueError
-            If the file is no log, or if both copies of its first line are damaged.
-        BlockingIOError
-            If another process writes to it.
-        """
+        """Open a log and find its whole blocks; a record that is torn or damaged counts as none."""
         file = open_regular(path, writing=writing)
         try:
             if writing:

@@ -30,35 +30,14 @@ Variables: TypeAlias = "dict[str, tuple[tuple[str, ...], np.ndarray]]"
 
 
 def encode(value: object, data: xr.Dataset) -> tuple[Tree, Variables]:
-    """Return the fields of a frozen value as JSON types, and the arrays that `data` lack.
-
-    Raises
-    ------
-    TypeError
-        If a field is of a type that has no form in a file.
-    """
+    """Return the fields of a frozen value as JSON types, and the arrays that `data` lack."""
     writer = _Writer(data)
     tree = writer.tree(value, "")
     return {"root": tree, "scenes": [json.loads(text) for text in writer.scenes]}, writer.further
 
 
 def decode(tree: Mapping[str, Any], data: xr.Dataset, classes: Mapping[str, type]) -> Any:
-    """Return the value of a tree.
-
-    Parameters
-    ----------
-    tree : mapping
-        As `encode` returns it.
-    data : Dataset
-        Holds the arrays.
-    classes : mapping
-        The classes that a tree may name, by their names, enumerations among them.
-
-    Raises
-    ------
-    ValueError, KeyError, TypeError
-        If the tree is not one of `encode`, or if a class refuses its fields.
-    """
+    """Return the value of a tree."""
     return _Reader(data, classes, [Scene.from_dict(each) for each in tree["scenes"]]).value(tree["root"])
 
 

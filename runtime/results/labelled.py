@@ -113,17 +113,7 @@ class Labelled(Shown):
 def dataset(
     variables: Mapping[str, tuple[Sequence[str], Any, str]], coordinates: Mapping[str, Any], scene: Scene | None = None
 ) -> xr.Dataset:
-    """Return labelled data.
-
-    Parameters
-    ----------
-    variables : mapping
-        Dimensions, values and meaning of each variable.
-    coordinates : mapping
-        Coordinates as for `xarray.Dataset`.
-    scene : Scene, optional
-        What the numbers belong to; it becomes an attribute.
-    """
+    """Return labelled data."""
     made = {
         name: (tuple(dims), np.asarray(values), {"long_name": words})
         for name, (dims, values, words) in variables.items()

@@ -107,19 +107,11 @@ TOLERANCES = ("rtol_used", "atol_used")
 
 @dataclass(frozen=True, slots=True)
 class States:
-    """Where each state of a network stands in a table of components and nodes.
-
-    Attributes
-    ----------
-    components : tuple of str
-    nodes : int
-    rows, columns : ndarray of int, shape (states,)
-        Component and node, counted from 0, of each state in the order of the equations.
-    """
+    """Where each state of a network stands in a table of components and nodes."""
 
     components: tuple[str, ...]
     nodes: int
-    rows: np.ndarray
+    rows: np.ndarray  # (states,): component and node, counted from 0, of each state in the order of the equations
     columns: np.ndarray
 
     @classmethod
@@ -148,19 +140,7 @@ class States:
 def variables(
     scene: Scene, spans: np.ndarray, buffers: Buffers, certificate: Certificate | None, most: int
 ) -> Iterator[Variable]:
-    """Yield the variables of some cells.
-
-    Parameters
-    ----------
-    scene : Scene
-    spans : ndarray, shape (cells, len(Span))
-    buffers : Buffers
-        Results of these cells, of the whole network.
-    certificate : Certificate, optional
-        Exponents of these cells.
-    most : int
-        Section points of a cell that there is room for.
-    """
+    """Yield the variables of some cells. Shapes: spans (cells, len(Span)."""
     for name in ("status", "steps", "rejected", "periods_skipped"):
         yield name, (), buffers.counts[:, COUNTS[name]].astype(np.int32)
     ran = buffers.status != Status.NOT_RUN
@@ -286,17 +266,7 @@ def _of_links(scene: Scene) -> dict[str, dict[str, tuple[float, ...]]]:
 def labelled(
     scene: Scene, found: Iterable[Variable], shape: tuple[int, ...], attributes: Mapping[str, object]
 ) -> xr.Dataset:
-    """Return the dataset of variables with one row for each cell.
-
-    Parameters
-    ----------
-    scene : Scene
-    found : iterable of Variable
-    shape : tuple of int
-        Number of cells along each dimension of the sweep; if it is not that of the scene, the values
-        of the axes are cut to it.
-    attributes : mapping
-    """
+    """Return the dataset of variables with one row for each cell."""
     dims, coords = dimensions(scene), coordinates(scene)
     for name, (dim, *more), values in swept(scene):
         coords[name] = ((dim, *more), values[: shape[dims.index(dim)]])
@@ -309,14 +279,7 @@ def labelled(
 
 
 def scene_of(attributes: Mapping[str, Any]) -> Scene:
-    """Return the scene of a result from its attributes.
-
-    Raises
-    ------
-    ValueError, TypeError
-        If the attributes are not those of `provenance`, or if the installed models cannot make the
-        scene.
-    """
+    """Return the scene of a result from its attributes."""
     missing = [name for name in TOLD if not isinstance(attributes.get(name), str)]
     if "scene" in missing:
         raise ValueError("it is no synchain result: it has no attribute 'scene'")

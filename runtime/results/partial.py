@@ -60,13 +60,7 @@ def describe_sweep(
 
 
 def layout_of(about: Description, scene: Scene) -> Layout:
-    """Return the blocks of a log.
-
-    Raises
-    ------
-    ValueError
-        If it does not have as many as its scene needs.
-    """
+    """Return the blocks of a log."""
     layout = Layout.of(scene, check_integer("size", about["size"], 1))
     if layout.blocks != about["blocks"]:
         raise ValueError(f"found {about['blocks']} blocks; expected {layout.blocks} for the cells of its scene")
@@ -104,13 +98,7 @@ class _Reader:
 
 
 def read_partial(path: str | os.PathLike[str]) -> Result:
-    """Return the cells so far of a sweep on disk; the others have the status NOT_RUN.
-
-    Raises
-    ------
-    ValueError
-        If the file is damaged, or if its cells do not fit into memory.
-    """
+    """Return the cells so far of a sweep on disk; the others have the status NOT_RUN."""
     with understood(Path(path)):
         about = BlockLog.describe(path)
         scene = scene_of(about["attributes"])
@@ -140,12 +128,6 @@ def _so_far(reader: _Reader) -> Result:
 def write_result(log: BlockLog, path: str | os.PathLike[str], scene: Scene) -> dict[str, int]:
     """Write the file of a scene's log that has all blocks, with one block in memory at a time; the
     ending of `path` chooses its form.
-
-    Returns
-    -------
-    dict of str to int
-        How many cells have each verdict, and how many "ended early"; empty if the cells are not
-        certified.
     """
     reader = _Reader(log, scene)
     verdicts: dict[str, int] = {}

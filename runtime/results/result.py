@@ -250,13 +250,7 @@ class Result(_Deferred, Labelled):
 
 
 def read_result(path: Path) -> Result:
-    """Return the result that a file of `Result.save` or `stream` holds.
-
-    Raises
-    ------
-    OSError, ValueError
-        If the file is damaged or holds no result.
-    """
+    """Return the result that a file of `Result.save` or `stream` holds."""
     return result_of(read_data(path), path)
 
 
@@ -280,18 +274,7 @@ def gather(
     buffers: Buffers,
     certificate: Certificate | None = None,
 ) -> Result:
-    """Return the labelled result of all cells.
-
-    Parameters
-    ----------
-    scene : Scene
-    attributes : callable
-        Returns how the result came about (`synchain.runtime.results.labels.provenance`).
-    spans : ndarray, shape (cells, len(Span))
-    buffers : Buffers
-        Results of all cells, of the whole network.
-    certificate : Certificate, optional
-    """
+    """Return the labelled result of all cells. Shapes: spans (cells, len(Span)."""
 
     def make() -> xr.Dataset:
         found = list(variables(scene, spans, buffers, certificate, buffers.most_points))

@@ -58,46 +58,21 @@ Copy: TypeAlias = "Callable[[xr.Dataset, Path, Collection[str]], None]"
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """A form of files.
+    """A form of files."""
 
-    Attributes
-    ----------
-    package : str or None
-        What it needs besides the dependencies of this package.
-    check : callable
-        Raises OSError if what stands at a path is no file of this form.
-    whole : callable
-        Yields a temporary path that takes the place of the one that is given.
-    write : callable
-        Writes a dataset to a path, without its digest.
-    rows : callable
-        Yields the sheet of a file at a path, which is like a template but for the lengths of some
-        dimensions.
-    seal : callable
-        Writes the digest of a file into it.
-    open : callable
-        Returns the data of a file whose digest fits, to be read as they are asked for.
-    """
-
-    package: str | None
-    check: Callable[[Path], None]
+    package: str | None  # what it needs besides the dependencies of this package
+    check: Callable[[Path], None]  # raises OSError if what stands at a path is no file of this form
+    # yields a temporary path that takes the place of the one that is given
     whole: Callable[[Path], AbstractContextManager[Path]]
-    write: Callable[[xr.Dataset, Path], None]
+    write: Callable[[xr.Dataset, Path], None]  # writes a dataset to a path, without its digest
+    # yields the sheet of a file at a path, which is like a template but for the lengths of some dimensions
     rows: Callable[[xr.Dataset, Mapping[str, int], Path], AbstractContextManager[Sheet]]
-    seal: Callable[[Path], None]
-    open: Callable[[Path], xr.Dataset]
+    seal: Callable[[Path], None]  # writes the digest of a file into it
+    open: Callable[[Path], xr.Dataset]  # returns the data of a file whose digest fits, to be read as they are asked for
 
 
 def form_of(path: str | os.PathLike[str]) -> Form:
-    """Return the form that the ending of a path chooses.
-
-    Raises
-    ------
-    ValueError
-        If no form has this ending.
-    ModuleNotFoundError
-        If the package of the form is not installed.
-    """
+    """Return the form that the ending of a path chooses."""
     ending = check_path("path", path).suffix.lower()
     if ending not in FORMS:
         raise ValueError(f"path: found {os.fspath(path)!r}; expected a name that ends in {' or '.join(FORMS)}")
@@ -135,17 +110,7 @@ def write_data(data: xr.Dataset, path: str | os.PathLike[str], overwrite: bool =
 
 @contextmanager
 def filled(path: str | os.PathLike[str], template: xr.Dataset, lengths: Mapping[str, int]) -> Iterator[Sheet]:
-    """Yield the variables of a new file, to be filled; it appears at the end of the with block.
-
-    Parameters
-    ----------
-    path : str or path
-        Its ending chooses the form.
-    template : Dataset
-        Holds variables, dimensions and attributes.
-    lengths : mapping of str to int
-        Of the dimensions that are longer in the file; their variables are what is to be filled.
-    """
+    """Yield the variables of a new file, to be filled; it appears at the end of the with block."""
     with _new(path) as (form, temporary), form.rows(_without_complex(template), lengths, temporary) as rows:
         yield rows
 
@@ -163,15 +128,7 @@ def _new(path: str | os.PathLike[str]) -> Iterator[tuple[Form, Path]]:
 
 @contextmanager
 def opened(path: Path) -> Iterator[xr.Dataset]:
-    """Yield the open data of a file, which are read as they are asked for.
-
-    Raises
-    ------
-    ModuleNotFoundError
-        If the package of the form is not installed.
-    OSError
-        If there is no such file or if it is damaged.
-    """
+    """Yield the open data of a file, which are read as they are asked for."""
     if not path.exists():
         raise FileNotFoundError(f"{path} does not exist; expected a result: check the path")
     form = form_of(path) if path.suffix.lower() in FORMS else FORMS[".nc"]

@@ -17,13 +17,7 @@ SIZE = (4.8, 3.4)
 
 @contextmanager
 def canvas(ax: Axes | None) -> Iterator[Axes]:
-    """Yield the axes, or those of a new figure, within the style of the figures.
-
-    Raises
-    ------
-    TypeError
-        If `ax` is no axes.
-    """
+    """Yield the axes, or those of a new figure, within the style of the figures."""
     if ax is not None and not isinstance(ax, Axes):
         raise TypeError(f"ax: found {type(ax).__name__}; expected matplotlib axes, e.g. plt.subplots()[1]")
     with context():

@@ -42,13 +42,7 @@ DOTS: dict[str, Any] = {"linestyle": "none", "marker": "."}
 
 
 def drawn(value: object, ax: Axes | None, **options: Any) -> Axes:
-    """Draw a value into axes, by default those of a new figure, and return them.
-
-    Raises
-    ------
-    TypeError
-        If values of this type have no plot, or if `ax` is no axes.
-    """
+    """Draw a value into axes, by default those of a new figure, and return them."""
     with canvas(ax) as axes:
         return _draw(value, axes, **options)
 
@@ -227,15 +221,7 @@ def _branches(branches: tuple[Branch, ...], axes: Axes) -> Axes:
 
 
 def stretches(branch: Branch) -> list[tuple[bool, np.ndarray, np.ndarray]]:
-    """Cut a branch at its bifurcations into stretches of one stability.
-
-    Returns
-    -------
-    list of (bool, ndarray, ndarray)
-        Whether the orbits of a stretch are stable, values (k,) of the parameter and states
-        (k, components), those at
-        the bifurcations at both ends among them.
-    """
+    """Cut a branch at its bifurcations into stretches of one stability."""
     orbits = [(float(value), orbit, False) for value, orbit in zip(branch.values, branch.orbits, strict=True)]
     turns = [(float(turn.value), turn.orbit, True) for turn in branch.bifurcations]
     found: list[tuple[bool, list[tuple[float, np.ndarray]]]] = []

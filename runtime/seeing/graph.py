@@ -48,47 +48,25 @@ BEND = 0.18
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
-    """A link, or a link with its mirror image, as it is drawn.
+    """A link, or a link with its mirror image, as it is drawn."""
 
-    Attributes
-    ----------
-    source, target : int
-        Nodes, counted from 0.
-    width : float
-        In points.
-    arrow, bent, negative : bool
-        Whether it runs one way, leaves the straight line, has a negative weight.
-    """
-
-    source: int
+    source: int  # nodes, counted from 0
     target: int
-    width: float
-    arrow: bool
+    width: float  # in points
+    arrow: bool  # whether it runs one way, leaves the straight line, has a negative weight
     bent: bool
     negative: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """A graph that is ready to be drawn.
+    """A graph that is ready to be drawn."""
 
-    Attributes
-    ----------
-    place : ndarray, shape (n, 2)
-    lines : tuple of Line
-    kind : tuple of int
-        The kind of each node.
-    names : tuple of str
-        The kinds.
-    labels : sequence
-        What the nodes are called.
-    """
-
-    place: np.ndarray
+    place: np.ndarray  # (n, 2)
     lines: tuple[Line, ...]
-    kind: tuple[int, ...]
-    names: tuple[str, ...]
-    labels: Sequence[int] | Sequence[str]
+    kind: tuple[int, ...]  # the kind of each node
+    names: tuple[str, ...]  # the kinds
+    labels: Sequence[int] | Sequence[str]  # what the nodes are called
 
     @classmethod
     def of(cls, value: Drawn) -> Picture:

@@ -49,22 +49,12 @@ POLICY = (
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """How much a report computes.
+    """How much a report computes."""
 
-    Parameters
-    ----------
-    strengths : int
-        Number of strengths of the master stability function.
-    precision, periods : float
-        As for `synchain.runtime.exponents`.
-    values : int, optional
-        Most values of each axis of the sweep; None runs it as it is.
-    """
-
-    strengths: int = 241
-    precision: float = 1e-3
+    strengths: int = 241  # number of strengths of the master stability function
+    precision: float = 1e-3  # as for `synchain.runtime.exponents`
     periods: float = 5000.0
-    values: int | None = None
+    values: int | None = None  # most values of each axis of the sweep; None runs it as it is
 
 
 QUICK = Effort(strengths=61, precision=1e-2, periods=300.0, values=25)
@@ -74,25 +64,7 @@ QUICK = Effort(strengths=61, precision=1e-2, periods=300.0, values=25)
 def report(
     scene: Scene, effort: Effort | None = None, *, workers: int | None = None, show_progress: bool | None = None
 ) -> str:
-    """Compute what there is to say of a scene, and return it as a page of HTML.
-
-    Parameters
-    ----------
-    scene : Scene
-        Its axes are the sweep of the report.  The master stability function covers sigma abs(gamma)
-        of all modes for every sigma of the sweep; without an axis of sigma, up to twice its value.
-    effort : Effort, optional
-        By default a full one.
-    workers : int, optional
-        Number of threads; all cores by default.
-    show_progress : bool, optional
-        As for `run`.
-
-    Returns
-    -------
-    str
-        A document that opens without a network.
-    """
+    """Compute what there is to say of a scene, and return it as a page of HTML."""
     effort = Effort() if effort is None else effort
     title = escape(a_scene(scene).title or repr(scene))
     parts = [f"<h1>{title}</h1>", *(f"<p>Note: {escape(words)}</p>" for words in scene.warnings)]

@@ -51,28 +51,16 @@ class Motion(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Attractor:
-    """Motion of one start.
+    """Motion of one start."""
 
-    Parameters
-    ----------
-    motion : Motion
-        Kind of the motion.
-    cycle : float
-        Length of one cycle in units of non-dimensional time; 0 if the motion is not a cycle.
-    propagators : ndarray, shape (3, m, p, p), optional
-        Propagators of all m modes over two successive cycles, and over the second one once more with SLACK
-        times the tolerance. For a fixed point and a constant linear motion, the matrix of the variational
-        equation as often. None for aperiodic motion.
-    periods : int
-        Drive periods of one cycle; 1 without a drive.
-    logarithms : float or ndarray, shape (3, m)
-        Logarithms of the factors that the propagators of a cycle are without.
-    """
-
-    motion: Motion
-    cycle: float
+    motion: Motion  # kind of the motion
+    cycle: float  # length of one cycle in units of non-dimensional time; 0 if the motion is not a cycle
+    # (3, m, p, p): propagators of all m modes over two successive cycles, and over the second one once more with
+    # SLACK times the tolerance. For a fixed point and a constant linear motion, the matrix of the variational
+    # equation as often. None for aperiodic motion
     propagators: np.ndarray | None = field(default=None, repr=False)
-    periods: int = 1
+    periods: int = 1  # drive periods of one cycle; 1 without a drive
+    # (3, m): logarithms of the factors that the propagators of a cycle are without
     logarithms: np.ndarray | float = field(default=0.0, repr=False)
 
     @property
@@ -81,20 +69,7 @@ class Attractor:
         return str(self.motion) if self.periods == 1 else f"{self.motion}, {self.periods} drive periods"
 
     def exponents(self) -> tuple[np.ndarray, np.ndarray]:
-        """Compute the exponents from the eigenvalues of the propagators.
-
-        Returns
-        -------
-        values : ndarray, shape (m,)
-            Largest exponent of each mode, per unit of non-dimensional time.
-        error : ndarray, shape (m,)
-            Difference between the two cycles, or from the looser tolerance if that is larger.
-
-        Raises
-        ------
-        ValueError
-            If the motion is aperiodic.
-        """
+        """Compute the exponents from the eigenvalues of the propagators. Shapes: returns values (m,), error (m,)."""
         if self.propagators is None:
             raise ValueError(f"{self.kind} motion has no eigenvalues to take exponents from")
         values = np.linalg.eigvals(self.propagators)
@@ -108,13 +83,7 @@ class Attractor:
         return exponents[1], apart.max(axis=0)
 
     def resolution(self) -> np.ndarray:
-        """Return how far apart the exponents (m,) of two starts on this attractor may lie: by their errors, and by where the starts end.
-
-        Raises
-        ------
-        ValueError
-            If the motion is aperiodic.
-        """
+        """Return how far apart the exponents (m,) of two starts on this attractor may lie: by their errors, and by where the starts end."""
         _, error = self.exponents()
         if self.propagators is None or self.cycle:
             return error + ALIKE / self.cycle
@@ -122,22 +91,7 @@ class Attractor:
 
 
 def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
-    """Look for a fixed point or a cycle of 1 … LONGEST drive periods.
-
-    Parameters
-    ----------
-    orbits : Orbits
-        Orbits after their transient, which linear ones need not have. The state of `row` is advanced.
-    row : int
-        Index of the start.
-    patience : float
-        Additional transient in drive periods, used at most twice, for a state that returns, but not
-        yet closely enough.
-
-    Returns
-    -------
-    Attractor
-    """
+    """Look for a fixed point or a cycle of 1 … LONGEST drive periods."""
     orbit = orbits.part([row])
     if orbit.linear:
         timed = any(e.has(sp.Symbol("t", real=True)) for _, e in orbit.variation.matrix)
@@ -180,25 +134,7 @@ def cycle_propagators(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Integrate the propagators of all modes over one cycle.
 
-    Parameters
-    ----------
-    orbit : Orbits
-        A single orbit; its state is advanced by the cycle.
-    cycle : int
-        Number of blocks, drive periods unless said otherwise.
-    block : float
-        Length of a block in units of the orbit.
-    state : ndarray, shape (1, components), optional
-        Where the cycle begins, the current state by default.
-    slack : float
-        How many times the tolerance of the orbit the steps are allowed.
-
-    Returns
-    -------
-    propagators : ndarray, shape (1, m, p, p)
-        Propagators of the m modes with p components each, without a factor.
-    logarithms : ndarray, shape (1, m)
-        Logarithm of this factor.
+    Shapes: state (1, components); returns propagators (1, m, p, p), logarithms (1, m).
     """
     orbit.state = orbit.state if state is None else state
     orbit.block, orbit.integrator = block, orbit.integrator_of(orbit.strengths, tolerance=slack)

@@ -36,32 +36,14 @@ SLACK, TRIED = 4.0, 8
 
 @dataclass(frozen=True, slots=True)
 class Averaging:
-    """How long to average along an orbit; checked.
+    """How long to average along an orbit; checked."""
 
-    Parameters
-    ----------
-    precision : float
-        The average ends if every standard error is below this value.
-    periods : float
-        Longest average, in periods of the drive, or in mean return times of undriven motion; a whole number.
-    transient : float
-        Transient before the average, in the same units; a whole number.
-    seed : int
-        Seed of what is drawn at random before the orbit begins.
-    execution : Execution
-        Who does the work, and who hears how many periods are done.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If a number is none, too small, or not whole.
-    """
-
-    precision: float
+    precision: float  # the average ends if every standard error is below this value
+    # longest average, in periods of the drive, or in mean return times of undriven motion; a whole number
     periods: float
-    transient: float
-    seed: int
-    execution: Execution
+    transient: float  # transient before the average, in the same units; a whole number
+    seed: int  # seed of what is drawn at random before the orbit begins
+    execution: Execution  # who does the work, and who hears how many periods are done
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "precision", check_number("precision", self.precision, 0.0))
@@ -79,15 +61,6 @@ class Averaging:
         Triple sampling: the errors after FIRST periods choose half of the length, those after it the whole. The average
         ends there if the errors still are below `precision`, and else goes on as long as they ask for. Few looks, and
         errors that are no smaller than the planned one, leave no chance to end where an error is small by chance.
-
-        Parameters
-        ----------
-        batches : Batches
-            The average.
-        error : callable
-            Returns the standard errors that must become small.
-        reporter : Reporter
-            Counts the periods.
 
         References
         ----------
@@ -122,13 +95,6 @@ def error_of_steps(
 
     It is the mean change over single blocks, each from the same state and deviations as the other, with its own standard
     error: chaos makes much of a small difference within a block, at random.
-
-    Parameters
-    ----------
-    usual, looser : sequence of ndarray
-        Growth over each block, with the usual and with the looser tolerance; blocks without growth do not count.
-    length : float
-        Length of a block in units of non-dimensional time.
     """
     with np.errstate(invalid="ignore"):
         change = np.subtract(usual, looser)
@@ -149,38 +115,21 @@ class Batches:
     lies within two errors of the truth as often as a normal variable, in 95 of 100 runs. An error of fewer than FEWEST
     frequencies is unknown: it has no variance.
 
-    Parameters
-    ----------
-    unit : float
-        Length of a period in units of non-dimensional time.
-    block : float
-        Number of periods of one block.
-    blocks : int
-        Number of blocks so far.
-    per_batch : int
-        Number of blocks in a batch.
-    sums : ndarray, shape (BATCHES, starts, m)
-        Growth over each batch; behind the first `count` nothing that counts.
-    count : int
-        Number of batches, the last of which may be incomplete.
-    enough : float
-        Blocks before the next look at the errors.
-    planned : ndarray, shape (starts, m), optional
-        Errors times the root of the blocks at the look that chose the length of the average.
-
     References
     ----------
     Batches joined in pairs: Flyvbjerg & Petersen, J. Chem. Phys. 91, 461 (1989). Averaged periodogram, Student's
     distribution and number of frequencies: Lazarus, Lewis, Stock & Watson, J. Bus. Econ. Stat. 36, 541 (2018).
     """
 
-    unit: float
-    block: float = 1.0
-    blocks: int = 0
-    per_batch: int = 1
+    unit: float  # length of a period in units of non-dimensional time
+    block: float = 1.0  # number of periods of one block
+    blocks: int = 0  # number of blocks so far
+    per_batch: int = 1  # number of blocks in a batch
+    # (BATCHES, starts, m): growth over each batch; behind the first `count` nothing that counts
     sums: np.ndarray = field(default_factory=lambda: np.zeros((BATCHES, 0, 0)))
-    count: int = 0
-    enough: float = field(init=False)
+    count: int = 0  # number of batches, the last of which may be incomplete
+    enough: float = field(init=False)  # blocks before the next look at the errors
+    # (starts, m): errors times the root of the blocks at the look that chose the length of the average
     planned: np.ndarray | None = None
 
     def __post_init__(self) -> None:
@@ -207,15 +156,7 @@ class Batches:
         return self.blocks >= self.enough and self.blocks % self.per_batch == 0
 
     def plan(self, ratio: float, final: bool) -> None:
-        """Put off the next look at the errors until a ratio of the present length is done.
-
-        Parameters
-        ----------
-        ratio : float
-            Length at the next look over the present one; below 1 the next look comes at once.
-        final : bool
-            True if the average may end there: no error is then smaller than the present one lets expect.
-        """
+        """Put off the next look at the errors until a ratio of the present length is done."""
         if final:
             self.planned = self.error_by_start() * math.sqrt(self.blocks)
         self.enough = self.blocks * max(1.0, ratio)
@@ -223,15 +164,7 @@ class Batches:
     def ahead(self, most: int) -> np.ndarray:
         """Return the blocks of the next batches: TOGETHER of them, or fewer until the next look at the errors.
 
-        Parameters
-        ----------
-        most : int
-            Most blocks of all of them.
-
-        Returns
-        -------
-        ndarray of int64, shape (batches,)
-            The last batch may stay incomplete.
+        Shapes: returns (batches,).
         """
         blocks, count, per_batch, parts = self.blocks, self.count, self.per_batch, list[int]()
         while most > 0 and len(parts) < TOGETHER and not (parts and blocks >= self.enough):
@@ -241,13 +174,7 @@ class Batches:
         return np.array(parts, dtype=np.int64)
 
     def add(self, growth: np.ndarray) -> None:
-        """Add the growth over a further block.
-
-        Parameters
-        ----------
-        growth : ndarray, shape (starts, m)
-            Logarithm of the growth of each deviation.
-        """
+        """Add the growth over a further block. Shapes: growth (starts, m)."""
         if self.blocks % self.per_batch:
             self.sums[self.count - 1] += growth
             self.blocks += 1
@@ -257,12 +184,7 @@ class Batches:
     def extend(self, growths: np.ndarray, parts: np.ndarray) -> None:
         """Add the growth over further batches, as many blocks in each as `ahead` has said.
 
-        Parameters
-        ----------
-        growths : ndarray, shape (b, starts, m)
-            Logarithm of the growth of each deviation over each batch.
-        parts : ndarray of int64, shape (b,)
-            Blocks of each batch.
+        Shapes: growths (b, starts, m), parts (b,).
         """
         if self.blocks == 0:
             self.sums = np.empty((BATCHES, *growths.shape[1:]))
@@ -284,10 +206,7 @@ class Batches:
     def error_by_start(self) -> np.ndarray:
         """Estimate the standard error of each start: half of what the mean is within in 95 of 100 runs.
 
-        Returns
-        -------
-        ndarray, shape (starts, m)
-            The estimates; inf if the average has fewer than FEWEST frequencies; 59 periods have them.
+        Shapes: returns (starts, m).
         """
         whole, frequencies = self.blocks // self.per_batch, self.frequencies
         sums = self.sums[:whole]

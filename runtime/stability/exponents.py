@@ -374,20 +374,7 @@ def transversal(
 ) -> Exponents:
     """Compute what `exponents` returns, for whichever public function was called.
 
-    Parameters
-    ----------
-    given : Given
-        Parameters of the scene to set.
-    scene : Scene
-        Source of the oscillator and the coupling.
-    strengths : ndarray, shape (m,) or (m, layers)
-        Strengths, real or complex.
-    starts : int
-        Number of initial states.
-    rtol : float
-        Relative tolerance.
-    averaging : Averaging
-        How long to average, and who does it.
+    Shapes: strengths (m,) or (m, layers).
     """
     reporter = averaging.reporter()
     orbits = orbits_of(coupled_cell(given, scene, rtol), strengths, starts, averaging)
@@ -407,19 +394,7 @@ def orbits_of(scene: Scene, strengths: np.ndarray, starts: int, averaging: Avera
 
 
 def along(orbits: Orbits, strengths: np.ndarray, averaging: Averaging, reporter: Reporter) -> Exponents:
-    """Compute the exponents of all modes along orbits from their start.
-
-    Parameters
-    ----------
-    orbits : Orbits
-        Orbits at the start of their transient.
-    strengths : ndarray, shape (m,) or (m, layers)
-        The strengths of their modes, alpha + i beta.
-    averaging : Averaging
-        How long to average.
-    reporter : Reporter
-        Counts the periods.
-    """
+    """Compute the exponents of all modes along orbits from their start. Shapes: strengths (m,) or (m, layers)."""
     starts = len(orbits.state)
     bounded = [True] * starts if orbits.linear else _settle(orbits, averaging.transient, reporter)
     attractors = tuple(
@@ -487,15 +462,6 @@ def coupled_cell(given: Given, scene: Scene, rtol: float) -> Scene:
     """Return a single cell whose network has a coupling: a lone oscillator gets a partner, if there is a link for it.
 
     The scene may sweep strengths that do not move the synchronous orbit.
-
-    Parameters
-    ----------
-    given : Given
-        Parameters to set.
-    scene : Scene
-        Scene to change.
-    rtol : float
-        Relative tolerance.
     """
     given.expect_one_cell(scene, unused_axes(scene))
     return single_cell(given, with_partner(scene), rtol)
@@ -517,24 +483,7 @@ def with_partner(scene: Scene) -> Scene:
 
 
 def single_cell(given: Given, scene: Scene, rtol: float) -> Scene:
-    """Return the single cell of a scene, with the parameters passed to a public function.
-
-    Parameters
-    ----------
-    given : Given
-        Parameters to set.
-    scene : Scene
-        Scene to change.
-    rtol : float
-        Relative tolerance.
-
-    Raises
-    ------
-    TypeError
-        If `scene` is no Scene.
-    ValueError
-        If a parameter is unknown, and for axes and draws.
-    """
+    """Return the single cell of a scene, with the parameters passed to a public function."""
     return given.scene(scene, rtol=rtol)
 
 
@@ -572,21 +521,7 @@ def group_by_attractor(
 def average(orbits: Orbits, averaging: Averaging, reporter: Reporter) -> tuple[np.ndarray, np.ndarray, float]:
     """Average growth rates along orbits with their modes, from the settled states on.
 
-    Parameters
-    ----------
-    orbits : Orbits
-        Orbits whose `prepare` was called.
-    averaging : Averaging
-        How long to average.
-    reporter : Reporter
-        Counts the periods.
-
-    Returns
-    -------
-    mean, error : ndarray, shape (starts, m)
-        Growth rates and their standard errors, per unit of non-dimensional time.
-    length : float
-        Time averaged over.
+    Shapes: returns mean, error (starts, m).
     """
     batches, steps = Batches(orbits.unit, orbits.block), np.zeros(())
     for left in averaging.rounds(batches, batches.error, reporter):

@@ -32,27 +32,13 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """Strengths that are interpolated from the same nodes.
+    """Strengths that are interpolated from the same nodes."""
 
-    Parameters
-    ----------
-    rows : ndarray, shape (m,)
-        Indices of the strengths.
-    points : ndarray, shape (k,) or (k, layers)
-        Strengths of the nodes.
-    extras : ndarray, shape (c,) or (c, layers)
-        Strengths that are integrated for comparison only.
-    weights : ndarray, shape (m, k)
-        Propagators of the strengths = weights @ propagators of the nodes.
-    checks : ndarray, shape (c, k)
-        Weights that give the propagators of the strengths for comparison from the nodes.
-    """
-
-    rows: np.ndarray
-    points: np.ndarray
-    extras: np.ndarray
-    weights: np.ndarray
-    checks: np.ndarray
+    rows: np.ndarray  # (m,): indices of the strengths
+    points: np.ndarray  # (k,) or (k, layers): strengths of the nodes
+    extras: np.ndarray  # (c,) or (c, layers): strengths that are integrated for comparison only
+    weights: np.ndarray  # (m, k): propagators of the strengths = weights @ propagators of the nodes
+    checks: np.ndarray  # (c, k): weights that give the propagators of the strengths for comparison from the nodes
 
     @classmethod
     def of(
@@ -65,18 +51,10 @@ class Panel:
 
 @dataclass(frozen=True, slots=True)
 class Interpolation:
-    """Linear map from the propagators of nodes to those of all strengths.
+    """Linear map from the propagators of nodes to those of all strengths."""
 
-    Parameters
-    ----------
-    strengths : ndarray, shape (m,) or (m, layers)
-        All strengths, real or complex.
-    panels : tuple of Panel
-        Parts of the strengths with their nodes; none if every strength is integrated.
-    """
-
-    strengths: np.ndarray
-    panels: tuple[Panel, ...] = ()
+    strengths: np.ndarray  # (m,) or (m, layers): all strengths, real or complex
+    panels: tuple[Panel, ...] = ()  # parts of the strengths with their nodes; none if every strength is integrated
 
     @property
     def is_exact(self) -> bool:
@@ -91,13 +69,7 @@ class Interpolation:
         return np.concatenate([part for panel in self.panels for part in (panel.points, panel.extras)])
 
     def registers(self, lanes: int) -> Registers:
-        """Return the strengths and the weights in groups of `lanes`, as kernels take them.
-
-        Parameters
-        ----------
-        lanes : int
-            Numbers in a register.
-        """
+        """Return the strengths and the weights in groups of `lanes`, as kernels take them."""
         if self.is_exact:
             count = len(self.strengths)
             table = np.array([[0.0, -(-count // lanes), 0.0, 0.0, 0.0, 0.0, 0.0]])
@@ -121,27 +93,13 @@ class Interpolation:
 
 @dataclass(frozen=True, slots=True)
 class Registers:
-    """The weights of an interpolation as `synchain.codegen.driver.propagators` takes them.
+    """The weights of an interpolation as `synchain.codegen.driver.propagators` takes them."""
 
-    Parameters
-    ----------
-    panels : ndarray, shape (panels, 7)
-        What belongs to each panel: whole numbers.
-    weights : ndarray, shape (any,)
-        The weights of the strengths, then those of the strengths for comparison.
-    where : ndarray of int64, shape (m,)
-        Position of each strength in the registers.
-    room : int
-        Numbers in all registers.
-    lanes : int
-        Numbers in one.
-    """
-
-    panels: np.ndarray
-    weights: np.ndarray
-    where: np.ndarray
-    room: int
-    lanes: int
+    panels: np.ndarray  # (panels, 7): what belongs to each panel: whole numbers
+    weights: np.ndarray  # (any,): the weights of the strengths, then those of the strengths for comparison
+    where: np.ndarray  # (m,): position of each strength in the registers
+    room: int  # numbers in all registers
+    lanes: int  # numbers in one
 
     def of_strengths(self, values: np.ndarray) -> np.ndarray:
         """Return what belongs to each strength, from values (..., room) in registers."""
@@ -154,27 +112,7 @@ def exact_interpolation(strengths: np.ndarray) -> Interpolation:
 
 
 def strength_interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) -> Interpolation:
-    """Divide the range of the strengths into panels with interpolation nodes.
-
-    Parameters
-    ----------
-    strengths : ndarray, shape (m,) or (m, layers)
-        Real or complex strengths, one for each layer.
-    nodes : int
-        Chebyshev points on each piece of the real line; a square has twice as many on a circle.
-    parts : int
-        Panels on each side of the range.
-
-    Returns
-    -------
-    Interpolation
-        `exact_interpolation(strengths)` if the panels need as many nodes as there are strengths.
-
-    Raises
-    ------
-    ValueError
-        If there is no strength.
-    """
+    """Divide the range of the strengths into panels with interpolation nodes. Shapes: strengths (m,) or (m, layers)."""
     if len(strengths) == 0:
         raise ValueError("found no strength of a mode; expected at least one")
     panels = tuple((_on_a_line if strengths.ndim == 1 else _along_lines)(strengths, parts, nodes))
@@ -186,14 +124,7 @@ def strength_interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) ->
 def lines_of(strengths: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
     """Return the lines on which strengths (m, layers) lie that differ in a single layer.
 
-    Returns
-    -------
-    moving : int
-        The layer for which they are fewest.
-    fixed : ndarray, shape (lines, layers - 1)
-        The strengths of the other layers on each line.
-    line : ndarray of int, shape (m,)
-        The line of each mode.
+    Shapes: returns fixed (lines, layers - 1), line (m,).
     """
     found = []
     for moving in range(strengths.shape[1]):

@@ -40,43 +40,16 @@ Conservative orbits have the multiplier 1 twice, which errors of size rtol split
 
 
 class Cycle(NamedTuple):
-    """A closed orbit.
+    """A closed orbit."""
 
-    Parameters
-    ----------
-    state : ndarray, shape (p,)
-        A state on it.
-    period : float
-        The time after which the state is back.
-    matrix : ndarray, shape (p, p)
-        Derivative of the state a period later by the state.
-    steps : int
-        Steps of Newton's method.
-    """
-
-    state: np.ndarray
-    period: float
-    matrix: np.ndarray
-    steps: int
+    state: np.ndarray  # (p,): a state on it
+    period: float  # the time after which the state is back
+    matrix: np.ndarray  # (p, p): derivative of the state a period later by the state
+    steps: int  # steps of Newton's method
 
 
 def limit_cycle(orbit: Orbits, closed: float) -> tuple[float, int]:
-    """Find the attracting cycle that an undriven orbit has settled on.
-
-    Parameters
-    ----------
-    orbit : Orbits
-        A single orbit after its transient; on success its state is moved onto the cycle.
-    closed : float
-        Largest distance of a closed cycle, relative to the extent of each component.
-
-    Returns
-    -------
-    period : float
-        The least one, in units of non-dimensional time; 0 if no such cycle is found.
-    steps : int
-        Steps of Newton's method.
-    """
+    """Find the attracting cycle that an undriven orbit has settled on."""
     alone = replace(orbit, strengths=np.zeros_like(orbit.strengths[:1]))
     rates, start = orbit.rates, orbit.state[0].copy()
     if rests(rates, start, closed, orbit.extent):

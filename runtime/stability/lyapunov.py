@@ -333,61 +333,23 @@ class Observed:
 
 @dataclass(slots=True)
 class TangentFrame:
-    """One orbit with orthogonal deviations, advanced over blocks of 1/parts of a period.
+    """One orbit with orthogonal deviations, advanced over blocks of 1/parts of a period."""
 
-    Parameters
-    ----------
-    scene : Scene
-        Network and its start.
-    variation : Variation
-        Variational equation of the whole network.
-    integrator : VariationalIntegrator
-        Integrator of the orbit and its deviations.
-    basis : ndarray, shape (size, count)
-        Orthonormal deviations.
-    turns : Turns
-        Period of the drive, or mean return time of undriven motion.
-    parts : int
-        Blocks in a period.
-    phase : int
-        Block within the period.
-    group : int
-        Blocks between two orthogonalisations, over which propagators are multiplied.
-    carried : tuple, optional
-        What multiplies them, made at the first call.
-    rates : callable
-        The matrix (size, size) of the variational equation as a function of states and parameters.
-    """
-
-    scene: Scene
-    variation: Variation
-    integrator: VariationalIntegrator
-    basis: np.ndarray
-    turns: Turns
-    parts: int = 1
-    phase: int = 0
-    group: int = 1
-    carried: tuple[VariationalIntegrator, Travellers] | None = None
+    scene: Scene  # network and its start
+    variation: Variation  # variational equation of the whole network
+    integrator: VariationalIntegrator  # integrator of the orbit and its deviations
+    basis: np.ndarray  # (size, count): orthonormal deviations
+    turns: Turns  # period of the drive, or mean return time of undriven motion
+    parts: int = 1  # blocks in a period
+    phase: int = 0  # block within the period
+    group: int = 1  # blocks between two orthogonalisations, over which propagators are multiplied
+    carried: tuple[VariationalIntegrator, Travellers] | None = None  # what multiplies them, made at the first call
+    # the matrix (size, size) of the variational equation as a function of states and parameters
     rates: Callable[..., np.ndarray] = field(kw_only=True)
 
     @classmethod
     def make(cls, scene: Scene, count: int, seed: int) -> TangentFrame:
-        """Set up the frame at the scene's start, with random directions.
-
-        Parameters
-        ----------
-        scene : Scene
-            Network and its start.
-        count : int
-            Number of deviations.
-        seed : int
-            Seed of the directions.
-
-        Raises
-        ------
-        ValueError
-            If time enters without a known period.
-        """
+        """Set up the frame at the scene's start, with random directions."""
         turns = Turns(unit_of_time(scene), np.zeros(0), "period of the drive")
         network = network_variation(without_drive(scene.equations, scene.parameters))
         sticks = network.events is not None
@@ -445,17 +407,7 @@ class TangentFrame:
         return float(self.integrator.control[0])
 
     def advance(self) -> tuple[np.ndarray, np.ndarray, float]:
-        """Advance by one block.
-
-        Returns
-        -------
-        growth : ndarray, shape (count,)
-            Logarithm of the growth in each direction.
-        share : ndarray, shape (count,)
-            Length of each direction after the block over the longest length of its deviation.
-        volume : float
-            Logarithm of the growth of volumes; nan with set-valued friction.
-        """
+        """Advance by one block. Shapes: returns growth (count,), share (count,)."""
         self._set_clock()
         self.phase = (self.phase + 1) % self.parts
         followed = self.followed()
@@ -492,16 +444,7 @@ class TangentFrame:
         return int((decay * length > -GONE).sum())
 
     def measure(self) -> tuple[np.ndarray, np.ndarray]:
-        """Advance by one block.
-
-        Returns
-        -------
-        growth : ndarray, shape (count + 1,)
-            Logarithm of the growth in each direction, 0 for those that are lost, and of the growth of volumes.
-        lost : ndarray of bool, shape (count,)
-            Directions whose growth is unknown. One alone is known: its growth is what the others leave of that of
-            volumes.
-        """
+        """Advance by one block. Shapes: returns growth (count + 1,), lost (count,)."""
         growth, share, volume = self.advance()
         lost = share < LOST * self.rtol
         if lost.sum() == 1 and self.count == self.variation.size and self.variation.events is None:
@@ -524,15 +467,7 @@ class TangentFrame:
         """Advance by several blocks in one call: propagators of single blocks move the directions, which are orthogonal at the end.
 
         Propagators are as exact as the steps, and their products lose no more than rounding.
-
-        Returns
-        -------
-        growths : ndarray, shape (blocks, count)
-            Logarithm of the growth in each direction over each block.
-        angles : ndarray, shape (blocks, count)
-            Length of the part of each direction, at unit length, that is normal to those before.
-        volumes : ndarray, shape (blocks,)
-            Logarithm of the growth of volumes; nan with set-valued friction.
+        Shapes: returns growths (blocks, count), angles (blocks, count), volumes (blocks,).
         """
         size, count = self.variation.size, self.count
         carrier, travellers = self.carried = self.carried or self._carriers()

@@ -668,19 +668,7 @@ def _known(given: Given, scene: Scene) -> Scene:
 
 
 def classify(intervals: Sequence[Interval], end: float, begin: float = 0.0) -> StabilityClass:
-    """Classify a function that is negative on some intervals of its grid.
-
-    Parameters
-    ----------
-    intervals : sequence of (float, float)
-        Intervals of alpha with a negative exponent.
-    end, begin : float
-        Ends of the grid.
-
-    Returns
-    -------
-    StabilityClass
-    """
+    """Classify a function that is negative on some intervals of its grid."""
     if not intervals:
         return StabilityClass.NEVER
     if len(intervals) > 1:

@@ -16,34 +16,16 @@ __all__ = ["SharedOrbit", "shared_orbits", "still_strengths", "transversal_modes
 
 @dataclass(frozen=True, slots=True)
 class SharedOrbit:
-    """Cells that differ only in what does not move their synchronous orbit.
+    """Cells that differ only in what does not move their synchronous orbit."""
 
-    Parameters
-    ----------
-    cells : ndarray of int, shape (c,)
-        The cells.
-    numbers : dict
-        Parameters of all of them that the orbit depends on.
-    strengths : ndarray, shape (m,) or (m, layers)
-        The strengths -sigma gamma of all modes of all cells, each once.
-    place : ndarray of int, shape (c, modes)
-        Where in `strengths` the modes of each cell are.
-    """
-
-    cells: np.ndarray
-    numbers: dict[str, float]
-    strengths: np.ndarray
-    place: np.ndarray
+    cells: np.ndarray  # (c,): the cells
+    numbers: dict[str, float]  # parameters of all of them that the orbit depends on
+    strengths: np.ndarray  # (m,) or (m, layers): the strengths -sigma gamma of all modes of all cells, each once
+    place: np.ndarray  # (c, modes): where in `strengths` the modes of each cell are
 
 
 def transversal_modes(scene: Scene) -> tuple[JointEigenvalue, ...]:
-    """Return the distinct joint eigenvalues of the layers of a network, without one mode of equal states.
-
-    Raises
-    ------
-    ValueError
-        If the matrices of two layers do not commute.
-    """
+    """Return the distinct joint eigenvalues of the layers of a network, without one mode of equal states."""
     modes = joint_spectrum(tuple(graph for _, graph in scene.model.linked))
     return tuple(mode for mode in modes if any(mode.values) or mode.multiplicity > 1)
 
@@ -61,20 +43,7 @@ def unused_axes(scene: Scene) -> set[str]:
 
 
 def shared_orbits(scene: Scene, columns: Mapping[str, np.ndarray]) -> Iterator[SharedOrbit]:
-    """Yield the cells of a sweep by their synchronous orbits.
-
-    Parameters
-    ----------
-    scene : Scene
-        A network, with the numbers of what is not swept.
-    columns : mapping of str to ndarray, shape (cells,)
-        The values of what is swept.
-
-    Raises
-    ------
-    ValueError
-        As `transversal_modes`, and if a layer has no strength.
-    """
+    """Yield the cells of a sweep by their synchronous orbits. Shapes: columns (cells,)."""
     (count,) = {len(column) for column in columns.values()} or {1}
     gamma = np.array([mode.values for mode in transversal_modes(scene)])
     names, still = scene.strengths, still_strengths(scene)

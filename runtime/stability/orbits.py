@@ -73,48 +73,24 @@ exponent dips towards -inf and magnifies every error.
 
 @dataclass(slots=True)
 class Orbits:
-    """Orbits from several starts with the modes of all strengths along them.
+    """Orbits from several starts with the modes of all strengths along them."""
 
-    Parameters
-    ----------
-    scene : Scene
-        Oscillator, coupling and numerical settings.
-    variation : Variation
-        Variational equation of a mode.
-    strengths : ndarray, shape (m,) or (m, layers)
-        Strengths in the variational equation: alpha + i beta unless links have inertia; of several layers one each.
-    state : ndarray, shape (starts, components)
-        Current states.
-    workers : int or None
-        Number of threads.
-    turns : Turns
-        The unit of time, which is the period of the drive or the mean return time of undriven motion, and how far the
-        components move; without a drive from the start of the first orbit, with one from `settle` on.
-    method : Integrator
-        Method of all steps, the one that suits all strengths.
-    block : float
-        Number of units of a block.
-
-    Attributes
-    ----------
-    interpolation : Interpolation
-        Interpolation in the strength, set by `prepare`, as what follows is.
-    integrator : VariationalIntegrator
-        Integrator of the nodes of the interpolation.
-    travellers : Travellers
-        Deviations of all strengths, and the largest error of the interpolation so far.
-    """
-
-    scene: Scene
-    variation: Variation
+    scene: Scene  # oscillator, coupling and numerical settings
+    variation: Variation  # variational equation of a mode
+    # (m,) or (m, layers): strengths in the variational equation: alpha + i beta unless links have inertia; of several
+    # layers one each
     strengths: np.ndarray
-    state: np.ndarray
-    workers: int | None
+    state: np.ndarray  # (starts, components): current states
+    workers: int | None  # number of threads
+    # the unit of time, which is the period of the drive or the mean return time of undriven motion, and how far the
+    # components move; without a drive from the start of the first orbit, with one from `settle` on
     turns: Turns
-    method: Integrator
-    block: float = 1.0
+    method: Integrator  # method of all steps, the one that suits all strengths
+    block: float = 1.0  # number of units of a block
+    # interpolation in the strength, set by `prepare`, as what follows is
     interpolation: Interpolation = field(init=False, repr=False)
-    integrator: VariationalIntegrator = field(init=False, repr=False)
+    integrator: VariationalIntegrator = field(init=False, repr=False)  # integrator of the nodes of the interpolation
+    # deviations of all strengths, and the largest error of the interpolation so far
     travellers: Travellers = field(init=False, repr=False)
 
     @classmethod
@@ -123,24 +99,7 @@ class Orbits:
     ) -> Orbits:
         """Set up orbits at the start of their transient.
 
-        Parameters
-        ----------
-        scene : Scene
-            Scene with coupling; one without has the mode of strength 0 alone.
-        strengths : ndarray, shape (m,) or (m, layers)
-            Strengths alpha + i beta of the modes.
-        state : ndarray, shape (starts, components)
-            Initial states.
-        workers : int or None
-            Number of threads.
-        turns : Turns, optional
-            Unit of time and extent, if they are known; by default observed along the first orbit.
-
-        Raises
-        ------
-        ValueError
-            If time enters without a known period, if a strength other than 0 has no link, if a mode has no positive mass at its strength, or if modes have another
-            number of strengths than there are layers of links.
+        Shapes: strengths (m,) or (m, layers), state (starts, components).
         """
         scene = scene if scene.model.linked else _joined(scene, strengths)
         equations = without_drive(scene.equations, scene.parameters)
@@ -221,17 +180,7 @@ class Orbits:
     def integrator_of(
         self, strengths: np.ndarray, looseness: float = 1.0, tolerance: float = 1.0
     ) -> VariationalIntegrator:
-        """Return an integrator along the orbits from their current states.
-
-        Parameters
-        ----------
-        strengths : ndarray, shape (k,)
-            Strengths; each has one deviation for each component.
-        looseness : float
-            Ratio of the tolerance of the deviations to that of the orbit.
-        tolerance : float
-            Ratio of the tolerance of both to the usual one.
-        """
+        """Return an integrator along the orbits from their current states. Shapes: strengths (k,)."""
         repeated = np.repeat(strengths, self.components, axis=0)
         rows = _rows(repeated.astype(self.strengths.dtype))
         numbers = np.tile(self.numbers, (len(self.state), 1))
@@ -259,15 +208,7 @@ class Orbits:
         self.turns = self.turns._replace(extent=extent)
 
     def settle(self, periods: float, advanced: Callable[[float], object] | None = None) -> None:
-        """Advance all orbits over a transient of a number of units.
-
-        Parameters
-        ----------
-        periods : float
-            Length of the transient in units.
-        advanced : callable, optional
-            Hears the length of each stretch of it.
-        """
+        """Advance all orbits over a transient of a number of units."""
         self.observe()
         integrator = self.integrator_of(self.strengths[:1])
         for length in _stretches(round(periods)):
@@ -277,14 +218,7 @@ class Orbits:
         self.state = integrator.state
 
     def prepare(self, periods: float) -> None:
-        """Choose block and interpolation by trial on the next blocks, and start the deviations.
-
-        Parameters
-        ----------
-        periods : float
-            Length of the longest average in units, a whole number of blocks. A short one keeps short blocks, whose
-            scatter says its error.
-        """
+        """Choose block and interpolation by trial on the next blocks, and start the deviations."""
         limit = max(0.01 * self.scene.rtol, ALLOWED)  # later blocks of a chaotic orbit are up to ten times worse
         failed: list[Choice] = []
         for choice in self._choices(periods):
@@ -326,27 +260,7 @@ class Orbits:
         looseness: float = LOOSENESS,
         legs: Interpolation | None = None,
     ) -> tuple[VariationalIntegrator, Travellers]:
-        """Start deviations of all strengths along the orbits from their settled states.
-
-        Parameters
-        ----------
-        interpolation : Interpolation
-            Which propagators are integrated, and how the others follow from them.
-        block : float
-            Units of time between two products.
-        looseness : float
-            Ratio of the tolerance of the propagators to that of the orbit.
-        legs : Interpolation, optional
-            Of a body that sticks: which propagators are integrated from landing to landing, and how those of the nodes
-            follow from them; by default the nodes themselves.
-
-        Returns
-        -------
-        integrator : VariationalIntegrator
-            Integrator of the nodes, beside each other from the settled states.
-        travellers : Travellers
-            The deviations.
-        """
+        """Start deviations of all strengths along the orbits from their settled states."""
         if self.lands:
             legs = legs or exact_interpolation(interpolation.nodes)
         integrator = self.integrator_of((legs or interpolation).nodes, looseness)
@@ -372,12 +286,7 @@ class Orbits:
     def propagators(self) -> tuple[np.ndarray, np.ndarray]:
         """Advance by one block.
 
-        Returns
-        -------
-        propagators : ndarray, shape (starts, nodes, components, components)
-            Propagators of the nodes over the block, without a factor.
-        logarithms : ndarray, shape (starts, nodes)
-            Logarithm of this factor: 0 unless a propagator is larger than exp(FAR) or smaller than exp(-FAR).
+        Shapes: returns propagators (starts, nodes, components, components), logarithms (starts, nodes).
         """
         integrator, p, size = self.integrator, self.components, self.variation.size
         integrator.set_deviations(self._basis(integrator))
@@ -392,35 +301,12 @@ class Orbits:
     def growths(self, batches: np.ndarray, tracks: np.ndarray = NO_TRACKS) -> np.ndarray:
         """Advance orbits and deviations by batches of blocks.
 
-        Parameters
-        ----------
-        batches : ndarray of int64, shape (b,)
-            Blocks of each batch.
-        tracks : ndarray, shape (starts, b, any), optional
-            Is filled with the states and deviations that each batch begins with.
-
-        Returns
-        -------
-        ndarray, shape (b, starts, m)
-            Logarithm of the growth of each deviation over each batch.
+        Shapes: batches (b,), tracks (starts, b, any); returns (b, starts, m).
         """
         return self.integrator.follow(self.block * self.unit, batches, self.travellers, tracks)
 
     def tried(self, most: int) -> tuple[np.ndarray, np.ndarray]:
-        """Advance by TRIED blocks, or by fewer.
-
-        Parameters
-        ----------
-        most : int
-            Most blocks.
-
-        Returns
-        -------
-        growths : ndarray, shape (blocks, starts, m)
-            Logarithm of the growth of each deviation over each block.
-        error : ndarray, shape (starts, m)
-            The error of growth rates that is due to the steps (`averages.error_of_steps`).
-        """
+        """Advance by TRIED blocks, or by fewer. Shapes: returns growths (blocks, starts, m), error (starts, m)."""
         count, (starts, size), vectors = min(most, TRIED), self.state.shape, self.travellers.vectors
         tracks = np.empty((starts, count, size + vectors.shape[1]))
         usual = self.growths(np.ones(count, dtype=np.int64), tracks)
@@ -503,13 +389,7 @@ def _rates(equations: Equations, numbers: tuple[float, ...]) -> Rates:
 
 
 def unit_of_time(scene: Scene) -> float:
-    """Return the period of the drive, or 2 pi if there is none, in units of non-dimensional time.
-
-    Raises
-    ------
-    ValueError
-        If time enters the equations without a known period.
-    """
+    """Return the period of the drive, or 2 pi if there is none, in units of non-dimensional time."""
     drive = scene.drive
     if scene.forced and drive.frequency is None:
         raise ValueError(

@@ -21,17 +21,7 @@ def warn_of_slow_motion(equations: Equations, states: np.ndarray, numbers: np.nd
     """Warn if an average ends before undriven motion turns or settles.
 
     Its batches agree, because nothing has happened, and their error is small for no reason.
-
-    Parameters
-    ----------
-    equations : Equations
-        Equations of the orbit.
-    states : ndarray, shape (any, states)
-        States along the orbit.
-    numbers : ndarray, shape (parameters,)
-        Values of the parameters.
-    averaged : float
-        Length of the average in units of non-dimensional time.
+    Shapes: states (any, states), numbers (parameters,).
     """
     if equations.forced:
         return

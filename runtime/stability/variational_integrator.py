@@ -62,45 +62,20 @@ which these and the size in all; stretches of fewer steps tell nothing."""
 
 @dataclass(slots=True)
 class Travellers:
-    """Deviations of all strengths, which propagators move.
+    """Deviations of all strengths, which propagators move."""
 
-    Parameters
-    ----------
-    registers : Registers
-        How they follow from the propagators of the nodes.
-    columns : int
-        Components of a deviation, real or complex.
-    vectors : ndarray, shape (cells, any)
-        The deviations at unit length, in registers.
-    legs : Registers or None
-        How the propagators of the nodes follow from those that are integrated, of bodies that stick.
-    error : float
-        Largest error of the interpolation so far, relative to the size of a propagator.
-    """
-
-    registers: Registers
-    columns: int
-    vectors: np.ndarray
+    registers: Registers  # how they follow from the propagators of the nodes
+    columns: int  # components of a deviation, real or complex
+    vectors: np.ndarray  # (cells, any): the deviations at unit length, in registers
+    # how the propagators of the nodes follow from those that are integrated, of bodies that stick
     legs: Registers | None = None
-    error: float = 0.0
+    error: float = 0.0  # largest error of the interpolation so far, relative to the size of a propagator
 
     @classmethod
     def make(
         cls, registers: Registers, cells: int, columns: int, parts: int, legs: Registers | None = None
     ) -> Travellers:
-        """Return deviations along (1, 1, …).
-
-        Parameters
-        ----------
-        registers : Registers
-            How they follow from the propagators of the nodes.
-        cells, columns : int
-            Numbers of orbits and of components.
-        parts : int
-            Real numbers of a deviation.
-        legs : Registers, optional
-            As the attribute.
-        """
+        """Return deviations along (1, 1, …)."""
         lanes = registers.lanes
         start = np.zeros((cells, registers.room // lanes, parts, lanes))
         start[:, :, :columns] = 1.0 / math.sqrt(columns)
@@ -142,56 +117,26 @@ class GrowthWatch:
 
 @dataclass(slots=True)
 class VariationalIntegrator:
-    """Orbits with several deviations each, which differ in their strengths.
+    """Orbits with several deviations each, which differ in their strengths."""
 
-    Parameters
-    ----------
-    variation : Variation
-        Orbit with its variational equation.
-    kernel : Kernel
-        The same, compiled.
-    state : ndarray, shape (cells, dimension)
-        States of the orbits.
-    numbers : ndarray, shape (cells, parameters)
-        Values of the parameters.
-    period : ndarray, shape (cells,)
-        Time after which the clock restarts; 0 if it does not.
-    control : ndarray
-        Tolerances, limits and the cancel flag for the kernel.
-    strengths : ndarray, shape (number of strengths, padded modes)
-        Strengths sorted by size, padded to a multiple of the lanes.
-    order : ndarray, shape (modes,)
-        Position of each mode of the caller in `strengths`.
-    vectors : ndarray, shape (cells, size, padded modes)
-        Deviations.
-    workers : int
-        Number of threads.
-    steps : int
-        Steps taken so far.
-    warned : bool
-        Whether it was said that the steps are short because the modes are stiff.
-    observes : bool
-        Whether stretches are so short that steps begin as long as those before, and that their length is no cause to warn.
-    slow : float
-        Rate of the motion that steps must follow anyway.
-    watch : GrowthWatch
-        Ends orbits without bound, and those that take more than `max_steps` steps in all.
-    """
-
-    variation: Variation
-    kernel: Kernel
-    state: np.ndarray
-    numbers: np.ndarray
-    period: np.ndarray
-    control: np.ndarray
+    variation: Variation  # orbit with its variational equation
+    kernel: Kernel  # the same, compiled
+    state: np.ndarray  # (cells, dimension): states of the orbits
+    numbers: np.ndarray  # (cells, parameters): values of the parameters
+    period: np.ndarray  # (cells,): time after which the clock restarts; 0 if it does not
+    control: np.ndarray  # tolerances, limits and the cancel flag for the kernel
+    # (number of strengths, padded modes): strengths sorted by size, padded to a multiple of the lanes
     strengths: np.ndarray
-    order: np.ndarray
-    vectors: np.ndarray
-    workers: int
-    steps: int = 0
-    warned: bool = False
+    order: np.ndarray  # (modes,): position of each mode of the caller in `strengths`
+    vectors: np.ndarray  # (cells, size, padded modes): deviations
+    workers: int  # number of threads
+    steps: int = 0  # steps taken so far
+    warned: bool = False  # whether it was said that the steps are short because the modes are stiff
+    # whether stretches are so short that steps begin as long as those before, and that their length is no cause to
+    # warn
     observes: bool = False
-    slow: float = 1.0
+    slow: float = 1.0  # rate of the motion that steps must follow anyway
+    # ends orbits without bound, and those that take more than `max_steps` steps in all
     watch: GrowthWatch = field(default_factory=GrowthWatch)
 
     @classmethod
@@ -208,24 +153,7 @@ class VariationalIntegrator:
     ) -> VariationalIntegrator:
         """Prepare the kernel and the arrays; tolerances and the step budget are those of the scene.
 
-        Parameters
-        ----------
-        scene : Scene
-            Source of the tolerances and the largest number of steps.
-        variation : Variation
-            Orbit with its variational equation.
-        state : ndarray, shape (cells, dimension)
-            Initial states.
-        numbers : ndarray, shape (cells, parameters)
-            Values of the parameters of `variation`.
-        strengths : ndarray, shape (number of strengths, modes)
-            Strengths of the modes in any order. All deviations start along (1, 1, …).
-        workers : int, optional
-            Number of threads; all cores by default.
-        looseness : float
-            Ratio of the tolerance of the deviations to that of the orbit.
-        method : Integrator, optional
-            Method of the steps; by default the one that suits these strengths.
+        Shapes: state (cells, dimension), numbers (cells, parameters), strengths (number of strengths, modes).
         """
         method = chosen_for_modes(scene, variation, state, numbers, strengths) if method is None else method
         kernel = _kernel(variation, method, native_width())
@@ -264,41 +192,14 @@ class VariationalIntegrator:
         return self.vectors[:, :, self.order]
 
     def set_deviations(self, vectors: np.ndarray) -> None:
-        """Set the deviations.
-
-        Parameters
-        ----------
-        vectors : ndarray, shape (cells, size, modes)
-            Deviations in the caller's order; lengths other than 1 are kept.
-        """
+        """Set the deviations. Shapes: vectors (cells, size, modes)."""
         self.vectors[:, :, self.order] = vectors
         spare = self.vectors.shape[2] - len(self.order)
         if spare:
             self.vectors[:, :, -spare:] = self.vectors[:, :, -spare - 1 : -spare]
 
     def advance(self, length: float | np.ndarray) -> np.ndarray:
-        """Integrate over a length of time.
-
-        Parameters
-        ----------
-        length : float or ndarray, shape (cells,)
-            Length in units of non-dimensional time, one for all cells or one each. If the equations
-            are periodic in time, it must be a whole number of periods: each stretch begins at phase
-            0.
-
-        Returns
-        -------
-        ndarray, shape (cells, modes)
-            Logarithm of the growth of each deviation; -inf for one that has become zero. The
-            deviations have unit length afterwards.
-
-        Raises
-        ------
-        FloatingPointError
-            If an orbit cannot be integrated.
-        KeyboardInterrupt
-            On Ctrl-C.
-        """
+        """Integrate over a length of time. Shapes: length (cells,); returns (cells, modes)."""
         growth = np.empty((len(self.state), self.strengths.shape[1]))
         self._run(length, NO_PANELS, self.vectors, growth)
         return growth[:, self.order]
@@ -309,29 +210,7 @@ class VariationalIntegrator:
         """Integrate over blocks of time that follow each other, and move deviations by their propagators.
 
         Every block begins with the deviations that were set, p for each node, which stay as they are.
-
-        Parameters
-        ----------
-        length : float
-            Length of a block, as for `advance`.
-        batches : ndarray of int64, shape (b,)
-            Numbers of blocks.
-        travellers : Travellers
-            The deviations of all strengths, which are moved.
-        tracks : ndarray, shape (cells, b, any), optional
-            Is filled with the states and deviations that each batch begins with, behind each other.
-
-        Returns
-        -------
-        ndarray, shape (b, cells, strengths)
-            Logarithm of the growth of each deviation over each batch.
-
-        Raises
-        ------
-        FloatingPointError
-            If an orbit cannot be integrated.
-        KeyboardInterrupt
-            On Ctrl-C.
+        Shapes: batches (b,), tracks (cells, b, any); returns (b, cells, strengths).
         """
         places, room = self.order.reshape(-1, travellers.columns).astype(float), travellers.registers.room
         gains, misfits = np.empty((len(self.state), len(batches), room)), np.zeros(len(self.state))
@@ -343,24 +222,13 @@ class VariationalIntegrator:
         return registers.of_strengths(gains.transpose(1, 0, 2))
 
     def loosen(self, ratio: float) -> None:
-        """Multiply the tolerances.
-
-        Parameters
-        ----------
-        ratio : float
-            Looser over usual tolerance.
-        """
+        """Multiply the tolerances."""
         self.control[[Control.RTOL, Control.ATOL]] *= ratio
 
     def beside(self, state: np.ndarray, ratio: float) -> VariationalIntegrator:
         """Return an integrator with the same deviations along other orbits, with looser tolerances.
 
-        Parameters
-        ----------
-        state : ndarray, shape (cells, dimension)
-            States of the orbits, a multiple of those of this integrator; each takes the parameters of one in turn.
-        ratio : float
-            Looser over usual tolerance.
+        Shapes: state (cells, dimension).
         """
         times = len(state) // len(self.state)
         numbers, period, vectors = (
@@ -380,13 +248,7 @@ class VariationalIntegrator:
 
     @contextmanager
     def loosened(self, ratio: float) -> Iterator[None]:
-        """Multiply the tolerances of what is integrated inside; states, deviations and tolerances are as before after it.
-
-        Parameters
-        ----------
-        ratio : float
-            Looser over usual tolerance.
-        """
+        """Multiply the tolerances of what is integrated inside; states, deviations and tolerances are as before after it."""
         state, vectors, control = self.state, self.vectors.copy(), self.control.copy()
         self.loosen(ratio)
         yield
@@ -396,11 +258,6 @@ class VariationalIntegrator:
         """Advance by TRIED blocks, and return the error of growth rates (cells, modes) that is due to the steps.
 
         See `averages.error_of_steps`.
-
-        Parameters
-        ----------
-        length : float
-            Length of a block, as for `advance`.
         """
         usual, looser = [], []
         for _ in range(TRIED):

@@ -16,11 +16,6 @@ LARGEST = 1e300
 def numbers(what: str, values: object, *, complex_too: bool = False) -> np.ndarray:
     """Return the values as an array of any shape, of floats or, if `complex_too`, of complex
     numbers.
-
-    Raises
-    ------
-    ValueError
-        If a value is no such number.
     """
     try:
         found = np.asarray(values)
@@ -33,26 +28,7 @@ def numbers(what: str, values: object, *, complex_too: bool = False) -> np.ndarr
 
 
 def row(what: str, values: ArrayLike, least: int = 1, *, rising: bool = False, complex_too: bool = False) -> np.ndarray:
-    """Return the values as one row (m,) of floats or, if `complex_too`, of complex numbers, up to LARGEST in size.
-
-    Parameters
-    ----------
-    what : str
-        Name of the argument, for errors.
-    values : number or sequence of numbers
-        A single number is a row of one.
-    least : int
-        Fewest numbers.
-    rising : bool
-        Whether the numbers must increase.
-    complex_too : bool
-        Whether complex numbers are allowed.
-
-    Raises
-    ------
-    ValueError
-        If the values are anything else.
-    """
+    """Return the values as one row (m,) of floats or, if `complex_too`, of complex numbers, up to LARGEST in size."""
     found = np.atleast_1d(numbers(what, values, complex_too=complex_too))
     if not np.all(np.isfinite(found)):
         raise ValueError(f"{what}: found {found[~np.isfinite(found)][0]}; expected finite numbers")

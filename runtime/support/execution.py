@@ -15,30 +15,14 @@ __all__ = ["Execution"]
 
 @dataclass(frozen=True, slots=True)
 class Execution:
-    """Who does the work of a call, and who hears how far it is; checked.
+    """Who does the work of a call, and who hears how far it is; checked."""
 
-    Parameters
-    ----------
-    workers : int, optional
-        Number of threads (default: all cores).
-    executor : concurrent.futures.Executor, optional
-        Runs the blocks in place of threads (docs/scale.md).
-    show_progress : bool, optional
-        Whether to show a bar; by default a bar on terminals and in notebooks, a line a minute elsewhere.
-    progress : callable, optional
-        Is called with a `Progress` after each block of cells, periods or values.
-
-    Attributes
-    ----------
-    size : int
-        Blocks that run at a time.
-    """
-
-    workers: int | None = None
-    executor: Executor | None = None
+    workers: int | None = None  # number of threads (default: all cores)
+    executor: Executor | None = None  # runs the blocks in place of threads (docs/scale.md)
+    # whether to show a bar; by default a bar on terminals and in notebooks, a line a minute elsewhere
     show_progress: bool | None = None
-    progress: Hook | None = None
-    size: int = field(init=False)
+    progress: Hook | None = None  # is called with a `Progress` after each block of cells, periods or values
+    size: int = field(init=False)  # blocks that run at a time
 
     def __post_init__(self) -> None:
         if self.progress is not None:

@@ -18,24 +18,7 @@ def names(path: Iterable[str]) -> tuple[str, ...]:
 
 
 def load(what: str, name: str, package: str, path: Iterable[str]) -> ModuleType:
-    """Return a module of a package.
-
-    Parameters
-    ----------
-    what : str
-        What the modules are called in errors.
-    name : str
-        The name of the module.
-    package : str
-        The dotted name of the package.
-    path : iterable of str
-        Its folders.
-
-    Raises
-    ------
-    ValueError
-        If there is no such module.
-    """
+    """Return a module of a package."""
     known = names(path)
     if name not in known:
         raise ValueError(f"unknown {what} {short_repr(name)}; known: {', '.join(known)}{suggestion(name, known)}")

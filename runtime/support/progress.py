@@ -141,15 +141,7 @@ class Reporter:
         self.close()
 
     def start(self, counts: np.ndarray | None = None, compiling: float = 0.0) -> None:
-        """Begin to count.
-
-        Parameters
-        ----------
-        counts : ndarray, shape (CODES,), optional
-            Cells that are kept from an earlier run.
-        compiling : float
-            Seconds of the time since this reporter was made that the compilation took.
-        """
+        """Begin to count. Shapes: counts (CODES,)."""
         now = time.perf_counter()
         self.preparing, self.compiling = now - self.began - compiling, compiling
         self.began, self._said = now, now

@@ -79,15 +79,7 @@ class _Ends:
 
 
 def certified(prepared: PreparedRun) -> PreparedRun:
-    """Return a run with the exponents of every cell along the motion that it ends on: all cells run once for their ends.
-
-    Raises
-    ------
-    ValueError
-        As `certify`.
-    SweepInterrupted, SweepFailed
-        On Ctrl-C, or if the workers are lost; no cell has finished.
-    """
+    """Return a run with the exponents of every cell along the motion that it ends on: all cells run once for their ends."""
     scene, layout = prepared.scene, prepared.layout()
     check_certifiable(scene)
     shape = (scene.cells, prepared.reduction.dimension), (scene.cells, len(scene.y0))
@@ -121,20 +113,7 @@ def certify(
 
     Cells that differ only in their starts and in the strength of links that vanish between equal states share the
     exponents of each motion that they are on.
-
-    Parameters
-    ----------
-    scene : Scene
-        A sweep, with its axes.
-    states : ndarray, shape (cells, states), optional
-        Where the cells ended, of which the first node counts; by default where they start.
-    precision, periods, workers
-        As for `exponents`.
-
-    Raises
-    ------
-    ValueError
-        If the synchronous state has no transversal exponents; as `exponents` does.
+    Shapes: states (cells, states).
     """
     check_certifiable(scene)
     averaging = Averaging(precision, periods, TRANSIENT, 0, Execution(workers, None, False))

@@ -96,25 +96,14 @@ class Problem(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class JobSpec:
-    """What all blocks of a job have in common: enough to rebuild it in another process.
-
-    Attributes
-    ----------
-    problem : Problem
-    width, digest : int, str
-        Lanes of the kernel and SHA-256 of its text.
-    versions, processor : str
-        Versions and kind of processor of the main program; a worker must have the same.
-    code : tuple of str
-        Files of code that are allowed to run.
-    """
+    """What all blocks of a job have in common: enough to rebuild it in another process."""
 
     problem: Problem
-    width: int
+    width: int  # lanes of the kernel and SHA-256 of its text
     digest: str
-    versions: str
+    versions: str  # versions and kind of processor of the main program; a worker must have the same
     processor: str
-    code: tuple[str, ...]
+    code: tuple[str, ...]  # files of code that are allowed to run
 
     @classmethod
     def of(cls, problem: Problem, source: KernelSource) -> JobSpec:
@@ -131,13 +120,7 @@ class JobSpec:
 
     @classmethod
     def unpacked(cls, data: bytes) -> JobSpec:
-        """Return the specification from bytes.
-
-        Raises
-        ------
-        InstallationError
-            If this worker has other versions or another processor than the main program.
-        """
+        """Return the specification from bytes."""
         source = io.BytesIO(data)
         head = pickle.load(source)
         if head["versions"] != versions():
@@ -155,13 +138,7 @@ class JobSpec:
         return cls(pickle.load(source), **head)
 
     def rebuilt(self) -> Job:
-        """Return the job, with a kernel from this installation.
-
-        Raises
-        ------
-        InstallationError
-            If the text of the kernel is not that of the main program.
-        """
+        """Return the job, with a kernel from this installation."""
         source = self.problem.source(self.width)
         if source.digest != self.digest:
             raise InstallationError(
@@ -220,17 +197,7 @@ class SweepJob:
                 control[Control.CANCEL] = 1.0
 
     def run(self, cells: np.ndarray, start: Start | None = None, near: np.ndarray | None = None) -> Buffers:
-        """Run cells of the sweep.
-
-        Parameters
-        ----------
-        cells : ndarray of int
-            Numbers of the cells.
-        start : tuple of ndarray, optional
-            States to start from in place of the scene's, and for which of the cells they are good.
-        near : ndarray, shape (cells,), optional
-            Synchronisation errors below which the cells end early.
-        """
+        """Run cells of the sweep. Shapes: near (cells,)."""
         reduction = self.reduction
         rows = reduction.rows(reduction.planner.rows(cells, near))
         if start is not None:
@@ -319,26 +286,15 @@ class SweepJob:
 class RowsSpec:
     """Equations without a sweep, whose cells come as rows; the synchronisation error is the only
     record.
-
-    Attributes
-    ----------
-    equations : Equations
-    integrator : Integrator or str
-    control : ndarray, shape (len(Control),)
-    multiplicity : tuple of int, optional
-        How many oscillators each node stands for in the synchronisation error.
-    records : tuple of str
-        ("sync_error",), or none if all oscillators are stepped as one.
-    watched : Watched
-        Holds the stop of a scene, if it has one.
     """
 
     equations: Equations
     integrator: Integrator | str
-    control: np.ndarray
+    control: np.ndarray  # (len(Control)
+    # how many oscillators each node stands for in the synchronisation error
     multiplicity: tuple[int, ...] | None = None
-    records: tuple[str, ...] = ("sync_error",)
-    watched: Watched = UNWATCHED
+    records: tuple[str, ...] = ("sync_error",)  # ("sync_error",), or none if all oscillators are stepped as one
+    watched: Watched = UNWATCHED  # holds the stop of a scene, if it has one
 
     def source(self, width: int | None = None) -> KernelSource:
         """Return the text of the kernel."""

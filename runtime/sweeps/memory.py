@@ -78,13 +78,7 @@ class Memory:
         self.buffers.put(task.cells, buffers)
 
     def run(self, reporter: Reporter) -> None:
-        """Run the blocks that have not finished.
-
-        Raises
-        ------
-        SweepInterrupted, SweepFailed
-            On Ctrl-C, or if the workers are lost; the error has the cells that have finished.
-        """
+        """Run the blocks that have not finished."""
         scheduler = BlockScheduler(self.layout, self.done(), self, self.prepared, reporter)
         try:
             reporter.start(tally(self.buffers.status[self.buffers.finished]), self.prepared.compiling)

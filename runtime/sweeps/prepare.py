@@ -24,23 +24,12 @@ __all__ = ["PreparedRun", "prepare"]
 
 @dataclass(frozen=True, slots=True)
 class PreparedRun:
-    """A sweep that is ready to run.
-
-    Attributes
-    ----------
-    job : SweepJob
-    certificate : Certificate, optional
-        The exponents of all cells, if the run is certified.
-    execution : Execution
-        Runs the blocks.
-    compiling : float
-        Seconds that the compilation of the kernel took, or its loading.
-    """
+    """A sweep that is ready to run."""
 
     job: SweepJob
-    certificate: Certificate | None
-    execution: Execution
-    compiling: float
+    certificate: Certificate | None  # the exponents of all cells, if the run is certified
+    execution: Execution  # runs the blocks
+    compiling: float  # seconds that the compilation of the kernel took, or its loading
 
     @property
     def reduction(self) -> Reduction:
@@ -71,19 +60,7 @@ def prepare(
     width: int | None = None,
     room: int | None = None,
 ) -> PreparedRun:
-    """Write and compile the kernel of a reduced scene.
-
-    Parameters
-    ----------
-    reduction : Reduction
-    execution : Execution
-    certificate : Certificate, optional
-        The exponents of all cells of a certified run that goes on.
-    width : int, optional
-        Number of lanes.
-    room : int, optional
-        Section points of a cell to make room for at first.
-    """
+    """Write and compile the kernel of a reduced scene."""
     expect_whole_periods(reduction.planner)
     source = write_kernel(reduction, width)
     warn_of_chords(source)

@@ -35,23 +35,7 @@ CELLS = 65536
 
 
 def started(scene: Scene, start: Start) -> tuple[Scene, float]:
-    """Return the scene with the states of one cell as its start, and when they were reached.
-
-    Parameters
-    ----------
-    scene : Scene
-    start : Result, DataArray, mapping, or sequence of numbers
-        A result of one cell, or the states `end` of one, with dimensions component and node; a table as `initial` of
-        `Scene` takes; or all states in the order of the equations.
-
-    Raises
-    ------
-    TypeError
-        If `start` is none of these.
-    ValueError
-        If the states are those of several cells or of other components or nodes, if one is not
-        finite, or if the drive was not at the beginning of a period.
-    """
+    """Return the scene with the states of one cell as its start, and when they were reached."""
     if isinstance(start, Mapping):
         return scene.replace(initial=start), 0.0
     if isinstance(start, list | tuple | np.ndarray):
@@ -139,13 +123,7 @@ def _expect_finite(states: np.ndarray) -> None:
 
 
 def expect_whole_periods(planner: Planner) -> None:
-    """Refuse a continued sweep in which the drive is amid a period at the end of a cell, as each cell begins with one.
-
-    Raises
-    ------
-    ValueError
-        With the part of the period.
-    """
+    """Refuse a continued sweep in which the drive is amid a period at the end of a cell, as each cell begins with one."""
     scene = planner.scene
     if not (scene.continued and scene.forced) or scene.time_unit == "period":
         return

@@ -195,17 +195,6 @@ def claim(
 ) -> str:
     """Return what can be done about a result at `path`: "begin", "continue", or nothing because it
     is "complete".
-
-    Raises
-    ------
-    ValueError
-        If a file there belongs to another run.
-    FileExistsError
-        If a run there was not finished and `resume` is not given.
-    FileNotFoundError
-        If there is nothing to resume.
-    BlockingIOError
-        If another process writes there.
     """
     for name, value in (("resume", resume), ("overwrite", overwrite), ("certified", certified)):
         check_flag(name, value)

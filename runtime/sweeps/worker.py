@@ -22,22 +22,7 @@ class JobCache:
         self.lock = threading.Lock()
 
     def run(self, key: str, spec: bytes | None, *block: object) -> Buffers | None:
-        """Run a block of a job.
-
-        Parameters
-        ----------
-        key : str
-            Names the job.
-        spec : bytes, optional
-            The packed specification, if the process may not know the job.
-        *block
-            Arguments of `Job.run`.
-
-        Returns
-        -------
-        Buffers or None
-            None if the process does not know the job and needs its specification.
-        """
+        """Run a block of a job."""
         with self.lock:
             job = self.jobs.get(key)
             if job is None and spec is not None:

@@ -124,30 +124,7 @@ def agreement(
     parameters: Mapping[str, float] | None = None,
     **more: float,
 ) -> Agreement:
-    """Judge synchronisation by exponents and by direct simulation for each sigma.
-
-    Parameters
-    ----------
-    scene : Scene
-        The network; its records are not used.
-    sigma : sequence of float
-        Increasing numbers from 0 up.
-    line : Exponents, optional
-        Exponents at all `strengths` of the graph (and perhaps others), of the same oscillator and
-        parameters; by default they are computed.
-    criterion : Criterion, optional
-        When a simulation counts as synchronous.
-    workers, executor, show_progress, progress
-        As for `run`; exponents are computed in this process.
-    parameters, **more
-        Override the parameters of the scene, as for `exponents`.
-
-    Raises
-    ------
-    ValueError
-        If the line lacks a strength, or if sigma is negative, not finite or does not increase, and for
-        a scene with a stop, draws or axes, but for one of sigma; as `strengths` does.
-    """
+    """Judge synchronisation by exponents and by direct simulation for each sigma."""
     scene = Given(agreement, parameters, more, IN_CRITERION).scene(scene, unused_axes(scene))
     expect_vanishing("agreement", scene.equations)
     check_probe(scene.topology, scene.spectrum)

@@ -79,19 +79,7 @@ class ExponentWindows:
 def exponent_windows(
     scene: Scene, alpha: np.ndarray, execution: Execution, precision: float, periods: float, seed: int
 ) -> ExponentWindows:
-    """Compute the windows of a scene's network.
-
-    Parameters
-    ----------
-    scene : Scene
-        Network with real eigenvalues.
-    alpha : ndarray, shape (m,)
-        Increasing strengths; the exponents count as positive beyond them.
-    execution : Execution
-        Its threads do the work; its bar and its hook count periods.
-    precision, periods, seed
-        As for `exponents`, checked.
-    """
+    """Compute the windows of a scene's network. Shapes: alpha (m,)."""
     try:
         Orbits.make(scene, alpha, initial_states(scene, 1, seed), 1)
     except ValueError as problem:

@@ -20,11 +20,6 @@ def hidden_modes(scene: Scene) -> tuple[str, ...]:
     rounding alone, so that its growth is noticed late. The default start of three in a chain, 0.30, 0.28, 0.26, has no
     part in the mode (1, -2, 1). Other networks hand motion from mode to mode; between all pairs of equal links every start has a part; one-way links are not
     looked at.
-
-    Parameters
-    ----------
-    scene : Scene
-        A network of equal oscillators.
     """
     graph = scene.topology
     if graph.all_to_all is not None or not graph.symmetric or not _linear(scene.equations):

@@ -187,12 +187,6 @@ def ring_of_three(equations: Equations) -> Equations:
 
     The parameters `mode_alpha` and `mode_beta` take the place of sigma; the weight of a link, 1 or
     -1, is its direction.
-
-    Raises
-    ------
-    ValueError
-        If there is no coupling, if a link is not proportional to sigma and to its weight or does
-        not vanish between equal states, or if the model uses one of the two names itself.
     """
     equations.expect_alike("the three-oscillator probe")
     edge = equations.edge

@@ -93,23 +93,7 @@ def measure_motion(
     times: tuple[float | None, float | None],
     apart: np.ndarray,
 ) -> SynchronousMotion:
-    """Measure the motion that begins with a row of the whole network.
-
-    Parameters
-    ----------
-    trials : Trials
-        Run the equations, or what is left of them.
-    rows : callable
-        What is left of rows of the whole network.
-    equations : Equations
-        Those of the whole network.
-    row : Plan
-        One row (`alike`), whose window begins after one unit of the scene's time.
-    times : (float or None, float or None)
-        Transient and window in units of the scene's time; None for 1000 and 100 radians.
-    apart : ndarray, shape (components,)
-        Extent of components that do not move at all.
-    """
+    """Measure the motion that begins with a row of the whole network. Shapes: apart (components,)."""
 
     def sample(ends: np.ndarray) -> Outcome:
         spans = np.tile(row.spans, (len(ends), 1))

@@ -93,22 +93,7 @@ class Trials:
         self.pool.close()
 
     def run(self, count: int, rows: Rows) -> Outcome:
-        """Run a round.
-
-        Parameters
-        ----------
-        count : int
-            Number of cells.
-        rows : callable
-            Lays out cells by their numbers, block by block.
-
-        Raises
-        ------
-        SweepInterrupted
-            On Ctrl-C.
-        SweepFailed
-            If the workers are lost.
-        """
+        """Run a round."""
         error, status = np.full(count, np.inf), np.full(count, int(Status.NOT_RUN))
         end, steps = np.full((count, self.scene.equations.dimension), np.nan), np.zeros(count, dtype=np.int64)
         reporter = self.execution.reporter(count)

@@ -64,17 +64,7 @@ def best_time(run: Callable[[], object], quick: bool) -> float:
 
 
 def timed_periods(cost: float, least: int, quick: bool) -> int:
-    """Return the length of a timed run: TIMED periods, or as many as LONGEST seconds allow.
-
-    Parameters
-    ----------
-    cost : float
-        CPU seconds of one period.
-    least : int
-        The least length.
-    quick : bool
-        Whether slow runs are QUICK times shorter.
-    """
+    """Return the length of a timed run: TIMED periods, or as many as LONGEST seconds allow."""
     longest = LONGEST / QUICK if quick else LONGEST
     return max(least, min(TIMED, int(longest / max(cost, 1e-9))))
 
