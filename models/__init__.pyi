@@ -28,7 +28,7 @@ from .graphs.symbolic import from_symbols as from_symbols
 from .graphs.topology import Topology as Topology
 from .graphs.topology import from_matrix as from_matrix
 from .graphs.topology import read_matrix as read_matrix
-from .inputs.expressions import exprel as exprel
+from .inputs.expression_text import exprel as exprel
 from .inputs.options import integer_option as integer_option
 from .inputs.options import integers_option as integers_option
 from .inputs.options import probability_option as probability_option
@@ -36,12 +36,12 @@ from .inputs.plugins import allow_code as allow_code
 from .interactions.ends import ends as ends
 from .interactions.interaction import Potential as Potential
 from .interactions.interaction import Rates as Rates
-from .mechanics.friction import FrictionLaw as FrictionLaw
+from .mechanics.contact import FrictionLaw as FrictionLaw
 from .mechanics.oscillator import Oscillator as Oscillator
 from .mechanics.oscillator import friction as friction
 from .mechanics.parameter import Parameter as Parameter
-from .presentation.equations import latex as latex
-from .presentation.equations import text as text
+from .presentation.equations_text import latex as latex
+from .presentation.equations_text import text as text
 from .scenes.file import load_scene as load_scene
 from .scenes.file import scene_names as scene_names
 from .scenes.scene import Scene as Scene

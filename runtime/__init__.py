@@ -1,4 +1,4 @@
-"""Running scenes: sweeps, thresholds, exponents, figures, benchmarks and the command line.
+"""Running scenes: sweeps, thresholds, exponents, figures and the command line.
 
 Names are loaded on first use, so that the command line starts fast.
 
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from .bifurcation.equilibrium import Equilibrium, equilibrium
     from .bifurcation.periodic import PeriodicOrbit, periodic_orbit
     from .bifurcation.skeleton import Skeleton, skeleton
-    from .cells.kernels import kernel
+    from .engines.scene_kernels import kernel
     from .opening.open import open_result
     from .results.result import Result
-    from .stability.clusters import ClusterExponents, cluster_exponents
+    from .stability.cluster_exponents import ClusterExponents, cluster_exponents
     from .stability.exponents import Exponents, exponents
     from .stability.lyapunov import Lyapunov, lyapunov_spectrum
     from .stability.msf import MSF, Plane, msf, plane
@@ -91,7 +91,7 @@ __all__ = [
 _HOME = {
     "Basin": "synchronisation.basin",
     "Branch": "bifurcation.branches",
-    "ClusterExponents": "stability.clusters",
+    "ClusterExponents": "stability.cluster_exponents",
     "Criterion": "synchronisation.criterion",
     "Equilibrium": "bifurcation.equilibrium",
     "ExponentWindows": "synchronisation.exponent_windows",
@@ -110,11 +110,11 @@ _HOME = {
     "SweepInterrupted": "sweeps.errors",
     "Thresholds": "synchronisation.threshold",
     "basin": "synchronisation.basin",
-    "cluster_exponents": "stability.clusters",
+    "cluster_exponents": "stability.cluster_exponents",
     "equilibrium": "bifurcation.equilibrium",
     "exponents": "stability.exponents",
     "follow": "bifurcation.branches",
-    "kernel": "cells.kernels",
+    "kernel": "engines.scene_kernels",
     "lyapunov_spectrum": "stability.lyapunov",
     "msf": "stability.msf",
     "open_result": "opening.open",

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any, NoReturn
 
-from synchain.codegen.kernels.installation import InstallationError
+from synchain.codegen.machine_code.installation import InstallationError
 
 from .commands import command, names
 from .console.outcome import FAILED, FINE, WRONG_USE, Failed, WrongUse, discard_output, sentence, wrong_use

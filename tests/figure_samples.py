@@ -13,7 +13,8 @@ import pytest
 import xarray as xr
 
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.figures import exponent, figure_runs, load, make, plane, style, synchronisability_map
+from synchain.runtime.paper import exponent_figure, figure_runs, load, make, plane_figure, synchronisability_map
+from synchain.runtime.plots import style
 from synchain.runtime.results.labels import States
 from synchain.runtime.results.result import Result
 from synchain.runtime.stability.attractor import Attractor, Motion
@@ -71,8 +72,8 @@ class Simulation:
         """Stand in for the runs and sweeps, and make both qualities tiny."""
         for name in ("run", "probe", "simulate"):
             monkeypatch.setattr(figure_runs, name, getattr(self, name))
-        monkeypatch.setattr(exponent, "msf", self.msf)
-        monkeypatch.setattr(plane, "plane", self.plane)
+        monkeypatch.setattr(exponent_figure, "msf", self.msf)
+        monkeypatch.setattr(plane_figure, "plane", self.plane)
         monkeypatch.setattr(synchronisability_map, "exponents", self.exponents)
         monkeypatch.setattr(make, "QUICK", TINY)
         monkeypatch.setattr(make, "FULL", TINY)

@@ -18,7 +18,7 @@ from synchain.runtime.bifurcation.phases import Phases
 from synchain.runtime.bifurcation.skeleton import Skeleton
 from synchain.runtime.results.labelled import Labelled
 from synchain.runtime.stability.attractor import Attractor, Motion
-from synchain.runtime.stability.clusters import ClusterExponents
+from synchain.runtime.stability.cluster_exponents import ClusterExponents
 from synchain.runtime.stability.exponents import Exponents
 from synchain.runtime.stability.lyapunov import Lyapunov
 from synchain.runtime.stability.msf import MSF, Plane

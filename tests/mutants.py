@@ -32,7 +32,7 @@ TESTS = {
     "models/algebra/cosines": "spectrum closed_forms angle_text graph_families",
     "models/graphs/closed_forms": "closed_forms spectrum",
     "models/spectra/joint": "joint",
-    "models/mechanics/friction": "contact contact_theory",
+    "models/mechanics/contact": "contact contact_theory",
     "models/interactions/coupling": "coupling_matrix parts_manual",
     "models/algebra/isolation": "isolation spectrum",
     "models/mechanics/lagrangian": "lagrangian nondimensional energy inertia",
@@ -48,7 +48,7 @@ TESTS = {
     "runtime/prediction/stable_ranges": "synchronisability",
     "runtime/prediction/synchronisability": "synchronisability one_way",
     "runtime/synchronisation/threshold": "threshold one_way synchronisability",
-    "runtime/prediction/modes": "tangent synchronisability",
+    "runtime/prediction/mode_windows": "tangent synchronisability",
 }
 """The test files that concern a module."""
 COMPARISONS = ["Lt_LtE", "LtE_Lt", "Gt_GtE", "GtE_Gt", "Eq_NotEq", "NotEq_Eq", "Is_IsNot", "IsNot_Is"]

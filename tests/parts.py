@@ -9,10 +9,10 @@ from synchain.models.graphs.topology import Topology
 from synchain.models.interactions import link
 from synchain.models.interactions.coupling import Coupling
 from synchain.models.mechanics.components import Edge, Node
-from synchain.models.mechanics.friction import FrictionLaw
+from synchain.models.mechanics.contact import FrictionLaw
 from synchain.models.mechanics.oscillator import LagrangianModel, Oscillator
 from synchain.models.mechanics.parameter import Parameter
-from synchain.models.networks.parts import as_coupling, as_law, as_oscillator
+from synchain.models.networks.layers import as_coupling, as_law, as_oscillator
 
 __all__ = ["connectivity", "coupling_of", "edge", "is_lagrangian", "law_of", "node", "oscillator_of", "parameters"]
 

@@ -46,7 +46,7 @@ from synchain.runtime.bifurcation.branches import follow
 from synchain.runtime.bifurcation.periodic import periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton
 from synchain.runtime.opening.open import open_result
-from synchain.runtime.stability.clusters import cluster_exponents
+from synchain.runtime.stability.cluster_exponents import cluster_exponents
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum
 from synchain.runtime.stability.msf import msf, plane
@@ -73,11 +73,11 @@ from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCIL
 from synchain.models.graphs.families import TOPOLOGY
 from synchain.models.inputs.plugins import names
 
-from synchain.models.presentation.equations import latex  # isort: skip
-from synchain.models.presentation.equations import text
+from synchain.models.presentation.equations_text import latex  # isort: skip
+from synchain.models.presentation.equations_text import text
 
 from synchain.runtime.cli import main  # isort: skip
-from synchain.runtime.results.energy import energy_function  # isort: skip
+from synchain.runtime.results.energy_of_states import energy_function  # isort: skip
 from synchain.runtime.cells.reduce import as_reduction, explain  # isort: skip
 from synchain.runtime.synchronisation.criterion import PAPER  # isort: skip
 

@@ -18,8 +18,8 @@ from pendula import pendulum, telescope
 from synchain import one_way_ring
 from synchain.codegen import driver
 from synchain.codegen.driver.columns import COUNTS
-from synchain.codegen.kernels.compile import Kernel, load
-from synchain.codegen.kernels.sweep import KernelSource, emit
+from synchain.codegen.kernels.sweep_kernel import KernelSource, emit
+from synchain.codegen.machine_code.compile import Kernel, load
 from synchain.models import Potential, Rates, chain, ends, ring, star
 from synchain.models.definitions.loader import load_oscillator
 from synchain.models.dynamics.equations import Equations

@@ -94,7 +94,6 @@ def test_the_wheel_holds_the_packages_and_nothing_else(wheel: zipfile.Path) -> N
         *(f"{package}/py.typed" for package in ("models", "codegen", "runtime")),
         "models/scenes/library/figure_4a.toml",
         "models/templates/friction.txt",
-        "runtime/bench/data/trajectory_n1.json",
     ],
 )
 def test_files_that_are_no_code_are_in_the_wheel(name: str, wheel: zipfile.Path) -> None:

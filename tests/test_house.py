@@ -42,7 +42,8 @@ ARROWS = {
     "models.oscillators": "mechanics",
     "models.frictions": "mechanics",
     "models.couplings": "mechanics",
-    "codegen.simd": "",
+    "codegen.front_end": "",
+    "codegen.simd": "front_end",
     "codegen.integrators": "",
     "codegen.driver": "simd",
     "codegen.recorders": "driver simd",
@@ -50,34 +51,36 @@ ARROWS = {
     "codegen.steps": "program integrators simd models",
     "codegen.taylor": "steps program integrators simd models",
     "codegen.kernels": "taylor steps program driver integrators simd models",
+    "codegen.machine_code": "kernels driver steps front_end simd models",
     "codegen.export": "program models",
     "runtime.support": "models.inputs",
     "runtime.cells": "support codegen models",
     "runtime.prediction": "support models",
-    "runtime.stability": "results cells prediction support codegen models",
-    "runtime.results": "cells support codegen models",
-    "runtime.sweeps": "stability results prediction cells support codegen models",
-    "runtime.synchronisation": "sweeps stability results prediction cells support codegen models",
+    "runtime.engines": "cells support codegen models",
+    "runtime.stability": "results engines cells prediction support codegen models",
+    "runtime.results": "engines cells support codegen models",
+    "runtime.sweeps": "stability results engines prediction cells support codegen models",
+    "runtime.synchronisation": "sweeps stability results engines prediction cells support codegen models",
     "runtime.bifurcation": "sweeps stability results cells support models",
     "runtime.opening": "bifurcation synchronisation sweeps stability results prediction cells support codegen models",
-    "runtime.figures": "bifurcation synchronisation sweeps stability results prediction cells support codegen models",
-    "runtime.seeing": "figures opening bifurcation synchronisation sweeps stability results prediction cells support codegen models",
-    "runtime.bench": "bench.kit bench.peers figures bifurcation synchronisation sweeps stability results "
-    "prediction cells support codegen models",
-    "runtime.bench.kit": "bench.peers figures synchronisation sweeps stability results prediction cells support "
-    "codegen models",
-    "runtime.bench.peers": "support codegen models",
-    "runtime.console": "figures bifurcation synchronisation sweeps stability results prediction cells "
+    "runtime.plots": "bifurcation synchronisation sweeps stability results prediction support models",
+    "runtime.reports": "plots sweeps stability results engines models",
+    "runtime.paper": "plots bifurcation synchronisation sweeps stability results prediction support models",
+    "runtime.console": "plots bifurcation synchronisation sweeps stability results prediction cells "
     "support codegen models",
     "runtime.front": "models runtime",
-    "runtime.commands": "console seeing opening bench bench.kit figures bifurcation synchronisation sweeps stability results prediction cells "
-    "support codegen models",
+    "runtime.commands": "console reports plots paper opening bifurcation synchronisation sweeps stability results engines "
+    "prediction cells support codegen models",
 }
 """The rooms that a room may import, beside itself; names without a package are rooms of the same
 package, a package stands for all of its rooms.
 """
 
-DOORS = {("models/inputs/shown.py", "runtime.seeing"), ("runtime/results/labelled.py", "runtime.seeing")}
+DOORS = {
+    ("models/inputs/display.py", "runtime.plots"),
+    ("models/inputs/display.py", "runtime.reports"),
+    ("runtime/results/labelled.py", "runtime.plots"),
+}
 """Files that call a room above them, inside a method: values draw and show themselves by what stands at the top."""
 
 FRONT = {"models", "codegen", "runtime"}
@@ -138,6 +141,8 @@ def wrong_imports(path: Path, text: str) -> list[str]:
         door = (path.relative_to(PROJECT).as_posix(), room_of(name)) in DOORS
         if top == "synchain" and room not in FRONT and room_of(name) not in allowed(room) and not door:
             found.append(f"{path.relative_to(PROJECT)}:{line} imports {name} of {room_of(name) or 'synchain'}")
+        if top == "benchmarks":
+            found.append(f"{path.relative_to(PROJECT)}:{line} imports {name}")
         if room.startswith("models") and top not in sys.stdlib_module_names | {"synchain", "sympy", "flint"}:
             found.append(f"{path.relative_to(PROJECT)}:{line} imports {name}")
     return found
@@ -200,11 +205,15 @@ def test_no_modules_import_each_other() -> None:
         ("models/inputs", "def f():\n    import synchain.runtime.sweeps.run"),
         ("models/inputs", "import numpy as np"),
         ("models/graphs", "def f():\n    from scipy import linalg"),
-        ("codegen/steps", "from ..kernels.cache import x"),
+        ("codegen/front_end", "from ..simd import lanes"),
+        ("codegen/steps", "from ..machine_code.cache import x"),
+        ("codegen/kernels", "from ..machine_code.compile import load"),
         ("codegen/kernels", "from ...runtime.sweeps.run import run"),
         ("codegen/kernels", "from synchain import runtime"),
-        ("runtime/cells", "from ..sweeps import run"),
-        ("runtime/prediction", "from ...codegen.kernels import compile"),
+        ("runtime/cells", "from ..engines import choice"),
+        ("runtime/prediction", "from ...codegen.machine_code import compile"),
+        ("runtime/plots", "from ..paper import published"),
+        ("runtime/commands", "from benchmarks import names"),
     ],
 )
 def test_a_wrong_import_is_seen(place: str, text: str) -> None:
@@ -241,13 +250,8 @@ def test_values_of_the_models_cannot_be_changed() -> None:
 
 
 def test_every_package_that_is_imported_is_declared() -> None:
-    """Peers of the benchmark and the extras `dask`, `completion` and `files` aside, which may be missing."""
-    found = {
-        name.partition(".")[0]
-        for path in sources()
-        if path.parent.name != "peers"
-        for _, name in imported(path, path.read_text("utf-8"))
-    }
+    """The extras `dask`, `completion` and `files` aside, which may be missing."""
+    found = {name.partition(".")[0] for path in sources() for _, name in imported(path, path.read_text("utf-8"))}
     project = tomllib.loads((PROJECT / "pyproject.toml").read_text("utf-8"))["project"]
     declared = {re.match("[a-z-]+", line).group().removeprefix("python-") for line in project["dependencies"]}
     assert (

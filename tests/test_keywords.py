@@ -15,7 +15,7 @@ from synchain import runtime
 from synchain.models import Field, Rates, Scene, chain
 from synchain.models.scenes.scene import KEYWORDS
 from synchain.runtime.bifurcation import skeleton as skeletons
-from synchain.runtime.cells.keywords import Given
+from synchain.runtime.cells.run_keywords import Given
 from synchain.runtime.support.progress import Progress
 from synchain.runtime.support.status import Status
 from synchain.runtime.synchronisation.agreement import agreement

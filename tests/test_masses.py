@@ -18,8 +18,8 @@ from synchain.models.dynamics.network import node
 from synchain.models.dynamics.variational import mode, network_variation
 from synchain.models.scenes.scene import Scene
 from synchain.runtime import run
-from synchain.runtime.cells.kernels import kernel_source
 from synchain.runtime.cells.paces import Templates
+from synchain.runtime.engines.scene_kernels import kernel_source
 
 
 def hanging(links: int, **more: Any) -> Scene:

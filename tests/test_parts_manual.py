@@ -11,7 +11,7 @@ from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCIL
 from synchain.models.inputs.arithmetic import constant
 from synchain.models.inputs.plugins import Kind, load, names
 from synchain.models.interactions.coupling import STRENGTH
-from synchain.models.mechanics.friction import KAPPA
+from synchain.models.mechanics.contact import KAPPA
 
 MANUAL = (Path(__file__).parent.parent / "docs" / "scenes.md").read_text("utf-8")
 TABLES = {OSCILLATOR: "Oscillators", FRICTION_LAW: "Friction laws", COUPLING: "Couplings"}

@@ -21,8 +21,8 @@ from synchain.models.scenes.scene import Scene
 from synchain.models.scenes.section import Section
 from synchain.models.spectra.spectrum import Spectrum
 from synchain.models.symmetries.clusters import clusters, orbital_partitions
-from synchain.runtime.cells.keywords import Given
-from synchain.runtime.results.energy import energy_function
+from synchain.runtime.cells.run_keywords import Given
+from synchain.runtime.results.energy_of_states import energy_function
 from synchain.runtime.results.labelled import Labelled
 from synchain.runtime.support.threads import worker_count
 from synchain.runtime.synchronisation.agreement import agreement

@@ -1,6 +1,6 @@
 """Columns of the arrays that a kernel reads and writes, by name.
 
-The text of every kernel defines the same numbers for itself (`names.py`); a test compares the
+The text of every kernel defines the same numbers for itself (`clock_slots.py`); a test compares the
 two.
 """
 

@@ -15,8 +15,8 @@ from __future__ import annotations
 from numba import njit
 
 from ..simd.lanes import absolute, any_lane, broadcast, load, maximum, minimum, select, store
+from .clock_slots import ACCEPTED, LOOPED, REJECTED, RUSH, STEP, STOP, WIDTH
 from .dense import inside
-from .names import ACCEPTED, LOOPED, REJECTED, RUSH, STEP, STOP, WIDTH
 
 # --- kernel text below ---
 # A gap this little below zero counts as zero; a passage is never sought closer than the shortest step to it.

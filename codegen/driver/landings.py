@@ -20,7 +20,7 @@ from ..simd.lanes import load
 from ..simd.lanes import maximum
 from ..simd.lanes import select
 from ..simd.lanes import store
-from .names import LANES
+from .clock_slots import LANES
 from .propagators import FROM
 from .propagators import NODE
 from .propagators import PANEL

@@ -24,7 +24,7 @@ from ..simd.lanes import select
 from ..simd.lanes import split_binary
 from ..simd.lanes import sqrt
 from ..simd.lanes import store
-from .names import LANES
+from .clock_slots import LANES
 
 # --- kernel text below ---
 # Columns of `panels`: registers of strengths, first node, nodes with weights, nodes for comparison, where the weights of

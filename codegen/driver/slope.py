@@ -5,7 +5,7 @@ from __future__ import annotations
 from numba import njit
 
 from ..simd.lanes import load
-from .names import SERIES, WIDTH
+from .clock_slots import SERIES, WIDTH
 
 
 # --- kernel text below ---

@@ -2,7 +2,7 @@
 
 `work` holds lanes.  The matrix stands from group `first` on: the diagonal, then the other entries,
 row after row in the order of elimination; within a row those of earlier pivots come first.
-`Program` in codegen/steps/program.py describes the integer arrays.  `apart` is 0 if the elimination
+`Program` in codegen/steps/sparse_plan.py describes the integer arrays.  `apart` is 0 if the elimination
 is exact.  Otherwise the factors stand so many groups behind the matrix and have only the entries for
 which the rows have room, and every solution is refined to rounding.
 """
@@ -14,7 +14,7 @@ import math
 from numba import njit
 
 from ..simd.lanes import absolute, any_lane, broadcast, load, maximum, select, store
-from .names import DIMENSION, WIDTH
+from .clock_slots import DIMENSION, WIDTH
 
 # --- kernel text below ---
 REFINEMENTS = 30

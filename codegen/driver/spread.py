@@ -5,7 +5,7 @@ from __future__ import annotations
 from numba import njit
 
 from ..simd.lanes import broadcast, load, sqrt
-from .names import WIDTH
+from .clock_slots import WIDTH
 
 
 # --- kernel text below ---

@@ -38,33 +38,33 @@ from .control import arrive
 from .control import judge
 from .control import pause
 from .control import wrap
-from .names import ALL
-from .names import ATOL
-from .names import BASE
-from .names import BOUND
-from .names import CANCEL
-from .names import CLOCK
-from .names import CONTACTS
-from .names import FIRST_LOOK
-from .names import FIRST_OF_CELL
-from .names import LEFT
-from .names import LONGEST
-from .names import LONGEST_OF_CELL
-from .names import LOOK
-from .names import LOOPED
-from .names import MARK
-from .names import MAX_STEPS
-from .names import OBSERVED
-from .names import PAUSED
-from .names import RTOL
-from .names import SERIES
-from .names import START
-from .names import STATUS
-from .names import STEP
-from .names import STOP
-from .names import SYNC
-from .names import TIME
-from .names import WIDTH
+from .clock_slots import ALL
+from .clock_slots import ATOL
+from .clock_slots import BASE
+from .clock_slots import BOUND
+from .clock_slots import CANCEL
+from .clock_slots import CLOCK
+from .clock_slots import CONTACTS
+from .clock_slots import FIRST_LOOK
+from .clock_slots import FIRST_OF_CELL
+from .clock_slots import LEFT
+from .clock_slots import LONGEST
+from .clock_slots import LONGEST_OF_CELL
+from .clock_slots import LOOK
+from .clock_slots import LOOPED
+from .clock_slots import MARK
+from .clock_slots import MAX_STEPS
+from .clock_slots import OBSERVED
+from .clock_slots import PAUSED
+from .clock_slots import RTOL
+from .clock_slots import SERIES
+from .clock_slots import START
+from .clock_slots import STATUS
+from .clock_slots import STEP
+from .clock_slots import STOP
+from .clock_slots import SYNC
+from .clock_slots import TIME
+from .clock_slots import WIDTH
 from .spread import spread
 
 
@@ -163,8 +163,8 @@ def drive(
     functions: those of a scene and those that record.  dims: the sizes of its arrays; what is 0 there is not recorded,
     and its functions are not called.
     multiplicity (nodes): how many oscillators each node stands for.  rule (points, 4 + points): of the panels of a step
-    (codegen/kernels/observed.py).  network: of one that is stepped through in loops, the arrays of its
-    program (codegen/steps/program.py) and the weights of its links.
+    (codegen/kernels/observable_text.py).  network: of one that is stepped through in loops, the arrays of its
+    program (codegen/steps/sparse_plan.py) and the weights of its links.
     start (cells, dimension), numbers (cells, parameters), spans (cells, 7): start and end of the window, the period after
     which the right-hand side repeats (0: none), the synchronisation error below which a cell that records nothing
     else may end early (0: never), the first step, the longest one, and the steps after which the cell first looks

@@ -9,7 +9,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.checks import check_number, short_repr, suggestion
 
 from .body import check_inertia
-from .names import portable
+from .portable_names import portable
 
 __all__ = ["Exported"]
 
@@ -57,7 +57,7 @@ def _header(
 
 
 def _equations(equations: Equations) -> list[str]:
-    from synchain.models.presentation.equations import text
+    from synchain.models.presentation.equations_text import text
 
     try:
         return text(equations).splitlines()

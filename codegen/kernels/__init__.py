@@ -1,1 +1,1 @@
-"""Kernels: the functions of a scene and the driver that runs them, as modules that are compiled, kept and loaded."""
+"""Kernels as text: the functions of a scene, and the driver that runs them."""

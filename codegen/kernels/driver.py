@@ -112,7 +112,7 @@ def _list(subject: str, width: int, *traits: str) -> str:
 def _module(title: str, constants: tuple[tuple[str, int | bool], ...], pieces: tuple[str, ...]) -> str:
     """The text of a module of some files, specialised by constants."""
     head = "\n".join(f"{name} = {value!r}" for name, value in constants)
-    body = "\n\n\n".join(map(driver.text, ("driver.names", *pieces))) + "\n"
+    body = "\n\n\n".join(map(driver.text, ("driver.clock_slots", *pieces))) + "\n"
     return "\n\n\n".join([f'"""{title[0].upper()}{title[1:]}."""', imports(body), head, body])
 
 

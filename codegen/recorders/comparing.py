@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from numba import njit
 
+from ..driver.clock_slots import SERIES, SYNC, SYNC_PEAK, SYNC_SUM, WIDTH
 from ..driver.dense import inside
-from ..driver.names import SERIES, SYNC, SYNC_PEAK, SYNC_SUM, WIDTH
 from ..driver.spread import spread
 from ..simd.lanes import broadcast, load, maximum, select, store
 

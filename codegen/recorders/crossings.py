@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from numba import njit
 
-from ..driver.names import WIDTH
+from ..driver.clock_slots import WIDTH
 from ..simd.addresses import address
 from ..simd.lanes import absolute, any_lane, broadcast, load, maximum, select, store
 from .panels import POINT, simple

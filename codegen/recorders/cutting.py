@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ..driver.clock_slots import DIRECTION, FURTHER, N_POINTS, WIDTH
 from ..driver.dense import inside
-from ..driver.names import DIRECTION, FURTHER, N_POINTS, WIDTH
 from ..simd.lanes import any_lane, broadcast, lane_bits, load, store
 from .crossings import at_point, begin, crosses, locate, look, ready
 from .panels import following

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from numba import njit
 
+from ..driver.clock_slots import BASE, HALTED, MARK, SERIES, WIDTH
 from ..driver.dense import inside
-from ..driver.names import BASE, HALTED, MARK, SERIES, WIDTH
 from ..simd.lanes import any_lane, broadcast, load, select, store
 from .crossings import at_point, begin, crosses, locate, look, ready
 from .panels import following

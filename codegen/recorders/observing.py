@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ..driver.names import ATOL, OBSERVED, RTOL, WIDTH
+from ..driver.clock_slots import ATOL, OBSERVED, RTOL, WIDTH
 from ..simd.addresses import address
 from ..simd.lanes import broadcast, lane_bits, load, store
 from .panels import NEXT, POINT, TOP, WEIGHT, following, gentle, simple

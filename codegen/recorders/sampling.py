@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numba import njit
 
+from ..driver.clock_slots import BASE, END, NEXT_SAMPLE, WIDTH
 from ..driver.dense import inside
-from ..driver.names import BASE, END, NEXT_SAMPLE, WIDTH
 from ..simd.lanes import load, store
 
 

@@ -5,8 +5,8 @@ Kernels name this package alone, so that no text of a kernel changes if a functi
 
 from __future__ import annotations
 
+from ..front_end.decorator import njit
 from .addresses import address
-from .decorator import njit
 from .elementary import *  # noqa: F403
 from .elementary import __all__ as _elementary
 from .lanes import *  # noqa: F403

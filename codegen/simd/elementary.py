@@ -19,7 +19,7 @@ from typing import Any
 
 from numba.extending import intrinsic
 
-from .decorator import njit
+from ..front_end.decorator import njit
 from .lane_types import INT64, Lane, constant, vector
 from .lanes import (
     absolute,

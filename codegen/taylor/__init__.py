@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from .graph import is_analytic, is_linear, jump, outlives_series
-from .leaps import unpassed
-from .looped import write_looped
-from .order import order_for
+from .jump_series import unpassed
+from .looped_series import write_looped
 from .rolled import is_large, write_rolled
-from .step import TaylorStep
+from .series_graph import is_analytic, is_linear, jump, outlives_series
+from .series_order import order_for
 from .tangent import TangentStep, write_tangent
-from .unrolled import write_step
+from .taylor_step import TaylorStep
+from .unrolled_series import write_step
 
 __all__ = [
     "TangentStep",

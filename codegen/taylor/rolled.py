@@ -25,12 +25,12 @@ from ..program.expressions import ZERO, Expression, Load, Name, Number, call, pl
 from ..program.statements import Assign, Do, Loop, Statement, Store, let, mentioned, whole
 from ..steps.places import Kind, span
 from ..steps.step import lane
-from .graph import Graph, check_jumps
-from .length import unseen
-from .looped import CONVOLUTION, START, Hoisted, Looped, Outer, Section, Track
+from .looped_series import CONVOLUTION, START, Hoisted, Looped, Outer, Section, Track
 from .series import Constant, Exponential, Kink, Linear, Product, Series, Square
-from .step import TaylorStep
-from .terms import absolute
+from .series_graph import Graph, check_jumps
+from .simplify import absolute
+from .step_length import unseen
+from .taylor_step import TaylorStep
 
 __all__ = ["is_large", "write_rolled"]
 

@@ -18,8 +18,8 @@ from typing import ClassVar, Protocol
 from ..program import expressions
 from ..program.expressions import ONE, ZERO, Call, Compare, Expression, Name, Number
 from ..program.statements import Statement
-from .passage import Stored
-from .terms import absolute, add, over, times
+from .event_location import Stored
+from .simplify import absolute, add, over, times
 
 __all__ = ["Brink", "Choice", "Constant", "Crest", "Exponential", "Fraction", "Integral", "Kink", "Leaping", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
            "Row", "Secant", "Series", "Sigmoid", "Slope", "Square", "SquareRoot", "SquaredSecant", "State", "Time", "Unknown",

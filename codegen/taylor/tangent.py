@@ -21,12 +21,12 @@ from ..program.lowering import lower
 from ..program.passes import Names
 from ..program.printers import LANES
 from ..program.statements import Comment, Function, If, Return, Role, let, store
-from .graph import Graph, Template, is_analytic
-from .length import last_orders, reach
 from .series import Series, State
-from .step import TaylorStep, check_order
-from .terms import absolute, add, largest, times
-from .unrolled import SQUARE, Lines, Unrolled, polynomial
+from .series_graph import Graph, Template, is_analytic
+from .simplify import absolute, add, largest, times
+from .step_length import last_orders, reach
+from .taylor_step import TaylorStep, check_order
+from .unrolled_series import SQUARE, Lines, Unrolled, polynomial
 
 __all__ = ["TangentStep", "write_tangent"]
 

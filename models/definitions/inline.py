@@ -27,11 +27,11 @@ from ..inputs.checks import (
     suggestion,
     typed_repr,
 )
-from ..inputs.expressions import FUNCTIONS
+from ..inputs.expression_text import FUNCTIONS
 from ..inputs.frozen import Frozen
 from ..mechanics.components import TIME
+from ..mechanics.contact import SLIDING, ContactModel, FrictionLaw
 from ..mechanics.expression import RESERVED, exact
-from ..mechanics.friction import SLIDING, ContactModel, FrictionLaw
 from ..mechanics.lagrangian import check_masses_exist, mass_matrix
 from ..mechanics.oscillator import FRICTION, Coordinate, FieldModel, LagrangianModel, Oscillator
 from ..mechanics.parameter import Parameter

@@ -17,7 +17,7 @@ from ..inputs.frozen import Frozen
 from ..inputs.plugins import call, load
 from ..interactions.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling, split
 from ..mechanics.components import TIME
-from ..mechanics.friction import SLIDING, FrictionLaw
+from ..mechanics.contact import SLIDING, FrictionLaw
 from ..mechanics.oscillator import Coordinate, FieldModel, LagrangianModel, Oscillator, Scaling
 from .definition import COUPLING, FRICTION_LAW, OSCILLATOR, coordinates_of, lagrangian_symbols
 

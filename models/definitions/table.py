@@ -10,8 +10,8 @@ import sympy as sp
 
 from ..inputs.checks import check_keys, check_table, check_text, short_repr, typed_repr
 from ..mechanics.components import TIME
+from ..mechanics.contact import SLIDING, ContactModel, FrictionLaw
 from ..mechanics.expression import read, written
-from ..mechanics.friction import SLIDING, ContactModel, FrictionLaw
 from ..mechanics.oscillator import FieldModel, LagrangianModel, Oscillator
 from ..mechanics.parameter import Parameter
 from .inline import Field, Lagrangian, friction_law

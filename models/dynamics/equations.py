@@ -15,11 +15,11 @@ from itertools import chain, compress, count
 import sympy as sp
 
 from ..graphs.links import AllPairs, Link, Links
+from ..inputs.display import Written
 from ..inputs.names import LinkName
-from ..inputs.shown import Written
 from ..interactions.separation import separated
 from ..mechanics.components import Block, Edge, Node
-from ..mechanics.friction import Contact
+from ..mechanics.contact import Contact
 
 __all__ = ["Ends", "Equations", "Layer", "check"]
 

@@ -23,7 +23,7 @@ from ..interactions.link import edge
 from ..interactions.separation import separated
 from ..mechanics.calculus import cancelled, expanded
 from ..mechanics.components import WEIGHT_NUMBER, Block, Edge, Node
-from ..mechanics.friction import KAPPA, SLIDING, SLIP, ContactModel, FrictionLaw, regularise, set_valued
+from ..mechanics.contact import KAPPA, SLIDING, SLIP, ContactModel, FrictionLaw, regularise, set_valued
 from ..mechanics.lagrangian import LARGEST_BY_MINORS, Mechanics, check_masses_exist, coupled, solve_masses
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
 from ..mechanics.oscillator import FieldModel, LagrangianModel, Oscillator

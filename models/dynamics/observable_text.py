@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ..inputs.checks import check_text, short_repr
-from ..inputs.expressions import COMPOSED, FUNCTIONS, Expressions
+from ..inputs.expression_text import COMPOSED, FUNCTIONS, Expressions
 from ..inputs.reader import Algebra, Expression, NoMeaning, parse, unpaired
 from .observable import Observable, Window, nodes, rate, real
 

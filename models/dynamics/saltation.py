@@ -23,7 +23,7 @@ import sympy as sp
 
 from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, Edge
-from ..mechanics.friction import SLIP
+from ..mechanics.contact import SLIP
 from .equations import Equations
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from itertools import groupby
 from operator import itemgetter
 from typing import TYPE_CHECKING, Protocol
 
-from ..inputs.rationals import total
+from ..inputs.rational_text import total
 from ..spectra.matrix import Matrix
 from .links import Link, one_degree
 

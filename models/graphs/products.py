@@ -13,7 +13,7 @@ from fractions import Fraction
 from itertools import product
 from typing import TYPE_CHECKING, TypeAlias
 
-from ..inputs.rationals import rational
+from ..inputs.rational_text import rational
 from .links import LINK_LIMIT, Link, one_degree
 from .readers import as_topology
 from .topology import Rule, Topology

@@ -15,7 +15,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from ..inputs.checks import check_flag, check_integer, check_printable, short_repr, typed_repr
-from ..inputs.rationals import file_text, rational
+from ..inputs.rational_text import file_text, rational
 from .links import LINK_LIMIT
 from .topology import Topology, from_matrix
 

@@ -1,6 +1,6 @@
 """Graphs whose weights are rational functions of symbols; nothing in a text is run.
 
-Their spectrum holds for symbols as such (`synchain.models.spectra.symbolic`); `SymbolicTopology.at` gives the graph for
+Their spectrum holds for symbols as such (`synchain.models.spectra.symbolic_spectrum`); `SymbolicTopology.at` gives the graph for
 particular numbers, with its own proved spectrum.
 """
 
@@ -18,9 +18,9 @@ from typing import NoReturn
 
 import sympy as sp
 
-from ..inputs.rationals import file_text, parse_rows, rational, square
+from ..inputs.rational_text import file_text, parse_rows, rational, square
 from ..inputs.reader import Algebra, NoMeaning, parse
-from ..spectra.symbolic import SymbolicSpectrum, Z, symbolic_spectrum
+from ..spectra.symbolic_spectrum import SymbolicSpectrum, Z, symbolic_spectrum
 from .topology import Topology, from_matrix
 
 __all__ = ["SymbolicTopology", "from_symbols", "read_symbols", "weight"]
@@ -57,7 +57,7 @@ class SymbolicTopology:
 
     @property
     def spectrum(self) -> SymbolicSpectrum:
-        """The characteristic polynomial, factored (see `synchain.models.spectra.symbolic`)."""
+        """The characteristic polynomial, factored (see `synchain.models.spectra.symbolic_spectrum`)."""
         return symbolic_spectrum(self.matrix, self.name)
 
     def at(self, **values: object) -> Topology:

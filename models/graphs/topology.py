@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ..inputs.checks import check_instance, check_integer, check_printable, short_repr, typed_repr
+from ..inputs.display import Drawn
 from ..inputs.options import Options
-from ..inputs.rationals import file_text, parse_rows, rational_rows, total
-from ..inputs.shown import Drawn
+from ..inputs.rational_text import file_text, parse_rows, rational_rows, total
 from .links import Link, join
 from .matrices import Exact, GraphMatrix, MatrixKind
 
@@ -256,16 +256,16 @@ class Topology(Exact, Drawn):
     def spanning_trees(self) -> Fraction:
         """The number of spanning trees, each counted with the product of its weights.
 
-        See `synchain.models.spectra.trees`.
+        See `synchain.models.spectra.tree_spectrum`.
         """
-        from ..spectra.trees import spanning_trees
+        from ..spectra.tree_spectrum import spanning_trees
 
         return spanning_trees(self)
 
     @property
     def kirchhoff_index(self) -> Fraction:
-        """The sum of the resistances between all pairs of nodes; see `synchain.models.spectra.trees`."""
-        from ..spectra.trees import kirchhoff_index
+        """The sum of the resistances between all pairs of nodes; see `synchain.models.spectra.tree_spectrum`."""
+        from ..spectra.tree_spectrum import kirchhoff_index
 
         return kirchhoff_index(self)
 

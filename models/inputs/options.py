@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, SupportsIndex, TypeAlias
 
 from .checks import check_integer, short_repr
-from .rationals import rational
+from .rational_text import rational
 
 __all__ = ["Option", "Options", "as_options", "integer_option", "integers_option", "probability_option"]
 

@@ -18,7 +18,7 @@ from fractions import Fraction
 import sympy as sp
 
 from ..inputs.checks import check_text, short_repr, suggestion
-from ..inputs.expressions import MAGNITUDE
+from ..inputs.expression_text import MAGNITUDE
 from ..inputs.frozen import Frozen
 from ..mechanics.components import Node
 from ..mechanics.parameter import Parameter

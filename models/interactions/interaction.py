@@ -20,7 +20,7 @@ from ..inputs.checks import (
     suggestion,
     typed_repr,
 )
-from ..inputs.expressions import FUNCTIONS
+from ..inputs.expression_text import FUNCTIONS
 from ..inputs.frozen import Frozen
 from ..mechanics.components import TIME, Node
 from ..mechanics.expression import FRICTION_NAME, LENGTH, exact, read, written

@@ -16,7 +16,7 @@ from functools import lru_cache
 import sympy as sp
 
 from ..mechanics.components import TIME, Block, Edge, Node
-from ..mechanics.friction import SLIP
+from ..mechanics.contact import SLIP
 from ..mechanics.lagrangian import balance, mass_matrix, solve_masses
 from ..mechanics.nondimensional import nondimensional
 from ..mechanics.oscillator import FieldModel, Oscillator

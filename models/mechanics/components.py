@@ -9,7 +9,7 @@ from typing import TypeAlias
 import sympy as sp
 
 from .calculus import derivative
-from .friction import SLIP, Contact
+from .contact import SLIP, Contact
 
 __all__ = ["TIME", "WEIGHT_NUMBER", "Block", "Edge", "Node"]
 

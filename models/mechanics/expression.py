@@ -18,7 +18,7 @@ from sympy.codegen.cfunctions import expm1, log1p
 from sympy.logic.boolalg import Boolean
 
 from ..inputs.checks import short_repr, suggestion
-from ..inputs.expressions import COMPOSED, FUNCTIONS, Expressions
+from ..inputs.expression_text import COMPOSED, FUNCTIONS, Expressions
 from ..inputs.reader import NoMeaning, parse, unpaired
 from ..inputs.unsupported import COMPLEX, unsupported
 from .components import TIME

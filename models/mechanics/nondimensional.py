@@ -12,7 +12,7 @@ import sympy as sp
 
 from .calculus import derivative
 from .components import TIME
-from .friction import SLIDING, ContactModel, FrictionLaw, regularise
+from .contact import SLIDING, ContactModel, FrictionLaw, regularise
 from .lagrangian import Mechanics
 from .oscillator import FRICTION, LagrangianModel, Oscillator
 from .parameter import Parameter, dimension

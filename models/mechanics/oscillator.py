@@ -9,7 +9,7 @@ from typing import Any
 import sympy as sp
 
 from ..inputs.frozen import Frozen
-from .friction import ContactModel, FrictionLaw
+from .contact import ContactModel, FrictionLaw
 from .parameter import Parameter
 
 __all__ = ["FRICTION", "Coordinate", "FieldModel", "LagrangianModel", "Oscillator", "Scaling", "friction"]

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import sympy as sp
 
-from .friction import ContactModel, FrictionLaw
+from .contact import ContactModel, FrictionLaw
 from .lagrangian import mass_matrix
 from .nondimensional import friction_coefficient, nondimensional
 from .oscillator import FieldModel, Oscillator

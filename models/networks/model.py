@@ -22,7 +22,7 @@ from ..inputs.names import LinkName, NodeName
 from ..inputs.unsupported import unsupported
 from ..interactions.coupling import Coupling, LagrangianCoupling, Potential
 from ..mechanics.components import WEIGHT_NUMBER
-from ..mechanics.friction import ContactModel, FrictionLaw
+from ..mechanics.contact import ContactModel, FrictionLaw
 from ..mechanics.oscillator import Oscillator
 from ..mechanics.parameter import Parameter
 

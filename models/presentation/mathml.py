@@ -11,7 +11,7 @@ from html import escape
 from sympy.printing.pretty.pretty_symbology import greek_unicode
 
 from ..dynamics.equations import Equations
-from .equations import lines
+from .equations_text import lines
 from .writer import LATEX_FUNCTIONS, VARIANTS, Latex
 
 __all__ = ["formula", "mathml"]

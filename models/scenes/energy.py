@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..networks.energy import Energy, energy_of
+from ..networks.energy_terms import Energy, energy_of
 from .scene import Scene
 
 __all__ = ["energy"]

@@ -13,7 +13,7 @@ from ..inputs.checks import check_table, check_text, short_repr, suggestion
 from ..inputs.frozen import Frozen
 from ..inputs.names import ATTRIBUTES, NodeName, expect_free
 from ..mechanics.components import TIME
-from ..networks.energy import energy_of
+from ..networks.energy_terms import energy_of
 from ..networks.model import Model
 from ..sweeps.parameters import varied
 from .section import Section

@@ -16,22 +16,22 @@ from ..dynamics.periodicity import Drive, as_function, names_in, period_of
 from ..dynamics.record import Record
 from ..graphs.topology import Topology
 from ..inputs.checks import check_instance, check_table, check_text, is_row, listed, suggestion
+from ..inputs.display import Drawn, Written
 from ..inputs.frozen import Frozen
 from ..inputs.keywords import called_from_outside, warn
 from ..inputs.names import NodeName
-from ..inputs.shown import Drawn, Written
 from ..inputs.unsupported import unsupported
 from ..interactions.coupling import Coupling
 from ..interactions.link import strength
-from ..mechanics.friction import SLIP, ContactModel, FrictionLaw
+from ..mechanics.contact import SLIP, ContactModel, FrictionLaw
 from ..mechanics.oscillator import Oscillator
+from ..networks.layers import as_topology
 from ..networks.model import Group, Model
-from ..networks.parts import as_topology
 from ..sweeps.axis import Axis
+from ..sweeps.checked_axes import Continuation
 from ..sweeps.draw import GRAPH, Draws, drawn_axes
 from ..sweeps.parameters import drive, varied, without
-from ..sweeps.sweep import Continuation
-from .complete import TimeUnit, complete
+from .defaults import TimeUnit, complete
 from .dictionary import arguments, as_dict
 from .section import Section
 from .toml import write

@@ -15,12 +15,12 @@ from ..graphs.families import names as families
 from ..inputs import plugins
 from ..inputs.plugins import Kind
 from ..inputs.words import Word
-from ..mechanics.friction import ContactModel
+from ..mechanics.contact import ContactModel
 from ..mechanics.parameter import Parameter
 from ..networks.model import MOST_NODES
 from ..sweeps.axis import LIMIT as AXIS_LIMIT
 from ..sweeps.draw import GRAPH
-from .complete import LIMITS, integrators
+from .defaults import LIMITS, integrators
 from .scene import KEYWORDS, Scene
 from .section import Direction
 

@@ -13,7 +13,7 @@ from ..algebra.balls import precision
 from ..algebra.lazy import LazyEigenvalues
 from ..algebra.roots import Root, coefficient_text
 from ..inputs.checks import check_instance
-from ..inputs.shown import Written
+from ..inputs.display import Written
 from .eigenvalue import Eigenvalue, decimal
 
 __all__ = ["Spectrum", "table"]

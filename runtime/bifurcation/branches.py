@@ -22,7 +22,7 @@ from synchain.models.inputs.keywords import warn
 from synchain.models.inputs.names import expect_free
 from synchain.models.scenes.scene import Scene
 
-from ..cells.keywords import Given
+from ..cells.run_keywords import Given
 from ..results.labelled import Labelled, dataset
 from ..support.error_text import range_text
 from ..support.execution import Execution

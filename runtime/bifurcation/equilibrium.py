@@ -30,10 +30,10 @@ from synchain.models.dynamics.variational import expect_continuous
 from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
-from ..cells.keywords import Given
+from ..cells.run_keywords import Given
 from ..results.labelled import Labelled, dataset, scene_text
 from ..results.labels import STATE, States
-from ..sweeps.start import Start, started
+from ..sweeps.continued_start import Start, started
 from .linearised import Linearised
 
 __all__ = ["Equilibrium", "equilibrium"]

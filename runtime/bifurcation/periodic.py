@@ -23,10 +23,10 @@ from scipy.optimize import brentq
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.inputs.checks import short_repr
 from synchain.models.inputs.keywords import warn
-from synchain.models.mechanics.friction import SLIP
+from synchain.models.mechanics.contact import SLIP
 from synchain.models.scenes.scene import Scene
 
-from ..cells.keywords import Given
+from ..cells.run_keywords import Given
 from ..results.labelled import Labelled, dataset, scene_text
 from ..stability.attractor import RETURN, cycle_propagators
 from ..stability.exponents import coupled_cell, single_cell

@@ -22,10 +22,10 @@ from numpy.polynomial import Polynomial
 
 from synchain.models.graphs.families import topology
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.friction import Contact
+from synchain.models.mechanics.contact import Contact
 from synchain.models.scenes.scene import Scene
 
-from ..cells.keywords import ONE_CELL
+from ..cells.run_keywords import ONE_CELL
 from ..sweeps.run import run
 
 __all__ = ["Phases", "phases_of"]

@@ -19,10 +19,10 @@ import xarray as xr
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.inputs.checks import check_integer, check_keys, check_number, check_table, short_repr
 from synchain.models.inputs.frozen import Frozen
-from synchain.models.mechanics.friction import SLIP
+from synchain.models.mechanics.contact import SLIP
 from synchain.models.scenes.scene import Scene, a_scene
 
-from ..cells.keywords import Given, with_numbers
+from ..cells.run_keywords import Given, with_numbers
 from ..results.labelled import Labelled, dataset
 from ..stability.exponents import coupled_cell
 from ..stability.orbits import Orbits, driven_states, within

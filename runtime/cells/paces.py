@@ -10,14 +10,14 @@ from typing import NamedTuple
 import numpy as np
 import sympy as sp
 
-from synchain.codegen.steps.mass import turned_masses
+from synchain.codegen.steps.mass_solve import turned_masses
 from synchain.codegen.taylor import is_analytic, is_large
 from synchain.models.dynamics.equations import Equations, Layer
 from synchain.models.graphs.links import AllPairs, Link
 from synchain.models.inputs.names import NodeName
 from synchain.models.mechanics.components import TIME, Block, Edge, Node
 
-from .rates import eigenvalue_rates, turns
+from .stiffness_rates import eigenvalue_rates, turns
 
 __all__ = ["Paces", "Templates", "fastest_rates"]
 

@@ -17,7 +17,7 @@ from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
 
 from .initial_modes import local_clock, with_modes
-from .stays import shortest_stays
+from .shortest_interval import shortest_stays
 
 __all__ = [
     "Plan",

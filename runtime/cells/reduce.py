@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 
 from synchain.codegen.driver.columns import Point, Sum
-from synchain.codegen.kernels.observed import Watched
+from synchain.codegen.kernels.observable_text import Watched
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.reduction import NoQuotient, quotient, substitute_constants
 from synchain.models.inputs.checks import check_flag
@@ -26,7 +26,7 @@ from synchain.models.scenes.scene import Scene, a_scene
 
 from ..support.status import Status
 from .buffers import IN_MEMORY, Buffers, numbers_of_a_cell
-from .observed import Observed, Sections, watched
+from .observable_arrays import Observed, Sections, watched
 from .plan import Plan, Planner
 
 __all__ = ["NodeMerge", "Reduction", "as_reduction", "explain", "reduce_scene"]

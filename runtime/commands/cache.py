@@ -25,7 +25,7 @@ def execute(arguments: Namespace) -> int:
     """Describe, empty or fill the cache."""
     if arguments.action == "warm":
         return _warm()
-    from synchain.codegen.kernels.cache import clear, describe
+    from synchain.codegen.machine_code.cache import clear, describe
 
     try:
         info = describe()
@@ -46,7 +46,7 @@ def execute(arguments: Namespace) -> int:
 def _warm() -> int:
     """Compile the common drivers that the folder does not hold yet, with a line for each."""
     from synchain.codegen.kernels import driver
-    from synchain.codegen.kernels.compile import load_shared
+    from synchain.codegen.machine_code.compile import load_shared
 
     for common in driver.common_drivers():
         made = load_shared(common)

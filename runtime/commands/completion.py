@@ -63,12 +63,11 @@ def _whole() -> ArgumentParser:
 
     from synchain.models.graphs.families import names as families
 
-    from ..bench import names as benchmarks
-    from ..figures import names as figures
+    from ..paper import names as figures
     from . import command, names
 
     places = {"DIR": shtab.DIRECTORY, "FILE": shtab.FILE, "XML": shtab.FILE, "SCENE": SCENES}
-    words = {"TOPOLOGY": families(), "FIGURE": figures(extra=True), "BENCHMARK": benchmarks()}
+    words = {"TOPOLOGY": families(), "FIGURE": figures(extra=True)}
     whole = ArgumentParser(prog="synchain")
     whole.add_argument("--version", action="store_true", help="print the version")
     commands = whole.add_subparsers(dest="command")

@@ -29,6 +29,19 @@ SOUND, DOUBTFUL, WRONG = "fine", "doubtful", "wrong"
 TRAJECTORY_ERROR = 1e-9
 """Largest error of a state of the trial kernel."""
 
+DRIVE_PERIODS = (
+    (0.49651127615228413, -0.0057670521276488),
+    (0.18501018103435476, 0.09999773701994646),
+    (0.728198814423405, 0.09237293284448857),
+    (0.004262807240396986, 0.10000256031741263),
+    (0.5505620170579013, 0.09997575781703481),
+)
+"""Position and velocity of TRIAL at the ends of five drive periods, from quadruple precision."""
+
+TRIAL = {"omega": 1.15, "u": 0.1, "theta_b": 0.1, "epsilon": 2.0, "mu_s": 0.3, "mu_k": 0.15, "a": 2.5, "kappa": 1e5}
+"""Parameters of the friction oscillator that is integrated, from rest at x = 0.3."""
+
+
 NO_FMA = "kernels take up to twice the time and round otherwise; unset NUMBA_CPU_NAME and NUMBA_CPU_FEATURES if set"
 
 Answer = tuple[str, str, str]
@@ -107,7 +120,7 @@ def _packages() -> Answer:
 
 
 def _cache() -> Answer:
-    from synchain.codegen.kernels.cache import cache_folder, describe, open_folder
+    from synchain.codegen.machine_code.cache import cache_folder, describe, open_folder
 
     try:
         with open_folder(cache_folder()) as opened:
@@ -156,12 +169,27 @@ def judge_spectrum(eigenvalues: Mapping[sp.Expr, int]) -> Answer:
 def _trajectory() -> Answer:
     import numpy as np
 
-    from ..bench.kit.cases import read_case
-    from ..bench.kit.own_program import prepare
+    from synchain.models.graphs.families import topology
+    from synchain.models.scenes.scene import Scene
 
-    case = read_case("friction, n = 1").within(5)
-    states, counts = prepare(case, "rodas5p", 1)(1e-11, 1e-12, case.times)
-    return judge_trajectory(float(np.abs(states - case.states).max()), int(counts[-1, 1]))
+    from ..sweeps.run import run
+
+    periods = len(DRIVE_PERIODS)
+    scene = Scene(
+        topology=topology("chain", 1),
+        parameters=TRIAL,
+        initial={"x": 0.3, "v": 0.0},
+        transient=0,
+        window=periods,
+        record=("trajectory",),
+        samples=periods + 1,
+        integrator="rodas5p",
+        rtol=1e-11,
+        atol=1e-12,
+    )
+    found = run(scene, width=1, workers=1, show_progress=False)
+    states = found.trajectory.values.reshape(periods + 1, 2)[1:]  # of the ends of the periods
+    return judge_trajectory(float(np.abs(states - DRIVE_PERIODS).max()), int(found.steps))
 
 
 def judge_trajectory(error: float, steps: int) -> Answer:

@@ -33,7 +33,7 @@ def configure(parser: ArgumentParser) -> None:
 
 def execute(arguments: Namespace) -> int:
     """Print the equations as text, LaTeX, JSON or source."""
-    from synchain.models.presentation.equations import as_dict, latex, text
+    from synchain.models.presentation.equations_text import as_dict, latex, text
     from synchain.models.scenes.file import load_scene
 
     with wrong_use():

@@ -35,8 +35,8 @@ def execute(arguments: Namespace) -> int:
 
     matplotlib.use("Agg")
 
-    from ..figures import load, names
-    from ..figures.make import written
+    from ..paper import load, names
+    from ..paper.make import written
     from ..support.files import output_folder
 
     with wrong_use():

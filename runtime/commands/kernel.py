@@ -25,7 +25,7 @@ def execute(arguments: Namespace) -> int:
     """Print the functions of the scene, or the driver that runs them; nothing is compiled."""
     from synchain.models.scenes.file import load_scene
 
-    from ..cells.kernels import kernel_source
+    from ..engines.scene_kernels import kernel_source
 
     with wrong_use():
         source = kernel_source(load_scene(arguments.scene))

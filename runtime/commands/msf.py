@@ -20,7 +20,7 @@ from ..console.arguments import (
     settings,
     spaced,
 )
-from ..console.network import add_network, named_network, scene_on
+from ..console.network_arguments import add_network, named_network, scene_on
 from ..console.outcome import FINE, Failed, WrongUse, print_json, sentence, warn, wrong_use
 
 if TYPE_CHECKING:
@@ -112,9 +112,9 @@ def execute(arguments: Namespace) -> int:
 
 def _write(found: MSF | Plane, folder: Path) -> list[Path]:
     """Write numbers and plot, over complex strengths with the rays of modes; return both paths."""
-    from ..figures.plane import draw_rays
-    from ..figures.style import context
-    from ..figures.tables import Table, as_csv
+    from ..plots.csv_table import Table, as_csv
+    from ..plots.plane import draw_rays
+    from ..plots.style import context
     from ..stability.msf import Plane
     from ..support.files import whole_file, write_text
 
@@ -153,7 +153,7 @@ def _scene(arguments: Namespace, numbers: dict[str, float], rows: Rows) -> Scene
     from synchain.models.graphs.families import topology
     from synchain.models.scenes.file import load_scene
 
-    from ..cells.keywords import with_numbers
+    from ..cells.run_keywords import with_numbers
 
     scene = None if arguments.scene is None else load_scene(arguments.scene)
     network = named_network(arguments, scene)
@@ -176,7 +176,7 @@ def _check(scene: Scene, arguments: Namespace, rows: Rows, alpha: np.ndarray) ->
     """Raise ValueError for what cannot be computed; return warnings of complex eigenvalues."""
     import numpy as np
 
-    from ..prediction.modes import transversal_modes
+    from ..prediction.mode_windows import transversal_modes
     from ..prediction.synchronisability import windows
     from ..stability.orbits import Orbits, pair_of
 

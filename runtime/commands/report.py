@@ -28,7 +28,7 @@ def execute(arguments: Namespace) -> int:
 
     from synchain.models.scenes.file import load_scene
 
-    from ..seeing.report import QUICK, Effort, report
+    from ..reports.scene_report import QUICK, Effort, report
     from ..support.files import check_replaceable, output_folder, write_text
 
     with wrong_use():

@@ -89,8 +89,8 @@ def configure(parser: ArgumentParser) -> None:
 
 def execute(arguments: Namespace) -> int:
     """Explain the scene where asked to; run it to a file, draw, and say how the cells ended."""
-    from ..cells.kernels import kernel
     from ..cells.reduce import explain, reduce_scene
+    from ..engines.scene_kernels import kernel
     from ..support.status import Status
     from ..sweeps.errors import SweepFailed, SweepInterrupted
     from ..sweeps.stream import claim, stream
@@ -142,7 +142,7 @@ def changed_scene(arguments: Namespace) -> Scene:
     """The scene with the changes of --set and --rtol; ValueError where they do not fit."""
     from synchain.models.scenes.file import load_scene
 
-    from ..cells.keywords import Given
+    from ..cells.run_keywords import Given
     from ..sweeps.run import run
 
     scene = load_scene(arguments.scene)
@@ -177,8 +177,8 @@ def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[st
 
 def _check(skip: Reduction, arguments: Namespace) -> None:
     """Raise now what would stop the run later."""
-    from ..cells.kernels import kernel_source
     from ..cells.plan import Planner
+    from ..engines.scene_kernels import kernel_source
     from ..sweeps.certify import check_certifiable
 
     if arguments.out is None:
@@ -277,7 +277,7 @@ def _draw(target: Path) -> Path:
     import matplotlib
 
     matplotlib.use("Agg")
-    from ..figures.result_plot import draw_result
+    from ..plots.result_plot import draw_result
     from ..results.labels import scene_of
     from ..results.result import Result
     from ..results.store import opened

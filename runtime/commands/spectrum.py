@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
 from ..console.arguments import add_allow_code, whole
-from ..console.network import FILES, named_graph, named_values
+from ..console.network_arguments import FILES, named_graph, named_values
 from ..console.outcome import FINE, WrongUse, print_json, warn, wrong_use
 
 if TYPE_CHECKING:

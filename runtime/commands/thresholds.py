@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..console.arguments import above_zero, add_scene, add_workers, positive, spaced
-from ..console.network import add_network, named_network, scene_on
+from ..console.network_arguments import add_network, named_network, scene_on
 from ..console.outcome import FINE, WrongUse, print_json, warn, wrong_use
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def configure(parser: ArgumentParser) -> None:
 
 def execute(arguments: Namespace) -> int:
     """Print the summary of the synchronous ranges, or JSON."""
-    from ..cells.kernels import kernel_source
+    from ..engines.scene_kernels import kernel_source
     from ..synchronisation.hidden_modes import hidden_modes
     from ..synchronisation.threshold import check_probe, default_grid, thresholds
 

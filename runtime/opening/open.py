@@ -36,7 +36,7 @@ def _classes() -> dict[str, type]:
     from ..bifurcation.phases import Phases
     from ..bifurcation.skeleton import Skeleton
     from ..stability.attractor import Attractor, Motion
-    from ..stability.clusters import ClusterExponents
+    from ..stability.cluster_exponents import ClusterExponents
     from ..stability.exponents import Exponents
     from ..stability.lyapunov import Lyapunov
     from ..stability.msf import MSF, Plane

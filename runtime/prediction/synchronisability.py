@@ -28,11 +28,11 @@ import numpy as np
 import sympy as sp
 
 from synchain.models.graphs.topology import Topology
-from synchain.models.spectra.order import compare
+from synchain.models.spectra.eigenvalue_order import compare
 
 from ..support.error_text import interval_text
 from .intervals import find
-from .modes import NetworkMode, has_loose_parts, transversal_modes
+from .mode_windows import NetworkMode, has_loose_parts, transversal_modes
 from .stable_ranges import StableRange, exact_ranges, widen
 
 __all__ = [

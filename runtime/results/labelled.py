@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from synchain.models.inputs.shown import Shown
+from synchain.models.inputs.display import Shown
 
 from .codec import encode
 from .store import write_data
@@ -72,7 +72,7 @@ class Labelled(Shown):
         return self._drawn(ax)
 
     def _drawn(self, ax: Axes | None, **options: Any) -> Axes:
-        from synchain.runtime.seeing.draw import drawn
+        from synchain.runtime.plots.drawing import drawn
 
         return drawn(self, ax, **options)
 

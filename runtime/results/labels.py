@@ -13,13 +13,13 @@ import xarray as xr
 from synchain.codegen.driver.columns import Count, Point, Span, Sum
 from synchain.models.scenes.scene import Scene
 
-from ..cells.choice import method_names
-from ..cells.observed import Observed, Sections
+from ..cells.observable_arrays import Observed, Sections
+from ..engines.choice import method_names
 from ..support.status import Status
 from .certificate import VERDICTS, Certificate
 
 if TYPE_CHECKING:
-    from synchain.codegen.kernels.compile import Kernel
+    from synchain.codegen.machine_code.compile import Kernel
 
     from ..cells.buffers import Buffers
 

@@ -18,7 +18,7 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import IN_MEMORY, Buffers, numbers_of_a_cell
 from ..cells.layout import Layout
-from ..cells.observed import Sections
+from ..cells.observable_arrays import Sections
 from ..cells.plan import Planner
 from ..cells.reduce import NodeMerge, Reduction
 from ..support.files import understood

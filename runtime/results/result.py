@@ -11,12 +11,12 @@ import numpy as np
 import xarray as xr
 
 from synchain.codegen.driver.columns import Count, Point
-from synchain.codegen.kernels.processor import processor, told_apart
+from synchain.codegen.machine_code.processor import processor, told_apart
 from synchain.models.inputs.checks import check_choice, check_instance
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.buffers import Buffers
-from ..cells.observed import Observed, Sections
+from ..cells.observable_arrays import Observed, Sections
 from ..support.files import understood
 from ..support.status import Status
 from .certificate import Certificate

@@ -1,7 +1,7 @@
 """Transversal Lyapunov exponents of the synchronous state: the master stability function.
 
 One orbit carries the modes of all strengths alpha + i beta = -sigma gamma at once
-(`synchain.codegen.kernels.modes`). The propagators of most modes are interpolated in the strength
+(`synchain.codegen.kernels.mode_kernel`). The propagators of most modes are interpolated in the strength
 (`synchain.runtime.stability.interpolation`). On a fixed point or a periodic orbit locked to the
 drive the exponents follow from eigenvalues. Elsewhere they are the mean growth of a deviation, with
 an error from batch means (`Batches`).
@@ -25,7 +25,7 @@ from synchain.models.inputs.checks import check_integer
 from synchain.models.inputs.keywords import warn
 from synchain.models.scenes.scene import Scene, a_scene
 
-from ..cells.keywords import ONE_CELL, ORBITS, Given
+from ..cells.run_keywords import ONE_CELL, ORBITS, Given
 from ..prediction.intervals import Interval
 from ..results.labelled import Labelled, dataset
 from ..support.arrays import numbers
@@ -36,9 +36,9 @@ from ..support.progress import Hook, Reporter
 from .attractor import Attractor, Motion, find_attractor
 from .averages import Averaging, Batches
 from .motion import starts_near
-from .network import unused_axes
 from .orbits import Orbits, pair_of
-from .slowness import warn_of_slow_motion
+from .slow_motion import warn_of_slow_motion
+from .transversal_modes import unused_axes
 
 __all__ = [
     "Exponents",

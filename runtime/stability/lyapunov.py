@@ -31,9 +31,9 @@ from synchain.models.dynamics.variational import PHASE, Variation, network_varia
 from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
-from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import with_modes
-from ..cells.keywords import ONE_ORBIT, Given
+from ..cells.run_keywords import ONE_ORBIT, Given
+from ..engines.choice import chosen_for_modes
 from ..results.labelled import Labelled, dataset
 from ..support.error_text import with_error
 from ..support.execution import Execution
@@ -43,7 +43,7 @@ from .exponents import single_cell
 from .interpolation import Interpolation, Panel
 from .motion import Turns, rates_of, turns_of
 from .orbits import LOOKS, OF_EXTENT, unit_of_time
-from .slowness import warn_of_slow_motion
+from .slow_motion import warn_of_slow_motion
 from .variational_integrator import Travellers, VariationalIntegrator
 
 __all__ = ["Lyapunov", "lyapunov_spectrum"]

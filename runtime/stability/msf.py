@@ -23,10 +23,10 @@ from synchain.models.inputs.keywords import warn
 from synchain.models.inputs.names import expect_free
 from synchain.models.scenes.scene import Scene, a_scene
 
-from ..cells.keywords import ORBITS, Given, with_numbers
+from ..cells.run_keywords import ORBITS, Given, with_numbers
 from ..prediction.intervals import Interval
-from ..prediction.modes import defective_rows
-from ..prediction.modes import transversal_modes as network_modes
+from ..prediction.mode_windows import defective_rows
+from ..prediction.mode_windows import transversal_modes as network_modes
 from ..prediction.synchronisability import Answer, Verdict, Window, verdict, windows, windows_complex
 from ..results.labelled import Labelled, as_json, dataset, drive_text, scene_text
 from ..support.arrays import row
@@ -35,7 +35,7 @@ from ..support.execution import Execution
 from ..support.progress import Hook
 from .averages import Averaging
 from .exponents import Exponents, along, coupled_cell, exponent_rows, orbits_of, transversal, with_partner
-from .network import SharedOrbit, shared_orbits, still_strengths, transversal_modes
+from .transversal_modes import SharedOrbit, shared_orbits, still_strengths, transversal_modes
 
 __all__ = ["MSF", "Plane", "StabilityClass", "classify", "msf", "plane"]
 

@@ -19,11 +19,11 @@ from synchain.models.dynamics.mode_inertia import inertia_of_modes
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.dynamics.variational import Variation, mode
 from synchain.models.graphs.families import topology
-from synchain.models.mechanics.friction import SLIP
+from synchain.models.mechanics.contact import SLIP
 from synchain.models.scenes.scene import Scene
 
-from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import with_modes
+from ..engines.choice import chosen_for_modes
 from .averages import BATCHES, SLACK, TRIED, error_of_steps
 from .interpolation import Interpolation, exact_interpolation, lines_of, strength_interpolation
 from .motion import Rates, Turns, above, extent_of, rates_of, turns_of

@@ -1,6 +1,6 @@
 """Integration of orbits together with deviations, one stretch of time after the other.
 
-The arrays here surround the kernels of `synchain.codegen.kernels.modes`.
+The arrays here surround the kernels of `synchain.codegen.kernels.mode_kernel`.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ import numpy as np
 
 from synchain.codegen.driver.columns import Control
 from synchain.codegen.integrators import Integrator
-from synchain.codegen.kernels.compile import Kernel, load
-from synchain.codegen.kernels.modes import emit_modes
+from synchain.codegen.kernels.mode_kernel import emit_modes
+from synchain.codegen.machine_code.compile import Kernel, load
 from synchain.codegen.simd.lane_types import native_width
 from synchain.models.dynamics.variational import Variation
 from synchain.models.scenes.scene import Scene
 
-from ..cells.choice import chosen_for_modes, warn_of_stiff_modes
 from ..cells.initial_modes import local_clock
 from ..cells.plan import by_place, control_array, first_step, half_swing, periods, tolerances
-from ..cells.rates import mode_rates
+from ..cells.stiffness_rates import mode_rates
+from ..engines.choice import chosen_for_modes, warn_of_stiff_modes
 from ..support.status import Status
 from ..support.threads import worker_count
 from .averages import SLACK, TRIED, error_of_steps

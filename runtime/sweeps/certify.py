@@ -16,23 +16,23 @@ import numpy as np
 
 from synchain.models.dynamics.variational import mode
 from synchain.models.scenes.scene import Scene
-from synchain.models.sweeps.sweep import rest_in_sweep
+from synchain.models.sweeps.checked_axes import rest_in_sweep
 
 from ..cells.buffers import Buffers
-from ..cells.keywords import Given, with_numbers
 from ..cells.layout import Layout
 from ..cells.plan import Planner
 from ..cells.reduce import Reduction
+from ..cells.run_keywords import Given, with_numbers
+from ..engines.job import Start
 from ..results.certificate import ERRORS, Certificate
 from ..results.labels import States
 from ..stability.attractor import Motion
 from ..stability.averages import Averaging, errors_for
 from ..stability.exponents import along, coupled_cell
-from ..stability.network import shared_orbits, transversal_modes
 from ..stability.orbits import Orbits, unit_of_time, within
+from ..stability.transversal_modes import shared_orbits, transversal_modes
 from ..support.execution import Execution
 from .errors import SweepFailed, SweepInterrupted
-from .job import Start
 from .memory import Memory
 from .pool import Task, worker_lost
 from .prepare import PreparedRun

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..cells.buffers import Buffers
-from ..cells.choice import warn_of_steps
 from ..cells.layout import Layout
-from ..cells.observed import Sections
+from ..cells.observable_arrays import Sections
+from ..engines.choice import warn_of_steps
+from ..engines.job import Start
 from ..results.labels import STATE, States, dimensions
 from ..results.result import Result, gather
 from ..support.progress import Reporter
 from ..support.status import tally
 from .errors import SweepFailed, SweepInterrupted
-from .job import Start
 from .pool import Task, worker_lost
 from .prepare import PreparedRun
 from .scheduler import BlockScheduler

@@ -12,8 +12,8 @@ from queue import Empty, SimpleQueue
 import numpy as np
 
 from ..cells.buffers import Buffers
+from ..engines.job import Job
 from ..support.execution import Execution
-from .job import Job
 from .worker import forget, run_block
 
 __all__ = ["Task", "WorkerPool", "worker_lost"]

@@ -7,17 +7,17 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-from synchain.codegen.kernels.compile import load
+from synchain.codegen.machine_code.compile import load
 from synchain.models.scenes.scene import Scene
 
-from ..cells.kernels import warn_of_chords, write_kernel
 from ..cells.layout import Layout, block_size
 from ..cells.reduce import Reduction
+from ..engines.job import JobSpec, SweepJob, SweepSpec
+from ..engines.scene_kernels import warn_of_chords, write_kernel
 from ..results.certificate import Certificate
 from ..results.labels import provenance
 from ..support.execution import Execution
-from .job import JobSpec, SweepJob, SweepSpec
-from .start import expect_whole_periods
+from .continued_start import expect_whole_periods
 
 __all__ = ["PreparedRun", "prepare"]
 

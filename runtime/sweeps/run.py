@@ -10,16 +10,16 @@ import numpy as np
 from synchain.models.inputs.checks import check_flag, check_instance
 from synchain.models.scenes.scene import Scene, a_scene
 
-from ..cells.keywords import Given
 from ..cells.reduce import Reduction, as_reduction
+from ..cells.run_keywords import Given
 from ..results.labels import dimensions
 from ..results.result import Result
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .certify import certified as with_certificate
+from .continued_start import START_TIME, Start, several, started, starts_of_cells
 from .memory import Memory
 from .prepare import prepare
-from .start import START_TIME, Start, several, started, starts_of_cells
 
 __all__ = ["run"]
 

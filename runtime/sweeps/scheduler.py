@@ -12,9 +12,9 @@ import numpy as np
 
 from ..cells.buffers import Buffers
 from ..cells.layout import Layout
+from ..engines.job import Start
 from ..support.progress import Reporter
 from ..support.status import tally
-from .job import Start
 from .pool import Task, WorkerPool
 from .prepare import PreparedRun
 

@@ -13,15 +13,16 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from synchain.codegen.kernels.installation import InstallationError
-from synchain.codegen.kernels.processor import told_apart
+from synchain.codegen.machine_code.installation import InstallationError
+from synchain.codegen.machine_code.processor import told_apart
 from synchain.models.inputs.checks import check_flag, check_path, short_repr
 from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
-from ..cells.keywords import Given
 from ..cells.layout import Layout
 from ..cells.reduce import Reduction, as_reduction
+from ..cells.run_keywords import Given
+from ..engines.job import Start
 from ..results.block_log import BlockLog
 from ..results.labelled import Labelled
 from ..results.labels import alike, changed, scene_of
@@ -35,7 +36,6 @@ from ..support.progress import Hook, Progress, Reporter
 from ..support.status import Status, tally
 from .certify import certified as with_certificate
 from .errors import SweepFailed, SweepInterrupted
-from .job import Start
 from .pool import Task, worker_lost
 from .prepare import PreparedRun, prepare
 from .scheduler import BlockScheduler

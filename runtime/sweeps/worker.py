@@ -8,7 +8,7 @@ import threading
 from collections import OrderedDict
 
 from ..cells.buffers import Buffers
-from .job import Job, JobSpec
+from ..engines.job import Job, JobSpec
 
 __all__ = ["JobCache", "forget", "run_block"]
 

@@ -23,9 +23,9 @@ from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
 
-from ..cells.keywords import Given
+from ..cells.run_keywords import Given
 from ..stability.exponents import Exponents, exponents
-from ..stability.network import unused_axes
+from ..stability.transversal_modes import unused_axes
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .criterion import IN_CRITERION, AppliedCriterion, Criterion, checked

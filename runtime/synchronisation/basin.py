@@ -19,13 +19,13 @@ import xarray as xr
 
 from synchain.models.inputs.checks import check_integer, check_number, check_table
 from synchain.models.inputs.words import Word
-from synchain.models.mechanics.friction import SLIP
-from synchain.models.scenes.complete import TimeUnit
+from synchain.models.mechanics.contact import SLIP
+from synchain.models.scenes.defaults import TimeUnit
 from synchain.models.scenes.scene import Scene, a_scene
 
-from ..cells.keywords import Given
 from ..cells.plan import Planner
 from ..cells.reduce import Reduction, reduce_scene
+from ..cells.run_keywords import Given
 from ..results.labelled import Labelled, dataset, scene_text
 from ..results.labels import STATE, States
 from ..support.arrays import row

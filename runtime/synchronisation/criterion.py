@@ -12,7 +12,7 @@ import numpy as np
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.checks import check_instance, check_integer, check_number, check_positive
-from synchain.models.scenes.complete import TimeUnit
+from synchain.models.scenes.defaults import TimeUnit
 from synchain.models.scenes.scene import Scene
 
 from ..cells.plan import scale_of_atol

@@ -27,16 +27,16 @@ from synchain.models.interactions.link import strength
 from synchain.models.mechanics.components import Edge
 from synchain.models.scenes.scene import Scene
 
-from ..cells.choice import chosen_for_rows
-from ..cells.keywords import Given
 from ..cells.plan import Plan, Planner, control_of
+from ..cells.run_keywords import Given
+from ..engines.choice import chosen_for_rows
+from ..engines.job import RowsSpec
 from ..results.labelled import Labelled, dataset, scene_text
-from ..stability.network import unused_axes
+from ..stability.transversal_modes import unused_axes
 from ..support.arrays import numbers
 from ..support.error_text import range_text
 from ..support.execution import Execution
 from ..support.progress import Hook
-from ..sweeps.job import RowsSpec
 from .criterion import IN_CRITERION, AppliedCriterion, Criterion, checked, errors, offsets, preset, resolved
 from .synchronous_motion import SynchronousMotion, alike, first_starts, measure_motion, spread_of
 from .trials import Trials

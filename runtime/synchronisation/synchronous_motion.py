@@ -15,7 +15,7 @@ import numpy as np
 
 from synchain.codegen.driver.columns import Span
 from synchain.models.dynamics.equations import Equations
-from synchain.models.mechanics.friction import SLIP
+from synchain.models.mechanics.contact import SLIP
 from synchain.models.scenes.scene import Scene
 
 from ..cells.paces import fastest_rates

@@ -22,18 +22,18 @@ from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
 from synchain.models.inputs.checks import check_number, check_positive
-from synchain.models.scenes.complete import TimeUnit
+from synchain.models.scenes.defaults import TimeUnit
 from synchain.models.scenes.scene import Scene, a_scene
 from synchain.models.spectra.spectrum import Spectrum
 
-from ..cells.keywords import Given
 from ..cells.plan import Planner
 from ..cells.reduce import reduce_scene
+from ..cells.run_keywords import Given
 from ..prediction.intervals import Interval, intersect, refine, scale
 from ..prediction.synchronisability import expect_no_repulsion
 from ..results.labelled import Labelled, as_json, dataset, scene_text
 from ..stability.averages import check_whole
-from ..stability.network import unused_axes
+from ..stability.transversal_modes import unused_axes
 from ..support.arrays import row
 from ..support.error_text import interval_text, range_text
 from ..support.execution import Execution

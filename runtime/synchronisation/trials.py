@@ -11,20 +11,20 @@ from typing import NamedTuple
 import numpy as np
 
 from synchain.codegen.driver.columns import Count, Sum
-from synchain.codegen.kernels.compile import load
-from synchain.codegen.kernels.sweep import KernelSource
+from synchain.codegen.kernels.sweep_kernel import KernelSource
+from synchain.codegen.machine_code.compile import load
 from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
-from ..cells.choice import chosen_for_rows
-from ..cells.kernels import write_kernel
 from ..cells.layout import block_size
 from ..cells.plan import Plan, control_of
 from ..cells.reduce import Reduction
+from ..engines.choice import chosen_for_rows
+from ..engines.job import JobSpec, RowsSpec
+from ..engines.scene_kernels import write_kernel
 from ..support.execution import Execution
 from ..support.status import CODES, Status, tally
 from ..sweeps.errors import SweepFailed, SweepInterrupted
-from ..sweeps.job import JobSpec, RowsSpec
 from ..sweeps.pool import Task, WorkerPool, worker_lost
 
 __all__ = ["Outcome", "Rows", "Trials", "mean_errors"]

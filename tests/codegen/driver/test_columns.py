@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from synchain.codegen.driver import names as text
+from synchain.codegen.driver import clock_slots as text
 from synchain.codegen.driver.columns import Control, Count, Sum
 
 

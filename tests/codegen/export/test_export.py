@@ -21,8 +21,8 @@ import sympy as sp
 from samples import CASES, Late, numbered, pendula, real, telescopes
 
 from synchain.codegen.export.c import to_c
-from synchain.codegen.export.names import RESERVED, portable
 from synchain.codegen.export.numba import to_numba
+from synchain.codegen.export.portable_names import RESERVED, portable
 from synchain.codegen.export.python import to_python
 from synchain.codegen.program.lowering import Library, number
 from synchain.codegen.program.printers import C99, MATH, NUMPY, Printer

@@ -15,8 +15,8 @@ from samples import DIGITS, Interpreted, take_step, waving
 
 from synchain.codegen import integrators
 from synchain.codegen.integrators import Integrator
-from synchain.codegen.kernels.sweep import emit
-from synchain.models.scenes import complete
+from synchain.codegen.kernels.sweep_kernel import emit
+from synchain.models.scenes import defaults
 
 METHODS = {name: m for name in integrators.names() if not (m := integrators.integrator(name)).series}
 ROUNDING = {"rosenbrock": 4e-14, "explicit": 2e-14}
@@ -323,4 +323,4 @@ def test_wrong_integrators_are_refused():
 
 
 def test_scenes_know_the_integrators_that_there_are():
-    assert complete.integrators() == integrators.names()
+    assert defaults.integrators() == integrators.names()

@@ -14,8 +14,8 @@ import pytest
 from scipy.linalg import expm
 
 from synchain.codegen import integrators
-from synchain.codegen.kernels import compile as loading
-from synchain.codegen.simd import decorator
+from synchain.codegen.front_end import decorator
+from synchain.codegen.machine_code import compile as loading
 from synchain.models import Field, Rates, Scene, chain
 from synchain.runtime import run
 from synchain.runtime.support.status import Status

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 from synchain.codegen import integrators
 from synchain.codegen.export.python import to_python
-from synchain.codegen.kernels.compile import load
+from synchain.codegen.machine_code.compile import load
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Edge, Node
 

@@ -9,9 +9,9 @@ import scipy.linalg
 import sympy as sp
 from variational_reference import transversal_equations
 
-from synchain.codegen.kernels.compile import load
-from synchain.codegen.kernels.modes import emit_modes
-from synchain.codegen.kernels.sweep import emit
+from synchain.codegen.kernels.mode_kernel import emit_modes
+from synchain.codegen.kernels.sweep_kernel import emit
+from synchain.codegen.machine_code.compile import load
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation, mode, network_variation
 from synchain.models.graphs.families import topology

@@ -9,10 +9,10 @@ from itertools import product
 import pytest
 
 import synchain as sc
-from synchain.codegen.kernels.observed import Watched
+from synchain.codegen.kernels.observable_text import Watched
 from synchain.codegen.program.functions import LANES
 from synchain.codegen.program.printers import Lanes
-from synchain.codegen.steps.names import tidy
+from synchain.codegen.steps.safe_names import tidy
 from synchain.models.dynamics.observable_text import KNOWN, as_observable
 
 INSIDE = ("rate(v)", "x", "x_2", "rate(x_1)", "nodes.mean(x*rate(v))", "mu", "t")

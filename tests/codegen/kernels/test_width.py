@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from synchain.codegen.integrators import integrator
-from synchain.codegen.kernels.sweep import emit
+from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.simd.lane_types import native_width
 from synchain.models import Scene, chain
 

@@ -13,11 +13,11 @@ from samples import CASES, FLOATS, TABLE, Interpreted, friction_chain, path, rea
 from sympy.functions.elementary.piecewise import ExprCondPair
 
 from synchain.codegen import integrators
-from synchain.codegen.kernels.sweep import emit
+from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.program.passes import Body, Hoist, Names
 from synchain.codegen.steps.blocks import analyse
-from synchain.codegen.steps.names import RESERVED, tidy
-from synchain.codegen.steps.program import program
+from synchain.codegen.steps.safe_names import RESERVED, tidy
+from synchain.codegen.steps.sparse_plan import program
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Edge, Node
 

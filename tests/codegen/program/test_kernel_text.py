@@ -16,10 +16,10 @@ from samples import CASES, TABLE, friction_chain, real
 from synchain.codegen import simd
 from synchain.codegen.integrators import integrator
 from synchain.codegen.kernels.driver import RECORDERS, Driver, KernelKind, Recorder, imports
-from synchain.codegen.kernels.modes import emit_modes
-from synchain.codegen.kernels.sweep import emit
+from synchain.codegen.kernels.mode_kernel import emit_modes
+from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.program.lowering import UnprintableError
-from synchain.codegen.steps.names import tidy
+from synchain.codegen.steps.safe_names import tidy
 from synchain.codegen.taylor import write_looped, write_step
 from synchain.models import chain
 from synchain.models.dynamics.equations import Equations

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from samples import FLOATS, friction_chain, harmonic_chain, plain, spring
 
 from synchain.codegen import driver
-from synchain.codegen.kernels.sweep import emit
+from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.program.expressions import ONE, Name, Negation, negative
 from synchain.codegen.program.printers import LANES
 from synchain.codegen.steps.elimination import less, plan, times, write_factors, write_solve
-from synchain.codegen.steps.program import order, program
+from synchain.codegen.steps.sparse_plan import order, program
 from synchain.models.dynamics.equations import Equations
 
 Links = list[tuple[int, int]]
@@ -216,7 +216,7 @@ def test_the_program_solves_the_system(links, weighted):
 
 
 def driver_names() -> tuple[str, ...]:
-    from synchain.codegen.steps.names import NAMES
+    from synchain.codegen.steps.safe_names import NAMES
 
     return NAMES
 

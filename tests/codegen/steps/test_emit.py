@@ -31,13 +31,13 @@ from samples import (
 )
 
 from synchain.codegen import integrators
-from synchain.codegen.kernels.sweep import emit
+from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.program import lowering
 from synchain.codegen.program.expressions import Expression, call
 from synchain.codegen.steps.elimination import plan
-from synchain.codegen.steps.names import NAMES
 from synchain.codegen.steps.places import by_joint
-from synchain.codegen.steps.program import program
+from synchain.codegen.steps.safe_names import NAMES
+from synchain.codegen.steps.sparse_plan import program
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 

@@ -7,13 +7,13 @@ import pytest
 from samples import FLOATS, kernel, plain, run_cells
 
 from synchain.codegen import driver
-from synchain.codegen.steps.names import NAMES
-from synchain.codegen.steps.program import Program, order, program
+from synchain.codegen.steps.safe_names import NAMES
+from synchain.codegen.steps.sparse_plan import Program, order, program
 from synchain.models import chain, complete, grid, random_cubic, ring, star, tree, wheel
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.cells.kernels import kernel_source
+from synchain.runtime.engines.scene_kernels import kernel_source
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.run import run
 

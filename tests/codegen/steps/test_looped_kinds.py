@@ -11,14 +11,14 @@ from samples import FLOATS, Interpreted, clocks, take_step
 from scipy.integrate import solve_ivp
 
 from synchain.codegen.export.python import to_python
-from synchain.codegen.kernels.sweep import emit
+from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.steps.places import by_joint
-from synchain.codegen.steps.program import program
+from synchain.codegen.steps.sparse_plan import program
 from synchain.models import ring, star
 from synchain.models.dynamics.equations import Equations
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.results.energy import energy_function
+from synchain.runtime.results.energy_of_states import energy_function
 from synchain.runtime.sweeps.run import run
 
 

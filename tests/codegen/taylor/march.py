@@ -12,9 +12,9 @@ import numpy as np
 from numba import njit as numba_njit
 
 from synchain.codegen import simd
-from synchain.codegen.simd.trees import execute
-from synchain.codegen.steps.names import tidy
-from synchain.codegen.steps.program import program
+from synchain.codegen.front_end.syntax_trees import execute
+from synchain.codegen.steps.safe_names import tidy
+from synchain.codegen.steps.sparse_plan import program
 from synchain.codegen.taylor import TaylorStep, write_looped, write_step
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import Node

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from synchain.codegen.steps.names import tidy
-from synchain.codegen.steps.program import program
+from synchain.codegen.steps.safe_names import tidy
+from synchain.codegen.steps.sparse_plan import program
 from synchain.codegen.taylor import write_looped, write_rolled, write_step
 from synchain.models.dynamics.equations import Equations
 

@@ -12,7 +12,7 @@ from march import Lanes, alone, compiled, step_of
 from plain import Text, march
 from samples import path, spring
 
-from synchain.codegen.steps.names import tidy
+from synchain.codegen.steps.safe_names import tidy
 from synchain.codegen.taylor import jump, write_looped
 from synchain.models import Scene, chain
 from synchain.models.dynamics.equations import Equations

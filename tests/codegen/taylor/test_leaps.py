@@ -13,7 +13,7 @@ from plain import march
 from samples import path
 from scipy.integrate import solve_ivp
 
-from synchain.codegen.steps.names import tidy
+from synchain.codegen.steps.safe_names import tidy
 from synchain.codegen.taylor import jump, write_looped, write_step
 from synchain.models import Field, Rates, Scene, chain, ring
 from synchain.models.dynamics.equations import Equations

@@ -11,7 +11,7 @@ from plain import march
 from samples import clocks, inertial
 from scipy.integrate import solve_ivp
 
-from synchain.codegen.steps.names import tidy
+from synchain.codegen.steps.safe_names import tidy
 from synchain.codegen.taylor import write_looped
 from synchain.models import chain
 from synchain.models.dynamics.equations import Equations

@@ -8,11 +8,11 @@ from plain import Text
 
 import synchain as sc
 from synchain.codegen.integrators import integrator
-from synchain.codegen.kernels.sweep import emit
-from synchain.codegen.steps.names import tidy
+from synchain.codegen.kernels.sweep_kernel import emit
+from synchain.codegen.steps.safe_names import tidy
 from synchain.codegen.taylor import is_large, order_for, write_rolled
 from synchain.models.dynamics.equations import Equations
-from synchain.runtime.cells.kernels import kernel_source
+from synchain.runtime.engines.scene_kernels import kernel_source
 
 
 def node(*rates: str, **parameters: float) -> Equations:

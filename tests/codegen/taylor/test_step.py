@@ -17,9 +17,9 @@ from samples import numbers, path, spring
 from scipy.integrate import solve_ivp
 
 from synchain.codegen.program.statements import walk
-from synchain.codegen.steps.names import tidy
+from synchain.codegen.steps.safe_names import tidy
 from synchain.codegen.taylor import order_for, write_looped, write_step
-from synchain.codegen.taylor.step import called
+from synchain.codegen.taylor.taylor_step import called
 from synchain.models import Scene, chain, complete
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME as T

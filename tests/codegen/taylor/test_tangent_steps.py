@@ -14,8 +14,8 @@ from variational_reference import transversal_equations
 
 from synchain.codegen.driver.columns import Control
 from synchain.codegen.integrators import Integrator, integrator
-from synchain.codegen.kernels.modes import emit_modes
-from synchain.codegen.steps.names import tidy
+from synchain.codegen.kernels.mode_kernel import emit_modes
+from synchain.codegen.steps.safe_names import tidy
 from synchain.codegen.taylor import write_tangent
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation, mode, network_variation

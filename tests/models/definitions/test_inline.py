@@ -20,7 +20,7 @@ from synchain.codegen.program.functions import FUNCTIONS as PRINTED
 from synchain.models import Field, Lagrangian, Parameter, friction, friction_law
 from synchain.models.definitions.loader import load_friction_law, load_oscillator
 from synchain.models.definitions.table import as_name_or_table, law_of_table, oscillator_of_table
-from synchain.models.inputs.expressions import FUNCTIONS
+from synchain.models.inputs.expression_text import FUNCTIONS
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.expression import exact, read, written
 from synchain.models.mechanics.oscillator import Oscillator

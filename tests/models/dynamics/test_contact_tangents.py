@@ -15,7 +15,7 @@ from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
 from synchain.models.symmetries.clusters import clusters
 from synchain.runtime.bifurcation.periodic import periodic_orbit
-from synchain.runtime.stability.clusters import cluster_exponents
+from synchain.runtime.stability.cluster_exponents import cluster_exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum
 from synchain.runtime.stability.orbits import Orbits
 

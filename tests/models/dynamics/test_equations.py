@@ -152,7 +152,7 @@ DIGEST = """
 from fractions import Fraction
 from parts import edge, node
 from synchain.models.dynamics.network import network
-from synchain.models.presentation.equations import as_dict
+from synchain.models.presentation.equations_text import as_dict
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.links import Link
 def digests():

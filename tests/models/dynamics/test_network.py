@@ -20,7 +20,7 @@ from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.inputs.plugins import call, load, names
 from synchain.models.interactions.coupling import Coupling
 from synchain.models.mechanics.components import TIME, Node
-from synchain.models.mechanics.friction import ContactModel
+from synchain.models.mechanics.contact import ContactModel
 from synchain.models.mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, static_coefficient
 from synchain.models.mechanics.oscillator import Oscillator
 

@@ -17,7 +17,7 @@ from synchain.models.graphs.families import topology
 from synchain.models.graphs.products import cartesian, complement, weighted
 from synchain.models.graphs.readers import as_topology, from_edges, from_graph, from_sparse, read_edges, read_graphml
 from synchain.models.graphs.topology import Topology, from_matrix
-from synchain.models.inputs.rationals import FILE_LIMIT
+from synchain.models.inputs.rational_text import FILE_LIMIT
 from synchain.models.networks.model import union_of
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene

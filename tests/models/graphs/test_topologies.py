@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from synchain.models.graphs.families import family, names, topology
 from synchain.models.graphs.topology import Topology, from_matrix, read_matrix
-from synchain.models.inputs.rationals import FILE_LIMIT
+from synchain.models.inputs.rational_text import FILE_LIMIT
 from synchain.models.scenes.scene import Scene
 from synchain.models.scenes.warnings import zero_multiplicity
 

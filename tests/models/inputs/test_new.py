@@ -24,7 +24,7 @@ from synchain.models import chain
 from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.graphs.families import TOPOLOGY, names, topology
 from synchain.models.inputs import plugins
-from synchain.models.mechanics.friction import ContactModel
+from synchain.models.mechanics.contact import ContactModel
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cli import main

@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from synchain.models.definitions.inline import Lagrangian, friction_law
 from synchain.models.dynamics.reduction import substitute_constants
 from synchain.models.graphs.families import topology
-from synchain.models.mechanics.friction import SLIP, set_valued
+from synchain.models.mechanics.contact import SLIP, set_valued
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.run import run

@@ -26,7 +26,7 @@ from synchain.models.inputs.plugins import names
 from synchain.models.interactions.coupling import MatrixCoupling
 from synchain.models.mechanics.components import Node
 from synchain.models.mechanics.oscillator import FieldModel
-from synchain.models.presentation.equations import text
+from synchain.models.presentation.equations_text import text
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.sweeps.run import run

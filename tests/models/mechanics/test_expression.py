@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import synchain as sc
-from synchain.models.inputs.expressions import FUNCTIONS
+from synchain.models.inputs.expression_text import FUNCTIONS
 from synchain.models.mechanics.expression import exact, read, written
 
 NAMES = {name: sp.Symbol(name, real=True) for name in ("x", "z", "k", "t")}

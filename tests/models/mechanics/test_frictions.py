@@ -15,7 +15,7 @@ from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCIL
 from synchain.models.dynamics.network import parameters
 from synchain.models.inputs.frozen import Frozen
 from synchain.models.inputs.plugins import load, names
-from synchain.models.mechanics.friction import KAPPA, ContactModel, FrictionLaw, regularise
+from synchain.models.mechanics.contact import KAPPA, ContactModel, FrictionLaw, regularise
 from synchain.models.mechanics.nondimensional import friction_coefficient
 from synchain.models.mechanics.parameter import Parameter
 

@@ -22,7 +22,7 @@ from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.energy import energy
 from synchain.models.scenes.scene import Scene
 from synchain.models.scenes.section import Section
-from synchain.models.sweeps.start import default_start
+from synchain.models.sweeps.initial_values import default_start
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.run import run
 

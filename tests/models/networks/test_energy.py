@@ -20,7 +20,7 @@ from synchain.models.mechanics.oscillator import Coordinate, LagrangianModel, Os
 from synchain.models.scenes.energy import energy
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.results.energy import energy_function
+from synchain.runtime.results.energy_of_states import energy_function
 
 FORCES = [c for c in names(COUPLING) if not hasattr(load(COUPLING, c), "kinetic")]
 """The couplings without inertia: their accelerations are the right-hand side itself."""

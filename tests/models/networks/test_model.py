@@ -12,10 +12,10 @@ from synchain.models import Parameter, chain
 from synchain.models.inputs.frozen import Frozen
 from synchain.models.inputs.names import NodeName
 from synchain.models.interactions.coupling import WEIGHT, LagrangianCoupling, MatrixCoupling
-from synchain.models.mechanics.friction import ContactModel, FrictionLaw
+from synchain.models.mechanics.contact import ContactModel, FrictionLaw
 from synchain.models.mechanics.oscillator import FRICTION, Coordinate, FieldModel, LagrangianModel, Oscillator
+from synchain.models.networks.layers import as_law, as_oscillator
 from synchain.models.networks.model import Model, NodeKind
-from synchain.models.networks.parts import as_law, as_oscillator
 from synchain.models.scenes.scene import Scene
 
 x, v, w, mu, k, sigma, q_i, q_j = sp.symbols("x v w mu k sigma q_i q_j", real=True)

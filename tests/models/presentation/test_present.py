@@ -19,8 +19,8 @@ from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.plugins import names
 from synchain.models.mechanics.components import TIME, Edge, Node
-from synchain.models.mechanics.friction import ContactModel
-from synchain.models.presentation.equations import LARGEST, as_dict, latex, text
+from synchain.models.mechanics.contact import ContactModel
+from synchain.models.presentation.equations_text import LARGEST, as_dict, latex, text
 
 PAIR = made(topology("chain", 2))
 X, Y, Z, A = sp.symbols("x y z a", real=True)

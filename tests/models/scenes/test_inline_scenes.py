@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from synchain.models import Field, Lagrangian, Parameter, Scene, chain, friction_law, load_scene, ring, scene_names
-from synchain.models.mechanics.friction import ContactModel
+from synchain.models.mechanics.contact import ContactModel
 from synchain.models.mechanics.oscillator import Oscillator
 from synchain.models.scenes.toml import toml
 

@@ -11,12 +11,12 @@ from scipy.integrate import solve_ivp
 from variational_reference import transversal_equations
 
 from synchain.codegen.export.python import to_python
-from synchain.codegen.kernels.sweep import emit
+from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.models import Field, chain, ring, star
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Node
-from synchain.models.presentation.equations import text
+from synchain.models.presentation.equations_text import text
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.reduce import reduce_scene

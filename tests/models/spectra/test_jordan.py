@@ -20,7 +20,7 @@ from synchain.models.spectra.jordan import geometric_multiplicity, nullity
 from synchain.models.spectra.solve import Proof, spectrum
 from synchain.models.spectra.spectrum import Spectrum, table
 from synchain.runtime.cli import main
-from synchain.runtime.prediction.modes import defective_rows
+from synchain.runtime.prediction.mode_windows import defective_rows
 
 ONE = Fraction(1)
 

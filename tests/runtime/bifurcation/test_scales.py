@@ -7,7 +7,7 @@ import pytest
 
 import synchain as sc
 from synchain.runtime.bifurcation.skeleton import near_returns, starts_of
-from synchain.runtime.seeing.draw import stretches
+from synchain.runtime.plots.drawing import stretches
 
 DUFFING = sc.Field(
     {"x": "k*s/r*v", "v": "k*r*(F*cos(k*w*t) - v/r/10 + (x - c)/s - ((x - c)/s)**3)"},

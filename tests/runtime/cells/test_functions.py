@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import erf, exprel
 
 import synchain as sc
-from synchain.models.inputs.expressions import FUNCTIONS
+from synchain.models.inputs.expression_text import FUNCTIONS
 
 SMOOTH = (
     "acos(x/9) - acosh(2 + x*x) + asin(x/9) - asinh(3*x) + atan(x) - atanh(x/9) + cos(x) - cosh(x/3) + erf(2*x)"

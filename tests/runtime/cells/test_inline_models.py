@@ -13,8 +13,8 @@ import synchain as sc
 from synchain.models.definitions.loader import load_oscillator
 from synchain.models.mechanics.oscillator import Oscillator
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.cells.kernels import kernel_source
 from synchain.runtime.cli import main
+from synchain.runtime.engines.scene_kernels import kernel_source
 
 t = dynamicsymbols._t
 x = dynamicsymbols("x")

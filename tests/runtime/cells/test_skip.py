@@ -9,17 +9,17 @@ import pytest
 import xarray as xr
 from samples import source_of
 
+from benchmarks import skip as bench
 from synchain.models import chain, ring, star
 from synchain.models.dynamics import reduction as reduction_module
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.scenes.scene import Scene
 from synchain.models.sweeps.axis import Axis
-from synchain.runtime.bench import skip as bench
 from synchain.runtime.cells import reduce as skip_module
 from synchain.runtime.cells.buffers import Buffers
-from synchain.runtime.cells.kernels import kernel, kernel_source
 from synchain.runtime.cells.reduce import explain, reduce_scene
 from synchain.runtime.cli import main
+from synchain.runtime.engines.scene_kernels import kernel, kernel_source
 from synchain.runtime.results.result import Result
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.run import run

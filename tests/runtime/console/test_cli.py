@@ -23,11 +23,11 @@ from synchain.models.graphs.families import names as families
 from synchain.models.scenes.file import load_scene, scene_names
 from synchain.models.scenes.schema import schema
 from synchain.runtime import commands
-from synchain.runtime.cells import kernels
 from synchain.runtime.cli import main
 from synchain.runtime.console.outcome import print_json
+from synchain.runtime.engines import job, scene_kernels
 from synchain.runtime.opening.open import open_result
-from synchain.runtime.sweeps import job, stream
+from synchain.runtime.sweeps import stream
 from synchain.runtime.synchronisation import threshold
 from synchain.runtime.synchronisation.criterion import PAPER
 from synchain.runtime.synchronisation.exponent_windows import ExponentWindows
@@ -57,7 +57,7 @@ def scene(tmp_path: Path) -> str:
 @pytest.fixture
 def compiled(scene: str) -> None:
     """The kernel of a sweep of the scene is there, so that a command has no line to say about it."""
-    kernels.kernel(load_scene(scene).replace(axes={"sigma": [0.0, 0.25, 0.5]}))
+    scene_kernels.kernel(load_scene(scene).replace(axes={"sigma": [0.0, 0.25, 0.5]}))
 
 
 def matrix(folder: Path, text: str) -> str:
@@ -206,7 +206,7 @@ def test_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> N
 
 
 def test_equations_in_three_forms(capsys: pytest.CaptureFixture[str]) -> None:
-    from synchain.models.presentation import equations as present
+    from synchain.models.presentation import equations_text as present
 
     equations = load_scene("two_oscillators").equations
     for option, expected in (([], present.text(equations)), (["--latex"], present.latex(equations))):
@@ -219,10 +219,10 @@ def test_equations_in_three_forms(capsys: pytest.CaptureFixture[str]) -> None:
 def test_kernel_prints_the_source_without_compiling(
     scene: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delattr(kernels, "load")
+    monkeypatch.delattr(scene_kernels, "load")
     assert main(["kernel", scene]) == 0
     out = capsys.readouterr().out
-    source = kernels.kernel_source(load_scene(scene))
+    source = scene_kernels.kernel_source(load_scene(scene))
     assert out == source.text
     compile(out, "kernel", "exec")
     assert main(["kernel", scene, "--driver"]) == 0
@@ -492,7 +492,7 @@ def test_thresholds_really_simulates(capsys: pytest.CaptureFixture[str]) -> None
 def test_figures_are_made_by_their_names(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from synchain.runtime.figures import make
+    from synchain.runtime.paper import make
 
     asked: list[Any] = []
     monkeypatch.setattr(make, "written", lambda *words: asked.append(words) or [tmp_path / "out" / "figure_4b.png"])
@@ -504,7 +504,7 @@ def test_figures_are_made_by_their_names(
 def test_interrupted_figures_print_the_files_that_are_whole(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from synchain.runtime.figures import make
+    from synchain.runtime.paper import make
 
     def written(*words: object) -> Iterator[Path]:
         yield tmp_path / "figure_4a.png"
@@ -513,19 +513,6 @@ def test_interrupted_figures_print_the_files_that_are_whole(
     monkeypatch.setattr(make, "written", written)
     assert main(["figures", "4a", "4b", "--out", str(tmp_path)]) == 1
     assert capsys.readouterr() == (f"{tmp_path / 'figure_4a.png'}\n", "synchain figures: interrupted\n")
-
-
-def test_benchmarks_print_a_table_each(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    from synchain.runtime.bench import precision
-
-    asked: list[bool] = []
-    monkeypatch.setattr(precision, "measure", lambda quick: asked.append(quick) or [(2, "scalar", 0.25)])
-    assert main(["bench", "--quick", "precision"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert "Numba" in lines[0]
-    assert lines[2] == "precision"
-    assert lines[-1] == "| 2 | scalar | 0.25 |"
-    assert asked == [True]
 
 
 def test_the_cache_is_described_and_emptied(
@@ -602,7 +589,6 @@ WRONG = [
     ("figures nope", "unknown figure 'nope'"),
     ("figures 4b --out {scene}", "the name of a file; expected a folder"),
     ("cache empty", "invalid choice"),
-    ("bench nope", "unknown benchmark 'nope'; known: agreement, "),
 ]
 
 

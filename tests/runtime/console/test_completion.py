@@ -11,10 +11,9 @@ import pytest
 
 from synchain.models import scene_names
 from synchain.models.graphs.families import names as families
-from synchain.runtime.bench import names as benchmarks
 from synchain.runtime.cli import main
 from synchain.runtime.commands import names as commands
-from synchain.runtime.figures import names as figures
+from synchain.runtime.paper import names as figures
 
 ASK = {
     "bash": "source ./script; COMP_WORDS=({quoted}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1));"
@@ -56,7 +55,7 @@ def test_the_script_is_of_the_shell(script: tuple[str, Path]) -> None:
 
 def test_the_script_has_all_names(script: tuple[str, Path]) -> None:
     text = (script[1] / "script").read_text()
-    known = {*commands(), *scene_names(), *families(), *figures(extra=True), *benchmarks(), "--certify"}
+    known = {*commands(), *scene_names(), *families(), *figures(extra=True), "--certify"}
     assert [name for name in known if name.removeprefix("--") not in text] == []
 
 

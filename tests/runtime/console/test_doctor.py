@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from synchain.codegen.kernels import compile as loading
+from synchain.codegen.machine_code import compile as loading
 from synchain.models.graphs.families import topology
 from synchain.runtime.cli import main
 from synchain.runtime.commands import doctor

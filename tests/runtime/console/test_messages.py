@@ -13,19 +13,19 @@ import numpy as np
 import pytest
 from test_load import SOURCE
 
-from synchain.codegen.kernels import compile as loading
+from synchain.codegen.machine_code import compile as loading
 from synchain.models import chain
 from synchain.models.presentation.writer import Latex
 from synchain.models.scenes.scene import Scene
 from synchain.runtime import cli
-from synchain.runtime.cells.kernels import warn_of_chords, write_kernel
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.cli import main
 from synchain.runtime.commands.run import _nothing_to_do
 from synchain.runtime.console.arguments import spaced
+from synchain.runtime.engines import job
+from synchain.runtime.engines.scene_kernels import warn_of_chords, write_kernel
 from synchain.runtime.prediction.synchronisability import Window
 from synchain.runtime.support.error_text import interval_text, with_error
-from synchain.runtime.sweeps import job
 from synchain.runtime.sweeps.certify import check_certifiable
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.sweeps.stream import claim
@@ -90,7 +90,7 @@ def test_the_command_line_prints_what_is_told_and_leaves_no_trace(capsys):
     logger = logging.getLogger("synchain")
     before = logger.level, list(logger.handlers)
     with cli._news("synchain run"):
-        logging.getLogger("synchain.codegen.kernels.compile").info("compiling a kernel")
+        logging.getLogger("synchain.codegen.machine_code.compile").info("compiling a kernel")
     assert capsys.readouterr().err == "synchain run: compiling a kernel\n"
     assert (logger.level, logger.handlers) == before
 

@@ -9,7 +9,7 @@ import pytest
 from flint import arb
 
 from synchain.models.graphs.families import topology
-from synchain.runtime.prediction.families import CLOSED, eigenratio, largest_network
+from synchain.runtime.prediction.largest_networks import CLOSED, eigenratio, largest_network
 from synchain.runtime.prediction.synchronisability import verdict
 
 

@@ -16,9 +16,9 @@ from synchain.models.algebra.roots import RealRoot
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.spectra.eigenvalue import Eigenvalue
+from synchain.models.spectra.eigenvalue_order import compare
 from synchain.models.spectra.jordan import geometric_multiplicity
-from synchain.models.spectra.order import compare
-from synchain.runtime.prediction.modes import transversal_modes
+from synchain.runtime.prediction.mode_windows import transversal_modes
 from synchain.runtime.prediction.stable_ranges import StableRange, exact_ranges, widen
 from synchain.runtime.prediction.synchronisability import verdict, windows
 from synchain.runtime.synchronisation.threshold import project

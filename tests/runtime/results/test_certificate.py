@@ -126,7 +126,7 @@ def test_cells_of_one_sweep_that_end_apart_have_exponents_of_their_own() -> None
 
 
 def test_an_interrupted_run_is_resumed_with_its_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from synchain.runtime.sweeps.job import SweepJob
+    from synchain.runtime.engines.job import SweepJob
 
     module = sys.modules[run.__module__]
     work, certified, calls = SweepJob.run, module.with_certificate, []

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from benchmarks.energy import CASES
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.bench.energy import CASES
-from synchain.runtime.results.energy import energy_function
+from synchain.runtime.results.energy_of_states import energy_function
 from synchain.runtime.sweeps.run import run
 
 

@@ -16,7 +16,7 @@ from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.mechanics.components import Edge
 from synchain.models.scenes.scene import Scene
 from synchain.models.symmetries.clusters import clusters, orbital_partitions
-from synchain.runtime.stability.clusters import ClusterExponents, cluster_exponents
+from synchain.runtime.stability.cluster_exponents import ClusterExponents, cluster_exponents
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.run import run
 

@@ -13,7 +13,7 @@ from effort import effort
 
 import synchain as sc
 from synchain.runtime import run
-from synchain.runtime.cells.choice import Ladder
+from synchain.runtime.engines.choice import Ladder
 
 
 def one_pendulum() -> sc.Scene:

@@ -26,10 +26,10 @@ from synchain.models import (
     uniform,
 )
 from synchain.models.definitions.loader import load_oscillator
-from synchain.models.networks.energy import Energy
+from synchain.models.networks.energy_terms import Energy
 from synchain.models.scenes.energy import energy as energy_of
-from synchain.runtime.cells.kernels import kernel_source
-from synchain.runtime.results.energy import energy_function
+from synchain.runtime.engines.scene_kernels import kernel_source
+from synchain.runtime.results.energy_of_states import energy_function
 from synchain.runtime.sweeps.run import run
 
 X, V, P, K = sp.symbols("x v P K")

@@ -18,16 +18,16 @@ import numpy as np
 import pytest
 from streams import MAP, UP, partial, warm
 
-from synchain.codegen.kernels.installation import InstallationError
+from synchain.codegen.machine_code.installation import InstallationError
 from synchain.models import chain
 from synchain.models.graphs.products import cartesian
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.cells.kernels import write_kernel
 from synchain.runtime.cells.reduce import reduce_scene
+from synchain.runtime.engines.job import JobSpec, SweepSpec
+from synchain.runtime.engines.scene_kernels import write_kernel
 from synchain.runtime.opening.open import open_result
 from synchain.runtime.results.result import Result
 from synchain.runtime.sweeps.errors import SweepFailed
-from synchain.runtime.sweeps.job import JobSpec, SweepSpec
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.sweeps.stream import stream
 from synchain.runtime.sweeps.worker import JobCache, forget
@@ -65,7 +65,7 @@ def test_a_worker_with_other_versions_or_another_kernel_refuses(monkeypatch):
     packed = spec(MAP).packed()
     with pytest.raises(RuntimeError, match="makes the kernel"):
         replace(spec(MAP), digest="0" * 64).rebuilt()
-    monkeypatch.setattr("synchain.runtime.sweeps.job.versions", lambda: "synchain 0.0.1, numba 0.0.1")
+    monkeypatch.setattr("synchain.runtime.engines.job.versions", lambda: "synchain 0.0.1, numba 0.0.1")
     with pytest.raises(RuntimeError, match=r"this worker has synchain 0\.0\.1, .*; expected .*, synchain "):
         JobSpec.unpacked(packed)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import synchain as sc
-from synchain.codegen.driver import names
+from synchain.codegen.driver import clock_slots
 from synchain.codegen.driver.cells import unbounded
 from synchain.runtime.support.status import Status
 
@@ -63,16 +63,16 @@ def test_linear_growth_has_its_exponent() -> None:
 
 def clock(**values: float) -> np.ndarray:
     """The clock of one lane."""
-    found = np.zeros(names.CLOCK)
+    found = np.zeros(clock_slots.CLOCK)
     for name, value in values.items():
-        found[getattr(names, name)] = value
+        found[getattr(clock_slots, name)] = value
     return found
 
 
 def control(steps: float) -> np.ndarray:
     """A budget."""
-    found = np.zeros(names.FURTHER)
-    found[names.MAX_STEPS] = steps
+    found = np.zeros(clock_slots.FURTHER)
+    found[clock_slots.MAX_STEPS] = steps
     return found
 
 

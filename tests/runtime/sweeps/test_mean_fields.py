@@ -10,10 +10,10 @@ from scipy.integrate import solve_ivp
 import synchain as sc
 from synchain.models.dynamics.network import FEW
 from synchain.models.graphs.links import LINK_LIMIT, AllPairs
-from synchain.runtime.cells.choice import Ladder
-from synchain.runtime.cells.kernels import chosen_integrator, kernel_source, ladder_of
 from synchain.runtime.cells.plan import Planner
 from synchain.runtime.cells.reduce import reduce_scene
+from synchain.runtime.engines.choice import Ladder
+from synchain.runtime.engines.scene_kernels import chosen_integrator, kernel_source, ladder_of
 
 THETA, OMEGA, K, LAG = sp.symbols("theta omega K lag")
 PHASE = sc.Field({THETA: OMEGA}, parameters={OMEGA: 0})

@@ -6,12 +6,12 @@ import numpy as np
 from samples import run_cells
 
 from synchain.codegen.driver.columns import Count
-from synchain.codegen.kernels.compile import load
-from synchain.codegen.kernels.sweep import emit
+from synchain.codegen.kernels.sweep_kernel import emit
+from synchain.codegen.machine_code.compile import load
 from synchain.models import chain
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.cells.kernels import chosen_integrator
 from synchain.runtime.cells.reduce import reduce_scene
+from synchain.runtime.engines.scene_kernels import chosen_integrator
 from synchain.runtime.sweeps.run import run
 
 PAIR = Scene(

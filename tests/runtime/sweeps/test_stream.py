@@ -24,8 +24,8 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.commands.run import stopped_by_signals
-from synchain.runtime.figures.result_plot import draw_result
 from synchain.runtime.opening.open import open_result
+from synchain.runtime.plots.result_plot import draw_result
 from synchain.runtime.results.block_log import HEAD, BlockLog
 from synchain.runtime.support.netcdf import Sheet
 from synchain.runtime.support.status import Status
@@ -545,7 +545,7 @@ def test_other_versions_do_not_go_on_with_a_run(tmp_path, monkeypatch, interrupt
     path = tmp_path / "a.nc"
     with pytest.raises(SweepInterrupted):
         stream(MAP, path, show_progress=False, progress=interrupt_at(1))
-    monkeypatch.setattr("synchain.runtime.sweeps.job.versions", lambda: "synchain 0.0.1, numba 0.0.1")
+    monkeypatch.setattr("synchain.runtime.engines.job.versions", lambda: "synchain 0.0.1, numba 0.0.1")
     with pytest.raises(ValueError, match=r"was begun with synchain .*; found synchain 0\.0\.1, numba"):
         stream(MAP, path, resume=True, show_progress=False)
 

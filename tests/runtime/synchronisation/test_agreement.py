@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import benchmarks
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.scenes.scene import Scene
-from synchain.runtime import bench
 from synchain.runtime.stability.exponents import Exponents, exponents
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.synchronisation.agreement import (
@@ -136,7 +136,7 @@ def test_what_is_refused() -> None:
 
 
 def test_the_benchmark_has_a_row_for_each_graph(monkeypatch: pytest.MonkeyPatch) -> None:
-    module = bench.load("agreement")
+    module = benchmarks.load("agreement")
     monkeypatch.setattr(module, "POINTS", 10)
     rows = module.measure(quick=True)
     assert [row[:3] for row in rows] == [("chain(3)", 1.15, 2), ("star(4)", 1.15, 2)]

@@ -14,7 +14,7 @@ from synchain.models import Field, chain, complete, star
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
-from synchain.runtime.figures.style import GREEN
+from synchain.runtime.plots.style import GREEN
 from synchain.runtime.stability.exponents import Exponents, exponents
 from synchain.runtime.stability.msf import MSF
 from synchain.runtime.support.execution import Execution
@@ -437,7 +437,7 @@ def test_the_effort_of_the_exponents_can_be_chosen(monkeypatch):
     ],
 )
 def test_exponents_that_do_not_apply_say_why(scene, why, monkeypatch):
-    monkeypatch.setattr("synchain.codegen.kernels.sweep._suited", lambda *_: 1)  # the drivers of other tests
+    monkeypatch.setattr("synchain.codegen.kernels.sweep_kernel._suited", lambda *_: 1)  # the drivers of other tests
     found = thresholds(scene, sigma=[0.0, 0.1], **ASKED)
     assert found.exponents.intervals == ()
     assert why in found.exponents.absent

@@ -1,0 +1,394 @@
+"""The text of a sweep kernel: one self-contained module from equations, an integrator and records."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+import numpy as np
+import sympy as sp
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.periodicity import angular_frequency
+from synchain.models.dynamics.record import Record
+from synchain.models.graphs.links import LINK_LIMIT
+
+from .. import driver
+from ..driver.dimensions import Dimensions, ModeDimensions
+from ..integrators import Integrator, integrator
+from ..program.passes import Names, real
+from ..program.printers import LANES
+from ..program.statements import Function, Role, operations
+from ..simd import lanes
+from ..steps.blocks import NodeBlocks, analyse
+from ..steps.contact_step import push_functions
+from ..steps.looped_step import Looped
+from ..steps.safe_names import tidy
+from ..steps.sparse_plan import FILL_LIMIT, Program, program, workspace
+from ..steps.step import Step, function_name, node_function, scaling
+from ..steps.unrolled_step import Unrolled
+from ..taylor import TaylorStep, is_large, write_looped, write_rolled, write_step
+from .driver import RECORDERS, Driver, KernelKind, Recorder, imports
+from .observable_text import UNWATCHED, Watched, count_of, rule_of
+
+__all__ = [
+    "KernelSource",
+    "describe",
+    "emit",
+    "free_names",
+    "module",
+    "node_functions",
+]
+
+
+AUTO = "rodas5p"
+"""The integrator that "auto" stands for."""
+
+LARGEST_UNROLLED = 8
+"""Nodes up to which a step is written out by default; larger networks are stepped through in loops."""
+
+MOST_OF_LINKS = 1000
+"""Operations of all links up to which a step is written out: more take minutes to compile."""
+
+
+@dataclass(frozen=True, slots=True)
+class KernelSource:
+    """The functions of a scene as the text of a module, the driver that runs them, and what its arrays mean.
+
+    `marks` says of each node how many oscillators it stands for, or of each component of a mode which contact's velocity
+    it is (-1: none).  `elimination` holds the integer arrays that a kernel of loops runs through; None if its steps are
+    written out.  `rule` has the points at which functions of the state are looked at inside a step, and the weights of its integrals.
+    """
+
+    head: str = field(repr=False)
+    code: str = field(repr=False)
+    equations: Equations = field(repr=False)
+    method: Integrator = field(repr=False)
+    driver: Driver
+    dimensions: Dimensions | ModeDimensions = field(repr=False)
+    marks: tuple[int, ...] = field(repr=False)
+    elimination: Program | None = field(default=None, repr=False, compare=False)
+    rule: tuple[tuple[float, ...], ...] = field(default=((),), repr=False)
+
+    @property
+    def text(self) -> str:
+        """The module for readers, `head` before its code."""
+        return f"{self.head}\n\n\n{self.code}"
+
+    @property
+    def integrator(self) -> str:
+        """The name of the integrator."""
+        return self.method.name
+
+    @property
+    def functions(self) -> tuple[str, ...]:
+        """The functions of its module that the driver calls."""
+        driver, sizes = self.driver, self.dimensions
+        if isinstance(sizes, ModeDimensions):
+            return ("step", "carry", *(("pushes", "release") if driver.contacts else ()))
+        wanted = (
+            ("pushes", driver.contacts),
+            ("section", sizes.sections or sizes.stops),
+            ("values", sizes.observed),
+        )
+        return ("step", *(name for name, called in wanted if called))
+
+    @property
+    def recorders(self) -> tuple[Recorder, ...]:
+        """The functions that record what the scene wants."""
+        sizes = self.dimensions
+        if isinstance(sizes, ModeDimensions):
+            return ()
+        wanted = sizes.stops, sizes.components, sizes.sections, sizes.observed, sizes.sampled
+        return tuple(self.driver.recorder(name) for name, asked in zip(RECORDERS, wanted, strict=True) if asked)
+
+    @property
+    def shared(self) -> tuple[Driver | Recorder, ...]:
+        """The modules besides its own."""
+        return (self.driver, *self.recorders)
+
+    @property
+    def width(self) -> int:
+        """Cells, or modes, in one register."""
+        return self.driver.width
+
+    @property
+    def kind(self) -> KernelKind:
+        """What the kernel runs."""
+        return self.driver.kind
+
+    @property
+    def looped(self) -> bool:
+        """True if the steps run in loops over nodes and links, False if they are written out."""
+        return self.elimination is not None
+
+    @property
+    def digest(self) -> str:
+        """Hexadecimal SHA-256 of the text and of those of its driver and recorders."""
+        return _digest(self.text, *(module.text for module in self.shared))
+
+
+@lru_cache(maxsize=64)
+def _digest(*texts: str) -> str:
+    """The SHA-256 of some texts; runs ask for that of one kernel again and again."""
+    return hashlib.sha256("".join(texts).encode()).hexdigest()
+
+
+def emit(
+    equations: Equations,
+    method: str | Integrator = "auto",
+    records: Sequence[str] = ("sync_error",),
+    section: sp.Expr | None = None,
+    width: int | None = None,
+    multiplicity: Sequence[int] | None = None,
+    *,
+    watched: Watched = UNWATCHED,
+    unroll: int = LARGEST_UNROLLED,
+    fill: float = FILL_LIMIT,
+) -> KernelSource:
+    """Write the kernel of these equations for one integrator, one set of records and one lane width."""
+    method = AUTO if method == "auto" else method
+    method = integrator(method) if isinstance(method, str) else method
+    _check_records(equations, records, section, watched, multiplicity)
+    ordered = tuple(r for r in Record if r in records)
+    equations, elimination = _planned(equations, method, unroll, fill)
+    plain, looped = tidy(equations), elimination is not None
+    names = free_names(plain)
+    if method.series:
+        series = _series(plain, method, elimination)
+        functions, scratch, count = [series.text], series.workspace, series.operations
+        if elimination is not None and series.table:
+            elimination = replace(elimination, arrays=(*elimination.arrays[:-1], np.array(series.table)))
+    else:
+        functions, scratch, count = _stages(plain, method, names, elimination)
+    width = _suited(equations, method, count) if width is None else width
+    chosen = Driver(KernelKind.SWEEP, width, looped, plain.sticks, method.series)
+    cut = _cut(equations, section) if section is not None and "section" in ordered else UNWATCHED
+    events = [
+        *push_functions(plain, names, looped),
+        *cut.functions(equations, plain),
+        *watched.functions(equations, plain),
+    ]
+    functions += [driver.text("driver.dense")] if cut or watched else []
+    functions += [driver.text("driver.slope")] if watched.has_rates else []
+    constants = {
+        "WIDTH": width,
+        "DENSE": bool(ordered or watched) or (plain.sticks and not method.series),
+        "SERIES": method.series,
+    }
+    if looped:
+        constants |= {"NODES": plain.n, "DIMENSION": plain.dimension, "DENSE_ROWS": method.dense_rows}
+    return KernelSource(
+        describe(equations, plain, method, (*ordered, *watched.words(equations)), count),
+        module({**constants, **watched.tables(equations)}, functions, events),
+        equations,
+        method,
+        chosen,
+        _dimensions(plain, method, scratch)._replace(
+            components=len(plain.compared) if "sync_error" in ordered else 0,
+            observed=count_of(equations, watched.observed),
+            gaps=count_of(equations, watched.gaps),
+            depths=count_of(equations, watched.depths),
+            sections=len(cut.sections or watched.sections),
+            kept=-1 if cut else watched.kept,
+            sampled=int("trajectory" in ordered),
+            stops=int(watched.stop is not None),
+        ),
+        (1,) * equations.n if multiplicity is None or "sync_error" not in ordered else tuple(multiplicity),
+        elimination,
+        rule_of(method),
+    )
+
+
+def module(constants: Mapping[str, object], steps: Sequence[str], events: Sequence[Function]) -> str:
+    """The code of a kernel: what it imports, its constants, the functions of its steps, and those of events."""
+    named = "\n".join(f"{name} = {value}" for name, value in constants.items())
+    text = "\n\n\n".join([*steps, *map(LANES.function, events)]) + "\n"
+    return "\n\n\n".join([imports(f"{named}\n{text}"), named, text])
+
+
+def _check_records(
+    equations: Equations,
+    records: Sequence[str],
+    section: sp.Expr | None,
+    watched: Watched,
+    multiplicity: Sequence[int] | None,
+) -> None:
+    """Raise ValueError for records that are unknown, lack what they need, or do not go together."""
+    unknown = [r for r in records if r not in list(Record)]
+    if unknown:
+        raise ValueError(f"unknown record {unknown[0]!r}; known: {', '.join(Record)}")
+    if "section" in records and watched.events:
+        raise ValueError("the record 'section' beside functions of the state: found both; expected one of them")
+    if "section" in records and section is None:
+        raise ValueError("the record 'section' needs a section function, for example v_1")
+    if "sync_error" not in records:
+        return
+    if not equations.common:
+        raise ValueError("the record 'sync_error' compares states of one name, and these nodes have none in common")
+    if multiplicity is not None and len(multiplicity) != equations.n:
+        raise ValueError(f"multiplicity has {len(multiplicity)} entries; expected one for each of {equations.n} nodes")
+
+
+MOST_DECODED = 2200
+"""Operations of a step of which two registers take as many instructions as the processor keeps decoded, some 6000.
+
+`python -m benchmarks methods` times both: a longer step is up to a seventh faster in one register.
+"""
+
+
+def _suited(equations: Equations, method: Integrator, count: int) -> int:
+    """Lanes that suit the processor; a small system does not keep its pipelines busy with one register and gets two.
+
+    The steps of implicit methods are chains that use all registers earlier: two lanes slow them down beyond two states.
+    """
+    most = 2 if method.implicit else 6
+    moving = sum(len(equations.nodes[kind].continuous) for kind in equations.kind_of[: most + 1])
+    return lanes.native_width(2 if moving <= most and count <= MOST_DECODED else 1)
+
+
+def _planned(equations: Equations, method: Integrator, unroll: int, fill: float) -> tuple[Equations, Program | None]:
+    """Return the equations as they are stepped, and the elimination that steps in loops run through."""
+    if not _is_looped(equations, method, unroll):
+        return equations, None
+    if method.inexact:
+        raise ValueError(f"integrator {method.name}: steps at most {unroll} nodes, found {equations.n}; use rodas5p")
+    if method.implicit and any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
+        raise ValueError(
+            f"integrator {method.name}: found a mean field of {equations.n} nodes, whose Jacobian has an entry for each pair; "
+            f"expected at most {LINK_LIMIT} pairs; use dop853 or taylor"
+        )
+    equations = equations.without_fields() if method.implicit else equations
+    return equations, program(equations, fill, method.implicit or equations.inertial)
+
+
+def free_names(plain: Equations) -> Names:
+    """Return a supply of names that no symbol of the equations has."""
+    weights = [edge.weight.name for edge in plain.edges]
+    states = [s.name for node in plain.nodes for s in node.state]
+    return Names([*plain.state, *plain.parameters, *states, *plain.varied, *weights])
+
+
+def _is_looped(equations: Equations, method: Integrator, unroll: int) -> bool:
+    """True if the steps run in loops."""
+    alone = method.series and (is_large(equations) or (equations.inertial and not equations.link_count))
+    return equations.n > unroll or alone or (not method.inexact and _of_links(equations) > MOST_OF_LINKS)
+
+
+def _of_links(equations: Equations) -> int:
+    """The number of operations that the right-hand sides of all links take."""
+    size = {edge: sum(int(sp.count_ops(e)) for e in edge.rhs) for edge in equations.edges}
+    return sum(size[edge] for _, edge in equations.linked()) if equations.n <= LARGEST_UNROLLED else 0
+
+
+def _series(plain: Equations, method: Integrator, elimination: Program | None) -> TaylorStep:
+    """The Taylor step of a method."""
+    if elimination is None:
+        return write_step(plain, method.order)
+    return (write_rolled if is_large(plain) else write_looped)(plain, method.order)
+
+
+def _stages(
+    plain: Equations, method: Integrator, names: Names, elimination: Program | None
+) -> tuple[list[str], int, int]:
+    """Write a step in stages; return its functions, the groups of scratch memory that it needs, and its operations."""
+    blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
+    arguments = ["t", "h", "y", "p", "y_new", "dense", "rtol", "atol"]
+    scratch = 0
+    writer: Step
+    if elimination is None:
+        writer = Unrolled(plain, blocks, method)
+        writer.write()
+    else:
+        writer = Looped(plain, blocks, method, elimination)
+        writer.write()
+        scratch = workspace(writer, elimination)
+        arguments += ["graph", "weights"]
+    about = "One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."
+    step = Function("step", tuple(arguments), about, tuple(writer.statements), role=Role.ENTRY)
+    functions = [f for k in range(len(blocks)) for f in node_functions(writer, blocks[k], k)]
+    functions += dict.fromkeys(writer.functions)
+    texts = [*map(LANES.function, functions), scaling(method)]
+    texts += [driver.text("driver.sparse")] if elimination is not None and writer.solves else []
+    return [*texts, LANES.function(step)], scratch, operations(step.body)
+
+
+def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimensions:
+    return Dimensions(
+        nodes=plain.n,
+        components=0,
+        dimension=plain.dimension,
+        parameters=len(plain.parameters),
+        dense_rows=method.dense_rows,
+        workspace=scratch,
+        error_order=method.error_order,
+        repeats=int(angular_frequency(plain) is not None),
+        observed=0,
+        gaps=0,
+        depths=0,
+        sections=0,
+        kept=0,
+        sampled=0,
+        stops=0,
+    )
+
+
+def node_functions(step: Step, blocks: NodeBlocks, kind: int = 0) -> list[Function]:
+    """Write the right-hand side of one node of some kind and, for an implicit step, its linearisation."""
+    functions = [("node", "Right-hand side of one oscillator.", blocks.rhs)]
+    if step.method.implicit:
+        about = "Right-hand side of one oscillator and the parts of its Jacobian that move."
+        functions.append(("node_linear", about, blocks.linear))
+    made = []
+    for name, about, body in functions:
+        results = [e for e in body.results if not step.is_plain(e)]
+        if results:
+            arguments = [s.name for s in step.arguments(body, results)]
+            made.append(node_function(function_name(name, kind), about, body, arguments, results))
+    return made
+
+
+def describe(
+    equations: Equations,
+    plain: Equations,
+    method: Integrator,
+    records: tuple[str, ...],
+    count: int,
+    more: str = "",
+) -> str:
+    """The docstring at the head of a kernel module."""
+    names = ((*eq.state, *eq.parameters) for eq in (equations, plain))
+    swapped = tuple(f"{a} as {b}" for a, b in zip(*names, strict=True) if a != b)
+    rows = [
+        f"Generated kernel: {equations.n} oscillator{'s' * (equations.n > 1)}, {equations.link_count} links, {method.name}.",
+        "",
+        f"Equations   {equations.digest[:16]}",
+        f"Integrator  {method.name}, order {method.order}: {method.source}",
+        f"State       {_listed(equations.state)}",
+        f"Parameters  {_listed(equations.parameters) or 'none'}",
+        f"Records     {', '.join(('final state', *records))}",
+        *([f"Modes       {more}"] if more else []),
+        f"Step        {count} operations outside the node functions",
+    ]
+    if swapped:
+        rows.append(f"Renamed     {_listed(swapped)}")
+    return '"""' + "\n".join(rows) + '\n"""'
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    """Names with commas; of many the first and the last few."""
+    if len(names) <= 40:
+        return ", ".join(names)
+    return f"{', '.join(names[:6])}, … {', '.join(names[-3:])} ({len(names)} variables)"
+
+
+def _cut(equations: Equations, section: sp.Expr) -> Watched:
+    """The section on a state as a function of the state."""
+    section = section.xreplace({s: real(s.name) for s in section.free_symbols})
+    used = {s.name for s in section.free_symbols}
+    unknown = sorted(used - set(equations.state) - set(equations.parameters) - {"t"})
+    if unknown:
+        raise ValueError(f"section function {section}: unknown symbol {unknown[0]!r}; use the state, parameters and t")
+    return Watched(sections=((section,),))

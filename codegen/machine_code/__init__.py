@@ -1,0 +1,1 @@
+"""Kernels as machine code: compiled, kept on disk, loaded; no step and no scene."""

@@ -1,0 +1,67 @@
+"""Values that show themselves in a notebook: the door from a value to the room that draws."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from .keywords import check_methods
+
+if TYPE_CHECKING:
+    from typing import TypeAlias
+
+    Axes: TypeAlias = Any
+
+__all__ = ["Drawn", "Shown", "Written"]
+
+
+class Shown:
+    """A value with HTML for notebooks, which `synchain.runtime.reports` writes.
+
+    Its public methods refuse arguments that do not fit as public functions do.
+    """
+
+    __slots__ = ()
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        check_methods(cls)
+
+    def _repr_html_(self) -> str:
+        from synchain.runtime.reports.html import fragment
+
+        return fragment(self)
+
+
+class Written(Shown):
+    """A value with LaTeX besides."""
+
+    __slots__ = ()
+
+    def _repr_latex_(self) -> str:
+        from synchain.runtime.reports.html import latex
+
+        return latex(self)
+
+
+class Drawn(Shown):
+    """A graph, or a value with a graph."""
+
+    __slots__ = ()
+
+    def draw(self, ax: Axes | None = None) -> Axes:
+        """Draw the graph; nothing is shown on a screen, ``ax.figure.savefig("graph.png")`` writes it.
+
+        Widths show weights, arrows one-way links, colours kinds of nodes.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            By default those of a new figure.
+
+        Returns
+        -------
+        matplotlib axes
+        """
+        from synchain.runtime.plots.graph_picture import draw_graph
+
+        return draw_graph(self, ax)

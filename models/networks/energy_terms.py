@@ -1,0 +1,160 @@
+"""The energy of a network and the power that changes it, as exact expressions for one node and one link of each kind.
+
+E = sum over nodes of sum v dL/dv - L, plus the same of the links; dE/dt = sum v Q - (partial) dL/dt, plus what Rayleigh
+functions of the links take away.
+Source: Goldstein, Poole & Safko, Classical Mechanics, 3rd ed. (Addison-Wesley, 2002), sect. 2.7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import sympy as sp
+
+from ..dynamics.equations import Equations
+from ..dynamics.observable import Rows, RowSum
+from ..graphs.links import Link
+from ..graphs.topology import Topology
+from ..interactions.coupling import Coupling, LagrangianCoupling, Potential
+from ..interactions.ends import Pair, Terms
+from ..mechanics.calculus import derivative
+from ..mechanics.components import TIME, WEIGHT_NUMBER, Edge
+from ..mechanics.contact import ContactModel
+from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional
+from ..mechanics.oscillator import FieldModel
+from .model import Model, NodeKind
+
+__all__ = ["Energy", "Share", "energy_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """What one node or one link has of the energy of a network, and the power that it feeds in."""
+
+    energy: sp.Expr = sp.S.Zero
+    power: sp.Expr = sp.S.Zero
+
+
+@dataclass(frozen=True, slots=True)
+class Energy:
+    """Energy and power of a node of each kind, in its states, and of a link of each edge, in those of its two ends.
+
+    All is non-dimensional.  `nodes` follow equations.nodes, `links` equations.edges.  A pair of links, there and back, is
+    one spring or damper: `pairs` are the links that count, each pair once.
+    """
+
+    equations: Equations
+    nodes: tuple[Share, ...]
+    links: tuple[Share, ...]
+
+    @property
+    def pairs(self) -> tuple[tuple[Link, int], ...]:
+        """One link (target, source, weight) of each pair, the one whose target has the smaller number, and its edge.
+
+        An edge goes by its number in equations.edges.
+        """
+        eq, found, first = self.equations, list[tuple[Link, int]](), 0
+        for layer in (layer for layer in eq.layers if layer.links):
+            numbers = {ends: k for k, (ends, _) in enumerate(layer.edge_of, start=first)}
+            first += len(numbers)
+            found += [(link, numbers[eq.ends(link)]) for link in layer.links if link[0] < link[1]]
+        return tuple(found)
+
+    @property
+    def conservative(self) -> bool:
+        """True if no power is fed in or lost, for all values of the parameters."""
+        return all(share.power == 0 for share in (*self.nodes, *self.links))
+
+    def whole(self) -> tuple[sp.Expr, sp.Expr]:
+        """Return energy and power of the whole network in its state symbols (algebra grows with n: meant for small n)."""
+        eq = self.equations
+        placed = [(self.nodes[eq.kind_of[i]], eq.at_node(i)) for i in range(eq.n)]
+        shares: list[tuple[Share, dict[sp.Symbol, sp.Expr]]] = [
+            *placed,
+            *((self.links[k], eq.at_link(link, eq.edges[k])) for link, k in self.pairs),
+        ]
+        found = sp.Add(*(share.energy.xreplace(values) for share, values in shares))
+        return found, sp.Add(*(share.power.xreplace(values) for share, values in shares))
+
+    def rows(self) -> tuple[sp.Expr, tuple[Rows, ...]]:
+        """Return the energy of the whole network as sums over nodes of each kind and links of each edge, for observables."""
+        eq, places = self.equations, [list[dict[sp.Symbol, sp.Expr]]() for _ in (*self.nodes, *self.links)]
+        for i, kind in enumerate(eq.kind_of):
+            places[kind].append(dict(eq.at_node(i)))
+        for link, k in self.pairs:
+            places[len(self.nodes) + k].append(eq.at_link(link, eq.edges[k]))
+        shares = [(share.energy, own) for share, own in zip((*self.nodes, *self.links), places, strict=True) if own]
+        found = tuple(Rows.of(value, own) for value, own in shares if value != 0)
+        return sp.Add(*(RowSum(sp.Integer(k)) for k in range(len(found)))), found
+
+
+@lru_cache(maxsize=16)
+def energy_of(model: Model, varied: tuple[str, ...] = ()) -> Energy:
+    """Return the energy of a model's network."""
+    kinds = model.kinds
+    for kind in kinds:
+        if isinstance(kind.oscillator.model, FieldModel):
+            name = kind.oscillator.name
+            raise ValueError(f"energy: oscillator {name!r} is a vector field; expected one with a Lagrangian")
+    equations = model.equations(varied)
+    if equations.sticks:
+        raise ValueError("energy: set-valued friction does work that is no function of the state; use contact 'atan'")
+    nodes = tuple(_of_node(kind, model.contact) for kind in kinds)
+    links, layers = [], []
+    for (coupling, graph), layer in zip(model.linked, equations.layers, strict=True):
+        _check(coupling, graph)
+        edges = []
+        for (a, b), edge in layer.edge_of:
+            pair = Pair((equations.nodes[a], equations.nodes[b]), (kinds[a].oscillator, kinds[b].oscillator))
+            share, joint = _of_link(edge, pair, coupling.terms(pair), equations.varied)
+            if WEIGHT_NUMBER.name in layer.varied:
+                share = Share(*(e.xreplace({edge.weight: WEIGHT_NUMBER}) for e in (share.energy, share.power)))
+            links.append(share)
+            edges.append(((a, b), joint))
+        layers.append(replace(layer, edge_of=tuple(edges)))
+    return Energy(replace(equations, layers=tuple(layers)), nodes, tuple(links))
+
+
+def _of_node(kind: NodeKind, contact: ContactModel) -> Share:
+    """Energy and power of one oscillator by itself."""
+    system = nondimensional(kind.oscillator)
+    lagrangian = system.kinetic - system.potential
+    power = sp.Add(*(v * f for v, f in zip(system.velocities, system.forces, strict=True)))
+    power -= derivative(lagrangian, TIME)
+    if kind.friction is not None:
+        power = power.replace(FRICTION, friction_coefficient(kind.friction, contact))
+    return Share(_of_lagrangian(lagrangian, system.velocities), power)
+
+
+def _check(coupling: Coupling, graph: Topology) -> None:
+    """Raise ValueError for links without an energy."""
+    if not isinstance(coupling, LagrangianCoupling | Potential):
+        raise ValueError(f"energy: the coupling '{coupling}' has none; expected a spring or damper by its name")
+    if coupling.forced:
+        raise ValueError(f"energy: the coupling '{coupling}' depends on time; expected one that does not")
+    if graph.asymmetry:
+        raise ValueError(
+            f"energy: found {graph.asymmetry} in {graph.name}({graph.n}); expected links of equal weights both ways"
+        )
+
+
+def _of_link(edge: Edge, pair: Pair, terms: Terms, varied: tuple[str, ...]) -> tuple[Share, Edge]:
+    """The energy of a link, and the power it feeds in: minus v dR/dv at either end.
+
+    The edge gets the parameters of its nodes that the energy uses, though its forces may not.
+    """
+    shared = {s: own for s, own in pair.theirs.items() if own.name not in varied}
+    kinetic, potential, dissipation = (e.xreplace(shared) for e in (terms.kinetic, terms.potential, terms.dissipation))
+    lost = sp.Add(*(v * derivative(dissipation, v) for v in pair.velocities))
+    share = Share(potential if kinetic == 0 else _of_lagrangian(kinetic - potential, pair.velocities), -lost)
+    used = share.energy.free_symbols | share.power.free_symbols
+    more = tuple(s for s in pair.nodes[0].parameters if s in used and s not in edge.parameters)
+    theirs = tuple((s, own) for s, own in pair.theirs.items() if s in used)
+    return share, replace(edge, parameters=(*edge.parameters, *more), theirs=theirs)
+
+
+def _of_lagrangian(lagrangian: sp.Expr, velocities: Sequence[sp.Symbol]) -> sp.Expr:
+    """The energy function sum v dL/dv - L."""
+    return sp.expand(sp.Add(*(v * derivative(lagrangian, v) for v in velocities)) - lagrangian)

@@ -1,0 +1,173 @@
+"""What a scene observes and where it cuts: the values of its kernel, and the numbers of its result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import sympy as sp
+
+from synchain.codegen.driver.columns import Sum, Tally
+from synchain.codegen.kernels.observable_text import Watched, with_rows
+from synchain.models.dynamics.observable import ENERGY, Window
+from synchain.models.dynamics.observable_text import as_value
+from synchain.models.scenes.energy import energy as exact_energy
+from synchain.models.scenes.observables import has_own_energy
+from synchain.models.scenes.scene import Scene, Section
+
+__all__ = ["Observed", "Sections", "watched"]
+
+
+def watched(scene: Scene) -> Watched:
+    """Return what the kernel of a scene watches: observables, sections and a stop, the energy in them as sums."""
+    sections = Sections(scene)
+    found = Watched(Observed(scene).values, sections.values, sections.stop)
+    if has_own_energy(scene.model) or not any(e.has(ENERGY) for e in (*found.observed, *found.events)):
+        return found
+    value, sums = exact_energy(scene).rows()
+    swap = {ENERGY: value}
+    return Watched(
+        tuple(e.xreplace(swap) for e in found.observed),
+        tuple(tuple(e.xreplace(swap) for e in parts) for parts in found.sections),
+        None if found.stop is None else found.stop.xreplace(swap),
+        sums,
+    )
+
+
+@dataclass(frozen=True)
+class Observed:
+    """The observables of a scene, in the arrays of its kernel and of its result."""
+
+    scene: Scene
+
+    @cached_property
+    def values(self) -> tuple[sp.Expr, ...]:
+        """The values that the kernel tallies; observables of one value share it."""
+        return tuple(dict.fromkeys(observable.value for observable in self.scene.observe.values()))
+
+    @cached_property
+    def _rows(self) -> dict[sp.Expr, int]:
+        """How many numbers each value is."""
+        equations = self.scene.equations
+        return {value: equations.n if with_rows(equations, value) else 1 for value in self.values}
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers a cell has of all observables."""
+        return sum(self._rows[observable.value] for observable in self.scene.observe.values())
+
+    @property
+    def tallies(self) -> int:
+        """How many numbers the kernel keeps of a cell."""
+        return 1 + len(Tally) * sum(self._rows.values()) if self.values else 0
+
+    def columns(self) -> Iterator[tuple[str, bool, slice]]:
+        """Yield the name of each observable, whether it has a value for each node, and its columns in `Buffers.sums`."""
+        first = len(Sum)
+        for name, observable in self.scene.observe.items():
+            rows = self._rows[observable.value]
+            yield name, with_rows(self.scene.equations, observable.value), slice(first, first + rows)
+            first += rows
+
+    def summary(self, sums: np.ndarray) -> np.ndarray:
+        """Return the `sums` of buffers out of those of a kernel; NaN in cells that ended before their window."""
+        if not self.values:
+            return sums
+        length = sums[:, len(Sum), None]
+        length = np.where(length > 0.0, length, np.nan)
+        tallies = sums[:, len(Sum) + 1 :].reshape(len(sums), -1, len(Tally))
+        begins, first = {}, 0
+        for value, rows in self._rows.items():
+            begins[value] = slice(first, first + rows)
+            first += rows
+        parts = [sums[:, : len(Sum)]]
+        for observable in self.scene.observe.values():
+            parts.append(_over_window(observable.window, tallies[:, begins[observable.value]], length))
+        return np.concatenate(parts, axis=1)
+
+
+@dataclass(frozen=True)
+class Sections:
+    """The sections on functions of a scene, in the arrays of its kernel and of its result."""
+
+    scene: Scene
+
+    @cached_property
+    def values(self) -> tuple[tuple[sp.Expr, ...], ...]:
+        """Each section function, followed by what its points keep."""
+        return tuple(
+            (
+                as_value(name, section.variable) - sp.Rational(repr(section.level)),
+                *(as_value(name, e) for e in _kept(section)),
+            )
+            for name, section in self.scene.sections.items()
+        )
+
+    @property
+    def stop(self) -> sp.Expr | None:
+        """The function that ends a cell."""
+        return None if self.scene.stop is None else as_value("stop", self.scene.stop)
+
+    def width(self, dimension: int) -> int:
+        """Return how many numbers a section point has beside its time; `dimension` if sections are on states."""
+        if not self.values:
+            return dimension
+        return 1 + max(len(parts) - 1 for parts in self.values)
+
+    def variables(self, points: np.ndarray, most: int) -> Iterator[tuple[str, tuple[str, ...], np.ndarray]]:
+        """Yield names, dimensions and values of the variables out of points (cells, room, 1 + width)."""
+        room = max(most, 1)
+        for k, (name, section) in enumerate(self.scene.sections.items()):
+            own = points[:, :, 1] == k
+            order = np.argsort(~own, axis=1, kind="stable")[:, :room]
+            found = np.full((len(points), room, 1 + len(_kept(section))), np.nan)
+            sorted_points = np.take_along_axis(points, order[:, :, None], axis=1)
+            mine = np.take_along_axis(own, order, axis=1)
+            numbers = np.delete(sorted_points, 1, axis=2)[:, :, : found.shape[2]]
+            found[:, : order.shape[1]] = np.where(mine[:, :, None], numbers, np.nan)
+            yield f"{name}_count", (), own.sum(axis=1).astype(np.int32)
+            yield f"{name}_time", ("point",), found[:, :, 0]
+            if _kept(section):
+                yield name, ("point", f"{name}_kept"), found[:, :, 1:]
+
+    def points(self, cells: int, data: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return the points (cells, room, 1 + width) out of variables by their names; the way back of `variables`."""
+        parts = []
+        for k, (name, section) in enumerate(self.scene.sections.items()):
+            times = np.reshape(data[f"{name}_time"], (cells, -1))
+            part = np.full((*times.shape, 1 + self.width(0)), np.nan)
+            part[:, :, 0], part[:, :, 1] = times, np.where(np.isnan(times), np.nan, k)
+            if size := len(_kept(section)):
+                part[:, :, 2 : 2 + size] = np.reshape(data[name], (*times.shape, size))
+            parts.append(part)
+        whole = np.concatenate(parts, axis=1)
+        order = np.argsort(np.isnan(whole[:, :, 0]), axis=1, kind="stable")
+        return np.take_along_axis(whole, order[:, :, None], axis=1)
+
+    def meanings(self) -> dict[str, str]:
+        """What the variables of the sections hold, in words."""
+        words: dict[str, str] = {}
+        for name, section in self.scene.sections.items():
+            words[f"{name}_count"] = f"number of points in the window where {section}"
+            words[f"{name}_time"] = f"times of the points where {section}"
+            words[name] = f"what is kept of the points where {section}, NaN where there are fewer"
+        return words
+
+
+def _kept(section: Section) -> tuple[str, ...]:
+    return section.keep or ()
+
+
+def _over_window(window: Window, tallies: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """What a window keeps (cells, rows) of tallies (cells, rows, len(Tally)); NaN where a value was undefined."""
+    gap = tallies[:, :, Tally.SUM] / length
+    defined = np.where(np.isfinite(gap), 0.0, np.nan)
+    match window:
+        case Window.MEAN:
+            return np.asarray(tallies[:, :, Tally.FIRST] + gap)
+        case Window.VARIANCE:
+            return np.asarray(np.maximum(tallies[:, :, Tally.SQUARES] / length - gap * gap, 0.0))
+    kept = {Window.MAXIMUM: Tally.LARGEST, Window.MINIMUM: Tally.LEAST, Window.END: Tally.LATEST}[window]
+    return np.asarray(tallies[:, :, kept] + defined)

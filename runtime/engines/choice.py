@@ -1,0 +1,350 @@
+"""Which integrators the cells of a scene go through: the first by where they start, others by what their steps show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from synchain.codegen.driver.clock_slots import WORTH
+from synchain.codegen.driver.columns import Count, Span, Sum
+from synchain.codegen.integrators import Integrator, integrator
+from synchain.codegen.kernels.sweep_kernel import AUTO
+from synchain.codegen.taylor import is_analytic, is_large, is_linear, jump, order_for, outlives_series, unpassed
+from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.variational import Variation
+from synchain.models.graphs.links import LINK_LIMIT
+from synchain.models.inputs.keywords import warn
+from synchain.models.scenes.scene import Scene
+
+from ..cells.buffers import Buffers
+from ..cells.paces import Paces, Templates
+from ..cells.plan import Plan, first_step, scale_of_atol, tolerances
+from ..cells.stiffness_rates import eigenvalue_rates, mode_rates
+from ..support.status import Status
+
+__all__ = [
+    "STIFF",
+    "Ladder",
+    "chosen_for_modes",
+    "chosen_for_rows",
+    "first_steps",
+    "method_names",
+    "mode_stiffness",
+    "warn_of_steps",
+    "warn_of_stiff_modes",
+]
+
+STIFF = 30.0
+"""How many times faster than it turns and goes on a motion decays from where Rosenbrock steps are the faster ones, by
+measurement (docs/performance.md)."""
+
+LAYER = 0.1
+"""Part of its stiffness with which the layer of a smoothed jump counts: motion is not always inside."""
+
+FIRST_LOOK = 64.0
+"""Steps after which a cell first looks whether its integrator suits it."""
+
+STALLED = 0.01
+"""Part of the shortest time of a motion below which series are short for a reason of their own, such as a hidden pole."""
+
+
+SLIDE = 64.0
+"""Part of max_steps after which a slide along a jump ends, if the time that is left would take as many times max_steps."""
+
+AUTOMATIC = ("taylor", "dop853", AUTO)
+"""What `auto` stands for, in the order in which cells try them."""
+
+
+def method_names(scene: Scene) -> tuple[str, ...]:
+    """Return the names of the integrators that cells of a scene may go through."""
+    return AUTOMATIC if scene.integrator == "auto" else (scene.integrator,)
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """The integrators of some equations in the order in which cells try them.
+
+    Series come first where they exist, then explicit stages, then a Rosenbrock method. A cell begins with the last one
+    if it is stiff where it starts, else with the first one. While it runs it pauses at 64, 256, 1024 ... steps if many
+    are to come, and is handed on from there: to Rosenbrock steps if its steps are as short as its fastest decay while its
+    motion is slow, to explicit stages if its series are far shorter than any time of its motion. A series without a next
+    term ends in steps that underflow, and is handed on as well. Each decision depends on the cell alone.
+    """
+
+    scene: Scene  # its integrator and its tolerances
+    equations: Equations  # what is integrated
+
+    @cached_property
+    def methods(self) -> tuple[Integrator, ...]:
+        """The integrators; one if the scene names it."""
+        if self.scene.integrator == "taylor":
+            return (_taylor(self.scene, self.equations, is_large(self.equations)),)
+        if self.scene.integrator != "auto":
+            return (integrator(self.scene.integrator),)
+        series = (_taylor(self.scene, self.equations, is_large(self.equations)),) if _has_series(self.equations) else ()
+        return (*series, integrator("dop853"), *((integrator(AUTO),) if self.solvable else ()))
+
+    @property
+    def columns(self) -> np.ndarray:
+        """Where among `method_names` each method stands."""
+        return np.array([method_names(self.scene).index(method.name) for method in self.methods])
+
+    @property
+    def solvable(self) -> bool:
+        """True if a Rosenbrock method can step the network: no mean field has too many pairs."""
+        return not any(len(pairs) > LINK_LIMIT for _, pairs in self.equations.fields)
+
+    @cached_property
+    def templates(self) -> Templates:
+        """Rates and slopes as numbers."""
+        return Templates(self.equations)
+
+    def first(self, rows: Plan) -> np.ndarray:
+        """Return which of the methods (cells,) each cell begins with."""
+        if len(self.methods) == 1:
+            return np.zeros(len(rows), int)
+        if self.scene.cells > 1:
+            return self._first(rows)
+        # a run asks for its only cell twice: which kernel to load, and how to begin
+        asked = b"".join(part.tobytes() for part in (rows.start, rows.numbers, rows.spans))
+        found = self._known.get(asked)
+        if found is None:
+            found = self._known[asked] = self._first(rows)
+        return found.copy()
+
+    @cached_property
+    def _known(self) -> dict[bytes, np.ndarray]:
+        return {}
+
+    def _first(self, rows: Plan) -> np.ndarray:
+        paces = at_start(self.templates, rows)
+        endless = ~np.isfinite(paces.size)
+        slow = np.maximum(np.maximum(paces.turning, paces.growth), math.pi / rows.spans[:, Span.LONGEST])
+        stiff = (paces.parted > STIFF * slow) & (paces.parted * rows.spans[:, Span.END] > WORTH) & ~endless
+        stiff |= ~endless & ~stiff & self._enters_layers(rows, slow)
+        last = len(self.methods) - 1 if self.solvable else self._explicit
+        return np.where(stiff & (not self.equations.sticks), last, np.where(endless, self._explicit, 0))
+
+    def main(self, rows: Plan) -> Integrator:
+        """Return the method that most of some cells begin with."""
+        return self.methods[np.bincount(self.first(rows)).argmax()]
+
+    def steps(self, rows: Plan, first: np.ndarray) -> np.ndarray:
+        """Return spans (cells, len(Span)) with the first step and the first look of cells that begin with some methods."""
+        spans = rows.spans.copy()
+        implicit = np.flatnonzero(np.array([method.implicit for method in self.methods])[first])
+        if len(implicit):
+            spans[implicit, Span.FIRST_STEP] = first_steps(self.templates, rows.take(implicit))
+        spans[:, Span.LOOK] = np.where(first < len(self.methods) - 1, FIRST_LOOK, math.inf)
+        return spans
+
+    def further(self, rows: Plan, buffers: Buffers, method: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+        """Return which method (cells,) cells go on with that have paused or whose steps underflow; -1 for none.
+
+        Shapes: method (cells,), lengths (cells,).
+        """
+        paused = buffers.status == Status.PAUSED
+        series = np.array([m.series for m in self.methods])[method]
+        implicit = np.array([m.implicit for m in self.methods])[method]
+        untried = buffers.counts[:, Count.BY_METHOD + self.columns[self._explicit]] == 0
+        found = np.where(paused, method, np.where(untried, self._explicit, -1))
+        looked = np.flatnonzero(paused & ~implicit & np.isfinite(buffers.end).all(axis=1))
+        if len(looked):
+            at = self.at(rows.take(looked), buffers.end[looked], buffers.sums[looked, Sum.STOPPED_AT])
+            slow, length = np.maximum(at.turning, at.going), lengths[looked]
+            finite = np.isfinite(at.size)
+            stiff = finite & (at.fastest > STIFF * slow) & (at.fastest * length > 1.0) & self.solvable
+            free = length < STALLED * rows.spans[looked, Span.LONGEST]
+            stalled = series[looked] & finite & free & (np.maximum(at.size, at.going) * length < STALLED)
+            found[looked] = np.where(stiff, len(self.methods) - 1, np.where(stalled, self._explicit, found[looked]))
+        return found
+
+    @cached_property
+    def jumps(self) -> bool:
+        """True if motion may slide along a jump of a rate."""
+        return next(iter(unpassed(self.equations)), None) is not None
+
+    def sliding(self, rows: Plan, buffers: Buffers, lengths: np.ndarray, before: np.ndarray) -> np.ndarray:
+        """Return which of some paused cells (cells,) slide along a jump, so that max_steps will not do.
+
+        Explicit steps across a jump are as short as its error asks for, and alike: `lengths` (cells,) is their mean length
+        since the last pause, `before` that before it. A slide may end soon, so that it has 1/SLIDE of max_steps.
+        """
+        left = rows.spans[:, Span.END] - buffers.sums[:, Sum.STOPPED_AT]
+        steady = (lengths < 2.0 * before) & (before < 2.0 * lengths)
+        hopeless = left > SLIDE * self.scene.max_steps * lengths
+        return self.jumps & steady & hopeless & (SLIDE * buffers.steps > self.scene.max_steps)
+
+    def tolerances(self, rows: Plan) -> tuple[np.ndarray, np.ndarray]:
+        """Return (rtol, atol), each (cells,), with which cells are integrated.
+
+        A default atol shrinks for small motions (`scale_of_atol`). Their size is that of the start, or how far the rates there
+        carry the cell in its shortest time.
+        """
+        rtol, atol = tolerances(self.scene, self.equations, rows.numbers)
+        if self.scene.given["atol"] is None:
+            small = np.flatnonzero(np.abs(rows.start).max(axis=1) < 0.1)
+            if len(small):
+                few = rows.take(small)
+                size = np.maximum(np.abs(few.start).max(axis=1), self.templates.reach(few.start, few.numbers))
+                atol[small] *= scale_of_atol(size)
+        return rtol, atol
+
+    def at(self, rows: Plan, state: np.ndarray, time: np.ndarray) -> Paces:
+        """Return how fast cells move at some states and times, where states are known to the tolerances."""
+        rtol, atol = self.tolerances(rows)
+        noise = rtol[:, None] * np.abs(state) + atol[:, None]
+        return self.templates.paces(state, rows.numbers, time, rows.spans[:, Span.LONGEST], noise)
+
+    @property
+    def _explicit(self) -> int:
+        """Place of the explicit method of stages."""
+        return next(k for k, m in enumerate(self.methods) if not m.series)
+
+    def _enters_layers(self, rows: Plan, slow: np.ndarray) -> np.ndarray:
+        """True for cells (cells,) of which a smoothed jump is stiff inside, although the start lies outside."""
+        found = np.zeros(len(rows), dtype=bool)
+        for blocks in self.templates.layers(rows.start, rows.numbers):
+            fastest, turning, *_ = eigenvalue_rates(blocks)
+            within = LAYER * fastest * rows.spans[:, Span.END] > WORTH
+            found |= within & (LAYER * fastest > STIFF * np.maximum(slow, LAYER * turning)) & np.isfinite(fastest)
+        return found
+
+
+def at_start(templates: Templates, rows: Plan) -> Paces:
+    """Return how fast cells move where they start."""
+    shortest = np.minimum(rows.spans[:, Span.LONGEST], np.maximum(rows.spans[:, Span.END], 1e-300))
+    return templates.paces(rows.start, rows.numbers, np.zeros(len(rows)), shortest, None)
+
+
+def first_steps(templates: Templates, rows: Plan) -> np.ndarray:
+    """Return the first step (cells,) of each cell by a Rosenbrock method."""
+    growth = at_start(templates, rows).growth
+    return np.array([first_step(rate if math.isfinite(rate) else 0.0) for rate in growth])
+
+
+@lru_cache(maxsize=64)
+def _has_series(equations: Equations) -> bool:
+    """True if Taylor steps pass all that the equations hold, and take no longer to compile than most runs take.
+
+    Power series where all functions are analytic between kinks, and between jumps along which no motion slides, unless
+    motion may pass another place without a series.  The recurrences of a dense mass matrix take long to compile.
+    """
+    return not equations.inertial and jump(equations) is None and not outlives_series(equations)
+
+
+def chosen_for_rows(scene: Scene, equations: Equations, rows: Plan) -> Integrator:
+    """Return the one integrator for equations whose cells come as rows: the last one that any cell begins with."""
+    ladder = Ladder(scene, equations)
+    return ladder.methods[ladder.first(rows).max()]
+
+
+def chosen_for_modes(
+    scene: Scene,
+    variation: Variation,
+    state: np.ndarray,
+    numbers: np.ndarray,
+    strengths: np.ndarray,
+    slow: float = 1.0,
+) -> Integrator:
+    """Return the integrator of orbits with deviations along them, Taylor or Rosenbrock steps: modes have no others.
+
+    Power series where all functions are analytic, and neither the orbit nor the strongest mode is stiff at the start.
+    Shapes: state (cells, dimension), numbers (cells, parameters), strengths (number of strengths, modes).
+    """
+    if scene.integrator == "taylor":
+        return _taylor(scene, variation.orbit)
+    smooth = scene.integrator == "auto" and is_analytic(variation.orbit)
+    if smooth and mode_stiffness(variation, state, numbers, strengths, slow) < STIFF:
+        return _taylor(scene, variation.orbit)
+    return integrator(AUTO)
+
+
+def _taylor(scene: Scene, equations: Equations, large: bool = False) -> Integrator:
+    return integrator("taylor", order_for(scene.rtol, scene.atol, is_linear(equations), large))
+
+
+def mode_stiffness(
+    variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray, slow: float = 1.0
+) -> float:
+    """Return how much faster deviations decay or grow at some states than they or the motion turn: the largest of the first orbits.
+
+    Of the strengths none and the largest are looked at; parameters as for `chosen_for_modes`.
+    """
+    return _stiffest(((at.fastest, at.turning) for at in mode_rates(variation, state, numbers, strengths)), slow)
+
+
+def warn_of_stiff_modes(
+    variation: Variation,
+    state: np.ndarray,
+    numbers: np.ndarray,
+    strengths: np.ndarray,
+    step: float,
+    slow: float = 1.0,
+) -> bool:
+    """Warn if Taylor steps with deviations were short, `step` in the mean, because they are stiff where they ended.
+
+    The other parameters are those of `chosen_for_modes`.  Return whether they were.
+    """
+    if step * STIFF * slow >= 1.0:
+        return False
+    for fastest, turning, _ in mode_rates(variation, state, numbers, strengths):
+        if fastest * step > 1.0 and fastest > STIFF * max(slow, turning):
+            warn(
+                f"stiff modes: found a rate of {fastest:.3g} beside slow motion, and Taylor steps of {step:.2g}; "
+                "expected longer ones; integrator = 'rodas5p' takes them"
+            )
+            return True
+    return False
+
+
+def _stiffest(rates: Iterable[tuple[float, float]], slow: float = 1.0) -> float:
+    return max((fastest / max(slow, turning) for fastest, turning in rates), default=0.0)
+
+
+FEW = 100
+"""Steps of a cell that are not many, however short."""
+
+BLOWN = 1e6
+"""Growth of a state from which on what grows as fast as anything is a solution without bound."""
+
+
+def warn_of_steps(ladder: Ladder, buffers: Buffers, rows_of: Callable[[np.ndarray], Plan]) -> None:
+    """Warn if no cell came to its end, if some made no step, if explicit steps were short because a cell is stiff, or if a
+    motion has no bound.
+    """
+    status, steps, times = buffers.status, buffers.steps, buffers.sums[:, Sum.STOPPED_AT]
+    idle = np.isin(status, (Status.STEP_UNDERFLOW, Status.STEP_BUDGET)) & (times <= 0.0)
+    if len(status) and not np.isin(status, (Status.FINISHED, Status.STOPPED, Status.INTERRUPTED, Status.NOT_RUN)).any():
+        warn(f"no cell came to its end: {Status(int(status[0])).message}")
+    elif idle.any():
+        k = int(idle.argmax())
+        warn(f"{idle.sum()} of {len(idle)} cells made no step, cell {k} first: {Status(int(status[k])).message}")
+    explicit = not (ladder.methods[-1].implicit or ladder.equations.sticks)
+    whole = ~np.isin(status, (Status.STEP_UNDERFLOW, Status.DIVERGED)) & (times > 0.0)
+    whole &= np.isfinite(buffers.end).all(axis=1)
+    cells = np.flatnonzero(whole & ((np.abs(buffers.end).max(axis=1) > BLOWN) | (explicit & (steps >= FEW))))
+    if not len(cells):
+        return
+    rows, end, steps, times = rows_of(cells), buffers.end[cells], steps[cells], times[cells]
+    at, length = ladder.at(rows, end, times), times / np.maximum(steps, 1)
+    short = (at.fastest * length > 1.0) & np.isfinite(at.fastest)
+    grown = np.abs(end).max(axis=1) > BLOWN * np.maximum(1.0, np.abs(rows.start).max(axis=1))
+    blown = grown & (at.growth >= 0.5 * at.fastest) & (at.growth * length > 0.5)
+    stiff = explicit & short & ~grown & (at.fastest > STIFF * np.maximum(at.turning, at.going))
+    if blown.any():
+        k = int(blown.argmax())
+        warn(
+            f"a state grew to {np.abs(end[k]).max():.3g} in {steps[k]} steps of a cell; expected a bounded motion; "
+            "check the signs and the size of the parameters"
+        )
+    elif stiff.any():
+        k = int(stiff.argmax())
+        warn(
+            f"stiff equations: found a rate of {at.fastest[k]:.3g} beside slow motion, and {steps[k]} explicit steps in a "
+            "cell; expected few; the result may be worse than rtol says; integrator = 'rodas5p' takes longer steps"
+        )

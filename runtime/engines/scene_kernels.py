@@ -1,0 +1,107 @@
+"""The kernel of a scene: its text, or the text compiled."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from weakref import WeakKeyDictionary
+
+import sympy as sp
+
+from synchain.codegen.integrators import Integrator
+from synchain.codegen.kernels.observable_text import Watched
+from synchain.codegen.kernels.sweep_kernel import KernelSource, emit
+from synchain.codegen.machine_code.compile import Kernel, load
+from synchain.codegen.simd.lane_types import WIDTHS
+from synchain.models.dynamics.equations import Equations
+from synchain.models.inputs.checks import check_integer
+from synchain.models.inputs.keywords import warn
+from synchain.models.scenes.scene import Scene
+
+from ..cells.reduce import Reduction, as_reduction
+from .choice import Ladder
+
+__all__ = ["chosen_integrator", "kernel", "kernel_source", "ladder_of", "warn_of_chords", "write_kernel"]
+
+
+def kernel(scene: Scene, width: int | None = None, reduce: bool | Reduction = True) -> Kernel:
+    """Return the compiled kernel of a scene, the one that `run(scene)` runs.
+
+    Scenes that differ only in numbers share a kernel.
+
+    Parameters
+    ----------
+    scene : Scene
+    width : int, optional
+        Number of lanes: 1, 2, 4, 8 or 16 (default: what the processor has, one for a single cell).
+    reduce : bool or Reduction
+        Whether to leave out what the scene does not need (docs/skips.md); as for `run`.
+
+    Raises
+    ------
+    ValueError
+        If the width is none of these, or if the reduction is that of another scene.
+    """
+    return load(kernel_source(scene, width, reduce))
+
+
+def kernel_source(scene: Scene, width: int | None = None, reduce: bool | Reduction = True) -> KernelSource:
+    """Return the text of a scene's kernel without compiling it; parameters and errors as for
+    `kernel`.
+    """
+    return write_kernel(as_reduction(scene, reduce), width)
+
+
+_ladders: WeakKeyDictionary[Reduction, Ladder] = WeakKeyDictionary()
+
+
+def ladder_of(reduction: Reduction) -> Ladder:
+    """Return the integrators that the cells of what is left of a scene go through; the same object each time."""
+    found = _ladders.get(reduction)
+    if found is None:
+        found = _ladders[reduction] = Ladder(reduction.scene, reduction.equations)
+    return found
+
+
+def chosen_integrator(reduction: Reduction) -> Integrator:
+    """Return the integrator that most of the first cells of what is left of a scene begin with."""
+    return ladder_of(reduction).main(reduction.rows(reduction.planner.sample()))
+
+
+def write_kernel(reduction: Reduction, width: int | None = None, method: Integrator | None = None) -> KernelSource:
+    """Return the text of the kernel that integrates what is left of a scene; `width` as for
+    `kernel`.  By default the integrator is the one that most cells begin with.
+    """
+    scene = reduction.scene
+    width = 1 if width is None and scene.cells == 1 else width
+    if width is not None and check_integer("width", width, 1) not in WIDTHS:
+        raise ValueError(f"width = {width}; expected one of {', '.join(map(str, WIDTHS))}")
+    section = None
+    if "section" in scene.record:
+        section = sp.Symbol(reduction.section_variable(), real=True) - sp.Rational(repr(scene.section.level))
+    method = chosen_integrator(reduction) if method is None else method
+    recorded = (reduction.records, section, width, reduction.multiplicity)
+    return _emitted(reduction.equations, method, recorded, reduction.watched)
+
+
+@lru_cache(maxsize=32)
+def _emitted(
+    equations: Equations,
+    method: Integrator,
+    recorded: tuple[tuple[str, ...], sp.Expr | None, int | None, tuple[int, ...] | None],
+    watched: Watched,
+) -> KernelSource:
+    """The text of a kernel; runs that differ in numbers alone share it."""
+    return emit(equations, method, *recorded, watched=watched)
+
+
+def warn_of_chords(source: KernelSource) -> None:
+    """Warn if states between steps are recorded by an integrator that has only straight lines
+    there.
+    """
+    words = {"sample": "trajectory", "cut": "sections", "tally": "observables"}
+    between = [words[r.entry] for r in reversed(source.recorders) if r.entry in words]
+    if between and source.method.dense_order < 2:
+        warn(
+            f"{source.integrator} draws straight lines between its steps, so errors of {' and '.join(between)} are not bounded "
+            "by rtol; take another integrator for these records, e.g. rodas5p"
+        )

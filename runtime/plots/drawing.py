@@ -1,0 +1,252 @@
+"""Plots of every kind of result: functions that take and return axes, and show nothing."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from synchain.models.graphs.topology import Topology
+
+from ..bifurcation.branches import Branch
+from ..bifurcation.equilibrium import Equilibrium
+from ..bifurcation.periodic import PeriodicOrbit
+from ..bifurcation.skeleton import Skeleton
+from ..results.result import Result
+from ..stability.cluster_exponents import BlockVerdict, ClusterExponents
+from ..stability.exponents import Exponents
+from ..stability.lyapunov import Lyapunov
+from ..stability.msf import MSF, Plane
+from ..sweeps.run import run
+from ..sweeps.stream import Streamed
+from ..synchronisation.basin import Basin, Fate
+from ..synchronisation.probe import Probe
+from ..synchronisation.threshold import Thresholds
+from .branch_marks import MARK, MARKERS, STABLE, UNSTABLE
+from .canvas import canvas
+from .exponent import draw_exponent, finite
+from .plane import draw_plane
+from .result_plot import draw_result
+from .style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, bands, note, symbol
+
+__all__ = ["drawn"]
+
+SAMPLES = 400
+"""Samples of an orbit in a period of the drive."""
+
+DOTS: dict[str, Any] = {"linestyle": "none", "marker": "."}
+
+
+def drawn(value: object, ax: Axes | None, **options: Any) -> Axes:
+    """Draw a value into axes, by default those of a new figure, and return them."""
+    with canvas(ax) as axes:
+        return _draw(value, axes, **options)
+
+
+@singledispatch
+def _draw(value: object, axes: Axes) -> Axes:
+    raise TypeError(f"found {type(value).__name__}; expected a value with a plot")
+
+
+@_draw.register
+def _(value: Result, axes: Axes, kind: str | None = None) -> Axes:
+    return draw_result(value, axes, kind)
+
+
+@_draw.register
+def _(value: Streamed, axes: Axes) -> Axes:
+    return draw_result(value.result, axes)
+
+
+@_draw.register
+def _(value: MSF, axes: Axes) -> Axes:
+    return draw_exponent(axes, value)
+
+
+@_draw.register
+def _(value: Plane, axes: Axes) -> Axes:
+    return draw_plane(axes, value)
+
+
+@_draw.register
+def _(value: Exponents, axes: Axes) -> Axes:
+    """Exponents over a strength as a line, over two numbers of a mode as dots, else in order."""
+    label, numbers = r"exponent $\Lambda$ per unit of $\tau$", value.alpha.reshape(len(value.alpha), -1)
+    columns = np.concatenate([numbers.real, numbers.imag], axis=1).T if np.iscomplexobj(numbers) else numbers.T
+    if len(columns) == 2:
+        names = (r"$\alpha$", r"$\beta$") if value.alpha.ndim == 1 else (r"$\alpha_1$", r"$\alpha_2$")
+        colour = finite(value.exponent)
+        top = float(np.nanmax(np.abs(colour), initial=0.0)) or 1.0
+        look: dict[str, Any] = {"cmap": "RdBu_r", "s": 14.0, "edgecolors": BLACK, "linewidths": 0.3}
+        dots = axes.scatter(columns[0], columns[1], c=colour, vmin=-top, vmax=top, **look)
+        axes.set(xlabel=names[0], ylabel=names[1])
+        axes.figure.colorbar(dots, ax=axes, label=label)
+        return axes
+    axes.axhline(0.0, color=BLACK, linewidth=0.6)
+    places = value.alpha if value.on_a_line else np.arange(len(value.alpha))
+    axes.errorbar(places, finite(value.exponent), 2 * finite(value.stderr), color=BLUE)
+    axes.set(xlabel=r"strength of a mode $\alpha$" if value.on_a_line else "number of the mode", ylabel=label)
+    return axes
+
+
+@_draw.register
+def _(value: Thresholds, axes: Axes) -> Axes:
+    """Share of synchronous starts over sigma; grey: at least half; bars: the probe's prediction,
+    and where exponents are negative, with two standard errors.
+    """
+    bands(axes, value.direct.intervals)
+    axes.plot(value.direct.x, value.direct.share, color=BLUE, drawstyle="steps-mid", label="simulated")
+    for k, (low, high) in enumerate(value.predicted):
+        axes.plot([low, high], [1.06, 1.06], color=ORANGE, marker="|", label="" if k else "predicted by the probe")
+    for k, (ends, errors) in enumerate(zip(value.exponents.intervals, value.exponents.errors, strict=True)):
+        spread = 2 * finite(np.array(errors))
+        axes.errorbar(ends, [1.12, 1.12], xerr=spread, color=GREEN, capsize=2, label="" if k else "negative exponents")
+    axes.set(xlabel=symbol(value.scene.strength), ylabel="share of synchronous starts", ylim=(-0.05, 1.18))
+    axes.set_xlim(value.direct.x[0], value.direct.x[-1])
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
+    note(axes, "exponents: not computed" if value.exponents.absent else "")
+    return axes
+
+
+@_draw.register
+def _(value: Basin, axes: Axes) -> Axes:
+    """First two components of the first node at the start, by what became of it."""
+    initial, names = value.data.initial.values[:, :2, 0], [str(name) for name in value.data.component.values[:2]]
+    across, up = (initial[:, 0], initial[:, -1])
+    colours = (BLUE, GREEN, ORANGE, PURPLE, BLACK, GREY)
+    for k, (fate, colour) in enumerate(zip(Fate, colours, strict=True)):
+        chosen = value.fate == k
+        if chosen.any():
+            axes.plot(across[chosen], up[chosen], **DOTS, markersize=2.5, color=colour, label=fate)
+    axes.set(xlabel=symbol(f"{names[0]}_1"), ylabel=symbol(f"{names[-1]}_1"))
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+    return axes
+
+
+@_draw.register
+def _(value: Lyapunov, axes: Axes) -> Axes:
+    number = np.arange(1, len(value.exponent) + 1)
+    axes.axhline(0.0, color=BLACK, linewidth=0.6)
+    axes.errorbar(number, finite(value.exponent), 2 * value.stderr, color=BLUE, **DOTS)
+    axes.set(xlabel="number", ylabel="Lyapunov exponent per unit of time")
+    lost = int((~value.resolved).sum())
+    note(axes, f"{lost} of {len(number)} decay too fast to be followed" if lost else "")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    return axes
+
+
+@_draw.register
+def _(value: ClusterExponents, axes: Axes) -> Axes:
+    """The exponent of each block with two standard errors, coloured by its verdict."""
+    colours = {BlockVerdict.STABLE: BLUE, BlockVerdict.UNDECIDED: GREY, BlockVerdict.UNSTABLE: ORANGE}
+    axes.axhline(0.0, color=BLACK, linewidth=0.6)
+    for k, verdict in enumerate(value.verdicts):
+        axes.errorbar([k + 1], finite(value.exponent[[k]]), 2 * value.stderr[[k]], color=colours[verdict], fmt="o")
+    names = [f"block {k + 1}\nclusters {', '.join(str(c + 1) for c in own)}" for k, own in enumerate(value.intertwined)]
+    axes.set_xticks(range(1, len(names) + 1), names)
+    axes.set_ylabel("exponent per unit of time")
+    axes.margins(x=0.2)
+    return axes
+
+
+@_draw.register
+def _(value: Equilibrium, axes: Axes) -> Axes:
+    """The eigenvalues in the complex plane; those that grow stand out."""
+    grows = value.eigenvalues.real > 0.0 if value.growing else np.zeros(len(value.eigenvalues), dtype=bool)
+    axes.axvline(0.0, color=BLACK, linewidth=0.6)
+    for chosen, colour in ((~grows, BLUE), (grows, ORANGE)):
+        axes.plot(value.eigenvalues.real[chosen], value.eigenvalues.imag[chosen], **DOTS, color=colour)
+    axes.set(xlabel="real part of eigenvalues", ylabel="imaginary part")
+    note(axes, value.verdict)
+    return axes
+
+
+@_draw.register
+def _(value: PeriodicOrbit, axes: Axes) -> Axes:
+    """The closed curve of the first two components; a dot begins each period."""
+    start = {name: [x] for name, x in zip(value.components, value.state.tolist(), strict=True)}
+    one = value.scene.replace(
+        topology=Topology("one", 1, ()),
+        record=("trajectory",),
+        samples=SAMPLES * value.periods,
+        transient=0.0,
+        window=value.period,
+        time_unit="time",
+        initial=start,
+    )
+    path = run(one, show_progress=False, workers=1).trajectory.sel(node=1)
+    names = value.components[0], value.components[min(1, len(value.components) - 1)]
+    axes.plot(*(path.sel(component=name) for name in names), color=BLUE)
+    points = value.points
+    axes.plot(points[:, 0], points[:, min(1, points.shape[1] - 1)], **DOTS, markersize=6.0, color=ORANGE)
+    axes.set(xlabel=symbol(names[0]), ylabel=symbol(names[1]))
+    return axes
+
+
+@_draw.register
+def _(value: Branch, axes: Axes) -> Axes:
+    return _branches((value,), axes)
+
+
+@_draw.register
+def _(value: Skeleton, axes: Axes) -> Axes:
+    return _branches(value.branches, axes)
+
+
+def _branches(branches: tuple[Branch, ...], axes: Axes) -> Axes:
+    """First component at the start of a period: solid where stable, dashed where unstable."""
+    colours = (PURPLE, BLUE, ORANGE, GREEN)
+    counts = sorted({branch.orbits[0].periods for branch in branches})
+    seen: dict[str, dict[str, Any]] = {
+        f"{n} drive period{'s' * (n > 1)}": {"color": colours[k % len(colours)]} for k, n in enumerate(counts)
+    }
+    for branch in branches:
+        colour = colours[counts.index(branch.orbits[0].periods) % len(colours)]
+        for stable, values, states in stretches(branch):
+            axes.plot(values, states[:, 0], color=colour, **(STABLE if stable else UNSTABLE))
+            seen["stable" if stable else "unstable"] = {"color": BLACK, **(STABLE if stable else UNSTABLE)}
+        for turn in branch.bifurcations:
+            axes.plot([turn.value], [turn.orbit.state[0]], color=colour, marker=MARKERS[turn.kind], **MARK)
+            seen[str(turn.kind)] = {"color": BLACK, "marker": MARKERS[turn.kind], **MARK}
+    if branches:
+        name = symbol(branches[0].orbits[0].components[0])
+        axes.set(xlabel=symbol(branches[0].name), ylabel=f"{name} at the beginning of a period")
+        handles = [Line2D([], [], label=label, **style) for label, style in seen.items()]
+        axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=6)
+    return axes
+
+
+def stretches(branch: Branch) -> list[tuple[bool, np.ndarray, np.ndarray]]:
+    """Cut a branch at its bifurcations into stretches of one stability."""
+    orbits = [(float(value), orbit, False) for value, orbit in zip(branch.values, branch.orbits, strict=True)]
+    turns = [(float(turn.value), turn.orbit, True) for turn in branch.bifurcations]
+    found: list[tuple[bool, list[tuple[float, np.ndarray]]]] = []
+    ends: list[tuple[float, np.ndarray]] = []
+    for value, orbit, turned in sorted(orbits + turns, key=lambda each: each[0]):
+        point = (value, orbit.state)
+        if turned:
+            if found and not ends:
+                found[-1][1].append(point)
+            ends = [point]
+        elif not found or ends or found[-1][0] != orbit.stable:
+            found.append((orbit.stable, [*ends, point]))
+            ends = []
+        else:
+            found[-1][1].append(point)
+    return [(s, np.array([v for v, _ in line]), np.array([state for _, state in line])) for s, line in found]
+
+
+@_draw.register
+def _(value: Probe, axes: Axes) -> Axes:
+    """Strengths in the complex plane: filled if synchronous, open if not."""
+    good = value.synchronous
+    axes.plot(value.alpha[good], value.beta[good], **DOTS, markersize=7.0, color=BLUE, label="synchronous")
+    crosses: dict[str, Any] = {"linestyle": "none", "marker": "x", "markersize": 5.0}
+    axes.plot(value.alpha[~good], value.beta[~good], **crosses, color=ORANGE, label="not")
+    axes.set(xlabel=r"$\alpha$", ylabel=r"$\beta$")
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+    return axes

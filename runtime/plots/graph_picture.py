@@ -1,0 +1,252 @@
+"""Graphs as drawings: in matplotlib axes, and as SVG text that follows the colours of its page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from synchain.models.graphs.topology import Topology
+from synchain.models.inputs.checks import check_instance
+from synchain.models.inputs.display import Drawn
+from synchain.models.scenes.scene import Scene
+
+from .graph_layout import positions
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["COLOURS", "Picture", "draw_graph", "svg"]
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+"""Colours of the kinds of nodes (Okabe & Ito)."""
+
+NEGATIVE = "#D55E00"
+"""Colour of links with a negative weight."""
+
+SVG_NODES, SVG_LINES = 300, 3000
+"""Most nodes and lines of an SVG; a larger graph is described in words."""
+
+NUMBERED = 0.05
+"""Least radius of nodes that carry their labels."""
+
+LETTERS = 4
+"""Most letters of a label in a node."""
+
+POINTS = 60.0
+"""Points of a new figure for each unit of the places."""
+
+THIN, THICK = 0.7, 3.2
+"""Widths of lines, in points."""
+
+BEND = 0.18
+"""How far a bent line leaves the straight one, as a part of its length."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Line:
+    """A link, or a link with its mirror image, as it is drawn."""
+
+    source: int  # nodes, counted from 0
+    target: int
+    width: float  # in points
+    arrow: bool  # whether it runs one way, leaves the straight line, has a negative weight
+    bent: bool
+    negative: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """A graph that is ready to be drawn."""
+
+    place: np.ndarray  # (n, 2)
+    lines: tuple[Line, ...]
+    kind: tuple[int, ...]  # the kind of each node
+    names: tuple[str, ...]  # the kinds
+    labels: Sequence[int] | Sequence[str]  # what the nodes are called
+
+    @classmethod
+    def of(cls, value: Drawn) -> Picture:
+        """Lay out a graph, or that of a scene with its kinds of nodes."""
+        graph = graph_of(value)
+        place = positions(graph)
+        kinds: tuple[int, ...] = (0,) * graph.n
+        names: tuple[str, ...] = ("",)
+        if isinstance(value, Scene):
+            kinds, names = value.equations.kind_of, tuple(kind.oscillator.name for kind in value.model.kinds)
+        return cls(place, _lines(graph, place), kinds, names, graph.labels)
+
+    def inscription(self, i: int) -> str:
+        """The label of a node as it fits into its circle."""
+        text = str(self.labels[i])
+        return text if len(text) <= LETTERS else f"{text[: LETTERS - 1]}…"
+
+    @property
+    def radius(self) -> float:
+        """Radius of a node in the units of the places."""
+        count = len(self.place)
+        nearest = 2.0 / np.sqrt(count)
+        if 1 < count <= SVG_NODES:
+            apart = np.linalg.norm(self.place[:, None] - self.place[None], axis=2)
+            nearest = float((apart + np.diag(np.full(count, np.inf))).min())
+        return float(np.clip(0.4 * nearest, 0.012, 0.11))
+
+
+def graph_of(value: Drawn) -> Topology:
+    """Return a graph itself, or that of a scene; TypeError for anything else."""
+    return value.topology if isinstance(value, Scene) else check_instance("graph", value, Topology, "a graph")
+
+
+def _lines(graph: Topology, place: np.ndarray) -> tuple[Line, ...]:
+    """The lines of a graph; two links of equal weight are one line without an arrow."""
+    weight = {(target, source): w for target, source, w in graph.links}
+    largest = max((abs(w) for w in weight.values()), default=0)
+    uneven = len({abs(w) for w in weight.values()}) > 1
+    lines = []
+    for (target, source), w in weight.items():
+        back = weight.get((source, target))
+        if back == w and target > source:
+            continue
+        width = THIN + (THICK - THIN) * float(abs(w) / largest) if uneven else 1.2
+        bent = (back is not None and back != w) or _hides(place, source, target)
+        lines.append(Line(source, target, width, back != w, bent, w < 0))
+    return tuple(lines)
+
+
+def _hides(place: np.ndarray, i: int, j: int) -> bool:
+    """True if the straight line between two nodes passes through a third one."""
+    way = place[j] - place[i]
+    length = float(way @ way)
+    if length == 0.0 or len(place) > SVG_NODES:
+        return False
+    rest = place - place[i]
+    along = rest @ way / length
+    aside = np.abs(rest[:, 0] * way[1] - rest[:, 1] * way[0]) / np.sqrt(length)
+    return bool(np.any((along > 1e-6) & (along < 1.0 - 1e-6) & (aside < 0.01)))
+
+
+def draw_graph(value: Drawn, ax: Axes | None = None) -> Axes:
+    """Draw a graph, or that of a scene, into axes (default: those of a new figure); return them."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.patches import FancyArrowPatch
+
+    from .canvas import canvas
+
+    picture = Picture.of(value)
+    with canvas(ax) as axes:
+        place, straight = picture.place, [line for line in picture.lines if not (line.arrow or line.bent)]
+        axes.add_collection(
+            LineCollection(
+                [place[[line.source, line.target]] for line in straight],
+                linewidths=[line.width for line in straight],
+                colors=[NEGATIVE if line.negative else "0.45" for line in straight],
+                zorder=1,
+            )
+        )
+        for line in picture.lines:
+            if line.arrow or line.bent:
+                patch = FancyArrowPatch(
+                    place[line.source],
+                    place[line.target],
+                    arrowstyle="-|>" if line.arrow else "-",
+                    connectionstyle=f"arc3,rad={BEND if line.bent else 0.0}",
+                    mutation_scale=8.0,
+                    shrinkA=0.0,
+                    shrinkB=6.0 if line.arrow else 0.0,
+                    linewidth=line.width,
+                    color=NEGATIVE if line.negative else "0.45",
+                    zorder=1,
+                )
+                axes.add_patch(patch)
+        _nodes(axes, picture)
+    return axes
+
+
+def _nodes(axes: Axes, picture: Picture) -> None:
+    """Draw the nodes with their colours and labels, and name several kinds."""
+    place, kind = picture.place, np.array(picture.kind)
+    size = (2.0 * POINTS * picture.radius) ** 2
+    for k, name in enumerate(picture.names):
+        own = kind == k
+        colour = COLOURS[k % len(COLOURS)]
+        axes.scatter(place[own, 0], place[own, 1], s=size, color=colour, zorder=2, label=name, linewidths=0.0)
+    if picture.radius >= NUMBERED:
+        for i, (x, y) in enumerate(place.tolist()):
+            axes.text(
+                x,
+                y,
+                picture.inscription(i),
+                color="white",
+                ha="center",
+                va="center_baseline",
+                fontsize=min(POINTS * picture.radius, 7.0),
+                zorder=3,
+            )
+    if len(picture.names) > 1:
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
+    low, high = place.min(axis=0) - 0.2, place.max(axis=0) + 0.2
+    axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    axes.set_axis_off()
+
+
+def svg(value: Drawn, width: int = 300) -> str:
+    """Return a graph as SVG text; of more than SVG_NODES nodes or SVG_LINES lines only words.
+
+    Lines have the colour of the text around, so that the drawing reads on any ground.
+    """
+    graph = graph_of(value)
+    if graph.n > SVG_NODES or graph.link_count > 2 * SVG_LINES:
+        return (
+            f"<p>{graph.n} nodes and {graph.link_count} links are too many to be drawn here; "
+            "<code>draw()</code> draws them</p>"
+        )
+    picture = Picture.of(value)
+    low, high = picture.place.min(axis=0), picture.place.max(axis=0)
+    margin = picture.radius + 0.14
+    (left, bottom), (across, up) = low - margin, high - low + 2 * margin
+    scale = width / max(across, up)
+    body = [_svg_line(picture, line, scale) for line in picture.lines]
+    body += [_svg_node(picture, i, scale) for i in range(len(picture.place))]
+    box = f"{scale * left:.1f} {-scale * (bottom + up):.1f} {scale * across:.1f} {scale * up:.1f}"
+    label = escape(f"{graph.name} of {graph.n} nodes", quote=True)
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{label}" width="{scale * across:.0f}" '
+        f'height="{scale * up:.0f}" viewBox="{box}">{"".join(body)}</svg>'
+    )
+
+
+def _svg_line(picture: Picture, line: Line, scale: float) -> str:
+    """One line, with a head at its target if it runs one way."""
+    a, b = (picture.place[i] * [scale, -scale] for i in (line.source, line.target))
+    colour = NEGATIVE if line.negative else "currentColor"
+    way = b - a
+    bend = 0.5 * (a + b) + 2 * BEND * np.array([-way[1], way[0]]) * 0.5 if line.bent else 0.5 * (a + b)
+    into = (b - bend) / (np.hypot(*(b - bend)) or 1.0)
+    tip = b - into * picture.radius * scale if line.arrow else b
+    path = f"M{a[0]:.1f} {a[1]:.1f}Q{bend[0]:.1f} {bend[1]:.1f} {tip[0]:.1f} {tip[1]:.1f}"
+    head = ""
+    if line.arrow:
+        side = np.array([-into[1], into[0]]) * 3.5
+        back = tip - into * 8.0
+        corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in (tip, back + side, back - side))
+        head = f'<polygon points="{corners}" fill="{colour}" opacity="0.8"/>'
+    return f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="{line.width:.2g}" opacity="0.55"/>{head}'
+
+
+def _svg_node(picture: Picture, i: int, scale: float) -> str:
+    """One node with its label if there are few."""
+    (x, y), k = picture.place[i] * [scale, -scale], picture.kind[i]
+    name = picture.names[k]
+    title = f"<title>{escape(f'node {picture.labels[i]}' + (f', {name}' if name else ''))}</title>"
+    colour = COLOURS[k % len(COLOURS)]
+    dot = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{picture.radius * scale:.1f}" fill="{colour}">{title}</circle>'
+    if picture.radius < NUMBERED:
+        return dot
+    size = min(picture.radius * scale * 1.1, 12.0)
+    return dot + (
+        f'<text x="{x:.1f}" y="{y + 0.35 * size:.1f}" fill="#fff" font-size="{size:.1f}" text-anchor="middle" '
+        f'font-family="sans-serif">{escape(picture.inscription(i))}</text>'
+    )

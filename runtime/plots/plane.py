@@ -1,0 +1,107 @@
+"""Plots of master stability functions over complex strengths, and the modes of a network on them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import TwoSlopeNorm
+
+from ..prediction.mode_windows import transversal_modes
+from ..stability.msf import Plane
+from .csv_table import Table
+from .exponent import finite
+from .style import BLACK, symbol
+
+FAR = 100.0
+"""Largest coupling of the rays, beyond every plane of interest."""
+AXES = {"alpha": r"$\alpha=-\sigma\,\mathrm{Re}\,\gamma$", "beta": r"$\beta=-\sigma\,\mathrm{Im}\,\gamma$"}
+"""Labels of axes that are strengths of a mode."""
+RAY: dict[str, Any] = {"color": BLACK, "linestyle": "--", "linewidth": 0.8}
+DOT: dict[str, Any] = {
+    "color": BLACK,
+    "linestyle": "none",
+    "marker": "o",
+    "markersize": 4.0,
+    "markerfacecolor": "white",
+    "clip_on": False,
+    "zorder": 5,
+}
+
+
+def draw_plane(axes: Axes, found: Plane) -> Axes:
+    """Draw exponents in colours, blue if negative, with a line at zero."""
+    value = finite(found.exponent)
+    cmap, norm = _colours(value)
+    painted = axes.pcolormesh(found.across, found.up, value.T, norm=norm, cmap=cmap, shading="nearest", rasterized=True)
+    for k, line in enumerate(found.contours):
+        axes.plot(line[:, 0], line[:, 1], color=BLACK, linewidth=1.1, label="" if k else r"$\Lambda=0$")
+    axes.set(
+        xlim=(found.across[0], found.across[-1]),
+        ylim=(found.up[0], found.up[-1]),
+        xlabel=_label(found, found.names[0]),
+        ylabel=_label(found, found.names[1]),
+    )
+    bar = axes.figure.colorbar(painted, ax=axes, aspect=30, pad=0.02)
+    bar.set_label(r"exponent $\Lambda$ per unit of $\tau$")
+    bar.ax.tick_params(labelsize=7)
+    return axes
+
+
+def _label(found: Plane, name: str) -> str:
+    """An axis as a formula."""
+    return AXES[name] if name in found.strengths else symbol(name)
+
+
+def _colours(value: np.ndarray) -> tuple[str, TwoSlopeNorm]:
+    """Colours that are white at zero and symmetric about it; the darker half alone for values of one sign that differ."""
+    known = value[np.isfinite(value)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
+    if low * high > 0 and not np.isclose(low, high):
+        return ("Blues_r", TwoSlopeNorm(high, low, 0.0)) if high < 0 else ("Reds", TwoSlopeNorm(low, 0.0, high))
+    size = max(-low, high) or 1.0
+    return "RdBu_r", TwoSlopeNorm(0.0, -size, size)
+
+
+def plane_table(found: Plane) -> Table:
+    """Return exponent and standard error, per unit of time, at every point of the grid."""
+    rows = [
+        (a, b, found.exponent[i, j], found.stderr[i, j])
+        for i, a in enumerate(found.across)
+        for j, b in enumerate(found.up)
+    ]
+    return Table((*found.names, "exponent", "stderr"), tuple(rows))
+
+
+def draw_rays(axes: Axes, found: Plane, sigma: float | None = None) -> Axes:
+    """Draw the ray of every mode of the scene's network.
+
+    Of conjugate modes only the one with beta >= 0 is seen if the plane ends at beta = 0.
+    """
+    graph = found.scene.topology
+    still: dict[str, Any] = {"scalex": False, "scaley": False}
+    for mode in transversal_modes(graph):
+        unit = -complex(mode.eigenvalue.value)
+        (ray,) = axes.plot([0.0, FAR * unit.real], [0.0, FAR * unit.imag], **RAY, **still)
+        ray.set_label(rf"$-\sigma\gamma_k$ of {graph.name}({graph.n})" if mode.number == 1 else "")
+        if sigma is not None and _within(found, sigma * unit):
+            (dot,) = axes.plot(sigma * unit.real, sigma * unit.imag, **DOT, **still)
+            dot.set_label(rf"$\sigma={sigma:.3g}$")
+    handles = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
+    axes.figure.legend(
+        handles.values(),
+        handles.keys(),
+        loc="outside upper center",
+        ncols=3,
+        handlelength=1.8,
+        columnspacing=1.4,
+        borderpad=0.1,
+    )
+    return axes
+
+
+def _within(found: Plane, point: complex) -> bool:
+    """True if a point lies in the drawn part of the plane."""
+    across, up = (row[0] <= value <= row[-1] for row, value in ((found.across, point.real), (found.up, point.imag)))
+    return bool(across and up)

@@ -1,0 +1,160 @@
+"""One page of HTML on a scene: equations, graph, exact spectrum, stability, a sweep, origin.
+
+The page is whole in itself: no script, no font, no image comes from elsewhere.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+
+from synchain.models.presentation.equations_text import latex
+from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.sweeps.axis import Axis
+
+from ..engines.job import versions
+from ..engines.scene_kernels import kernel_source
+from ..stability.msf import MSF, msf
+from ..sweeps.run import run
+from .html import STYLE, body, figure, provenance_rows, rows_table
+
+__all__ = ["QUICK", "Effort", "report"]
+
+PAGE = """
+:root{color-scheme:light dark}
+body{margin:0 auto;max-width:52em;padding:1.5em;background:#fff;color:#1a1a1a}
+h1{font-size:1.5em;line-height:1.25;margin:.2em 0 .6em}
+h2{font-size:1.15em;margin:1.6em 0 .5em;padding-top:.5em;border-top:1px solid rgba(128,128,128,.5)}
+pre{white-space:pre-wrap;overflow-wrap:anywhere;font-size:.85em}
+code{overflow-wrap:anywhere}
+img{display:block}
+@media (prefers-color-scheme:dark){body{background:#16181c;color:#e6e6e6}circle{stroke:#e6e6e6;stroke-width:.5}}
+@media print{body{background:#fff;color:#000;max-width:none;padding:0}h2{break-after:avoid}
+img,svg,table,math{break-inside:avoid}details{display:none}}
+"""
+
+
+DEFAULT = 1.2
+"""Largest strength of the master stability function of a scene without coupling."""
+
+POLICY = (
+    '<meta http-equiv="Content-Security-Policy" '
+    "content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">"
+)
+"""Tells the browser to run no script and to load nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How much a report computes."""
+
+    strengths: int = 241  # number of strengths of the master stability function
+    precision: float = 1e-3  # as for `synchain.runtime.exponents`
+    periods: float = 5000.0
+    values: int | None = None  # most values of each axis of the sweep; None runs it as it is
+
+
+QUICK = Effort(strengths=61, precision=1e-2, periods=300.0, values=25)
+"""For a first look."""
+
+
+def report(
+    scene: Scene, effort: Effort | None = None, *, workers: int | None = None, show_progress: bool | None = None
+) -> str:
+    """Compute what there is to say of a scene, and return it as a page of HTML."""
+    effort = Effort() if effort is None else effort
+    title = escape(a_scene(scene).title or repr(scene))
+    parts = [f"<h1>{title}</h1>", *(f"<p>Note: {escape(words)}</p>" for words in scene.warnings)]
+    source = f"<details><summary>LaTeX</summary><pre>{escape(latex(scene.equations))}</pre></details>"
+    parts += [_section("Equations", body(scene.equations) + source)]
+    parts += [_section("Numbers", rows_table(provenance_rows(scene)))]
+    if scene.n > 1:
+        parts += [_section("Network and exact spectrum", body(scene.topology))]
+        parts += [_section("Master stability function", _stability(scene, effort, workers, show_progress))]
+    if scene.axes:
+        parts += [_section("Sweep", _sweep(scene, effort, workers, show_progress))]
+    parts += [_section("Provenance", _provenance(scene))]
+    head = f'<meta charset="utf-8">{POLICY}<meta name="viewport" content="width=device-width"><title>{title}</title>'
+    content = "\n".join(parts)
+    return (
+        f'<!DOCTYPE html>\n<html lang="en"><head>{head}<style>{STYLE}{PAGE}</style></head>\n'
+        f'<body class="synchain">\n{content}\n</body></html>\n'
+    )
+
+
+def _section(name: str, content: str) -> str:
+    return f"<section><h2>{escape(name)}</h2>{content}</section>"
+
+
+def _stability(scene: Scene, effort: Effort, workers: int | None, show_progress: bool | None) -> str:
+    """The function with its windows, or why there is none."""
+    try:
+        found = msf(
+            scene.replace(axes=()),
+            _strengths(scene, effort.strengths),
+            precision=effort.precision,
+            periods=effort.periods,
+            workers=workers,
+            show_progress=show_progress,
+        )
+        picture = figure(found.plot(), "exponent over strength")
+        return f"{rows_table(found.summary[1:])}{picture}{_ends(found)}{_fixed(scene)}"
+    except (ValueError, FloatingPointError) as problem:
+        return f"<p>This scene has none: {escape(str(problem))}</p>"
+
+
+def _strengths(scene: Scene, count: int) -> np.ndarray:
+    """Strengths of all modes over the sweep of sigma, and 0; 0 … 1.2 if sigma is 0 throughout."""
+    fixed = scene.parameters[scene.strength]
+    swept = next((axis.values for axis in scene.axes if axis.name == scene.strength), (2.0 * fixed,))
+    largest = max(abs(value) for value in scene.topology.spectrum.values)
+    low, high = (largest * end(0.0, *swept) for end in (min, max))
+    return np.linspace(low, high if high > low else DEFAULT, count)
+
+
+def _ends(found: MSF) -> str:
+    """A sentence if a range goes on beyond the grid; strengths begin at 0."""
+    first, last = found.fine.alpha[[0, -1]]
+    cut = [low for low, _ in found.intervals if low == first != 0.0]
+    cut += [high for _, high in found.intervals if high == last]
+    words = " and at ".join(f"{end:g}" for end in cut)
+    return f'<p class="quiet">The range that ends at alpha = {words} ends there with the grid.</p>' if cut else ""
+
+
+def _fixed(scene: Scene) -> str:
+    """A sentence if the sweep moves more than the strength."""
+    moved = [axis.name for axis in scene.axes if axis.name != scene.strength]
+    words = f"The sweep moves {', '.join(moved)}; this function is that of the scene's own values."
+    return f'<p class="quiet">{escape(words)}</p>' if moved else ""
+
+
+def _sweep(scene: Scene, effort: Effort, workers: int | None, show_progress: bool | None) -> str:
+    """The scene's own sweep, with fewer values if the effort says so."""
+    thinned = scene.replace(axes=tuple(_thinned(axis, effort.values) for axis in scene.axes))
+    found = run(thinned, workers=workers, show_progress=show_progress)
+    plain = [None] if not scene.observe or {"sync_error", "section"} & set(scene.record) else []
+    pictures = "".join(figure(found.plot(kind=kind), kind or "sweep") for kind in (*plain, *scene.observe))
+    words = "" if thinned.cells == scene.cells else f"<p>{thinned.cells} of the scene's {scene.cells} cells.</p>"
+    return f"{words}{rows_table(found.summary[1:3])}{pictures}"
+
+
+def _thinned(axis: Axis, most: int | None) -> Axis:
+    """Some of the values of an axis, its ends among them."""
+    if most is None or len(axis) <= most:
+        return axis
+    places = np.unique(np.linspace(0, len(axis) - 1, most).round().astype(int))
+    return Axis(axis.name, tuple(axis.values[k] for k in places))
+
+
+def _provenance(scene: Scene) -> str:
+    rows = [
+        ("versions", versions()),
+        ("equations", scene.equations.digest),
+        ("kernel", kernel_source(scene).digest),
+        ("seed", str(scene.seed)),
+    ]
+    text = json.dumps(scene.as_dict(), indent=1)
+    return f"{rows_table(rows)}<details><summary>the scene</summary><pre>{escape(text)}</pre></details>"

@@ -1,0 +1,134 @@
+"""Energy and power of the states of a run, and how well a trajectory keeps the balance of the two."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+from scipy.integrate import cumulative_simpson
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.inputs.checks import check_keys, check_number, check_table
+from synchain.models.mechanics.components import TIME
+from synchain.models.networks.energy_terms import Energy, Share
+from synchain.models.scenes.energy import energy
+from synchain.models.scenes.scene import Scene, a_scene
+
+from ..support.arrays import numbers
+
+__all__ = ["EnergyFunction", "energy_function"]
+
+Array = np.ndarray
+Formula = Callable[..., np.ndarray | float]
+Values = Mapping[str, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Group:
+    """Nodes or links of one kind: energy and power as functions of (t or weight, states,
+    parameters).
+
+    states (count,) each: where a state of each of them stands, of a link those of its target, then
+    of its source. parameters (count,) or one name each: what they are called in a scene.
+    """
+
+    formulas: tuple[Formula, Formula]
+    weights: Array | None
+    states: list[Array]
+    parameters: list[str | list[str]]
+
+    def total(self, power: bool, states: Array, t: Array, values: Mapping[str, float]) -> Array:
+        """The sum over all of them."""
+        given = [states[..., place] for place in self.states]
+        numbers = [values[p] if isinstance(p, str) else np.array([values[name] for name in p]) for p in self.parameters]
+        found = self.formulas[power](t if self.weights is None else self.weights, *given, *numbers)
+        return np.asarray(np.broadcast_to(found, given[0].shape).sum(axis=-1))
+
+
+@dataclass(frozen=True, slots=True)
+class EnergyFunction:
+    """The energy of a scene's network as functions of state arrays (…, dimension), in state order;
+    all non-dimensional.
+
+    One formula for the nodes and one for the links of each kind are applied to all of them at once,
+    so that large networks and long trajectories cost array operations alone.  `parameters` replace
+    numbers of the scene by others.
+    """
+
+    scene: Scene
+    exact: Energy
+    groups: tuple[_Group, ...]
+
+    def __call__(self, states: Array, t: Array | float = 0.0, parameters: Values = None) -> Array:
+        """Return the energy (…) of the states at times (…) or at one time."""
+        return self._sum(False, states, t, parameters)
+
+    def power(self, states: Array, t: Array | float = 0.0, parameters: Values = None) -> Array:
+        """Return the power (…) that forces and the explicit time feed into the network."""
+        return self._sum(True, states, t, parameters)
+
+    def imbalance(self, t: Array, states: Array, parameters: Values = None) -> Array:
+        """Return E(t) - E(t_0) - (integral of the power) of a trajectory: states (samples,
+        dimension) at times t (samples).
+
+        The integral is a quadrature, Simpson's rule on the samples.  Where the power is smooth, its
+        own error falls with the third power of their distance, at every other sample with the fourth;
+        where the power jumps, as with `sign` in a force, with the first alone.  The mean of the power
+        as an observable of the run is as exact as its `rtol` (docs/models.md).  Raises ValueError for
+        fewer than three samples.
+        """
+        if np.ndim(t) != 1 or len(t) < 3:
+            raise ValueError(f"imbalance: found {np.size(t)} samples; expected at least three; raise samples")
+        found = self(states, t, parameters)
+        work = cumulative_simpson(self.power(states, t, parameters), x=t, initial=0.0)
+        return np.asarray(found - found[0] - work)
+
+    def _sum(self, power: bool, states: Array, t: Array | float, parameters: Values) -> Array:
+        values = dict(self.scene.parameters)
+        if parameters is not None:
+            check_keys("parameters", check_table("parameters", parameters), values)
+            values |= {name: check_number(name, value) for name, value in parameters.items()}
+        given, time, size = numbers("states", states), numbers("t", t)[..., None], len(self.scene.y0)
+        if given.ndim < 1 or given.shape[-1] != size:
+            raise ValueError(f"states: found an array of shape {given.shape}; expected rows of {size} numbers")
+        return np.asarray(sum(group.total(power, given, time, values) for group in self.groups))
+
+
+def energy_function(scene: Scene) -> EnergyFunction:
+    """Return the compiled energy of a scene's network; ValueError as
+    `synchain.models.scenes.energy.energy`.
+    """
+    exact = energy(a_scene(scene))
+    equations, places = exact.equations, exact.equations.places
+    groups = []
+    for kind, (share, node) in enumerate(zip(exact.nodes, equations.nodes, strict=True)):
+        members = [i for i, k in enumerate(equations.kind_of) if k == kind]
+        states = list(np.array([places[i] for i in members]).T)
+        names = _names(equations, node.parameters, members)
+        groups.append(_Group(_compiled(share, (TIME, *node.state, *node.parameters)), None, states, names))
+    for kind, (share, edge) in enumerate(zip(exact.links, equations.edges, strict=True)):
+        pairs = [pair for pair, number in exact.pairs if number == kind]
+        if pairs:
+            here, there = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
+            states = [s for end in (here, there) for s in np.array([places[i] for i in end]).T]
+            sources, own = [s for s, _ in edge.theirs], [s for _, s in edge.theirs]
+            names = _names(equations, edge.parameters, here) + _names(equations, own, there)
+            for k, s in enumerate(edge.parameters):
+                if s.name in equations.numbered:
+                    names[k] = [equations.numbered[s.name].name(s.name, pair) for pair in pairs]
+            formulas = _compiled(share, (edge.weight, *edge.here, *edge.there, *edge.parameters, *sources))
+            groups.append(_Group(formulas, np.array([float(pair[2]) for pair in pairs]), states, names))
+    return EnergyFunction(scene, exact, tuple(groups))
+
+
+def _names(equations: Equations, symbols: Sequence[sp.Symbol], nodes: Sequence[int]) -> list[str | list[str]]:
+    """What the parameters of some nodes are called: one name, or one for each node."""
+    return [[f"{s.name}_{i + 1}" for i in nodes] if s.name in equations.varied else s.name for s in symbols]
+
+
+def _compiled(share: Share, arguments: Sequence[sp.Symbol]) -> tuple[Formula, Formula]:
+    """Energy and power as functions of arrays."""
+    made = [sp.lambdify(arguments, e, modules="numpy", cse=True) for e in (share.energy, share.power)]
+    return made[0], made[1]

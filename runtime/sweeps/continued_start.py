@@ -1,0 +1,188 @@
+"""Runs that begin where an earlier one ended: states by their labels, and the phase of the drive."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TypeAlias, TypeGuard
+
+import numpy as np
+import xarray as xr
+
+from synchain.codegen.driver.columns import Span
+from synchain.models.inputs.checks import typed_repr
+from synchain.models.mechanics.contact import SLIP
+from synchain.models.scenes.scene import Scene
+
+from ..cells.plan import Planner
+from ..results.labels import DRIVE_PHASE, END_TIME, STATE, States, coordinates, dimensions
+from ..results.result import Result
+from ..support.arrays import row
+
+__all__ = ["START_TIME", "Start", "expect_whole_periods", "several", "started", "starts_of_cells"]
+
+Start: TypeAlias = Result | xr.DataArray | Mapping[str, object] | Sequence[float] | np.ndarray
+"""What a run may start from."""
+
+START_TIME = "start_time"
+"""What a result calls the time of the earlier run at which it started."""
+
+WHOLE = 1e-9
+"""Largest distance of a time from a whole number of drive periods, in periods."""
+
+CELLS = 65536
+"""Cells of a continued sweep that are looked at together."""
+
+
+def started(scene: Scene, start: Start) -> tuple[Scene, float]:
+    """Return the scene with the states of one cell as its start, and when they were reached."""
+    if isinstance(start, Mapping):
+        return scene.replace(initial=start), 0.0
+    if isinstance(start, list | tuple | np.ndarray):
+        start = _in_order(scene, start)
+    end = _end(start)
+    if not isinstance(end, xr.DataArray):
+        raise TypeError(
+            f"start: found {typed_repr(start)}; expected a Result of one cell, result.end of one, a table of initial states, "
+            "or all states in a row"
+        )
+    _check_labels(scene, end)
+    time = float(end.coords[END_TIME]) if END_TIME in end.coords else 0.0
+    _check_phases(scene, end)
+    initial = {}
+    for name in scene.components:
+        if name != SLIP.name:  # the modes of contacts follow from the other states
+            nodes = [scene.topology.labels[i] for i in scene.equations.holders(name)]
+            initial[name] = [float(x) for x in end.sel(component=name, node=nodes).values]
+    _expect_finite(np.array([x for values in initial.values() for x in values]))
+    return scene.replace(initial=initial), time
+
+
+def several(start: Start) -> TypeGuard[Result | xr.DataArray]:
+    """True for a result, or states, of several cells."""
+    end = _end(start)
+    return isinstance(end, xr.DataArray) and set(STATE) < set(end.dims)
+
+
+def starts_of_cells(scene: Scene, start: Result | xr.DataArray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the states (cells, dimension) that the cells of a scene start from, and the times (axes) when they were reached.
+
+    A cell starts from that of the same values of the axes; axes that `start` lacks start from one cell.  Raises
+    ValueError as `started`, and if axes of `start` are none of the scene or have other values.
+    """
+    end, dims = start.end if isinstance(start, Result) else start, dimensions(scene)
+    states = end.isel({name: 0 for name in end.dims if name in dims})
+    _check_labels(scene, states)
+    if scene.continued:
+        raise ValueError(
+            f"start: found the states of several cells; expected those of one, as continuation = {str(scene.continuation)!r} "
+            "starts cells from others; set continuation = 'none'"
+        )
+    # Coordinates along the axes, of draws too, say which cell is which.
+    own = xr.Dataset(coords=coordinates(scene)).coords
+    for name, values in end.coords.items():
+        along = set(values.dims) & set(dims)
+        if along and name in own and not (values.dims == own[name].dims and np.array_equal(values, own[name])):
+            raise ValueError(
+                f"start: found cells of {name} = {_listed(values.values.ravel().tolist())}; expected those of the sweep, "
+                f"{_listed(own[name].values.ravel().tolist())}; choose one cell, e.g. result.end.isel({next(iter(along))}=-1)"
+            )
+    for name in set(end.dims) & set(dims):
+        size = scene.shape[dims.index(name)]
+        if end.sizes[name] != size:
+            raise ValueError(f"start: found {end.sizes[name]} cells along {name}; expected {size}, those of the sweep")
+    _check_phases(scene, end)
+    labels = {"component": list(scene.equations.components), "node": list(scene.topology.labels)}
+    table = _along(end.sel(labels), dims, STATE)
+    starts = States.of(scene).flat(np.broadcast_to(table, (*scene.shape, *table.shape[-2:]))).reshape(scene.cells, -1)
+    modes = [k for k, name in enumerate(scene.equations.state) if name.rpartition("_")[0] == SLIP.name]
+    starts[:, modes] = np.array(scene.y0)[modes]  # they follow from the other states
+    _expect_finite(np.delete(starts, modes, axis=1))
+    time = end.coords.get(END_TIME, xr.zeros_like(end.isel({name: 0 for name in STATE}, drop=True)))
+    return starts, np.broadcast_to(_along(time, dims), scene.shape).astype(float)
+
+
+def _end(start: Start) -> object:
+    """The final states of a result, of which all cells finished; any other start as it is."""
+    if not isinstance(start, Result):
+        return start
+    if not start.success:
+        raise ValueError(f"start: found a result with {start.message}; expected cells that finished")
+    return start.end
+
+
+def _along(values: xr.DataArray, dims: tuple[str, ...], more: tuple[str, ...] = ()) -> np.ndarray:
+    """Values along the dimensions of a sweep, of length 1 where they lack one, then along others."""
+    missing = [name for name in dims if name not in values.dims]
+    return values.expand_dims(missing).transpose(*dims, *more).values
+
+
+def _expect_finite(states: np.ndarray) -> None:
+    if not np.isfinite(states).all():
+        raise ValueError("start: found a state that is not finite; expected those of a cell that finished")
+
+
+def expect_whole_periods(planner: Planner) -> None:
+    """Refuse a continued sweep in which the drive is amid a period at the end of a cell, as each cell begins with one."""
+    scene = planner.scene
+    if not (scene.continued and scene.forced) or scene.time_unit == "period":
+        return
+    for first in range(0, scene.cells, CELLS):
+        spans = planner.spans(np.arange(first, min(first + CELLS, scene.cells)))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            periods = np.where(spans[:, Span.PERIOD] > 0.0, spans[:, Span.END] / spans[:, Span.PERIOD], np.nan)
+        amid = np.abs(periods - np.rint(periods)) < WHOLE
+        if not amid.all():
+            part = periods[amid.argmin()] % 1.0
+            where = "has no period" if math.isnan(part) else f"is {part:.6f} into a period"
+            raise ValueError(
+                f"continuation: the drive {where} at the end of a cell; expected the beginning of one, where the next cell "
+                "begins; let transient + window be whole drive periods, or set time_unit = 'period'"
+            )
+
+
+def _in_order(scene: Scene, start: Sequence[float] | np.ndarray) -> xr.DataArray:
+    """States in the order of the equations with their labels."""
+    values, names = row("start", start), scene.equations.state
+    if len(values) != len(names):
+        raise ValueError(f"start: found {len(values)} numbers; expected {len(names)}, of {_listed(names)}")
+    states = States.of(scene)
+    labels = {"component": list(states.components), "node": list(scene.topology.labels)}
+    return xr.DataArray(states.table(values), labels, STATE)
+
+
+def _check_labels(scene: Scene, end: xr.DataArray) -> None:
+    """Raise ValueError if the labels are not those of one cell of the scene."""
+    further = [f"{name} ({end.sizes[name]})" for name in end.dims if name not in STATE]
+    if further:
+        axis = next(name for name in end.dims if name not in STATE)
+        raise ValueError(
+            f"start: found the states of several cells, along {', '.join(map(str, further))}; expected those of one; "
+            f"choose it, e.g. result.end.isel({axis}=-1)"
+        )
+    expected = {"component": tuple(scene.equations.components), "node": tuple(scene.topology.labels)}
+    for name, labels in expected.items():
+        found = tuple(end.coords[name].values.tolist()) if name in end.dims and name in end.coords else ()
+        if set(found) != set(labels) or len(found) != len(labels):
+            raise ValueError(
+                f"start: found the {name}s {_listed(found)}; expected {_listed(labels)}, those of the scene"
+            )
+
+
+def _check_phases(scene: Scene, end: xr.DataArray) -> None:
+    """Raise ValueError if the drive of a cell was amid a period, where a run cannot begin."""
+    times = np.ravel(end.coords[END_TIME].values) if END_TIME in end.coords else np.zeros(1)
+    phases = np.ravel(end.coords[DRIVE_PHASE].values) if DRIVE_PHASE in end.coords else np.full(times.shape, np.nan)
+    amid = ~(np.abs(phases - np.rint(phases)) < WHOLE) & (times != 0.0)
+    if scene.forced and amid.any():
+        time, phase = float(times[amid][0]), float(phases[amid][0])
+        where = "has no period" if math.isnan(phase) else f"is {phase:.6f} into a period"
+        raise ValueError(
+            f"start: the drive {where} at t = {time:.10g}; expected the beginning of one, where a run begins; "
+            "let the first run last a whole number of drive periods"
+        )
+
+
+def _listed(labels: Sequence[object]) -> str:
+    words = [str(label) for label in labels[:8]]
+    return ", ".join([*words, *(["…"] if len(labels) > len(words) else [])]) or "none"
