@@ -20,8 +20,6 @@ from synchain.runtime.stability.exponents import Exponents, exponents
 from synchain.runtime.synchronisation.agreement import OUTCOMES, Agreement, agreement, strengths
 from synchain.runtime.synchronisation.criterion import Criterion
 
-__all__ = ["COLUMNS", "GRAPHS", "OMEGAS", "measure", "summary"]
-
 COLUMNS = ("graph", "omega", "values of sigma", *OUTCOMES, "causes of disagreement")
 GRAPHS = (
     ("chain", 3),

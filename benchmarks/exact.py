@@ -21,8 +21,6 @@ from synchain.runtime.synchronisation.threshold import critical_ratio
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["CASES", "COLUMNS", "KAPPAS", "draw", "measure", "row"]
-
 COLUMNS = (
     "omega",
     "n",

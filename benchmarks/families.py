@@ -33,8 +33,6 @@ from synchain.runtime.synchronisation.threshold import simulate
 
 from .kit.tables import markdown
 
-__all__ = ["CASES", "COLUMNS", "GRAPHS", "function_of", "measure", "sigma_of", "summary"]
-
 COLUMNS = (
     "omega",
     "contact",

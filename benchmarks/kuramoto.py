@@ -28,8 +28,6 @@ from synchain.runtime.engines.scene_kernels import kernel
 
 from .scaling import apart, peak_memory
 
-__all__ = ["COLUMNS", "graph_of", "measure", "network_row", "scene_of"]
-
 COLUMNS = (
     "graph",
     "n",

@@ -19,8 +19,6 @@ from .kit.cases import Case
 from .kit.own_program import REFILLS, Own
 from .precision import case_of
 
-__all__ = ["CASES", "COLUMNS", "measure"]
-
 COLUMNS = ("case", "method", "lanes", "rtol", "error", "microseconds per period", "steps per period", "gain")
 Choice = tuple[str, int, tuple[float, ...]]
 """Integrator, registers that the lanes fill, and relative tolerances."""

@@ -45,19 +45,6 @@ from . import peers
 from .kit.tables import markdown
 from .peers import _jitcode_transversal as jitcode
 
-__all__ = [
-    "CASES",
-    "COLUMNS",
-    "LAWS",
-    "Case",
-    "difference",
-    "measure",
-    "notes",
-    "orbit_rows",
-    "strengths",
-    "summary",
-]
-
 COLUMNS = (
     "what",
     "system",

@@ -26,8 +26,6 @@ from synchain.runtime.engines.scene_kernels import kernel
 
 from .kit.operations import operations
 
-__all__ = ["COLUMNS", "measure"]
-
 COLUMNS = ("n", "lanes", "flops per step and lane", "nanoseconds per step", "Gflop/s", "peak Gflop/s", "share of peak")
 CHAINS = 12
 """Independent multiply-adds in flight: at least latency times units, at most the vector registers.

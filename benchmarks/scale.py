@@ -23,8 +23,6 @@ from .scaling import apart, peak_memory
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["COLUMNS", "draw", "measure", "measure_long", "row"]
-
 COLUMNS = (
     *("cells", "periods", "threads", "seconds", "cells per second", "steps per cell"),
     *("peak MB", "file MB", "bytes per cell"),

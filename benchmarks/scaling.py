@@ -31,8 +31,6 @@ from synchain.runtime.sweeps.run import run
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["COLUMNS", "FAMILIES", "apart", "draw", "measure", "network_row", "peak_memory", "sweep_row"]
-
 COLUMNS = (
     "network",
     "n",

@@ -19,8 +19,6 @@ from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.synchronisation.criterion import PAPER
 from synchain.runtime.synchronisation.threshold import project, simulate
 
-__all__ = ["CASES", "CHANGES", "COLUMNS", "PROJECTED", "measure"]
-
 COLUMNS = ("n", "omega", "what is different", "lower end", "upper end", "ranges found")
 CASES = ((2, 1.15, 0.0, 0.3), (2, 1.40, 0.02, 0.34), (3, 1.55, 0.16, 0.22))
 """Oscillators, drive frequency, and the grid of sigma from … to, 33 points."""

@@ -28,8 +28,6 @@ from .kit.clock import best_time
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["COLUMNS", "FAMILIES", "SIZES", "digits", "draw", "measure", "random_integers"]
-
 COLUMNS = ("graph", "n", "method", "seconds", "digits", "eigenvalues", "state")
 SIZES = (4, 6, 10, 20, 50, 100, 200)
 FAMILIES = (

@@ -26,8 +26,6 @@ from .kit.stability_reference import FLOOR, end_state
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["COLUMNS", "SAFETY", "draw", "measure", "row", "summary"]
-
 COLUMNS = (
     "group",
     "case",

@@ -27,8 +27,6 @@ from synchain.runtime.stability.orbits import unit_of_time
 from . import peers
 from .peers._problem import Problem
 
-__all__ = ["COLUMNS", "SIZES", "measure", "notes", "stages"]
-
 COLUMNS = ("stage", "oscillators", "seconds")
 SIZES = (2, 4)
 REPEATS = 5

@@ -19,8 +19,6 @@ from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability.orbits import unit_of_time
 
-__all__ = ["CASES", "Case", "normal_modes", "read_case"]
-
 CASES = {
     "friction, n = 1": "trajectory_n1",
     "friction, n = 2": "trajectory_n2",

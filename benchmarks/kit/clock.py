@@ -12,8 +12,6 @@ import numpy as np
 from ..peers._problem import Problem, Solve
 from .cases import Case
 
-__all__ = ["LONGEST", "SHORTEST", "Point", "best_time", "curve", "timed_periods"]
-
 SHORTEST = 0.2
 """A timed run lasts at least this many seconds of CPU time, by repetition."""
 LONGEST = 1.0

@@ -9,8 +9,6 @@ from typing import Any
 
 from .tables import markdown
 
-__all__ = ["TARGETS", "curves", "table", "time_at"]
-
 TARGETS = (1e-6, 1e-8, 1e-10, 1e-12)
 """Errors at which methods are compared."""
 

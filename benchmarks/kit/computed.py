@@ -18,8 +18,6 @@ from synchain.runtime.stability.orbits import unit_of_time
 from .cases import Case, read_case
 from .own_program import prepare
 
-__all__ = ["EXACT", "SMOOTH", "computed_case", "reading_times"]
-
 REFERENCE = (1e-14, 1e-15)
 
 

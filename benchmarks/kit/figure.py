@@ -10,8 +10,6 @@ from synchain.runtime.plots.style import BLACK, BLUE, COLUMN, GREEN, ORANGE, PUR
 
 from .compare import curves
 
-__all__ = ["figure"]
-
 COLOURS = (ORANGE, GREEN, PURPLE, SKY, BLACK)
 OWN = "o*hdp"
 MARKERS = ("s", "^", "v", "D", "P", "X")

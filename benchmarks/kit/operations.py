@@ -15,8 +15,6 @@ from dataclasses import dataclass, field
 from synchain.codegen.kernels.sweep_kernel import KernelSource
 from synchain.codegen.simd import elementary
 
-__all__ = ["PRIMITIVE", "Counter", "operations"]
-
 PRIMITIVE = {"fma": 2, "multiply_add": 2, "sqrt": 1} | dict.fromkeys(
     (
         "absolute",

@@ -21,8 +21,6 @@ from synchain.runtime.engines.scene_kernels import chosen_integrator, kernel
 from .cases import Case
 from .clock import Point, best_time, timed_periods
 
-__all__ = ["REFILLS", "Own", "full_width", "prepare"]
-
 Ends = tuple[np.ndarray, np.ndarray]
 """States at the ends (m, dimension) and counts (m, …) of the kernel."""
 Integrate = Callable[[float, float, np.ndarray], Ends]

@@ -19,8 +19,6 @@ from synchain.models.scenes.scene import Scene
 
 from .stability_models import said
 
-__all__ = ["BUDGET", "Case", "cases"]
-
 BUDGET = 2_000_000
 """Most steps of a cell."""
 

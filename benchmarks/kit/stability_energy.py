@@ -21,8 +21,6 @@ from synchain.runtime.cells.plan import control_array, plan, tolerances
 from synchain.runtime.results.energy_of_states import energy_function
 from synchain.runtime.support.status import Status
 
-__all__ = ["energy_residual"]
-
 
 def energy_residual(scene: Scene, end: np.ndarray) -> float:
     """(E(end) - E(0) - W) / max(|E(0)|, |E(end)|, 1) of a network, W the work of its drives and of

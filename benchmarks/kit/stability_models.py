@@ -16,8 +16,6 @@ from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.oscillator import Oscillator
 from synchain.models.scenes.scene import Scene
 
-__all__ = ["said"]
-
 X, V, A = sp.symbols("x v a", real=True)
 SMOOTH = ("taylor", "dop853", "rodas5p")
 DIGITS = (2, 4, 8, 12, 14)

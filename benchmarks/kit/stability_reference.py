@@ -20,8 +20,6 @@ from synchain.models.scenes.scene import Scene
 
 from .cases import normal_modes
 
-__all__ = ["FLOOR", "REFERENCES", "end_state"]
-
 RTOL, ATOL = 1e-11, 1e-13
 FLOOR = {
     "radau": 1e-11,

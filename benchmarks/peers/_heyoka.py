@@ -11,8 +11,6 @@ import sympy as sp
 
 from ._problem import Problem, Solve
 
-__all__ = ["prepare"]
-
 
 def prepare(problem: Problem, lanes: int) -> Solve:
     """Return a solver by Taylor series, for `lanes` equal copies at once; it compiles at the first

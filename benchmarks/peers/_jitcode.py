@@ -12,8 +12,6 @@ import sympy as sp
 
 from ._problem import Problem, Solve
 
-__all__ = ["prepare"]
-
 
 def prepare(problem: Problem, method: str, jacobian: bool) -> Solve:
     """Return a solver by one method of SciPy's ode; the compiler is that of Python's own build, at

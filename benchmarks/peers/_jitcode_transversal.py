@@ -21,8 +21,6 @@ from synchain.models.scenes.scene import Scene
 
 from ._problem import Problem
 
-__all__ = ["NAME", "PACKAGE", "REQUIRES", "Growths", "prepare"]
-
 NAME = "JiTCODE"
 PACKAGE = "jitcode and a C compiler"
 REQUIRES = {"module": ("jitcode", "symengine")}

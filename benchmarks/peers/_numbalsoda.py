@@ -6,8 +6,6 @@ from typing import Any
 
 from ._problem import Problem, load
 
-__all__ = ["PACKAGE", "REQUIRES", "compiled"]
-
 PACKAGE = "numbalsoda (its build needs gfortran)"
 REQUIRES = {"module": ("numbalsoda",)}
 

@@ -19,8 +19,6 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.scenes.scene import Scene
 
-__all__ = ["Problem", "Solve", "ladder", "load"]
-
 Solve = Callable[[float, float, np.ndarray], np.ndarray]
 
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from ._problem import Problem, Solve
 
-__all__ = ["prepare"]
-
 
 def prepare(problem: Problem, method: str, implicit: bool) -> Solve:
     """Return a solver by one method of solve_ivp.

@@ -6,8 +6,6 @@ import numpy as np
 
 from ._problem import Problem, Solve
 
-__all__ = ["prepare"]
-
 
 def prepare(problem: Problem, method: str) -> Solve:
     """Return a solver by CVODE, `method` "BDF" or "Adams"; both solve their equations by Newton's

@@ -18,8 +18,6 @@ import sympy as sp
 
 from ._problem import Problem, Solve
 
-__all__ = ["NAME", "PACKAGE", "REQUIRES", "TOLERANCES", "missing", "prepare"]
-
 NAME = "Cash-Karp, C++ Boost Odeint"
 PACKAGE = "g++ and the headers of Boost (libboost-dev)"
 REQUIRES = {"program": ("g++",)}

@@ -11,8 +11,6 @@ import sympy as sp
 
 from ._problem import Problem, Solve, ladder
 
-__all__ = ["NAME", "PACKAGE", "REQUIRES", "TOLERANCES", "prepare"]
-
 NAME = "diffrax Kvaerno5"
 PACKAGE = "diffrax"
 REQUIRES = {"module": ("jax", "diffrax")}

@@ -5,8 +5,6 @@ from __future__ import annotations
 from . import _heyoka
 from ._problem import Problem, Solve
 
-__all__ = ["CELLS", "NAME", "PACKAGE", "REQUIRES", "TOLERANCES", "prepare"]
-
 NAME = "heyoka Taylor batch"
 PACKAGE = "heyoka"
 REQUIRES = {"module": ("heyoka",)}

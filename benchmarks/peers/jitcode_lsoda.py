@@ -5,8 +5,6 @@ from __future__ import annotations
 from . import _jitcode
 from ._problem import Problem, Solve, ladder
 
-__all__ = ["NAME", "PACKAGE", "REQUIRES", "TOLERANCES", "prepare"]
-
 NAME = "JiTCODE LSODA"
 PACKAGE = "jitcode and a C compiler"
 REQUIRES = {"module": ("jitcode", "symengine")}

@@ -5,8 +5,6 @@ from __future__ import annotations
 from . import _scipy
 from ._problem import Problem, Solve, ladder
 
-__all__ = ["NAME", "PACKAGE", "REQUIRES", "TOLERANCES", "prepare"]
-
 NAME = "SciPy BDF"
 PACKAGE = "scipy"
 REQUIRES = {"module": ("scipy.integrate",)}

@@ -10,8 +10,6 @@ import numpy as np
 
 from ._problem import Problem, Solve, ladder
 
-__all__ = ["NAME", "PACKAGE", "REQUIRES", "TOLERANCES", "prepare"]
-
 NAME = "SciPy LSODA (odeint)"
 PACKAGE = "scipy"
 REQUIRES = {"module": ("scipy.integrate",)}

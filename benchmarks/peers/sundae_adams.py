@@ -7,8 +7,6 @@ from __future__ import annotations
 from . import _sundae
 from ._problem import Problem, Solve, ladder
 
-__all__ = ["NAME", "PACKAGE", "REQUIRES", "TOLERANCES", "prepare"]
-
 NAME = "CVODE Adams (scikit-SUNDAE)"
 PACKAGE = "scikit-sundae"
 REQUIRES = {"module": ("sksundae.cvode",)}

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-__all__ = ["COUNTS", "MOST_METHODS", "TOLERANCES", "Control", "Count", "Point", "Span", "Sum", "Tally"]
-
 
 class Control(IntEnum):
     """Entries of the array `control` that steers a kernel."""

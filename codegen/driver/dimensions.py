@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["Dimensions", "ModeDimensions"]
-
 
 class Dimensions(NamedTuple):
     """What a driver of a sweep must know of a scene and of its integrator."""

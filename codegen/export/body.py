@@ -18,30 +18,6 @@ from ..program.lowering import Library, number
 from ..program.passes import real
 from ..program.statements import Statement, let
 
-__all__ = [
-    "LARGEST_UNROLLED",
-    "Body",
-    "Linked",
-    "Place",
-    "Storing",
-    "array_tables",
-    "check_inertia",
-    "is_unrolled",
-    "link_body",
-    "link_places",
-    "link_tables",
-    "mass_body",
-    "node_body",
-    "node_mass_body",
-    "node_places",
-    "node_rate_symbols",
-    "own_parameters",
-    "parameters",
-    "rate_symbols",
-    "weights",
-    "wrapped",
-]
-
 LARGEST_UNROLLED = 8
 """Networks up to this size are written node by node, larger ones as loops."""
 

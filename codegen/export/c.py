@@ -14,8 +14,6 @@ from .body import is_unrolled, link_places, link_tables, node_places, weights, w
 from .header import Exported
 from .loops import jacobian_statements, mass_statements, rhs_statements
 
-__all__ = ["to_c"]
-
 ARGUMENTS = "double t, const double *state, const double *numbers, double *"
 SIGN = ["static double sign(double x)", "{", "    return (double)((x > 0.0) - (x < 0.0));", "}", ""]
 

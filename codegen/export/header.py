@@ -11,8 +11,6 @@ from synchain.models.inputs.checks import check_number, short_repr, suggestion
 from .body import check_inertia
 from .portable_names import portable
 
-__all__ = ["Exported"]
-
 SHOWN = 12
 """Of more states only the first and last are listed."""
 

@@ -32,8 +32,6 @@ from .body import (
     rate_symbols,
 )
 
-__all__ = ["jacobian_statements", "mass_statements", "place_of", "rhs_statements"]
-
 Places: TypeAlias = Callable[[int], Expression]
 """Where the components of a node stand."""
 

@@ -13,8 +13,6 @@ from .body import array_tables, is_unrolled, wrapped
 from .header import Exported
 from .loops import mass_statements, rhs_statements
 
-__all__ = ["to_numba"]
-
 
 def to_numba(equations: Equations, values: Mapping[str, float] | None = None) -> str:
     """Return a module whose `rhs` is a Numba cfunc of (t, state, rates, numbers), the signature lsoda_sig of NumbaLSODA.

@@ -14,8 +14,6 @@ from synchain.models.mechanics.components import Edge
 
 from ..program.passes import real
 
-__all__ = ["portable"]
-
 _C = """auto break case char const continue default do double else enum extern float for goto if inline int long register
 restrict return short signed sizeof static struct switch typedef union unsigned void volatile while asm typeof bool true
 false main NULL EOF errno INFINITY NAN HUGE_VAL HUGE_VALF HUGE_VALL OVERFLOW UNDERFLOW DOMAIN SING PLOSS TLOSS linux unix

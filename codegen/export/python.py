@@ -26,8 +26,6 @@ from .body import (
 from .header import Exported
 from .loops import jacobian_statements, mass_statements, place_of, rhs_statements
 
-__all__ = ["to_python"]
-
 SPARSITY = [
     "",
     "def sparsity():",

@@ -13,8 +13,6 @@ from numba.core.typed_passes import NativeLowering, NoPythonBackend
 from . import syntax_reader
 from .emitter import Program
 
-__all__ = ["EntryCompiler", "InnerCompiler", "SeparateCompiler"]
-
 
 class _Linked(JITCodeLibrary):
     """LLVM code of a function that only others of its module call: they link it, and it is optimised with them.

@@ -13,8 +13,6 @@ from typing import Any
 import numba
 from numba.core.compiler import Compiler
 
-__all__ = ["front_end_problems", "njit", "uses_front_end"]
-
 front_end_problems: list[str] = []
 """Why Numba's own pipeline compiled functions of this process."""
 

@@ -10,8 +10,6 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils, lowering
 
-__all__ = ["Program", "Typed", "Value", "Write", "Writer"]
-
 Value: TypeAlias = ir.Value
 Write: TypeAlias = "Callable[[Writer], Any]"
 

@@ -25,8 +25,6 @@ from numba.core.typing.templates import fold_arguments
 from .emitter import Program, Typed, Value, Write, Writer
 from .syntax_trees import TREES, functions
 
-__all__ = ["UnreadError", "read"]
-
 OPERATORS: dict[type, Callable[..., Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,

@@ -5,8 +5,6 @@ from __future__ import annotations
 import ast
 from typing import Any
 
-__all__ = ["TREES", "execute", "functions"]
-
 TREES = "__syntax__"
 """What a module calls the syntax trees of its functions, by the lines that they begin in."""
 

@@ -10,8 +10,6 @@ from synchain.models.mechanics.jumps import JUMPING, KINKED, gaps_of
 
 from .rounding import magnitude
 
-__all__ = ["calmed", "depths_in", "gaps_in", "settled"]
-
 NOISE = sp.Rational(3, 2) / 10**14
 """Rounding of a value, as a part of the size of its terms (codegen/recorders/crossings.py)."""
 

@@ -10,8 +10,6 @@ from functools import cache
 from .. import driver, simd
 from ..simd.lanes import native_width
 
-__all__ = ["RECORDERS", "Driver", "KernelKind", "Recorder", "common_drivers"]
-
 
 class KernelKind(StrEnum):
     """What a kernel runs: the cells of a sweep, or orbits and the modes carried along each."""

@@ -36,8 +36,6 @@ from ..taylor import write_tangent
 from .driver import Driver, KernelKind
 from .sweep_kernel import AUTO, LARGEST_UNROLLED, KernelSource, describe, free_names, module, node_functions
 
-__all__ = ["emit_modes"]
-
 HEAD = 3
 """First entries of the shared array: rate = 1/h, shift = 1/(gamma h), reach = gamma h."""
 

@@ -34,8 +34,6 @@ from ..program.statements import Function, Loop, Role, Statement, let, store
 from .between import calmed, depths_in, gaps_in, settled
 from .rounding import magnitude
 
-__all__ = ["UNWATCHED", "Watched", "count_of", "rule_of", "with_rows"]
-
 LARGEST = 1.7976931348623157e308
 BEGINS = {NodeSum: 0.0, NodeMean: 0.0, NodeMaximum: -LARGEST, NodeMinimum: LARGEST}
 """What the loop of a reduction begins with."""

@@ -7,8 +7,6 @@ import sympy as sp
 from synchain.models.dynamics.observable import AtNode, NodeMaximum, NodeMean, NodeMinimum, NodeSum, Rate, RowSum
 from synchain.models.mechanics.jumps import JUMPING
 
-__all__ = ["magnitude"]
-
 LEVEL = (sp.acos, sp.acosh, sp.asin, sp.asinh, sp.atan, sp.atan2, sp.atanh, sp.erf, sp.log, sp.tanh)
 """Functions that turn a large argument, and its rounding, into a number of the order of one."""
 

@@ -33,16 +33,6 @@ from ..taylor import TaylorStep, is_large, write_looped, write_rolled, write_ste
 from .driver import RECORDERS, Driver, KernelKind, Recorder, imports
 from .observable_text import UNWATCHED, Watched, count_of, rule_of
 
-__all__ = [
-    "KernelSource",
-    "describe",
-    "emit",
-    "free_names",
-    "module",
-    "node_functions",
-]
-
-
 AUTO = "rodas5p"
 """The integrator that "auto" stands for."""
 

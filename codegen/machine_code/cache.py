@@ -33,8 +33,6 @@ try:
 except ImportError:  # Windows has no such locks
     fcntl = None  # type: ignore[assignment]
 
-__all__ = ["Folder", "cache_folder", "clear", "describe", "open_folder"]
-
 DIGEST = hashlib.sha256().digest_size
 
 KINDS = ("kernel", "driver")

@@ -48,8 +48,6 @@ from .function_table import Functions, FunctionsType
 from .installation import InstallationError
 from .processor import processor
 
-__all__ = ["Compiled", "Kernel", "forget", "load", "load_shared"]
-
 _vector, _matrix, _counts = types.float64[::1], types.float64[:, ::1], types.int64[:, ::1]
 _cube = types.float64[:, :, ::1]
 _input = types.Array(types.float64, 2, "C", readonly=True)

@@ -16,8 +16,6 @@ from numba.core.imputils import impl_ret_borrowed, lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import NativeValue, models, register_model, unbox
 
-__all__ = ["Functions", "FunctionsType"]
-
 
 class FunctionsType(types.Type):
     """Numba type of `Functions`, whose attributes are first-class functions of these signatures."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["InstallationError"]
-
 
 class InstallationError(RuntimeError):
     """A kernel cannot be made here: versions differ, the kernel differs, or Numba does not compile."""

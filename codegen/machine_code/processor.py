@@ -9,8 +9,6 @@ import numba
 
 from ..simd import lane_types
 
-__all__ = ["processor", "told_apart"]
-
 
 def processor() -> str:
     """Return name and features of the processor, as LLVM calls them, for example "znver3: aes avx avx2".

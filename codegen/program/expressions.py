@@ -9,36 +9,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
-__all__ = [
-    "ONE",
-    "ZERO",
-    "Call",
-    "Choice",
-    "Compare",
-    "Expression",
-    "Junction",
-    "Load",
-    "Name",
-    "Negation",
-    "Not",
-    "Number",
-    "Power",
-    "Product",
-    "Quotient",
-    "Slice",
-    "Sum",
-    "Value",
-    "as_expression",
-    "call",
-    "factors_of",
-    "linear",
-    "negative",
-    "plus",
-    "product",
-    "scaled",
-    "terms_of",
-]
-
 
 class Expression:
     """A value, a condition or a place; operators build larger ones."""

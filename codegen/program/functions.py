@@ -6,8 +6,6 @@ from collections.abc import Mapping
 
 import sympy as sp
 
-__all__ = ["C99", "FUNCTIONS", "LANES", "MATH", "NUMPY"]
-
 FUNCTIONS: dict[type, str] = {
     sp.exp: "exp", sp.log: "log", sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.sinh: "sinh", sp.cosh: "cosh",
     sp.tanh: "tanh", sp.asin: "asin", sp.acos: "acos", sp.atan: "atan", sp.asinh: "asinh", sp.acosh: "acosh",

@@ -31,8 +31,6 @@ from .expressions import (
     product,
 )
 
-__all__ = ["Library", "Lowering", "UnprintableError", "lower", "number"]
-
 SIGNS = {sp.StrictLessThan: "<", sp.LessThan: "<=", sp.StrictGreaterThan: ">", sp.GreaterThan: ">="}
 
 

@@ -11,8 +11,6 @@ from dataclasses import dataclass, field
 import sympy as sp
 from sympy.functions.elementary.piecewise import ExprCondPair
 
-__all__ = ["Body", "Hoist", "Names", "real", "share"]
-
 
 def real(name: str) -> sp.Symbol:
     """Return the symbol of that name that models have."""

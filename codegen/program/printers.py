@@ -44,8 +44,6 @@ from .statements import (
     Titled,
 )
 
-__all__ = ["C99", "LANES", "MATH", "NUMPY", "Printer"]
-
 SUM, TERM, POWER, ATOM = range(4)
 """How tightly a piece of text holds together."""
 

@@ -9,36 +9,6 @@ from typing import TypeAlias
 
 from .expressions import Call, Expression, Load, Name, Power, Product, Quotient, Sum, Value, as_expression
 
-__all__ = [
-    "Accumulate",
-    "Array",
-    "Assign",
-    "Comment",
-    "Do",
-    "Function",
-    "Identity",
-    "If",
-    "Index",
-    "Loop",
-    "Repeat",
-    "Return",
-    "Role",
-    "Statement",
-    "Store",
-    "Titled",
-    "accumulate",
-    "called",
-    "let",
-    "mentioned",
-    "operations",
-    "store",
-    "targets",
-    "used",
-    "values",
-    "walk",
-    "whole",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class Assign:

@@ -15,8 +15,6 @@ from numba.extending import intrinsic, lower_builtin, models, register_model
 
 from .lane_types import DOUBLE
 
-__all__ = ["ADDRESS", "Address", "address", "data_of"]
-
 FIRST = {"target": "cpu"}
 
 

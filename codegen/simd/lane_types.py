@@ -12,23 +12,6 @@ from llvmlite import ir
 from numba import types
 from numba.extending import models, register_model
 
-__all__ = [
-    "BOOL",
-    "DOUBLE",
-    "INT32",
-    "INT64",
-    "WIDTHS",
-    "Lane",
-    "Mask",
-    "as_lane",
-    "common_width",
-    "constant",
-    "has_fma",
-    "native_width",
-    "splat",
-    "vector",
-]
-
 DOUBLE, INT32, INT64, BOOL = ir.DoubleType(), ir.IntType(32), ir.IntType(64), ir.IntType(1)
 WIDTHS = (1, 2, 4, 8, 16)
 

@@ -15,8 +15,6 @@ from synchain.models.mechanics.components import TIME, Node
 
 from ..program.passes import Body, Hoist, Names, real, share
 
-__all__ = ["NodeBlocks", "analyse"]
-
 
 @dataclass(frozen=True, slots=True)
 class NodeBlocks:

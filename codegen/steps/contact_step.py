@@ -22,8 +22,6 @@ from .places import link_ends, named, places, span
 from .safe_names import NAMES
 from .step import lane
 
-__all__ = ["event_functions", "push_functions", "register"]
-
 FORCES = (2, 3, 4, 5)
 """The groups of `pushes` that the force of a link adds to."""
 

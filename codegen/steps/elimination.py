@@ -17,8 +17,6 @@ from ..program.expressions import ONE, ZERO, Expression, Name, Negation, Product
 from ..program.lowering import lower
 from ..program.statements import Statement, let
 
-__all__ = ["Entries", "Entry", "Plan", "plan", "write_elimination", "write_factors", "write_solve"]
-
 Entry = tuple[int, int]
 Entries = dict[Entry, sp.Expr]
 

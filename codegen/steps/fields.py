@@ -25,8 +25,6 @@ from ..program.statements import Statement, accumulate, let, store
 from .places import Joint, Places, link_ends, named, span
 from .step import NOW, lane
 
-__all__ = ["LinkSums", "MeanField", "compensated", "link_sums", "mean_fields"]
-
 
 @dataclass(frozen=True, slots=True)
 class MeanField:

@@ -41,8 +41,6 @@ from .safe_names import NAMES
 from .sparse_plan import Program, block_pattern
 from .step import NOW, Step, lane, linearised
 
-__all__ = ["Looped"]
-
 SLOTS = ("here_slot", "there_slot")
 """The arrays that say where the entries of a link's blocks stand, by its target and by its source."""
 

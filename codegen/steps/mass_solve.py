@@ -23,8 +23,6 @@ from ..program.statements import Assign, Function, Return, Statement, let
 from .elimination import Entries, Entry, Factors, Plan, plan, write_elimination, write_solve
 from .step import Step, function_of, prefix
 
-__all__ = ["Mass", "added_masses", "momentum_slopes", "turned_masses"]
-
 
 def added_masses(node: Node) -> Block:
     """Return M - 1 of one node, empty where M is the identity."""

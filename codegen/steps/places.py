@@ -25,22 +25,6 @@ from ..program.expressions import Expression, Load, Name, Number, Value, as_expr
 from ..program.passes import real
 from ..program.statements import Assign, Loop, Statement, let, whole
 
-__all__ = [
-    "Joint",
-    "Kind",
-    "Places",
-    "by_joint",
-    "by_kind",
-    "joint_numbers",
-    "link_ends",
-    "link_table",
-    "named",
-    "places",
-    "span",
-    "table",
-    "theirs",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class Span:

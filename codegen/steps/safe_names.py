@@ -14,8 +14,6 @@ from synchain.models.dynamics.equations import Equations
 from ..program.passes import real
 from ..simd import elementary, lanes, special
 
-__all__ = ["NAMES", "RESERVED", "renamed", "tidy"]
-
 NAMES = (
     "target", "source", "node_slot", "here_slot", "there_slot", "order", "place", "row_start", "after_start", "column",
     "where",

@@ -28,8 +28,6 @@ from .mass_solve import added_masses, momentum_slopes, turned_masses
 from .places import by_joint, by_kind, joint_numbers, link_table, places, table
 from .step import Step
 
-__all__ = ["FILL_LIMIT", "Program", "block_pattern", "program", "workspace"]
-
 FILL_LIMIT = 3.0
 """Entries of the exact factors for each entry of the matrix, above which the elimination is incomplete."""
 

@@ -18,19 +18,6 @@ from ..program.passes import Body, real
 from ..program.statements import Assign, Comment, Function, Return, Role, Statement, let, operations
 from .blocks import NodeBlocks
 
-__all__ = [
-    "NOW",
-    "Step",
-    "entry",
-    "function_name",
-    "function_of",
-    "lane",
-    "linearised",
-    "node_function",
-    "prefix",
-    "scaling",
-]
-
 LARGEST_INLINED = 400
 """Operations of a function up to which its body stands in each stage; copies of longer ones take long to compile."""
 

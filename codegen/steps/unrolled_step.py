@@ -16,8 +16,6 @@ from .elimination import Entries, plan, times, write_factors, write_solve
 from .mass_solve import Mass
 from .step import NOW, Step, entry, lane, linearised, prefix
 
-__all__ = ["Unrolled", "stage_state"]
-
 
 class Unrolled(Step):
     """Names its vectors by prefixes: x_1 at the start, u_x_1 in a stage, f_x_1 the slope, k2_x_1 of stage 2, n_x_1 new."""

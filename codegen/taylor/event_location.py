@@ -17,18 +17,6 @@ from ..program.statements import Comment, If, Repeat, Statement, called, let, me
 from .simplify import absolute
 from .step_length import bounded
 
-__all__ = [
-    "Stored",
-    "closed",
-    "first_passage",
-    "functions",
-    "further",
-    "jumps",
-    "loose",
-    "settled",
-    "told",
-]
-
 PASSAGE = '''
 PASSED, ROUNDING, NEAREST = 1e-10, 1e-15, 1e-8
 

@@ -11,8 +11,6 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.jumps import INEQUALITIES, gaps_of, jumps
 
-__all__ = ["Leap", "changing", "leaping", "templates", "unpassed"]
-
 RISING, STRICT = (sp.StrictGreaterThan, sp.GreaterThan), (sp.StrictGreaterThan, sp.StrictLessThan)
 
 

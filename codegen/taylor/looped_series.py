@@ -34,8 +34,6 @@ from .simplify import absolute, add, times
 from .step_length import SEEN, last_orders
 from .taylor_step import StepWriter, TaylorStep
 
-__all__ = ["write_looped"]
-
 CONVOLUTION = '''
 @njit(error_model='numpy')
 def convolution(dense, left, right, k, first, end):

@@ -12,8 +12,6 @@ from ..steps.mass_solve import added_masses
 from .series import Constant, Row, Series, Unknown
 from .series_graph import Graph, split
 
-__all__ = ["moving", "solved"]
-
 Factor = tuple[Expression, Series]
 
 

@@ -32,8 +32,6 @@ from .simplify import absolute
 from .step_length import unseen
 from .taylor_step import TaylorStep
 
-__all__ = ["is_large", "write_rolled"]
-
 LARGE = 200
 """Operations in the rates of a node from which its step is rolled; a choice between two values counts as CHOICE."""
 

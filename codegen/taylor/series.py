@@ -21,10 +21,6 @@ from ..program.statements import Statement
 from .event_location import Stored
 from .simplify import absolute, add, over, times
 
-__all__ = ["Brink", "Choice", "Constant", "Crest", "Exponential", "Fraction", "Integral", "Kink", "Leaping", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
-           "Row", "Secant", "Series", "Sigmoid", "Slope", "Square", "SquareRoot", "SquaredSecant", "State", "Time", "Unknown",
-           "Whole"]  # fmt: skip
-
 
 class Order(Protocol):
     """What a recurrence can ask for while coefficient k is made."""

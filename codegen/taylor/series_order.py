@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["order_for"]
-
 ORDERS = ((1e-2, 8), (1e-4, 12), (1e-10, 16), (1e-13, 20))
 """Tolerances down to which an order is the fastest.
 

@@ -15,8 +15,6 @@ from .series_graph import Graph
 from .simplify import absolute, largest, over, times
 from .step_length import distant, last_orders, unseen
 
-__all__ = ["Gaps", "Part"]
-
 
 @dataclass(frozen=True, slots=True)
 class Gaps:

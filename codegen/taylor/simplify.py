@@ -22,8 +22,6 @@ from ..program.expressions import (
     terms_of,
 )
 
-__all__ = ["absolute", "add", "extreme", "largest", "over", "times"]
-
 
 def add(*terms: Expression) -> Expression:
     """The sum, without zeros, its numbers together at the end."""

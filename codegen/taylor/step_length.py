@@ -12,8 +12,6 @@ from ..program.expressions import ZERO, Call, Choice, Compare, Expression, Junct
 from ..program.statements import If, Statement, let
 from .simplify import absolute, add, extreme, largest, times
 
-__all__ = ["SEEN", "bounded", "distant", "finished", "last_orders", "reach", "unseen"]
-
 FARTHEST = 16.0
 """How many times longer than `scale` a step may be."""
 

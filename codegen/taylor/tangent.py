@@ -28,8 +28,6 @@ from .step_length import last_orders, reach
 from .taylor_step import TaylorStep, check_order
 from .unrolled_series import SQUARE, Lines, Unrolled, polynomial
 
-__all__ = ["TangentStep", "write_tangent"]
-
 HEAD = 2
 """First entries of the shared array: `scale` of the orbit's step, and its length, which the driver writes."""
 

@@ -21,8 +21,6 @@ from .series_graph import STARTS
 from .series_writer import Part
 from .step_length import finished, last_orders, reach
 
-__all__ = ["StepWriter", "TaylorStep", "called", "check_order"]
-
 WORDS = frozenset(
     {"unseen", "high", "low", "largest", "scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "TERMS", "j_there",
      "slope_scale", "convolution", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", "nearest", "loose", "closing", "side_or", "found_side", "news", "new", "floor", "value", "stuck", "side", "way", "room", *STARTS.values()}

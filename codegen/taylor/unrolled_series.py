@@ -25,8 +25,6 @@ from .simplify import add, largest, times
 from .step_length import SEEN, last_orders, reach
 from .taylor_step import StepWriter, TaylorStep, check_order
 
-__all__ = ["SQUARE", "Lines", "Unrolled", "polynomial", "write_step"]
-
 SQUARE = let("square", Name("ratio") * "ratio")
 
 

@@ -14,8 +14,6 @@ from flint import acb, arb, ctx, fmpq, fmpz
 
 from .rationals import to_flint
 
-__all__ = ["Ball", "accurate", "cotangent", "decimals", "disjoint", "enclose", "nearest", "precision"]
-
 Ball: TypeAlias = Any
 """flint.arb if the number is real, flint.acb if it is complex (flint has no types)."""
 

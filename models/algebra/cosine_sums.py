@@ -23,8 +23,6 @@ from .balls import Ball, precision
 from .lazy import LazyEigenvalues
 from .rationals import to_flint, to_fraction, to_sympy
 
-__all__ = ["AngleSum", "box", "expression", "expressions", "folded_sum", "merged", "minimal_polynomial", "read"]
-
 _HUGE = 10**300
 """Rational numbers above it are infinite as floats."""
 

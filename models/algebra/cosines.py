@@ -16,20 +16,6 @@ from flint import fmpq, fmpq_poly, fmpz_poly
 
 from .rationals import to_flint, to_fraction, to_sympy
 
-__all__ = [
-    "biquadratic",
-    "cosine",
-    "cosine_roots",
-    "exponential",
-    "exponential_roots",
-    "is_short",
-    "linear_cosine",
-    "linear_exponential",
-    "minimal_polynomial",
-    "minus_four_sine_squared",
-    "written",
-]
-
 _SHORT = {
     (0, 1): "2", (1, 2): "-2", (1, 3): "-1", (1, 4): "0", (1, 6): "1",
     (1, 5): "-1/2 + sqrt(5)/2", (2, 5): "-1/2 - sqrt(5)/2",

@@ -21,8 +21,6 @@ from flint import acb, arb
 from .balls import Ball, enclose, precision
 from .roots import Root
 
-__all__ = ["Number", "check_size", "equal", "sign"]
-
 Number: TypeAlias = sp.Expr | Root
 """Rationals, roots, I, sin and cos of rational multiples of pi, exp of those of I*pi, combined."""
 

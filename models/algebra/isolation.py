@@ -20,8 +20,6 @@ from flint import acb, acb_poly, arb, arb_poly, fmpq, fmpz, fmpz_poly
 
 from .balls import Ball, disjoint, precision
 
-__all__ = ["Disc", "discs", "dyadic", "sharpened", "sign"]
-
 _IDLE = {arb: 30, acb: 200}
 """Steps without another root that settles, after which the iteration ends; 10 and 70 suffice."""
 _DIGITS = 2.0**-44

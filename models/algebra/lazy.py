@@ -6,8 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar, overload
 
-__all__ = ["LazyEigenvalues"]
-
 T = TypeVar("T", covariant=True)
 
 

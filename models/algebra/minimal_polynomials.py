@@ -18,8 +18,6 @@ from .cosine_sums import AngleSum
 from .rationals import to_flint
 from .roots import Root
 
-__all__ = ["minimal_polynomial", "monic", "multiplied"]
-
 _X = sp.Symbol("x")
 
 

@@ -7,8 +7,6 @@ from fractions import Fraction
 import sympy as sp
 from flint import fmpq
 
-__all__ = ["to_flint", "to_fraction", "to_sympy"]
-
 
 def to_fraction(x: fmpq | sp.Rational) -> Fraction:
     """Return a rational number of FLINT or SymPy as a Fraction."""

@@ -23,8 +23,6 @@ from .balls import Ball, nearest, precision
 from .isolation import Disc, discs, dyadic, sharpened, sign
 from .rationals import to_flint, to_fraction
 
-__all__ = ["ComplexRoot", "RealRoot", "Root", "coefficient_text", "complex_order", "roots"]
-
 Polynomial = tuple[int, ...]
 """Integer coefficients, constant first; irreducible and primitive, the leading one positive."""
 

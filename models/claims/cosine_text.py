@@ -17,8 +17,6 @@ from math import lcm
 from ..algebra.cosine_sums import AngleSum, folded_sum
 from ..inputs.reader import Algebra, Expression, NoMeaning, parse
 
-__all__ = ["Wave", "angle_number", "angle_wave"]
-
 _CIRCULAR = re.compile(r"[0-9A-Za-z_+\-*/() \t]*\b(?:sin|cos)\([0-9A-Za-z_+\-*/() \t]*", re.ASCII)
 LENGTH, DEPTH, TERMS, POWER, WHOLE, DENOMINATOR = 300, 24, 16, 4, 10**10, 10**10
 

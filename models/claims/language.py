@@ -30,8 +30,6 @@ from .cosine_text import angle_number, angle_wave
 from .number_text import exact_number, whole_number
 from .parts import LARGEST, WORDS, Part, interval, is_part, read_part
 
-__all__ = ["Claim", "Claimed", "read_claims"]
-
 BYTES, REPETITIONS = 1_000_000, 100_000
 _OPTIONS = r"((?:\s+[A-Za-z_]\w*=\S+)*)"
 _RANGE = re.compile(r"(\w+)\s+n\s*=\s*([0-9]{1,6})\s*\.\.\s*([0-9]{1,6})" + _OPTIONS)

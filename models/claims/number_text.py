@@ -19,8 +19,6 @@ import sympy as sp
 from ..algebra.equality import check_size, equal
 from ..inputs.reader import Algebra, Arithmetic, NoMeaning, parse, stray_character
 
-__all__ = ["GRAMMAR", "exact_number", "whole_number"]
-
 LENGTH, DEPTH, DIGITS, BITS = 300, 24, 30, 20_000
 GRAMMAR = "whole numbers, + - * / **, parentheses, sqrt, I, and sin cos exp of rational multiples of pi"
 _PI = sp.Dummy("pi", real=True)

@@ -38,8 +38,6 @@ from ..spectra.spectrum import Spectrum
 from .cosine_text import angle_number
 from .number_text import exact_number
 
-__all__ = ["LARGEST", "WORDS", "Exact", "Part", "interval", "is_part", "read_part", "verify_parts"]
-
 LARGEST = 500
 """Largest graph whose spectrum is proved here: above it, closed forms take long to prove."""
 

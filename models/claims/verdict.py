@@ -20,8 +20,6 @@ from ..spectra.solve import Proof, spectrum
 from .language import Claim, Claimed
 from .parts import verify_parts
 
-__all__ = ["Verdict", "verify"]
-
 
 @dataclass(frozen=True, slots=True)
 class Verdict:

@@ -19,8 +19,6 @@ from ..mechanics.parameter import Parameter
 if TYPE_CHECKING:
     import sympy as sp
 
-__all__ = ["COUPLING", "FRICTION_LAW", "KNOWN", "OSCILLATOR", "coordinates_of", "lagrangian_symbols"]
-
 _PHYSICAL = ("scales", "UNITS")
 _LAGRANGIAN = ("kinetic", "potential", "force", "dissipation", "particles", "COORDINATES", "PHYSICAL", *_PHYSICAL)
 

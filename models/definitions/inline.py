@@ -37,8 +37,6 @@ from ..mechanics.oscillator import FRICTION, Coordinate, FieldModel, LagrangianM
 from ..mechanics.parameter import Parameter
 from .loader import load_friction_law
 
-__all__ = ["Field", "Lagrangian", "friction_law"]
-
 Expression: TypeAlias = "sp.Expr | float | str"
 """An expression of SymPy, a number, or text that is parsed and not run."""
 

@@ -17,8 +17,6 @@ from ..mechanics.parameter import Parameter
 from .inline import Field, Lagrangian, friction_law
 from .loader import load_friction_law, load_oscillator
 
-__all__ = ["as_name_or_table", "law_of_table", "oscillator_of_table"]
-
 _COMMON = ("name", "parameters", "initial")
 _FIELD = (*_COMMON, "rates")
 _LAGRANGIAN = (*_COMMON, "coordinates", "kinetic", "potential", "forces", "dissipation", "friction", "contact")

@@ -21,8 +21,6 @@ from ..interactions.separation import separated
 from ..mechanics.components import Block, Edge, Node
 from ..mechanics.contact import Contact
 
-__all__ = ["Ends", "Equations", "Layer", "check"]
-
 Ends = tuple[int, int]
 """The kinds of a link's target and source."""
 

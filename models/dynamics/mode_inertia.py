@@ -13,8 +13,6 @@ import sympy as sp
 from ..interactions.link import strength
 from .equations import Equations
 
-__all__ = ["effective_slope", "inertia_of_modes"]
-
 
 def inertia_of_modes(equations: Equations) -> tuple[sp.Matrix, sp.Expr]:
     """Return the inertia of links as modes feel it."""

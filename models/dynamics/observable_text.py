@@ -14,8 +14,6 @@ from ..inputs.expression_text import COMPOSED, FUNCTIONS, Expressions
 from ..inputs.reader import Algebra, Expression, NoMeaning, parse, unpaired
 from .observable import Observable, Window, nodes, rate, real
 
-__all__ = ["as_observable", "as_value"]
-
 LENGTH = 4000
 """Most characters."""
 

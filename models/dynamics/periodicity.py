@@ -16,8 +16,6 @@ from ..mechanics.components import TIME, Edge, Node
 from ..mechanics.jumps import JUMPING, KINKED, gaps_of
 from .equations import Equations
 
-__all__ = ["Drive", "angular_frequency", "as_function", "drive_of", "gaps", "names_in", "period_of"]
-
 HIGHEST, MOST_TIMES = 8, 64
 """Highest power of waves that is written as a sum, and most shares of a period that are tried."""
 

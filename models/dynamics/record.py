@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from ..inputs.words import Word
 
-__all__ = ["Record"]
-
 
 class Record(Word):
     """What a cell of a sweep records, and what its kernel therefore computes."""

@@ -27,8 +27,6 @@ from ..mechanics.components import TIME, Edge
 from ..symmetries.partitions import class_links, coarsest_balanced
 from .equations import Equations
 
-__all__ = ["NoQuotient", "collapse", "quotient", "substitute_constants", "without_drive"]
-
 
 class NoQuotient(ValueError):
     """The coupling has no exact quotient network, whatever the partition."""

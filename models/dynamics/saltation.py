@@ -29,8 +29,6 @@ from .equations import Equations
 if TYPE_CHECKING:
     from ..symmetries.clusters import Block
 
-__all__ = ["Entry", "Events", "of_blocks", "of_mode", "of_network"]
-
 Entry = tuple[tuple[int, int], sp.Expr]
 """((row, column), expression) of a matrix."""
 

@@ -12,8 +12,6 @@ from ..graphs.links import AllPairs
 from ..mechanics.components import Edge, Node
 from .equations import Equations, Layer
 
-__all__ = ["NoSynchrony", "expect_vanishing", "synchronous_node"]
-
 
 class NoSynchrony(ValueError):
     """Equal motion of all nodes is no solution of a network."""

@@ -25,21 +25,6 @@ from .synchrony import synchronous_node
 if TYPE_CHECKING:
     from ..symmetries.clusters import Block, Clusters
 
-__all__ = [
-    "LOG_VOLUME",
-    "MODE",
-    "PHASE",
-    "STRENGTH",
-    "Variation",
-    "clustered",
-    "expect_continuous",
-    "mode",
-    "network_variation",
-    "phase_shifted",
-    "source_slopes",
-    "with_volume",
-]
-
 MODE = (sp.Symbol("mode_alpha", real=True), sp.Symbol("mode_beta", real=True))
 """Real and imaginary part of the strength of a mode, alpha + i beta = -sigma gamma; of layer l, mode_alpha_l, mode_beta_l."""
 

@@ -17,8 +17,6 @@ from . import products
 from .closed_forms import NODE, ClosedForm, Term
 from .topology import Topology
 
-__all__ = ["box", "cartesian", "counters", "kronecker", "renamed", "union"]
-
 Joined = Callable[[Topology, Topology], Topology]
 
 

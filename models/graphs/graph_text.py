@@ -19,8 +19,6 @@ from .topology import Topology
 if TYPE_CHECKING:
     from .closed_forms import ClosedForm
 
-__all__ = ["checked_name", "is_composed", "read_form", "read_graph"]
-
 V = TypeVar("V")
 
 LENGTH, DEPTH = 300, 8

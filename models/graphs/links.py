@@ -10,8 +10,6 @@ from fractions import Fraction
 from itertools import islice
 from typing import TypeAlias
 
-__all__ = ["LINK_LIMIT", "AllPairs", "Link", "Links", "join", "numbered", "one_degree"]
-
 LINK_LIMIT = 4_000_000
 """Greatest number of links of a graph: more take above 600 MB."""
 

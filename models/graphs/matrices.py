@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from ..spectra.eigenspaces import Eigenspace
     from ..spectra.spectrum import Spectrum
 
-__all__ = ["Exact", "GraphMatrix", "MatrixKind"]
-
 
 class Exact:
     """A matrix of a graph that says what its entries are: its rows, its exact spectrum and eigenvectors."""

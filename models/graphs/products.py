@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from ..algebra.cosine_sums import AngleSum
 
-__all__ = ["cartesian", "complement", "factors", "kronecker", "union", "weighted"]
-
 Listed: TypeAlias = "list[tuple[AngleSum, int]]"
 Closed: TypeAlias = "list[tuple[sp.Expr, int]] | None"
 

@@ -19,8 +19,6 @@ from ..inputs.rational_text import file_text, rational
 from .links import LINK_LIMIT
 from .topology import Topology, from_matrix
 
-__all__ = ["as_topology", "from_edges", "from_graph", "from_sparse", "is_graph", "parsed", "read_edges", "read_graphml"]
-
 Weights = dict[tuple[int, int], Fraction]
 
 

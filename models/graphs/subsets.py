@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
-__all__ = ["ground_set", "multiplicity", "numbered", "size"]
-
 
 def ground_set(n: int, k: int) -> int:
     """Return the number of elements of a set that has n subsets of k elements."""

@@ -23,8 +23,6 @@ from ..inputs.reader import Algebra, NoMeaning, parse
 from ..spectra.symbolic_spectrum import SymbolicSpectrum, Z, symbolic_spectrum
 from .topology import Topology, from_matrix
 
-__all__ = ["SymbolicTopology", "from_symbols", "read_symbols", "weight"]
-
 LARGEST, LENGTH, DEPTH, EXPONENT = 30, 200, 20, 12
 DEGREE, TERMS, BITS = 60, 2000, 10_000
 """Largest degree, number of terms and bits of a number that a weight may have once it is multiplied out."""

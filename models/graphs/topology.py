@@ -27,9 +27,6 @@ if TYPE_CHECKING:
     import sympy as sp
 
 
-__all__ = ["Rule", "Topology", "from_matrix", "read_matrix"]
-
-
 class Rule(Protocol):
     """How a graph came about: what is known without its links, and the links themselves.
 

@@ -15,8 +15,6 @@ from typing import NoReturn
 
 from .reader import Algebra, NoMeaning, parse, stray_character, unpaired
 
-__all__ = ["MAGNITUDE", "constant"]
-
 LENGTH, DEPTH, EXPONENT, MAGNITUDE = 200, 24, 100.0, 1e100
 FUNCTIONS: dict[str, Callable[[float], float]] = {
     "cos": math.cos,

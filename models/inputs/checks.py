@@ -21,27 +21,6 @@ from typing import Any, TypeGuard, TypeVar
 from .arithmetic import constant
 from .unsupported import unsupported
 
-__all__ = [
-    "check_callable",
-    "check_choice",
-    "check_flag",
-    "check_instance",
-    "check_integer",
-    "check_keys",
-    "check_number",
-    "check_path",
-    "check_positive",
-    "check_printable",
-    "check_table",
-    "check_text",
-    "first_of",
-    "is_row",
-    "listed",
-    "short_repr",
-    "suggestion",
-    "typed_repr",
-]
-
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 """Control characters, ends of lines, changes of direction, and surrogates."""
 

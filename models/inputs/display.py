@@ -11,8 +11,6 @@ if TYPE_CHECKING:
 
     Axes: TypeAlias = Any
 
-__all__ = ["Drawn", "Shown", "Written"]
-
 
 class Shown:
     """A value with HTML for notebooks, which `synchain.runtime.reports` writes.

@@ -12,8 +12,6 @@ import sympy as sp
 from .checks import short_repr, suggestion
 from .reader import Algebra, Expression, NoMeaning
 
-__all__ = ["COMPOSED", "EXPONENT", "FUNCTIONS", "MAGNITUDE", "Expressions", "exprel"]
-
 EXPONENT, MAGNITUDE = 16, 1e100
 """Largest exponent of a power that is a number, largest constant."""
 

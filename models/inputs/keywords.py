@@ -12,8 +12,6 @@ from typing import Any
 from .checks import short_repr, suggestion
 from .unsupported import unsupported
 
-__all__ = ["called_from_outside", "check_methods", "public", "warn"]
-
 
 def warn(message: str, kind: type[Warning] = RuntimeWarning) -> None:
     """Warn at the line that called this package, through however many of its functions."""

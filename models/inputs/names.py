@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
-__all__ = ["ATTRIBUTES", "TAKEN", "LinkName", "NodeName", "expect_free"]
-
 _DIGITS = 9
 """Most digits of the number of a node."""
 

@@ -9,8 +9,6 @@ from typing import Any, SupportsIndex, TypeAlias
 from .checks import check_integer, short_repr
 from .rational_text import rational
 
-__all__ = ["Option", "Options", "as_options", "integer_option", "integers_option", "probability_option"]
-
 Option: TypeAlias = int | str | tuple[int, ...]
 
 Options: TypeAlias = tuple[tuple[str, Option], ...]

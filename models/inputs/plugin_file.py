@@ -15,8 +15,6 @@ from typing import Any, Self
 
 from .plugins import call
 
-__all__ = ["PluginFile"]
-
 _FLAGS = ("FRICTION", "ODD", "SELF_EXCITING", "DIRECTED", "CONNECTED", "ALL_TO_ALL")
 _TEXTS = ("SUMMARY", "SOURCE", "TOO_SMALL")
 

@@ -14,8 +14,6 @@ from typing import Any
 
 from .checks import check_path, check_printable
 
-__all__ = ["FILE_LIMIT", "ROWS", "file_text", "parse_rows", "rational", "rational_rows", "square", "total"]
-
 FILE_LIMIT = 32 * 2**20
 """Largest matrix file that is read, in bytes."""
 ROWS = 2000

@@ -14,8 +14,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, NoReturn, TypeVar, cast
 
-__all__ = ["Algebra", "Arithmetic", "Expression", "NoMeaning", "parse", "stray_character", "unpaired"]
-
 V = TypeVar("V")
 
 _ARITHMETIC = re.compile(r"[0-9A-Za-z_.+\-*/() \t]*")

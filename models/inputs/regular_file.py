@@ -8,8 +8,6 @@ import stat
 from io import FileIO
 from pathlib import Path
 
-__all__ = ["open_regular"]
-
 
 def open_regular(
     path: str | os.PathLike[str], *, writing: bool = False, flags: int = 0, folder: int | None = None

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-__all__ = ["COMPLEX", "unsupported"]
-
 _DELAYS = "delays are not supported; JiTCDDE and DifferentialEquations.jl (DDEProblem) integrate them"
 _NOISE = "noise is not supported; JiTCSDE and DifferentialEquations.jl (SDEProblem) integrate it"
 _RESETS = "resets of the state are not supported; Brian 2 and callbacks of DifferentialEquations.jl have them"

@@ -7,8 +7,6 @@ from typing import Self
 
 from .checks import check_choice
 
-__all__ = ["Word"]
-
 
 class Word(StrEnum):
     """One of a few words: it equals its text and is written as its text."""

@@ -10,8 +10,6 @@ from ..inputs.checks import check_instance, suggestion
 from ..mechanics.components import TIME, Node
 from ..mechanics.oscillator import FieldModel, Oscillator
 
-__all__ = ["WEIGHT", "End", "Pair", "Terms", "ends"]
-
 WEIGHT = sp.Symbol("weight", real=True)
 """The weight of a link in the expressions of a coupling."""
 

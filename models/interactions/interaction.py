@@ -27,8 +27,6 @@ from ..mechanics.expression import FRICTION_NAME, LENGTH, exact, read, written
 from ..mechanics.parameter import Parameter
 from .ends import WEIGHT, Pair, Terms
 
-__all__ = ["Potential", "Rates"]
-
 _WEIGHT = "W"
 """What the weight of a link is called in a text."""
 

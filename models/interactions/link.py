@@ -23,8 +23,6 @@ from ..mechanics.oscillator import FieldModel, Oscillator
 from .coupling import WEIGHT, Coupling
 from .ends import Pair, Terms
 
-__all__ = ["edge", "strength"]
-
 Symbols = tuple[sp.Symbol, ...]
 
 

@@ -16,8 +16,6 @@ import sympy as sp
 
 from ..mechanics.components import Edge
 
-__all__ = ["MOST_PRODUCTS", "Separated", "Summed", "separated", "summed"]
-
 MOST_PRODUCTS = 32
 """Most products in the rate of one state, and highest power of a sum that is multiplied out."""
 

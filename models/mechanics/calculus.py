@@ -12,8 +12,6 @@ from functools import lru_cache
 
 import sympy as sp
 
-__all__ = ["cancelled", "derivative", "expanded", "expanded_terms", "operations"]
-
 LARGEST_CANCELLED = 200
 """Operations of an expression up to which it is cancelled: longer ones are products of minors, which grow by it."""
 

@@ -11,8 +11,6 @@ import sympy as sp
 from .calculus import derivative
 from .contact import SLIP, Contact
 
-__all__ = ["TIME", "WEIGHT_NUMBER", "Block", "Edge", "Node"]
-
 TIME = sp.Symbol("t", real=True)
 """Non-dimensional time, the one time symbol of all equations."""
 

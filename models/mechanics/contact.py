@@ -22,8 +22,6 @@ from ..inputs.words import Word
 from .jumps import rough_at
 from .parameter import Parameter
 
-__all__ = ["KAPPA", "SLIDING", "SLIP", "Contact", "ContactModel", "FrictionLaw", "regularise", "set_valued"]
-
 
 class ContactModel(Word):
     """How the jump of a friction law at rest is treated."""

@@ -24,8 +24,6 @@ from ..inputs.unsupported import COMPLEX, unsupported
 from .components import TIME
 from .oscillator import FRICTION
 
-__all__ = ["FRICTION_NAME", "LENGTH", "exact", "read", "written"]
-
 LENGTH = 20_000
 """Most characters."""
 

@@ -12,8 +12,6 @@ from sympy.functions.elementary.piecewise import Piecewise
 
 from .calculus import derivative
 
-__all__ = ["JUMPING", "KINKED", "discontinuity", "gaps_of", "jumps", "rough_at"]
-
 JUMPING = (sp.sign, sp.floor, sp.ceiling, sp.Heaviside)
 """Functions that jump."""
 

@@ -10,19 +10,6 @@ import sympy as sp
 from .calculus import derivative
 from .components import TIME
 
-__all__ = [
-    "LARGEST_BY_MINORS",
-    "Mechanics",
-    "balance",
-    "check_masses_exist",
-    "coupled",
-    "energy_rate",
-    "equations_of_motion",
-    "mass_matrix",
-    "solve_masses",
-    "total_derivative",
-]
-
 Symbols = Sequence[sp.Symbol]
 
 

@@ -12,8 +12,6 @@ from ..inputs.frozen import Frozen
 from .contact import ContactModel, FrictionLaw
 from .parameter import Parameter
 
-__all__ = ["FRICTION", "Coordinate", "FieldModel", "LagrangianModel", "Oscillator", "Scaling", "friction"]
-
 FRICTION = sp.Function("f", real=True)
 """The friction coefficient as an unknown function of the sliding velocity; a law takes its place at the end."""
 

@@ -9,8 +9,6 @@ from typing import Any
 
 from ..inputs.checks import check_flag, check_keys, check_number, check_text, short_repr
 
-__all__ = ["Dimension", "Parameter", "dimension"]
-
 
 @dataclass(frozen=True, slots=True)
 class Parameter:

@@ -12,8 +12,6 @@ from .lagrangian import mass_matrix
 from .nondimensional import friction_coefficient, nondimensional
 from .oscillator import FieldModel, Oscillator
 
-__all__ = ["check_masses", "check_power"]
-
 SPEEDS = tuple(side * 10.0 ** (k / 4) for k in range(-24, 9) for side in (1.0, -1.0))
 """Sliding velocities at which a law is looked at, from 1e-6 to 100 and both ways."""
 

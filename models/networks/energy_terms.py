@@ -26,8 +26,6 @@ from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimens
 from ..mechanics.oscillator import FieldModel
 from .model import Model, NodeKind
 
-__all__ = ["Energy", "Share", "energy_of"]
-
 
 @dataclass(frozen=True, slots=True)
 class Share:

@@ -18,16 +18,6 @@ from ..mechanics.contact import ContactModel, FrictionLaw
 from ..mechanics.oscillator import Oscillator
 from .model import Group
 
-__all__ = [
-    "as_contact",
-    "as_coupling",
-    "as_groups",
-    "as_law",
-    "as_layers",
-    "as_oscillator",
-    "as_topology",
-]
-
 MOST = 100_000
 """Most nodes that groups may name."""
 

@@ -26,15 +26,6 @@ from ..mechanics.contact import ContactModel, FrictionLaw
 from ..mechanics.oscillator import Oscillator
 from ..mechanics.parameter import Parameter
 
-__all__ = [
-    "MOST_NODES",
-    "Group",
-    "Model",
-    "NodeKind",
-    "in_range",
-    "union_of",
-]
-
 MOST_NODES = 1_000_000
 """Most nodes of a model: they take 2 s and 700 MB."""
 

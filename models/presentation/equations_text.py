@@ -19,8 +19,6 @@ from ..mechanics.contact import SLIDING
 from ..mechanics.nondimensional import FRICTION
 from .writer import Latex, Style, Text, Writer
 
-__all__ = ["as_dict", "latex", "lines", "text"]
-
 LARGEST = 6
 """Networks of more nodes are written once, for node i, instead of node by node."""
 

@@ -14,8 +14,6 @@ from ..dynamics.equations import Equations
 from .equations_text import lines
 from .writer import LATEX_FUNCTIONS, VARIANTS, Latex
 
-__all__ = ["formula", "mathml"]
-
 TOKENS = re.compile(r"\\[A-Za-z]+|\\.|\d+(?:\.\d+)?|[A-Za-z]|\s+|.", re.DOTALL)
 
 SIGNS = {

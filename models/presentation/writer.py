@@ -14,8 +14,6 @@ from typing import Protocol
 import sympy as sp
 from sympy.printing.pretty.pretty_symbology import greek_unicode
 
-__all__ = ["LATEX_FUNCTIONS", "VARIANTS", "Latex", "Style", "Text", "Writer"]
-
 VARIANTS = {"theta": ("\\vartheta", "ϑ"), "epsilon": ("\\varepsilon", "ε")}
 """Greek letters of which the field writes the other form: (LaTeX, Unicode)."""
 

@@ -29,8 +29,6 @@ from ..sweeps.parameters import at_nodes, drive, parameters, varied
 from .observables import ENDINGS, observables, sections, stop
 from .section import Section
 
-__all__ = ["LIMITS", "TimeUnit", "complete", "integrators"]
-
 
 class TimeUnit(Word):
     """What `transient` and `window` count."""

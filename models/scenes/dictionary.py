@@ -19,8 +19,6 @@ from ..sweeps.distribution import Draw
 from ..sweeps.draw import GRAPH, Draws, Graphs, RandomGraph
 from ..sweeps.parameters import collected
 
-__all__ = ["arguments", "as_dict", "graph_of", "graph_table"]
-
 
 def arguments(values: object, keywords: Iterable[str], folder: Path | None = None) -> dict[str, Any]:
     """Return the keywords of a scene from names and values as in a scene file."""

@@ -15,8 +15,6 @@ from .toml import BYTES
 if TYPE_CHECKING:
     from .scene import Scene
 
-__all__ = ["load_scene", "scene_names"]
-
 KEY_PARTS = 8
 """Most parts of a dotted key in a scene file."""
 

@@ -18,8 +18,6 @@ from ..networks.model import Model
 from ..sweeps.parameters import varied
 from .section import Section
 
-__all__ = ["ENDINGS", "has_own_energy", "observables", "sections", "stop"]
-
 ENDINGS = ("", "_time", "_count", "_kept")
 """What follows the name of a section in the names that results have of it."""
 

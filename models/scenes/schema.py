@@ -24,8 +24,6 @@ from .defaults import LIMITS, integrators
 from .scene import KEYWORDS, Scene
 from .section import Direction
 
-__all__ = ["schema"]
-
 Table: TypeAlias = dict[str, Any]
 
 TEXT: Table = {"type": "string", "maxLength": 200}

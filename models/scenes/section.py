@@ -11,8 +11,6 @@ from ..dynamics.observable_text import LENGTH, as_value
 from ..inputs.checks import check_keys, check_number, check_table, check_text, short_repr
 from ..inputs.words import Word
 
-__all__ = ["Direction", "Section"]
-
 
 class Direction(Word):
     """In which direction a state crosses a level."""

@@ -9,8 +9,6 @@ from collections.abc import Iterator, Mapping
 
 from ..inputs.checks import check_path, short_repr, typed_repr
 
-__all__ = ["BYTES", "toml", "write"]
-
 BYTES = 1_000_000
 """Most bytes of a scene file."""
 

@@ -16,8 +16,6 @@ from ..interactions.coupling import Coupling, MatrixCoupling, Rates
 from ..interactions.ends import WEIGHT
 from ..networks.model import Model
 
-__all__ = ["asynchrony", "function_of_inputs", "warnings", "zero_multiplicity"]
-
 STIFF = 100.0
 """Frequency of a mode and number of its swings above which springs are called stiff."""
 

@@ -6,8 +6,6 @@ from ..algebra.cosine_sums import AngleSum, read
 from .matrix import Matrix
 from .solve import spectrum
 
-__all__ = ["angle_sums"]
-
 SMALL = 100
 """Most rows of a matrix without a closed form whose eigenvalues are computed for it."""
 

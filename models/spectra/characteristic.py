@@ -18,8 +18,6 @@ from flint import fmpq, fmpq_poly, fmpz_mat, fmpz_poly
 
 from .matrix import Matrix
 
-__all__ = ["banded", "characteristic", "cyclic", "forest", "pairwise_product", "sparse"]
-
 T = TypeVar("T")
 
 Entries: TypeAlias = Mapping[tuple[int, int], int]

@@ -29,8 +29,6 @@ from .jordan import value_at
 from .matrix import Matrix
 from .solve import spectrum
 
-__all__ = ["LARGEST", "Eigenspace", "check", "eigenspaces"]
-
 LARGEST = 100
 """Most nodes of a graph whose eigenvectors are computed: a few seconds if no eigenvalue is rational."""
 

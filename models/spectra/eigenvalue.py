@@ -19,19 +19,6 @@ from ..algebra.equality import equal, sign
 from ..algebra.rationals import to_fraction
 from ..algebra.roots import ComplexRoot, RealRoot, Root
 
-__all__ = [
-    "Blocks",
-    "Eigenvalue",
-    "ProofError",
-    "decimal",
-    "distinct",
-    "entry",
-    "ordered",
-    "rounded",
-    "times",
-    "words",
-]
-
 NEAR = 1e-12
 """Relative difference of floats below which numbers are compared exactly."""
 

@@ -15,8 +15,6 @@ from ..algebra.minimal_polynomials import minimal_polynomial
 from ..algebra.rationals import to_flint
 from .eigenvalue import Eigenvalue
 
-__all__ = ["compare"]
-
 
 def compare(alpha: Fraction, gamma: Eigenvalue, other_alpha: Fraction, other_gamma: Eigenvalue) -> int:
     """Compare the coupling strengths sigma = alpha / |gamma| of two modes exactly."""

@@ -24,8 +24,6 @@ from .jordan import value_at
 from .matrix import Matrix
 from .solve import DENSE_LIMIT, spectrum
 
-__all__ = ["JointEigenvalue", "joint_spectrum"]
-
 BITS = (64, 256, 1024)
 """Precisions at which sums of eigenvalues are told apart."""
 

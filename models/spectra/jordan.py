@@ -17,8 +17,6 @@ from ..algebra.minimal_polynomials import minimal_polynomial
 from .eigenvalue import Blocks, Eigenvalue
 from .matrix import Matrix
 
-__all__ = ["blocks", "geometric_multiplicity", "nullity", "value_at"]
-
 
 def blocks(graph: Matrix, polynomial: fmpq_poly, multiplicity: int) -> Blocks:
     """Return the Jordan blocks that every root of a factor of the characteristic polynomial has."""

@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Protocol
 if TYPE_CHECKING:
     import sympy as sp
 
-__all__ = ["Matrix"]
-
 
 class Matrix(Hashable, Protocol):
     """A square rational matrix, as its entries other than 0."""

@@ -25,8 +25,6 @@ from .characteristic import pairwise_product, sparse
 from .eigenvalue import ProofError
 from .matrix import Matrix
 
-__all__ = ["check_modulo"]
-
 PRIMES = 3
 """Number of primes."""
 

@@ -31,8 +31,6 @@ from .matrix import Matrix
 from .modular import check_modulo
 from .spectrum import Spectrum
 
-__all__ = ["Proof", "has_closed_form", "spectrum"]
-
 DENSE_LIMIT = 1000
 """Largest matrix without a closed form."""
 

@@ -16,8 +16,6 @@ from ..inputs.checks import check_instance
 from ..inputs.display import Written
 from .eigenvalue import Eigenvalue, decimal
 
-__all__ = ["Spectrum", "table"]
-
 SHOWN = 24
 """The text of a spectrum leaves out the middle of more eigenvalues than this."""
 

@@ -13,8 +13,6 @@ from sympy.polys.matrices import DomainMatrix
 
 from .eigenvalue import ProofError
 
-__all__ = ["SymbolicSpectrum", "Z", "symbolic_spectrum"]
-
 Z = sp.Symbol("z")
 """The variable of characteristic polynomials; no weight may be called so."""
 

@@ -15,8 +15,6 @@ from .characteristic import characteristic
 from .matrix import Matrix
 from .solve import DENSE_LIMIT
 
-__all__ = ["kirchhoff_index", "spanning_trees"]
-
 
 class Graph(Matrix, Protocol):
     """The matrix G of a graph: weights of links, with rows that sum to 0."""

@@ -9,8 +9,6 @@ from itertools import islice
 
 from ..inputs.checks import check_integer, check_keys, check_number, check_text, short_repr
 
-__all__ = ["Axis", "known_length"]
-
 LIMIT = 10_000_000
 """Most values on one axis."""
 

@@ -18,8 +18,6 @@ from ..networks.model import WEIGHTS, Model, in_range
 from .axis import LIMIT, Axis, known_length
 from .parameters import drive
 
-__all__ = ["Continuation", "check_cells", "check_draws", "check_sweep", "read_axes", "rest_in_sweep"]
-
 
 class Continuation(Word):
     """In which direction along the last axis cells start from the end of their neighbours."""

@@ -14,8 +14,6 @@ from ..inputs.checks import check_number, check_positive, check_text, short_repr
 from ..inputs.reader import Algebra, NoMeaning, parse, unpaired
 from ..inputs.words import Word
 
-__all__ = ["KNOWN", "Distribution", "Draw", "lorentzian", "normal", "read_draw", "uniform"]
-
 KNOWN = "normal(mean, deviation), uniform(low, high), lorentzian(centre, half width)"
 """What may be drawn from, in messages."""
 

@@ -20,15 +20,6 @@ from .axis import LIMIT, Axis
 from .distribution import KNOWN, Draw, read_draw
 from .parameters import by_name, in_order
 
-__all__ = [
-    "GRAPH",
-    "Draws",
-    "drawn_axes",
-    "drawn_graph",
-    "drawn_nodes",
-    "draws",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class Graphs:

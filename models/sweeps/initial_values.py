@@ -9,8 +9,6 @@ from typing import Any
 from ..inputs.checks import check_integer, check_keys, check_number, check_table, first_of, is_row, short_repr
 from ..inputs.frozen import Frozen
 
-__all__ = ["chosen_start", "default_start"]
-
 SEED_LIMIT = 2**63 - 1
 
 

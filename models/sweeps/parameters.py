@@ -16,8 +16,6 @@ from ..inputs.names import LinkName, NodeName
 from ..networks.model import WEIGHTS, Model, NodeKind, in_range
 from .axis import Axis
 
-__all__ = ["at_nodes", "by_name", "collected", "drive", "in_order", "parameters", "varied", "without"]
-
 T = TypeVar("T")
 
 Place: TypeAlias = NodeName | LinkName

@@ -8,8 +8,6 @@ from collections.abc import Iterator
 from ..graphs.topology import Topology
 from .partitions import coarsest_balanced
 
-__all__ = ["Permutation", "automorphisms"]
-
 Permutation = tuple[int, ...]
 """The image of each node."""
 

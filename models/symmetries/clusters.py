@@ -28,8 +28,6 @@ from ..spectra.eigenvalue import ProofError
 from .automorphisms import automorphisms
 from .partitions import class_links
 
-__all__ = ["Block", "Clusters", "check", "clusters", "orbital_partitions"]
-
 NODE_LIMIT = 64
 """Largest graph with a search for symmetries."""
 

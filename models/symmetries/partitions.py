@@ -9,8 +9,6 @@ from fractions import Fraction
 
 from ..graphs.links import Link, numbered
 
-__all__ = ["class_links", "coarsest_balanced"]
-
 
 def class_links(n: int, links: Iterable[Link], classes: Sequence[int]) -> tuple[Link, ...]:
     """Return the links between the classes of a balanced partition."""

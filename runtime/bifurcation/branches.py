@@ -32,8 +32,6 @@ from .continuation import Arc
 from .periodic import NEWTON, PeriodicOrbit, periodic_orbit, relative
 from .phases import Phases
 
-__all__ = ["Branch", "checked_values", "follow", "others", "traced"]
-
 SHORT = 1.0 / 32.0
 """Length of the pieces, relative to the step, at which the end of the branch is first looked for.
 

@@ -35,8 +35,6 @@ from .kinds import BifurcationKind
 from .periodic import SAME, PeriodicOrbit, closed, orbit_through, periodic_orbit, relative, strobe
 from .phases import Phases
 
-__all__ = ["Arc", "det", "find_turn", "turns"]
-
 NEAR = 3
 """Number of orbits that the polynomial passes through."""
 

@@ -36,8 +36,6 @@ from ..results.labels import STATE, States
 from ..sweeps.continued_start import Start, started
 from .linearised import Linearised
 
-__all__ = ["Equilibrium", "equilibrium"]
-
 MOST_STEPS, HALVINGS = 100, 40
 """Most steps of Newton's method, and how often one is halved until the residual falls."""
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-__all__ = ["BifurcationKind"]
-
 
 class BifurcationKind(StrEnum):
     """Kind of a bifurcation of periodic orbits."""

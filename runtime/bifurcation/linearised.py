@@ -15,8 +15,6 @@ from synchain.models.inputs.names import NodeName
 from synchain.models.mechanics.calculus import derivative
 from synchain.models.mechanics.components import Block, Edge, Node
 
-__all__ = ["Linearised"]
-
 
 @dataclass(frozen=True, slots=True)
 class Part:

@@ -28,8 +28,6 @@ from synchain.models.scenes.scene import Scene
 from ..cells.run_keywords import ONE_CELL
 from ..sweeps.run import run
 
-__all__ = ["Phases", "phases_of"]
-
 SAMPLES = 2000
 """Samples in each period of the drive."""
 

@@ -33,8 +33,6 @@ from .bifurcations import BifurcationKind
 from .branches import Branch, checked_values, others, traced, warn_of_lost
 from .periodic import NEWTON, TOLERANCE, PeriodicOrbit, check_periods, periodic_orbit, relative
 
-__all__ = ["Skeleton", "near_returns", "skeleton", "starts_of"]
-
 Range = tuple[float, float]
 """Ends of an interval."""
 

@@ -10,8 +10,6 @@ from synchain.codegen.driver.columns import COUNTS, TOLERANCES, Count, Point, Su
 
 from ..support.status import Status
 
-__all__ = ["IN_MEMORY", "Buffers", "numbers_of_a_cell"]
-
 IN_MEMORY = 10**9
 """Numbers of the largest result that is kept in memory, 8 GB."""
 

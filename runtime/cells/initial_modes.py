@@ -11,8 +11,6 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
-__all__ = ["CLOCK", "local_clock", "with_modes"]
-
 CLOCK = 8.0
 """Period of the clock of an oscillator without a drive: a power of two, so that no digit is lost."""
 

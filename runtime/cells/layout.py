@@ -9,8 +9,6 @@ import numpy as np
 
 from synchain.models.scenes.scene import Scene
 
-__all__ = ["Layout", "block_size"]
-
 REFILLS = 16
 """Most cells of a block for each lane: enough that the lanes which idle at its end do not count."""
 

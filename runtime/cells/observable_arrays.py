@@ -17,8 +17,6 @@ from synchain.models.scenes.energy import energy as exact_energy
 from synchain.models.scenes.observables import has_own_energy
 from synchain.models.scenes.scene import Scene, Section
 
-__all__ = ["Observed", "Sections", "watched"]
-
 
 def watched(scene: Scene) -> Watched:
     """Return what the kernel of a scene watches: observables, sections and a stop, the energy in them as sums."""

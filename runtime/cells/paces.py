@@ -19,8 +19,6 @@ from synchain.models.mechanics.components import TIME, Block, Edge, Node
 
 from .stiffness_rates import eigenvalue_rates, turns
 
-__all__ = ["Paces", "Templates", "fastest_rates"]
-
 NODES, LINKS = 50, 5000
 """Nodes of a large network whose slopes are computed, and links of one layer."""
 

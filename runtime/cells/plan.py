@@ -19,22 +19,6 @@ from synchain.models.scenes.scene import Scene
 from .initial_modes import local_clock, with_modes
 from .shortest_interval import shortest_stays
 
-__all__ = [
-    "Plan",
-    "Planner",
-    "by_place",
-    "control_array",
-    "control_of",
-    "first_step",
-    "half_swing",
-    "longest_steps",
-    "parameter_names",
-    "periods",
-    "plan",
-    "scale_of_atol",
-    "tolerances",
-]
-
 FIRST_STEP, SHORT = 1e-4, 0.1
 """Step tried first in every cell, and as a part of the time in which what grows fastest does so by a factor e; the step
 control enlarges it sixfold at a time."""

@@ -15,8 +15,6 @@ from synchain.models.inputs.unsupported import unsupported
 from synchain.models.scenes.scene import KEYWORDS, Scene, a_scene
 from synchain.models.sweeps.parameters import without
 
-__all__ = ["ONE_CELL", "ONE_ORBIT", "ORBITS", "Given", "with_numbers"]
-
 ORBITS = {"executor": "its orbits advance on threads of this process, as many as `workers` says"}
 """What functions that advance several orbits at once do not take, and why."""
 

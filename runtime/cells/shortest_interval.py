@@ -12,8 +12,6 @@ import sympy as sp
 from synchain.models.dynamics.periodicity import names_in
 from synchain.models.mechanics.components import TIME
 
-__all__ = ["shortest_stays"]
-
 POINTS = 1 << 14
 """Points of a period at which a drive is looked at."""
 

@@ -13,8 +13,6 @@ import sympy as sp
 from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import TIME
 
-__all__ = ["Rates", "eigenvalue_rates", "mode_rates", "turns"]
-
 NODES = 50
 """Orbits that are looked at."""
 

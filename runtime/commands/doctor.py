@@ -19,8 +19,6 @@ from ..console.outcome import FAILED, FINE, print_json
 if TYPE_CHECKING:
     import sympy as sp
 
-__all__ = ["CHECKS", "Check", "configure", "examine", "execute", "judge_spectrum", "judge_trajectory"]
-
 SUMMARY = "check the installation, the cache, the processor and known answers"
 EXAMPLES = ("synchain doctor", "synchain doctor --json")
 

@@ -12,20 +12,6 @@ from synchain.models.sweeps.axis import Axis
 
 from .outcome import WrongUse
 
-__all__ = [
-    "add_allow_code",
-    "add_scene",
-    "add_set",
-    "add_workers",
-    "folder",
-    "number",
-    "positive",
-    "setting",
-    "settings",
-    "tolerance",
-    "whole",
-]
-
 NODES = 100_000
 """Largest number of oscillators that can be asked for."""
 

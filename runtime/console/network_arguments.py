@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from synchain.models.graphs.topology import Topology
     from synchain.models.scenes.scene import Scene
 
-__all__ = ["add_network", "named_graph", "named_network", "named_values", "scene_on"]
-
 FILES = ("matrix", "edges", "graphml")
 """Options that name a file with a graph."""
 

@@ -7,19 +7,6 @@ import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 
-__all__ = [
-    "FAILED",
-    "FINE",
-    "WRONG_USE",
-    "Failed",
-    "WrongUse",
-    "discard_output",
-    "print_json",
-    "sentence",
-    "warn",
-    "wrong_use",
-]
-
 FINE, FAILED, WRONG_USE = 0, 1, 2
 
 

@@ -26,18 +26,6 @@ from ..cells.plan import Plan, first_step, scale_of_atol, tolerances
 from ..cells.stiffness_rates import eigenvalue_rates, mode_rates
 from ..support.status import Status
 
-__all__ = [
-    "STIFF",
-    "Ladder",
-    "chosen_for_modes",
-    "chosen_for_rows",
-    "first_steps",
-    "method_names",
-    "mode_stiffness",
-    "warn_of_steps",
-    "warn_of_stiff_modes",
-]
-
 STIFF = 30.0
 """How many times faster than it turns and goes on a motion decays from where Rosenbrock steps are the faster ones, by
 measurement (docs/performance.md)."""

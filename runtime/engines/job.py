@@ -61,8 +61,6 @@ from ..support.status import Status
 from .choice import Ladder, first_steps
 from .scene_kernels import ladder_of, write_kernel
 
-__all__ = ["Job", "JobSpec", "Problem", "RowsJob", "RowsSpec", "Start", "SweepJob", "SweepSpec", "versions"]
-
 LARGEST_ROOM = 2**25
 """Numbers that the room for section points of a block has at first, 268 MB."""
 

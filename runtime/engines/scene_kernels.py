@@ -20,8 +20,6 @@ from synchain.models.scenes.scene import Scene
 from ..cells.reduce import Reduction, as_reduction
 from .choice import Ladder
 
-__all__ = ["chosen_integrator", "kernel", "kernel_source", "ladder_of", "warn_of_chords", "write_kernel"]
-
 
 def kernel(scene: Scene, width: int | None = None, reduce: bool | Reduction = True) -> Kernel:
     """Return the compiled kernel of a scene, the one that `run(scene)` runs.

@@ -21,8 +21,6 @@ from ..results.result import Result, result_of
 from ..results.store import read_data
 from ..support.files import understood
 
-__all__ = ["open_result"]
-
 
 @cache
 def _classes() -> dict[str, type]:

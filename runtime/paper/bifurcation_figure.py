@@ -22,8 +22,6 @@ from .figure_runs import FigureRuns
 from .published import published
 from .sync_error import synchronous
 
-__all__ = ["EXTRA", "NAMES", "SIZE", "compute", "draw", "points", "table"]
-
 NAMES = ("figure_3", "figure_4d", "figure_4e", "figure_4f")
 EXTRA = tuple(f"{name}_{direction}" for name in NAMES for direction in ("up", "down"))
 SIZE = (COLUMN, 2.5)

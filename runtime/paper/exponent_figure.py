@@ -22,8 +22,6 @@ from ..stability.msf import MSF, msf
 from .figure_runs import FigureRuns
 from .published import PAIRS, published
 
-__all__ = ["NAMES", "SIZE", "compute", "curve", "draw", "effort", "layout", "ranges", "table"]
-
 NAMES = ("msf",)
 SIZE = (COLUMN, 4.4)
 HIGHEST = 1.2

@@ -23,8 +23,6 @@ from ..sweeps.run import run
 from ..synchronisation.criterion import PAPER, AppliedCriterion
 from ..synchronisation.threshold import Sweep, probe, project, simulate
 
-__all__ = ["FULL", "QUICK", "FigureRuns", "Quality", "thin"]
-
 T = TypeVar("T")
 
 

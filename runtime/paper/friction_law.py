@@ -17,8 +17,6 @@ from ..plots.csv_table import Table
 from ..plots.style import BLUE, COLUMN, ORANGE
 from .figure_runs import FigureRuns
 
-__all__ = ["NAMES", "SIZE", "compute", "draw", "table"]
-
 NAMES = ("figure_1b",)
 SIZE = (COLUMN, 2.5)
 Function = Callable[[np.ndarray], np.ndarray]

@@ -16,8 +16,6 @@ from . import Drawing, load
 from . import names as all_names
 from .figure_runs import FULL, QUICK, FigureRuns
 
-__all__ = ["make", "written"]
-
 AT_ONCE = 2
 """Figures that are computed at a time."""
 

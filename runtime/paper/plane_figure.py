@@ -23,8 +23,6 @@ from ..stability.msf import Plane, plane
 from .exponent_figure import HIGHEST, effort
 from .figure_runs import FigureRuns
 
-__all__ = ["NAMES", "SIZE", "Rays", "compute", "draw", "ranges", "table", "uneven_ring"]
-
 NAMES = ("msf_plane",)
 SIZE = (COLUMN, 2.5)
 OMEGA, SIGMA, NODES = 1.40, 0.13, 4

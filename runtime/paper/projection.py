@@ -31,8 +31,6 @@ from .exponent_figure import curve
 from .figure_runs import FigureRuns
 from .published import published
 
-__all__ = ["NAMES", "SIZE", "compute", "draw", "layout", "ranges", "table"]
-
 NAMES = ("figure_5", "figure_6", "figure_7", "figure_8")
 SIZE = (COLUMN, 4.0)
 LINES = ((BLUE, "-"), (PURPLE, "--"), (GREEN, "-."), (BLACK, ":"))

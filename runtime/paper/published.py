@@ -10,8 +10,6 @@ from dataclasses import dataclass
 
 from ..prediction.intervals import Interval
 
-__all__ = ["NOT_PERIODIC", "PAIRS", "PUBLISHED", "Published", "published"]
-
 
 @dataclass(frozen=True, slots=True)
 class Published:

@@ -31,8 +31,6 @@ from ..sweeps.run import run
 from .bifurcation_figure import Diagram, points
 from .figure_runs import FigureRuns
 
-__all__ = ["EXTRA", "SIZE", "compute", "document", "draw", "ranges", "table"]
-
 EXTRA = ("skeleton",)
 SIZE = (COLUMN, 3.3)
 LOW, HIGH = 1.0, 1.9

@@ -18,8 +18,6 @@ from ..synchronisation.criterion import PAPER
 from .figure_runs import FigureRuns
 from .published import published
 
-__all__ = ["NAMES", "SIZE", "compute", "draw", "synchronous", "table"]
-
 NAMES = ("figure_4a", "figure_4b", "figure_4c")
 SIZE = (COLUMN, 2.2)
 

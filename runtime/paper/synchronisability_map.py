@@ -28,8 +28,6 @@ from .exponent_figure import effort
 from .figure_runs import FigureRuns
 from .published import PAIRS, published
 
-__all__ = ["NAMES", "NETWORKS", "SIZE", "Map", "compute", "draw", "largest_exponent", "layout", "table"]
-
 NAMES = ("synchronisability_map",)
 SIZE = (COLUMN, 4.7)
 NETWORKS = (("chain", 2), ("chain", 3), ("chain", 4), ("ring", 6), ("star", 5), ("complete", 5))

@@ -24,20 +24,6 @@ from .exponent_figure import curve
 from .figure_runs import FigureRuns, Quality
 from .published import NOT_PERIODIC, PUBLISHED, Published, published
 
-__all__ = [
-    "NAMES",
-    "SIZE",
-    "Row",
-    "compute",
-    "document",
-    "draw",
-    "joined",
-    "nearest",
-    "scene_of",
-    "table",
-    "windows_of",
-]
-
 NAMES = ("thresholds",)
 SIZE = (COLUMN, 4.8)
 KINDS = (

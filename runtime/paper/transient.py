@@ -21,8 +21,6 @@ from .figure_runs import FigureRuns
 from .published import NOT_PERIODIC, PUBLISHED, Published
 from .threshold_table import scene_of
 
-__all__ = ["EXTRA", "SIZE", "compute", "draw", "layout", "table"]
-
 EXTRA = ("transient",)
 SIZE = (COLUMN, 3.6)
 ROWS = tuple(row for row in PUBLISHED if row.omega in NOT_PERIODIC)

@@ -9,8 +9,6 @@ from matplotlib.axes import Axes
 
 from .style import context, new_figure
 
-__all__ = ["canvas"]
-
 SIZE = (4.8, 3.4)
 """Width and height of a new figure in inches."""
 

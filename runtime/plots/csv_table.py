@@ -14,8 +14,6 @@ import xarray as xr
 
 from ..support.status import Status
 
-__all__ = ["Table", "as_csv", "status_names"]
-
 
 @dataclass(frozen=True, slots=True)
 class Table:

@@ -33,8 +33,6 @@ from .plane import draw_plane
 from .result_plot import draw_result
 from .style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, bands, note, symbol
 
-__all__ = ["drawn"]
-
 SAMPLES = 400
 """Samples of an orbit in a period of the drive."""
 

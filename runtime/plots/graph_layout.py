@@ -17,8 +17,6 @@ from synchain.models.graphs.families import FamilyRule
 from synchain.models.graphs.links import join
 from synchain.models.graphs.topology import Topology
 
-__all__ = ["positions"]
-
 DENSE = 300
 """Largest graph with dense matrices."""
 

@@ -19,8 +19,6 @@ from .graph_layout import positions
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["COLOURS", "Picture", "draw_graph", "svg"]
-
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 """Colours of the kinds of nodes (Okabe & Ito)."""
 

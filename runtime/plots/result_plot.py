@@ -15,8 +15,6 @@ from ..results.result import Result
 from ..support.status import Status
 from .style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, context, failures, new_figure, note, symbol
 
-__all__ = ["KINDS", "draw_result"]
-
 KINDS = ("error", "section", "map", "phase", "end")
 CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
 SIZE = (4.8, 3.4)

@@ -24,23 +24,6 @@ from synchain.models.presentation.writer import Latex
 from ..prediction.intervals import Interval
 from ..support.files import whole_file
 
-__all__ = [
-    "BLACK",
-    "BLUE",
-    "COLUMN",
-    "GREEN",
-    "GREY",
-    "ORANGE",
-    "PURPLE",
-    "bands",
-    "bracket",
-    "context",
-    "new_figure",
-    "note",
-    "save",
-    "symbol",
-]
-
 BLACK, BLUE, ORANGE, GREEN, PURPLE, SKY = "#1a1a1a", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
 GREY = "#d9d9d9"
 COLUMN = 3.46

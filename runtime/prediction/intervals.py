@@ -6,8 +6,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-__all__ = ["Interval", "find", "grid_intervals", "intersect", "refine", "scale"]
-
 Interval = tuple[float, float]
 """Closed interval (low, high)."""
 Predicate = Callable[[np.ndarray], np.ndarray]

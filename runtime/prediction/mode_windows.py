@@ -10,8 +10,6 @@ from synchain.models.graphs.topology import Topology
 from synchain.models.spectra.eigenvalue import Eigenvalue
 from synchain.models.spectra.jordan import geometric_multiplicity
 
-__all__ = ["NetworkMode", "defective_rows", "has_loose_parts", "transversal_modes"]
-
 VECTOR_LIMIT = 2000
 """Most nodes for which an eigenvector is computed, since the matrix is dense."""
 

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-__all__ = ["StableRange", "exact_ranges", "widen"]
-
 
 @dataclass(frozen=True, slots=True)
 class StableRange:

@@ -33,8 +33,6 @@ from ..results.labelled import Labelled
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["STYLE", "body", "figure", "fragment", "latex", "provenance_rows", "rows_table", "spectrum_of"]
-
 STYLE = """
 .synchain{font-family:system-ui,sans-serif;line-height:1.45}
 .synchain table{border-collapse:collapse;margin:.4em 0}

@@ -21,8 +21,6 @@ from ..stability.msf import MSF, msf
 from ..sweeps.run import run
 from .html import STYLE, body, figure, provenance_rows, rows_table
 
-__all__ = ["QUICK", "Effort", "report"]
-
 PAGE = """
 :root{color-scheme:light dark}
 body{margin:0 auto;max-width:52em;padding:1.5em;background:#fff;color:#1a1a1a}

@@ -31,8 +31,6 @@ from ..cells.buffers import Buffers
 from ..support.files import whole_file
 from ..support.status import CODES, tally
 
-__all__ = ["BlockLog", "Description", "is_block_log"]
-
 KIND = b"synchain blocks "
 MAGIC = KIND + b"3\n"
 PAGE = 4096

@@ -7,8 +7,6 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-__all__ = ["VERDICTS", "Certificate"]
-
 NEAR = 1e-11
 """Synchronisation error below which a certified cell ends, relative to the size of the motion."""
 

@@ -23,8 +23,6 @@ from synchain.models.scenes.scene import Scene
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["decode", "encode"]
-
 Tree: TypeAlias = "dict[str, Any]"
 Variables: TypeAlias = "dict[str, tuple[tuple[str, ...], np.ndarray]]"
 

@@ -23,27 +23,6 @@ if TYPE_CHECKING:
 
     from ..cells.buffers import Buffers
 
-__all__ = [
-    "COUNTS",
-    "DRIVE_PHASE",
-    "END_TIME",
-    "MEANINGS",
-    "STATE",
-    "SUMS",
-    "TOLERANCES",
-    "States",
-    "Variable",
-    "alike",
-    "changed",
-    "coordinates",
-    "dimensions",
-    "labelled",
-    "meaning",
-    "provenance",
-    "scene_of",
-    "variables",
-]
-
 Variable = tuple[str, tuple[str, ...], np.ndarray]
 """Name, dimensions besides those of the sweep, values with one row for each cell."""
 

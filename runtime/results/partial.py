@@ -28,16 +28,6 @@ from .labels import Variable, dimensions, labelled, scene_of, swept, variables
 from .result import Result, gather
 from .store import filled
 
-__all__ = [
-    "certificate_of",
-    "describe_sweep",
-    "layout_of",
-    "partial_path",
-    "read_partial",
-    "verdicts_in",
-    "write_result",
-]
-
 
 def describe_sweep(
     reduction: Reduction, layout: Layout, attributes: Mapping[str, object], certificate: Certificate | None

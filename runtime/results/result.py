@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
     from synchain.models.dynamics.equations import Equations
 
-__all__ = ["Result", "gather", "read_result", "result_of"]
-
 
 class _Deferred:
     """`_make` returns the labelled data of a result that has none yet."""

@@ -30,19 +30,6 @@ from synchain.models.inputs.regular_file import open_regular
 from ..support.files import check_replaceable, synced, whole_file, whole_folder
 from ..support.netcdf import DIGEST, Sheet, is_sealed, seal, unsealed
 
-__all__ = [
-    "FORMS",
-    "Form",
-    "attributes_of",
-    "chunk",
-    "filled",
-    "form_of",
-    "opened",
-    "pieces",
-    "read_data",
-    "write_data",
-]
-
 PARTS = ("real", "imaginary")
 """The values of the dimension `part`, by which complex numbers are stored as pairs of real ones."""
 

@@ -18,8 +18,6 @@ from .limit_cycle import limit_cycle
 from .motion import rests
 from .orbits import FAR, Orbits, within
 
-__all__ = ["Attractor", "Motion", "cycle_propagators", "find_attractor"]
-
 LONGEST = 32
 """Longest cycle that is looked for, in periods of the drive."""
 

@@ -15,8 +15,6 @@ from synchain.models.inputs.checks import check_integer, check_number, check_pos
 from ..support.execution import Execution
 from ..support.progress import Reporter
 
-__all__ = ["SLACK", "TRIED", "Averaging", "Batches", "check_whole", "error_of_steps", "errors_for"]
-
 BATCHES, TOGETHER = 64, 8
 """Most batches that are kept, and most that are added in one call: an average listens to Ctrl-C between calls."""
 FEWEST, MOST = 2, 8

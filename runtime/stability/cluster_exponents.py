@@ -36,8 +36,6 @@ from .motion import Turns, rates_of, turns_of
 from .orbits import OF_EXTENT, unit_of_time
 from .variational_integrator import VariationalIntegrator
 
-__all__ = ["BlockVerdict", "ClusterExponents", "cluster_exponents"]
-
 MERGED = 1e-9
 """Distance below which two clusters count as one."""
 

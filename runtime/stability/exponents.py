@@ -40,21 +40,6 @@ from .orbits import Orbits, pair_of
 from .slow_motion import warn_of_slow_motion
 from .transversal_modes import unused_axes
 
-__all__ = [
-    "Exponents",
-    "along",
-    "average",
-    "coupled_cell",
-    "exponents",
-    "group_by_attractor",
-    "initial_states",
-    "orbits_of",
-    "single_cell",
-    "transversal",
-    "with_partner",
-]
-
-
 APART = 5.0
 """Averages of two starts that differ by more errors, at any strength, are those of two motions."""
 

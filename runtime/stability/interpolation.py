@@ -19,16 +19,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-__all__ = [
-    "Interpolation",
-    "Panel",
-    "Registers",
-    "exact_interpolation",
-    "lines_of",
-    "on_a_cache_line",
-    "strength_interpolation",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class Panel:

@@ -19,8 +19,6 @@ from .motion import Rates, path, rests, shortest_time
 from .orbits import Orbits
 from .variational_integrator import VariationalIntegrator
 
-__all__ = ["limit_cycle"]
-
 SAMPLES = 4096
 """Steps from state to state in which a return is looked for."""
 

@@ -18,19 +18,6 @@ from synchain.models.mechanics.components import TIME
 from .averages import ROUNDING
 from .variational_integrator import VariationalIntegrator
 
-__all__ = [
-    "Rates",
-    "Turns",
-    "above",
-    "extent_of",
-    "path",
-    "rates_of",
-    "rests",
-    "shortest_time",
-    "starts_near",
-    "turns_of",
-]
-
 SHARE = 8
 """Least number of steps of a path from one end of a component to the other."""
 

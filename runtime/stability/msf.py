@@ -37,8 +37,6 @@ from .averages import Averaging
 from .exponents import Exponents, along, coupled_cell, exponent_rows, orbits_of, transversal, with_partner
 from .transversal_modes import SharedOrbit, shared_orbits, still_strengths, transversal_modes
 
-__all__ = ["MSF", "Plane", "StabilityClass", "classify", "msf", "plane"]
-
 STRENGTHS = ("alpha", "beta")
 """What the axes of a plane are called that are strengths of a mode; a parameter may have such a name too."""
 

@@ -29,8 +29,6 @@ from .interpolation import Interpolation, exact_interpolation, lines_of, strengt
 from .motion import Rates, Turns, above, extent_of, rates_of, turns_of
 from .variational_integrator import NO_TRACKS, Travellers, VariationalIntegrator
 
-__all__ = ["Orbits", "pair_of", "unit_of_time"]
-
 NODES, PARTS = (13, 21, 29, 37, 61), (1, 2, 4, 8, 16)
 """Nodes of a panel of strengths, and panels on each side, that are tried; with three for comparison they fill registers."""
 

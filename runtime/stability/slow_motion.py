@@ -11,8 +11,6 @@ from synchain.models.inputs.keywords import warn
 
 from ..cells.paces import fastest_rates
 
-__all__ = ["warn_of_slow_motion"]
-
 TURN = 2.0 * math.pi
 """Fewest times the inverse of the fastest rate in which motion turns, or settles."""
 

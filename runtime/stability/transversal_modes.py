@@ -11,8 +11,6 @@ import numpy as np
 from synchain.models.scenes.scene import Scene, a_scene
 from synchain.models.spectra.joint import JointEigenvalue, joint_spectrum
 
-__all__ = ["SharedOrbit", "shared_orbits", "still_strengths", "transversal_modes", "unused_axes"]
-
 
 @dataclass(frozen=True, slots=True)
 class SharedOrbit:

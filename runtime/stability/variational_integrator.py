@@ -32,9 +32,6 @@ from ..support.threads import worker_count
 from .averages import SLACK, TRIED, error_of_steps
 from .interpolation import Registers, on_a_cache_line
 
-__all__ = ["NO_TRACKS", "Travellers", "VariationalIntegrator"]
-
-
 NO_PANELS = (
     np.ones(1, dtype=np.int64),
     np.zeros((0, 1)),

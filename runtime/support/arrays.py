@@ -7,8 +7,6 @@ from numpy.typing import ArrayLike
 
 from synchain.models.inputs.checks import short_repr
 
-__all__ = ["numbers", "row"]
-
 LARGEST = 1e300
 """Largest size of a number in a row: sums, differences and multiples of them are finite."""
 

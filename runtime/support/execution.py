@@ -10,8 +10,6 @@ from synchain.models.inputs.checks import check_callable, check_flag, check_inst
 from .progress import Hook, Reporter
 from .threads import worker_count
 
-__all__ = ["Execution"]
-
 
 @dataclass(frozen=True, slots=True)
 class Execution:

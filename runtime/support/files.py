@@ -10,17 +10,6 @@ from contextlib import contextmanager
 from glob import escape
 from pathlib import Path
 
-__all__ = [
-    "check_replaceable",
-    "drop_leftovers",
-    "output_folder",
-    "synced",
-    "understood",
-    "whole_file",
-    "whole_folder",
-    "write_text",
-]
-
 
 @contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:

@@ -9,8 +9,6 @@ from types import ModuleType
 
 from synchain.models.inputs.checks import short_repr, suggestion
 
-__all__ = ["load", "names"]
-
 
 def names(path: Iterable[str]) -> tuple[str, ...]:
     """Return the names of the modules in the folders of a package, sorted, without those that begin with "_"."""

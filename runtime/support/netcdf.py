@@ -22,8 +22,6 @@ import numpy as np
 import xarray as xr
 from scipy.io import netcdf_file
 
-__all__ = ["DIGEST", "Sheet", "is_sealed", "seal", "unsealed"]
-
 DIGEST = "digest"
 """Name of the attribute that holds the SHA-256 of the file, in hexadecimal digits."""
 BLANK = "0" * 64

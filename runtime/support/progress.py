@@ -18,8 +18,6 @@ from .status import CODES, Status
 if TYPE_CHECKING:
     from tqdm import tqdm
 
-__all__ = ["Hook", "Progress", "Reporter", "duration"]
-
 T = TypeVar("T")
 
 EVERY = 60.0

@@ -6,8 +6,6 @@ from enum import IntEnum
 
 import numpy as np
 
-__all__ = ["CODES", "Status", "tally"]
-
 CODES = 16
 """Room for codes in counts, also in files: more than exist, so that new ones find a place."""
 

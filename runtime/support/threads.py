@@ -6,8 +6,6 @@ import os
 
 from synchain.models.inputs.checks import check_integer
 
-__all__ = ["worker_count"]
-
 
 def worker_count(workers: int | None) -> int:
     """Return the number of threads (default: all cores); ValueError for less than one, TypeError

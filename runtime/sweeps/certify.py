@@ -38,8 +38,6 @@ from .pool import Task, worker_lost
 from .prepare import PreparedRun
 from .scheduler import BlockScheduler
 
-__all__ = ["certified", "certify", "check_certifiable"]
-
 MOST = 10**7
 """Cells of the largest certified sweep: exponents and verdicts of all of them are held in memory."""
 

@@ -19,8 +19,6 @@ from ..results.labels import DRIVE_PHASE, END_TIME, STATE, States, coordinates, 
 from ..results.result import Result
 from ..support.arrays import row
 
-__all__ = ["START_TIME", "Start", "expect_whole_periods", "several", "started", "starts_of_cells"]
-
 Start: TypeAlias = Result | xr.DataArray | Mapping[str, object] | Sequence[float] | np.ndarray
 """What a run may start from."""
 

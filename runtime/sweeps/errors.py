@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from ..results.result import Result
 
-__all__ = ["SweepFailed", "SweepInterrupted"]
-
 
 class SweepInterrupted(KeyboardInterrupt):
     """Ctrl-C during a sweep; `finished` of `cells` had finished, `result` holds them if no file

@@ -20,9 +20,6 @@ from .pool import Task, worker_lost
 from .prepare import PreparedRun
 from .scheduler import BlockScheduler
 
-__all__ = ["Memory"]
-
-
 START = "start_state"
 """Variable of the states that the cells started from, if those are not the scene's."""
 

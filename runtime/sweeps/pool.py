@@ -16,8 +16,6 @@ from ..engines.job import Job
 from ..support.execution import Execution
 from .worker import forget, run_block
 
-__all__ = ["Task", "WorkerPool", "worker_lost"]
-
 LOOK = 0.2
 """Seconds after which a wait for a block looks whether Ctrl-C was pressed."""
 

@@ -19,8 +19,6 @@ from ..results.labels import provenance
 from ..support.execution import Execution
 from .continued_start import expect_whole_periods
 
-__all__ = ["PreparedRun", "prepare"]
-
 
 @dataclass(frozen=True, slots=True)
 class PreparedRun:

@@ -21,8 +21,6 @@ from .continued_start import START_TIME, Start, several, started, starts_of_cell
 from .memory import Memory
 from .prepare import prepare
 
-__all__ = ["run"]
-
 
 def run(
     scene: Scene,

@@ -18,8 +18,6 @@ from ..support.status import tally
 from .pool import Task, WorkerPool
 from .prepare import PreparedRun
 
-__all__ = ["BlockScheduler", "Sink"]
-
 
 class Sink(Protocol):
     """Keeps blocks that have ended."""

@@ -40,8 +40,6 @@ from .pool import Task, worker_lost
 from .prepare import PreparedRun, prepare
 from .scheduler import BlockScheduler
 
-__all__ = ["Streamed", "claim", "stream"]
-
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Streamed(Labelled):

@@ -10,8 +10,6 @@ from collections import OrderedDict
 from ..cells.buffers import Buffers
 from ..engines.job import Job, JobSpec
 
-__all__ = ["JobCache", "forget", "run_block"]
-
 
 class JobCache:
     """The jobs that a process remembers: the last `size` ones; an older one is sent to it again."""

@@ -31,8 +31,6 @@ from ..support.progress import Hook
 from .criterion import IN_CRITERION, AppliedCriterion, Criterion, checked
 from .threshold import check_probe, fitted, simulate
 
-__all__ = ["CAUSES", "OUTCOMES", "Agreement", "Cell", "agreement", "strengths"]
-
 OUTCOMES = ("both yes", "both no", "exponent yes, simulation no", "exponent no, simulation yes", "undecided")
 
 CAUSES = ("transient too short", "round-off merger", "intermittency", "coexisting attractor", "unexplained")

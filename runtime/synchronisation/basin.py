@@ -38,8 +38,6 @@ from .criterion import AppliedCriterion, Criterion, errors, preset, resolved
 from .synchronous_motion import SynchronousMotion, alike, measure_motion, spread_of
 from .trials import Outcome, Trials
 
-__all__ = ["Basin", "Fate", "basin", "random_starts"]
-
 Range = tuple[float, float]
 
 SAMPLE_LIMIT = 10_000_000

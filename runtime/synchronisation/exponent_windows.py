@@ -16,8 +16,6 @@ from ..stability.orbits import Orbits
 from ..support.error_text import interval_text
 from ..support.execution import Execution
 
-__all__ = ["ExponentWindows", "exponent_windows"]
-
 
 @dataclass(frozen=True, slots=True)
 class ExponentWindows:

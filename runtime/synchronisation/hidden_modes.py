@@ -7,8 +7,6 @@ import numpy as np
 from synchain.models.dynamics.equations import Equations
 from synchain.models.scenes.scene import Scene
 
-__all__ = ["hidden_modes"]
-
 ROUNDING = 1e-12
 """Part of the distances between oscillators below which a mode has none."""
 

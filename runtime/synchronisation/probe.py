@@ -41,8 +41,6 @@ from .criterion import IN_CRITERION, AppliedCriterion, Criterion, checked, error
 from .synchronous_motion import SynchronousMotion, alike, first_starts, measure_motion, spread_of
 from .trials import Trials
 
-__all__ = ["MODE_ALPHA", "MODE_BETA", "Probe", "ring_of_three", "universal_probe"]
-
 MODE_ALPHA = sp.Symbol("mode_alpha", real=True)
 MODE_BETA = sp.Symbol("mode_beta", real=True)
 """Real and imaginary part of a mode's strength alpha + i beta = -sigma gamma."""

@@ -24,8 +24,6 @@ from ..stability.motion import above, extent_of
 from ..support.status import Status
 from .trials import Outcome, Rows, Trials
 
-__all__ = ["SynchronousMotion", "alike", "columns_of", "first_starts", "measure_motion", "spread_of"]
-
 SAMPLES = 64
 """States at which a stretch of the motion is looked at."""
 

@@ -44,20 +44,6 @@ from .hidden_modes import hidden_modes
 from .synchronous_motion import SynchronousMotion, alike, first_starts, measure_motion, spread_of
 from .trials import Trials
 
-__all__ = [
-    "Sweep",
-    "Thresholds",
-    "cells_of",
-    "critical_ratio",
-    "judge",
-    "probe",
-    "project",
-    "simulate",
-    "thresholds",
-    "wu_chua",
-]
-
-
 RESOLUTION, CLOSER, RELATIVE = 5e-4, 5.0, 1e-3
 """Width in sigma to which ends of ranges are refined by default: it is less where a step of the grid is less than so many
 times as wide, and more where sigma is so large that this part of it is more."""

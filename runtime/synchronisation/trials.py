@@ -27,8 +27,6 @@ from ..support.status import CODES, Status, tally
 from ..sweeps.errors import SweepFailed, SweepInterrupted
 from ..sweeps.pool import Task, WorkerPool, worker_lost
 
-__all__ = ["Outcome", "Rows", "Trials", "mean_errors"]
-
 Rows = Callable[[np.ndarray], Plan]
 """Lays out cells by their numbers (count,)."""
 
