@@ -5,7 +5,6 @@ ever.  Such a cell jumps over as many whole cycles as fit before its window and,
 recorded, inside it.
 """
 
-# ruff: noqa: I001  (the long lists of names stay short)
 from __future__ import annotations
 
 import math
@@ -13,82 +12,8 @@ import math
 import numpy as np
 from numba import njit
 
-from ..simd.lanes import broadcast
-from ..simd.lanes import load
-from ..simd.lanes import one_lane
-from ..simd.lanes import select
-from ..simd.lanes import store
-from .clock_slots import ACCEPTED
-from .clock_slots import BASE
-from .clock_slots import BOUND
-from .clock_slots import BUDGET
-from .clock_slots import CANCEL
-from .clock_slots import CHANGE
-from .clock_slots import CHATTERING
-from .clock_slots import CLIMB
-from .clock_slots import CLOCK
-from .clock_slots import CONTACTS
-from .clock_slots import CYCLE
-from .clock_slots import DIVERGED
-from .clock_slots import DUE
-from .clock_slots import END
-from .clock_slots import FAR
-from .clock_slots import FINISHED
-from .clock_slots import FIRST_MARK
-from .clock_slots import FIRST_STEP
-from .clock_slots import FROM
-from .clock_slots import HALTED
-from .clock_slots import HIGH
-from .clock_slots import INTERRUPTED
-from .clock_slots import LAPSE
-from .clock_slots import LAST
-from .clock_slots import LEFT
-from .clock_slots import LONGEST
-from .clock_slots import LONGEST_RUSH
-from .clock_slots import LOOK
-from .clock_slots import LOOKED_AT
-from .clock_slots import LOOKS
-from .clock_slots import MARK
-from .clock_slots import MARKED_AT
-from .clock_slots import MAX_STEP
-from .clock_slots import MAX_STEPS
-from .clock_slots import MEAN
-from .clock_slots import MEMORY
-from .clock_slots import NEXT_SAMPLE
-from .clock_slots import NO_JUMPS
-from .clock_slots import N_ACCEPTED
-from .clock_slots import N_REJECTED
-from .clock_slots import N_SKIPPED
-from .clock_slots import ORIGIN
-from .clock_slots import PACE
-from .clock_slots import PAUSED
-from .clock_slots import PEAK
-from .clock_slots import PERIOD
-from .clock_slots import PERIODS
-from .clock_slots import POWER
-from .clock_slots import RECORD
-from .clock_slots import REJECTED
-from .clock_slots import RTOL
-from .clock_slots import RUSH
-from .clock_slots import SAVED_AT
-from .clock_slots import SERIES
-from .clock_slots import SKIPPED
-from .clock_slots import START
-from .clock_slots import STATUS
-from .clock_slots import STEP
-from .clock_slots import STOP
-from .clock_slots import STOPPED
-from .clock_slots import STOPPED_AT
-from .clock_slots import SUM_BEFORE
-from .clock_slots import SYNC
-from .clock_slots import SYNC_PEAK
-from .clock_slots import SYNC_SUM
-from .clock_slots import TIME
-from .clock_slots import TOWER
-from .clock_slots import UNDERFLOW
-from .clock_slots import UNTIL
-from .clock_slots import WIDTH
-from .clock_slots import WORTH
+from ..simd.lanes import broadcast, load, one_lane, select, store
+from .clock_slots import *
 
 # --- kernel text below ---
 # What must repeat for the future to repeat, saved behind state and parameters: the state and these of the clock.

@@ -1,51 +1,15 @@
 """Step control of all lanes at once: the size of a step, its acceptance, and the next size."""
 
-# ruff: noqa: I001  (the long lists of names stay short)
 from __future__ import annotations
 
 import math
 
 from numba import njit
 
-from ..simd.elementary import exp
-from ..simd.elementary import log
-from ..simd.lanes import absolute
-from ..simd.lanes import any_lane
-from ..simd.lanes import broadcast
-from ..simd.lanes import floor
-from ..simd.lanes import fma
-from ..simd.lanes import load
-from ..simd.lanes import maximum
-from ..simd.lanes import minimum
-from ..simd.lanes import select
-from ..simd.lanes import store
-from ..simd.lanes import truncated
+from ..simd.elementary import exp, log
+from ..simd.lanes import absolute, any_lane, broadcast, floor, fma, load, maximum, minimum, select, store, truncated
 from ..simd.special import power_of_two
-from .clock_slots import ACCEPTED
-from .clock_slots import BASE
-from .clock_slots import BOUND
-from .clock_slots import CHANGE
-from .clock_slots import CONTACTS
-from .clock_slots import DUE
-from .clock_slots import END
-from .clock_slots import FAR
-from .clock_slots import FROM
-from .clock_slots import HIGH
-from .clock_slots import LONGEST
-from .clock_slots import LONGEST_RUSH
-from .clock_slots import LOOK
-from .clock_slots import MARK
-from .clock_slots import MEMORY
-from .clock_slots import PERIOD
-from .clock_slots import PERIODS
-from .clock_slots import REJECTED
-from .clock_slots import RUSH
-from .clock_slots import START
-from .clock_slots import STEP
-from .clock_slots import STOP
-from .clock_slots import TIME
-from .clock_slots import UNTIL
-from .clock_slots import WIDTH
+from .clock_slots import *
 
 
 # --- kernel text below ---

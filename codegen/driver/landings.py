@@ -6,34 +6,29 @@ these numbers; they are interpolated to the nodes of all legs of some blocks, an
 interpolated to all strengths.
 """
 
-# ruff: noqa: I001  (the long lists of names stay short)
 from __future__ import annotations
 
 from numba import njit
 
 from ..simd.addresses import address
 from ..simd.elementary import log
-from ..simd.lanes import absolute
-from ..simd.lanes import broadcast
-from ..simd.lanes import fma
-from ..simd.lanes import load
-from ..simd.lanes import maximum
-from ..simd.lanes import select
-from ..simd.lanes import store
+from ..simd.lanes import absolute, broadcast, fma, load, maximum, select, store
 from .clock_slots import LANES
-from .propagators import FROM
-from .propagators import NODE
-from .propagators import PANEL
-from .propagators import POINTS
-from .propagators import TO
-from .propagators import WEIGHTS
-from .propagators import apply
-from .propagators import largest_misfit
-from .propagators import larger
-from .propagators import lift
-from .propagators import multiply
-from .propagators import scale
-from .propagators import tabulate
+from .propagators import (
+    FROM,
+    NODE,
+    PANEL,
+    POINTS,
+    TO,
+    WEIGHTS,
+    apply,
+    larger,
+    largest_misfit,
+    lift,
+    multiply,
+    scale,
+    tabulate,
+)
 
 
 # --- kernel text below ---

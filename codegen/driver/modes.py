@@ -6,7 +6,6 @@ sort modes by the size of their strength: the last register is stepped first, an
 large, no other one is.  Taylor steps follow the series of the orbit and of all modes.
 """
 
-# ruff: noqa: I001  (the long lists of names stay short)
 from __future__ import annotations
 
 import math
@@ -15,69 +14,14 @@ import numpy as np
 from numba import njit
 
 from ..simd.addresses import address
-from ..simd.lanes import any_lane
-from ..simd.lanes import broadcast
-from ..simd.lanes import lane_bits
-from ..simd.lanes import load
-from ..simd.lanes import maximum
-from ..simd.lanes import minimum
-from ..simd.lanes import select
-from ..simd.lanes import store
-from .cells import REPEATING
-from .cells import aligned
-from .cells import begin
-from .cells import fill
-from .cells import outcome
-from .cells import put
-from .cells import restart
-from .cells import turn_over
-from .cells import watch
-from .contacts import change_modes
-from .contacts import note_rush
-from .contacts import take_back
-from .control import accept_series
-from .control import advance
-from .control import aim
-from .control import arrive
-from .control import judge
-from .control import pause
-from .control import wrap
+from ..simd.lanes import any_lane, broadcast, lane_bits, load, maximum, minimum, select, store
+from .cells import REPEATING, aligned, begin, fill, outcome, put, restart, turn_over, watch
+from .clock_slots import *
+from .contacts import change_modes, note_rush, take_back
+from .control import accept_series, advance, aim, arrive, judge, pause, wrap
 from .dense import inside
-from .landings import begin_leg
-from .landings import begin_products
-from .landings import bring
-from .landings import close_batch
-from .landings import hand_over
-from .landings import land
-from .landings import lay_out
-from .clock_slots import ACCEPTED
-from .clock_slots import ATOL
-from .clock_slots import BASE
-from .clock_slots import BOUND
-from .clock_slots import CLOCK
-from .clock_slots import CONTACTS
-from .clock_slots import FINISHED
-from .clock_slots import LANES
-from .clock_slots import LONGEST
-from .clock_slots import N_ACCEPTED
-from .clock_slots import N_REJECTED
-from .clock_slots import PERIODS
-from .clock_slots import REJECTED
-from .clock_slots import RTOL
-from .clock_slots import SERIES
-from .clock_slots import STATUS
-from .clock_slots import STEP
-from .clock_slots import STOP
-from .clock_slots import STOPPED_AT
-from .clock_slots import TIME
-from .clock_slots import WIDTH
-from .propagators import TILE
-from .propagators import TO
-from .propagators import apply
-from .propagators import larger
-from .propagators import scale
-from .propagators import settle
-from .propagators import tabulate
+from .landings import begin_leg, begin_products, bring, close_batch, hand_over, land, lay_out
+from .propagators import TILE, TO, apply, larger, scale, settle, tabulate
 
 # --- kernel text below ---
 # Steps between two scalings: a step's growth is bounded by its error, that of so many stays far from overflow.

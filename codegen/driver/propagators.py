@@ -5,7 +5,6 @@ nodes are interpolated from and which are there for comparison, and where its we
 every strength is a node itself.
 """
 
-# ruff: noqa: I001  (the long lists of names stay short)
 from __future__ import annotations
 
 import math
@@ -14,16 +13,7 @@ from numba import njit
 
 from ..simd.addresses import address
 from ..simd.elementary import log
-from ..simd.lanes import absolute
-from ..simd.lanes import broadcast
-from ..simd.lanes import fma
-from ..simd.lanes import load
-from ..simd.lanes import maximum
-from ..simd.lanes import scale_binary
-from ..simd.lanes import select
-from ..simd.lanes import split_binary
-from ..simd.lanes import sqrt
-from ..simd.lanes import store
+from ..simd.lanes import absolute, broadcast, fma, load, maximum, scale_binary, select, split_binary, sqrt, store
 from .clock_slots import LANES
 
 # --- kernel text below ---

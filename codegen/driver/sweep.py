@@ -5,66 +5,17 @@ the window, and makes room for the next cell.  Its result does not depend on its
 register.
 """
 
-# ruff: noqa: I001  (the long lists of names stay short)
 from __future__ import annotations
-
 
 import numpy as np
 from numba import njit
 
 from ..simd.addresses import address
-from ..simd.lanes import any_lane
-from ..simd.lanes import lane_bits
-from ..simd.lanes import load
-from ..simd.lanes import minimum
-from ..simd.lanes import store
-from .cells import REPEATING
-from .cells import aligned
-from .cells import come_back
-from .cells import fill
-from .cells import finish
-from .cells import outcome
-from .cells import put
-from .cells import settle_down
-from .cells import turn_over
-from .cells import vacate
-from .contacts import change_modes
-from .contacts import note_rush
-from .contacts import take_back
-from .control import accept_series
-from .control import advance
-from .control import aim
-from .control import arrive
-from .control import judge
-from .control import pause
-from .control import wrap
-from .clock_slots import ALL
-from .clock_slots import ATOL
-from .clock_slots import BASE
-from .clock_slots import BOUND
-from .clock_slots import CANCEL
-from .clock_slots import CLOCK
-from .clock_slots import CONTACTS
-from .clock_slots import FIRST_LOOK
-from .clock_slots import FIRST_OF_CELL
-from .clock_slots import LEFT
-from .clock_slots import LONGEST
-from .clock_slots import LONGEST_OF_CELL
-from .clock_slots import LOOK
-from .clock_slots import LOOPED
-from .clock_slots import MARK
-from .clock_slots import MAX_STEPS
-from .clock_slots import OBSERVED
-from .clock_slots import PAUSED
-from .clock_slots import RTOL
-from .clock_slots import SERIES
-from .clock_slots import START
-from .clock_slots import STATUS
-from .clock_slots import STEP
-from .clock_slots import STOP
-from .clock_slots import SYNC
-from .clock_slots import TIME
-from .clock_slots import WIDTH
+from ..simd.lanes import any_lane, lane_bits, load, minimum, store
+from .cells import REPEATING, aligned, come_back, fill, finish, outcome, put, settle_down, turn_over, vacate
+from .clock_slots import *
+from .contacts import change_modes, note_rush, take_back
+from .control import accept_series, advance, aim, arrive, judge, pause, wrap
 from .spread import spread
 
 
