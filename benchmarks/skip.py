@@ -18,7 +18,7 @@ import numpy as np
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.models.sweeps.axis import Axis
-from synchain.runtime.cells.reduce import Reduction, reduce_scene
+from synchain.runtime.cells.reduce import ReducedScene, reduce_scene
 from synchain.runtime.engines.scene_kernels import kernel_source
 from synchain.runtime.results.result import Result
 from synchain.runtime.sweeps.run import run
@@ -81,7 +81,7 @@ def measure(quick: bool = False) -> list[tuple[object, ...]]:
     return [_row(case, quick) for case in (CASES[:QUICK] if quick else CASES)]
 
 
-def scenes(case: Case, quick: bool) -> tuple[Reduction, Reduction]:
+def scenes(case: Case, quick: bool) -> tuple[ReducedScene, ReducedScene]:
     """What runs with the skip and without it: cells of one core over the frequency of the drive."""
     axis = Axis.between("omega", 1.1, 1.2, 8 if quick else 64)
     given = {"parameters": PARAMETERS, "transient": 0.0, "window": 20.0 if quick else 100.0, **case.given}
@@ -106,7 +106,7 @@ def _row(case: Case, quick: bool) -> tuple[object, ...]:
     return (case.name, case.n, *counts, 1e3 * fewer, 1e3 * more, more / fewer, _worst(case, pair))
 
 
-def _worst(case: Case, pair: tuple[Reduction, Reduction]) -> float:
+def _worst(case: Case, pair: tuple[ReducedScene, ReducedScene]) -> float:
     """The largest difference of the answers over a short time."""
     results = []
     for chosen, skip in zip(pair, (not case.less, False), strict=True):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import sympy as sp
 
-from synchain.models.inputs.frozen import Frozen
+from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.mechanics.oscillator import Coordinate, LagrangianModel, Oscillator
 from synchain.models.mechanics.parameter import Parameter
 
@@ -21,7 +21,7 @@ def of_energies(name: str, links: int, kinetic: sp.Expr, potential: sp.Expr, los
     """An oscillator with coordinates q1 …, velocities w1 … and parameters of the value 1."""
     coordinates = tuple(Coordinate(f"q{k + 1}", f"w{k + 1}", "1") for k in range(links))
     model = LagrangianModel(coordinates, kinetic, potential, (sp.S.Zero,) * links, lost)
-    return Oscillator(name, Frozen({s: Parameter(1.0, "1", "a number") for s in names}), model)
+    return Oscillator(name, FrozenDict({s: Parameter(1.0, "1", "a number") for s in names}), model)
 
 
 def pendulum(links: int) -> Oscillator:

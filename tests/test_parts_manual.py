@@ -9,7 +9,7 @@ import pytest
 
 from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.inputs.arithmetic import constant
-from synchain.models.inputs.plugins import Kind, load, names
+from synchain.models.inputs.plugins import PluginKind, load, names
 from synchain.models.interactions.coupling import STRENGTH
 from synchain.models.mechanics.contact import KAPPA
 
@@ -34,7 +34,7 @@ def table(title: str) -> dict[str, list[Row]]:
 
 
 @pytest.mark.parametrize("kind", TABLES)
-def test_the_tables_are_those_of_the_modules(kind: Kind) -> None:
+def test_the_tables_are_those_of_the_modules(kind: PluginKind) -> None:
     expected = {name: load(kind, name).PARAMETERS for name in names(kind)}
     if kind is COUPLING:
         expected["components"] = STRENGTH

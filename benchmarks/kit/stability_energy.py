@@ -14,7 +14,7 @@ from synchain.codegen.machine_code.compile import load
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.mechanics.lagrangian import total_derivative
-from synchain.models.networks.energy_terms import Energy
+from synchain.models.networks.energy_terms import EnergyTerms
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.cells.plan import control_array, plan, tolerances
@@ -54,7 +54,7 @@ def _with_energy(scene: Scene) -> tuple[Scene, dict[str, float]]:
     return scene, {}
 
 
-def _worked(scene: Scene, exact: Energy) -> tuple[np.ndarray, float]:
+def _worked(scene: Scene, exact: EnergyTerms) -> tuple[np.ndarray, float]:
     """End state and work of an integration of both; NaN where it did not finish."""
     n, integrator = scene.n, scene.integrator
     whole = _with_work(scene.equations, exact)
@@ -69,7 +69,7 @@ def _worked(scene: Scene, exact: Energy) -> tuple[np.ndarray, float]:
     return buffers.end[0, :-n], math.fsum(buffers.end[0, -n:])
 
 
-def _with_work(equations: Equations, exact: Energy) -> Equations:
+def _with_work(equations: Equations, exact: EnergyTerms) -> Equations:
     """The same network with the work done on each oscillator as its last state."""
     node, edge, share = equations.node, equations.edge, exact.nodes[0]
     if any(share.power != 0 for share in exact.links):

@@ -27,7 +27,7 @@ class Control(IntEnum):
     """Behind those of every kernel: the directions of the second section and of those behind it."""
 
 
-class Span(IntEnum):
+class SpanColumn(IntEnum):
     """Columns of `spans` (cells, 7), in non-dimensional time."""
 
     START = 0
@@ -45,7 +45,7 @@ class Span(IntEnum):
     """Steps after which the cell first looks whether to pause; inf if it never does."""
 
 
-class Sum(IntEnum):
+class SumColumn(IntEnum):
     """Columns of `sums` (cells, 4): synchronisation error over the window, and the time at which
     the cell stopped.
     """
@@ -57,7 +57,7 @@ class Sum(IntEnum):
 
 
 class Tally(IntEnum):
-    """Columns of each observed value in `sums`; behind those of `Sum` stands the time that was
+    """Columns of each observed value in `sums`; behind those of `SumColumn` stands the time that was
     observed, then come the values one after the other.
     """
 
@@ -96,7 +96,7 @@ COUNTS = TOLERANCES.stop
 """Columns of `counts`."""
 
 
-class Point(IntEnum):
+class PointColumn(IntEnum):
     """Columns of a section point: its time, then the state."""
 
     TIME = 0

@@ -35,7 +35,7 @@ lower = Library()
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class ExportBody:
     """Temporaries in order, then the results that are not zero, with the component or place that each belongs to."""
 
     steps: tuple[tuple[sp.Symbol, sp.Expr], ...]
@@ -53,7 +53,7 @@ class Body:
         return found + [storing(place, lower(e)) for place, e in self.results]
 
 
-def node_body(equations: Equations, jacobian: bool = False, i: int = 0) -> Body:
+def node_body(equations: Equations, jacobian: bool = False, i: int = 0) -> ExportBody:
     """The right-hand side of node `i` (component -> value), or its block of the Jacobian (place -> value)."""
     if jacobian:
         return _body({place: e for place, e in node_places(equations, i).items()})
@@ -69,7 +69,7 @@ def node_places(equations: Equations, i: int = 0) -> dict[Place, sp.Expr]:
     return _places(_less(node.jacobian(), push, node.state))
 
 
-def node_mass_body(equations: Equations, i: int = 0) -> Body:
+def node_mass_body(equations: Equations, i: int = 0) -> ExportBody:
     """The entries of a node's block of M that are not those of the identity (place -> value)."""
     block = equations.node_at(i).inertia
     table = {(r, c): e for r, row in enumerate(block) for c, e in enumerate(row) if e != sp.Integer(r == c)}
@@ -112,11 +112,11 @@ def _less(block: Block, push: sp.Matrix, states: tuple[sp.Symbol, ...]) -> Block
     )
 
 
-def mass_body(equations: Equations, link: Linked | None = None) -> Body:
+def mass_body(equations: Equations, link: Linked | None = None) -> ExportBody:
     """What a link adds to M in M d(state)/dt = rhs, ((False or True for there, place) -> value)."""
     edge = _edge(equations, link)
     if edge is None:
-        return Body((), ())
+        return ExportBody((), ())
     weight, blocks = _weight(link), enumerate(edge.inertia)
     return _body(
         {(bool(end), place): e.xreplace(weight) for end, block in blocks for place, e in _places(block).items()}
@@ -154,19 +154,19 @@ def _weight(link: Linked | None) -> dict[sp.Symbol, sp.Expr]:
     return {edge.weight: sp.Rational(weight.numerator, weight.denominator)}
 
 
-def link_body(equations: Equations, link: Linked | None = None, jacobian: bool = False) -> Body:
+def link_body(equations: Equations, link: Linked | None = None, jacobian: bool = False) -> ExportBody:
     """What a link adds to its target (component -> value), or to the Jacobian ((False or True for there, place) -> value).
 
     Without a `link` the weight stays a symbol.
     """
     edge = _edge(equations, link)
     if edge is None:
-        return Body((), ())
+        return ExportBody((), ())
     table: dict[Any, sp.Expr] = {**link_places(equations, link)} if jacobian else dict(enumerate(edge.rhs))
     return _body({place: e.xreplace(_weight(link)) for place, e in table.items()})
 
 
-def parameters(equations: Equations, bodies: Iterable[Body]) -> list[int]:
+def parameters(equations: Equations, bodies: Iterable[ExportBody]) -> list[int]:
     """The places, in Equations.parameters, of the parameters that all nodes share and some bodies use."""
     used = {s.name for body in bodies for s in body.uses(map(real, equations.parameters))}
     return [k for k, name in enumerate(equations.parameters) if name in used]
@@ -184,7 +184,7 @@ def _places(block: tuple[tuple[sp.Expr, ...], ...]) -> dict[Place, sp.Expr]:
     return {place: e for place, e in table.items() if e != 0}
 
 
-def _body(table: dict, every: bool = False) -> Body:
+def _body(table: dict, every: bool = False) -> ExportBody:
     """Common parts are computed once: w1, w2, …, which no symbol of a portable model is called."""
     kept = {place: sp.sympify(e) for place, e in table.items() if every or e != 0}
     names = (real(f"w{k}") for k in range(1, 1_000_000))
@@ -195,7 +195,7 @@ def _body(table: dict, every: bool = False) -> Body:
     shown = {symbol: c for c, symbol in hidden.items()}  # a temporary is a number: conditions stay where they are
     steps, results = sp.cse([e.xreplace(hidden) for e in kept.values()], symbols=names, order="canonical")
     values = [e.xreplace(shown) for e in results]
-    return Body(tuple((s, e.xreplace(shown)) for s, e in steps), tuple(zip(kept, values, strict=True)))
+    return ExportBody(tuple((s, e.xreplace(shown)) for s, e in steps), tuple(zip(kept, values, strict=True)))
 
 
 def wrapped(numbers: Iterable[str]) -> list[str]:

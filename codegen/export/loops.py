@@ -16,7 +16,7 @@ from ..program.expressions import Expression, Load, Name, Number, plus
 from ..program.passes import real
 from ..program.statements import Accumulate, Identity, Loop, Statement, Store, Titled, let, mentioned, whole
 from .body import (
-    Body,
+    ExportBody,
     Linked,
     Storing,
     is_unrolled,
@@ -32,7 +32,7 @@ from .body import (
     rate_symbols,
 )
 
-Places: TypeAlias = Callable[[int], Expression]
+StateLayout: TypeAlias = Callable[[int], Expression]
 """Where the components of a node stand."""
 
 
@@ -70,7 +70,7 @@ def place_of(block: int, size: str, index: str) -> Expression:
 
 
 def _of_nodes(
-    equations: Equations, body_of: Callable[[int], Body], storing: Callable[[Places], Storing], reads: bool
+    equations: Equations, body_of: Callable[[int], ExportBody], storing: Callable[[StateLayout], Storing], reads: bool
 ) -> Iterator[Titled | Loop]:
     """One block for each node, or one loop over them; `storing` is made of the places of a node."""
     if not is_unrolled(equations):
@@ -85,8 +85,8 @@ def _of_nodes(
 
 def _of_links(
     equations: Equations,
-    body_of: Callable[[Linked | None], Body],
-    storing: Callable[[Places, Places], Storing],
+    body_of: Callable[[Linked | None], ExportBody],
+    storing: Callable[[StateLayout, StateLayout], Storing],
     reads: bool,
 ) -> Iterator[Titled | Loop]:
     """One block for each link, or one loop over them; `storing` is made of the places of its target and of its source."""
@@ -101,29 +101,31 @@ def _of_links(
         yield Titled(f"oscillator {target + 1} feels oscillator {source + 1}", tuple(found))
 
 
-def _to(array: str, statement: type[Store] | type[Accumulate], at: Places) -> Storing:
+def _to(array: str, statement: type[Store] | type[Accumulate], at: StateLayout) -> Storing:
     return lambda c, value: statement(array, at(c), value)
 
 
-def _entry(array: str, statement: type[Store] | type[Accumulate], row: Places, column: Places) -> Storing:
+def _entry(array: str, statement: type[Store] | type[Accumulate], row: StateLayout, column: StateLayout) -> Storing:
     return lambda place, value: statement(array, (row(place[0]), column(place[1])), value)
 
 
-def _own(array: str) -> Callable[[Places], Storing]:
+def _own(array: str) -> Callable[[StateLayout], Storing]:
     """Stores entries in the rows and columns of a node."""
     return lambda at: _entry(array, Store, at, at)
 
 
-def _either_end(array: str) -> Callable[[Places, Places], Storing]:
+def _either_end(array: str) -> Callable[[StateLayout, StateLayout], Storing]:
     """Adds to entries in the rows of the target and, as each place tells, the columns of the target or of the source."""
 
-    def made(at: Places, other: Places) -> Storing:
+    def made(at: StateLayout, other: StateLayout) -> Storing:
         return lambda place, value: _entry(array, Accumulate, at, other if place[0] else at)(place[1], value)
 
     return made
 
 
-def _listed(equations: Equations) -> tuple[Callable[[Places], Storing], Callable[[Places, Places], Storing]]:
+def _listed(
+    equations: Equations,
+) -> tuple[Callable[[StateLayout], Storing], Callable[[StateLayout, StateLayout], Storing]]:
     """Store the entries of all nodes, and those of all links, place by place behind each other."""
     own, slots = list(node_places(equations)), list(link_places(equations))
 
@@ -152,7 +154,7 @@ def _at(array: str, index: Expression) -> Load:
     return Load(array, index, None)
 
 
-def _loads(equations: Equations, i: int | None, at: Places, reads: bool) -> dict[sp.Symbol, Expression]:
+def _loads(equations: Equations, i: int | None, at: StateLayout, reads: bool) -> dict[sp.Symbol, Expression]:
     """Where the states of a node are and the parameters that it has for itself; node None is the one of a loop."""
     found: dict[sp.Symbol, Expression] = {s: _at("state", at(c)) for c, s in enumerate(equations.node_at(i or 0).state)}
     for s, k in own_parameters(equations, i or 0).items():
@@ -162,7 +164,7 @@ def _loads(equations: Equations, i: int | None, at: Places, reads: bool) -> dict
 
 
 def _pair(
-    equations: Equations, here: Places, there: Places, link: Linked | None = None, reads: bool = True
+    equations: Equations, here: StateLayout, there: StateLayout, link: Linked | None = None, reads: bool = True
 ) -> dict[sp.Symbol, Expression]:
     """Where the states at both ends of a link are, the parameters of its ends, and the rates."""
     edge = equations.edge if link is None else link[1]
@@ -187,15 +189,15 @@ def _pair(
     return found | {s: _at("rates", place) for s, place in zip(rate_symbols(edge), places, strict=True)}
 
 
-def _literal(places: tuple[int, ...]) -> Places:
+def _literal(places: tuple[int, ...]) -> StateLayout:
     return lambda c: Number(places[c])
 
 
-def _indexed(name: str) -> Places:
+def _indexed(name: str) -> StateLayout:
     return lambda c: place_of(c, "NODES", name)
 
 
-def _ends(equations: Equations, body: Body, statements: list[Statement]) -> list[Statement]:
+def _ends(equations: Equations, body: ExportBody, statements: list[Statement]) -> list[Statement]:
     """The two ends and the weight of a link, those that are used."""
     edge, link, names = equations.edge, Name("link_"), mentioned(statements)
     if edge is None:

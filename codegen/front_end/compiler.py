@@ -11,7 +11,7 @@ from numba.core.compiler_machinery import FunctionPass, PassManager, register_pa
 from numba.core.typed_passes import NativeLowering, NoPythonBackend
 
 from . import syntax_reader
-from .emitter import Program
+from .emitter import ReadFunction
 
 
 class _Linked(JITCodeLibrary):
@@ -43,7 +43,7 @@ class _Linked(JITCodeLibrary):
 class _Function(ir.FunctionIR):
     """What Numba asks of a function that was read from its syntax tree."""
 
-    def __init__(self, identity: Any, program: Program) -> None:
+    def __init__(self, identity: Any, program: ReadFunction) -> None:
         place = ir.Loc(identity.filename, identity.firstlineno)
         blocks = {0: ir.Block(ir.Scope(None, place), place)}
         super().__init__(blocks, False, identity, place, {}, identity.arg_count, identity.arg_names)

@@ -11,11 +11,11 @@ from numba import types
 from numba.core import cgutils, lowering
 
 Value: TypeAlias = ir.Value
-Write: TypeAlias = "Callable[[Writer], Any]"
+Write: TypeAlias = "Callable[[CodeWriter], Any]"
 
 
 @dataclass(frozen=True, slots=True)
-class Typed:
+class TypedExpr:
     """An expression: its type, what writes its code and returns its value, and whether that is an array of nobody else."""
 
     kind: types.Type
@@ -30,7 +30,7 @@ class Typed:
 
 
 @dataclass(frozen=True, slots=True)
-class Program:
+class ReadFunction:
     """A function that was read."""
 
     statements: tuple[Write, ...]  # what writes its statements
@@ -41,7 +41,7 @@ class Program:
 
     def write(self, lower: lowering.Lower, arguments: Sequence[Value]) -> None:
         """Write the code of the function, whose arguments have these values."""
-        writer = Writer(lower, self)
+        writer = CodeWriter(lower, self)
         for name, kind in self.arrays.items():
             whole = lower.context.get_value_type(kind)
             writer.slots[name] = cgutils.alloca_once(writer.builder, whole, zfill=True)
@@ -53,11 +53,11 @@ class Program:
 
 
 @dataclass(slots=True)
-class Writer:
+class CodeWriter:
     """Where code is written: the function, the values of its variables, and where `continue` and `break` lead."""
 
     lower: lowering.Lower
-    program: Program
+    program: ReadFunction
     values: dict[str, Value] = field(default_factory=dict)
     slots: dict[str, Value] = field(default_factory=dict)
     ends: list[tuple[ir.Block, ir.Block]] = field(default_factory=list)

@@ -22,7 +22,7 @@ from numba import types
 from numba.core import cgutils, errors
 from numba.core.typing.templates import fold_arguments
 
-from .emitter import Program, Typed, Value, Write, Writer
+from .emitter import CodeWriter, ReadFunction, TypedExpr, Value, Write
 from .syntax_trees import TREES, functions
 
 OPERATORS: dict[type, Callable[..., Any]] = {
@@ -69,53 +69,53 @@ def tree_of(function: Any) -> ast.FunctionDef:
     return found
 
 
-def read(context: Any, function: Any, args: Sequence[types.Type], result: types.Type | None) -> Program:
+def read(context: Any, function: Any, args: Sequence[types.Type], result: types.Type | None) -> ReadFunction:
     """Read a function."""
-    return _Reader(context, function.__globals__).function(tree_of(function), args, result)
+    return _TreeReader(context, function.__globals__).function(tree_of(function), args, result)
 
 
-def gathered(parts: Sequence[Typed]) -> Typed:
+def gathered(parts: Sequence[TypedExpr]) -> TypedExpr:
     """A tuple."""
     if any(part.owned for part in parts):
         raise UnreadError
     kind = types.BaseTuple.from_types([part.kind for part in parts])
-    return Typed(kind, lambda w: w.context.make_tuple(w.builder, kind, [part.write(w) for part in parts]))
+    return TypedExpr(kind, lambda w: w.context.make_tuple(w.builder, kind, [part.write(w) for part in parts]))
 
 
-def part(value: Typed, k: int) -> Typed:
+def part(value: TypedExpr, k: int) -> TypedExpr:
     """A part of a tuple."""
-    return Typed(value.kind.types[k], lambda w: w.builder.extract_value(value.write(w), k))
+    return TypedExpr(value.kind.types[k], lambda w: w.builder.extract_value(value.write(w), k))
 
 
-def lent(value: Typed) -> Typed:
+def lent(value: TypedExpr) -> TypedExpr:
     """The argument of a function, which has it to its end."""
     if not value.owned:
         return value
 
-    def write(w: Writer) -> Value:
+    def write(w: CodeWriter) -> Value:
         found = value.write(w)
         w.lent.append((value.kind, found))
         return found
 
-    return Typed(value.kind, write)
+    return TypedExpr(value.kind, write)
 
 
-def called(kind: types.Type, given: Sequence[Write], call: Callable[[Writer, Sequence[Value]], Value]) -> Typed:
+def called(kind: types.Type, given: Sequence[Write], call: Callable[[CodeWriter, Sequence[Value]], Value]) -> TypedExpr:
     """What a function returns, which gives back the arrays that were lent to it."""
 
-    def write(w: Writer) -> Value:
+    def write(w: CodeWriter) -> Value:
         before = len(w.lent)
         found = call(w, [argument(w) for argument in given])
         w.take_back(before)
         return found
 
-    return Typed(kind, write, isinstance(kind, types.Array))
+    return TypedExpr(kind, write, isinstance(kind, types.Array))
 
 
-def held(value: Typed) -> tuple[Write, Typed]:
+def held(value: TypedExpr) -> tuple[Write, TypedExpr]:
     """What computes a value, and the value for those that are written behind it."""
     place: list[Value] = []
-    return lambda w: place.append(value.write(w)), Typed(value.kind, lambda w: place[-1], value.owned)
+    return lambda w: place.append(value.write(w)), TypedExpr(value.kind, lambda w: place[-1], value.owned)
 
 
 def in_turn(writes: Sequence[Write]) -> Write:
@@ -123,8 +123,8 @@ def in_turn(writes: Sequence[Write]) -> Write:
     return lambda w: w.write(writes)
 
 
-class _Reader(ast.NodeVisitor):
-    """Reads the nodes of a syntax tree, expressions into `Typed`, statements into what writes them.
+class _TreeReader(ast.NodeVisitor):
+    """Reads the nodes of a syntax tree, expressions into `TypedExpr`, statements into what writes them.
 
     Blocks are those of Numba, and a variable is kept in a register if Numba does so: sums are fused with products that stand
     in registers (codegen/simd/lanes.py).
@@ -137,10 +137,10 @@ class _Reader(ast.NodeVisitor):
         self.place = 0
         self.changing: set[str] = set()
         self.arrays: dict[str, types.Type] = {}
-        self.results: list[Typed] = []
+        self.results: list[TypedExpr] = []
         self.meanings: dict[Any, tuple[types.Type, Any]] = {}
 
-    def function(self, tree: ast.FunctionDef, args: Sequence[types.Type], result: types.Type | None) -> Program:
+    def function(self, tree: ast.FunctionDef, args: Sequence[types.Type], result: types.Type | None) -> ReadFunction:
         for argument, kind in zip(tree.args.args, args, strict=True):
             self.declare(argument.arg, kind)
         statements = self.body(tree.body)
@@ -151,7 +151,7 @@ class _Reader(ast.NodeVisitor):
         if not self.changing <= local:
             raise UnreadError(f"{', '.join(sorted(self.changing - local))} of several types")
         calls = tuple(signature for _, signature in self.meanings.values())
-        return Program(tuple(statements), kind, local, self.arrays, calls)
+        return ReadFunction(tuple(statements), kind, local, self.arrays, calls)
 
     def visit(self, node: ast.AST) -> Any:
         """Read a node."""
@@ -180,7 +180,7 @@ class _Reader(ast.NodeVisitor):
 
     # -- expressions ------------------------------------------------------------------------------------------
 
-    def call(self, function: Any, *values: Typed) -> Typed:
+    def call(self, function: Any, *values: TypedExpr) -> TypedExpr:
         """The value of a function or of an operator."""
         kind, signature = self.meaning(function, tuple(value.kind for value in values))
         if signature is None or signature.recvr:
@@ -198,7 +198,7 @@ class _Reader(ast.NodeVisitor):
                 lambda index, _, values: gathered(values).cast(wanted[index]),
             )
 
-        def write(w: Writer, arguments: Sequence[Value]) -> Value:
+        def write(w: CodeWriter, arguments: Sequence[Value]) -> Value:
             found = w.context.get_function(kind, signature)(w.builder, arguments)
             return w.context.get_dummy_value() if found is None else found
 
@@ -216,10 +216,10 @@ class _Reader(ast.NodeVisitor):
             self.meanings[function, kinds] = kind, self.context.resolve_function_type(kind, given, {})
         return self.meanings[function, kinds]
 
-    def known(self, value: Any) -> Typed:
+    def known(self, value: Any) -> TypedExpr:
         """A value that is known when the function is read."""
         kind = types.maybe_literal(value) or self.context.resolve_value_type(value)
-        return Typed(kind, lambda w: w.context.get_constant_generic(w.builder, kind, value))
+        return TypedExpr(kind, lambda w: w.context.get_constant_generic(w.builder, kind, value))
 
     def is_known(self, node: ast.expr) -> bool:
         """True for a name of the module, or an attribute of one: it has a value when the function is read."""
@@ -239,58 +239,58 @@ class _Reader(ast.NodeVisitor):
             raise UnreadError
         return getattr(builtins, node.id)
 
-    def common(self, values: Sequence[Typed]) -> types.Type:
+    def common(self, values: Sequence[TypedExpr]) -> types.Type:
         """The type that values of several can have."""
         kind = self.context.unify_types(*(types.unliteral(value.kind) for value in values))
         if kind is None or not kind.is_precise():
             raise UnreadError
         return kind
 
-    def chosen(self, test: Typed, yes: Typed, no: Typed) -> Typed:
+    def chosen(self, test: TypedExpr, yes: TypedExpr, no: TypedExpr) -> TypedExpr:
         """One value if a condition holds, else another one."""
         if yes.owned or no.owned:
             raise UnreadError
         kind = self.common([yes, no])
         first, second = yes.cast(kind), no.cast(kind)
 
-        def write(w: Writer) -> Value:
+        def write(w: CodeWriter) -> Value:
             slot = cgutils.alloca_once(w.builder, w.context.get_value_type(kind))
             w.choose(test.write, lambda w: w.builder.store(first(w), slot), lambda w: w.builder.store(second(w), slot))
             return w.builder.load(slot)
 
-        return Typed(kind, write)
+        return TypedExpr(kind, write)
 
-    def test(self, node: ast.expr) -> Typed:
+    def test(self, node: ast.expr) -> TypedExpr:
         """A condition."""
-        found: Typed = self.visit(node)
+        found: TypedExpr = self.visit(node)
         return found if found.kind == types.boolean else self.call(bool, found)
 
-    def visit_Name(self, node: ast.Name) -> Typed:
+    def visit_Name(self, node: ast.Name) -> TypedExpr:
         name = node.id
         if name not in self.kinds:
             return self.known(self.found(node))
         self.blocks[name].add(self.place)
-        return Typed(self.kinds[name], lambda w: w.get(name))
+        return TypedExpr(self.kinds[name], lambda w: w.get(name))
 
-    def visit_Constant(self, node: ast.Constant) -> Typed:
+    def visit_Constant(self, node: ast.Constant) -> TypedExpr:
         return self.known(node.value)
 
-    def visit_Attribute(self, node: ast.Attribute) -> Typed:
+    def visit_Attribute(self, node: ast.Attribute) -> TypedExpr:
         name = node.attr
         if self.is_known(node):
             return self.known(self.found(node))
-        base: Typed = self.visit(node.value)
+        base: TypedExpr = self.visit(node.value)
         kind = self.context.resolve_getattr(typ=base.kind, attr=name)
         if kind is None or isinstance(kind, types.Callable | types.Array) or base.owned:
             raise UnreadError
 
-        def write(w: Writer) -> Value:
+        def write(w: CodeWriter) -> Value:
             return w.context.get_getattr(base.kind, name)(w.context, w.builder, base.kind, base.write(w), name)
 
-        return Typed(kind, write)
+        return TypedExpr(kind, write)
 
-    def visit_Subscript(self, node: ast.Subscript) -> Typed:
-        base: Typed = self.visit(node.value)
+    def visit_Subscript(self, node: ast.Subscript) -> TypedExpr:
+        base: TypedExpr = self.visit(node.value)
         if isinstance(base.kind, types.BaseTuple) and isinstance(node.slice, ast.Slice):
             first, last = (
                 None if bound is None else int(ast.literal_eval(bound))
@@ -301,22 +301,22 @@ class _Reader(ast.NodeVisitor):
             return part(base, ast.literal_eval(node.slice))
         return self.call(operator.getitem, base, self.visit(node.slice))
 
-    def visit_Slice(self, node: ast.Slice) -> Typed:
+    def visit_Slice(self, node: ast.Slice) -> TypedExpr:
         bounds = [self.known(None) if bound is None else self.visit(bound) for bound in (node.lower, node.upper)]
         return self.call(slice, *bounds, *([] if node.step is None else [self.visit(node.step)]))
 
-    def visit_Tuple(self, node: ast.Tuple) -> Typed:
+    def visit_Tuple(self, node: ast.Tuple) -> TypedExpr:
         return gathered([self.visit(part) for part in node.elts])
 
-    def visit_BinOp(self, node: ast.BinOp) -> Typed:
+    def visit_BinOp(self, node: ast.BinOp) -> TypedExpr:
         return self.call(OPERATORS[type(node.op)], self.visit(node.left), self.visit(node.right))
 
-    def visit_UnaryOp(self, node: ast.UnaryOp) -> Typed:
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> TypedExpr:
         if isinstance(node.op, ast.USub) and isinstance(node.operand, ast.Constant):
             return self.known(ast.literal_eval(node))
         return self.call(OPERATORS[type(node.op)], self.visit(node.operand))
 
-    def visit_Compare(self, node: ast.Compare) -> Typed:
+    def visit_Compare(self, node: ast.Compare) -> TypedExpr:
         if len(node.ops) > 1:
             pairs = zip(pairwise([node.left, *node.comparators]), node.ops, strict=True)
             return self.visit_BoolOp(ast.BoolOp(ast.And(), [ast.Compare(x, [op], [y]) for (x, y), op in pairs]))
@@ -324,7 +324,7 @@ class _Reader(ast.NodeVisitor):
             raise UnreadError
         return self.call(OPERATORS[type(node.ops[0])], self.visit(node.left), self.visit(node.comparators[0]))
 
-    def visit_BoolOp(self, node: ast.BoolOp) -> Typed:
+    def visit_BoolOp(self, node: ast.BoolOp) -> TypedExpr:
         tests = []
         for value in node.values:
             tests.append(self.test(value))
@@ -335,28 +335,28 @@ class _Reader(ast.NodeVisitor):
             found = self.chosen(test, yes, no)
         return found
 
-    def visit_IfExp(self, node: ast.IfExp) -> Typed:
+    def visit_IfExp(self, node: ast.IfExp) -> TypedExpr:
         parts = []
         for read, piece in ((self.test, node.test), (self.visit, node.body), (self.visit, node.orelse)):
             parts.append(read(piece))
             self.turn()
         return self.chosen(*parts)
 
-    def visit_Call(self, node: ast.Call) -> Typed:
+    def visit_Call(self, node: ast.Call) -> TypedExpr:
         if node.keywords:
             raise UnreadError
         if self.is_known(node.func):
             return self.call(self.found(node.func), *map(self.visit, node.args))
         return self.pointed(self.visit(node.func), [self.visit(value) for value in node.args])
 
-    def pointed(self, function: Typed, values: Sequence[Typed]) -> Typed:
+    def pointed(self, function: TypedExpr, values: Sequence[TypedExpr]) -> TypedExpr:
         """The value of a function that is given by the address of its machine code."""
         if not isinstance(function.kind, types.FunctionType) or len(values) != len(function.kind.signature.args):
             raise UnreadError
         result, kinds = function.kind.signature.return_type, function.kind.signature.args
         given = [lent(value).cast(kind) for value, kind in zip(values, kinds, strict=True)]
 
-        def write(w: Writer, arguments: Sequence[Value]) -> Value:
+        def write(w: CodeWriter, arguments: Sequence[Value]) -> Value:
             calls, builder = w.context.call_conv, w.builder
             address = cgutils.create_struct_proxy(function.kind)(w.context, builder, value=function.write(w)).jit_addr
             pointer = builder.bitcast(address, calls.get_function_type(result, kinds).as_pointer())
@@ -404,7 +404,7 @@ class _Reader(ast.NodeVisitor):
             return in_turn(
                 [computed for _, computed, _ in pairs] + [self.assigned(one, value) for one, _, value in pairs]
             )
-        value: Typed = self.visit(node.value)
+        value: TypedExpr = self.visit(node.value)
         if not many:
             return self.assigned(target, value)
         if value.owned:
@@ -412,7 +412,7 @@ class _Reader(ast.NodeVisitor):
         computed, whole = held(value)
         return in_turn([computed, *(self.assigned(target, whole) for target in node.targets)])
 
-    def assigned(self, target: ast.expr, value: Typed) -> Write:
+    def assigned(self, target: ast.expr, value: TypedExpr) -> Write:
         """What gives a variable, an element, or several of them a value."""
         if isinstance(target, ast.Subscript):
             return self.call(operator.setitem, self.visit(target.value), self.visit(target.slice), value).write
@@ -440,7 +440,7 @@ class _Reader(ast.NodeVisitor):
     def visit_Expr(self, node: ast.Expr) -> Write:
         if isinstance(node.value, ast.Constant):  # a docstring
             return lambda w: None
-        found: Typed = self.visit(node.value)
+        found: TypedExpr = self.visit(node.value)
         if found.owned:
             raise UnreadError
         return found.write
@@ -449,7 +449,7 @@ class _Reader(ast.NodeVisitor):
         value = self.known(None) if node.value is None else self.visit(node.value)
         self.results.append(value)
 
-        def write(w: Writer) -> None:
+        def write(w: CodeWriter) -> None:
             kind = w.program.result
             found = value.cast(kind)(w)
             if not value.owned:
@@ -491,15 +491,15 @@ class _Reader(ast.NodeVisitor):
         start, stop, step = self.bounds([self.visit(bound) for bound in node.iter.args])
         self.turn()
         numbers: list[Value] = []
-        now = Typed(types.int64, lambda w: numbers[-1])
+        now = TypedExpr(types.int64, lambda w: numbers[-1])
         body = in_turn([self.assigned(node.target, now), *self.body(node.body)])
         self.turn()
 
-        def write(w: Writer) -> None:
+        def write(w: CodeWriter) -> None:
             first, last = start(w), stop(w)
             following = w.memory(first)
 
-            def count(w: Writer) -> None:
+            def count(w: CodeWriter) -> None:
                 """Count before the body, as Numba does: LLVM takes the first turn out of short loops then."""
                 numbers.append(w.builder.load(following))
                 w.builder.store(w.builder.add(numbers[-1], first.type(step)), following)
@@ -510,7 +510,7 @@ class _Reader(ast.NodeVisitor):
 
         return write
 
-    def bounds(self, given: Sequence[Typed]) -> tuple[Write, Write, int]:
+    def bounds(self, given: Sequence[TypedExpr]) -> tuple[Write, Write, int]:
         """What writes the first number of a range and the one behind it, and the step."""
         if not all(isinstance(bound.kind, types.Integer) for bound in given):
             raise UnreadError
@@ -520,7 +520,7 @@ class _Reader(ast.NodeVisitor):
             raise UnreadError
         return start.cast(types.int64), stop.cast(types.int64), step.literal_value
 
-    def pieces(self, node: ast.expr) -> list[Typed] | None:
+    def pieces(self, node: ast.expr) -> list[TypedExpr] | None:
         """The values of a tuple that is written out or known, numbered by `enumerate` if that is asked for; else None."""
         if isinstance(node, ast.Tuple):
             return [self.visit(piece) for piece in node.elts]
@@ -531,7 +531,7 @@ class _Reader(ast.NodeVisitor):
             return None if pieces is None else [gathered([self.known(k), piece]) for k, piece in enumerate(pieces)]
         return None
 
-    def unrolled(self, node: ast.For, pieces: Sequence[Typed]) -> Write:
+    def unrolled(self, node: ast.For, pieces: Sequence[TypedExpr]) -> Write:
         """A loop whose statements stand there for each of some values."""
         bodies = []
         for piece in pieces:

@@ -30,8 +30,8 @@ from ..steps.blocks import analyse
 from ..steps.contact_step import event_functions, register
 from ..steps.elimination import plan, write_factors, write_solve
 from ..steps.safe_names import renamed, tidy
-from ..steps.step import Step, node_function, scaling
-from ..steps.unrolled_step import Unrolled, stage_state
+from ..steps.step import StepWriter, node_function, scaling
+from ..steps.unrolled_step import UnrolledStep, stage_state
 from ..taylor import write_tangent
 from .driver import Driver, KernelKind
 from .sweep_kernel import AUTO, LARGEST_UNROLLED, KernelSource, describe, free_names, module, node_functions
@@ -99,7 +99,7 @@ def _stages(variation: Variation, method: Integrator, names: Names) -> tuple[lis
     plain = variation.orbit
     blocks = analyse(plain.node, names, plain.varied)
     parts = Parts.of(variation, method.stages)
-    writer = Unrolled(plain, [blocks], method)
+    writer = UnrolledStep(plain, [blocks], method)
     functions = _functions(parts, plain.state, names)
     writer.write(after=lambda i: _note(writer, parts, functions, method, i))
     orbit = Function(
@@ -216,7 +216,7 @@ def _functions(parts: Parts, state: tuple[str, ...], names: Names) -> dict[str, 
     return found
 
 
-def _note(w: Step, parts: Parts, functions: Mapping[str, Function], method: Integrator, i: int) -> None:
+def _note(w: StepWriter, parts: Parts, functions: Mapping[str, Function], method: Integrator, i: int) -> None:
     """Write what stage i leaves in the shared array."""
 
     def called(name: str, at: Mapping[str, Value]) -> Expression:

@@ -78,7 +78,7 @@ def count_of(equations: Equations, values: Sequence[sp.Expr]) -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class Watched:
+class Recording:
     """Functions of the state that a kernel watches beside its records."""
 
     # values that the kernel tallies over the window (`synchain.models.dynamics.observable`)
@@ -157,15 +157,15 @@ def table_name(rows: int, number: int) -> str:
     return f"ROWS_{rows}_{number}"
 
 
-UNWATCHED = Watched()
+UNWATCHED = Recording()
 """Nothing beside the records."""
 
 
 def _function(
-    watched: Watched, equations: Equations, plain: Equations, observed: Sequence[sp.Expr], name: str, about: str
+    watched: Recording, equations: Equations, plain: Equations, observed: Sequence[sp.Expr], name: str, about: str
 ) -> Function:
     """A function that writes values at the fraction theta of a step."""
-    writer = _Writer(equations, plain, watched.sums)
+    writer = _LoopWriter(equations, plain, watched.sums)
     return Function(
         name,
         ("theta", "t", "h", "y", "y_new", "dense", "out", "dims"),
@@ -175,7 +175,7 @@ def _function(
     )
 
 
-class _Writer:
+class _LoopWriter:
     """Writes the loops over nodes, those of inner reductions first."""
 
     def __init__(self, equations: Equations, plain: Equations, sums: Sequence[Rows] = ()) -> None:

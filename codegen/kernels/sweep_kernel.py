@@ -24,14 +24,14 @@ from ..program.statements import Function, Role, operations
 from ..simd import lanes
 from ..steps.blocks import NodeBlocks, analyse
 from ..steps.contact_step import push_functions
-from ..steps.looped_step import Looped
+from ..steps.looped_step import LoopedStep
 from ..steps.safe_names import tidy
-from ..steps.sparse_plan import FILL_LIMIT, Program, program, workspace
-from ..steps.step import Step, function_name, node_function, scaling
-from ..steps.unrolled_step import Unrolled
+from ..steps.sparse_plan import FILL_LIMIT, SparsePlan, program, workspace
+from ..steps.step import StepWriter, function_name, node_function, scaling
+from ..steps.unrolled_step import UnrolledStep
 from ..taylor import TaylorStep, is_large, write_looped, write_rolled, write_step
 from .driver import RECORDERS, Driver, KernelKind, Recorder, imports
-from .observable_text import UNWATCHED, Watched, count_of, rule_of
+from .observable_text import UNWATCHED, Recording, count_of, rule_of
 
 AUTO = "rodas5p"
 """The integrator that "auto" stands for."""
@@ -59,7 +59,7 @@ class KernelSource:
     driver: Driver
     dimensions: Dimensions | ModeDimensions = field(repr=False)
     marks: tuple[int, ...] = field(repr=False)
-    elimination: Program | None = field(default=None, repr=False, compare=False)
+    elimination: SparsePlan | None = field(default=None, repr=False, compare=False)
     rule: tuple[tuple[float, ...], ...] = field(default=((),), repr=False)
 
     @property
@@ -134,7 +134,7 @@ def emit(
     width: int | None = None,
     multiplicity: Sequence[int] | None = None,
     *,
-    watched: Watched = UNWATCHED,
+    watched: Recording = UNWATCHED,
     unroll: int = LARGEST_UNROLLED,
     fill: float = FILL_LIMIT,
 ) -> KernelSource:
@@ -203,7 +203,7 @@ def _check_records(
     equations: Equations,
     records: Sequence[str],
     section: sp.Expr | None,
-    watched: Watched,
+    watched: Recording,
     multiplicity: Sequence[int] | None,
 ) -> None:
     """Raise ValueError for records that are unknown, lack what they need, or do not go together."""
@@ -239,7 +239,7 @@ def _suited(equations: Equations, method: Integrator, count: int) -> int:
     return lanes.native_width(2 if moving <= most and count <= MOST_DECODED else 1)
 
 
-def _planned(equations: Equations, method: Integrator, unroll: int, fill: float) -> tuple[Equations, Program | None]:
+def _planned(equations: Equations, method: Integrator, unroll: int, fill: float) -> tuple[Equations, SparsePlan | None]:
     """Return the equations as they are stepped, and the elimination that steps in loops run through."""
     if not _is_looped(equations, method, unroll):
         return equations, None
@@ -273,7 +273,7 @@ def _of_links(equations: Equations) -> int:
     return sum(size[edge] for _, edge in equations.linked()) if equations.n <= LARGEST_UNROLLED else 0
 
 
-def _series(plain: Equations, method: Integrator, elimination: Program | None) -> TaylorStep:
+def _series(plain: Equations, method: Integrator, elimination: SparsePlan | None) -> TaylorStep:
     """The Taylor step of a method."""
     if elimination is None:
         return write_step(plain, method.order)
@@ -281,18 +281,18 @@ def _series(plain: Equations, method: Integrator, elimination: Program | None) -
 
 
 def _stages(
-    plain: Equations, method: Integrator, names: Names, elimination: Program | None
+    plain: Equations, method: Integrator, names: Names, elimination: SparsePlan | None
 ) -> tuple[list[str], int, int]:
     """Write a step in stages; return its functions, the groups of scratch memory that it needs, and its operations."""
     blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
     arguments = ["t", "h", "y", "p", "y_new", "dense", "rtol", "atol"]
     scratch = 0
-    writer: Step
+    writer: StepWriter
     if elimination is None:
-        writer = Unrolled(plain, blocks, method)
+        writer = UnrolledStep(plain, blocks, method)
         writer.write()
     else:
-        writer = Looped(plain, blocks, method, elimination)
+        writer = LoopedStep(plain, blocks, method, elimination)
         writer.write()
         scratch = workspace(writer, elimination)
         arguments += ["graph", "weights"]
@@ -325,7 +325,7 @@ def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimension
     )
 
 
-def node_functions(step: Step, blocks: NodeBlocks, kind: int = 0) -> list[Function]:
+def node_functions(step: StepWriter, blocks: NodeBlocks, kind: int = 0) -> list[Function]:
     """Write the right-hand side of one node of some kind and, for an implicit step, its linearisation."""
     functions = [("node", "Right-hand side of one oscillator.", blocks.rhs)]
     if step.method.implicit:
@@ -374,11 +374,11 @@ def _listed(names: tuple[str, ...]) -> str:
     return f"{', '.join(names[:6])}, … {', '.join(names[-3:])} ({len(names)} variables)"
 
 
-def _cut(equations: Equations, section: sp.Expr) -> Watched:
+def _cut(equations: Equations, section: sp.Expr) -> Recording:
     """The section on a state as a function of the state."""
     section = section.xreplace({s: real(s.name) for s in section.free_symbols})
     used = {s.name for s in section.free_symbols}
     unknown = sorted(used - set(equations.state) - set(equations.parameters) - {"t"})
     if unknown:
         raise ValueError(f"section function {section}: unknown symbol {unknown[0]!r}; use the state, parameters and t")
-    return Watched(sections=((section,),))
+    return Recording(sections=((section,),))

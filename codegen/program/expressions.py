@@ -111,7 +111,7 @@ class Call(Expression):
 
 
 @dataclass(frozen=True, slots=True)
-class Choice(Expression):
+class Conditional(Expression):
     """One value if a condition holds, another if not."""
 
     condition: Expression

@@ -15,8 +15,8 @@ from . import functions
 from .expressions import (
     ONE,
     Call,
-    Choice,
     Compare,
+    Conditional,
     Expression,
     Junction,
     Name,
@@ -120,7 +120,7 @@ class Lowering:
             raise UnprintableError(f"{e} has no value where no condition holds; end it with (value, True)")
         found = self(value)
         for value, condition in reversed(e.args[:-1]):
-            found = Choice(self.condition(condition), self(value), found)
+            found = Conditional(self.condition(condition), self(value), found)
         return found
 
     def condition(self, e: Boolean) -> Expression:

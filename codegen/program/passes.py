@@ -74,7 +74,7 @@ class Hoist:
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class StraightLine:
     """Straight-line statements and the expressions that they end in."""
 
     statements: tuple[tuple[sp.Symbol, sp.Expr], ...]
@@ -89,7 +89,7 @@ class Body:
         return used - {s for s, _ in self.statements}
 
 
-def share(results: Sequence[sp.Expr], supply: Iterator[sp.Symbol]) -> Body:
+def share(results: Sequence[sp.Expr], supply: Iterator[sp.Symbol]) -> StraightLine:
     """Return the results with their common subexpressions computed once."""
     statements, reduced = sp.cse(list(results), symbols=supply, order="canonical")
-    return Body(tuple(statements), tuple(reduced))
+    return StraightLine(tuple(statements), tuple(reduced))

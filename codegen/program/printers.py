@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from . import functions
 from .expressions import (
     Call,
-    Choice,
     Compare,
+    Conditional,
     Expression,
     Junction,
     Load,
@@ -91,7 +91,7 @@ class Printer:
             case Call(function, arguments):
                 name = self.functions.get(function, function)
                 return f"{name}({', '.join(map(self.text, arguments))})", ATOM
-            case Choice(condition, yes, no):
+            case Conditional(condition, yes, no):
                 return self.choice(*map(self.text, (condition, yes, no))), ATOM
             case Slice(start, stop):
                 return f"{'' if start == Number(0) else self.text(start)}:{self.text(stop)}", SUM

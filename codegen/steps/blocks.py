@@ -13,7 +13,7 @@ import sympy as sp
 
 from synchain.models.mechanics.components import TIME, Node
 
-from ..program.passes import Body, Hoist, Names, real, share
+from ..program.passes import Hoist, Names, StraightLine, real, share
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,8 +26,8 @@ class NodeBlocks:
 
     constants: tuple[tuple[sp.Symbol, sp.Expr], ...]
     timed: tuple[tuple[sp.Symbol, sp.Expr], ...]
-    rhs: Body
-    linear: Body
+    rhs: StraightLine
+    linear: StraightLine
 
 
 def analyse(node: Node, names: Names, varied: Iterable[str] = ()) -> NodeBlocks:

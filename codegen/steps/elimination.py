@@ -22,7 +22,7 @@ Entries = dict[Entry, sp.Expr]
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class EliminationPlan:
     """Elimination order with, for each pivot, the rows below it and the columns after it in its row."""
 
     order: tuple[int, ...]
@@ -30,7 +30,7 @@ class Plan:
     after: tuple[tuple[int, ...], ...]
 
 
-def plan(size: int, pattern: set[Entry]) -> Plan:
+def plan(size: int, pattern: set[Entry]) -> EliminationPlan:
     """Order the pivots 0 … size-1 and list the fill.
 
     Two orders are tried, by least Markowitz cost from the start or after all rows without a diagonal entry of J, whose
@@ -40,13 +40,13 @@ def plan(size: int, pattern: set[Entry]) -> Plan:
     return min((_order(size, pattern, first), _order(size, pattern, frozenset())), key=_multiplications)
 
 
-def _multiplications(steps: Plan) -> int:
+def _multiplications(steps: EliminationPlan) -> int:
     """Cost of one factorisation and eight solves."""
     pairs = list(zip(steps.below, steps.after, strict=True))
     return sum(len(b) * (1 + len(a)) for b, a in pairs) + 8 * sum(1 + len(b) + len(a) for b, a in pairs)
 
 
-def _order(size: int, pattern: set[Entry], first: frozenset[int]) -> Plan:
+def _order(size: int, pattern: set[Entry], first: frozenset[int]) -> EliminationPlan:
     rows = {i: {i} | {c for r, c in pattern if r == i} for i in range(size)}
     columns = {i: {i} | {r for r, c in pattern if c == i} for i in range(size)}
     left = set(range(size))
@@ -64,10 +64,10 @@ def _order(size: int, pattern: set[Entry], first: frozenset[int]) -> Plan:
         order.append(pivot)
         below.append(tuple(down))
         after.append(tuple(right))
-    return Plan(tuple(order), tuple(below), tuple(after))
+    return EliminationPlan(tuple(order), tuple(below), tuple(after))
 
 
-class _Writer:
+class _FactorWriter:
     """Statements of the factors; equal right-hand sides share one name."""
 
     def __init__(self, labels: tuple[str, ...]) -> None:
@@ -105,7 +105,10 @@ class Factors:
 
 
 def write_factors(
-    steps: Plan, jacobian: Mapping[Entry, sp.Expr], labels: tuple[str, ...], mass: Mapping[Entry, sp.Expr] | None = None
+    steps: EliminationPlan,
+    jacobian: Mapping[Entry, sp.Expr],
+    labels: tuple[str, ...],
+    mass: Mapping[Entry, sp.Expr] | None = None,
 ) -> Factors:
     """Write the elimination of (shift M - J), `mass` the entries of M, None or empty where it is the identity.
 
@@ -117,10 +120,10 @@ def write_factors(
 
 
 def write_elimination(
-    steps: Plan, matrix: Mapping[Entry, sp.Expr], taken: Mapping[Entry, sp.Expr], labels: tuple[str, ...]
+    steps: EliminationPlan, matrix: Mapping[Entry, sp.Expr], taken: Mapping[Entry, sp.Expr], labels: tuple[str, ...]
 ) -> Factors:
     """Write the elimination of `matrix` minus `taken`; a symmetric matrix alone takes half the operations, L D L^T."""
-    writer = _Writer(labels)
+    writer = _FactorWriter(labels)
     entries = {key: lower(matrix.get(key, sp.S.Zero) - taken.get(key, sp.S.Zero)) for key in sorted({*matrix, *taken})}
     value = {
         key: writer.atomic(writer.entry("m", *key), e) for key, e in entries.items() if key[0] != key[1] and e != ZERO
@@ -147,7 +150,9 @@ def write_elimination(
     return Factors(tuple(writer.statements), below, upper, inverse)
 
 
-def write_solve(steps: Plan, factors: Factors, right: Mapping[int, str], result: Mapping[int, str]) -> list[Statement]:
+def write_solve(
+    steps: EliminationPlan, factors: Factors, right: Mapping[int, str], result: Mapping[int, str]
+) -> list[Statement]:
     """Write the solution: names `right` of the right-hand sides are overwritten, `result` names the unknowns."""
     found: list[Statement] = []
     for k, down in zip(steps.order, steps.below, strict=True):

@@ -20,9 +20,9 @@ from synchain.models.mechanics.components import Edge, Node
 
 from ..program.expressions import Load, Name, Value, as_expression, plus
 from ..program.lowering import lower
-from ..program.passes import Body, real, share
+from ..program.passes import StraightLine, real, share
 from ..program.statements import Statement, accumulate, let, store
-from .places import Joint, Places, link_ends, named, span
+from .places import Joint, StateLayout, link_ends, named, span
 from .step import NOW, lane
 
 
@@ -68,7 +68,7 @@ class MeanField:
         found = {s: e.xreplace(swap) for s, e in self.sums.items()}
         return {s: e for s, e in found.items() if not e.is_Symbol and any(rate.has(e) for rate in self.rates)}
 
-    def statements(self, places: Places, base: str, out: str, kept: int = 0) -> list[Statement]:
+    def statements(self, places: StateLayout, base: str, out: str, kept: int = 0) -> list[Statement]:
         """Both loops, at one vector of states; they add to the slopes in `out`.
 
         What a node is as a source and as a target is computed once, and stands in FIELD behind `kept` others meanwhile.
@@ -101,7 +101,7 @@ class MeanField:
                 here.append(accumulate("dense", plus(Name(out), places.place(c)), lower(e)))
         return [*found, span("i", "NODES").over(here)]
 
-    def states(self, places: Places, base: str, suffix: str, index: str) -> list[Statement]:
+    def states(self, places: StateLayout, base: str, suffix: str, index: str) -> list[Statement]:
         """Load the states of a node; those of which differences alone matter are counted from the first node's."""
         found = places.read(self.node, base, suffix, index)
         for k in self.shifted:
@@ -171,7 +171,7 @@ class LinkSums:
         """The rates, with functions of the target by the names of those of the source where they are alike."""
         return [e.xreplace(self.alike) for e in self.rates]
 
-    def statements(self, places: Places, base: str, out: str, kept: int) -> list[Statement]:
+    def statements(self, places: StateLayout, base: str, out: str, kept: int) -> list[Statement]:
         """The loops at one vector of states, which add to the slopes in `out`; FIELD has `kept` numbers of each node before."""
         joint, names, nodes = self.joint, (real(f"sum_part_{k}") for k in count()), span("j", "NODES")
         at = {s: Name("FIELD") + k * Name("NODES") for k, s in enumerate((*self.functions, *self.sums), start=kept)}
@@ -236,6 +236,6 @@ def compensated(total: str, value: Value) -> Iterator[Statement]:
     yield let(total, new)
 
 
-def assigned(body: Body) -> list[Statement]:
+def assigned(body: StraightLine) -> list[Statement]:
     """The statements of a body."""
     return [let(s.name, lower(e)) for s, e in body.statements]

@@ -36,10 +36,10 @@ from ..program.statements import (
 from .blocks import NodeBlocks
 from .fields import LinkSums, link_sums, mean_fields
 from .mass_solve import added_masses, momentum_slopes, turned_masses
-from .places import Joint, Kind, link_ends, named, places, span
+from .places import Joint, NodeKindLayout, link_ends, named, places, span
 from .safe_names import NAMES
-from .sparse_plan import Program, block_pattern
-from .step import NOW, Step, lane, linearised
+from .sparse_plan import SparsePlan, block_pattern
+from .step import NOW, StepWriter, lane, linearised
 
 SLOTS = ("here_slot", "there_slot")
 """The arrays that say where the entries of a link's blocks stand, by its target and by its source."""
@@ -51,11 +51,11 @@ GROUPS = {"f": "SLOPE"}
 """What vectors of slopes are called in memory, besides those of stages, K1, K2, …"""
 
 
-class Looped(Step):
+class LoopedStep(StepWriter):
     """Keeps its vectors in the workspace behind the dense output; `elimination` has the order of the pivots."""
 
     def __init__(
-        self, equations: Equations, kinds: Sequence[NodeBlocks], method: Integrator, elimination: Program
+        self, equations: Equations, kinds: Sequence[NodeBlocks], method: Integrator, elimination: SparsePlan
     ) -> None:
         super().__init__(equations, kinds, method)
         self.places, self.elimination, self.fields = places(equations), elimination, mean_fields(equations)
@@ -113,7 +113,7 @@ class Looped(Step):
         self.functions.append(Function("slopes", ("y", "dense", "out", *given), about, tuple(body), Role.CALLED))
         return given
 
-    def node_slopes(self, kind: Kind, base: str, out: str) -> None:
+    def node_slopes(self, kind: NodeKindLayout, base: str, out: str) -> None:
         """The right-hand side of the nodes of one kind."""
         body = self.kinds[kind.number].rhs
         left = [f"f_{s.name}" for s in kind.node.state]
@@ -193,7 +193,7 @@ class Looped(Step):
         self.mass.turn()
         self.mass.factorise()
 
-    def node_linear(self, kind: Kind) -> None:
+    def node_linear(self, kind: NodeKindLayout) -> None:
         """Slopes, matrix entries and time slopes of the nodes of one kind."""
         body, state = self.kinds[kind.number].linear, kind.node.state
         size, place = len(state), self.places.place
@@ -296,7 +296,7 @@ def vector(number: int) -> Expression:
 class LoopMass:
     """What a looped step writes about M; where M is the identity, nothing but the solution of each stage."""
 
-    def __init__(self, writer: Looped) -> None:
+    def __init__(self, writer: LoopedStep) -> None:
         self.writer, self.equations = writer, writer.equations
         self.inertial, self.constant = self.equations.inertial, self.equations.constant_mass
         self.joints = [joint for joint in writer.places.joints if joint.edge.inertia]
@@ -356,7 +356,7 @@ class LoopMass:
         used = tuple(e for block in joint.edge.inertia for row in block for e in row)
         return self.writer.link(joint, base, used, states=not self.constant)
 
-    def node(self, kind: Kind, used: Block, base: str) -> list[Statement]:
+    def node(self, kind: NodeKindLayout, used: Block, base: str) -> list[Statement]:
         """What some masses of a node are made of: its states and its own parameters."""
         w, symbols = self.writer, {s for row in used for e in row for s in e.free_symbols}
         states = [] if kind.node.constant_inertia else w.places.read(kind.node, base)

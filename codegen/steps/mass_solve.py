@@ -20,8 +20,8 @@ from ..program.expressions import Expression, Name, Product, call
 from ..program.lowering import lower
 from ..program.passes import Names, real
 from ..program.statements import Assign, Function, Return, Statement, let
-from .elimination import Entries, Entry, Factors, Plan, plan, write_elimination, write_solve
-from .step import Step, function_of, prefix
+from .elimination import EliminationPlan, Entries, Entry, Factors, plan, write_elimination, write_solve
+from .step import StepWriter, function_of, prefix
 
 
 def added_masses(node: Node) -> Block:
@@ -52,7 +52,7 @@ def momentum_slopes(edge: Edge, here: Sequence[sp.Symbol], there: Sequence[sp.Sy
 class Mass:
     """The entries of M and what a step writes about it; without entries M is the identity and nothing is written."""
 
-    def __init__(self, writer: Step) -> None:
+    def __init__(self, writer: StepWriter) -> None:
         self.writer, self.equations = writer, writer.equations
 
     @cached_property
@@ -86,20 +86,20 @@ class Mass:
         """The states whose rates M couples."""
         return [self.writer.state[row] for row in self.rows]
 
-    def elimination(self, matrix: Mapping[Entry, sp.Expr]) -> tuple[Plan, Factors]:
+    def elimination(self, matrix: Mapping[Entry, sp.Expr]) -> tuple[EliminationPlan, Factors]:
         """The elimination of the coupled rows of M, whose entries may have been given names."""
         place = {row: k for k, row in enumerate(self.rows)}
         inner = {(place[r], place[c]): e for (r, c), e in matrix.items() if r in place and c in place}
         steps = plan(len(place), set(inner))
         return steps, write_elimination(steps, inner, {}, tuple(f"mass_{name}" for name in self.names))
 
-    def solution(self, steps: Plan, factors: Factors, out: str) -> list[Statement]:
+    def solution(self, steps: EliminationPlan, factors: Factors, out: str) -> list[Statement]:
         """Statements that solve for the right-hand sides r_x, …, which are overwritten."""
         numbered = list(enumerate(self.names))
         return write_solve(steps, factors, {k: f"r_{s}" for k, s in numbered}, {k: f"{out}{s}" for k, s in numbered})
 
     @cached_property
-    def factors(self) -> tuple[Plan, Factors]:
+    def factors(self) -> tuple[EliminationPlan, Factors]:
         """The factors of a constant M, written where they are asked for first."""
         found = self.elimination(self.entries)
         self.writer.note("factors of M")

@@ -50,7 +50,7 @@ def parts(index: str, counts: Sequence[int]) -> list[Span]:
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class NodeKindLayout:
     """The nodes of one kind: their template, its number, and where they stand in the numbering."""
 
     node: Node
@@ -68,7 +68,7 @@ class Joint:
     span: Span
 
 
-class Places:
+class StateLayout:
     """The places where loops over the nodes and links of a network read and write; this one has nodes of one kind."""
 
     def __init__(self, equations: Equations) -> None:
@@ -79,7 +79,7 @@ class Places:
         self.slots = {name: slot for slot, name in enumerate(equations.parameters, start=equations.dimension)}
         counts = [equations.kind_of.count(k) for k in range(len(equations.nodes))]
         parts = zip(equations.nodes, self.spans("i", "NODES", counts), strict=True)
-        self.kinds = tuple(Kind(node, k, part) for k, (node, part) in enumerate(parts))
+        self.kinds = tuple(NodeKindLayout(node, k, part) for k, (node, part) in enumerate(parts))
         numbers, nodes = Counter(joint_numbers(equations)), equations.nodes
         templates = [pair for layer in equations.listed for pair in layer.edge_of]
         shares = [numbers[k] for k in range(len(templates))]
@@ -134,7 +134,7 @@ class Places:
         return Load(slot, (a * self.size + b) * Name(length) + index, None)
 
 
-class MixedPlaces(Places):
+class MixedPlaces(StateLayout):
     """Nodes of several kinds: their states stand where the array `where` says."""
 
     def spans(self, index: str, stop: str, counts: Sequence[int]) -> list[Span]:
@@ -159,9 +159,9 @@ class MixedPlaces(Places):
         return self.place(self.size + number, index)
 
 
-def places(equations: Equations) -> Places:
+def places(equations: Equations) -> StateLayout:
     """Return where loops find the nodes and links of a network."""
-    return (MixedPlaces if equations.mixed else Places)(equations)
+    return (MixedPlaces if equations.mixed else StateLayout)(equations)
 
 
 def link_ends(edge: Edge, weight: str, source: str = "j") -> list[Statement]:

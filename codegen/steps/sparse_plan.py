@@ -22,11 +22,11 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.links import Link
 from synchain.models.mechanics.components import Edge, Node
 
-from .elimination import Entry, Plan
+from .elimination import EliminationPlan, Entry
 from .fields import link_sums, mean_fields
 from .mass_solve import added_masses, momentum_slopes, turned_masses
 from .places import by_joint, by_kind, joint_numbers, link_table, places, table
-from .step import Step
+from .step import StepWriter
 
 FILL_LIMIT = 3.0
 """Entries of the exact factors for each entry of the matrix, above which the elimination is incomplete."""
@@ -35,7 +35,7 @@ Pattern = tuple[Entry, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Program:
+class SparsePlan:
     """Integer arrays in the order of NAMES, weights of the links, the number of matrix entries, exact or incomplete.
 
     target, source (links,): ends of each link.  node_slot (components**2 * n,), here_slot, there_slot
@@ -57,7 +57,7 @@ def block_pattern(block: Iterable[Iterable[object]]) -> tuple[Entry, ...]:
     return tuple((a, b) for a, row in enumerate(block) for b, e in enumerate(row) if e != 0)
 
 
-def program(equations: Equations, fill: float = FILL_LIMIT, solves: bool = True) -> Program:
+def program(equations: Equations, fill: float = FILL_LIMIT, solves: bool = True) -> SparsePlan:
     """Plan the elimination of (s - J) for a network; time and memory grow with its links.
 
     Equations that differ only in what their symbols are called, or in numbers, share the program.  The factors are exact
@@ -110,7 +110,7 @@ def _program(
     counts: tuple[int, ...],
     shares: tuple[int, ...],
     where: tuple[int, ...],
-) -> Program:
+) -> SparsePlan:
     """The program of a network of `counts` nodes of each kind and `shares` links of each joint."""
     stands = np.array(where, np.int64).reshape(-1, n)[:size] if where else np.arange(n * size).reshape(size, n)
     dimension = int((stands >= 0).sum())
@@ -132,7 +132,7 @@ def _program(
     slots = [blocks.slots(place, keys) for blocks in (alike, *ends)]
     arrays = (target, source, *slots, pivots, place, starts, middles, pivots[columns], where)
     weights = np.array([float(link[2]) for link in links])
-    return Program(tuple(np.ascontiguousarray(a, np.int64) for a in arrays), weights, dimension + len(keys), exact)
+    return SparsePlan(tuple(np.ascontiguousarray(a, np.int64) for a in arrays), weights, dimension + len(keys), exact)
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,7 +210,7 @@ def _first_level(dimension: int, off: np.ndarray, pivots: np.ndarray) -> np.ndar
     return pivots[np.stack(np.divmod(keys, dimension))]
 
 
-def order(size: int, pattern: set[Entry]) -> Plan:
+def order(size: int, pattern: set[Entry]) -> EliminationPlan:
     """Pivots by least degree in the symmetrised pattern, rows without a diagonal entry of J first; O(fill log n)."""
     off = [(r, c) for r, c in sorted(pattern) if r != c]
     found = _eliminate_all(size, [r for r, _ in off], [c for _, c in off], {r for r, c in pattern if r == c}, np.inf)
@@ -219,7 +219,9 @@ def order(size: int, pattern: set[Entry]) -> Plan:
     return found
 
 
-def _eliminate_all(size: int, row_of: list[int], column_of: list[int], listed: set[int], limit: float) -> Plan | None:
+def _eliminate_all(
+    size: int, row_of: list[int], column_of: list[int], listed: set[int], limit: float
+) -> EliminationPlan | None:
     """The exact elimination, None as soon as its off-diagonal entries exceed the limit."""
     rows: list[set[int]] = [set() for _ in range(size)]
     columns: list[set[int]] = [set() for _ in range(size)]
@@ -244,7 +246,7 @@ def _eliminate_all(size: int, row_of: list[int], column_of: list[int], listed: s
         for j in near[k]:
             heapq.heappush(heap, (j in listed, len(near[j]), j))
         rows[k] = columns[k] = near[k] = set()
-    return Plan(tuple(found), tuple(below), tuple(after))
+    return EliminationPlan(tuple(found), tuple(below), tuple(after))
 
 
 def _eliminate(k: int, rows: list[set[int]], columns: list[set[int]], near: list[set[int]]) -> int:
@@ -269,7 +271,7 @@ def _eliminate(k: int, rows: list[set[int]], columns: list[set[int]], near: list
     return fill
 
 
-def workspace(w: Step, elimination: Program) -> int:
+def workspace(w: StepWriter, elimination: SparsePlan) -> int:
     """Groups of scratch memory: stages, stage state, slopes, time slopes and, for implicit methods, the matrix.
 
     Factors of an incomplete elimination stand beside the matrix, exact ones replace it.  Where M is not the

@@ -14,7 +14,7 @@ from synchain.models.mechanics.components import TIME
 from ..integrators import Integrator
 from ..program.expressions import ZERO, Expression, Load, Name, Negation, Number, Product, Value, call, linear
 from ..program.lowering import lower
-from ..program.passes import Body, real
+from ..program.passes import StraightLine, real
 from ..program.statements import Assign, Comment, Function, Return, Role, Statement, let, operations
 from .blocks import NodeBlocks
 
@@ -51,7 +51,9 @@ def function_name(name: str, kind: int) -> str:
     return name if kind == 0 else name.replace("node", f"node{kind + 1}", 1)
 
 
-def node_function(name: str, about: str, body: Body, arguments: Sequence[str], results: Sequence[sp.Expr]) -> Function:
+def node_function(
+    name: str, about: str, body: StraightLine, arguments: Sequence[str], results: Sequence[sp.Expr]
+) -> Function:
     """A small inlined function of lanes: statements first, results last."""
     statements = [let(s.name, lower(e)) for s, e in body.statements]
     return function_of(name, arguments, about, [*statements, Return(tuple(map(lower, results)))])
@@ -84,7 +86,7 @@ def linearised(state: Sequence[sp.Symbol]) -> list[str]:
     return [*(f"f_{r.name}" for r in state), *entries, *(f"ft_{r.name}" for r in state)]
 
 
-class Step(ABC):
+class StepWriter(ABC):
     """Writes one step of `method` for `equations`, whose kinds of nodes were analysed into `kinds`.
 
     The stages are the same for every network.  `Unrolled` keeps each state in a register and writes every node out,
@@ -215,7 +217,7 @@ class Step(ABC):
         stiff = self.method.dense_error * (Number(1.0) - 2.0 * share) * call("absolute", last)
         return call("maximum", call("absolute", error), stiff)
 
-    def first_of(self, blocks: NodeBlocks) -> Body:
+    def first_of(self, blocks: NodeBlocks) -> StraightLine:
         """What is evaluated of a node of some kind at the start of a step."""
         return blocks.linear if self.method.implicit else blocks.rhs
 
@@ -236,9 +238,9 @@ class Step(ABC):
         """The parameters of the template that have a value for each node."""
         return {real(name) for name in self.equations.varied}
 
-    def arguments(self, body: Body, results: Sequence[sp.Expr]) -> list[sp.Symbol]:
+    def arguments(self, body: StraightLine, results: Sequence[sp.Expr]) -> list[sp.Symbol]:
         """What a node function must be given: state first, then the rest by name."""
-        used = Body(body.statements, tuple(results)).symbols
+        used = StraightLine(body.statements, tuple(results)).symbols
         states = dict.fromkeys(s for node in self.equations.nodes for s in node.state)
         own = [s for s in states if s in used]
         return own + sorted((s for s in used if s not in own), key=lambda s: s.name)
@@ -256,7 +258,7 @@ class Step(ABC):
             self.let("now", linear((c[i],), ["h"], "t"))
             self.timed("now", self.wanted([blocks.rhs for blocks in self.kinds]))
 
-    def wanted(self, bodies: Sequence[Body]) -> set[sp.Symbol]:
+    def wanted(self, bodies: Sequence[StraightLine]) -> set[sp.Symbol]:
         """Time terms that some bodies use."""
         return {s for blocks in self.kinds for s, _ in blocks.timed} & {s for body in bodies for s in body.symbols}
 
@@ -271,7 +273,7 @@ class Step(ABC):
             self.put(*(let(symbol.name, lower(e)) for symbol, e in blocks.constants if symbol in wanted))
 
     def node_call(
-        self, function: str, kind: int, body: Body, found: Sequence[str], at: Mapping[sp.Symbol, sp.Symbol]
+        self, function: str, kind: int, body: StraightLine, found: Sequence[str], at: Mapping[sp.Symbol, sp.Symbol]
     ) -> list[Statement]:
         """The call of a node function at some names of its arguments; plain results among those `found` need none."""
         pairs = [(name, e) for name, e in zip(found, body.results, strict=True) if not self.is_plain(e)]

@@ -14,10 +14,10 @@ from ..program.statements import If, Return, let, store
 from .blocks import NodeBlocks
 from .elimination import Entries, plan, times, write_factors, write_solve
 from .mass_solve import Mass
-from .step import NOW, Step, entry, lane, linearised, prefix
+from .step import NOW, StepWriter, entry, lane, linearised, prefix
 
 
-class Unrolled(Step):
+class UnrolledStep(StepWriter):
     """Names its vectors by prefixes: x_1 at the start, u_x_1 in a stage, f_x_1 the slope, k2_x_1 of stage 2, n_x_1 new."""
 
     @cached_property

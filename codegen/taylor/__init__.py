@@ -5,7 +5,7 @@ from __future__ import annotations
 from .jump_series import unpassed
 from .looped_series import write_looped
 from .rolled import is_large, write_rolled
-from .series_graph import is_analytic, is_linear, jump, outlives_series
+from .series_graph import is_analytic, is_linear, jump, may_cross_singularity
 from .series_order import order_for
 from .tangent import TangentStep, write_tangent
 from .taylor_step import TaylorStep
@@ -18,8 +18,8 @@ __all__ = [
     "is_large",
     "is_linear",
     "jump",
+    "may_cross_singularity",
     "order_for",
-    "outlives_series",
     "unpassed",
     "write_looped",
     "write_rolled",

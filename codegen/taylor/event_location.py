@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from synchain.models.dynamics.equations import Equations
 
-from ..program.expressions import ONE, ZERO, Choice, Compare, Expression, Name, Negation, Number, Value, call, plus
+from ..program.expressions import ONE, ZERO, Compare, Conditional, Expression, Name, Negation, Number, Value, call, plus
 from ..program.statements import Comment, If, Repeat, Statement, called, let, mentioned
 from .simplify import absolute
 from .step_length import bounded
@@ -186,7 +186,7 @@ def first_passage(found: Sequence[Statement]) -> list[Statement]:
     """The statements that end a step at the first of the passages that are `found` one after another."""
     if not found:
         return []
-    until = Choice(Compare("<", Name("passed"), Name("ratio")), Name("passed") * "scale", Name("length"))
+    until = Conditional(Compare("<", Name("passed"), Name("ratio")), Name("passed") * "scale", Name("length"))
     soonest = [SOONEST] if "nearest" in mentioned(found) else []
     begun: list[Statement] = [Comment("first passage"), let("passed", "ratio"), *soonest]
     return [*begun, *found, let("until", until), let("ratio", "passed")]

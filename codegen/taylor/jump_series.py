@@ -14,7 +14,7 @@ from synchain.models.mechanics.jumps import INEQUALITIES, gaps_of, jumps
 RISING, STRICT = (sp.StrictGreaterThan, sp.GreaterThan), (sp.StrictGreaterThan, sp.StrictLessThan)
 
 
-class Leap(sp.Function):
+class Jump(sp.Function):
     """Leap(gap, above, at, below): one of three values by the sign of a gap, which do not agree at zero."""
 
     nargs = 4
@@ -51,7 +51,7 @@ def unpassed(equations: Equations) -> Iterator[sp.Expr]:
 
 
 def leaping(expressions: Iterable[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:
-    """Some expressions with their jumps as `Leap` or sp.floor, parts that no step passes as they are."""
+    """Some expressions with their jumps as `Jump` or sp.floor, parts that no step passes as they are."""
     given = list(expressions)
     parts = {part for part in jumps(given, moving) if _passable(part)}
     return [_leaping(e, parts) for e in given] if parts else given
@@ -68,7 +68,7 @@ def _leaping(e: sp.Basic, parts: Collection[sp.Expr]) -> sp.Basic:
     if isinstance(e, sp.ceiling):
         return -sp.floor(-inner[0])
     at, below = (sp.S.Zero, sp.S.NegativeOne) if isinstance(e, sp.sign) else (inner[1], sp.S.Zero)
-    return Leap(inner[0], sp.S.One, at, below)
+    return Jump(inner[0], sp.S.One, at, below)
 
 
 def _choice(pieces: Sequence[ExprCondPair]) -> sp.Expr:
@@ -78,7 +78,7 @@ def _choice(pieces: Sequence[ExprCondPair]) -> sp.Expr:
         return piece
     rest = _choice(others)
     above, below = (piece, rest) if isinstance(condition, RISING) else (rest, piece)
-    return Leap(condition.lhs - condition.rhs, above, rest if isinstance(condition, STRICT) else piece, below)
+    return Jump(condition.lhs - condition.rhs, above, rest if isinstance(condition, STRICT) else piece, below)
 
 
 def _passable(part: sp.Expr) -> bool:

@@ -22,14 +22,14 @@ from ..program.lowering import lower
 from ..program.passes import Hoist, Names, real
 from ..program.statements import Assign, Comment, Loop, Statement, Store, let, whole
 from ..steps.fields import LinkSums, MeanField, compensated, link_sums, mean_fields
-from ..steps.places import Joint, Kind, Span, link_ends, places, span, theirs
+from ..steps.places import Joint, NodeKindLayout, Span, link_ends, places, span, theirs
 from ..steps.safe_names import NAMES
 from ..steps.step import lane
 from .event_location import Stored, further
 from .mass_matrix import moving, solved
 from .series import Constant, Series, State, magnitude
-from .series_graph import Graph, Template, check_jumps
-from .series_writer import Gaps, Part
+from .series_graph import SeriesGraph, Template, check_jumps
+from .series_writer import Gaps, SeriesWriter
 from .simplify import absolute, add, times
 from .step_length import SEEN, last_orders
 from .taylor_step import StepWriter, TaylorStep
@@ -93,7 +93,7 @@ class Outer(State):
 
 
 @dataclass(eq=False)
-class Section(Part):
+class SeriesLoop(SeriesWriter):
     """What is done alike for all nodes of a kind, for all links of a joint, or once, its coefficients in memory.
 
     span, count: the loop and the number of its turns in the whole numbering; `setting` loads what the turn needs at any
@@ -258,7 +258,7 @@ class Section(Part):
 
 
 @dataclass(eq=False)
-class Totals(Section):
+class Totals(SeriesLoop):
     """The sums over all nodes of some series, by their names."""
 
     totals: list[tuple[str, Series]] = field(default_factory=list)
@@ -279,7 +279,7 @@ class Totals(Section):
 
 
 @dataclass(eq=False)
-class Gathered(Section):
+class Gathered(SeriesLoop):
     """The sums over the links of each node of some series, by their names."""
 
     totals: list[tuple[str, Series]] = field(default_factory=list)
@@ -345,7 +345,7 @@ def with_pushes(joint: Joint) -> list[sp.Expr]:
     return [*edge.rhs, push, -push]
 
 
-class Looped(StepWriter):
+class LoopedSeries(StepWriter):
     """Writes loops around the recurrences, with a part for what each of them makes."""
 
     functions: Sequence[str] = (CONVOLUTION,)
@@ -359,7 +359,7 @@ class Looped(StepWriter):
         self.places, self.fields = places(equations), mean_fields(equations)
         self.names = Names([*words, *self.called.values(), *(s + end for s in words for end in ("_here", "_there"))])
         self.varied = [real(name) for name in eq.differing]
-        self.waves = Section(Graph(self.names), order)
+        self.waves = SeriesLoop(SeriesGraph(self.names), order)
         kinds, (self.sums, joints) = self.places.kinds, link_sums(equations, self.places.joints)
         rates = [[*with_gaps(kind.node), *(e for links in self.sums for e in links.of_node())] for kind in kinds]
         nodes = [self.hoisted(e, [*kind.node.state, *self.varied]) for kind, e in zip(kinds, rates, strict=True)]
@@ -371,7 +371,7 @@ class Looped(StepWriter):
         self.waves.graph.settle(self.waves.lent)
         if self.waves.lent:
             self.waves.outer.append(self.time)
-        self.parts: list[Section] = [self.waves, *map(self.node, kinds, nodes), *map(self.link, joints, pushes)]
+        self.parts: list[SeriesLoop] = [self.waves, *map(self.node, kinds, nodes), *map(self.link, joints, pushes)]
         for mean, parts in zip(self.fields, fields, strict=True):
             self.parts += self.field(mean, *parts)
         names = [name for links in self.sums for name in links.functions]
@@ -383,9 +383,12 @@ class Looped(StepWriter):
 
     # -- sections ---------------------------------------------------------------------------------------------
 
-    def node(self, kind: Kind, found: Hoisted) -> Section:
+    def node(self, kind: NodeKindLayout, found: Hoisted) -> SeriesLoop:
         """The rates of the nodes of a kind."""
-        node, section = kind.node, Section(Graph(self.names), self.order, span=kind.span, count=self.equations.n)
+        node, section = (
+            kind.node,
+            SeriesLoop(SeriesGraph(self.names), self.order, span=kind.span, count=self.equations.n),
+        )
         self.end(section, node.state, node, ("", "i"), node.state)
         used = {s for e in (*found.rates, *(e for row in node.inertia for e in row)) for s in e.free_symbols}
         section.setting += self.loaded(self.places.own(used))
@@ -405,10 +408,10 @@ class Looped(StepWriter):
         own = (edge.weight, *edge.here, *edge.there, *(s for s, _ in edge.theirs), *self.varied, *more)
         return self.hoisted(rates, own)
 
-    def link(self, joint: Joint, found: Hoisted) -> Section:
+    def link(self, joint: Joint, found: Hoisted) -> SeriesLoop:
         """What the links of a joint add."""
         edge, used = joint.edge, {s for e in found.rates for s in e.free_symbols}
-        section = Section(Graph(self.names), self.order, span=joint.span, count=self.places.links, adds=True)
+        section = SeriesLoop(SeriesGraph(self.names), self.order, span=joint.span, count=self.places.links, adds=True)
         section.setting += link_ends(edge, self.called[edge.weight.name], "j_there")
         self.end(section, edge.here, joint.target, ("_here", "i"), used)
         self.end(section, edge.there, joint.source, ("_there", "j_there"), used)
@@ -417,7 +420,7 @@ class Looped(StepWriter):
         self.store(section, joint.target, self.read(section, found))
         return section
 
-    def store(self, section: Section, node: Node, found: Sequence[Series]) -> None:
+    def store(self, section: SeriesLoop, node: Node, found: Sequence[Series]) -> None:
         """Let a section store what was read for a node: its rates at their places, and behind them its gaps."""
         size = len(node.state)
         section.rates, section.gaps = (
@@ -427,7 +430,7 @@ class Looped(StepWriter):
 
     def end(
         self,
-        section: Section,
+        section: SeriesLoop,
         symbols: Sequence[sp.Symbol],
         node: Node,
         at: tuple[str, str],
@@ -446,13 +449,13 @@ class Looped(StepWriter):
                 section.fixed[s] = real(name)
                 section.setting.append(let(name, Load("y", place)))
 
-    def field(self, field: MeanField, sums: Hoisted, shared: Hoisted, rates: Hoisted) -> Iterator[Section]:
+    def field(self, field: MeanField, sums: Hoisted, shared: Hoisted, rates: Hoisted) -> Iterator[SeriesLoop]:
         """The sums over the nodes, what all nodes make of them, and what is added to the rates.
 
         Source functions that are functions of the target too are series once.
         """
         nodes = self.places.kinds[0].span
-        totals = Totals(Graph(self.names), self.order, span=nodes, count=self.equations.n)
+        totals = Totals(SeriesGraph(self.names), self.order, span=nodes, count=self.equations.n)
         used = {s for e in sums.rates for s in e.free_symbols}
         self.field_end(totals, field, "_there", used)
         totals.setting += self.loaded(self.places.of_source(field.edge, used, "i"))
@@ -460,13 +463,13 @@ class Looped(StepWriter):
         found = self.read(totals, sums)
         totals.totals = [(s.name, series) for s, series in zip(field.sums, found, strict=True)]
         yield totals
-        combined = Section(Graph(self.names), self.order)
+        combined = SeriesLoop(SeriesGraph(self.names), self.order)
         self.see(combined, self.waves, shared.waves)
         self.see(combined, combined, {s: State(name=s.name) for s in field.sums})
         common = dict(zip(field.shared, self.read(combined, replace(shared, waves={})), strict=True))
         combined.lent += [series for series in common.values() if not isinstance(series, Constant)]
         yield combined
-        target = Section(Graph(self.names), self.order, span=nodes, count=self.equations.n, adds=True)
+        target = SeriesLoop(SeriesGraph(self.names), self.order, span=nodes, count=self.equations.n, adds=True)
         made = dict(zip(field.sums, found, strict=True))
         lent = {e: made[s] for s, e in field.alike.items() if made[s] in totals.graph.series}
         borrowed = {e: real(series.name) for e, series in lent.items()}
@@ -481,10 +484,10 @@ class Looped(StepWriter):
         self.store(target, field.node, self.read(target, replace(rates, rates=wanted)))
         yield target
 
-    def summed(self, links: LinkSums, functions: Mapping[sp.Symbol, Series]) -> Iterator[Section]:
+    def summed(self, links: LinkSums, functions: Mapping[sp.Symbol, Series]) -> Iterator[SeriesLoop]:
         """The sums over links of functions of their sources, and what is added to the rates."""
         edge, nodes, n = links.joint.edge, self.places.kinds[0].span, self.equations.n
-        sums = Gathered(Graph(self.names), self.order, span=links.joint.span, count=self.places.links)
+        sums = Gathered(SeriesGraph(self.names), self.order, span=links.joint.span, count=self.places.links)
         sums.setting += link_ends(edge, self.called[edge.weight.name], "j_there")
         used = {s for factor, _ in links.sums.values() for s in factor.free_symbols}
         sums.setting += self.loaded(self.places.of_link(edge, used, "j_there"))
@@ -494,7 +497,7 @@ class Looped(StepWriter):
         found = self.read(sums, Hoisted([a * b for a, b in links.sums.values()]))
         sums.totals = [(s.name, series) for s, series in zip(links.sums, found, strict=True)]
         yield sums
-        target = Section(Graph(self.names), self.order, span=nodes, count=n, adds=True)
+        target = SeriesLoop(SeriesGraph(self.names), self.order, span=nodes, count=n, adds=True)
         rates = links.applied()
         used = {s for e in rates for s in e.free_symbols}
         self.end(target, edge.here, links.joint.target, ("_here", "i"), used)
@@ -504,7 +507,7 @@ class Looped(StepWriter):
         self.store(target, links.joint.target, self.read(target, Hoisted(rates)))
         yield target
 
-    def field_end(self, section: Section, field: MeanField, suffix: str, used: Container[sp.Symbol]) -> None:
+    def field_end(self, section: SeriesLoop, field: MeanField, suffix: str, used: Container[sp.Symbol]) -> None:
         """Let a section read a node of a mean field; states of which differences alone matter count from the first node's."""
         symbols = field.edge.there if suffix == "_there" else field.edge.here
         self.end(section, symbols, field.node, (suffix, "i"), used)
@@ -514,7 +517,7 @@ class Looped(StepWriter):
                 first = section.reads(of_state(self.places.place(k, "0")), name)
                 section.moving[symbols[k]] = section.graph.sum([(ONE, state), (Number(-1.0), first)])
 
-    def see(self, section: Section, other: Section, series: Mapping[sp.Symbol, Series]) -> None:
+    def see(self, section: SeriesLoop, other: SeriesLoop, series: Mapping[sp.Symbol, Series]) -> None:
         """Let a section read the series of another one; constants are no different."""
         for symbol, s in series.items():
             section.moving[symbol] = s if isinstance(s, Constant) else section.reads(other.own(s.name), s.name)
@@ -547,7 +550,7 @@ class Looped(StepWriter):
             self.waves.lent.append(waves[symbol])
         return Hoisted(rates, waves, constants)
 
-    def read(self, section: Section, given: Hoisted, inertia: Block = ()) -> list[Series]:
+    def read(self, section: SeriesLoop, given: Hoisted, inertia: Block = ()) -> list[Series]:
         """The series of a section, and the constants that each of its turns computes."""
         self.see(section, self.waves, given.waves)
         graph, size, masses = section.graph, len(given.rates), (e for row in inertia for e in row)
@@ -666,4 +669,4 @@ def write_looped(equations: Equations, order: int) -> TaylorStep:
         found = "links with inertia" if equations.inertial_links else "links of nodes with a mass matrix"
         raise ValueError(f"taylor: found {found} in a network that is stepped in loops; use dop853 or rodas5p")
     check_jumps(equations)
-    return Looped(equations, order).step("graph", "weights")
+    return LoopedSeries(equations, order).step("graph", "weights")

@@ -9,8 +9,8 @@ from synchain.models.mechanics.components import Edge, Node
 from ..program.expressions import ONE, ZERO, Expression
 from ..steps.elimination import Entry, plan
 from ..steps.mass_solve import added_masses
-from .series import Constant, Row, Series, Unknown
-from .series_graph import Graph, split
+from .series import Constant, MassMatrixRow, Series, Unknown
+from .series_graph import SeriesGraph, split
 
 Factor = tuple[Expression, Series]
 
@@ -27,7 +27,7 @@ def _moved(part: Node | Edge) -> list[bool]:
     return [e != 0 or any(block[c] for block in coupled) for c, e in enumerate(part.rhs)]
 
 
-def solved(graph: Graph, masses: Mapping[Entry, Series], right: Mapping[int, Series]) -> dict[int, Series]:
+def solved(graph: SeriesGraph, masses: Mapping[Entry, Series], right: Mapping[int, Series]) -> dict[int, Series]:
     """Return the series of the rates."""
     entries = {key: found for key, s in masses.items() if (found := _factor(s))[0] != ZERO}
     coupled = sorted({k for key, e in entries.items() if not (key[0] == key[1] and e == (ONE, _UNIT)) for k in key})
@@ -35,10 +35,10 @@ def solved(graph: Graph, masses: Mapping[Entry, Series], right: Mapping[int, Ser
     inner = {(place[r], place[c]): e for (r, c), e in entries.items() if r in place and c in place}
     symmetric = all(inner.get((c, r)) == e for (r, c), e in inner.items())
     order = plan(len(coupled), set(inner)).order
-    rows: list[Row] = []
+    rows: list[MassMatrixRow] = []
     for r in order:
         own = {c: inner[r, slot] for c, slot in enumerate(order) if (r, slot) in inner}
-        rows.append(Row(right[coupled[r]], own, tuple(rows), symmetric))
+        rows.append(MassMatrixRow(right[coupled[r]], own, tuple(rows), symmetric))
     unknowns: dict[int, Unknown] = {}
     for number in reversed(range(len(rows))):
         unknowns[number] = Unknown(rows[number], dict(unknowns))

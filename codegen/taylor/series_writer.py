@@ -10,8 +10,8 @@ from typing import ClassVar
 from ..program.expressions import ONE, ZERO, Expression, Name, Number, call
 from ..program.statements import Statement, let
 from .event_location import Stored, closed, told
-from .series import Exponential, Kink, Order, Series
-from .series_graph import Graph
+from .series import AbsSeries, Exponential, Order, Series
+from .series_graph import SeriesGraph
 from .simplify import absolute, largest, over, times
 from .step_length import distant, last_orders, unseen
 
@@ -32,14 +32,14 @@ class Gaps:
 
 
 @dataclass(eq=False)
-class Part(Order):
+class SeriesWriter(Order):
     """Series that are made together up to some order; it is what their recurrences ask.
 
     A step that is written out has its coefficients in names (`Lines`), one in loops has them in memory (`Section`).  kept:
     the names of what is computed once in a step; zeros: what is zero in all lanes.
     """
 
-    graph: Graph
+    graph: SeriesGraph
     order: int
     contacts: list[Gaps] = field(default_factory=list)
     kept: dict[str, None] = field(default_factory=dict)
@@ -130,7 +130,7 @@ class Part(Order):
         """The statements that take note of those that the coefficients tell."""
         return self.run([self.side(kink) for kink in self.graph.kinks])
 
-    def side(self, kink: Kink) -> Statement:
+    def side(self, kink: AbsSeries) -> Statement:
         """The statement that takes note of one."""
         note = self.note(f"hint_{kink.base.name}", call("side_or", self.hint(kink.base), "new"))
         return told(self.recall(kink.name), self.signs(kink.base), note)
@@ -192,7 +192,7 @@ class Part(Order):
             found += [*stores, *closed(gaps.mode, exact, both, gaps.stuck, gaps.room)]
         return self.run(found)
 
-    def passage(self, kink: Kink) -> list[Statement]:
+    def passage(self, kink: AbsSeries) -> list[Statement]:
         """The statements that end the step where a series passes one kink."""
         stores, (stored,) = self.stored([kink.base], [self.recall(f"size_{kink.name}")])
         return self.near(kink.base, [*stores, *kink.passages(self.recall(kink.name), stored)])

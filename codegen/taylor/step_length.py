@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..program.expressions import ZERO, Call, Choice, Compare, Expression, Junction, Name, Negation, Number, call
+from ..program.expressions import ZERO, Call, Compare, Conditional, Expression, Junction, Name, Negation, Number, call
 from ..program.statements import If, Statement, let
 from .simplify import absolute, add, extreme, largest, times
 
@@ -96,7 +96,7 @@ def distant(start: Expression, further: Sequence[Expression]) -> list[Statement]
         *bound,
         let("way", Name("way") * "ratio"),
         let("room", call("maximum", Number(-REMOTE) + Negation(start), Number(NEARER))),
-        let("length", Choice(Junction("and", (remote, far)), shorter, Name("length"))),
+        let("length", Conditional(Junction("and", (remote, far)), shorter, Name("length"))),
         let("ratio", Name("length") / "scale"),
     )
     return [If(call("any_lane", remote), inner)]

@@ -22,11 +22,11 @@ from ..program.passes import Names
 from ..program.printers import LANES
 from ..program.statements import Comment, Function, If, Return, Role, let, store
 from .series import Series, State
-from .series_graph import Graph, Template, is_analytic
+from .series_graph import SeriesGraph, Template, is_analytic
 from .simplify import absolute, add, largest, times
 from .step_length import last_orders, reach
 from .taylor_step import TaylorStep, check_order
-from .unrolled_series import SQUARE, Lines, Unrolled, polynomial
+from .unrolled_series import SQUARE, Lines, UnrolledSeries, polynomial
 
 HEAD = 2
 """First entries of the shared array: `scale` of the orbit's step, and its length, which the driver writes."""
@@ -71,7 +71,7 @@ class TangentStep:
     shared: int
 
 
-class OrbitWriter(Unrolled):
+class OrbitWriter(UnrolledSeries):
     """Writes the step of an orbit, which leaves the series of some coefficients.
 
     Attributes
@@ -121,7 +121,7 @@ class ModeWriter(Lines):
     """Writes the step of the modes in one register, from what an orbit leaves."""
 
     def __init__(self, variation: Variation, orbit: OrbitWriter) -> None:
-        super().__init__(Graph(Names([s.name for s in variation.parameters])), orbit.order)
+        super().__init__(SeriesGraph(Names([s.name for s in variation.parameters])), orbit.order)
         self.size, self.called_so, strengths = variation.size, orbit.called_so, variation.parameters
         self.outer = {name: State(name=name) for name in orbit.called_so.values()}
         self.values |= {(self.outer[name], k): value for (name, k), value in orbit.left.items()}

@@ -18,7 +18,7 @@ from ..program.statements import Comment, Function, If, Return, Role, Statement,
 from .event_location import first_passage, functions, jumps, loose, settled
 from .series import Time
 from .series_graph import STARTS
-from .series_writer import Part
+from .series_writer import SeriesWriter
 from .step_length import finished, last_orders, reach
 
 WORDS = frozenset(
@@ -66,7 +66,7 @@ class StepWriter(ABC):
     together.
     """
 
-    parts: Sequence[Part]
+    parts: Sequence[SeriesWriter]
     functions: Sequence[str] = ()
 
     def __init__(self, equations: Equations, order: int, words: Collection[str]) -> None:

@@ -19,8 +19,8 @@ from ..steps.step import lane
 from .event_location import Stored, approached, further
 from .mass_matrix import moving, solved
 from .series import Constant, Exponential, Series, State, Time, magnitude
-from .series_graph import Graph, Template, check_jumps
-from .series_writer import Gaps, Part
+from .series_graph import SeriesGraph, Template, check_jumps
+from .series_writer import Gaps, SeriesWriter
 from .simplify import add, largest, times
 from .step_length import SEEN, last_orders, reach
 from .taylor_step import StepWriter, TaylorStep, check_order
@@ -29,7 +29,7 @@ SQUARE = let("square", Name("ratio") * "ratio")
 
 
 @dataclass(eq=False)
-class Lines(Part):
+class Lines(SeriesWriter):
     """Writes the coefficients of series one after another, each under a name.
 
     k: the order that is written; room: the group of memory behind which a passage finds coefficients; rates: the states that
@@ -140,7 +140,7 @@ class Lines(Part):
         self.make(self.graph.behind([*self.graph.kinks, *gaps]) if k == self.order else self.graph.series, k == 0)
 
 
-class Unrolled(StepWriter):
+class UnrolledSeries(StepWriter):
     """Writes everything out, with one part of all series."""
 
     def __init__(self, equations: Equations, order: int) -> None:
@@ -149,7 +149,7 @@ class Unrolled(StepWriter):
         self.names = [_unlike(self.called[name], taken, order) for name in equations.state]
         own = {s.name for node in equations.nodes for s in (*node.state, *node.parameters)}
         self.supply = Names([*taken, *self.names, *own, *(s.name for edge in equations.edges for s in edge.parameters)])
-        self.lines = Lines(Graph(self.supply), order, room=order * equations.dimension)
+        self.lines = Lines(SeriesGraph(self.supply), order, room=order * equations.dimension)
         self.graph, self.parts = self.lines.graph, [self.lines]
         edges = [[edge for link, edge in equations.linked() if link[0] == i] for i in range(equations.n)]
         moves = (compress(places, moving(equations.node_at(i), edges[i])) for i, places in enumerate(equations.places))
@@ -306,7 +306,7 @@ def write_step(equations: Equations, order: int) -> TaylorStep:
     """Return the Taylor step of some order for equations with names that a kernel can use (`tidy`)."""
     check_order(order)
     check_jumps(equations)
-    return Unrolled(equations, order).step()
+    return UnrolledSeries(equations, order).step()
 
 
 def _unlike(name: str, taken: set[str], order: int) -> str:

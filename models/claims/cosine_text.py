@@ -15,7 +15,7 @@ from itertools import product
 from math import lcm
 
 from ..algebra.cosine_sums import AngleSum, folded_sum
-from ..inputs.reader import Algebra, Expression, NoMeaning, parse
+from ..inputs.reader import Algebra, NoMeaning, ParsedText, parse
 
 _CIRCULAR = re.compile(r"[0-9A-Za-z_+\-*/() \t]*\b(?:sin|cos)\([0-9A-Za-z_+\-*/() \t]*", re.ASCII)
 LENGTH, DEPTH, TERMS, POWER, WHOLE, DENOMINATOR = 300, 24, 16, 4, 10**10, 10**10
@@ -84,7 +84,7 @@ def angle_wave(text: str, values: Mapping[str, int], letter: str = "") -> Wave |
 
 
 @lru_cache(maxsize=64)
-def _parsed(text: str) -> Expression | None:
+def _parsed(text: str) -> ParsedText | None:
     return parse(text) if len(text) <= LENGTH and _CIRCULAR.fullmatch(text) else None
 
 

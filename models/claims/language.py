@@ -28,7 +28,7 @@ from ..graphs.topology import Topology, read_matrix
 from ..inputs.checks import short_repr
 from .cosine_text import angle_number, angle_wave
 from .number_text import exact_number, whole_number
-from .parts import LARGEST, WORDS, Part, interval, is_part, read_part
+from .parts import LARGEST, WORDS, PartClaim, interval, is_part, read_part
 
 BYTES, REPETITIONS = 1_000_000, 100_000
 _OPTIONS = r"((?:\s+[A-Za-z_]\w*=\S+)*)"
@@ -82,7 +82,7 @@ class Claim:
     graph: Topology  # the graph
     numbers: tuple[Claimed, ...]  # the claimed eigenvalues; none if parts are claimed
     n: int | None = None  # the size, if the line has a range of sizes
-    parts: tuple[Part, ...] = ()  # the claims about parts of the spectrum
+    parts: tuple[PartClaim, ...] = ()  # the claims about parts of the spectrum
 
 
 def read_claims(path: str | Path) -> list[tuple[Claim, ...]]:

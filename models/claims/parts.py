@@ -56,7 +56,7 @@ _DECIMAL = re.compile(r"[+-]?[0-9]{1,40}\.[0-9]{1,60}")
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class PartClaim:
     """The claim about one part of a spectrum."""
 
     text: str  # the claim as it was written
@@ -72,7 +72,7 @@ def is_part(text: str) -> bool:
     return re.match(rf"({'|'.join(WORDS)})\b", text) is not None
 
 
-def read_part(text: str, values: Mapping[str, int]) -> Part:
+def read_part(text: str, values: Mapping[str, int]) -> PartClaim:
     """Return the claim in a text such as "ratio < 37.9"."""
     found = _PART.fullmatch(text)
     if found is None:
@@ -89,10 +89,10 @@ def read_part(text: str, values: Mapping[str, int]) -> Part:
     if right.startswith("~"):
         if relation != "=":
             raise ValueError(f"found {text[:60]!r}; expected an approximation behind = only; leave out the ~")
-        return Part(text, word, relation, interval=interval(right), of=of)
+        return PartClaim(text, word, relation, interval=interval(right), of=of)
     if relation != "=" and _DECIMAL.fullmatch(right):
-        return Part(text, word, relation, AngleSum.rational(Fraction(right)), of=of)
-    return Part(text, word, relation, exact(right, values), of=of)
+        return PartClaim(text, word, relation, AngleSum.rational(Fraction(right)), of=of)
+    return PartClaim(text, word, relation, exact(right, values), of=of)
 
 
 def exact(text: str, values: Mapping[str, int]) -> Exact:
@@ -119,7 +119,7 @@ def interval(text: str) -> tuple[Fraction, Fraction]:
 _RELATIONS: dict[str, Callable[[int, int], bool]] = {"=": eq, "<": lt, ">": gt, "<=": le, ">=": ge}
 
 
-def verify_parts(graph: Topology, parts: Sequence[Part]) -> tuple[tuple[str, ...], bool, str]:
+def verify_parts(graph: Topology, parts: Sequence[PartClaim]) -> tuple[tuple[str, ...], bool, str]:
     """Compare claimed parts with the spectrum of a graph.
 
     A chain, a ring, and grids, tori and Cartesian products of families need no list of their
@@ -136,7 +136,7 @@ def verify_parts(graph: Topology, parts: Sequence[Part]) -> tuple[tuple[str, ...
     return tuple(problems), graph.n <= LARGEST, ", ".join(dict.fromkeys(right))
 
 
-def _subject(part: Part) -> str:
+def _subject(part: PartClaim) -> str:
     return part.word if part.of is None else f"{part.word}({sp.sstr(_number(part.of))})"
 
 
@@ -217,7 +217,7 @@ def _neighbours(found: LazyEigenvalues[Eigenvalue], number: Exact) -> Sequence[E
     return found[max(low - 1, 0) : low + 2]
 
 
-def _decided(part: Part, known: _Known) -> tuple[bool, str]:
+def _decided(part: PartClaim, known: _Known) -> tuple[bool, str]:
     """Whether a part is as claimed, and its value in words."""
     if part.word in ("distinct", "multiplicity"):
         of = part.of if part.of is not None else AngleSum.rational(0)
@@ -232,7 +232,7 @@ def _decided(part: Part, known: _Known) -> tuple[bool, str]:
     return _holds(part, value, AngleSum.rational(1)), shown
 
 
-def _holds(part: Part, value: Value, unit: Value) -> bool:
+def _holds(part: PartClaim, value: Value, unit: Value) -> bool:
     """Whether value / unit is as claimed; the unit is 1, or the slowest eigenvalue."""
     if _complex(value) or _complex(unit):
         raise ValueError(f"{part.text}: complex eigenvalues have no order; expected = and an exact number")

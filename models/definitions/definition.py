@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Self
 
 from ..inputs.plugin_file import PluginFile
-from ..inputs.plugins import Kind
+from ..inputs.plugins import PluginKind
 from ..mechanics.parameter import Parameter
 
 if TYPE_CHECKING:
@@ -246,10 +246,12 @@ def _asked(function: Callable[..., Any]) -> tuple[str, ...]:
     return tuple(inspect.signature(function).parameters)
 
 
-OSCILLATOR = Kind("oscillator", "oscillators", check_oscillator, near={"roessler": "rossler", "vdp": "van_der_pol"})
+OSCILLATOR = PluginKind(
+    "oscillator", "oscillators", check_oscillator, near={"roessler": "rossler", "vdp": "van_der_pol"}
+)
 """Oscillators: the files of the folder `oscillators`."""
 
-FRICTION_LAW = Kind(
+FRICTION_LAW = PluginKind(
     "friction",
     "frictions",
     check_friction,
@@ -257,7 +259,7 @@ FRICTION_LAW = Kind(
 )
 """Friction laws: the files of the folder `frictions`."""
 
-COUPLING = Kind(
+COUPLING = PluginKind(
     "coupling",
     "couplings",
     check_coupling,

@@ -28,7 +28,7 @@ from ..inputs.checks import (
     typed_repr,
 )
 from ..inputs.expression_text import FUNCTIONS
-from ..inputs.frozen import Frozen
+from ..inputs.frozen import FrozenDict
 from ..mechanics.components import TIME
 from ..mechanics.contact import SLIDING, ContactModel, FrictionLaw
 from ..mechanics.expression import RESERVED, exact
@@ -115,7 +115,7 @@ def Lagrangian(
     moving = _functions(what, [T, V, R, *forces, *forces.values()])
     table = _coordinates(what, coordinates, moving)
     defaults = _parameters(what, parameters)
-    names = _Names.of(what, table, moving, defaults)
+    names = _ModelNames.of(what, table, moving, defaults)
     on = {names.state("Q", key, table): value for key, value in forces.items()}
     acting = tuple(names.expression(f"force on {c}", on.get(c, 0)) for c in table)
     energies = [names.expression(about, e) for about, e in (("T", T), ("V", V), ("R", R))]
@@ -187,7 +187,7 @@ def Field(
     moving = _functions(what, [*given, *given.values()])
     table = _distinct(what, "state", {_name(what, "state", key): "" for key in given}, len(given))
     defaults = _parameters(what, parameters)
-    names = _Names.of(what, table, moving, defaults)
+    names = _ModelNames.of(what, table, moving, defaults)
     found = tuple(names.expression(f"rate of {s}", e) for s, e in zip(table, given.values(), strict=True))
     if any(rate.has(FRICTION) for rate in found):
         raise ValueError(f"{what}: found friction(…) in a rate; expected it in the forces of a Lagrangian")
@@ -240,7 +240,7 @@ def friction_law(
     """
     what = f"friction law {_called(name)!r}"
     defaults = _parameters(what, parameters)
-    names = _Names.of_law(what, defaults)
+    names = _ModelNames.of_law(what, defaults)
     coefficient = names.expression("force", force)
     holding = None if static is None else names.expression("static", static)
     used = (coefficient,) if holding is None else (coefficient, holding)
@@ -266,7 +266,7 @@ def _called(name: object) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class _Names:
+class _ModelNames:
     """What the names in the expressions of one model stand for.
 
     `moving` has the functions of time and their derivatives with the symbols that take their places; a plain symbol
@@ -285,7 +285,7 @@ class _Names:
         table: Mapping[str, str],
         functions: Iterable[AppliedUndef],
         parameters: Mapping[str, Parameter],
-    ) -> _Names:
+    ) -> _ModelNames:
         """The names of a model: coordinates with the names of their velocities ("" for none), and parameters."""
         states = (*table, *filter(None, table.values()))
         for state in states:
@@ -308,7 +308,7 @@ class _Names:
         return cls(what, {**symbols, TIME.name: TIME}, states, moving)
 
     @classmethod
-    def of_law(cls, what: str, parameters: Mapping[str, Parameter]) -> _Names:
+    def of_law(cls, what: str, parameters: Mapping[str, Parameter]) -> _ModelNames:
         """The names of a friction law: the sliding velocity and parameters."""
         if SLIDING.name in parameters:
             raise ValueError(f"{what}: the name 'w' stands for the sliding velocity; rename that parameter")
@@ -341,12 +341,12 @@ class _Names:
             raise ValueError(f"{self.what}: {about} has the key {short_repr(key)}; expected {expected}")
         return name
 
-    def initial(self, given: Given | None) -> Frozen[float] | None:
+    def initial(self, given: Given | None) -> FrozenDict[float] | None:
         """The state around which oscillators start."""
         if given is None:
             return None
         table = check_table(f"{self.what}: initial", given)
-        return Frozen(
+        return FrozenDict(
             {self.state("initial", key, self.states): _value(f"initial {key}", value) for key, value in table.items()}
         )
 
@@ -457,7 +457,7 @@ def _assumed(key: object, parameter: Parameter) -> Parameter:
 
 def _own_parameters(
     what: str, expressions: Iterable[sp.Expr], law: FrictionLaw | None, defaults: Mapping[str, Parameter]
-) -> Frozen[Parameter]:
+) -> FrozenDict[Parameter]:
     """The parameters without those of a law that was written among them; ValueError if one is unused or in both."""
     used = {s.name for e in expressions for s in e.free_symbols}
     of_law = frozenset(() if law is None else law.parameters)
@@ -466,7 +466,7 @@ def _own_parameters(
             raise ValueError(f"{what}: {name!r} is in the friction law and outside of it; expected it in one of them")
         if name not in of_law and name not in used:
             raise ValueError(f"{what}: no expression has the parameter {name!r}; use it or leave it out")
-    return Frozen({name: parameter for name, parameter in defaults.items() if name not in of_law})
+    return FrozenDict({name: parameter for name, parameter in defaults.items() if name not in of_law})
 
 
 def _law(what: str, given: object, defaults: Mapping[str, Parameter]) -> FrictionLaw | None:
@@ -478,7 +478,7 @@ def _law(what: str, given: object, defaults: Mapping[str, Parameter]) -> Frictio
     expected = "a name, a law that friction_law('mu*sign(w)', {'mu': 0.3}) makes, or an expression of SymPy of w"
     value = check_instance(f"{what}: friction", given, (sp.Expr, int, float), expected)
     about = f"{what}: friction"
-    coefficient = _Names.of_law(about, defaults).expression("law", value)
+    coefficient = _ModelNames.of_law(about, defaults).expression("law", value)
     used = {s.name for s in coefficient.free_symbols}
     own = {name: parameter for name, parameter in defaults.items() if name in used}
     return friction_law(coefficient, own)

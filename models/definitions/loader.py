@@ -13,7 +13,7 @@ from typing import Any
 
 import sympy as sp
 
-from ..inputs.frozen import Frozen
+from ..inputs.frozen import FrozenDict
 from ..inputs.plugins import call, load
 from ..interactions.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling, split
 from ..mechanics.components import TIME
@@ -61,9 +61,9 @@ def _oscillator(name: str, module: ModuleType) -> Oscillator:
     initial = getattr(module, "INITIAL", None)
     return Oscillator(
         name,
-        Frozen(module.PARAMETERS),
+        FrozenDict(module.PARAMETERS),
         _field(module) if hasattr(module, "field") else _lagrangian(module),
-        None if initial is None else Frozen(initial),
+        None if initial is None else FrozenDict(initial),
         load_friction_law(USUAL_LAW) if module.FRICTION else None,
         summary=_text(module, "SUMMARY"),
         source=_text(module, "SOURCE"),
@@ -100,7 +100,7 @@ def _scaling(module: ModuleType) -> Scaling | None:
     if not hasattr(module, "scales"):
         return None
     scales = call(module.scales, {name: sp.Symbol(name, positive=True) for name in module.UNITS})
-    return Scaling(Frozen(module.UNITS), Frozen(getattr(module, "PHYSICAL", {})), Frozen(scales))
+    return Scaling(FrozenDict(module.UNITS), FrozenDict(getattr(module, "PHYSICAL", {})), FrozenDict(scales))
 
 
 @lru_cache(maxsize=256)
@@ -110,7 +110,7 @@ def _friction_law(name: str, module: ModuleType) -> FrictionLaw:
     static = sp.sympify(call(module.static, parameters)) if hasattr(module, "static") else None
     return FrictionLaw(
         name,
-        Frozen(module.PARAMETERS),
+        FrozenDict(module.PARAMETERS),
         sp.sympify(call(module.force, {**parameters, SLIDING.name: SLIDING})),
         static,
         tuple((low, high) for low, high in getattr(module, "ORDER", ())),
@@ -134,7 +134,7 @@ def _coupling(name: str, coordinates: tuple[str, ...] | None, module: ModuleType
 
     return LagrangianCoupling(
         name,
-        Frozen(module.PARAMETERS),
+        FrozenDict(module.PARAMETERS),
         energy("potential", "q_i", "q_j"),
         energy("dissipation", "v_i", "v_j"),
         energy("kinetic", "v_i", "v_j"),

@@ -15,7 +15,7 @@ from itertools import chain, compress, count
 import sympy as sp
 
 from ..graphs.links import AllPairs, Link, Links
-from ..inputs.display import Written
+from ..inputs.display import HasLatex
 from ..inputs.names import LinkName
 from ..interactions.separation import separated
 from ..mechanics.components import Block, Edge, Node
@@ -65,7 +65,7 @@ class Layer:
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Equations(_Cached, Written):
+class Equations(_Cached, HasLatex):
     """The equations of motion of a network, M d(state)/dt = rhs.
 
     M is the identity unless nodes or links have inertia.  The state is ordered by components, x_1 … x_n,

@@ -11,7 +11,7 @@ import sympy as sp
 
 from ..inputs.checks import check_text, short_repr
 from ..inputs.expression_text import COMPOSED, FUNCTIONS, Expressions
-from ..inputs.reader import Algebra, Expression, NoMeaning, parse, unpaired
+from ..inputs.reader import Algebra, NoMeaning, ParsedText, parse, unpaired
 from .observable import Observable, Window, nodes, rate, real
 
 LENGTH = 4000
@@ -63,12 +63,12 @@ def _read(what: str, text: str) -> Observable:
     expression = _parsed(what, text, "mean(x_1 - x_2)")
     match expression.tree:
         case ast.Call(func=ast.Name(id=name), args=[value], keywords=[]) if name in tuple(Window):
-            return Observable(Window(name), _real(what, Expression(expression.text, value)))
+            return Observable(Window(name), _real(what, ParsedText(expression.text, value)))
     windows = ", ".join(Window)
     raise ValueError(f"{what}: found {short_repr(text)}; expected one of {windows} of an expression outermost")
 
 
-def _parsed(what: str, text: str, example: str) -> Expression:
+def _parsed(what: str, text: str, example: str) -> ParsedText:
     """The expression that a text is; ValueError with an example for any other text."""
     if len(text) > LENGTH:
         raise ValueError(f"{what}: found {len(text)} characters; expected at most {LENGTH}; define parts of it")
@@ -79,7 +79,7 @@ def _parsed(what: str, text: str, example: str) -> Expression:
     return expression
 
 
-def _real(what: str, expression: Expression) -> sp.Expr:
+def _real(what: str, expression: ParsedText) -> sp.Expr:
     """The value of an expression, made of real symbols."""
     try:
         return real(_OfNodes(what).read(expression))

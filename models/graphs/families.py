@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from ..inputs import plugins
 from ..inputs.options import Options, as_options
 from ..inputs.plugin_file import PluginFile
-from ..inputs.plugins import Kind
+from ..inputs.plugins import PluginKind
 from .links import LINK_LIMIT, Link
 from .topology import Topology
 
@@ -64,7 +64,7 @@ def check_topology(module: ModuleType, where: str, text: bytes) -> None:
             raise file.wrong(function, f"{function} lacks the option {missing[0]!r} of edges; expected the same ones")
 
 
-TOPOLOGY = Kind(
+TOPOLOGY = PluginKind(
     "topology",
     "topologies",
     check_topology,

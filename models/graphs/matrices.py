@@ -81,7 +81,7 @@ class MatrixKind(StrEnum):
     """
 
 
-class Graph(Matrix, Protocol):
+class GraphMatrices(Matrix, Protocol):
     """What its other matrices know of a graph, which is the matrix G itself; a `Topology` is one."""
 
     @property
@@ -101,7 +101,7 @@ class Graph(Matrix, Protocol):
 class GraphMatrix(Exact):
     """A matrix of a graph beside its connectivity matrix G."""
 
-    graph: Graph  # the graph
+    graph: GraphMatrices  # the graph
     kind: MatrixKind  # the matrix
 
     def __post_init__(self) -> None:

@@ -119,7 +119,7 @@ def from_graph(graph: Any, weight: str | None = "weight", name: str = "graph") -
     nodes = list(graph.nodes())
     place = {node: k for k, node in enumerate(nodes)}
     many = bool(graph.is_multigraph()) if hasattr(graph, "is_multigraph") else False
-    weights, called = Weights(), _Names(name, [repr(node) for node in nodes])
+    weights, called = Weights(), _GraphNames(name, [repr(node) for node in nodes])
     edges = list(graph.edges(data=True))
     known = sorted({str(key) for *_, data in edges for key in data})
     if edges and weight not in (None, "weight", *known):
@@ -249,7 +249,7 @@ def assembled(
     for node in nodes:
         check_printable(f"{name}: node name", str(node))
     place = {node: k for k, node in enumerate(nodes)}
-    weights, called = Weights(), _Names(name, nodes)
+    weights, called = Weights(), _GraphNames(name, nodes)
     for u, v, value, directed in edges:
         number = value if type(value) is Fraction else rational(value, f"{name}: weight of edge {u} - {v}")
         _put(weights, place[v], place[u], number, directed, called)
@@ -263,7 +263,7 @@ def sorted_labels(labels: Iterable[Hashable]) -> list[Hashable]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Names:
+class _GraphNames:
     """The names of a graph and its nodes, for messages."""
 
     graph: str
@@ -274,7 +274,7 @@ class _Names:
 
 
 def _put(
-    weights: Weights, target: int, source: int, value: Fraction, directed: bool, called: _Names, many: bool = False
+    weights: Weights, target: int, source: int, value: Fraction, directed: bool, called: _GraphNames, many: bool = False
 ) -> None:
     """Add an edge; ValueError if it is a loop, has no weight or is there already."""
     if target == source:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ..inputs.checks import check_instance, check_integer, check_printable, short_repr, typed_repr
-from ..inputs.display import Drawn
+from ..inputs.display import HasDrawing
 from ..inputs.options import Options
 from ..inputs.rational_text import file_text, parse_rows, rational_rows, total
 from .links import Link, join
@@ -53,7 +53,7 @@ class Rule(Protocol):
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
-class Topology(Exact, Drawn):
+class Topology(Exact, HasDrawing):
     """`n` nodes and their sorted links (target, source, weight); an undirected edge is two links.
 
     Parameters

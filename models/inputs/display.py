@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     Axes: TypeAlias = Any
 
 
-class Shown:
+class HasHtml:
     """A value with HTML for notebooks, which `synchain.runtime.reports` writes.
 
     Its public methods refuse arguments that do not fit as public functions do.
@@ -30,7 +30,7 @@ class Shown:
         return fragment(self)
 
 
-class Written(Shown):
+class HasLatex(HasHtml):
     """A value with LaTeX besides."""
 
     __slots__ = ()
@@ -41,7 +41,7 @@ class Written(Shown):
         return latex(self)
 
 
-class Drawn(Shown):
+class HasDrawing(HasHtml):
     """A graph, or a value with a graph."""
 
     __slots__ = ()

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, NoReturn
 import sympy as sp
 
 from .checks import short_repr, suggestion
-from .reader import Algebra, Expression, NoMeaning
+from .reader import Algebra, NoMeaning, ParsedText
 
 EXPONENT, MAGNITUDE = 16, 1e100
 """Largest exponent of a power that is a number, largest constant."""
@@ -102,7 +102,7 @@ class Expressions(Algebra[sp.Basic]):
     numbers: ClassVar[str] = "finite numbers"  # what constants must be, in words
     functions: ClassVar[Mapping[str, Callable[..., sp.Expr]]]  # the functions by their names, as messages list them
 
-    def read(self, expression: Expression) -> sp.Expr:
+    def read(self, expression: ParsedText) -> sp.Expr:
         """Return the value of an expression."""
         try:
             found = self.value(expression.evaluate(self))

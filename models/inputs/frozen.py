@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 T = TypeVar("T")
 
 
-class Frozen(Mapping[str, T], Generic[T]):
+class FrozenDict(Mapping[str, T], Generic[T]):
     """A mapping that cannot change: reads like a dict and can be hashed, compared and pickled."""
 
     __slots__ = ("_hash", "_items")
@@ -40,5 +40,5 @@ class Frozen(Mapping[str, T], Generic[T]):
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError("this mapping is frozen; build a new one with {**old, name: value}")
 
-    def __reduce__(self) -> tuple[type[Frozen[T]], tuple[dict[str, T]]]:
+    def __reduce__(self) -> tuple[type[FrozenDict[T]], tuple[dict[str, T]]]:
         return type(self), (self._items,)

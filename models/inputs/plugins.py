@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 __all__ = [
-    "Kind",
     "OwnFile",
+    "PluginKind",
     "allow_code",
     "allowed_code",
     "blamed",
@@ -49,7 +49,7 @@ PACKAGE = "synchain.models"
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class PluginKind:
     """A kind of plug-in, defined by the room that knows what such a file must hold."""
 
     name: str  # what a file of the kind is called in messages: "oscillator"
@@ -104,7 +104,7 @@ _modules: dict[tuple[str, str, str], ModuleType] = {}
 _allowed: set[Path] = set()
 
 
-def names(kind: Kind) -> tuple[str, ...]:
+def names(kind: PluginKind) -> tuple[str, ...]:
     """Return the sorted names of all plug-ins of a kind."""
     return tuple(sorted({*_own(kind), *_entry_points(kind)}))
 
@@ -136,7 +136,7 @@ def allowed_code() -> tuple[str, ...]:
     return tuple(sorted(map(str, _allowed)))
 
 
-def named(kind: Kind, name: str) -> str:
+def named(kind: PluginKind, name: str) -> str:
     """Return the own name of a plug-in; of a file outside the package an `OwnFile` of its present text.
 
     What is an `OwnFile` already stays what it is, whatever has become of its file.
@@ -150,7 +150,7 @@ def named(kind: Kind, name: str) -> str:
     return own
 
 
-def load(kind: Kind, name: str) -> ModuleType:
+def load(kind: PluginKind, name: str) -> ModuleType:
     """Return the module of a plug-in."""
     own = named(kind, name)
     if own in _own(kind):
@@ -208,12 +208,12 @@ def located(error: Exception, function: Callable[..., object]) -> Exception:
     return _located(error, inspect.getsourcefile(function) or function.__module__)
 
 
-def _own(kind: Kind) -> tuple[str, ...]:
+def _own(kind: PluginKind) -> tuple[str, ...]:
     package = import_module(f"{PACKAGE}.{kind.folder}")
     return tuple(m.name for m in pkgutil.iter_modules(package.__path__) if not m.name.startswith("_"))
 
 
-def _entry_points(kind: Kind) -> Mapping[str, EntryPoint]:
+def _entry_points(kind: PluginKind) -> Mapping[str, EntryPoint]:
     """The plug-ins that installed packages announce; none is loaded for this."""
     return _announced(f"synchain.{kind.folder}", tuple(sys.path))
 
@@ -226,7 +226,7 @@ def _announced(group: str, places: tuple[str, ...]) -> Mapping[str, EntryPoint]:
     return {entry.name: entry for entry in entry_points(group=group)}
 
 
-def _entry(kind: Kind, name: str) -> ModuleType:
+def _entry(kind: PluginKind, name: str) -> ModuleType:
     entry = _entry_points(kind)[name]
     where = f"{kind.name} {name!r} of the entry point {entry.value!r}"
     try:
@@ -240,7 +240,7 @@ def _entry(kind: Kind, name: str) -> ModuleType:
 
 
 @lru_cache(maxsize=64)
-def _check_installed(kind: Kind, module: ModuleType, where: str) -> None:
+def _check_installed(kind: PluginKind, module: ModuleType, where: str) -> None:
     """Check a module of an installed package, once."""
     try:
         text = inspect.getsource(module).encode()
@@ -249,7 +249,7 @@ def _check_installed(kind: Kind, module: ModuleType, where: str) -> None:
     kind.check(module, where, text)
 
 
-def _text(kind: Kind, name: str, place: Path) -> bytes:
+def _text(kind: PluginKind, name: str, place: Path) -> bytes:
     """What stands in a file that may be run; ValueError if it may not, or cannot be read."""
     if not place.is_file():
         raise ValueError(f"{kind.name} {name!r}: no such file: {place}; expected a .py file; check the path")
@@ -266,7 +266,7 @@ def _text(kind: Kind, name: str, place: Path) -> bytes:
         ) from None
 
 
-def _module(kind: Kind, own: OwnFile, text: bytes | None = None) -> ModuleType:
+def _module(kind: PluginKind, own: OwnFile, text: bytes | None = None) -> ModuleType:
     """What the text of a file of code defines, run once for each text."""
     key = (kind.name, own.place, own.digest)
     if key in _modules:

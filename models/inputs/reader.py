@@ -1,6 +1,6 @@
 """The one reader of expressions of users: a whitelist over `ast`, nothing in a text is ever run.
 
-`parse` turns a text into an `Expression`; `Expression.evaluate` walks its tree and leaves the
+`parse` turns a text into an `ParsedText`; `ParsedText.evaluate` walks its tree and leaves the
 meaning of every number, name and operation to an `Algebra`: floats, exact numbers, sums of cosines,
 symbolic weights and graphs are algebras.
 """
@@ -158,7 +158,7 @@ class Arithmetic(Algebra[V]):
 
 
 @dataclass(frozen=True, slots=True)
-class Expression:
+class ParsedText:
     """A text and its syntax tree, made by `parse`."""
 
     text: str
@@ -259,13 +259,13 @@ def _called(node: ast.expr) -> str | None:
     return None
 
 
-def parse(text: str) -> Expression | None:
+def parse(text: str) -> ParsedText | None:
     """Return a text as an expression."""
     stripped = text.strip()
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return Expression(stripped, ast.parse(stripped, mode="eval").body)
+            return ParsedText(stripped, ast.parse(stripped, mode="eval").body)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return None
 

@@ -19,7 +19,7 @@ import sympy as sp
 
 from ..inputs.checks import check_text, short_repr, suggestion
 from ..inputs.expression_text import MAGNITUDE
-from ..inputs.frozen import Frozen
+from ..inputs.frozen import FrozenDict
 from ..mechanics.components import Node
 from ..mechanics.parameter import Parameter
 from .ends import WEIGHT, Pair, Terms
@@ -38,7 +38,7 @@ __all__ = [
     "split",
 ]
 
-STRENGTH = Frozen({"sigma": Parameter(0.0, "1", "strength of the coupling")})
+STRENGTH = FrozenDict({"sigma": Parameter(0.0, "1", "strength of the coupling")})
 """The parameters of every coupling by components; sigma may be negative."""
 
 _POSITIONS = sp.symbols("q_i q_j", real=True)
@@ -82,7 +82,7 @@ class MatrixCoupling:
         return cls(tuple(_read(words))) if "->" in words else None
 
     @property
-    def parameters(self) -> Frozen[Parameter]:
+    def parameters(self) -> FrozenDict[Parameter]:
         """The strength alone."""
         return STRENGTH
 
@@ -140,7 +140,7 @@ class LagrangianCoupling:
     """
 
     name: str  # what messages and scene files call it
-    parameters: Frozen[Parameter]  # its parameters
+    parameters: FrozenDict[Parameter]  # its parameters
     potential: sp.Expr = sp.S.Zero  # the energy stored, Rayleigh's function and the kinetic energy of a link
     dissipation: sp.Expr = sp.S.Zero
     kinetic: sp.Expr = sp.S.Zero

@@ -21,7 +21,7 @@ from ..inputs.checks import (
     typed_repr,
 )
 from ..inputs.expression_text import FUNCTIONS
-from ..inputs.frozen import Frozen
+from ..inputs.frozen import FrozenDict
 from ..mechanics.components import TIME, Node
 from ..mechanics.expression import FRICTION_NAME, LENGTH, exact, read, written
 from ..mechanics.parameter import Parameter
@@ -67,8 +67,8 @@ class Rates:
     True
     """
 
-    rates: Frozen[sp.Expr]
-    parameters: Frozen[Parameter]
+    rates: FrozenDict[sp.Expr]
+    parameters: FrozenDict[Parameter]
 
     def __init__(
         self, rates: Mapping[sp.Symbol | str, object], parameters: Mapping[sp.Symbol | str, object] | None = None
@@ -86,7 +86,7 @@ class Rates:
             if rate == 0:
                 raise ValueError(f"rates of a link: the rate of {name!r} is 0; expected a function; leave it out")
         ordered = sorted(zip(targets, found.expressions, strict=True))
-        object.__setattr__(self, "rates", Frozen(ordered))
+        object.__setattr__(self, "rates", FrozenDict(ordered))
         object.__setattr__(self, "parameters", found.parameters)
 
     def __reduce__(self) -> tuple[type[Rates], tuple[object, ...]]:
@@ -152,7 +152,7 @@ class Potential:
     """
 
     energy: sp.Expr
-    parameters: Frozen[Parameter]
+    parameters: FrozenDict[Parameter]
 
     def __init__(self, energy: object, parameters: Mapping[sp.Symbol | str, object] | None = None) -> None:
         found = _Content.of("potential of a link", [_told("potential of a link", energy)], parameters)
@@ -223,7 +223,7 @@ class _Content:
     """The checked expressions and parameters of a coupling, and the symbols that belong to no end."""
 
     expressions: tuple[sp.Expr, ...]
-    parameters: Frozen[Parameter]
+    parameters: FrozenDict[Parameter]
     own: frozenset[sp.Symbol]
 
     @classmethod
@@ -279,7 +279,7 @@ def _target(key: object) -> str:
     return key.name[:-2]
 
 
-def _parameters(what: str, given: Mapping[sp.Symbol | str, object] | None) -> Frozen[Parameter]:
+def _parameters(what: str, given: Mapping[sp.Symbol | str, object] | None) -> FrozenDict[Parameter]:
     """The parameters by name, in the order of the alphabet: equal contents make equal couplings."""
     found: dict[str, Parameter] = {}
     for key, value in check_table(f"{what}: parameters", {} if given is None else given).items():
@@ -294,7 +294,7 @@ def _parameters(what: str, given: Mapping[sp.Symbol | str, object] | None) -> Fr
         if name in found:
             raise ValueError(f"{what}: the parameter {name!r} is given twice; expected it once")
         found[name] = value if isinstance(value, Parameter) else _parameter(f"{what}: parameter {name}", value)
-    return Frozen(sorted(found.items(), key=lambda item: item[0]))
+    return FrozenDict(sorted(found.items(), key=lambda item: item[0]))
 
 
 def _parameter(what: str, value: object) -> Parameter:

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 import sympy as sp
 
-from ..inputs.frozen import Frozen
+from ..inputs.frozen import FrozenDict
 from ..inputs.words import Word
 from .jumps import rough_at
 from .parameter import Parameter
@@ -75,7 +75,7 @@ class FrictionLaw:
     """
 
     name: str
-    parameters: Frozen[Parameter]
+    parameters: FrozenDict[Parameter]
     force: sp.Expr
     static: sp.Expr | None = None
     order: tuple[tuple[str, str], ...] = ()

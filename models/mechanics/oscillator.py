@@ -8,7 +8,7 @@ from typing import Any
 
 import sympy as sp
 
-from ..inputs.frozen import Frozen
+from ..inputs.frozen import FrozenDict
 from .contact import ContactModel, FrictionLaw
 from .parameter import Parameter
 
@@ -53,11 +53,11 @@ class Coordinate:
 class Scaling:
     """How the physical quantities of a Lagrangian become numbers."""
 
-    units: Frozen[str]  # unit of each quantity that fixes the scales
-    physical: Frozen[str]  # physical quantity behind each parameter
+    units: FrozenDict[str]  # unit of each quantity that fixes the scales
+    physical: FrozenDict[str]  # physical quantity behind each parameter
     # the units of mass, length and time (keys kg, m, s), made of the quantities of `units`, which are positive
     # symbols
-    scales: Frozen[sp.Expr]
+    scales: FrozenDict[sp.Expr]
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +123,7 @@ class Oscillator:
     """
 
     name: str
-    parameters: Frozen[Parameter]
+    parameters: FrozenDict[Parameter]
     model: LagrangianModel | FieldModel
     initial: Mapping[str, Any] | None = None
     friction: FrictionLaw | None = None

@@ -36,7 +36,7 @@ class Share:
 
 
 @dataclass(frozen=True, slots=True)
-class Energy:
+class EnergyTerms:
     """Energy and power of a node of each kind, in its states, and of a link of each edge, in those of its two ends.
 
     All is non-dimensional.  `nodes` follow equations.nodes, `links` equations.edges.  A pair of links, there and back, is
@@ -89,7 +89,7 @@ class Energy:
 
 
 @lru_cache(maxsize=16)
-def energy_of(model: Model, varied: tuple[str, ...] = ()) -> Energy:
+def energy_of(model: Model, varied: tuple[str, ...] = ()) -> EnergyTerms:
     """Return the energy of a model's network."""
     kinds = model.kinds
     for kind in kinds:
@@ -112,7 +112,7 @@ def energy_of(model: Model, varied: tuple[str, ...] = ()) -> Energy:
             links.append(share)
             edges.append(((a, b), joint))
         layers.append(replace(layer, edge_of=tuple(edges)))
-    return Energy(replace(equations, layers=tuple(layers)), nodes, tuple(links))
+    return EnergyTerms(replace(equations, layers=tuple(layers)), nodes, tuple(links))
 
 
 def _of_node(kind: NodeKind, contact: ContactModel) -> Share:

@@ -17,7 +17,7 @@ from ..graphs.families import topology
 from ..graphs.links import LINK_LIMIT, numbered
 from ..graphs.topology import Topology
 from ..inputs.checks import check_number, listed, short_repr, suggestion
-from ..inputs.frozen import Frozen
+from ..inputs.frozen import FrozenDict
 from ..inputs.names import LinkName, NodeName
 from ..inputs.unsupported import unsupported
 from ..interactions.coupling import Coupling, LagrangianCoupling, Potential
@@ -72,7 +72,7 @@ class Model:
     unlinked: Equations = field(init=False, repr=False, compare=False)  # the equations of the nodes without their links
     # the parameters of all kinds, and those of the couplings whose graphs have links; a name has the default of the
     # first kind that has it
-    parameters: Frozen[Parameter] = field(init=False, repr=False, compare=False)
+    parameters: FrozenDict[Parameter] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "unlinked", _unlinked(self.kinds, self.kind_of, self.contact))
@@ -302,22 +302,22 @@ def _link_names(model: Model, name: str) -> Mapping[tuple[int, int], LinkName]:
 
 
 @lru_cache(maxsize=64)
-def _kind_parameters(kind: NodeKind, contact: ContactModel, couplings: tuple[Coupling, ...]) -> Frozen[Parameter]:
+def _kind_parameters(kind: NodeKind, contact: ContactModel, couplings: tuple[Coupling, ...]) -> FrozenDict[Parameter]:
     """Every parameter of nodes of one kind with its default, unit and range."""
-    return Frozen(network.parameters(kind.oscillator, kind.friction, contact, couplings))
+    return FrozenDict(network.parameters(kind.oscillator, kind.friction, contact, couplings))
 
 
 @lru_cache(maxsize=64)
 def _parameters(
     kinds: tuple[NodeKind, ...], contact: ContactModel, couplings: tuple[Coupling, ...]
-) -> Frozen[Parameter]:
+) -> FrozenDict[Parameter]:
     """The parameters of all kinds, each with the default of the first kind that has it, then those of the couplings."""
     known: dict[str, Parameter] = {}
     for joined in ((), couplings):
         for kind in kinds:
             for name, parameter in _kind_parameters(kind, contact, joined).items():
                 known.setdefault(name, parameter)
-    return Frozen(known)
+    return FrozenDict(known)
 
 
 def _states(component: str, holders: tuple[int, ...]) -> str:

@@ -17,7 +17,7 @@ from ..inputs.checks import check_instance
 from ..mechanics.components import TIME, WEIGHT_NUMBER, Edge, Node
 from ..mechanics.contact import SLIDING
 from ..mechanics.nondimensional import FRICTION
-from .writer import Latex, Style, Text, Writer
+from .writer import ExpressionWriter, Latex, Style, Text
 
 LARGEST = 6
 """Networks of more nodes are written once, for node i, instead of node by node."""
@@ -148,7 +148,7 @@ def lines(equations: Equations, style: Style) -> Iterator[str]:
 def _law(equations: Equations, law: sp.Expr, style: Style, kind: int) -> str:
     """The friction law of nodes of some kind; i is the node whose parameters they are."""
     own = {s: style.letter(s.name, "i") for s in _varied(equations) if law.has(s)}
-    writer = Writer(style, own, frozenset((SLIDING,)))
+    writer = ExpressionWriter(style, own, frozenset((SLIDING,)))
     text = f"{writer.write(FRICTION(SLIDING))} = {writer.write(law)}"
     nodes = [str(i + 1) for i, k in enumerate(equations.kind_of) if k == kind]
     about = [f"of node{'s' * (len(nodes) > 1)} {', '.join(nodes)}"] if equations.mixed else []
@@ -185,7 +185,7 @@ def _at_node(equations: Equations, named: tuple[_Named, ...], style: Style, i: i
     for j in range(equations.n):
         index = str(j + 1) if equations.n > 1 else ""
         letters |= _letters(equations, named[equations.kind_of[j]], style, equations.symbols(j), index, j)
-    writer = Writer(style, letters, frozenset((*letters, TIME)))
+    writer = ExpressionWriter(style, letters, frozenset((*letters, TIME)))
     links = [(link, edge) for link, edge in equations.linked() if link[0] == i]
     for c in _shown(equations, i):
         terms = [term.xreplace(here) for term in _ordered(own.rhs[c], node)]
@@ -195,7 +195,7 @@ def _at_node(equations: Equations, named: tuple[_Named, ...], style: Style, i: i
         yield f"{_left(equations, writer, c, i)} = {writer.total(terms)}"
 
 
-def _left(equations: Equations, writer: Writer, c: int, i: int) -> str:
+def _left(equations: Equations, writer: ExpressionWriter, c: int, i: int) -> str:
     """The left side: the rate of component c of node i, and the rates that links add.
 
     The rate is written chi'' if the component is the velocity of chi.
@@ -217,7 +217,7 @@ def _left(equations: Equations, writer: Writer, c: int, i: int) -> str:
     added = sp.collect(sp.expand(sp.Add(*terms)), list(rates))
     if added == 0:
         return own
-    full = Writer(writer.style, {**writer.letters, **rates}, frozenset((*writer.letters, *rates, TIME)))
+    full = ExpressionWriter(writer.style, {**writer.letters, **rates}, frozenset((*writer.letters, *rates, TIME)))
     more = full.total([sp.factor_terms(term) for term in sp.Add.make_args(added)])
     return f"{own} {'- ' + more[1:] if more.startswith('-') else '+ ' + more}"
 
@@ -228,10 +228,10 @@ def _masses(node: Node, c: int) -> tuple[sp.Expr, ...]:
     return () if all(e == sp.Integer(k == c) for k, e in enumerate(row)) else row
 
 
-def _massive(row: Sequence[sp.Expr], states: Sequence[sp.Symbol], writer: Writer) -> str:
+def _massive(row: Sequence[sp.Expr], states: Sequence[sp.Symbol], writer: ExpressionWriter) -> str:
     """A row of masses times rates."""
     rates = {sp.Symbol(f"{s.name}'", real=True): writer.write(s) + "'" for s in states}
-    full = Writer(writer.style, {**writer.letters, **rates}, frozenset((*writer.letters, *rates, TIME)))
+    full = ExpressionWriter(writer.style, {**writer.letters, **rates}, frozenset((*writer.letters, *rates, TIME)))
     return full.total([e * rate for e, rate in zip(row, rates, strict=True) if e != 0])
 
 
@@ -249,7 +249,7 @@ def _generic(equations: Equations, named: _Named, style: Style) -> Iterator[str]
         letters |= _letters(equations, named, style, edge.there, "j")
         letters |= {s: style.letter(of.name, "j") for s, of in edge.theirs}
         letters[_weight(name)] = style.letter(name, "ij")
-    writer = Writer(style, letters, frozenset({TIME, *letters} - {_weight(name) for _, name in joints}))
+    writer = ExpressionWriter(style, letters, frozenset({TIME, *letters} - {_weight(name) for _, name in joints}))
     for c in _shown(equations):
         line = writer.total([term.xreplace(here) for term in _ordered(named.rhs[c], node)])
         for edge, name in joints:
@@ -269,7 +269,7 @@ def _weight(name: str) -> sp.Symbol:
     return sp.Symbol(f"{name}_ij", real=True)
 
 
-def _summed_inertia(edge: Edge, weight: sp.Symbol, c: int, writer: Writer) -> str:
+def _summed_inertia(edge: Edge, weight: sp.Symbol, c: int, writer: ExpressionWriter) -> str:
     """What the links of node i add to the left side of component c: masses times rates."""
     ends = (*edge.here, *edge.there)
     rates = {sp.Symbol(f"{s.name}'", real=True): writer.write(s) + "'" for s in ends}
@@ -277,17 +277,21 @@ def _summed_inertia(edge: Edge, weight: sp.Symbol, c: int, writer: Writer) -> st
     term = sp.factor(sp.Add(*(e * rate for e, rate in zip(masses, rates, strict=True))))
     if term == 0:
         return ""
-    full = Writer(writer.style, {**writer.letters, **rates}, frozenset((*writer.letters, *rates, TIME)) - {weight})
+    full = ExpressionWriter(
+        writer.style, {**writer.letters, **rates}, frozenset((*writer.letters, *rates, TIME)) - {weight}
+    )
     return _summed(term.xreplace({edge.weight: weight}), (weight, *ends, *rates), full)
 
 
-def _sum_over_links(edge: Edge, weight: sp.Symbol, c: int, writer: Writer, numbered: tuple[sp.Symbol, ...]) -> str:
+def _sum_over_links(
+    edge: Edge, weight: sp.Symbol, c: int, writer: ExpressionWriter, numbered: tuple[sp.Symbol, ...]
+) -> str:
     """The links of node i: what all of them share, not what is `numbered` by link, stands before the sum sign."""
     inside = (weight, *edge.here, *edge.there, *(s for s, _ in edge.theirs), *numbered)
     return _summed(edge.rhs[c].xreplace({edge.weight: weight}), inside, writer)
 
 
-def _summed(term: sp.Expr, inside: tuple[sp.Symbol, ...], writer: Writer) -> str:
+def _summed(term: sp.Expr, inside: tuple[sp.Symbol, ...], writer: ExpressionWriter) -> str:
     """A sum over j with its sign in front.
 
     Factors that do not depend on symbols `inside` stand before the sum sign.

@@ -54,7 +54,7 @@ def formula(latex: str, display: bool = False) -> str:
     """Return a formula in this package's LaTeX as a MathML element that keeps the LaTeX beside it."""
     style = ' display="block"' if display else ""
     source = f'<annotation encoding="application/x-tex">{escape(latex)}</annotation>'
-    return f"<math{style}><semantics>{_Reader(TOKENS.findall(latex)).row()}{source}</semantics></math>"
+    return f"<math{style}><semantics>{_TokenReader(TOKENS.findall(latex)).row()}{source}</semantics></math>"
 
 
 def mathml(equations: Equations) -> str:
@@ -63,7 +63,7 @@ def mathml(equations: Equations) -> str:
 
 
 @dataclass(slots=True)
-class _Reader:
+class _TokenReader:
     """Reads tokens of LaTeX from left to right."""
 
     tokens: list[str]

@@ -174,7 +174,7 @@ class Text:
 
 
 @dataclass(frozen=True, slots=True)
-class Writer:
+class ExpressionWriter:
     """Writes expressions in one style."""
 
     style: Style  # LaTeX or text

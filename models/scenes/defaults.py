@@ -13,7 +13,7 @@ import sympy as sp
 
 from ..dynamics.record import Record
 from ..inputs.checks import check_choice, check_integer, check_number, check_text, short_repr
-from ..inputs.frozen import Frozen
+from ..inputs.frozen import FrozenDict
 from ..inputs.words import Word
 from ..mechanics.components import WEIGHT_NUMBER
 from ..mechanics.contact import ContactModel, FrictionLaw
@@ -154,7 +154,7 @@ def _check_physics(model: Model, numbers: Mapping[str, float], axes: Sequence[Ax
                 check_power(kind.friction, own)
 
 
-def _start(model: Model, given: object, seed: int) -> Frozen[tuple[float, ...]]:
+def _start(model: Model, given: object, seed: int) -> FrozenDict[tuple[float, ...]]:
     """The initial states, component by component, those of each kind of node around its own centre."""
     for name in model.components:
         base, _, number = name.rpartition("_")

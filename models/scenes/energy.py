@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from ..networks.energy_terms import Energy, energy_of
+from ..networks.energy_terms import EnergyTerms, energy_of
 from .scene import Scene
 
 __all__ = ["energy"]
 
 
-def energy(scene: Scene) -> Energy:
+def energy(scene: Scene) -> EnergyTerms:
     """Return the energy of a scene's network.
 
     Raises ValueError as `energy_of`, for a network that has none.

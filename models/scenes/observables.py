@@ -10,7 +10,7 @@ import sympy as sp
 from ..dynamics.observable import ENERGY, AtNode, Observable, Rate, Reduction, node_symbols
 from ..dynamics.observable_text import as_observable, as_value
 from ..inputs.checks import check_table, check_text, short_repr, suggestion
-from ..inputs.frozen import Frozen
+from ..inputs.frozen import FrozenDict
 from ..inputs.names import ATTRIBUTES, NodeName, expect_free
 from ..mechanics.components import TIME
 from ..networks.energy_terms import energy_of
@@ -22,24 +22,24 @@ ENDINGS = ("", "_time", "_count", "_kept")
 """What follows the name of a section in the names that results have of it."""
 
 
-def observables(model: Model, numbers: Mapping[str, float], given: object) -> Frozen[Observable]:
+def observables(model: Model, numbers: Mapping[str, float], given: object) -> FrozenDict[Observable]:
     """Return the observables of a scene by their names."""
     if given is None:
-        return Frozen()
+        return FrozenDict()
     found: dict[str, Observable] = {}
     for name, value in _named("observe", model, numbers, given):
         found[name] = as_observable(f"observe {name}", value)
         _check_names(f"observe {name}", found[name].value, model, numbers)
-    return Frozen(found)
+    return FrozenDict(found)
 
 
-def sections(model: Model, numbers: Mapping[str, float], given: object) -> Frozen[Section]:
+def sections(model: Model, numbers: Mapping[str, float], given: object) -> FrozenDict[Section]:
     """Return the sections on functions of a scene by their names, with all that they keep spelled out.
 
     Parameters and errors are those of `observables`; the values are sections or their tables.
     """
     if given is None:
-        return Frozen()
+        return FrozenDict()
     found: dict[str, Section] = {}
     for name, value in _named("sections", model, numbers, given, ENDINGS):
         what = f"section {name}"
@@ -54,7 +54,7 @@ def sections(model: Model, numbers: Mapping[str, float], given: object) -> Froze
         for text in model.unlinked.state if section.keep is None else section.keep:
             kept += _kept(what, as_value(what, text), model, numbers)
         found[name] = replace(section, variable=sp.sstr(function, order="lex"), keep=tuple(kept))
-    return Frozen(found)
+    return FrozenDict(found)
 
 
 def stop(model: Model, numbers: Mapping[str, float], given: object) -> str | None:

@@ -16,8 +16,8 @@ from ..dynamics.periodicity import Drive, as_function, names_in, period_of
 from ..dynamics.record import Record
 from ..graphs.topology import Topology
 from ..inputs.checks import check_instance, check_table, check_text, is_row, listed, suggestion
-from ..inputs.display import Drawn, Written
-from ..inputs.frozen import Frozen
+from ..inputs.display import HasDrawing, HasLatex
+from ..inputs.frozen import FrozenDict
 from ..inputs.keywords import called_from_outside, warn
 from ..inputs.names import NodeName
 from ..inputs.unsupported import unsupported
@@ -40,11 +40,11 @@ from .warnings import asynchrony, function_of_inputs, warnings
 if TYPE_CHECKING:
     from ..spectra.spectrum import Spectrum
 
-__all__ = ["KEYWORDS", "Axis", "Scene", "Section", "a_scene"]
+__all__ = ["KEYWORDS", "Axis", "Scene", "Section", "check_scene"]
 
 
 @dataclass(frozen=True, slots=True, init=False, repr=False)
-class Scene(Drawn, Written):
+class Scene(HasDrawing, HasLatex):
     """A network of oscillators, its numbers, its start, what to record and what to sweep.
 
     Every keyword has a default; the same names are the keys of a scene file (see docs/scenes.md).  States,
@@ -137,12 +137,12 @@ class Scene(Drawn, Written):
     nodes: tuple[Group, ...]
     topology: Topology
     links: tuple[tuple[Coupling | None, Topology], ...] | None
-    parameters: Frozen[float]
-    initial: Frozen[tuple[float, ...]]
+    parameters: FrozenDict[float]
+    initial: FrozenDict[tuple[float, ...]]
     record: tuple[Record, ...]
-    observe: Frozen[Observable]
+    observe: FrozenDict[Observable]
     section: Section
-    sections: Frozen[Section]
+    sections: FrozenDict[Section]
     stop: str | None
     transient: float
     window: float
@@ -157,10 +157,10 @@ class Scene(Drawn, Written):
     continuation: Continuation
     seed: int
     realisations: int
-    draws: Frozen[Draws]
+    draws: FrozenDict[Draws]
     rng: int
     model: Model = field(compare=False)
-    given: Frozen[Any] = field(compare=False)
+    given: FrozenDict[Any] = field(compare=False)
 
     def __init__(
         self,
@@ -451,7 +451,7 @@ _FOLLOWING = {"friction": "default", "contact": None, "record": None, "section":
 """Keywords whose default depends on other keywords, with the value that stands for it."""
 
 
-def _kept(given: Mapping[str, Any], values: Mapping[str, Any]) -> Frozen[Any]:
+def _kept(given: Mapping[str, Any], values: Mapping[str, Any]) -> FrozenDict[Any]:
     """What was given, in values that do not change: defaults that follow other keywords stay open."""
     kept = {name: values[name] for name in KEYWORDS}
     for name, following in _FOLLOWING.items():
@@ -463,16 +463,16 @@ def _kept(given: Mapping[str, Any], values: Mapping[str, Any]) -> Frozen[Any]:
     if GRAPH in values["draws"] and given["topology"] is not None:
         kept["topology"] = as_topology(given["topology"])
     if given["initial"] is not None:
-        kept["initial"] = Frozen({n: _kept_states(at, values["initial"][n]) for n, at in given["initial"].items()})
+        kept["initial"] = FrozenDict({n: _kept_states(at, values["initial"][n]) for n, at in given["initial"].items()})
     if given["parameters"] is not None:
-        kept["parameters"] = Frozen(_kept_parameters(given["parameters"], values["model"], values["parameters"]))
-    return Frozen(kept)
+        kept["parameters"] = FrozenDict(_kept_parameters(given["parameters"], values["model"], values["parameters"]))
+    return FrozenDict(kept)
 
 
 def _kept_states(given: object, states: tuple[float, ...]) -> object:
     """The states of a component as they were given: a number, a range, or a tuple with one number for each node."""
     if isinstance(given, Mapping):
-        return Frozen(given)
+        return FrozenDict(given)
     return states if is_row(given.tolist() if hasattr(given, "tolist") else given) else states[0]
 
 
@@ -491,7 +491,7 @@ def _kept_parameters(given: Mapping[str, object], model: Model, numbers: Mapping
     return kept
 
 
-def a_scene(value: object) -> Scene:
+def check_scene(value: object) -> Scene:
     """Return the value if it is a Scene, else raise TypeError."""
 
     return check_instance("scene", value, Scene, "a Scene, e.g. load_scene('figure_4a')")

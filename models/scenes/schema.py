@@ -13,7 +13,7 @@ from ..dynamics.network import KAPPA
 from ..graphs.families import Family, family
 from ..graphs.families import names as families
 from ..inputs import plugins
-from ..inputs.plugins import Kind
+from ..inputs.plugins import PluginKind
 from ..inputs.words import Word
 from ..mechanics.contact import ContactModel
 from ..mechanics.parameter import Parameter
@@ -147,7 +147,7 @@ def _either(*others: Table) -> Table:
     return {"anyOf": [NUMBER, *others]}
 
 
-def _part(kind: Kind, *words: str) -> Table:
+def _part(kind: PluginKind, *words: str) -> Table:
     """The name of a part, a file outside the package, or one of some words."""
     return {"anyOf": [{"enum": [*plugins.names(kind), *words]}, FILE]}
 

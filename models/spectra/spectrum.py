@@ -13,7 +13,7 @@ from ..algebra.balls import precision
 from ..algebra.lazy import LazyEigenvalues
 from ..algebra.roots import Root, coefficient_text
 from ..inputs.checks import check_instance
-from ..inputs.display import Written
+from ..inputs.display import HasLatex
 from .eigenvalue import Eigenvalue, decimal
 
 SHOWN = 24
@@ -21,7 +21,7 @@ SHOWN = 24
 
 
 @dataclass(frozen=True, slots=True)
-class Spectrum(Written):
+class Spectrum(HasLatex):
     """The distinct eigenvalues downwards by real part (of G from 0), conjugates side by side.
 
     Parameters

@@ -16,7 +16,7 @@ from .matrix import Matrix
 from .solve import DENSE_LIMIT
 
 
-class Graph(Matrix, Protocol):
+class WeightedGraph(Matrix, Protocol):
     """The matrix G of a graph: weights of links, with rows that sum to 0."""
 
     @property
@@ -24,7 +24,7 @@ class Graph(Matrix, Protocol):
         """In words, the first links that do not act both ways with one weight; "" if all do."""
 
 
-def spanning_trees(graph: Graph) -> Fraction:
+def spanning_trees(graph: WeightedGraph) -> Fraction:
     """Return the sum over all spanning trees of the products of their weights, by the matrix-tree theorem.
 
     Of a graph with weights of 1 it is the number of its spanning trees; it is 0 if the graph falls
@@ -34,7 +34,7 @@ def spanning_trees(graph: Graph) -> Fraction:
     return first / graph.n
 
 
-def kirchhoff_index(graph: Graph) -> Fraction:
+def kirchhoff_index(graph: WeightedGraph) -> Fraction:
     """Return the sum of the resistances between all pairs of nodes, weights taken for conductances.
 
     It is n Σ 1/μ over the nonzero eigenvalues μ of -G (D. J. Klein, M. Randić, J. Math. Chem. 12,
@@ -49,7 +49,7 @@ def kirchhoff_index(graph: Graph) -> Fraction:
     return graph.n * second / first
 
 
-def _lowest(graph: Graph, what: str) -> tuple[Fraction, Fraction]:
+def _lowest(graph: WeightedGraph, what: str) -> tuple[Fraction, Fraction]:
     """The coefficients of z and z² of det(z - G)."""
     if graph.asymmetry:
         raise ValueError(f"{what}: found {graph.asymmetry} in {graph.name}; expected an undirected graph")

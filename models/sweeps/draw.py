@@ -13,7 +13,7 @@ from ..graphs.graph_text import checked_name, read_graph
 from ..graphs.readers import as_topology, is_graph
 from ..graphs.topology import Topology
 from ..inputs.checks import check_integer, check_number, check_table, check_text, first_of, short_repr
-from ..inputs.frozen import Frozen
+from ..inputs.frozen import FrozenDict
 from ..inputs.names import LinkName, NodeName
 from ..networks.model import MOST_NUMBERED, WEIGHTS, Model, union_of
 from .axis import LIMIT, Axis
@@ -63,14 +63,14 @@ GRAPH = "topology"
 """The name of the graph among what is drawn."""
 
 
-def draws(given: object, realisations: object) -> Frozen[Draws]:
+def draws(given: object, realisations: object) -> FrozenDict[Draws]:
     """Return what is drawn, by the names of parameters and initial states."""
     count = check_integer("realisations", realisations, 0, LIMIT)
     table = {} if given is None else check_table("draws", given)
     if bool(table) != bool(count):
         found = f"{count} realisations and {len(table)} names to draw"
         raise ValueError(f"draws: found {found}; expected both, e.g. realisations=50, draws={{'x': normal(0, 1)}}")
-    return Frozen(
+    return FrozenDict(
         {
             check_text("draw", name): (_graphs if name == GRAPH else _drawn)(f"draw {name}", value, count)
             for name, value in table.items()
@@ -192,7 +192,7 @@ def _is_row(value: object) -> TypeGuard[Sequence[object]]:
 
 
 @lru_cache(maxsize=64)
-def drawn_axes(model: Model, drawn: Frozen[Draws], count: int, rng: int) -> tuple[Axis, ...]:
+def drawn_axes(model: Model, drawn: FrozenDict[Draws], count: int, rng: int) -> tuple[Axis, ...]:
     """Return the drawn values of each parameter and initial state, one for each realisation.
 
     A distribution of a parameter or state of the nodes is drawn for each node by itself, that of a parameter of links, or

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..inputs.checks import check_integer, check_keys, check_number, check_table, first_of, is_row, short_repr
-from ..inputs.frozen import Frozen
+from ..inputs.frozen import FrozenDict
 
 SEED_LIMIT = 2**63 - 1
 
@@ -43,7 +43,7 @@ def _distances(n: int, k: int) -> tuple[float, ...]:
     return tuple(width * (n - 1 - 2 * i) / (200 * (n - 1)) for i in range(n))
 
 
-def chosen_start(given: object, defaults: Mapping[str, tuple[float, ...]], seed: int) -> Frozen[tuple[float, ...]]:
+def chosen_start(given: object, defaults: Mapping[str, tuple[float, ...]], seed: int) -> FrozenDict[tuple[float, ...]]:
     """Return {component: floats} from what the user gave for some or all components, the rest as in `defaults`."""
     found = check_table("initial", {} if given is None else given)
     check_keys("initial", found, tuple(defaults))
@@ -51,7 +51,7 @@ def chosen_start(given: object, defaults: Mapping[str, tuple[float, ...]], seed:
     for name, values in defaults.items():
         if name in found:
             states[name] = _component(f"initial {name}", found[name], name, len(values), seed)
-    return Frozen(states)
+    return FrozenDict(states)
 
 
 def _component(what: str, value: object, name: str, n: int, seed: int) -> tuple[float, ...]:

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias, TypeVar
 from ..dynamics.periodicity import Drive, as_function, drive_of, names_in
 from ..graphs.readers import as_topology, is_graph
 from ..inputs.checks import check_number, check_table, first_of, is_row, short_repr
-from ..inputs.frozen import Frozen
+from ..inputs.frozen import FrozenDict
 from ..inputs.names import LinkName, NodeName
 from ..networks.model import WEIGHTS, Model, NodeKind, in_range
 from .axis import Axis
@@ -22,7 +22,7 @@ Place: TypeAlias = NodeName | LinkName
 """The name of a parameter at one node or one link."""
 
 
-def parameters(model: Model, given: object, axes: Sequence[Axis]) -> Frozen[float]:
+def parameters(model: Model, given: object, axes: Sequence[Axis]) -> FrozenDict[float]:
     """Return every parameter with its value; those that differ from node to node, or are swept at one, as a_1 … a_n.
 
     Those that differ from link to link, or are swept at one, are k_1_2 where node 1 feels node 2.
@@ -50,7 +50,7 @@ def parameters(model: Model, given: object, axes: Sequence[Axis]) -> Frozen[floa
     if WEIGHTS in swept - set(values):
         names, ((_, graph),) = model.link_names(WEIGHTS), model.linked
         values |= {str(names[i, j]): float(weight) for i, j, weight in graph.links}
-    return Frozen(values)
+    return FrozenDict(values)
 
 
 class _Given:

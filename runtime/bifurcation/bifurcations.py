@@ -76,14 +76,14 @@ def bifurcations_between(arc: Arc, value: float, orbit: PeriodicOrbit, phases: P
     before = arc.phases[-1]
     if before is None or phases is None or before.slip_states == phases.slip_states:
         both = arc.copy().take(value, orbit, phases)
-        return _crossings(Step(both, (arc.values[-1], value), (arc.orbits[-1], orbit)))
+        return _crossings(OrbitPair(both, (arc.values[-1], value), (arc.orbits[-1], orbit)))
     ahead = len(before.slip_states) <= len(phases.slip_states)
     known = arc.copy() if ahead else arc.empty().take(value, orbit, phases)
     far = value if ahead else arc.values[-1]
     change = _stick_loss(arc, value, orbit, before, phases) if _same_slips(before, phases) else None
     change = change or _graze(known, far)
     start = (known.values[0], known.orbits[0]) if not ahead else (arc.values[-1], arc.orbits[-1])
-    beside = _crossings(Step(known, (start[0], change.value), (start[1], change.orbit)))
+    beside = _crossings(OrbitPair(known, (start[0], change.value), (start[1], change.orbit)))
     return sorted([change, *beside], key=lambda bifurcation: bifurcation.value)
 
 
@@ -120,14 +120,14 @@ def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
             orbit = periodic_orbit(arc.scene, half, middle, parameters={arc.name: value})
             middle = orbit.state
             single.take(value, orbit, orbit.phases)
-        crossings = _crossings(Step(single, (single.values[0], beyond), (single.orbits[0], single.orbits[1])))
+        crossings = _crossings(OrbitPair(single, (single.values[0], beyond), (single.orbits[0], single.orbits[1])))
     except ArithmeticError:
         return None
     return next((each for each in crossings if each.kind is BifurcationKind.PERIOD_DOUBLING), None)
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class OrbitPair:
     """Two orbits of the same phases on an arc, between which test functions of the orbit have zeros."""
 
     arc: Arc  # arc of the orbits
@@ -169,7 +169,7 @@ class Step:
         return one * other < 0.0 and min(abs(one), abs(other)) > NEUTRAL
 
 
-def _crossings(step: Step) -> list[Bifurcation]:
+def _crossings(step: OrbitPair) -> list[Bifurcation]:
     """Crossings of the unit circle by multipliers."""
     at_one = BifurcationKind.FOLD if turns(step.arc, step.values, step.orbits) else BifurcationKind.BRANCH_POINT
     kinds = {-1.0: BifurcationKind.PERIOD_DOUBLING, 1.0: at_one}

@@ -17,7 +17,7 @@ from synchain.models.mechanics.components import Block, Edge, Node
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class TemplateJacobian:
     """What the nodes of one kind, or the links of one template, add."""
 
     # rates and entries of blocks, one after the other, as a function of states and parameters
@@ -37,7 +37,7 @@ class Part:
         blocks: list[Block],
         places: tuple[np.ndarray, ...],
         numbers: list[float | np.ndarray],
-    ) -> Part:
+    ) -> TemplateJacobian:
         """Compile a template."""
         entries = [e for block in blocks for row in block for e in row]
         states = frozenset(symbols[: sum(table.shape[1] for table in places)])
@@ -65,18 +65,19 @@ class Linearised:
     """The equations M d(state)/dt = r(state) of a network without a drive."""
 
     dimension: int  # number of states
-    parts: tuple[Part, ...]  # what nodes and links add to r and to its Jacobian
-    masses: tuple[Part, ...]  # what they add to M, as Jacobian blocks; empty if M is the identity
+    parts: tuple[TemplateJacobian, ...]  # what nodes and links add to r and to its Jacobian
+    masses: tuple[TemplateJacobian, ...]  # what they add to M, as Jacobian blocks; empty if M is the identity
 
     @classmethod
     def of(cls, equations: Equations, values: Mapping[str, float]) -> Linearised:
         """Compile equations with the values of their parameters."""
         sources = [*_nodes(equations, values), *_links(equations, values)]
         parts = tuple(
-            Part.of(symbols, rates, blocks, places, numbers) for symbols, rates, blocks, _, places, numbers in sources
+            TemplateJacobian.of(symbols, rates, blocks, places, numbers)
+            for symbols, rates, blocks, _, places, numbers in sources
         )
         masses = tuple(
-            Part.of(symbols, (), masses, places, numbers)
+            TemplateJacobian.of(symbols, (), masses, places, numbers)
             for symbols, _, _, masses, places, numbers in sources
             if masses and equations.inertial
         )
@@ -105,7 +106,7 @@ class Linearised:
         """Return M in sparse form, None if it is the identity."""
         return self._assembled(self.masses, state, 0) if self.masses else None
 
-    def _assembled(self, parts: tuple[Part, ...], state: np.ndarray, skipped: int) -> sparse.csc_array:
+    def _assembled(self, parts: tuple[TemplateJacobian, ...], state: np.ndarray, skipped: int) -> sparse.csc_array:
         """The blocks of some parts, which stand behind `skipped` rows of rates."""
         rows, columns, values = [], [], []
         for part in parts:

@@ -18,9 +18,9 @@ import xarray as xr
 
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.inputs.checks import check_integer, check_keys, check_number, check_table, short_repr
-from synchain.models.inputs.frozen import Frozen
+from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.mechanics.contact import SLIP
-from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.scenes.scene import Scene, check_scene
 
 from ..cells.run_keywords import Given, with_numbers
 from ..results.labelled import Labelled, dataset
@@ -65,7 +65,7 @@ class Skeleton(Labelled):
     """
 
     branches: tuple[Branch, ...]
-    searched: Mapping[str, Range] = Frozen()
+    searched: Mapping[str, Range] = FrozenDict()
 
     def __len__(self) -> int:
         return len(self.branches)
@@ -177,7 +177,7 @@ def skeleton(
         If the parameter is unknown, the values are not monotonic, `looks` is less than one, a range is empty or of an
         unknown component, and for an oscillator without a drive.
     """
-    grid = sorted(checked_values(a_scene(scene), name, values))
+    grid = sorted(checked_values(check_scene(scene), name, values))
     if isinstance(periods, Integral | str) or len(periods) == 0:
         raise ValueError(f"periods = {short_repr(periods)}; expected numbers of drive periods, e.g. (1, 2)")
     scene = coupled_cell(Given(skeleton), others(Given(skeleton, parameters, more, NEWTON), scene, name), TOLERANCE)
@@ -217,7 +217,7 @@ def skeleton(
     names = (component for component in scene.components if component != SLIP.name)
     return Skeleton(
         tuple(sorted(branches, key=lambda branch: (branch.orbits[0].periods, branch.values[0]))),
-        Frozen({component: (a, b) for component, a, b in zip(names, low, high, strict=True)}),
+        FrozenDict({component: (a, b) for component, a, b in zip(names, low, high, strict=True)}),
     )
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from synchain.codegen.driver.columns import COUNTS, TOLERANCES, Count, Point, Sum
+from synchain.codegen.driver.columns import COUNTS, TOLERANCES, Count, PointColumn, SumColumn
 
 from ..support.status import Status
 
@@ -17,7 +17,7 @@ IN_MEMORY = 10**9
 def numbers_of_a_cell(dimension: int, room: int, samples: int, observed: int = 0, kept: int | None = None) -> int:
     """Return how many numbers the buffers hold for each cell; the arguments are those of `Buffers.empty`."""
     kept = dimension if kept is None else kept
-    return dimension * (1 + samples) + (Point.STATE + kept) * room + len(Sum) + observed + COUNTS
+    return dimension * (1 + samples) + (PointColumn.STATE + kept) * room + len(SumColumn) + observed + COUNTS
 
 
 @dataclass(slots=True)
@@ -46,9 +46,9 @@ class Buffers:
         kept = dimension if kept is None else kept
         return cls(
             end=np.full((cells, dimension), np.nan),
-            sums=np.full((cells, len(Sum) + observed), np.nan),
+            sums=np.full((cells, len(SumColumn) + observed), np.nan),
             counts=np.zeros((cells, COUNTS), np.int64),
-            points=np.full((cells, room, Point.STATE + kept), np.nan),
+            points=np.full((cells, room, PointColumn.STATE + kept), np.nan),
             samples=np.full((cells, samples, dimension), np.nan),
         )
 

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 import sympy as sp
 
-from synchain.codegen.driver.columns import Sum, Tally
-from synchain.codegen.kernels.observable_text import Watched, with_rows
+from synchain.codegen.driver.columns import SumColumn, Tally
+from synchain.codegen.kernels.observable_text import Recording, with_rows
 from synchain.models.dynamics.observable import ENERGY, Window
 from synchain.models.dynamics.observable_text import as_value
 from synchain.models.scenes.energy import energy as exact_energy
@@ -18,15 +18,15 @@ from synchain.models.scenes.observables import has_own_energy
 from synchain.models.scenes.scene import Scene, Section
 
 
-def watched(scene: Scene) -> Watched:
+def watched(scene: Scene) -> Recording:
     """Return what the kernel of a scene watches: observables, sections and a stop, the energy in them as sums."""
     sections = Sections(scene)
-    found = Watched(Observed(scene).values, sections.values, sections.stop)
+    found = Recording(ObservableArrays(scene).values, sections.values, sections.stop)
     if has_own_energy(scene.model) or not any(e.has(ENERGY) for e in (*found.observed, *found.events)):
         return found
     value, sums = exact_energy(scene).rows()
     swap = {ENERGY: value}
-    return Watched(
+    return Recording(
         tuple(e.xreplace(swap) for e in found.observed),
         tuple(tuple(e.xreplace(swap) for e in parts) for parts in found.sections),
         None if found.stop is None else found.stop.xreplace(swap),
@@ -35,7 +35,7 @@ def watched(scene: Scene) -> Watched:
 
 
 @dataclass(frozen=True)
-class Observed:
+class ObservableArrays:
     """The observables of a scene, in the arrays of its kernel and of its result."""
 
     scene: Scene
@@ -63,7 +63,7 @@ class Observed:
 
     def columns(self) -> Iterator[tuple[str, bool, slice]]:
         """Yield the name of each observable, whether it has a value for each node, and its columns in `Buffers.sums`."""
-        first = len(Sum)
+        first = len(SumColumn)
         for name, observable in self.scene.observe.items():
             rows = self._rows[observable.value]
             yield name, with_rows(self.scene.equations, observable.value), slice(first, first + rows)
@@ -73,14 +73,14 @@ class Observed:
         """Return the `sums` of buffers out of those of a kernel; NaN in cells that ended before their window."""
         if not self.values:
             return sums
-        length = sums[:, len(Sum), None]
+        length = sums[:, len(SumColumn), None]
         length = np.where(length > 0.0, length, np.nan)
-        tallies = sums[:, len(Sum) + 1 :].reshape(len(sums), -1, len(Tally))
+        tallies = sums[:, len(SumColumn) + 1 :].reshape(len(sums), -1, len(Tally))
         begins, first = {}, 0
         for value, rows in self._rows.items():
             begins[value] = slice(first, first + rows)
             first += rows
-        parts = [sums[:, : len(Sum)]]
+        parts = [sums[:, : len(SumColumn)]]
         for observable in self.scene.observe.values():
             parts.append(_over_window(observable.window, tallies[:, begins[observable.value]], length))
         return np.concatenate(parts, axis=1)

@@ -55,7 +55,7 @@ class Paces(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class TemplateRates:
     """The nodes of one kind, or the links of one template, as functions of arrays."""
 
     # rates, and the entries of their derivatives by the node's own states, row by row
@@ -177,7 +177,7 @@ class Templates:
 
     def _inverse_masses(
         self, state: np.ndarray, numbers: np.ndarray, time: np.ndarray
-    ) -> Iterator[tuple[Part, np.ndarray]]:
+    ) -> Iterator[tuple[TemplateRates, np.ndarray]]:
         """The inverse mass matrices (cells, count, p, p) of nodes that have one; NaN where it is singular."""
         for part in self.masses:
             size = part.own.shape[1]
@@ -201,7 +201,7 @@ def fastest_rates(equations: Equations, states: np.ndarray, numbers: np.ndarray)
     return np.maximum(paces.fastest, paces.turning)
 
 
-def _node_parts(equations: Equations, slots: dict[str, int]) -> Iterator[Part]:
+def _node_parts(equations: Equations, slots: dict[str, int]) -> Iterator[TemplateRates]:
     """The first nodes, kind by kind."""
     for kind, node in enumerate(equations.nodes):
         nodes = [i for i, k in enumerate(equations.kind_of[:NODES]) if k == kind]
@@ -213,7 +213,7 @@ def _node_parts(equations: Equations, slots: dict[str, int]) -> Iterator[Part]:
             yield _node_part(equations, slots, node, nodes, node.rhs, node.jacobian())
 
 
-def _mass_parts(equations: Equations, slots: dict[str, int]) -> Iterator[Part]:
+def _mass_parts(equations: Equations, slots: dict[str, int]) -> Iterator[TemplateRates]:
     """The mass matrices of the first nodes that have one."""
     for kind, node in enumerate(equations.nodes):
         nodes = [i for i, k in enumerate(equations.kind_of[:NODES]) if k == kind]
@@ -225,9 +225,9 @@ def _mass_parts(equations: Equations, slots: dict[str, int]) -> Iterator[Part]:
 
 def _node_part(
     equations: Equations, slots: dict[str, int], node: Node, nodes: list[int], rates: tuple[sp.Expr, ...], block: Block
-) -> Part:
+) -> TemplateRates:
     symbols = (*node.state, *node.parameters, TIME)
-    return Part(
+    return TemplateRates(
         _function(symbols, rates),
         _function(symbols, _flat(block)),
         np.array([equations.places[i] for i in nodes]),
@@ -238,7 +238,7 @@ def _node_part(
     )
 
 
-def _link_parts(equations: Equations, slots: dict[str, int]) -> Iterator[Part]:
+def _link_parts(equations: Equations, slots: dict[str, int]) -> Iterator[TemplateRates]:
     """The links that the first nodes feel, template by template."""
     for layer in equations.layers:
         links, share = _links(layer)
@@ -263,7 +263,7 @@ def _links(layer: Layer) -> tuple[list[Link], float]:
 
 def _link_part(
     equations: Equations, slots: dict[str, int], layer: Layer, edge: Edge, links: list[Link], share: float
-) -> Part:
+) -> TemplateRates:
     targets, sources = [i for i, _, _ in links], [j for _, j, _ in links]
     columns: list[Column] = []
     for s in edge.parameters:
@@ -273,7 +273,7 @@ def _link_part(
             columns.append(_of_nodes(equations, slots, s.name, targets))
     columns += [_of_nodes(equations, slots, of.name, sources) for _, of in edge.theirs]
     symbols = (*edge.here, *edge.there, edge.weight, *edge.parameters, *(s for s, _ in edge.theirs), TIME)
-    return Part(
+    return TemplateRates(
         _function(symbols, edge.rhs),
         _function(symbols, _flat(edge.jacobian_here())),
         np.array([equations.places[i] for i in targets]),

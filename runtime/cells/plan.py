@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import sympy as sp
 
-from synchain.codegen.driver.columns import Control, Span
+from synchain.codegen.driver.columns import Control, SpanColumn
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.periodicity import Drive, as_function, drive_of, names_in
 from synchain.models.inputs.names import NodeName
@@ -31,7 +31,7 @@ DIRECTIONS = {"falling": -1.0, "rising": 1.0, "both": 0.0}
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class CellRows:
     """Rows of cells as a kernel takes them."""
 
     start: np.ndarray  # (cells, dimension): initial states
@@ -48,12 +48,12 @@ class Plan:
     def __len__(self) -> int:
         return len(self.start)
 
-    def take(self, cells: np.ndarray) -> Plan:
+    def take(self, cells: np.ndarray) -> CellRows:
         """Return the rows of some of the cells."""
-        return Plan(self.start[cells], self.numbers[cells], self.spans[cells])
+        return CellRows(self.start[cells], self.numbers[cells], self.spans[cells])
 
 
-def plan(scene: Scene, near: np.ndarray | None = None) -> Plan:
+def plan(scene: Scene, near: np.ndarray | None = None) -> CellRows:
     """Return the rows of all cells of a scene, in C order over the axes (the last one fastest).
 
     Shapes: near (cells,).
@@ -88,7 +88,7 @@ class Planner:
         columns = {name: values[place] for (name, values), place in zip(self.values.items(), along, strict=False)}
         return columns | {name: values[places[-1]] for name, values in self.drawn.items()}
 
-    def rows(self, cells: np.ndarray, near: np.ndarray | None = None) -> Plan:
+    def rows(self, cells: np.ndarray, near: np.ndarray | None = None) -> CellRows:
         """Return the rows of these cells; `near` (cells,) is the last column of their spans
         (default: 0).
         """
@@ -99,7 +99,7 @@ class Planner:
         for name, values in columns.items():
             if name not in self.slots:
                 start[:, self.places[name]] = values
-        return Plan(with_modes(self.equations, start, numbers), numbers, self._spans(numbers, near))
+        return CellRows(with_modes(self.equations, start, numbers), numbers, self._spans(numbers, near))
 
     def spans(self, cells: np.ndarray) -> np.ndarray:
         """Return the spans (cells, len(Span)) of these cells, without their states."""
@@ -117,21 +117,21 @@ class Planner:
     def _spans(self, numbers: np.ndarray, near: np.ndarray | None) -> np.ndarray:
         """The spans of cells with these parameters."""
         repeat = periods(self.equations, numbers)
-        spans = np.empty((len(numbers), len(Span)))
-        spans[:, : Span.PERIOD] = _windows(self.scene, repeat)
-        spans[:, Span.PERIOD] = local_clock(self.equations, repeat)
-        spans[:, Span.NEAR] = 0.0 if near is None else near
-        spans[:, Span.FIRST_STEP], spans[:, Span.LOOK] = FIRST_STEP, math.inf
-        spans[:, Span.LONGEST] = longest_steps(self.equations, numbers, spans[:, Span.END])
+        spans = np.empty((len(numbers), len(SpanColumn)))
+        spans[:, : SpanColumn.PERIOD] = _windows(self.scene, repeat)
+        spans[:, SpanColumn.PERIOD] = local_clock(self.equations, repeat)
+        spans[:, SpanColumn.NEAR] = 0.0 if near is None else near
+        spans[:, SpanColumn.FIRST_STEP], spans[:, SpanColumn.LOOK] = FIRST_STEP, math.inf
+        spans[:, SpanColumn.LONGEST] = longest_steps(self.equations, numbers, spans[:, SpanColumn.END])
         return spans
 
-    def extremes(self) -> Plan:
+    def extremes(self) -> CellRows:
         """Return the rows of a few cells in which every axis takes its smallest, its largest and
         its value nearest to 0.
         """
         return self.rows(self._extremes())
 
-    def sample(self) -> Plan:
+    def sample(self) -> CellRows:
         """Return the rows of the extreme cells and of others, evenly spread over the sweep: of LOOKED_AT nodes or two cells."""
         spread = _spread(math.prod(self.scene.shape), LOOKED_AT // self.equations.n)
         return self.rows(np.union1d(self._extremes(), spread))

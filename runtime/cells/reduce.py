@@ -16,20 +16,20 @@ from functools import lru_cache
 
 import numpy as np
 
-from synchain.codegen.driver.columns import Point, Sum
-from synchain.codegen.kernels.observable_text import Watched
+from synchain.codegen.driver.columns import PointColumn, SumColumn
+from synchain.codegen.kernels.observable_text import Recording
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.reduction import NoQuotient, quotient, substitute_constants
 from synchain.models.inputs.checks import check_flag
 from synchain.models.inputs.names import NodeName
-from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.scenes.scene import Scene, check_scene
 
 from ..support.status import Status
 from .buffers import IN_MEMORY, Buffers, numbers_of_a_cell
-from .observable_arrays import Observed, Sections, watched
-from .plan import Plan, Planner
+from .observable_arrays import ObservableArrays, Sections, watched
+from .plan import CellRows, Planner
 
-__all__ = ["NodeMerge", "Reduction", "as_reduction", "explain", "reduce_scene"]
+__all__ = ["NodeMerge", "ReducedScene", "as_reduction", "explain", "reduce_scene"]
 
 DIVERGED = "diverged: the cell ends as soon as its state is out of bounds"
 PERIODIC = (
@@ -57,7 +57,7 @@ class NodeMerge:
         whole = self._take(buffers, self.places)
         if self.together:
             whole = replace(whole, sums=whole.sums.copy())
-            whole.sums[whole.status != Status.NOT_RUN, : Sum.STOPPED_AT] = (
+            whole.sums[whole.status != Status.NOT_RUN, : SumColumn.STOPPED_AT] = (
                 0.0  # one oscillator has no distance to itself
             )
         return whole
@@ -70,7 +70,7 @@ class NodeMerge:
         """The buffers of a network whose states are these columns of another one's."""
         if not self.merges:
             return buffers
-        points = np.concatenate([[Point.TIME], columns + Point.STATE])
+        points = np.concatenate([[PointColumn.TIME], columns + PointColumn.STATE])
         return replace(
             buffers,
             end=np.take(buffers.end, columns, axis=1),
@@ -80,7 +80,7 @@ class NodeMerge:
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
-class Reduction:
+class ReducedScene:
     """What is left of a scene to integrate, and the way back."""
 
     scene: Scene
@@ -94,7 +94,7 @@ class Reduction:
     skipped: tuple[str, ...]  # sentences: what was left out, and what was not and why
     kept: tuple[str, ...]
     jumps: bool  # whether a cell that repeats itself leaves out whole cycles
-    watched: Watched = field(repr=False)  # what the kernel watches: observables, sections and a stop
+    watched: Recording = field(repr=False)  # what the kernel watches: observables, sections and a stop
 
     @property
     def dimension(self) -> int:
@@ -107,9 +107,9 @@ class Reduction:
         return self.scene.samples if "trajectory" in self.scene.record else 0
 
     @property
-    def observed(self) -> Observed:
+    def observed(self) -> ObservableArrays:
         """What the scene observes."""
-        return Observed(self.scene)
+        return ObservableArrays(self.scene)
 
     @property
     def point_size(self) -> int:
@@ -139,7 +139,7 @@ class Reduction:
         whole = self.scene.equations.state.index(self.scene.section.variable)
         return self.equations.state[int(self.merge.places[whole])]
 
-    def rows(self, whole: Plan) -> Plan:
+    def rows(self, whole: CellRows) -> CellRows:
         """Return the rows of the reduced network out of those of the whole one."""
         start, numbers = whole.start, whole.numbers
         if self.merge.merges:
@@ -153,10 +153,10 @@ class Reduction:
         return self.merge.expand(buffers)
 
 
-def as_reduction(scene: Scene, reduce: bool | Reduction, starts: np.ndarray | None = None) -> Reduction:
+def as_reduction(scene: Scene, reduce: bool | ReducedScene, starts: np.ndarray | None = None) -> ReducedScene:
     """Return the reduction of a scene that the argument `reduce` of `run` asks for."""
-    a_scene(scene)
-    if not isinstance(reduce, Reduction):
+    check_scene(scene)
+    if not isinstance(reduce, ReducedScene):
         return reduce_scene(scene, check_flag("reduce", reduce), starts=starts)
     if starts is not None:
         raise ValueError("reduce: found a Reduction beside a start of several cells; expected True or False")
@@ -167,7 +167,7 @@ def as_reduction(scene: Scene, reduce: bool | Reduction, starts: np.ndarray | No
 
 def reduce_scene(
     scene: Scene, reduce: bool = True, fold_all: bool = False, starts: np.ndarray | None = None
-) -> Reduction:
+) -> ReducedScene:
     """Return what is left of a scene to integrate. Shapes: starts (cells, dimension)."""
     whole, found = scene.equations, watched(scene)
     skipped: list[str] = []
@@ -187,7 +187,7 @@ def reduce_scene(
     for node, k in enumerate(classes):
         seen.setdefault(k, node)
     first = [seen[k] for k in range(equations.n)]
-    return Reduction(
+    return ReducedScene(
         scene,
         Planner(scene, starts),
         equations,
@@ -261,7 +261,7 @@ def _without(equations: Equations, name: str, value: Fraction) -> Equations:
     return substitute_constants(equations, {name: value})
 
 
-def _observed_parameters(scene: Scene, found: Watched) -> set[str]:
+def _observed_parameters(scene: Scene, found: Recording) -> set[str]:
     """The parameters that occur in observables and in sections on functions."""
     names = {s.name for value in (*found.observed, *found.events) for s in value.free_symbols}
     names = names.union(*(rows.names for rows in found.sums))
@@ -367,7 +367,7 @@ def _multiplicity(scene: Scene, classes: tuple[int, ...]) -> tuple[int, ...] | N
     return tuple(sizes[k] for k in range(len(sizes)))
 
 
-def explain(reduction: Reduction) -> str:
+def explain(reduction: ReducedScene) -> str:
     """Return in words what is left out of a scene and why, what is not, and what a cell may leave
     out at run time.
     """
@@ -384,7 +384,7 @@ def explain(reduction: Reduction) -> str:
     )
 
 
-def _unwritten(reduction: Reduction) -> list[str]:
+def _unwritten(reduction: ReducedScene) -> list[str]:
     """What the text of the kernel does not have, because the scene never had it."""
     scene, found = reduction.scene, []
     if not scene.forced:

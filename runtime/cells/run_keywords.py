@@ -12,7 +12,7 @@ from typing import Any
 from synchain.models.inputs.checks import check_number, check_table, check_text, is_row, listed, suggestion
 from synchain.models.inputs.names import NodeName
 from synchain.models.inputs.unsupported import unsupported
-from synchain.models.scenes.scene import KEYWORDS, Scene, a_scene
+from synchain.models.scenes.scene import KEYWORDS, Scene, check_scene
 from synchain.models.sweeps.parameters import without
 
 ORBITS = {"executor": "its orbits advance on threads of this process, as many as `workers` says"}
@@ -79,7 +79,7 @@ class Given:
         Axes of what is `free`, on which the function does not depend, are no choice between answers.  A stop ends the
         motion; it is refused too, unless the function `stops` there.
         """
-        swept = [axis.name for axis in a_scene(scene).axes if axis.name not in {*self.values, *free}]
+        swept = [axis.name for axis in check_scene(scene).axes if axis.name not in {*self.values, *free}]
         for what, names, remedy in (("axes", swept, "axes=()"), ("draws", scene.draws, "realisations=0, draws=None")):
             if names:
                 raise ValueError(
@@ -98,7 +98,7 @@ class Given:
         not None.
         """
         fixed: dict[str, object] = {}
-        swept: dict[str, object] = {axis.name: axis.values for axis in a_scene(scene).axes}
+        swept: dict[str, object] = {axis.name: axis.values for axis in check_scene(scene).axes}
         start: dict[str, list[float]] = {}
         given = self.checked(scene, states=True)
         for name, value in given.items():

@@ -23,7 +23,7 @@ TURNING = (sp.atan, sp.tanh, sp.erf, sp.Abs)
 """Functions that are steep, or turn sharply, where their argument is zero: the layer of a smoothed jump."""
 
 
-class Rates(NamedTuple):
+class FastestRates(NamedTuple):
     """The fastest decay or growth at a state, the fastest turning, and the fastest growth; 0 where there are no numbers."""
 
     fastest: float
@@ -31,7 +31,9 @@ class Rates(NamedTuple):
     growth: float
 
 
-def mode_rates(variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray) -> Iterator[Rates]:
+def mode_rates(
+    variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray
+) -> Iterator[FastestRates]:
     """Yield those of deviations without a strength, with the largest and with the most negative, of the first orbits."""
     strengths, extreme = strengths[: len(variation.parameters)], []
     if strengths.size:
@@ -48,9 +50,9 @@ def mode_rates(variation: Variation, state: np.ndarray, numbers: np.ndarray, str
             yield _of_blocks(_value(entries, values)[None])
 
 
-def _of_blocks(blocks: np.ndarray) -> Rates:
+def _of_blocks(blocks: np.ndarray) -> FastestRates:
     """Those of some blocks (count, p, p)."""
-    return Rates(*(float(found[0]) for found in eigenvalue_rates(blocks[None])[:3]))
+    return FastestRates(*(float(found[0]) for found in eigenvalue_rates(blocks[None])[:3]))
 
 
 def eigenvalue_rates(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from synchain.models.scenes.scene import Scene
 
-    from ..cells.reduce import Reduction
+    from ..cells.reduce import ReducedScene
     from ..sweeps.errors import SweepFailed, SweepInterrupted
 
 SUMMARY = "run a scene; write its results (netCDF or Zarr) and a figure"
@@ -175,7 +175,7 @@ def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[st
     return int(value) if name in ("samples", "max_steps") and value.is_integer() else value
 
 
-def _check(skip: Reduction, arguments: Namespace) -> None:
+def _check(skip: ReducedScene, arguments: Namespace) -> None:
     """Raise now what would stop the run later."""
     from ..cells.plan import Planner
     from ..engines.scene_kernels import kernel_source

@@ -10,10 +10,10 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from synchain.codegen.driver.clock_slots import WORTH
-from synchain.codegen.driver.columns import Count, Span, Sum
+from synchain.codegen.driver.columns import Count, SpanColumn, SumColumn
 from synchain.codegen.integrators import Integrator, integrator
 from synchain.codegen.kernels.sweep_kernel import AUTO
-from synchain.codegen.taylor import is_analytic, is_large, is_linear, jump, order_for, outlives_series, unpassed
+from synchain.codegen.taylor import is_analytic, is_large, is_linear, jump, may_cross_singularity, order_for, unpassed
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation
 from synchain.models.graphs.links import LINK_LIMIT
@@ -22,7 +22,7 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
 from ..cells.paces import Paces, Templates
-from ..cells.plan import Plan, first_step, scale_of_atol, tolerances
+from ..cells.plan import CellRows, first_step, scale_of_atol, tolerances
 from ..cells.stiffness_rates import eigenvalue_rates, mode_rates
 from ..support.status import Status
 
@@ -91,7 +91,7 @@ class Ladder:
         """Rates and slopes as numbers."""
         return Templates(self.equations)
 
-    def first(self, rows: Plan) -> np.ndarray:
+    def first(self, rows: CellRows) -> np.ndarray:
         """Return which of the methods (cells,) each cell begins with."""
         if len(self.methods) == 1:
             return np.zeros(len(rows), int)
@@ -108,29 +108,29 @@ class Ladder:
     def _known(self) -> dict[bytes, np.ndarray]:
         return {}
 
-    def _first(self, rows: Plan) -> np.ndarray:
+    def _first(self, rows: CellRows) -> np.ndarray:
         paces = at_start(self.templates, rows)
         endless = ~np.isfinite(paces.size)
-        slow = np.maximum(np.maximum(paces.turning, paces.growth), math.pi / rows.spans[:, Span.LONGEST])
-        stiff = (paces.parted > STIFF * slow) & (paces.parted * rows.spans[:, Span.END] > WORTH) & ~endless
+        slow = np.maximum(np.maximum(paces.turning, paces.growth), math.pi / rows.spans[:, SpanColumn.LONGEST])
+        stiff = (paces.parted > STIFF * slow) & (paces.parted * rows.spans[:, SpanColumn.END] > WORTH) & ~endless
         stiff |= ~endless & ~stiff & self._enters_layers(rows, slow)
         last = len(self.methods) - 1 if self.solvable else self._explicit
         return np.where(stiff & (not self.equations.sticks), last, np.where(endless, self._explicit, 0))
 
-    def main(self, rows: Plan) -> Integrator:
+    def main(self, rows: CellRows) -> Integrator:
         """Return the method that most of some cells begin with."""
         return self.methods[np.bincount(self.first(rows)).argmax()]
 
-    def steps(self, rows: Plan, first: np.ndarray) -> np.ndarray:
+    def steps(self, rows: CellRows, first: np.ndarray) -> np.ndarray:
         """Return spans (cells, len(Span)) with the first step and the first look of cells that begin with some methods."""
         spans = rows.spans.copy()
         implicit = np.flatnonzero(np.array([method.implicit for method in self.methods])[first])
         if len(implicit):
-            spans[implicit, Span.FIRST_STEP] = first_steps(self.templates, rows.take(implicit))
-        spans[:, Span.LOOK] = np.where(first < len(self.methods) - 1, FIRST_LOOK, math.inf)
+            spans[implicit, SpanColumn.FIRST_STEP] = first_steps(self.templates, rows.take(implicit))
+        spans[:, SpanColumn.LOOK] = np.where(first < len(self.methods) - 1, FIRST_LOOK, math.inf)
         return spans
 
-    def further(self, rows: Plan, buffers: Buffers, method: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    def further(self, rows: CellRows, buffers: Buffers, method: np.ndarray, lengths: np.ndarray) -> np.ndarray:
         """Return which method (cells,) cells go on with that have paused or whose steps underflow; -1 for none.
 
         Shapes: method (cells,), lengths (cells,).
@@ -142,11 +142,11 @@ class Ladder:
         found = np.where(paused, method, np.where(untried, self._explicit, -1))
         looked = np.flatnonzero(paused & ~implicit & np.isfinite(buffers.end).all(axis=1))
         if len(looked):
-            at = self.at(rows.take(looked), buffers.end[looked], buffers.sums[looked, Sum.STOPPED_AT])
+            at = self.at(rows.take(looked), buffers.end[looked], buffers.sums[looked, SumColumn.STOPPED_AT])
             slow, length = np.maximum(at.turning, at.going), lengths[looked]
             finite = np.isfinite(at.size)
             stiff = finite & (at.fastest > STIFF * slow) & (at.fastest * length > 1.0) & self.solvable
-            free = length < STALLED * rows.spans[looked, Span.LONGEST]
+            free = length < STALLED * rows.spans[looked, SpanColumn.LONGEST]
             stalled = series[looked] & finite & free & (np.maximum(at.size, at.going) * length < STALLED)
             found[looked] = np.where(stiff, len(self.methods) - 1, np.where(stalled, self._explicit, found[looked]))
         return found
@@ -156,18 +156,18 @@ class Ladder:
         """True if motion may slide along a jump of a rate."""
         return next(iter(unpassed(self.equations)), None) is not None
 
-    def sliding(self, rows: Plan, buffers: Buffers, lengths: np.ndarray, before: np.ndarray) -> np.ndarray:
+    def sliding(self, rows: CellRows, buffers: Buffers, lengths: np.ndarray, before: np.ndarray) -> np.ndarray:
         """Return which of some paused cells (cells,) slide along a jump, so that max_steps will not do.
 
         Explicit steps across a jump are as short as its error asks for, and alike: `lengths` (cells,) is their mean length
         since the last pause, `before` that before it. A slide may end soon, so that it has 1/SLIDE of max_steps.
         """
-        left = rows.spans[:, Span.END] - buffers.sums[:, Sum.STOPPED_AT]
+        left = rows.spans[:, SpanColumn.END] - buffers.sums[:, SumColumn.STOPPED_AT]
         steady = (lengths < 2.0 * before) & (before < 2.0 * lengths)
         hopeless = left > SLIDE * self.scene.max_steps * lengths
         return self.jumps & steady & hopeless & (SLIDE * buffers.steps > self.scene.max_steps)
 
-    def tolerances(self, rows: Plan) -> tuple[np.ndarray, np.ndarray]:
+    def tolerances(self, rows: CellRows) -> tuple[np.ndarray, np.ndarray]:
         """Return (rtol, atol), each (cells,), with which cells are integrated.
 
         A default atol shrinks for small motions (`scale_of_atol`). Their size is that of the start, or how far the rates there
@@ -182,34 +182,34 @@ class Ladder:
                 atol[small] *= scale_of_atol(size)
         return rtol, atol
 
-    def at(self, rows: Plan, state: np.ndarray, time: np.ndarray) -> Paces:
+    def at(self, rows: CellRows, state: np.ndarray, time: np.ndarray) -> Paces:
         """Return how fast cells move at some states and times, where states are known to the tolerances."""
         rtol, atol = self.tolerances(rows)
         noise = rtol[:, None] * np.abs(state) + atol[:, None]
-        return self.templates.paces(state, rows.numbers, time, rows.spans[:, Span.LONGEST], noise)
+        return self.templates.paces(state, rows.numbers, time, rows.spans[:, SpanColumn.LONGEST], noise)
 
     @property
     def _explicit(self) -> int:
         """Place of the explicit method of stages."""
         return next(k for k, m in enumerate(self.methods) if not m.series)
 
-    def _enters_layers(self, rows: Plan, slow: np.ndarray) -> np.ndarray:
+    def _enters_layers(self, rows: CellRows, slow: np.ndarray) -> np.ndarray:
         """True for cells (cells,) of which a smoothed jump is stiff inside, although the start lies outside."""
         found = np.zeros(len(rows), dtype=bool)
         for blocks in self.templates.layers(rows.start, rows.numbers):
             fastest, turning, *_ = eigenvalue_rates(blocks)
-            within = LAYER * fastest * rows.spans[:, Span.END] > WORTH
+            within = LAYER * fastest * rows.spans[:, SpanColumn.END] > WORTH
             found |= within & (LAYER * fastest > STIFF * np.maximum(slow, LAYER * turning)) & np.isfinite(fastest)
         return found
 
 
-def at_start(templates: Templates, rows: Plan) -> Paces:
+def at_start(templates: Templates, rows: CellRows) -> Paces:
     """Return how fast cells move where they start."""
-    shortest = np.minimum(rows.spans[:, Span.LONGEST], np.maximum(rows.spans[:, Span.END], 1e-300))
+    shortest = np.minimum(rows.spans[:, SpanColumn.LONGEST], np.maximum(rows.spans[:, SpanColumn.END], 1e-300))
     return templates.paces(rows.start, rows.numbers, np.zeros(len(rows)), shortest, None)
 
 
-def first_steps(templates: Templates, rows: Plan) -> np.ndarray:
+def first_steps(templates: Templates, rows: CellRows) -> np.ndarray:
     """Return the first step (cells,) of each cell by a Rosenbrock method."""
     growth = at_start(templates, rows).growth
     return np.array([first_step(rate if math.isfinite(rate) else 0.0) for rate in growth])
@@ -222,10 +222,10 @@ def _has_series(equations: Equations) -> bool:
     Power series where all functions are analytic between kinks, and between jumps along which no motion slides, unless
     motion may pass another place without a series.  The recurrences of a dense mass matrix take long to compile.
     """
-    return not equations.inertial and jump(equations) is None and not outlives_series(equations)
+    return not equations.inertial and jump(equations) is None and not may_cross_singularity(equations)
 
 
-def chosen_for_rows(scene: Scene, equations: Equations, rows: Plan) -> Integrator:
+def chosen_for_rows(scene: Scene, equations: Equations, rows: CellRows) -> Integrator:
     """Return the one integrator for equations whose cells come as rows: the last one that any cell begins with."""
     ladder = Ladder(scene, equations)
     return ladder.methods[ladder.first(rows).max()]
@@ -301,11 +301,11 @@ BLOWN = 1e6
 """Growth of a state from which on what grows as fast as anything is a solution without bound."""
 
 
-def warn_of_steps(ladder: Ladder, buffers: Buffers, rows_of: Callable[[np.ndarray], Plan]) -> None:
+def warn_of_steps(ladder: Ladder, buffers: Buffers, rows_of: Callable[[np.ndarray], CellRows]) -> None:
     """Warn if no cell came to its end, if some made no step, if explicit steps were short because a cell is stiff, or if a
     motion has no bound.
     """
-    status, steps, times = buffers.status, buffers.steps, buffers.sums[:, Sum.STOPPED_AT]
+    status, steps, times = buffers.status, buffers.steps, buffers.sums[:, SumColumn.STOPPED_AT]
     idle = np.isin(status, (Status.STEP_UNDERFLOW, Status.STEP_BUDGET)) & (times <= 0.0)
     if len(status) and not np.isin(status, (Status.FINISHED, Status.STOPPED, Status.INTERRUPTED, Status.NOT_RUN)).any():
         warn(f"no cell came to its end: {Status(int(status[0])).message}")

@@ -42,9 +42,9 @@ from synchain.codegen.driver.clock_slots import (
     TIME,
     UNTIL,
 )
-from synchain.codegen.driver.columns import Control, Count, Span, Sum
+from synchain.codegen.driver.columns import Control, Count, SpanColumn, SumColumn
 from synchain.codegen.integrators import Integrator
-from synchain.codegen.kernels.observable_text import UNWATCHED, Watched
+from synchain.codegen.kernels.observable_text import UNWATCHED, Recording
 from synchain.codegen.kernels.sweep_kernel import KernelSource, emit
 from synchain.codegen.machine_code.compile import Kernel, load
 from synchain.codegen.machine_code.installation import InstallationError
@@ -55,8 +55,8 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
 from ..cells.paces import Templates
-from ..cells.plan import FIRST_STEP, Plan, control_of
-from ..cells.reduce import Reduction
+from ..cells.plan import FIRST_STEP, CellRows, control_of
+from ..cells.reduce import ReducedScene
 from ..support.status import Status
 from .choice import Ladder, first_steps
 from .scene_kernels import ladder_of, write_kernel
@@ -152,7 +152,7 @@ class SweepSpec:
     room for at first.
     """
 
-    reduction: Reduction
+    reduction: ReducedScene
     room: int | None = None
 
     def source(self, width: int) -> KernelSource:
@@ -175,7 +175,7 @@ class SweepJob:
 
     spec: JobSpec
     kernel: Kernel
-    reduction: Reduction
+    reduction: ReducedScene
     room: int | None = None
     control: np.ndarray = field(init=False)
     ladder: Ladder = field(init=False)
@@ -208,7 +208,7 @@ class SweepJob:
         buffers.points = np.ascontiguousarray(buffers.points[:, : buffers.most_points])
         return buffers
 
-    def _climb(self, rows: Plan, room: int) -> Buffers:
+    def _climb(self, rows: CellRows, room: int) -> Buffers:
         """Run rows with room for so many section points of each, each with the integrators that suit it."""
         reduction, ladder = self.reduction, self.ladder
         buffers = reduction.empty(len(rows), room, reduction.observed.tallies)
@@ -233,7 +233,7 @@ class SweepJob:
                 break
             if len(ladder.methods) == 1 or not len(cells):
                 break
-            time, steps = buffers.sums[cells, Sum.STOPPED_AT], buffers.steps[cells]
+            time, steps = buffers.sums[cells, SumColumn.STOPPED_AT], buffers.steps[cells]
             lengths = (time - begun[cells]) / np.maximum(steps - went[cells], 1.0)
             begun[cells], went[cells] = time, steps
             looked, found = rows.take(cells), buffers.take(cells)
@@ -250,7 +250,7 @@ class SweepJob:
         buffers.lanes = np.empty((0, 0))
         return buffers
 
-    def _drive(self, method: int, cells: np.ndarray, rows: Plan, buffers: Buffers) -> None:
+    def _drive(self, method: int, cells: np.ndarray, rows: CellRows, buffers: Buffers) -> None:
         """Run some cells by one method, those of the same tolerances at once."""
         kernel = self._kernel(self.ladder.methods[method])
         pairs, which = np.unique(buffers.tolerances[cells], axis=0, return_inverse=True)
@@ -292,7 +292,7 @@ class RowsSpec:
     # how many oscillators each node stands for in the synchronisation error
     multiplicity: tuple[int, ...] | None = None
     records: tuple[str, ...] = ("sync_error",)  # ("sync_error",), or none if all oscillators are stepped as one
-    watched: Watched = UNWATCHED  # holds the stop of a scene, if it has one
+    watched: Recording = UNWATCHED  # holds the stop of a scene, if it has one
 
     def source(self, width: int | None = None) -> KernelSource:
         """Return the text of the kernel."""
@@ -315,18 +315,18 @@ class RowsJob:
         """End all cells that run in this process."""
         self.control[Control.CANCEL] = 1.0
 
-    def run(self, rows: Plan) -> Buffers:
+    def run(self, rows: CellRows) -> Buffers:
         """Run the cells of these rows."""
         buffers = Buffers.empty(len(rows), rows.start.shape[1], room=0, samples=0)
         if self.kernel.origin.method.implicit:
             spans = rows.spans.copy()
-            spans[:, Span.FIRST_STEP] = first_steps(Templates(self.kernel.equations), rows)
+            spans[:, SpanColumn.FIRST_STEP] = first_steps(Templates(self.kernel.equations), rows)
             rows = replace(rows, spans=spans)
         _drive(self.kernel, rows, self.control, buffers)
         return buffers
 
 
-def _drive(kernel: Kernel, rows: Plan, control: np.ndarray, buffers: Buffers) -> None:
+def _drive(kernel: Kernel, rows: CellRows, control: np.ndarray, buffers: Buffers) -> None:
     """Run all rows into the buffers."""
     kernel.drive(0, len(rows), rows.start, rows.numbers, rows.spans, control, *buffers.arrays())
 

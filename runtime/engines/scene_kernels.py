@@ -8,7 +8,7 @@ from weakref import WeakKeyDictionary
 import sympy as sp
 
 from synchain.codegen.integrators import Integrator
-from synchain.codegen.kernels.observable_text import Watched
+from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import KernelSource, emit
 from synchain.codegen.machine_code.compile import Kernel, load
 from synchain.codegen.simd.lane_types import WIDTHS
@@ -17,11 +17,11 @@ from synchain.models.inputs.checks import check_integer
 from synchain.models.inputs.keywords import warn
 from synchain.models.scenes.scene import Scene
 
-from ..cells.reduce import Reduction, as_reduction
+from ..cells.reduce import ReducedScene, as_reduction
 from .choice import Ladder
 
 
-def kernel(scene: Scene, width: int | None = None, reduce: bool | Reduction = True) -> Kernel:
+def kernel(scene: Scene, width: int | None = None, reduce: bool | ReducedScene = True) -> Kernel:
     """Return the compiled kernel of a scene, the one that `run(scene)` runs.
 
     Scenes that differ only in numbers share a kernel.
@@ -42,17 +42,17 @@ def kernel(scene: Scene, width: int | None = None, reduce: bool | Reduction = Tr
     return load(kernel_source(scene, width, reduce))
 
 
-def kernel_source(scene: Scene, width: int | None = None, reduce: bool | Reduction = True) -> KernelSource:
+def kernel_source(scene: Scene, width: int | None = None, reduce: bool | ReducedScene = True) -> KernelSource:
     """Return the text of a scene's kernel without compiling it; parameters and errors as for
     `kernel`.
     """
     return write_kernel(as_reduction(scene, reduce), width)
 
 
-_ladders: WeakKeyDictionary[Reduction, Ladder] = WeakKeyDictionary()
+_ladders: WeakKeyDictionary[ReducedScene, Ladder] = WeakKeyDictionary()
 
 
-def ladder_of(reduction: Reduction) -> Ladder:
+def ladder_of(reduction: ReducedScene) -> Ladder:
     """Return the integrators that the cells of what is left of a scene go through; the same object each time."""
     found = _ladders.get(reduction)
     if found is None:
@@ -60,12 +60,12 @@ def ladder_of(reduction: Reduction) -> Ladder:
     return found
 
 
-def chosen_integrator(reduction: Reduction) -> Integrator:
+def chosen_integrator(reduction: ReducedScene) -> Integrator:
     """Return the integrator that most of the first cells of what is left of a scene begin with."""
     return ladder_of(reduction).main(reduction.rows(reduction.planner.sample()))
 
 
-def write_kernel(reduction: Reduction, width: int | None = None, method: Integrator | None = None) -> KernelSource:
+def write_kernel(reduction: ReducedScene, width: int | None = None, method: Integrator | None = None) -> KernelSource:
     """Return the text of the kernel that integrates what is left of a scene; `width` as for
     `kernel`.  By default the integrator is the one that most cells begin with.
     """
@@ -86,7 +86,7 @@ def _emitted(
     equations: Equations,
     method: Integrator,
     recorded: tuple[tuple[str, ...], sp.Expr | None, int | None, tuple[int, ...] | None],
-    watched: Watched,
+    watched: Recording,
 ) -> KernelSource:
     """The text of a kernel; runs that differ in numbers alone share it."""
     return emit(equations, method, *recorded, watched=watched)

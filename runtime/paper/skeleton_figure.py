@@ -58,14 +58,14 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
-class Skeleton:
+class SkeletonFigure:
     """Bifurcation diagram with the branches of orbits."""
 
     diagram: Diagram  # motion
     branches: tuple[tuple[Place, ...], ...]  # orbits of each branch in the order of the parameter
 
 
-def compute(name: str, runs: FigureRuns) -> Skeleton:
+def compute(name: str, runs: FigureRuns) -> SkeletonFigure:
     """Run the scene of figure 3 with set-valued friction and find its skeleton."""
     scene = load_scene("figure_3").replace(contact="set-valued")
     cloud, values, looks = FULL
@@ -81,7 +81,7 @@ def compute(name: str, runs: FigureRuns) -> Skeleton:
         show_progress=runs.execution.show_progress,
         progress=runs.execution.progress,
     )
-    return Skeleton(Diagram(runs.run(swept), "omega", ()), tuple(_placed(scene, branch) for branch in found))
+    return SkeletonFigure(Diagram(runs.run(swept), "omega", ()), tuple(_placed(scene, branch) for branch in found))
 
 
 def _placed(scene: Scene, branch: Branch) -> tuple[Place, ...]:
@@ -122,7 +122,7 @@ def _periods(branch: tuple[Place, ...]) -> int:
     return max(place.orbit.periods for place in branch)
 
 
-def table(data: Skeleton) -> Table:
+def table(data: SkeletonFigure) -> Table:
     """Return one row for each orbit and crossing of the section."""
     rows = []
     for number, branch in enumerate(data.branches):
@@ -134,7 +134,7 @@ def table(data: Skeleton) -> Table:
     return Table(columns, tuple(rows))
 
 
-def ranges(data: Skeleton) -> Table:
+def ranges(data: SkeletonFigure) -> Table:
     """Return one row for each bifurcation of each branch, at its lowest point at the section."""
     rows = [
         (number, place.orbit.periods, place.kind, place.value, place.residual, min(place.x, default=math.nan))
@@ -145,7 +145,7 @@ def ranges(data: Skeleton) -> Table:
     return Table(("branch", "periods", "kind", "omega", "residual", "x_1"), tuple(rows))
 
 
-def document(data: Skeleton) -> str:
+def document(data: SkeletonFigure) -> str:
     """Return the bifurcations as a table in Markdown; a shared one is listed once."""
     lines = ["| ω | drive periods | kind | residual |", "|---|---|---|---|"]
     last: tuple[Any, ...] = (None, math.nan)
@@ -156,7 +156,7 @@ def document(data: Skeleton) -> str:
     return "\n".join(lines) + "\n"
 
 
-def draw(axes: Axes, data: Skeleton) -> Axes:
+def draw(axes: Axes, data: SkeletonFigure) -> Axes:
     """Draw the motion as grey dots, stable orbits as lines, unstable ones dashed."""
     _diagram(axes, data, 0.9)
     axes.set(xlim=(LOW, HIGH), xlabel=r"drive frequency $\omega$", ylabel=r"$\chi_1$ at the section")
@@ -173,7 +173,7 @@ def draw(axes: Axes, data: Skeleton) -> Axes:
     return axes
 
 
-def _diagram(axes: Axes, data: Skeleton, size: float) -> None:
+def _diagram(axes: Axes, data: SkeletonFigure, size: float) -> None:
     """Draw motion, branches and bifurcations."""
     cloud, _ = points(data.diagram)
     axes.plot(
@@ -221,7 +221,7 @@ def _stable(before: Place, after: Place) -> bool:
     return own.orbit.stable if own else max(abs(place.orbit.multipliers[0]) for place in (before, after)) < 1.0 + SAME
 
 
-def _key(data: Skeleton) -> list[Line2D]:
+def _key(data: SkeletonFigure) -> list[Line2D]:
     """Legend of the colours, lines and marks that occur."""
     counts = sorted({_periods(branch) for branch in data.branches})
     found = {place.kind for branch in data.branches for place in branch}

@@ -38,7 +38,7 @@ GAP = 0.001
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ThresholdRow:
     """Synchronous ranges of one chain at one frequency."""
 
     n: int  # number of oscillators
@@ -91,7 +91,7 @@ class Row:
 class Comparison:
     """All rows and the quality of their runs."""
 
-    rows: tuple[Row, ...]
+    rows: tuple[ThresholdRow, ...]
     quality: Quality
 
 
@@ -102,13 +102,13 @@ def compute(name: str, runs: FigureRuns) -> Comparison:
     return Comparison(tuple(_row(n, omega, runs) for n, omega in cases), runs.quality)
 
 
-def _row(n: int, omega: float, runs: FigureRuns) -> Row:
+def _row(n: int, omega: float, runs: FigureRuns) -> ThresholdRow:
     scene = scene_of(n, omega, runs)
     found = runs.network(scene)
     predicted = tuple(runs.predicted(scene))
     windows = windows_of(scene, runs)
     failed = int((~np.isfinite(found.error)).sum())
-    return Row(n, omega, found.intervals, predicted, windows, published(n, omega), failed, len(found.x))
+    return ThresholdRow(n, omega, found.intervals, predicted, windows, published(n, omega), failed, len(found.x))
 
 
 def windows_of(scene: Scene, runs: FigureRuns) -> ExponentWindows:
@@ -175,7 +175,7 @@ def table(data: Comparison) -> Table:
     return Table(tuple(columns), tuple(rows))
 
 
-def _ends(row: Row) -> tuple[tuple[float | None, float | None], ...]:
+def _ends(row: ThresholdRow) -> tuple[tuple[float | None, float | None], ...]:
     none = (None, None)
     printed = row.printed[0] if row.printed else none
     gaps = {"exponents": 0.0}
@@ -214,7 +214,7 @@ def _shown(ends: tuple[float | None, float | None]) -> str:
     return "none" if None in ends else f"[{ends[0]:z.4f}, {ends[1]:z.4f}]"
 
 
-def _with_errors(row: Row, ends: tuple[float | None, float | None]) -> str:
+def _with_errors(row: ThresholdRow, ends: tuple[float | None, float | None]) -> str:
     if row.windows.absent:
         return "not computed"
     pairs = zip(ends, row.errors, strict=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from synchain.models.graphs.topology import Topology
 from synchain.models.inputs.checks import check_instance
-from synchain.models.inputs.display import Drawn
+from synchain.models.inputs.display import HasDrawing
 from synchain.models.scenes.scene import Scene
 
 from .graph_layout import positions
@@ -67,7 +67,7 @@ class Picture:
     labels: Sequence[int] | Sequence[str]  # what the nodes are called
 
     @classmethod
-    def of(cls, value: Drawn) -> Picture:
+    def of(cls, value: HasDrawing) -> Picture:
         """Lay out a graph, or that of a scene with its kinds of nodes."""
         graph = graph_of(value)
         place = positions(graph)
@@ -93,7 +93,7 @@ class Picture:
         return float(np.clip(0.4 * nearest, 0.012, 0.11))
 
 
-def graph_of(value: Drawn) -> Topology:
+def graph_of(value: HasDrawing) -> Topology:
     """Return a graph itself, or that of a scene; TypeError for anything else."""
     return value.topology if isinstance(value, Scene) else check_instance("graph", value, Topology, "a graph")
 
@@ -126,7 +126,7 @@ def _hides(place: np.ndarray, i: int, j: int) -> bool:
     return bool(np.any((along > 1e-6) & (along < 1.0 - 1e-6) & (aside < 0.01)))
 
 
-def draw_graph(value: Drawn, ax: Axes | None = None) -> Axes:
+def draw_graph(value: HasDrawing, ax: Axes | None = None) -> Axes:
     """Draw a graph, or that of a scene, into axes (default: those of a new figure); return them."""
     from matplotlib.collections import LineCollection
     from matplotlib.patches import FancyArrowPatch
@@ -190,7 +190,7 @@ def _nodes(axes: Axes, picture: Picture) -> None:
     axes.set_axis_off()
 
 
-def svg(value: Drawn, width: int = 300) -> str:
+def svg(value: HasDrawing, width: int = 300) -> str:
     """Return a graph as SVG text; of more than SVG_NODES nodes or SVG_LINES lines only words.
 
     Lines have the colour of the text around, so that the drawing reads on any ground.

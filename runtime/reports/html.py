@@ -20,7 +20,7 @@ from synchain.models.graphs.topology import Topology
 from synchain.models.presentation.equations_text import latex as latex_of
 from synchain.models.presentation.equations_text import lines
 from synchain.models.presentation.mathml import formula
-from synchain.models.presentation.writer import Latex, Text, Writer
+from synchain.models.presentation.writer import ExpressionWriter, Latex, Text
 from synchain.models.scenes.scene import Scene
 from synchain.models.spectra.eigenvalue import Eigenvalue, decimal
 from synchain.models.spectra.spectrum import Spectrum
@@ -58,7 +58,7 @@ LONG = 400
 EXACT = 40
 """Largest graph without a closed form whose spectrum is computed to be shown."""
 
-PLAIN = Writer(Latex(), {}, frozenset())
+PLAIN = ExpressionWriter(Latex(), {}, frozenset())
 
 
 def fragment(value: object) -> str:

@@ -12,7 +12,7 @@ from html import escape
 import numpy as np
 
 from synchain.models.presentation.equations_text import latex
-from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.scenes.scene import Scene, check_scene
 from synchain.models.sweeps.axis import Axis
 
 from ..engines.job import versions
@@ -64,7 +64,7 @@ def report(
 ) -> str:
     """Compute what there is to say of a scene, and return it as a page of HTML."""
     effort = Effort() if effort is None else effort
-    title = escape(a_scene(scene).title or repr(scene))
+    title = escape(check_scene(scene).title or repr(scene))
     parts = [f"<h1>{title}</h1>", *(f"<p>Note: {escape(words)}</p>" for words in scene.warnings)]
     source = f"<details><summary>LaTeX</summary><pre>{escape(latex(scene.equations))}</pre></details>"
     parts += [_section("Equations", body(scene.equations) + source)]

@@ -24,7 +24,7 @@ from typing import Any, TypedDict, cast
 
 import numpy as np
 
-from synchain.codegen.driver.columns import COUNTS, Count, Point, Sum
+from synchain.codegen.driver.columns import COUNTS, Count, PointColumn, SumColumn
 from synchain.models.inputs.regular_file import open_regular
 
 from ..cells.buffers import Buffers
@@ -299,15 +299,20 @@ def _unpacked(
     counts = np.frombuffer(body, "<i8", cells * COUNTS).reshape(cells, COUNTS).astype(np.int64)
     lengths = [int(count) for count in counts[:, Count.POINTS]]
     points = sum(lengths)
-    sums_of_a_cell = len(Sum) + observed
-    sizes = (cells * dimension, cells * sums_of_a_cell, points * (Point.STATE + kept), cells * samples * dimension)
+    sums_of_a_cell = len(SumColumn) + observed
+    sizes = (
+        cells * dimension,
+        cells * sums_of_a_cell,
+        points * (PointColumn.STATE + kept),
+        cells * samples * dimension,
+    )
     if min(lengths, default=0) < 0 or max(lengths, default=0) != most or counts.nbytes + 8 * sum(sizes) != len(body):
         return None
     floats = np.frombuffer(body, "<f8", offset=counts.nbytes).astype(float)
     end, sums, sections, tracks = np.split(floats, np.cumsum(sizes)[:-1])
     buffers = Buffers.empty(cells, dimension, most, samples, 0, kept)
     buffers.counts = counts
-    buffers.points[_exists(buffers)] = sections.reshape(points, Point.STATE + kept)
+    buffers.points[_exists(buffers)] = sections.reshape(points, PointColumn.STATE + kept)
     buffers.end, buffers.sums = end.reshape(cells, dimension), sums.reshape(cells, sums_of_a_cell)
     buffers.samples = tracks.reshape(cells, samples, dimension)
     return buffers

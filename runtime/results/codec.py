@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from synchain.models.graphs.topology import Topology
-from synchain.models.inputs.frozen import Frozen
+from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.scenes.dictionary import graph_of, graph_table
 from synchain.models.scenes.scene import Scene
 
@@ -29,17 +29,17 @@ Variables: TypeAlias = "dict[str, tuple[tuple[str, ...], np.ndarray]]"
 
 def encode(value: object, data: xr.Dataset) -> tuple[Tree, Variables]:
     """Return the fields of a frozen value as JSON types, and the arrays that `data` lack."""
-    writer = _Writer(data)
+    writer = _SceneCollector(data)
     tree = writer.tree(value, "")
     return {"root": tree, "scenes": [json.loads(text) for text in writer.scenes]}, writer.further
 
 
 def decode(tree: Mapping[str, Any], data: xr.Dataset, classes: Mapping[str, type]) -> Any:
     """Return the value of a tree."""
-    return _Reader(data, classes, [Scene.from_dict(each) for each in tree["scenes"]]).value(tree["root"])
+    return _ValueReader(data, classes, [Scene.from_dict(each) for each in tree["scenes"]]).value(tree["root"])
 
 
-class _Writer:
+class _SceneCollector:
     """Collects the scenes and the further arrays of a value."""
 
     def __init__(self, data: xr.Dataset) -> None:
@@ -69,7 +69,7 @@ class _Writer:
         if isinstance(value, Scene):
             text = json.dumps(value.as_dict(), sort_keys=True)
             return {"scene": self.scenes.setdefault(text, len(self.scenes))}
-        if isinstance(value, Frozen):
+        if isinstance(value, FrozenDict):
             return {"table": {name: self.tree(item, f"{path}_{name}") for name, item in value.items()}}
         if isinstance(value, Topology):
             return {"graph": graph_table(value)}
@@ -94,7 +94,7 @@ class _Writer:
         return {"array": path, "dtype": values.dtype.str}
 
 
-class _Reader:
+class _ValueReader:
     """Makes values of a tree again."""
 
     def __init__(self, data: xr.Dataset, classes: Mapping[str, type], scenes: list[Scene]) -> None:
@@ -117,5 +117,5 @@ class _Reader:
             "complex": lambda: complex(*part),
             "fraction": lambda: Fraction(part),
             "graph": lambda: graph_of(part),
-            "table": lambda: Frozen({name: self.value(item) for name, item in part.items()}),
+            "table": lambda: FrozenDict({name: self.value(item) for name, item in part.items()}),
         }.get(tag, lambda: self.scenes[part])()

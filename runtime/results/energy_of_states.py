@@ -12,9 +12,9 @@ from scipy.integrate import cumulative_simpson
 from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.checks import check_keys, check_number, check_table
 from synchain.models.mechanics.components import TIME
-from synchain.models.networks.energy_terms import Energy, Share
+from synchain.models.networks.energy_terms import EnergyTerms, Share
 from synchain.models.scenes.energy import energy
-from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.scenes.scene import Scene, check_scene
 
 from ..support.arrays import numbers
 
@@ -58,7 +58,7 @@ class EnergyFunction:
     """
 
     scene: Scene
-    exact: Energy
+    exact: EnergyTerms
     groups: tuple[_Group, ...]
 
     def __call__(self, states: Array, t: Array | float = 0.0, parameters: Values = None) -> Array:
@@ -100,7 +100,7 @@ def energy_function(scene: Scene) -> EnergyFunction:
     """Return the compiled energy of a scene's network; ValueError as
     `synchain.models.scenes.energy.energy`.
     """
-    exact = energy(a_scene(scene))
+    exact = energy(check_scene(scene))
     equations, places = exact.equations, exact.equations.places
     groups = []
     for kind, (share, node) in enumerate(zip(exact.nodes, equations.nodes, strict=True)):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from synchain.models.inputs.display import Shown
+from synchain.models.inputs.display import HasHtml
 
 from .codec import encode
 from .store import write_data
@@ -25,7 +25,7 @@ KIND, VALUE = "kind", "value"
 """Attributes of a file: the class of the value, and its fields as JSON."""
 
 
-class Labelled(Shown):
+class Labelled(HasHtml):
     """A frozen value with `data`, `summary`, `as_dict`, `plot` and `save`.
 
     A subclass is a frozen dataclass that defines `data` and `summary`.  Its fields are written and

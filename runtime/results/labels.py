@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from synchain.codegen.driver.columns import Count, Point, Span, Sum
+from synchain.codegen.driver.columns import Count, PointColumn, SpanColumn, SumColumn
 from synchain.models.scenes.scene import Scene
 
-from ..cells.observable_arrays import Observed, Sections
+from ..cells.observable_arrays import ObservableArrays, Sections
 from ..engines.choice import method_names
 from ..support.status import Status
 from .certificate import VERDICTS, Certificate
@@ -73,10 +73,10 @@ COUNTS = {
     "section_count": Count.POINTS,
 }
 SUMS = {
-    "sync_error": Sum.MEAN,
-    "sync_error_max": Sum.PEAK,
-    "sync_error_end": Sum.LAST,
-    "end_time": Sum.STOPPED_AT,
+    "sync_error": SumColumn.MEAN,
+    "sync_error_max": SumColumn.PEAK,
+    "sync_error_end": SumColumn.LAST,
+    "end_time": SumColumn.STOPPED_AT,
 }
 """The columns of `counts` and of `sums` by the names of their variables."""
 
@@ -131,14 +131,16 @@ def variables(
         yield "method_steps", ("integrator",), by_method.astype(np.int32)
     states = States.of(scene)
     yield "end", STATE, states.table(buffers.end)
-    yield END_TIME, (), buffers.sums[:, Sum.STOPPED_AT]
-    yield DRIVE_PHASE, (), _drive_phase(scene, spans, buffers.sums[:, Sum.STOPPED_AT])
+    yield END_TIME, (), buffers.sums[:, SumColumn.STOPPED_AT]
+    yield DRIVE_PHASE, (), _drive_phase(scene, spans, buffers.sums[:, SumColumn.STOPPED_AT])
     if "sync_error" in scene.record:
-        unseen = (buffers.status != Status.FINISHED) & (buffers.sums[:, Sum.STOPPED_AT] <= spans[:, Span.START])
+        unseen = (buffers.status != Status.FINISHED) & (
+            buffers.sums[:, SumColumn.STOPPED_AT] <= spans[:, SpanColumn.START]
+        )
         for name in ("sync_error", "sync_error_max"):
             yield name, (), np.where(unseen, np.nan, buffers.sums[:, SUMS[name]])
-        yield "sync_error_end", (), buffers.sums[:, Sum.LAST]
-    for name, rows, columns in Observed(scene).columns():
+        yield "sync_error_end", (), buffers.sums[:, SumColumn.LAST]
+    for name, rows, columns in ObservableArrays(scene).columns():
         values = buffers.sums[:, columns]
         yield name, ("node",) if rows else (), values if rows else values[:, 0]
     if certificate is not None:
@@ -149,12 +151,12 @@ def variables(
         room = min(most, buffers.points.shape[1])
         points[:, :room] = buffers.points[:, :room]
         yield "section_count", (), buffers.point_counts.astype(np.int32)
-        yield "section_time", ("point",), points[:, :, Point.TIME]
-        yield "section", ("point", *STATE), states.table(points[:, :, Point.STATE :])
+        yield "section_time", ("point",), points[:, :, PointColumn.TIME]
+        yield "section", ("point", *STATE), states.table(points[:, :, PointColumn.STATE :])
     yield from Sections(scene).variables(buffers.points, most)
     if "trajectory" in scene.record:
         parts = np.linspace(0.0, 1.0, scene.samples) if scene.samples > 1 else np.zeros(1)
-        start, end = spans[:, Span.START, None], spans[:, Span.END, None]
+        start, end = spans[:, SpanColumn.START, None], spans[:, SpanColumn.END, None]
         yield "time", ("sample",), start + (end - start) * parts
         yield "trajectory", ("sample", *STATE), states.table(buffers.samples)
 
@@ -163,7 +165,7 @@ def _drive_phase(scene: Scene, spans: np.ndarray, time: np.ndarray) -> np.ndarra
     """How far (cells,) into a period of the drive each cell stopped, from 0 to 1."""
     if not scene.forced:
         return np.zeros(len(time))
-    period = np.where(spans[:, Span.PERIOD] > 0.0, spans[:, Span.PERIOD], np.nan)
+    period = np.where(spans[:, SpanColumn.PERIOD] > 0.0, spans[:, SpanColumn.PERIOD], np.nan)
     return np.asarray(np.mod(time / period, 1.0))
 
 
@@ -200,9 +202,9 @@ def _certified(scene: Scene, spans: np.ndarray, buffers: Buffers, certificate: C
     """The variables of a certificate."""
     sums, finished = buffers.sums, buffers.finished
     values = {"transversal_exponent": certificate.exponent, "transversal_stderr": certificate.stderr}
-    values["ended_early"] = (finished & (sums[:, Sum.STOPPED_AT] < spans[:, Span.END])).astype(np.int32)
+    values["ended_early"] = (finished & (sums[:, SumColumn.STOPPED_AT] < spans[:, SpanColumn.END])).astype(np.int32)
     if "sync_error" in scene.record:
-        verdicts = certificate.verdicts(finished, sums[:, Sum.MEAN], sums[:, Sum.PEAK])
+        verdicts = certificate.verdicts(finished, sums[:, SumColumn.MEAN], sums[:, SumColumn.PEAK])
         values["verdict"] = verdicts.astype(np.int32)
     return values
 

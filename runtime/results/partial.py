@@ -20,7 +20,7 @@ from ..cells.buffers import IN_MEMORY, Buffers, numbers_of_a_cell
 from ..cells.layout import Layout
 from ..cells.observable_arrays import Sections
 from ..cells.plan import Planner
-from ..cells.reduce import NodeMerge, Reduction
+from ..cells.reduce import NodeMerge, ReducedScene
 from ..support.files import understood
 from .block_log import BlockLog, Description
 from .certificate import VERDICTS, Certificate
@@ -30,7 +30,7 @@ from .store import filled
 
 
 def describe_sweep(
-    reduction: Reduction, layout: Layout, attributes: Mapping[str, object], certificate: Certificate | None
+    reduction: ReducedScene, layout: Layout, attributes: Mapping[str, object], certificate: Certificate | None
 ) -> Description:
     """Return what a block log says of its sweep."""
     merge = reduction.merge
@@ -63,7 +63,7 @@ def certificate_of(about: Description) -> Certificate | None:
     return None if exponents is None else Certificate(*(np.array(part, dtype=float) for part in exponents))
 
 
-class _Reader:
+class _BlockReader:
     """Reads the blocks of a log as those of the whole network."""
 
     def __init__(self, log: BlockLog, scene: Scene) -> None:
@@ -94,10 +94,10 @@ def read_partial(path: str | os.PathLike[str]) -> Result:
         scene = scene_of(about["attributes"])
         layout_of(about, scene)
         with closing(BlockLog.open(path)) as log:
-            return _so_far(_Reader(log, scene))
+            return _so_far(_BlockReader(log, scene))
 
 
-def _so_far(reader: _Reader) -> Result:
+def _so_far(reader: _BlockReader) -> Result:
     """The blocks that a log holds, as a result."""
     log, scene = reader.log, reader.scene
     dimension, samples = len(reader.merge.places), int(log.about["samples"])
@@ -119,7 +119,7 @@ def write_result(log: BlockLog, path: str | os.PathLike[str], scene: Scene) -> d
     """Write the file of a scene's log that has all blocks, with one block in memory at a time; the
     ending of `path` chooses its form.
     """
-    reader = _Reader(log, scene)
+    reader = _BlockReader(log, scene)
     verdicts: dict[str, int] = {}
     lengths = dict(zip(dimensions(scene), scene.shape, strict=True))
     with filled(path, _template(reader), lengths) as file:
@@ -134,7 +134,7 @@ def write_result(log: BlockLog, path: str | os.PathLike[str], scene: Scene) -> d
     return verdicts
 
 
-def _template(reader: _Reader) -> xr.Dataset:
+def _template(reader: _BlockReader) -> xr.Dataset:
     """The result of the first cell alone."""
     scene = reader.scene
     first = Buffers(*(array[:1] for array in reader.buffers(0).arrays()))

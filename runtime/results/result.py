@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from synchain.codegen.driver.columns import Count, Point
+from synchain.codegen.driver.columns import Count, PointColumn
 from synchain.codegen.machine_code.processor import processor, told_apart
 from synchain.models.inputs.checks import check_choice, check_instance
-from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.scenes.scene import Scene, check_scene
 
 from ..cells.buffers import Buffers
-from ..cells.observable_arrays import Observed, Sections
+from ..cells.observable_arrays import ObservableArrays, Sections
 from ..support.files import understood
 from ..support.status import Status
 from .certificate import Certificate
@@ -65,7 +65,7 @@ class Result(_Deferred, Labelled):
 
     def __post_init__(self) -> None:
         check_instance("data", self.data, xr.Dataset, "an xarray.Dataset; open_result reads one from a file")
-        a_scene(self.scene)
+        check_scene(self.scene)
 
     @classmethod
     def _deferred(cls, make: Callable[[], xr.Dataset], scene: Scene) -> Result:
@@ -233,11 +233,11 @@ class Result(_Deferred, Labelled):
         if "method_steps" in data:
             by_method = data.method_steps.values.reshape(cells, -1)
             buffers.counts[:, Count.BY_METHOD : Count.BY_METHOD + by_method.shape[1]] = by_method
-        for name, _, place in Observed(self.scene).columns():
+        for name, _, place in ObservableArrays(self.scene).columns():
             buffers.sums[:, place] = data[name].values.reshape(cells, -1)
         if self.scene.sections:
             points = Sections(self.scene).points(cells, {str(name): data[name].values for name in data})
-            buffers.counts[:, Count.POINTS] = np.isfinite(points[:, :, Point.TIME]).sum(axis=1)
+            buffers.counts[:, Count.POINTS] = np.isfinite(points[:, :, PointColumn.TIME]).sum(axis=1)
             buffers.widen(points.shape[1])
             buffers.points[:, : points.shape[1]] = points
         if "section" in data:

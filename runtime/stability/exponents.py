@@ -23,7 +23,7 @@ import xarray as xr
 from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.inputs.checks import check_integer
 from synchain.models.inputs.keywords import warn
-from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.scenes.scene import Scene, check_scene
 
 from ..cells.run_keywords import ONE_CELL, ORBITS, Given
 from ..prediction.intervals import Interval
@@ -347,7 +347,7 @@ def exponents(
     given = Given(exponents, parameters, more, ORBITS)
     averaging = Averaging(precision, periods, transient, seed, Execution(workers, None, show_progress, progress))
     asked = numbers("alpha", alpha, complex_too=True)
-    of_layers = asked.ndim == 2 and len(a_scene(scene).model.linked) > 1
+    of_layers = asked.ndim == 2 and len(check_scene(scene).model.linked) > 1
     strengths = row_of("alpha", asked.ravel() if of_layers else asked, complex_too=True)
     return transversal(
         given, scene, strengths.reshape(asked.shape) if of_layers else strengths, starts, rtol, averaging
@@ -457,7 +457,7 @@ def with_partner(scene: Scene) -> Scene:
 
     One that its coupling cannot join stays alone: it has the mode of strength 0 (`Orbits.make`).
     """
-    if a_scene(scene).model.linked:
+    if check_scene(scene).model.linked:
         return scene.replace(**ONE_CELL)
     try:
         coupled = pair_of(scene, **ONE_CELL)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from .motion import Rates, path, rests, shortest_time
+from .motion import RateFunctions, path, rests, shortest_time
 from .orbits import Orbits
 from .variational_integrator import VariationalIntegrator
 
@@ -61,7 +61,7 @@ def limit_cycle(orbit: Orbits, closed: float) -> tuple[float, int]:
     return 0.0, 0
 
 
-def _returns(orbit: Orbits, rates: Rates, start: np.ndarray) -> Iterator[tuple[float, np.ndarray]]:
+def _returns(orbit: Orbits, rates: RateFunctions, start: np.ndarray) -> Iterator[tuple[float, np.ndarray]]:
     """Yield the times at which the orbit comes back through the plane normal to its motion.
 
     With each comes the extent (p,) of the motion until then.
@@ -111,7 +111,7 @@ def _passage(
 
 
 def _newton(
-    orbit: Orbits, rates: Rates, start: np.ndarray, time: float, extent: np.ndarray, closed: float
+    orbit: Orbits, rates: RateFunctions, start: np.ndarray, time: float, extent: np.ndarray, closed: float
 ) -> Cycle | None:
     """The cycle near a state that is back after about some time; None if Newton's method leads elsewhere."""
     state, period, near = start, time, NEAR * extent
@@ -132,7 +132,7 @@ def _newton(
     return None
 
 
-def _least(orbit: Orbits, rates: Rates, cycle: Cycle, extent: np.ndarray, closed: float) -> Cycle:
+def _least(orbit: Orbits, rates: RateFunctions, cycle: Cycle, extent: np.ndarray, closed: float) -> Cycle:
     """The cycle with its least period: one integration looks whether the state is back after a part of the period."""
     integrator, time = _integrator(orbit, cycle.state), 0.0
     near = math.sqrt(closed) * extent

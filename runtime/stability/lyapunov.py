@@ -44,7 +44,7 @@ from .interpolation import Interpolation, Panel
 from .motion import Turns, rates_of, turns_of
 from .orbits import LOOKS, OF_EXTENT, unit_of_time
 from .slow_motion import warn_of_slow_motion
-from .variational_integrator import Travellers, VariationalIntegrator
+from .variational_integrator import Deviations, VariationalIntegrator
 
 __all__ = ["Lyapunov", "lyapunov_spectrum"]
 
@@ -306,7 +306,7 @@ def _counted(scene: Scene, count: int | None) -> int:
 
 
 @dataclass(slots=True)
-class Observed:
+class VisibleStates:
     """An integrator whose last states, the logarithms of volumes, are hidden from who looks at the motion."""
 
     integrator: VariationalIntegrator
@@ -343,7 +343,7 @@ class TangentFrame:
     parts: int = 1  # blocks in a period
     phase: int = 0  # block within the period
     group: int = 1  # blocks between two orthogonalisations, over which propagators are multiplied
-    carried: tuple[VariationalIntegrator, Travellers] | None = None  # what multiplies them, made at the first call
+    carried: tuple[VariationalIntegrator, Deviations] | None = None  # what multiplies them, made at the first call
     # the matrix (size, size) of the variational equation as a function of states and parameters
     rates: Callable[..., np.ndarray] = field(kw_only=True)
 
@@ -373,7 +373,7 @@ class TangentFrame:
             looked = cls(scene, variation, integrator, basis, turns, rates=_rates(variation))
             turns = turns._replace(extent=looked.extent_of_driven(hidden))
         else:
-            observed = Observed(integrator_of(variation, math.inf), hidden)
+            observed = VisibleStates(integrator_of(variation, math.inf), hidden)
             observed.integrator.observes = True
             turns = turns_of(cast("VariationalIntegrator", observed), rates_of(network.orbit, dict(scene.parameters)))
         variation = variation if sticks else _scaled(variation, turns.extent)
@@ -495,7 +495,7 @@ class TangentFrame:
         self.integrator.state = carrier.state
         return growths, angles, volumes
 
-    def _carriers(self) -> tuple[VariationalIntegrator, Travellers]:
+    def _carriers(self) -> tuple[VariationalIntegrator, Deviations]:
         """An integrator of the propagator of the network, and the directions, which all take this one."""
         size, count, own = self.variation.size, self.count, self.integrator
         carrier = own
@@ -505,7 +505,7 @@ class TangentFrame:
             carrier.control, carrier.watch, carrier.slow = own.control, own.watch, own.slow
         shared = Panel(np.arange(count), np.zeros(1), np.zeros(0), np.ones((count, 1)), np.zeros((0, 1)))
         registers = Interpolation(np.zeros(count), (shared,)).registers(own.kernel.origin.width)
-        return carrier, Travellers.make(registers, 1, size, size)
+        return carrier, Deviations.make(registers, 1, size, size)
 
     def choose_group(self) -> None:
         """Choose the most blocks whose product of propagators keeps all directions clear of rounding."""

@@ -60,7 +60,7 @@ REACH = 0.4
 """Largest distance of a further start in the first component, relative to the extent of the motion."""
 
 
-class Rates(NamedTuple):
+class RateFunctions(NamedTuple):
     """Rates (p,) of a state (p,) at time 0, and the sums of the sizes of their terms, with those of a drive at its largest."""
 
     values: Callable[[np.ndarray], np.ndarray]
@@ -90,7 +90,7 @@ class Turns(NamedTuple):
         return f"{self.words}, {self.time:.6g} units of time"
 
 
-def rates_of(equations: Equations, parameters: dict[str, float]) -> Rates:
+def rates_of(equations: Equations, parameters: dict[str, float]) -> RateFunctions:
     """Return the rates of equations as functions of the state alone."""
     names = [sp.Symbol(name, real=True) for name in (*equations.state, *equations.parameters)]
     values = [parameters[name] for name in equations.parameters]
@@ -98,7 +98,7 @@ def rates_of(equations: Equations, parameters: dict[str, float]) -> Rates:
     rates, sizes = (
         sp.lambdify(names, [e.xreplace({TIME: sp.S.Zero}) for e in both], "numpy") for both in (rhs, map(_size, rhs))
     )
-    return Rates(
+    return RateFunctions(
         lambda state: np.array(rates(*state, *values), dtype=float),
         lambda state: np.array(sizes(*state, *values), dtype=float),
     )
@@ -138,7 +138,7 @@ def starts_near(state: np.ndarray, extent: np.ndarray, count: int, seed: int) ->
     return starts
 
 
-def rests(rates: Rates, state: np.ndarray, closed: float, extent: np.ndarray) -> bool:
+def rests(rates: RateFunctions, state: np.ndarray, closed: float, extent: np.ndarray) -> bool:
     """Return whether the rates at a state are zero: below rounding of their terms, or within what they change by over a part `closed` of the extent."""
     changes = np.abs(rates.slopes(state, extent)).sum(axis=1)
     here = np.abs(rates.values(state))
@@ -146,7 +146,7 @@ def rests(rates: Rates, state: np.ndarray, closed: float, extent: np.ndarray) ->
 
 
 def path(
-    integrator: VariationalIntegrator, rates: Rates, shortest: float
+    integrator: VariationalIntegrator, rates: RateFunctions, shortest: float
 ) -> Iterator[tuple[np.ndarray, float, np.ndarray]]:
     """Advance a single orbit by steps in which no component moves by more than a share of its extent, and the motion does not turn round.
 
@@ -178,7 +178,7 @@ def _cosine(first: np.ndarray, second: np.ndarray, extent: np.ndarray) -> float:
         return float(a @ b / np.sqrt((a @ a) * (b @ b)))
 
 
-def shortest_time(rates: Rates, state: np.ndarray) -> float:
+def shortest_time(rates: RateFunctions, state: np.ndarray) -> float:
     """Return a time in which nothing has happened yet at a state that does not rest; 1 if nothing tells one."""
     size, speed = np.abs(state), np.abs(rates.values(state))
     known = (size > 0.0) & (speed > 0.0)
@@ -190,7 +190,7 @@ def shortest_time(rates: Rates, state: np.ndarray) -> float:
     return FIRST * float(min(times, default=1.0 / FIRST))
 
 
-def turns_of(integrator: VariationalIntegrator, rates: Rates) -> Turns:
+def turns_of(integrator: VariationalIntegrator, rates: RateFunctions) -> Turns:
     """Return the mean return time of an undriven orbit, or the slowest rate of the equilibrium that it comes to.
 
     A turn of a component lasts from one top to the next, with a fall and a rise by CLEAR of its extent at least between
@@ -256,7 +256,7 @@ def _tops(x: np.ndarray, least: float) -> list[int]:
     return tops
 
 
-def _slowest(rates: Rates, state: np.ndarray, extent: np.ndarray) -> float:
+def _slowest(rates: RateFunctions, state: np.ndarray, extent: np.ndarray) -> float:
     """The slowest rate of an equilibrium that is resolved; 0 if there is none."""
     scale = np.where(extent > 0.0, extent, np.where(state != 0.0, np.abs(state), 1.0))
     slopes = rates.slopes(state, scale) / scale[None, :]

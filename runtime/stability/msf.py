@@ -21,7 +21,7 @@ from synchain.models.dynamics.variational import mode
 from synchain.models.inputs.checks import check_integer
 from synchain.models.inputs.keywords import warn
 from synchain.models.inputs.names import expect_free
-from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.scenes.scene import Scene, check_scene
 
 from ..cells.run_keywords import ORBITS, Given, with_numbers
 from ..prediction.intervals import Interval
@@ -483,7 +483,7 @@ def msf(
     FloatingPointError
         If an integration fails.
     """
-    expect_vanishing("msf", a_scene(scene).equations)
+    expect_vanishing("msf", check_scene(scene).equations)
     line = row("alpha", alpha, 2, rising=True)
     fine = np.union1d(line, np.linspace(line[0], line[-1], FINE))
     given = Given(msf, parameters, more, ORBITS)
@@ -553,7 +553,7 @@ def plane(
     whole.checked(with_partner(scene))
     rows, given = whole.parted()
     strengths = {name: values for name, values in zip(STRENGTHS, (alpha, beta), strict=True) if values is not None}
-    if beta is not None and "beta" not in whole.values and a_scene(scene).takes("beta"):
+    if beta is not None and "beta" not in whole.values and check_scene(scene).takes("beta"):
         warn(
             "plane: found beta, the imaginary part of strengths, and a parameter of that name; "
             "write parameters={'beta': …} for the parameter",
@@ -572,7 +572,7 @@ def plane(
     expect_free("plane", rows, NAMES)
     axes = {name: row(name, values, 2, rising=True) for name, values in (*strengths.items(), *rows.items())}
     known = _known(given, scene)
-    if len(rows) == 2 and not a_scene(scene).model.linked:
+    if len(rows) == 2 and not check_scene(scene).model.linked:
         raise ValueError(
             "plane: found two parameters and a scene without links; expected a network, or alpha and a parameter"
         )
@@ -584,7 +584,7 @@ def plane(
         )
         _check_parameters(cell, {name: axes[name] for name in rows}, bool(strengths))
         return _over_parameters(known, cell, axes, tuple(strengths), starts, averaging)
-    expect_vanishing("plane", a_scene(scene).equations)
+    expect_vanishing("plane", check_scene(scene).equations)
     across, up = axes.values()
     heights, place = np.unique(np.abs(up), return_inverse=True)
     half_plane = transversal(given, scene, (across[:, None] + 1j * heights).reshape(-1), starts, rtol, averaging)

@@ -26,8 +26,8 @@ from ..cells.initial_modes import with_modes
 from ..engines.choice import chosen_for_modes
 from .averages import BATCHES, SLACK, TRIED, error_of_steps
 from .interpolation import Interpolation, exact_interpolation, lines_of, strength_interpolation
-from .motion import Rates, Turns, above, extent_of, rates_of, turns_of
-from .variational_integrator import NO_TRACKS, Travellers, VariationalIntegrator
+from .motion import RateFunctions, Turns, above, extent_of, rates_of, turns_of
+from .variational_integrator import NO_TRACKS, Deviations, VariationalIntegrator
 
 NODES, PARTS = (13, 21, 29, 37, 61), (1, 2, 4, 8, 16)
 """Nodes of a panel of strengths, and panels on each side, that are tried; with three for comparison they fill registers."""
@@ -89,7 +89,7 @@ class Orbits:
     interpolation: Interpolation = field(init=False, repr=False)
     integrator: VariationalIntegrator = field(init=False, repr=False)  # integrator of the nodes of the interpolation
     # deviations of all strengths, and the largest error of the interpolation so far
-    travellers: Travellers = field(init=False, repr=False)
+    travellers: Deviations = field(init=False, repr=False)
 
     @classmethod
     def make(
@@ -141,7 +141,7 @@ class Orbits:
         return self.turns.extent
 
     @property
-    def rates(self) -> Rates:
+    def rates(self) -> RateFunctions:
         """Rates of the state, at time 0."""
         return _rates(self.variation.orbit, tuple(self.numbers))
 
@@ -218,7 +218,7 @@ class Orbits:
     def prepare(self, periods: float) -> None:
         """Choose block and interpolation by trial on the next blocks, and start the deviations."""
         limit = max(0.01 * self.scene.rtol, ALLOWED)  # later blocks of a chaotic orbit are up to ten times worse
-        failed: list[Choice] = []
+        failed: list[InterpolationChoice] = []
         for choice in self._choices(periods):
             if any(choice.is_coarser(other) for other in failed):
                 continue
@@ -236,14 +236,14 @@ class Orbits:
             outer, legs = exact_interpolation(self.strengths), None
         self.start(outer, choice.block, legs=legs)
 
-    def _choices(self, periods: float) -> list[Choice]:
+    def _choices(self, periods: float) -> list[InterpolationChoice]:
         """What may suit an average of some length, the cheapest first, by the steps that one mode takes in a unit."""
         one = self.integrator_of(self.strengths[:1], LOOSENESS)
         one.advance(self.unit)
         taken = STEP * self.components * one.steps / len(self.state)
         whole = [b for b in BLOCKS if b <= max(4.0, periods / BATCHES) and periods % b == 0.0]
         lines = 1 if self.strengths.ndim == 1 else len(lines_of(self.strengths)[1])
-        found: list[Choice] = []
+        found: list[InterpolationChoice] = []
         if self.lands and lines == 1:
             found += _choices_of_legs([b for b in whole if b >= LEG], taken, len(self.strengths))
         if not found:
@@ -257,14 +257,14 @@ class Orbits:
         block: float,
         looseness: float = LOOSENESS,
         legs: Interpolation | None = None,
-    ) -> tuple[VariationalIntegrator, Travellers]:
+    ) -> tuple[VariationalIntegrator, Deviations]:
         """Start deviations of all strengths along the orbits from their settled states."""
         if self.lands:
             legs = legs or exact_interpolation(interpolation.nodes)
         integrator = self.integrator_of((legs or interpolation).nodes, looseness)
         integrator.set_deviations(self._basis(integrator))
         width = integrator.kernel.origin.width
-        travellers = Travellers.make(
+        travellers = Deviations.make(
             interpolation.registers(width),
             len(self.state),
             self.components,
@@ -381,7 +381,7 @@ def _variation(equations: Equations, plane: bool) -> Variation:
 
 
 @lru_cache(maxsize=16)
-def _rates(equations: Equations, numbers: tuple[float, ...]) -> Rates:
+def _rates(equations: Equations, numbers: tuple[float, ...]) -> RateFunctions:
     """The rates of equations; a limit cycle needs them at every step."""
     return rates_of(equations, dict(zip(equations.parameters, numbers, strict=True)))
 
@@ -398,7 +398,7 @@ def unit_of_time(scene: Scene) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class InterpolationChoice:
     """How propagators may be interpolated, and what it costs in multiplications for each unit of time.
 
     nodes, parts: of a panel, and panels on each side; of_legs: nodes that are integrated from landing to landing, 0 if all
@@ -411,7 +411,7 @@ class Choice:
     parts: int
     of_legs: int = 0
 
-    def is_coarser(self, other: Choice) -> bool:
+    def is_coarser(self, other: InterpolationChoice) -> bool:
         """True if another choice has shorter blocks and more nodes, in each panel and in all, or as many.
 
         Of as many nodes in all, those of few panels interpolate better.
@@ -420,16 +420,18 @@ class Choice:
         return self.block >= other.block and all(a <= b for a, b in zip(own, theirs, strict=True))
 
 
-def _choices_of_blocks(blocks: Sequence[float], taken: float, numbers: int) -> Iterator[Choice]:
+def _choices_of_blocks(blocks: Sequence[float], taken: float, numbers: int) -> Iterator[InterpolationChoice]:
     """Yield choices of blocks, nodes and panels.
 
     `taken`: multiplications that integrate a node of each line over a unit of time; `numbers`: those of all propagators.
     """
     for block, nodes, parts in itertools.product(blocks, NODES, PARTS):
-        yield Choice(nodes * parts * taken + (numbers * (nodes + BESIDE) + BLOCK) / block, block, nodes, parts)
+        yield InterpolationChoice(
+            nodes * parts * taken + (numbers * (nodes + BESIDE) + BLOCK) / block, block, nodes, parts
+        )
 
 
-def _choices_of_legs(blocks: Sequence[float], taken: float, numbers: int) -> Iterator[Choice]:
+def _choices_of_legs(blocks: Sequence[float], taken: float, numbers: int) -> Iterator[InterpolationChoice]:
     """Yield choices for a body that sticks; the arguments are those of `_choices_of_blocks`, with the number of strengths.
 
     One column of two is integrated, and one number of four is interpolated.
@@ -437,7 +439,7 @@ def _choices_of_legs(blocks: Sequence[float], taken: float, numbers: int) -> Ite
     for block, of_legs, nodes, parts in itertools.product(blocks, NODES, NODES, PARTS):
         if of_legs < nodes:
             cost = of_legs * parts * (taken / 2 + nodes) + LANDINGS + numbers * (nodes + BESIDE / 4) / block
-            yield Choice(cost, block, nodes, parts, of_legs)
+            yield InterpolationChoice(cost, block, nodes, parts, of_legs)
 
 
 def _stretches(periods: int) -> list[int]:

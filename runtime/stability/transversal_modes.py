@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.scenes.scene import Scene, check_scene
 from synchain.models.spectra.joint import JointEigenvalue, joint_spectrum
 
 
@@ -36,7 +36,7 @@ def still_strengths(scene: Scene) -> set[str]:
 
 def unused_axes(scene: Scene) -> set[str]:
     """Return the axes on which nothing depends that is computed for given strengths of modes or of links."""
-    axes = {axis.name for axis in a_scene(scene).axes}
+    axes = {axis.name for axis in check_scene(scene).axes}
     return axes & still_strengths(scene) if axes else set()
 
 

@@ -58,7 +58,7 @@ which these and the size in all; stretches of fewer steps tell nothing."""
 
 
 @dataclass(slots=True)
-class Travellers:
+class Deviations:
     """Deviations of all strengths, which propagators move."""
 
     registers: Registers  # how they follow from the propagators of the nodes
@@ -71,7 +71,7 @@ class Travellers:
     @classmethod
     def make(
         cls, registers: Registers, cells: int, columns: int, parts: int, legs: Registers | None = None
-    ) -> Travellers:
+    ) -> Deviations:
         """Return deviations along (1, 1, …)."""
         lanes = registers.lanes
         start = np.zeros((cells, registers.room // lanes, parts, lanes))
@@ -202,7 +202,7 @@ class VariationalIntegrator:
         return growth[:, self.order]
 
     def follow(
-        self, length: float, batches: np.ndarray, travellers: Travellers, tracks: np.ndarray = NO_TRACKS
+        self, length: float, batches: np.ndarray, travellers: Deviations, tracks: np.ndarray = NO_TRACKS
     ) -> np.ndarray:
         """Integrate over blocks of time that follow each other, and move deviations by their propagators.
 

@@ -21,7 +21,7 @@ from synchain.models.sweeps.checked_axes import rest_in_sweep
 from ..cells.buffers import Buffers
 from ..cells.layout import Layout
 from ..cells.plan import Planner
-from ..cells.reduce import Reduction
+from ..cells.reduce import ReducedScene
 from ..cells.run_keywords import Given, with_numbers
 from ..engines.job import Start
 from ..results.certificate import ERRORS, Certificate
@@ -56,7 +56,7 @@ class _Ends:
     """Keeps where the cells of a sweep end, of what is left of the network and of all of it."""
 
     layout: Layout
-    reduction: Reduction
+    reduction: ReducedScene
     left: np.ndarray
     whole: np.ndarray
     finished: np.ndarray

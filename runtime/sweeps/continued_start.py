@@ -9,7 +9,7 @@ from typing import TypeAlias, TypeGuard
 import numpy as np
 import xarray as xr
 
-from synchain.codegen.driver.columns import Span
+from synchain.codegen.driver.columns import SpanColumn
 from synchain.models.inputs.checks import typed_repr
 from synchain.models.mechanics.contact import SLIP
 from synchain.models.scenes.scene import Scene
@@ -128,7 +128,9 @@ def expect_whole_periods(planner: Planner) -> None:
     for first in range(0, scene.cells, CELLS):
         spans = planner.spans(np.arange(first, min(first + CELLS, scene.cells)))
         with np.errstate(divide="ignore", invalid="ignore"):
-            periods = np.where(spans[:, Span.PERIOD] > 0.0, spans[:, Span.END] / spans[:, Span.PERIOD], np.nan)
+            periods = np.where(
+                spans[:, SpanColumn.PERIOD] > 0.0, spans[:, SpanColumn.END] / spans[:, SpanColumn.PERIOD], np.nan
+            )
         amid = np.abs(periods - np.rint(periods)) < WHOLE
         if not amid.all():
             part = periods[amid.argmin()] % 1.0

@@ -11,7 +11,7 @@ from synchain.codegen.machine_code.compile import load
 from synchain.models.scenes.scene import Scene
 
 from ..cells.layout import Layout, block_size
-from ..cells.reduce import Reduction
+from ..cells.reduce import ReducedScene
 from ..engines.job import JobSpec, SweepJob, SweepSpec
 from ..engines.scene_kernels import warn_of_chords, write_kernel
 from ..results.certificate import Certificate
@@ -30,7 +30,7 @@ class PreparedRun:
     compiling: float  # seconds that the compilation of the kernel took, or its loading
 
     @property
-    def reduction(self) -> Reduction:
+    def reduction(self) -> ReducedScene:
         """What is left of the scene to integrate."""
         return self.job.reduction
 
@@ -51,7 +51,7 @@ class PreparedRun:
 
 
 def prepare(
-    reduction: Reduction,
+    reduction: ReducedScene,
     execution: Execution,
     certificate: Certificate | None = None,
     *,

@@ -8,9 +8,9 @@ from concurrent.futures import Executor
 import numpy as np
 
 from synchain.models.inputs.checks import check_flag, check_instance
-from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.scenes.scene import Scene, check_scene
 
-from ..cells.reduce import Reduction, as_reduction
+from ..cells.reduce import ReducedScene, as_reduction
 from ..cells.run_keywords import Given
 from ..results.labels import dimensions
 from ..results.result import Result
@@ -28,7 +28,7 @@ def run(
     resume: Result | None = None,
     start: Start | None = None,
     width: int | None = None,
-    reduce: bool | Reduction = True,
+    reduce: bool | ReducedScene = True,
     certified: bool = False,
     realisations: int | None = None,
     draws: Mapping[str, object] | None = None,
@@ -99,7 +99,7 @@ def run(
     begun: float | np.ndarray | None = None
     starts = None
     if start is not None and not several(start):
-        scene, begun = started(a_scene(scene), start)
+        scene, begun = started(check_scene(scene), start)
     scene = Given(run, parameters, axes).sweep(scene, realisations=realisations, draws=draws, rng=rng)
     if start is not None and several(start):
         starts, begun = starts_of_cells(scene, start)

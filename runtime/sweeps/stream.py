@@ -20,7 +20,7 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
 from ..cells.layout import Layout
-from ..cells.reduce import Reduction, as_reduction
+from ..cells.reduce import ReducedScene, as_reduction
 from ..cells.run_keywords import Given
 from ..engines.job import Start
 from ..results.block_log import BlockLog
@@ -94,7 +94,7 @@ def stream(
     resume: bool = False,
     overwrite: bool = False,
     width: int | None = None,
-    reduce: bool | Reduction = True,
+    reduce: bool | ReducedScene = True,
     certified: bool = False,
     realisations: int | None = None,
     draws: Mapping[str, object] | None = None,
@@ -184,7 +184,7 @@ def stream(
 
 
 def claim(
-    reduction: Reduction,
+    reduction: ReducedScene,
     path: str | os.PathLike[str],
     *,
     resume: bool = False,
@@ -228,7 +228,7 @@ def claim(
 
 
 def _check_same(
-    reduction: Reduction, certified: bool, path: Path, attributes: Mapping[str, object], exponents: bool
+    reduction: ReducedScene, certified: bool, path: Path, attributes: Mapping[str, object], exponents: bool
 ) -> None:
     """Raise ValueError if a file, with its attributes and with or without exponents, is not that of
     this run.

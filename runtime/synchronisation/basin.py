@@ -21,10 +21,10 @@ from synchain.models.inputs.checks import check_integer, check_number, check_tab
 from synchain.models.inputs.words import Word
 from synchain.models.mechanics.contact import SLIP
 from synchain.models.scenes.defaults import TimeUnit
-from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.scenes.scene import Scene, check_scene
 
 from ..cells.plan import Planner
-from ..cells.reduce import Reduction, reduce_scene
+from ..cells.reduce import ReducedScene, reduce_scene
 from ..cells.run_keywords import Given
 from ..results.labelled import Labelled, dataset, scene_text
 from ..results.labels import STATE, States
@@ -280,7 +280,7 @@ def _run(scene: Scene, cells: np.ndarray, used: AppliedCriterion, execution: Exe
     return found, planner.rows(cells).start
 
 
-def _whole(scene: Scene) -> Reduction:
+def _whole(scene: Scene) -> ReducedScene:
     """A scene in which nothing is left out."""
     return replace(reduce_scene(scene, reduce=False), jumps=True)
 
@@ -339,7 +339,7 @@ def random_starts(scene: Scene, samples: int, ranges: Mapping[str, Range] | None
 
 
 def _check(scene: Scene, samples: object, tolerance: object, confidence: object) -> None:
-    if a_scene(scene).n < 2:
+    if check_scene(scene).n < 2:
         raise ValueError(f"basin: found {scene.n} oscillator; expected at least two, which can synchronise")
     check_integer("basin: samples", samples, 1, SAMPLE_LIMIT)
     if tolerance is not None and not check_number("basin: tolerance", tolerance) > 0:

@@ -27,7 +27,7 @@ from synchain.models.interactions.link import strength
 from synchain.models.mechanics.components import Edge
 from synchain.models.scenes.scene import Scene
 
-from ..cells.plan import Plan, Planner, control_of
+from ..cells.plan import CellRows, Planner, control_of
 from ..cells.run_keywords import Given
 from ..engines.choice import chosen_for_rows
 from ..engines.job import RowsSpec
@@ -236,7 +236,7 @@ def _broadcast(alpha: ArrayLike, beta: ArrayLike) -> tuple[np.ndarray, np.ndarra
     return np.array(real), np.array(imaginary)
 
 
-def _rows(planner: Planner, names: tuple[str, ...], alpha: np.ndarray, beta: np.ndarray, moves: np.ndarray) -> Plan:
+def _rows(planner: Planner, names: tuple[str, ...], alpha: np.ndarray, beta: np.ndarray, moves: np.ndarray) -> CellRows:
     """Rows of every strength and start, the starts fastest; a start moves all oscillators alike in
     the position.
     """
@@ -248,4 +248,4 @@ def _rows(planner: Planner, names: tuple[str, ...], alpha: np.ndarray, beta: np.
     numbers[:, names.index(MODE_BETA.name)] = np.repeat(beta, starts)
     start = np.tile(one.start, (count, 1))
     start[:, : scene.n] += np.tile(moves, len(alpha))[:, None]
-    return Plan(start, numbers, np.tile(one.spans, (count, 1)))
+    return CellRows(start, numbers, np.tile(one.spans, (count, 1)))

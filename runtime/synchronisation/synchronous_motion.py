@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from synchain.codegen.driver.columns import Span
+from synchain.codegen.driver.columns import SpanColumn
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.contact import SLIP
 from synchain.models.scenes.scene import Scene
 
 from ..cells.paces import fastest_rates
-from ..cells.plan import Plan
+from ..cells.plan import CellRows
 from ..stability.motion import above, extent_of
 from ..support.status import Status
 from .trials import Outcome, Rows, Trials
@@ -63,7 +63,7 @@ def columns_of(equations: Equations) -> np.ndarray:
     return np.array([[place[f"{name}_{i + 1}"] for i in range(equations.n)] for name in equations.compared])
 
 
-def alike(equations: Equations, row: Plan) -> Plan:
+def alike(equations: Equations, row: CellRows) -> CellRows:
     """Return a row in which all oscillators start from the state of the first one."""
     start, columns = row.start.copy(), columns_of(equations)
     start[:, columns] = start[:, columns[:, :1]]
@@ -85,9 +85,9 @@ def spread_of(equations: Equations, start: np.ndarray) -> np.ndarray:
 
 def measure_motion(
     trials: Trials,
-    rows: Callable[[Plan], Plan],
+    rows: Callable[[CellRows], CellRows],
     equations: Equations,
-    row: Plan,
+    row: CellRows,
     times: tuple[float | None, float | None],
     apart: np.ndarray,
 ) -> SynchronousMotion:
@@ -95,13 +95,13 @@ def measure_motion(
 
     def sample(ends: np.ndarray) -> Outcome:
         spans = np.tile(row.spans, (len(ends), 1))
-        spans[:, Span.START], spans[:, Span.END] = 0.0, ends
+        spans[:, SpanColumn.START], spans[:, SpanColumn.END] = 0.0, ends
         cells = replace(row.take(np.zeros(len(ends), dtype=int)), spans=spans)
         lay_out: Rows = lambda which: rows(cells.take(which))  # noqa: E731
         return trials.run(len(ends), lay_out)
 
-    columns, unit = columns_of(equations), float(row.spans[0, Span.START])
-    period = float(row.spans[0, Span.PERIOD])
+    columns, unit = columns_of(equations), float(row.spans[0, SpanColumn.START])
+    period = float(row.spans[0, SpanColumn.PERIOD])
 
     def inverse(state: np.ndarray) -> float:
         fastest = float(fastest_rates(equations, state[None], row.numbers[0])[0])

@@ -23,7 +23,7 @@ from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
 from synchain.models.inputs.checks import check_number, check_positive
 from synchain.models.scenes.defaults import TimeUnit
-from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.scenes.scene import Scene, check_scene
 from synchain.models.spectra.spectrum import Spectrum
 
 from ..cells.plan import Planner
@@ -221,7 +221,7 @@ def thresholds(
         nodes, for links with inertia, and for a scene with a stop, draws or axes, but for one of sigma,
         which is not used; if a step of the grid is above 1e9 times the resolution.
     """
-    a_scene(scene).equations.expect_alike("thresholds")
+    check_scene(scene).equations.expect_alike("thresholds")
     expect_vanishing("thresholds", scene.equations)
     scene = Given(thresholds, parameters, more, IN_CRITERION).scene(scene, unused_axes(scene))
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)

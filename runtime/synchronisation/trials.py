@@ -10,15 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from synchain.codegen.driver.columns import Count, Sum
+from synchain.codegen.driver.columns import Count, SumColumn
 from synchain.codegen.kernels.sweep_kernel import KernelSource
 from synchain.codegen.machine_code.compile import load
 from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
 from ..cells.layout import block_size
-from ..cells.plan import Plan, control_of
-from ..cells.reduce import Reduction
+from ..cells.plan import CellRows, control_of
+from ..cells.reduce import ReducedScene
 from ..engines.choice import chosen_for_rows
 from ..engines.job import JobSpec, RowsSpec
 from ..engines.scene_kernels import write_kernel
@@ -27,7 +27,7 @@ from ..support.status import CODES, Status, tally
 from ..sweeps.errors import SweepFailed, SweepInterrupted
 from ..sweeps.pool import Task, WorkerPool, worker_lost
 
-Rows = Callable[[np.ndarray], Plan]
+Rows = Callable[[np.ndarray], CellRows]
 """Lays out cells by their numbers (count,)."""
 
 
@@ -74,7 +74,7 @@ class Trials:
         self.pool = WorkerPool(job, execution)
 
     @classmethod
-    def of(cls, reduction: Reduction, execution: Execution) -> Trials:
+    def of(cls, reduction: ReducedScene, execution: Execution) -> Trials:
         """Return trials of what is left of a scene; its cells stand for those of all rounds."""
         strongest = reduction.rows(reduction.planner.extremes())
         source = write_kernel(reduction, method=chosen_for_rows(reduction.scene, reduction.equations, strongest))
@@ -126,4 +126,4 @@ class Trials:
 
 def mean_errors(buffers: Buffers) -> np.ndarray:
     """Return the mean synchronisation errors (cells,), infinite if a cell did not finish."""
-    return np.where(buffers.finished, buffers.sums[:, Sum.MEAN], np.inf)
+    return np.where(buffers.finished, buffers.sums[:, SumColumn.MEAN], np.inf)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from synchain.codegen.driver import clock_slots as text
-from synchain.codegen.driver.columns import Control, Count, Sum
+from synchain.codegen.driver.columns import Control, Count, SumColumn
 
 
-@pytest.mark.parametrize(("columns", "prefixes"), [(Control, ("",)), (Sum, ("",)), (Count, ("", "N_"))])
+@pytest.mark.parametrize(("columns", "prefixes"), [(Control, ("",)), (SumColumn, ("",)), (Count, ("", "N_"))])
 def test_columns_are_those_of_the_kernel_text(columns: type, prefixes: tuple[str, ...]) -> None:
     for column in (
         column for column in columns if column != Count.BY_METHOD or columns is not Count

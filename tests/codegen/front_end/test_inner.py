@@ -93,7 +93,7 @@ def test_the_meaning_of_an_operator_is_found_once(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(
         context, "resolve_function_type", lambda *request: (asked.append(request[1]), found(*request))[1]
     )
-    made, four = syntax_reader._Reader(context, {}), Lane(4)
+    made, four = syntax_reader._TreeReader(context, {}), Lane(4)
     pairs = [(four, four), (types.float64, four), (four, four)]
     meanings = [made.meaning(operator.add, pair)[1] for pair in pairs]
     assert [meaning.args for meaning in meanings] == pairs

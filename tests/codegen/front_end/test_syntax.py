@@ -185,7 +185,7 @@ def test_what_is_not_read_is_left_to_numba(tmp_path: Path, monkeypatch: pytest.M
     ("owner", "name", "fault"),
     [
         (syntax_reader, "read", AttributeError),
-        (emitter.Program, "write", TypeError),
+        (emitter.ReadFunction, "write", TypeError),
         (compiler, "InnerCompiler", ImportError),
         (compiler._Lower, "setup_function", KeyError),
     ],

@@ -14,7 +14,7 @@ from sympy.functions.elementary.piecewise import ExprCondPair
 
 from synchain.codegen import integrators
 from synchain.codegen.kernels.sweep_kernel import emit
-from synchain.codegen.program.passes import Body, Hoist, Names
+from synchain.codegen.program.passes import Hoist, Names, StraightLine
 from synchain.codegen.steps.blocks import analyse
 from synchain.codegen.steps.safe_names import RESERVED, tidy
 from synchain.codegen.steps.sparse_plan import program
@@ -70,7 +70,7 @@ def test_blocks_put_together_are_the_equations(case):
     outer = dict(blocks.constants)
     outer |= {s: e.xreplace(outer) for s, e in blocks.timed}
 
-    def whole(body: Body) -> list[sp.Expr]:
+    def whole(body: StraightLine) -> list[sp.Expr]:
         known = dict(outer)
         for s, e in body.statements:
             known[s] = e.xreplace(known)

@@ -16,8 +16,8 @@ from synchain.codegen.program.expressions import (
     ONE,
     ZERO,
     Call,
-    Choice,
     Compare,
+    Conditional,
     Expression,
     Junction,
     Load,
@@ -187,7 +187,7 @@ PROGRAM = (
     Loop(
         "i", Number(0), Number(3), (store("v", Name("i"), call("absolute", "x")), accumulate("v", Name("i"), Name("w")))
     ),
-    let("z", Choice(Junction("or", (Compare("<", Name("x"), ZERO), Compare(">=", Name("w"), ONE))), ONE, ZERO)),
+    let("z", Conditional(Junction("or", (Compare("<", Name("x"), ZERO), Compare(">=", Name("w"), ONE))), ONE, ZERO)),
 )
 
 

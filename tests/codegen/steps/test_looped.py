@@ -8,7 +8,7 @@ from samples import FLOATS, kernel, plain, run_cells
 
 from synchain.codegen import driver
 from synchain.codegen.steps.safe_names import NAMES
-from synchain.codegen.steps.sparse_plan import Program, order, program
+from synchain.codegen.steps.sparse_plan import SparsePlan, order, program
 from synchain.models import chain, complete, grid, random_cubic, ring, star, tree, wheel
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
@@ -66,7 +66,7 @@ def strong(equations, shift: float) -> np.ndarray:
     return matrix
 
 
-def solved(equations, made: Program, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+def solved(equations, made: SparsePlan, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """The solution by the generated program, run by Python itself."""
     size = equations.dimension
     arrays = dict(zip(NAMES, made.arrays, strict=True))

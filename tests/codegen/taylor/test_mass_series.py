@@ -16,7 +16,7 @@ from synchain.codegen.taylor import write_looped
 from synchain.models import chain
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.network import node
-from synchain.models.inputs.frozen import Frozen
+from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.mechanics.oscillator import Coordinate, LagrangianModel, Oscillator
 from synchain.models.mechanics.parameter import Parameter
 from synchain.models.scenes.scene import Scene
@@ -81,7 +81,7 @@ def tubes(*forces: sp.Expr) -> Oscillator:
     kinetic = mass * sp.Add(*(sp.Add(*w[:k]) ** 2 for k in range(1, LINKS + 1))) / 2
     coordinates = tuple(Coordinate(a.name, b.name, "1") for a, b in zip(q, w, strict=True))
     model = LagrangianModel(coordinates, kinetic, sp.Add(*(a**2 for a in q[1:])) / 2, forces, sp.S.Zero)
-    return Oscillator("tubes", Frozen({"mass": Parameter(1.0, "1", "a number")}), model)
+    return Oscillator("tubes", FrozenDict({"mass": Parameter(1.0, "1", "a number")}), model)
 
 
 Q, W = real("q", LINKS), real("w", LINKS)

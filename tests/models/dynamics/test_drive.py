@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from synchain.codegen.driver.columns import Span
+from synchain.codegen.driver.columns import SpanColumn
 from synchain.models import Rates, ends
 from synchain.models.definitions.inline import Field
 from synchain.models.graphs.families import topology
@@ -30,7 +30,7 @@ from synchain.runtime.sweeps.run import run
 
 def longest_step(scene: Scene) -> float:
     """The longest step of the cell that has the shortest one."""
-    return float(plan(scene).spans[:, Span.LONGEST].min())
+    return float(plan(scene).spans[:, SpanColumn.LONGEST].min())
 
 
 PAIR, ALONE = topology("chain", 2), topology("chain", 1)
@@ -219,7 +219,7 @@ def test_each_cell_has_the_longest_step_of_its_own_pulses() -> None:
     node = Field({"x": "1 if sin(w*t) > level else 0"}, parameters={"w": 2.0, "level": 0.0})
     swept = Scene(node, None, ALONE, axes={"level": [0.0, 0.99, 1.1]}, transient=0.0, window=1.0)
     shortest = [0.5 * np.pi, np.arccos(0.99), 0.5 * np.sqrt(np.pi)]
-    found = plan(swept).spans[:, Span.LONGEST]
+    found = plan(swept).spans[:, SpanColumn.LONGEST]
     np.testing.assert_allclose(found[1], shortest[1], rtol=1e-3)
     for k, level in enumerate([0.0, 0.99, 1.1]):
         assert found[k] == longest_step(swept.replace(axes={}, parameters={"level": level}))
@@ -250,7 +250,7 @@ def test_the_fastest_drive_of_a_link_or_of_some_nodes_sets_the_longest_step() ->
     own = {"w": [1.0, 40.0]}
     nodes = Scene(nodes=kinds, coupling="x->x", topology=topology("chain", 3), parameters=own, time_unit="time")
     for scene in (links, nodes):
-        np.testing.assert_allclose(plan(scene).spans[:, Span.LONGEST], np.pi / 40)
+        np.testing.assert_allclose(plan(scene).spans[:, SpanColumn.LONGEST], np.pi / 40)
 
 
 @pytest.mark.parametrize("integrator", ["taylor", "dop853", "rodas5p"])

@@ -11,7 +11,7 @@ import sympy as sp
 
 from synchain.models import Potential, Rates, Scene, chain, complete, ends, ring, star
 from synchain.models.definitions.loader import load_oscillator
-from synchain.models.inputs.frozen import Frozen
+from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.interactions.coupling import from_table
 from synchain.models.interactions.link import edge, strength
 from synchain.models.mechanics.components import TIME
@@ -21,12 +21,12 @@ from synchain.models.mechanics.parameter import Parameter
 K, LAG, G = sp.symbols("K lag G")
 THETA, P, X, Y, U, V, M = sp.symbols("theta p x y u v m", real=True)
 
-PHASE = Oscillator("phase", Frozen({"p": Parameter(0.3, "1", "frequency")}), FieldModel(("theta",), (P,)))
+PHASE = Oscillator("phase", FrozenDict({"p": Parameter(0.3, "1", "frequency")}), FieldModel(("theta",), (P,)))
 """A phase that turns: a node of first order."""
 
 BODY = Oscillator(
     "body",
-    Frozen({"m": Parameter(1.0, "1", "mass", positive=True)}),
+    FrozenDict({"m": Parameter(1.0, "1", "mass", positive=True)}),
     LagrangianModel((Coordinate("x", "u"), Coordinate("y", "v")), M * (U**2 + V**2) / 2, sp.S.Zero, (sp.S.Zero,) * 2),
 )
 """A free body in the plane, with a mass."""

@@ -13,7 +13,7 @@ from parts import coupling_of, law_of, oscillator_of
 
 from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.dynamics.network import parameters
-from synchain.models.inputs.frozen import Frozen
+from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.inputs.plugins import load, names
 from synchain.models.mechanics.contact import KAPPA, ContactModel, FrictionLaw, regularise
 from synchain.models.mechanics.nondimensional import friction_coefficient
@@ -152,7 +152,7 @@ def test_units_cancel(name: str, contact: str) -> None:
 
 def test_a_wrong_unit_is_noticed() -> None:
     a, w = sp.symbols("a w", real=True)
-    table = Frozen({"a": Parameter(1.0, "m/s", "rate of decay")})
+    table = FrozenDict({"a": Parameter(1.0, "m/s", "rate of decay")})
     law = FrictionLaw("careless", table, sp.exp(-a * sp.Abs(w)) * sp.sign(w))
     with pytest.raises(ValueError, match="friction law careless: the unit m does not cancel"):
         friction_coefficient(law, "sign")
@@ -163,7 +163,7 @@ FRACTION = sp.Rational(1, 10**6)
 
 
 def law_with(force: sp.Expr) -> FrictionLaw:
-    return FrictionLaw("own", Frozen({"mu": Parameter(0.0)}), force)
+    return FrictionLaw("own", FrozenDict({"mu": Parameter(0.0)}), force)
 
 
 @pytest.mark.parametrize(

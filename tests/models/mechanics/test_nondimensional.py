@@ -16,7 +16,7 @@ from parts import edge, is_lagrangian, node, oscillator_of, parameters
 
 from synchain.models import oscillators
 from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
-from synchain.models.inputs.plugins import Kind, call, load, names
+from synchain.models.inputs.plugins import PluginKind, call, load, names
 from synchain.models.mechanics.calculus import cancelled, operations
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.nondimensional import FRICTION, nondimensional, physical, scale
@@ -308,7 +308,7 @@ def test_unreadable_units(unit: str) -> None:
 
 
 @pytest.mark.parametrize(("kind", "name"), OWNERS)
-def test_every_plug_in_declares_itself(kind: Kind, name: str) -> None:
+def test_every_plug_in_declares_itself(kind: PluginKind, name: str) -> None:
     module = load(kind, name)
     assert module.SUMMARY.strip()
     assert any(character.isdigit() for character in module.SOURCE), "a source has a year or a volume"

@@ -16,7 +16,7 @@ from synchain.models.definitions.definition import OSCILLATOR
 from synchain.models.dynamics.network import oriented_links
 from synchain.models.dynamics.variational import source_slopes
 from synchain.models.graphs.topology import from_matrix
-from synchain.models.inputs.frozen import Frozen
+from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.inputs.plugins import names
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.energy import energy
@@ -176,9 +176,9 @@ def test_starts_lie_around_the_centre(n: int, x: tuple[float, ...] | None) -> No
 def test_an_unknown_state_in_initial_is_refused() -> None:
     rossler = oscillator_of("rossler")
     with pytest.raises(ValueError, match="INITIAL of the oscillator: unknown key 'w'; known: x, y, z"):
-        Scene(oscillator=replace(rossler, initial=Frozen({"w": 1.0})))
+        Scene(oscillator=replace(rossler, initial=FrozenDict({"w": 1.0})))
     with pytest.raises(ValueError, match="INITIAL of the oscillator: x: found nan; expected a finite number"):
-        Scene(oscillator=replace(rossler, initial=Frozen({"x": math.nan})))
+        Scene(oscillator=replace(rossler, initial=FrozenDict({"x": math.nan})))
 
 
 @pytest.mark.parametrize("name", FIELDS)

@@ -12,7 +12,7 @@ from parts import is_lagrangian, oscillator_of
 from synchain.models import Parameter, Potential, Rates, chain, complete, ends, ring
 from synchain.models.definitions.definition import COUPLING, OSCILLATOR
 from synchain.models.graphs.topology import from_matrix
-from synchain.models.inputs.frozen import Frozen
+from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.inputs.plugins import load, names
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.lagrangian import total_derivative
@@ -181,7 +181,7 @@ def test_bodies_of_different_masses_have_an_energy_and_rates_have_none() -> None
     model = LagrangianModel(
         (Coordinate("x", "u"), Coordinate("y", "v")), m * (u**2 + v**2) / 2, sp.S.Zero, (sp.S.Zero,) * 2
     )
-    body = Oscillator("body", Frozen({"m": Parameter(1.0, "1", "mass", positive=True)}), model)
+    body = Oscillator("body", FrozenDict({"m": Parameter(1.0, "1", "mass", positive=True)}), model)
     i, j, w = ends(body)
     gravity = Potential(-g * w * i.m * j.m / sp.sqrt((i.x - j.x) ** 2 + (i.y - j.y) ** 2), {g: 1})
     for masses in ([1.0, 2.0, 3.0], 1.0):

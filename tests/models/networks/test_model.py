@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 
 from synchain.models import Parameter, chain
-from synchain.models.inputs.frozen import Frozen
+from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.inputs.names import NodeName
 from synchain.models.interactions.coupling import WEIGHT, LagrangianCoupling, MatrixCoupling
 from synchain.models.mechanics.contact import ContactModel, FrictionLaw
@@ -20,10 +20,10 @@ from synchain.models.scenes.scene import Scene
 
 x, v, w, mu, k, sigma, q_i, q_j = sp.symbols("x v w mu k sigma q_i q_j", real=True)
 DUMB = LagrangianModel((Coordinate("x", "v"),), v**2 / 2, k * x**2 / 2, (FRICTION(1 - v),))
-SLIDER = Oscillator("slider", Frozen({"k": Parameter(2.0, "1", "stiffness")}), DUMB)
-LAW = FrictionLaw("dry", Frozen({"mu": Parameter(0.3, "1", "coefficient", minimum=0)}), mu * sp.sign(w))
+SLIDER = Oscillator("slider", FrozenDict({"k": Parameter(2.0, "1", "stiffness")}), DUMB)
+LAW = FrictionLaw("dry", FrozenDict({"mu": Parameter(0.3, "1", "coefficient", minimum=0)}), mu * sp.sign(w))
 ROPE = LagrangianCoupling(
-    "rope", Frozen({"sigma": Parameter(0.1, "1", "strength")}), sigma * WEIGHT * (q_i - q_j) ** 2 / 2
+    "rope", FrozenDict({"sigma": Parameter(0.1, "1", "strength")}), sigma * WEIGHT * (q_i - q_j) ** 2 / 2
 )
 
 
@@ -39,7 +39,7 @@ def test_parts_made_by_hand_make_a_scene() -> None:
 
 def test_a_field_made_by_hand_takes_components() -> None:
     rotation = Oscillator(
-        "rotation", Frozen(), FieldModel(("a", "b"), (-sp.Symbol("b", real=True), sp.Symbol("a", real=True)))
+        "rotation", FrozenDict(), FieldModel(("a", "b"), (-sp.Symbol("b", real=True), sp.Symbol("a", real=True)))
     )
     scene = Scene(oscillator=rotation, coupling="2/4 b->a", topology=chain(3))
     assert scene.coupling == MatrixCoupling.parse("1/2 b->a")

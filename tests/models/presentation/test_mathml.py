@@ -10,7 +10,7 @@ import pytest
 import sympy as sp
 
 from synchain.models.presentation.mathml import GAP, formula, mathml
-from synchain.models.presentation.writer import Latex, Writer
+from synchain.models.presentation.writer import ExpressionWriter, Latex
 from synchain.models.scenes.file import load_scene, scene_names
 
 
@@ -62,7 +62,7 @@ def test_what_is_not_written_here_is_refused() -> None:
 
 def test_cases_become_a_table() -> None:
     x = sp.Symbol("x", real=True)
-    written = Writer(Latex(), {}, frozenset()).write(sp.Piecewise((x, x > 0), (-x / 2, True)))
+    written = ExpressionWriter(Latex(), {}, frozenset()).write(sp.Piecewise((x, x > 0), (-x / 2, True)))
     rows = tree(written).findall(".//mtr")
     assert [len(row) for row in rows] == [2, 2]
     assert "".join(rows[0][0].itertext()) == "x"

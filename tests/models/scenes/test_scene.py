@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 
 from synchain.models import Scene, cartesian, chain, complete, ring, star, weighted
 from synchain.models.graphs.topology import Topology, from_matrix
-from synchain.models.inputs.frozen import Frozen
+from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.scenes.file import load_scene, scene_names
 from synchain.models.scenes.scene import KEYWORDS
 from synchain.models.scenes.section import Section
@@ -128,10 +128,10 @@ def test_a_scene_is_frozen_hashable_and_picklable() -> None:
 
 
 def test_frozen_reads_like_a_dict() -> None:
-    mapping = Frozen({"a": 1, "b": 2})
+    mapping = FrozenDict({"a": 1, "b": 2})
     assert mapping == {"b": 2, "a": 1}
     assert {**mapping, "c": 3} == {"a": 1, "b": 2, "c": 3}
-    assert hash(mapping) == hash(Frozen({"b": 2, "a": 1}))
+    assert hash(mapping) == hash(FrozenDict({"b": 2, "a": 1}))
     assert repr(mapping) == "{'a': 1, 'b': 2}"
 
 

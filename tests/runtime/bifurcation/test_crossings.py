@@ -10,7 +10,7 @@ import pytest
 from synchain.models import Field
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.bifurcation.bifurcations import Step
+from synchain.runtime.bifurcation.bifurcations import OrbitPair
 from synchain.runtime.bifurcation.branches import Branch, follow
 from synchain.runtime.bifurcation.continuation import Arc
 from synchain.runtime.bifurcation.periodic import PeriodicOrbit, periodic_orbit
@@ -72,7 +72,9 @@ def test_a_multiplier_on_the_circle_at_a_value_counts_once() -> None:
     )
     steps = ((inside, on), (on, outside), (outside, on), (on, inside))
     arc = Arc(inside.scene, "u", 1)
-    changes = [Step(arc, (0.0, 1.0), each).changes(lambda orbit: abs(orbit.multipliers[0]) - 1.0) for each in steps]
+    changes = [
+        OrbitPair(arc, (0.0, 1.0), each).changes(lambda orbit: abs(orbit.multipliers[0]) - 1.0) for each in steps
+    ]
     assert changes == [True, False, False, True]
 
 

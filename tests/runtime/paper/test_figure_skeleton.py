@@ -14,7 +14,7 @@ from synchain.runtime.paper import load, names, skeleton_figure
 from synchain.runtime.paper import make as maker
 from synchain.runtime.paper.figure_runs import FigureRuns, Quality
 from synchain.runtime.paper.make import make
-from synchain.runtime.paper.skeleton_figure import Place, Skeleton, curves
+from synchain.runtime.paper.skeleton_figure import Place, SkeletonFigure, curves
 from synchain.runtime.plots import style
 
 SMALL = Quality(points=5, grid=9)
@@ -32,8 +32,8 @@ def narrow(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @cache
-def small() -> Skeleton:
-    data: Skeleton = load("skeleton").compute(FigureRuns(SMALL, workers=1))
+def small() -> SkeletonFigure:
+    data: SkeletonFigure = load("skeleton").compute(FigureRuns(SMALL, workers=1))
     return data
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from synchain.codegen.driver.columns import Span
+from synchain.codegen.driver.columns import SpanColumn
 from synchain.models import Field, Rates, Scene, chain, normal
 from synchain.models.inputs.names import ATTRIBUTES, TAKEN
 from synchain.runtime import follow, plane, run, skeleton
@@ -29,7 +29,7 @@ def names_of(scene: Scene) -> set[str]:
     cells, size = scene.cells, len(scene.y0)
     exponents = Certificate(*(np.zeros(cells) for _ in range(5)))
     buffers = Buffers.empty(cells, size, 3, scene.samples)
-    return own(gather(scene, dict, np.ones((cells, len(Span))), buffers, exponents).data)
+    return own(gather(scene, dict, np.ones((cells, len(SpanColumn))), buffers, exponents).data)
 
 
 def test_no_result_of_a_run_has_other_names() -> None:

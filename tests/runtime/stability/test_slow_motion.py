@@ -9,7 +9,7 @@ import pytest
 
 from synchain.models import Field, Scene, chain
 from synchain.runtime import exponents, lyapunov_spectrum
-from synchain.runtime.stability.motion import Rates, rests
+from synchain.runtime.stability.motion import RateFunctions, rests
 
 VAN_DER_POL = Field({"x": "v/T0", "v": "(-x + (1 - x**2)*v)/T0"}, parameters={"T0": 1.0}, initial={"x": 1.0, "v": 0.0})
 PAIR = Scene(VAN_DER_POL, "x->v", chain(2))
@@ -54,7 +54,7 @@ def test_rest_does_not_depend_on_units_nor_on_what_stands_beside(unit: float, be
         return unit * size * np.array([v, x + x**3 + 0.5 * v, beside + z])
 
     def at_rest(*state: float) -> bool:
-        return rests(Rates(values, sizes), size * np.array(state), 1e-9, size * np.ones(3))
+        return rests(RateFunctions(values, sizes), size * np.array(state), 1e-9, size * np.ones(3))
 
     assert at_rest(1.0 + 1e-10, -1e-10, beside)
     assert at_rest(0.0, 0.0, beside)

@@ -26,7 +26,7 @@ from synchain.models import (
     uniform,
 )
 from synchain.models.definitions.loader import load_oscillator
-from synchain.models.networks.energy_terms import Energy
+from synchain.models.networks.energy_terms import EnergyTerms
 from synchain.models.scenes.energy import energy as energy_of
 from synchain.runtime.engines.scene_kernels import kernel_source
 from synchain.runtime.results.energy_of_states import energy_function
@@ -112,8 +112,8 @@ i, j, W = ends(load_oscillator("harmonic"))
 
 def test_the_sums_of_the_energy_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """They take 0.1 s at 9000 links."""
-    made, rows = [], Energy.rows
-    monkeypatch.setattr(Energy, "rows", lambda own: made.append(own) or rows(own))
+    made, rows = [], EnergyTerms.rows
+    monkeypatch.setattr(EnergyTerms, "rows", lambda own: made.append(own) or rows(own))
     kernel_source(Scene("harmonic", "spring", ring(3), observe={"e": "mean(energy)"}))
     assert len(made) == 1
 

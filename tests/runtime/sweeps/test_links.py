@@ -11,7 +11,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from synchain.models import Field, Potential, Rates, Scene, Topology, complete, ends, ring, star
-from synchain.models.inputs.frozen import Frozen
+from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.mechanics.oscillator import Coordinate, FieldModel, LagrangianModel, Oscillator
 from synchain.models.mechanics.parameter import Parameter
 from synchain.runtime import run
@@ -26,11 +26,11 @@ def number(default: float) -> Parameter:
     return Parameter(default, "1", "a number")
 
 
-PHASE = Oscillator("phase", Frozen({"p": number(0.3)}), FieldModel(("theta",), (P,)))
+PHASE = Oscillator("phase", FrozenDict({"p": number(0.3)}), FieldModel(("theta",), (P,)))
 
 NEURON = Oscillator(
     "hindmarsh_rose",
-    Frozen({}),
+    FrozenDict({}),
     FieldModel(
         ("x", "y", "z"),
         (
@@ -43,7 +43,7 @@ NEURON = Oscillator(
 
 BODY = Oscillator(
     "body",
-    Frozen({"m": Parameter(1.0, "1", "mass", positive=True)}),
+    FrozenDict({"m": Parameter(1.0, "1", "mass", positive=True)}),
     LagrangianModel((Coordinate("x", "u"), Coordinate("y", "v")), M * (U**2 + V**2) / 2, sp.S.Zero, (sp.S.Zero,) * 2),
 )
 

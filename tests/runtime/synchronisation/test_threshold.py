@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from synchain.codegen.driver.columns import Count, Sum
+from synchain.codegen.driver.columns import Count, SumColumn
 from synchain.models import Field, chain, complete, star
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.scenes.scene import Scene
@@ -233,7 +233,7 @@ def test_cells_are_every_coupling_with_every_start():
 def test_errors_of_cells_that_failed_are_infinite():
     buffers = Buffers.empty(4, 4, 0, 0)
     buffers.counts[:, Count.STATUS] = [Status.FINISHED, Status.FINISHED, Status.STEP_BUDGET, Status.FINISHED]
-    buffers.sums[:, Sum.MEAN] = [0.0, 1.0, 2.0, 3.0]
+    buffers.sums[:, SumColumn.MEAN] = [0.0, 1.0, 2.0, 3.0]
     assert mean_errors(buffers).tolist() == [0.0, 1.0, np.inf, 3.0]
 
 
