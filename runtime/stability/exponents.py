@@ -30,7 +30,7 @@ from ..prediction.intervals import Interval
 from ..results.labelled import Labelled, dataset
 from ..support.arrays import numbers
 from ..support.arrays import row as row_of
-from ..support.error_text import interval_text, range_text
+from ..support.error_text import interval_text, range_text, with_error
 from ..support.execution import Execution
 from ..support.progress import Hook, Reporter
 from .attractor import Attractor, Motion, find_attractor
@@ -221,7 +221,7 @@ def exponent_rows(
     worst = float(np.max(stderr, initial=0.0))
     error = f"largest standard error {worst:.2g}" if math.isfinite(worst) else "too short for an error: raise periods"
     return (
-        ("smallest, largest", f"{exponent.min():z.4f}, {exponent.max():z.4f} per unit of time"),
+        ("smallest, largest", f"{with_error(exponent.min())}, {with_error(exponent.max())} per unit of time"),
         ("attractor", "; ".join(kinds)),
         ("average", f"{length}, {error}"),
     )

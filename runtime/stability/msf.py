@@ -30,7 +30,7 @@ from ..prediction.mode_windows import transversal_modes as network_modes
 from ..prediction.synchronisability import Answer, Verdict, Window, verdict, windows, windows_complex
 from ..results.labelled import Labelled, as_json, dataset, drive_text, scene_text
 from ..support.arrays import row
-from ..support.error_text import range_text
+from ..support.error_text import range_text, with_error
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .averages import Averaging
@@ -339,7 +339,7 @@ class Plane(Labelled):
         modes = f"the largest of {len(self.modes)} transversal modes of {self.scene.n} nodes"
         contours = [
             ", ".join(
-                f"{name} {part.min():z.4f} … {part.max():z.4f}" for name, part in zip(self.names, line.T, strict=True)
+                f"{name} {with_error(part.min())} … {with_error(part.max())}" for name, part in zip(self.names, line.T, strict=True)
             )
             for line in self.contours
         ]

@@ -14,19 +14,19 @@ if TYPE_CHECKING:
 def with_error(value: float, error: float = 0.0) -> str:
     """Return a number with its error: the error to two significant digits, the value to the same decimal place.
 
-    A number without an error has four decimals; so has one whose error is below its rounding.  An error that is infinite or
-    nan is "unknown".  Zero has no sign.
+    A number without an error has four decimals, or four digits if it is smaller than 0.001; so has one whose error is below
+    its rounding.  An error that is infinite or nan is "unknown".  Zero has no sign.
 
-    >>> with_error(0.17722, 5.2e-4), with_error(0.3), with_error(0.3, math.inf)
-    ('0.17722 ± 0.00052', '0.3000', '0.3000 ± unknown')
+    >>> with_error(0.17722, 5.2e-4), with_error(0.3), with_error(4e-6), with_error(0.3, math.inf)
+    ('0.17722 ± 0.00052', '0.3000', '4e-06', '0.3000 ± unknown')
     """
     value, error = float(value), float(error)
     if not math.isfinite(value):
         return f"{value:g}"
     if not math.isfinite(error):
-        return f"{value:z.4f} ± unknown"
+        return f"{with_error(value)} ± unknown"
     if error <= sys.float_info.epsilon * abs(value):
-        return f"{value:z.4f}"
+        return f"{value:z.4f}" if value == 0.0 or abs(value) >= 1e-3 else f"{value:.4g}"
     # the decimal place of the error's second digit, after rounding: 0.0996 is 0.10
     rounded = f"{error:.1e}"
     place = 1 - int(rounded.partition("e")[2])

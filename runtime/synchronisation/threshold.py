@@ -35,7 +35,7 @@ from ..results.labelled import Labelled, as_json, dataset, scene_text
 from ..stability.averages import check_whole
 from ..stability.transversal_modes import unused_axes
 from ..support.arrays import row
-from ..support.error_text import interval_text, range_text
+from ..support.error_text import interval_text, range_text, with_error
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .criterion import IN_CRITERION, AppliedCriterion, Criterion, checked, errors, offsets, preset, resolved
@@ -259,7 +259,7 @@ def _limited(found: Thresholds) -> Iterator[str]:
         late = (exponent < 0.0) & (-exponent * length < fall)
         if late.any():
             shown = ", ".join(
-                f"{end:.4f} (exponent {at:.2g})" for end, at in zip(ends[late], exponent[late], strict=True)
+                f"{with_error(end)} (exponent {at:.2g})" for end, at in zip(ends[late], exponent[late], strict=True)
             )
             yield (
                 f"the ends of what is {words} at {scene.strength} = {shown} come of the transient: errors fall by the factor "

@@ -38,7 +38,7 @@ def test_what_rounds_to_zero_has_no_sign():
     tiny, window = -2.7e-05, Window(-2.7e-05, 0.3, 3e-05, 0.0, None, None)
     written = [interval_text([(tiny, 0.3)], [(3e-03, 0.0)]), interval_text([(-1e-9, -0.0)]), with_error(tiny, 1e-3)]
     assert [*written, with_error(-0.0), with_error(tiny), window.text()] == [
-        "0.0000 ± 0.0030 … 0.3000", "0.0000 … 0.0000", "0.0000 ± 0.0010", "0.0000", "0.0000", "0.0000... … 0.3000...",
+        "0.0000 ± 0.0030 … 0.3000", "-1e-09 … 0.0000", "0.0000 ± 0.0010", "0.0000", "-2.7e-05", "-2.7e-05... … 0.3000...",
     ]  # fmt: skip
 
 
@@ -51,6 +51,8 @@ def test_what_rounds_to_zero_has_no_sign():
         (123456.0, 1234.0, "123500 ± 1200"),
         (7.3, 1.0, "7.3 ± 1.0"),
         (0.3, 1e-17, "0.3000"),
+        (-0.00099994, 0.0, "-0.0009999"),
+        (1.76796e-06, 3e-13, "0.00000176796000 ± 3.0e-13"),
         (0.3, math.inf, "0.3000 ± unknown"),
         (0.3, math.nan, "0.3000 ± unknown"),
         (-math.inf, math.nan, "-inf"),
