@@ -36,7 +36,7 @@ class CellRows:
 
     start: np.ndarray  # (cells, dimension): initial states
     numbers: np.ndarray  # (cells, parameters): parameters, in the order of `Equations.parameters`
-    # (cells, len(Span): start and end of the window and the period of the equations, in non-dimensional time, the
+    # (cells, len(Span)): start and end of the window and the period of the equations, in non-dimensional time, the
     # synchronisation error below which a cell ends early (0: none does), the first step, the longest one, and the
     # steps after which the cell first pauses (inf: it never does)
     spans: np.ndarray
