@@ -27,7 +27,7 @@ class Buffers:
     """
 
     end: np.ndarray  # (cells, dimension): states at which the cells stopped
-    # (cells, len(Sum): synchronisation errors, the time at which each cell stopped, and what was observed
+    # (cells, len(SumColumn)): synchronisation errors, the time at which each cell stopped, and what was observed
     sums: np.ndarray
     counts: np.ndarray  # (cells, COUNTS): status, steps, numbers of section points, and tolerances
     # (cells, room, 1 + kept): time and state of the section points, or time, number of the section and what it keeps;

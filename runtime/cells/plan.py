@@ -36,7 +36,7 @@ class CellRows:
 
     start: np.ndarray  # (cells, dimension): initial states
     numbers: np.ndarray  # (cells, parameters): parameters, in the order of `Equations.parameters`
-    # (cells, len(Span)): start and end of the window and the period of the equations, in non-dimensional time, the
+    # (cells, len(SpanColumn)): start and end of the window and the period of the equations, in non-dimensional time, the
     # synchronisation error below which a cell ends early (0: none does), the first step, the longest one, and the
     # steps after which the cell first pauses (inf: it never does)
     spans: np.ndarray
@@ -102,7 +102,7 @@ class Planner:
         return CellRows(with_modes(self.equations, start, numbers), numbers, self._spans(numbers, near))
 
     def spans(self, cells: np.ndarray) -> np.ndarray:
-        """Return the spans (cells, len(Span)) of these cells, without their states."""
+        """Return the spans (cells, len(SpanColumn)) of these cells, without their states."""
         return self._spans(self._numbers(self.columns(cells), len(cells)), None)
 
     def _numbers(self, columns: Mapping[str, np.ndarray], cells: int) -> np.ndarray:

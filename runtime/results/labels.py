@@ -119,7 +119,7 @@ class States:
 def variables(
     scene: Scene, spans: np.ndarray, buffers: Buffers, certificate: Certificate | None, most: int
 ) -> Iterator[Variable]:
-    """Yield the variables of some cells. Shapes: spans (cells, len(Span))."""
+    """Yield the variables of some cells. Shapes: spans (cells, len(SpanColumn))."""
     for name in ("status", "steps", "rejected", "periods_skipped"):
         yield name, (), buffers.counts[:, COUNTS[name]].astype(np.int32)
     ran = buffers.status != Status.NOT_RUN

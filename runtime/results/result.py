@@ -272,7 +272,7 @@ def gather(
     buffers: Buffers,
     certificate: Certificate | None = None,
 ) -> Result:
-    """Return the labelled result of all cells. Shapes: spans (cells, len(Span))."""
+    """Return the labelled result of all cells. Shapes: spans (cells, len(SpanColumn))."""
 
     def make() -> xr.Dataset:
         found = list(variables(scene, spans, buffers, certificate, buffers.most_points))
