@@ -223,5 +223,5 @@ def _news(name: str) -> Iterator[None]:
 
 def _readable(stream: object) -> None:
     """Write characters that the stream's encoding lacks as escapes instead of failing."""
-    if getattr(stream, "errors", None) == "strict" and hasattr(stream, "reconfigure"):
+    if getattr(stream, "errors", None) in ("strict", "surrogateescape") and hasattr(stream, "reconfigure"):
         stream.reconfigure(errors="backslashreplace")

@@ -9,7 +9,7 @@ from synchain.models.mechanics.components import Edge, Node
 from ..program.expressions import ONE, ZERO, Expression
 from ..steps.elimination import Entry, plan
 from ..steps.mass_solve import added_masses
-from .series import Constant, MassMatrixRow, Series, Unknown
+from .series import Constant, Row, Series, Unknown
 from .series_graph import SeriesGraph, split
 
 Factor = tuple[Expression, Series]
@@ -35,10 +35,10 @@ def solved(graph: SeriesGraph, masses: Mapping[Entry, Series], right: Mapping[in
     inner = {(place[r], place[c]): e for (r, c), e in entries.items() if r in place and c in place}
     symmetric = all(inner.get((c, r)) == e for (r, c), e in inner.items())
     order = plan(len(coupled), set(inner)).order
-    rows: list[MassMatrixRow] = []
+    rows: list[Row] = []
     for r in order:
         own = {c: inner[r, slot] for c, slot in enumerate(order) if (r, slot) in inner}
-        rows.append(MassMatrixRow(right[coupled[r]], own, tuple(rows), symmetric))
+        rows.append(Row(right[coupled[r]], own, tuple(rows), symmetric))
     unknowns: dict[int, Unknown] = {}
     for number in reversed(range(len(rows))):
         unknowns[number] = Unknown(rows[number], dict(unknowns))

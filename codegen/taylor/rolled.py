@@ -26,7 +26,7 @@ from ..program.statements import Assign, Do, Loop, Statement, Store, let, mentio
 from ..steps.places import NodeKindLayout, span
 from ..steps.step import lane
 from .looped_series import CONVOLUTION, START, Hoisted, LoopedSeries, Outer, SeriesLoop, Track
-from .series import AbsSeries, Constant, Exponential, Linear, ProductSeries, Series, Square
+from .series import Constant, Exponential, Kink, Linear, Product, Series, Square
 from .series_graph import SeriesGraph, check_jumps
 from .simplify import absolute
 from .step_length import unseen
@@ -131,12 +131,12 @@ class RolledSection(SeriesLoop):
         model = copy(members[0])
         model.name = self.graph.fresh(type(model).__name__.lower())
         columns = {"out": [(s.name, 0) for s in members]}
-        for part in () if isinstance(model, Linear | ProductSeries | Square) else fields(model):
+        for part in () if isinstance(model, Linear | Product | Square) else fields(model):
             if _moves(getattr(model, part.name)):
                 name = f"{model.name}_{part.name}"
                 columns[part.name] = [self.place_of(getattr(s, part.name)) for s in members]
                 setattr(model, part.name, Outer(Track(name, None), name=f"value_{name}"))
-        if isinstance(model, AbsSeries):
+        if isinstance(model, Kink):
             columns["size"] = [self.size_of(getattr(s, "base")) for s in members]  # noqa: B009
         return Run(members, model, columns)
 
@@ -177,7 +177,7 @@ class RolledSection(SeriesLoop):
     def room(self) -> dict[str, int]:
         found = {s.name: self.order + 1 for s in self.graph.series}
         for run in self.runs:
-            hints = [f"hint_{run.model.base.name}"] if isinstance(run.model, AbsSeries) else []
+            hints = [f"hint_{run.model.base.name}"] if isinstance(run.model, Kink) else []
             found |= dict.fromkeys([*run.kept, *hints], len(run.members))
         found |= {f"size_{s.name}": 1 for s in self.graph.series if isinstance(s, Linear)} if self.graph.kinks else {}
         return found | {"factors": len(self.factors), "one": 1}
@@ -219,7 +219,7 @@ class RolledSection(SeriesLoop):
             match run.model:
                 case Linear():
                     found += self.sums_of(run)
-                case ProductSeries() | Square():
+                case Product() | Square():
                     found += self.products_of(run)
                 case _:
                     found += self.recurrence(run)
@@ -247,7 +247,7 @@ class RolledSection(SeriesLoop):
         self.put(*(let(name, self.recall(name)) for name in (() if first else run.kept)))
         self.put(*(let(s.name, s.track.load(self.k)) for s in read))
         self.values = {s: Name(s.name) for s in read}
-        if first and isinstance(model, AbsSeries):
+        if first and isinstance(model, Kink):
             value = model.side(self, absolute(Load("dense", Name(f"at_{model.name}_size"))))
         else:
             value = model.begin(self) if first else model.coefficient(self)
@@ -280,13 +280,13 @@ class RolledSection(SeriesLoop):
 
     # -- end of the step ------------------------------------------------------------------------------------------
 
-    def over_kinks(self, body: Callable[[AbsSeries], Iterable[Statement]]) -> list[Statement]:
+    def over_kinks(self, body: Callable[[Kink], Iterable[Statement]]) -> list[Statement]:
         """Loops over all kinks."""
         return [
             s
             for run in self.runs
             for kink in [run.model]
-            if isinstance(kink, AbsSeries)
+            if isinstance(kink, Kink)
             for s in self.over_run(run, body(kink))
         ]
 
@@ -378,8 +378,8 @@ def _statics(series: Series) -> tuple[object, ...]:
     """What members of a run have in common: the kind, and all that is no series with coefficients."""
     if isinstance(series, Linear):
         return (Linear,)
-    if isinstance(series, ProductSeries | Square):
-        return (ProductSeries,)
+    if isinstance(series, Product | Square):
+        return (Product,)
     parts = [(part.name, getattr(series, part.name)) for part in fields(series) if part.name not in FOUND]
     return (type(series), *(e.value if isinstance(e, Constant) else e for name, e in parts if not _moves(e)))
 

@@ -122,7 +122,7 @@ class Linear(Series):
 
 
 @dataclass(eq=False, slots=True)
-class ProductSeries(Series):
+class Product(Series):
     """left * right."""
 
     left: Series
@@ -266,7 +266,7 @@ class Exponential(Integral):
 
 @dataclass(eq=False, slots=True)
 class Sigmoid(Integral):
-    """u = 1/(c + d exp(a)), c and d positive numbers, from u' = -w a', w the `LogisticDerivative` of the same; exp(a) may overflow."""
+    """u = 1/(c + d exp(a)), c and d positive numbers, from u' = -w a', w the `Crest` of the same; exp(a) may overflow."""
 
     ends: tuple[float, float] = (1.0, 1.0)
 
@@ -290,7 +290,7 @@ class Peak(Exponential):
 
 
 @dataclass(eq=False, slots=True)
-class LogisticDerivative(Peak):
+class Crest(Peak):
     """w = d exp(a) u**2, u the `Sigmoid`, from w' = (2 c u - 1) w a'; the smaller one of two exponentials makes its digits."""
 
     ends: tuple[float, float] = (1.0, 1.0)
@@ -351,7 +351,7 @@ class QuotientIntegral(Series):
 
 
 @dataclass(eq=False, slots=True)
-class PowerSeries(Series):
+class Power(Series):
     """u = a**e for a constant e, from a u' = e a' u."""
 
     base: Series
@@ -376,7 +376,7 @@ class PowerSeries(Series):
 
 
 @dataclass(eq=False, slots=True)
-class AbsSeries(Series):
+class Kink(Series):
     """The side of zero on which a series lies just after the start, 1 or -1; 0 while nothing but zeros is known of it.
 
     It is no series itself, it is the same to all orders.  A series that begins at zero, up to rounding, a small part of the
@@ -412,10 +412,10 @@ class AbsSeries(Series):
 
 
 @dataclass(eq=False, slots=True)
-class SideSeries(Series):
+class Choice(Series):
     """One of two series that agree where `kink` has its zero: `above` where the side is 1, `below` elsewhere."""
 
-    kink: AbsSeries
+    kink: Kink
     above: Series
     below: Series
 
@@ -428,7 +428,7 @@ class SideSeries(Series):
 
 
 @dataclass(eq=False, slots=True)
-class JumpSide(AbsSeries):
+class Brink(Kink):
     """The side of zero on which a series lies where another one jumps; it begins at zero at zero itself alone."""
 
     def least(self, size: Name) -> Expression:
@@ -443,10 +443,10 @@ class JumpSide(AbsSeries):
 
 
 @dataclass(eq=False, slots=True)
-class JumpSeries(Series):
+class Leaping(Series):
     """One of three series by the side, 1, 0 or -1, of a series with a brink."""
 
-    brink: JumpSide
+    brink: Brink
     above: Series
     at: Series
     below: Series
@@ -482,8 +482,8 @@ class Whole(Series):
     """The whole number below a series just after its start; the brinks are those of its distances from this and the next one."""
 
     base: Series
-    lower: JumpSide
-    upper: JumpSide
+    lower: Brink
+    upper: Brink
 
     @property
     def linear(self) -> tuple[Series, ...]:
@@ -536,7 +536,7 @@ def _one(side: Expression, above: Expression, middle: Expression, below: Express
 
 
 @dataclass(eq=False, slots=True)
-class MassMatrixRow(Series):
+class Row(Series):
     """One row of L y = r - (M - M_0) a, a the solution of M a = r, with the rows of L and U of M_0 = L U.
 
     M_0 a_k = r_k - sum of M_j a_(k-j) for j = 1 … k: the factors of M_0 serve all orders.  `entries` are factor and series
@@ -546,7 +546,7 @@ class MassMatrixRow(Series):
 
     right: Series
     entries: dict[int, tuple[Expression, Series]]
-    before: tuple[MassMatrixRow, ...]
+    before: tuple[Row, ...]
     symmetric: bool
     unknowns: tuple[Unknown, ...] = ()
     lower: dict[int, Expression] = field(default_factory=dict)
@@ -597,7 +597,7 @@ class MassMatrixRow(Series):
 class Unknown(Series):
     """One unknown a of U a = y; `after` are those of later rows by their columns."""
 
-    row: MassMatrixRow
+    row: Row
     after: dict[int, Unknown]
 
     @property

@@ -26,22 +26,22 @@ from ..program.passes import Names
 from ..program.statements import Assign, let
 from .jump_series import Jump, changing, leaping, templates, unpassed
 from .series import (
-    AbsSeries,
+    Brink,
+    Choice,
     Constant,
+    Crest,
     Exponential,
     Fraction,
     Integral,
-    JumpSeries,
-    JumpSide,
+    Kink,
+    Leaping,
     Linear,
-    LogisticDerivative,
-    PowerSeries,
-    ProductSeries,
+    Power,
+    Product,
     QuotientIntegral,
     Ratio,
     Secant,
     Series,
-    SideSeries,
     Sigmoid,
     Slope,
     Square,
@@ -331,7 +331,7 @@ class SeriesGraph:
                 ((factor, moving),) = one.terms
                 parts = [(one.constant, other), (factor, self.product(moving, other))]
                 return self.sum([(times(a, b, weight), part) for weight, part in parts])
-        inner = self.put(Square, left) if left is right else self.put(ProductSeries, left, right)
+        inner = self.put(Square, left) if left is right else self.put(Product, left, right)
         return self.sum([(times(a, b), inner)])
 
     def choice(self, gap: Series, *values: Series) -> Series:
@@ -343,7 +343,7 @@ class SeriesGraph:
             size, middle = gap.value.value, values[len(values) // 2]
             return values[0] if size > 0.0 else values[-1] if size < 0.0 else middle
         factor, inner = split(gap)
-        side, kind = (AbsSeries, SideSeries) if len(values) == 2 else (JumpSide, JumpSeries)
+        side, kind = (Kink, Choice) if len(values) == 2 else (Brink, Leaping)
         if not isinstance(factor, Number):
             return self.put(kind, self.put(side, gap), *values)
         return self.put(kind, self.put(side, inner), *(reversed(values) if _negative(factor) else values))
@@ -353,7 +353,7 @@ class SeriesGraph:
         factor, inner = split(series)
         part = self.put(Fraction, series, inner if factor == Number(-1.0) else series)
         rest = self.sum([(Number(-1.0), part)], ONE)
-        return self.put(Whole, series, self.put(JumpSide, part), self.put(JumpSide, rest))
+        return self.put(Whole, series, self.put(Brink, part), self.put(Brink, rest))
 
     def larger(self, left: Series, right: Series) -> Series:
         """The larger one of two series."""
@@ -364,9 +364,9 @@ class SeriesGraph:
         return self.choice(self.sum([(ONE, left), (Number(-1.0), right)]), right, left)
 
     @property
-    def kinks(self) -> list[AbsSeries]:
+    def kinks(self) -> list[Kink]:
         """The kinks of all series; what does not move has none."""
-        return [s for s in self.series if isinstance(s, AbsSeries) and not isinstance(s.base, Constant)]
+        return [s for s in self.series if isinstance(s, Kink) and not isinstance(s.base, Constant)]
 
     @property
     def gaps(self) -> list[Series]:
@@ -381,7 +381,7 @@ class SeriesGraph:
             match s:
                 case SquareRoot():
                     found.append(s)
-                case PowerSeries():
+                case Power():
                     found += [s, s.base]
                 case QuotientIntegral() if s.function == "log":
                     found.append(s.argument)
@@ -468,7 +468,7 @@ class SeriesGraph:
             return self.of(sp.exp(exponent * sp.log(base), evaluate=False))
         if not (2 * exponent).is_Integer:
             inner = self.of(base)
-            return self.put(PowerSeries, inner, self.put(Slope, inner), self.constant(exponent.xreplace(self.swap)))
+            return self.put(Power, inner, self.put(Slope, inner), self.constant(exponent.xreplace(self.swap)))
         if exponent.is_negative:
             if (inverse := _inverse(base)) is not None and exponent.is_Integer:
                 return self.of(inverse**-exponent)
@@ -540,7 +540,7 @@ class SeriesGraph:
         if key not in self.known:
             slope = self.put(Slope, argument)
             found = self.enter(key, Sigmoid("exp", argument, slope, -1.0, ends=ends, name=self.fresh("sigmoid")))
-            crest = LogisticDerivative("exp", argument, slope, ends=ends, name=self.fresh("crest"))
+            crest = Crest("exp", argument, slope, ends=ends, name=self.fresh("crest"))
             self.series.append(crest)
             found.factor = crest
             crest.factor = self.product(self.sum([(Number(2.0 * ends[0]), found)], Number(-1.0)), crest)
@@ -590,16 +590,16 @@ def _hiding(roots: Iterable[Series]) -> set[Series]:
             continue
         seen.add(s)
         match s:
-            case Linear() | SideSeries() | JumpSeries():
+            case Linear() | Choice() | Leaping():
                 open_ends += s.linear
             case Integral() | QuotientIntegral():
                 open_ends.append(s.argument)
-            case ProductSeries() | Square() | Ratio() | SquareRoot() | PowerSeries():
+            case Product() | Square() | Ratio() | SquareRoot() | Power():
                 parts = {*s.linear, *s.convolved} - {s}
                 open_ends += [part for factor in parts for part in factor.linear if isinstance(factor, Linear)]
                 open_ends += [part for part in _needed(parts) if isinstance(part, Integral | QuotientIntegral)]
         if (
-            isinstance(s, Integral | QuotientIntegral | ProductSeries | Square | Ratio | SquareRoot | PowerSeries)
+            isinstance(s, Integral | QuotientIntegral | Product | Square | Ratio | SquareRoot | Power)
             and _degree(s) > PLAIN
         ):
             found.add(s)
@@ -609,15 +609,15 @@ def _hiding(roots: Iterable[Series]) -> set[Series]:
 def _degree(series: Series) -> float:
     """The degree of a series as a polynomial in states, time, and sines and cosines of such; inf if it is none."""
     match series:
-        case Linear() | SideSeries() | JumpSeries():
+        case Linear() | Choice() | Leaping():
             return max(map(_degree, series.linear), default=0.0)
-        case ProductSeries():
+        case Product():
             return _degree(series.left) + _degree(series.right)
         case Square():
             return 2.0 * _degree(series.base)
         case Integral() if series.function in STEADY:
             return _degree(series.argument)
-        case Integral() | QuotientIntegral() | Ratio() | SquareRoot() | PowerSeries():
+        case Integral() | QuotientIntegral() | Ratio() | SquareRoot() | Power():
             return math.inf
     return 1.0
 

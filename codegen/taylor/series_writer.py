@@ -10,7 +10,7 @@ from typing import ClassVar
 from ..program.expressions import ONE, ZERO, Expression, Name, Number, call
 from ..program.statements import Statement, let
 from .event_location import Stored, closed, told
-from .series import AbsSeries, Exponential, Order, Series
+from .series import Exponential, Kink, Order, Series
 from .series_graph import SeriesGraph
 from .simplify import absolute, largest, over, times
 from .step_length import distant, last_orders, unseen
@@ -130,7 +130,7 @@ class SeriesWriter(Order):
         """The statements that take note of those that the coefficients tell."""
         return self.run([self.side(kink) for kink in self.graph.kinks])
 
-    def side(self, kink: AbsSeries) -> Statement:
+    def side(self, kink: Kink) -> Statement:
         """The statement that takes note of one."""
         note = self.note(f"hint_{kink.base.name}", call("side_or", self.hint(kink.base), "new"))
         return told(self.recall(kink.name), self.signs(kink.base), note)
@@ -192,7 +192,7 @@ class SeriesWriter(Order):
             found += [*stores, *closed(gaps.mode, exact, both, gaps.stuck, gaps.room)]
         return self.run(found)
 
-    def passage(self, kink: AbsSeries) -> list[Statement]:
+    def passage(self, kink: Kink) -> list[Statement]:
         """The statements that end the step where a series passes one kink."""
         stores, (stored,) = self.stored([kink.base], [self.recall(f"size_{kink.name}")])
         return self.near(kink.base, [*stores, *kink.passages(self.recall(kink.name), stored)])

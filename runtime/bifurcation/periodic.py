@@ -24,7 +24,7 @@ from synchain.models.dynamics.reduction import without_drive
 from synchain.models.inputs.checks import short_repr
 from synchain.models.inputs.keywords import warn
 from synchain.models.mechanics.contact import SLIP
-from synchain.models.scenes.scene import Scene
+from synchain.models.scenes.scene import Scene, check_scene
 
 from ..cells.run_keywords import Given
 from ..results.labelled import Labelled, dataset, scene_text
@@ -369,7 +369,7 @@ def _driven(given: Given, scene: Scene) -> Scene:
 
 def _warn_of_different_starts(scene: Scene) -> None:
     """Warn if the nodes of a network were given different initial states."""
-    given = scene.given["initial"] or {}
+    given = check_scene(scene).given["initial"] or {}
     apart = next((name for name in given if name in scene.initial and len({*scene.initial[name]}) > 1), None)
     if apart is not None:
         warn(

@@ -339,7 +339,8 @@ class Plane(Labelled):
         modes = f"the largest of {len(self.modes)} transversal modes of {self.scene.n} nodes"
         contours = [
             ", ".join(
-                f"{name} {with_error(part.min())} … {with_error(part.max())}" for name, part in zip(self.names, line.T, strict=True)
+                f"{name} {with_error(part.min())} … {with_error(part.max())}"
+                for name, part in zip(self.names, line.T, strict=True)
             )
             for line in self.contours
         ]

@@ -18,7 +18,7 @@ from synchain.models.dynamics.observable_text import KNOWN, as_observable
 INSIDE = ("rate(v)", "x", "x_2", "rate(x_1)", "nodes.mean(x*rate(v))", "mu", "t")
 PLACES = (
     "{}*x", "{} + rate(x)*v", "x/(2 + {})", "(2 + v**2)**{}", "nodes.sum({}*v)", "nodes[2](x*{})", "nodes.maximum({})*rate(v_1)",
-    "abs({})*v", "max({}, v)*x", "atan2({}, x)", "sign({})*rate(x)",
+    "abs({})*v", "max({}, v)*x", "atan2({}, x)", "mod({}, 3)", "sign({})*rate(x)",
 )  # fmt: skip
 SCENE = sc.Scene("van_der_pol", "x->x", sc.chain(3))
 GIVEN = {
@@ -56,7 +56,7 @@ def test_functions_in_all_places_read_what_is_defined() -> None:
 
 
 @pytest.mark.parametrize(
-    "function", [name for name in KNOWN if name not in ("rate", "nodes[3]", "atan2", "max", "min")]
+    "function", [name for name in KNOWN if name not in ("rate", "nodes[3]", "atan2", "max", "min", "mod")]
 )
 def test_functions_of_rates_and_states(function: str) -> None:
     for text in ("rate(v)*x", "rate(x)/3", "x*v/(5 + t)"):

@@ -154,7 +154,7 @@ def test_the_table_has_the_windows_of_the_exponents(simulation: Simulation, tmp_
 
 
 def test_a_row_without_exponents_says_why() -> None:
-    row = tables_of_thresholds.Row(4, 1.4, (), (), ExponentWindows(absent="no drive"), None, 0, 9)
+    row = tables_of_thresholds.ThresholdRow(4, 1.4, (), (), ExponentWindows(absent="no drive"), None, 0, 9)
     assert "exponents not computed: no drive" in row.remark
     data = tables_of_thresholds.Comparison((row,), TINY)
     assert "| none | none | not computed | none |" in tables_of_thresholds.document(data)
@@ -173,7 +173,7 @@ def test_ragged_ranges_are_joined_over_narrow_gaps_only() -> None:
     assert tables_of_thresholds.joined(found) == ((0.1, 0.14), (0.142, 0.15))
     assert tables_of_thresholds.joined(found, 0.0) == found
     assert tables_of_thresholds.joined(()) == ()
-    row = tables_of_thresholds.Row(4, 1.4, found, (), ExponentWindows(), published.published(4, 1.4), 0, 9)
+    row = tables_of_thresholds.ThresholdRow(4, 1.4, found, (), ExponentWindows(), published.published(4, 1.4), 0, 9)
     assert "2 narrow gaps bridged; 1 more range measured" in row.remark
 
 
