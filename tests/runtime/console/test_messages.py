@@ -136,7 +136,7 @@ def test_grids_of_the_command_line_have_the_limit_of_an_axis():
 
 def test_a_sweep_that_does_not_fit_is_refused_before_memory_is_taken():
     scene = PAIR.replace(axes=LARGE)
-    with pytest.raises(ValueError, match=r"1000000000 cells, 128 GB in memory; expected at most 8 GB; .* with stream"):
+    with pytest.raises(ValueError, match=r"1000000000 cells, 144 GB in memory; expected at most 8 GB; .* with stream"):
         reduce_scene(scene, reduce=False).check_memory()
     fewer = {name: values[:300] for name, values in LARGE.items()}
     reduce_scene(PAIR.replace(axes=fewer), reduce=False).check_memory()
