@@ -35,8 +35,8 @@ __all__ = ["Bifurcation", "BifurcationKind", "bifurcations_at_end", "bifurcation
 Test = Callable[[PeriodicOrbit], float]
 """A test function of the orbit, zero at a bifurcation."""
 
-CLOSED = 1e-6
-"""Largest gap that counts as closed: the branch ends by grazing."""
+LOCATED = 1e-6
+"""Largest residual of a bifurcation; a larger one shows that a test function jumps, as it does between two branches."""
 
 SHUT = 1e-13
 """Gap as small as the error of the integration, which cannot be closed further."""
@@ -66,9 +66,15 @@ class Bifurcation:
 
     value: float  # value of the parameter
     kind: BifurcationKind  # kind of the bifurcation
-    # distance of the multiplier from -1, from 1 or from the unit circle, or from the other phase, at `orbit`
+    # how far `orbit` is from the bifurcation: the distance of its multiplier from -1, from 1 or, for Neimark-Sacker,
+    # from the unit circle; the gap in grazing; the excess of the load in stick loss. `follow` accepts 1e-6 at most
     residual: float
     orbit: PeriodicOrbit = field(repr=False)  # nearest orbit that was found
+
+    @property
+    def located(self) -> bool:
+        """Whether the residual is small enough for a bifurcation."""
+        return self.residual < LOCATED
 
 
 def bifurcations_between(arc: Arc, value: float, orbit: PeriodicOrbit, phases: Phases | None) -> list[Bifurcation]:
@@ -87,7 +93,7 @@ def bifurcations_between(arc: Arc, value: float, orbit: PeriodicOrbit, phases: P
     return sorted([change, *beside], key=lambda bifurcation: bifurcation.value)
 
 
-def bifurcations_at_end(arc: Arc, beyond: float) -> list[Bifurcation]:
+def bifurcations_at_end(arc: Arc, beyond: float, final: bool) -> list[Bifurcation]:
     """Locate the bifurcation at which a branch ends.
 
     The branch may be born of one of half as many periods, or end at a fold, at a branch point or at a graze.
@@ -101,11 +107,12 @@ def bifurcations_at_end(arc: Arc, beyond: float) -> list[Bifurcation]:
         turn = None
     if turn is not None and (beyond - turn[1]) * (turn[1] - arc.values[-1]) >= 0.0:
         kind, at, orbit = turn
-        return [Bifurcation(at, kind, _residual(orbit, kind), orbit)]
-    if arc.phases[-1] is None:
+        found = Bifurcation(at, kind, _residual(orbit, kind), orbit)
+        return [found] if found.located else []
+    if arc.phases[-1] is None or not final:
         return []
     last = _graze(arc.copy(), beyond)
-    return [last] if last.residual < CLOSED else []
+    return [last] if last.located else []
 
 
 def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
@@ -123,7 +130,7 @@ def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
         crossings = _crossings(OrbitPair(single, (single.values[0], beyond), (single.orbits[0], single.orbits[1])))
     except ArithmeticError:
         return None
-    return next((each for each in crossings if each.kind is BifurcationKind.PERIOD_DOUBLING), None)
+    return next((each for each in crossings if each.kind is BifurcationKind.PERIOD_DOUBLING and each.located), None)
 
 
 @dataclass(frozen=True, slots=True)

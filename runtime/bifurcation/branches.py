@@ -32,23 +32,17 @@ from .continuation import Arc
 from .periodic import NEWTON, PeriodicOrbit, periodic_orbit, relative
 from .phases import Phases
 
+LONGEST = 1.0 / 4.0
+"""Longest step, relative to the range of the parameter."""
+
 SHORT = 1.0 / 32.0
-"""Length of the pieces, relative to the step, at which the end of the branch is first looked for.
+"""Length of a refused step, relative to the range or to the last such step, at which the end of the branch is sought."""
 
-A step is cut if Newton's method fails, or leads beyond a fold or to another branch.
-"""
+SHORTEST = 2.0**-20
+"""Shortest step, relative to the range; if it is refused too, the branch is lost."""
 
-SHORTEST = 1.0 / 4096.0
-"""Shortest piece of a step, relative to the step, before the branch is lost.
-
-Where a branch nearly turns it is steep, and pieces must be short.
-"""
-
-APART = 1.0 / 16.0
-"""Length of the pieces, relative to the step, in which a change of phases is located.
-
-Two changes in one piece count as one.
-"""
+APART = 1.0 / 64.0
+"""Length of the steps, relative to the range, in which a change of phases is located; two changes in one count as one."""
 
 FAR = 0.3
 """Largest distance from the expected state, relative to the step, of an orbit of other phases on the same branch."""
@@ -148,6 +142,9 @@ def follow(
 ) -> Branch:
     """Follow a periodic orbit along a parameter and locate its bifurcations.
 
+    Steps are chosen by the branch; `values` say only where orbits are returned. A step is halved if the orbit does not
+    fit the tangents of the branch, if a multiplier moves far, or if a bifurcation on it has a residual above 1e-6.
+
     Parameters
     ----------
     scene : Scene
@@ -194,7 +191,7 @@ def follow(
     wanted = checked_values(first.scene, name, values)
     scene = others(Given(follow, parameters, more, NEWTON), scene, name)
     with Execution(1, None, show_progress, progress).reporter(len(wanted), "value") as reporter:
-        branch = traced(scene, name, reporter.each(wanted), first)
+        branch = traced(scene, name, reporter.each(wanted), first, abs(wanted[-1] - wanted[0]))
     warn_of_lost("follow", [branch])
     return branch
 
@@ -205,7 +202,7 @@ def warn_of_lost(function: str, branches: Sequence[Branch]) -> None:
     if lost:
         warn(
             f"{function}: found no orbit and no bifurcation beyond {branches[0].name} = {numbers(lost)}; expected the "
-            "branch to go on, or to end at a bifurcation; try values closer together there, or periodic_orbit beyond"
+            "branch to go on, or to end at a bifurcation; try a shorter range there, or periodic_orbit beyond"
         )
 
 
@@ -221,9 +218,9 @@ def others(given: Given, scene: Scene, name: str) -> Scene:
     return given.scene(scene)
 
 
-def traced(scene: Scene, name: str, values: Iterable[float], first: PeriodicOrbit) -> Branch:
-    """Follow a periodic orbit along checked values of a parameter, as `follow` does."""
-    tracer = BranchTracer(Arc(scene, name, first.periods))
+def traced(scene: Scene, name: str, values: Iterable[float], first: PeriodicOrbit, span: float) -> Branch:
+    """Follow a periodic orbit along checked values of a parameter with a range of length `span`, as `follow` does."""
+    tracer = BranchTracer(Arc(scene, name, first.periods, span))
     orbits: dict[float, PeriodicOrbit] = {}
     for value in values:
         if orbits:
@@ -276,43 +273,50 @@ class BranchTracer:
         self.phases: dict[float, Phases | None] = {}
         self.least: int | None = None
         self.lost: tuple[float, ...] = ()
+        self.size = LONGEST * arc.span
 
-    def take(self, value: float, orbit: PeriodicOrbit, phases: Phases | None) -> PeriodicOrbit:
+    def take(
+        self, value: float, orbit: PeriodicOrbit, phases: Phases | None, way: Sequence[Bifurcation] = ()
+    ) -> PeriodicOrbit:
         """Append an orbit, after the bifurcations on the way to it."""
         self.phases[value] = phases
         self.least = self.least or orbit.least
         if self.arc.values:
-            way = sorted(
-                bifurcations_between(self.arc, value, orbit, phases),
-                key=lambda each: abs(each.value - self.arc.values[-1]),
-            )
-            self.bifurcations += way
-            last = self.arc.phases[-1]
-            if last is not None and phases is not None and last.slip_states != phases.slip_states:
+            self.bifurcations += sorted(way, key=lambda each: abs(each.value - self.arc.values[-1]))
+            if self._changes(phases):
                 self.arc = self.arc.empty()
         self.arc.take(value, orbit, phases)
         return orbit
 
     def on(self, value: float) -> PeriodicOrbit | None:
-        """Find the orbit at the next value, with intermediate orbits on a long step."""
-        step = abs(value - self.arc.values[-1])
-        ahead = [value]
-        sought = False
-        while ahead:
-            last = self.arc.values[-1]
-            piece = abs(ahead[-1] - last)
-            found = self._found(ahead[-1])
-            if found is not None and (piece <= APART * step or not self._changes(found[1])):
-                self.take(ahead.pop(), *found)
+        """Find the orbit at the next value by steps whose length follows the branch alone, None if the branch ends."""
+        span, longest, sought = self.arc.span, np.inf, SHORT * self.arc.span
+        while (last := self.arc.values[-1]) != value:
+            size = min(self.size, longest)
+            piece = min(size, abs(value - last))
+            at = value if size >= abs(value - last) else last + math.copysign(size, value - last)
+            found = self._found(at)
+            # An orbit of other phases: halve the step until the change is located.
+            if found is not None and piece > APART * span and self._changes(found[1]):
+                longest = 0.5 * piece
                 continue
-            if found is None and (piece <= SHORTEST * step or (piece <= SHORT * step and not sought)):
-                # up to the value after the next: a piece that ends just before a fold is refused too
-                sought, end = True, bifurcations_at_end(self.arc, ahead[-2:][0])
-                if end or piece <= SHORTEST * step:
+            way = None if found is None else bifurcations_between(self.arc, at, *found)
+            if found is not None and way is not None and all(each.located for each in way):
+                longest = np.inf if self._changes(found[1]) else longest
+                self.take(at, *found, way)
+                self.size = max(self.size, min(2.0 * piece, LONGEST * span))
+                continue
+            # A refused step: the branch ends within its double, or the step is too long.
+            if piece <= max(sought, SHORTEST * span):
+                sought = SHORT * piece
+                beyond = value if 2.0 * piece > abs(value - last) else last + 2.0 * (at - last)
+                final = piece <= SHORTEST * span
+                end = bifurcations_at_end(self.arc, beyond, final)
+                if end or final:
                     self.bifurcations += end
                     self.lost = () if end else (last,)
                     return None
-            ahead.append(0.5 * (last + ahead[-1]))
+            self.size = 0.5 * piece
         return self.arc.orbits[-1]
 
     def _changes(self, phases: Phases | None) -> bool:

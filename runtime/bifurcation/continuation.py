@@ -24,10 +24,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, linear_sum_assignment
 
 from synchain.models.scenes.scene import Scene
 
@@ -39,7 +39,10 @@ NEAR = 3
 """Number of orbits that the polynomial passes through."""
 
 FIT = 0.5
-"""Largest part of the change of the state on a step that its derivative at the end leaves unexplained."""
+"""Largest part of the change of the state on a step that its derivative at either end leaves unexplained."""
+
+MOVE = 0.75
+"""Largest distance that a multiplier moves in a step, relative to its modulus if that exceeds 1."""
 
 MOST_STEPS = 24
 """Most steps along the arc towards a turn, each at most twice as long as the one before."""
@@ -68,10 +71,13 @@ class Arc:
     scene: Scene  # scene of the orbits
     name: str  # name of the parameter
     periods: int  # drive periods of each orbit
+    span: float = 0.0  # length of the whole range of the parameter
     values: list[float] = field(default_factory=list)  # values of the parameter
     orbits: list[PeriodicOrbit] = field(default_factory=list)  # orbit at each value
     # phases of each orbit; None for friction that is not set-valued
     phases: list[Phases | None] = field(default_factory=list)
+    # (components,): derivatives of states by the parameter, relative to the extents, by value and state
+    tangents: dict[tuple[float, bytes], np.ndarray] = field(default_factory=dict)
 
     def take(self, value: float, orbit: PeriodicOrbit, phases: Phases | None) -> Arc:
         """Append an orbit and return the arc."""
@@ -82,11 +88,11 @@ class Arc:
 
     def empty(self) -> Arc:
         """Return an arc of the same scene without orbits."""
-        return Arc(self.scene, self.name, self.periods)
+        return Arc(self.scene, self.name, self.periods, self.span)
 
     def copy(self) -> Arc:
         """Return an arc with the same orbits, which can be extended independently."""
-        return Arc(self.scene, self.name, self.periods, [*self.values], [*self.orbits], [*self.phases])
+        return replace(self, values=[*self.values], orbits=[*self.orbits], phases=[*self.phases])
 
     def guess(self, value: float) -> np.ndarray:
         """Extrapolate the state of the orbit, shape (components,), at a value of the parameter."""
@@ -109,19 +115,45 @@ class Arc:
         step[-1] = max(DIFFERENCE * abs(point[-1]), SHARE * abs(way))
         return np.asarray((self.image(point + step)[0] - self.image(point - step)[0]) / (2.0 * step[-1]))
 
-    def joins(self, value: float, orbit: PeriodicOrbit) -> bool:
-        """Return whether the arc can go from its last orbit to another one of the same phases.
+    def tangent(self, value: float, orbit: PeriodicOrbit) -> np.ndarray:
+        """Derivative (components,) of an orbit's state by the parameter, relative to the extent of each component."""
+        key = (value, orbit.state.tobytes())
+        if key not in self.tangents:
+            point, units = np.append(orbit.state, value), _units(orbit)
+            matrix = np.eye(len(units)) - self.image(point)[1] * units / units[:, None]
+            slope = self.slope(point, SHARE * self.span) / units
+            self.tangents[key] = np.linalg.lstsq(matrix, slope, rcond=None)[0]
+        return self.tangents[key]
 
-        It cannot if it turns on the way, nor if the change of the state does not fit its derivative by
-        the parameter at the other orbit, as that of an orbit on another branch does not.
+    def joins(self, value: float, orbit: PeriodicOrbit) -> bool:
+        """Return whether the arc can go from its last orbit to another one of the same phases in one step.
+
+        An orbit of another branch lies far from the prediction by the tangent at the last orbit, or does not fit its
+        own tangent. A step on which a multiplier moves far can hide bifurcations.
         """
-        point, change, extent = np.append(orbit.state, value), orbit.state - self.orbits[-1].state, orbit.extent
-        way, units = value - self.values[-1], np.where(extent > 0.0, extent, 1.0)
-        matrix = np.eye(len(change)) - self.image(point)[1] * units / units[:, None]
-        expected = way * np.linalg.lstsq(matrix, self.slope(point, way) / units, rcond=None)[0]
-        if not np.abs(change / units - expected).max() < FIT * relative(change, extent) + SAME:
+        last = self.orbits[-1]
+        if not _moved(last.multipliers, orbit.multipliers) < MOVE:
             return False
-        return not turns(self, (self.values[-1], value), (self.orbits[-1], orbit))
+        way, change = value - self.values[-1], orbit.state - last.state
+        allowed = FIT * relative(change, orbit.extent) + SAME
+        # Compare the chord with the tangents at both ends, which bounds the angle between them. Under set-valued friction
+        # the state has a kink where the start of the period passes from stick to slip: only the tangent at the end fits.
+        ends = [(value, orbit), (self.values[-1], last)]
+        for at, end in ends if self.phases[-1] is None else ends[:1]:
+            if not np.abs(change / _units(end) - way * self.tangent(at, end)).max() < allowed:
+                return False
+        return not turns(self, (self.values[-1], value), (last, orbit))
+
+
+def _units(orbit: PeriodicOrbit) -> np.ndarray:
+    """Extent (components,) of an orbit, 1 for components that do not move."""
+    return np.where(orbit.extent > 0.0, orbit.extent, 1.0)
+
+
+def _moved(before: np.ndarray, after: np.ndarray) -> float:
+    """Largest distance that a multiplier moves, relative to its modulus if that exceeds 1; pairs are the nearest ones."""
+    distances = np.abs(before[:, None] - after) / np.maximum(1.0, np.maximum(np.abs(before)[:, None], np.abs(after)))
+    return float(distances[linear_sum_assignment(distances)].max())
 
 
 def _through(values: Sequence[float], places: Sequence[np.ndarray], value: float) -> np.ndarray:
@@ -159,7 +191,8 @@ def find_turn(arc: Arc, beyond: float) -> tuple[BifurcationKind, float, Periodic
     shortest = SHORTEST * length
     for _ in range(MOST_STEPS):
         there = way.point(length)
-        if there is None or _slip_states(way.orbit(there)) != slip_states:
+        astray = there is None or not way.length(there - way.guess(length)) < FIT * length
+        if there is None or astray or _slip_states(way.orbit(there)) != slip_states:
             length *= 0.25
             if length < shortest:
                 return None
@@ -211,12 +244,16 @@ class ArclengthStep:
         """Return the parameter's share of the tangent at a point: zero where the arc turns."""
         return self.side(point) / self.border(point)
 
+    def guess(self, length: float) -> np.ndarray:
+        """Return the point (components + 1,) at a length from the start on the direction."""
+        return np.asarray(self.start + length * self.along / self.length(self.along))
+
     def point(self, length: float, guess: np.ndarray | None = None) -> np.ndarray | None:
         """Find the point of the arc at a length from the start, measured along the direction.
 
         Shapes: guess (components + 1,); returns (components + 1,).
         """
-        guess = self.start + length * self.along / self.length(self.along) if guess is None else guess
+        guess = self.guess(length) if guess is None else guess
         slope = self._slope(guess)
         point, best = guess, np.inf
         for _ in range(30):

@@ -338,7 +338,7 @@ def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
 
 def _both_ways(scene: Scene, name: str, grid: list[float], k: int, orbit: PeriodicOrbit) -> Branch:
     """Branch through an orbit at grid[k], in one piece."""
-    up, down = (traced(scene, name, part, orbit) for part in (grid[k:], grid[k::-1]))
+    up, down = (traced(scene, name, part, orbit, grid[-1] - grid[0]) for part in (grid[k:], grid[k::-1]))
     return Branch(
         name,
         np.concatenate([down.values[:0:-1], up.values]),
@@ -368,7 +368,7 @@ def _other_sheets(scene: Scene, branch: Branch) -> list[tuple[float, PeriodicOrb
             try:
                 start = turn.orbit.state - 2.0**-NEARER * (last.state - turn.orbit.state)
                 first = periodic_orbit(scene, last.periods, start, parameters={branch.name: way[0]})
-                sheet = traced(scene, branch.name, way, first)
+                sheet = traced(scene, branch.name, way, first, abs(end - fold))
             except ArithmeticError:
                 continue
             sheets += [(end, sheet.orbits[-1])] if len(sheet.orbits) == len(way) else []

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from synchain.models import Field
+from synchain.models import Field, Lagrangian
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.bifurcation.bifurcations import OrbitPair
@@ -129,7 +129,7 @@ def test_steep_branches_are_followed_in_short_pieces() -> None:
 def test_a_branch_that_is_lost_says_so(tmp_path: object) -> None:
     """A state that jumps with its parameter is on no branch."""
     with pytest.warns(
-        RuntimeWarning, match=r"follow: found no orbit and no bifurcation beyond j = -.*try values closer"
+        RuntimeWarning, match=r"follow: found no orbit and no bifurcation beyond j = -.*try a shorter range"
     ) as seen:
         branch = followed("j", [-1.0, -0.5, 0.5, 1.0], (0.0, -2.0), a=-0.2, b=-0.3, r=1e9)
     assert seen[0].filename == __file__
@@ -162,3 +162,85 @@ def test_doublings_of_a_parametric_oscillator_are_found_in_any_form_of_its_drive
     branch = follow(one, "w", [1.1, 1.12, 1.15, 1.23, 1.3, 1.33], periodic_orbit(one))
     assert [turn.kind for turn in branch.bifurcations] == ["period doubling"] * 2
     np.testing.assert_allclose([turn.value for turn in branch.bifurcations], [1.133433, 1.310721], atol=1e-6)
+
+
+WELLS = Lagrangian(
+    "v**2/2",
+    "-x**2/2 + x**4/4",
+    {"x": "F*cos(w*t) - g*v"},
+    coordinates={"x": "v"},
+    parameters={"g": 0.2, "F": 1.0, "w": 1.05},
+)
+LOW, HIGH = 8 / 7, 1.482142857
+IN_WELL = [
+    ("period doubling", pytest.approx(1.2710356921, abs=1e-8)),
+    ("branch point", pytest.approx(1.2862282030, abs=1e-8)),
+]
+
+
+def wells() -> Scene:
+    return Scene(WELLS, initial={"x": 1, "v": 0}, transient=300)
+
+
+def seen(branch: Branch) -> list[tuple[str, float]]:
+    """Bifurcations of a branch that is not lost and that has only located ones."""
+    assert branch.lost == ()
+    assert all(each.residual < 1e-6 for each in branch.bifurcations)
+    return found(branch)
+
+
+@pytest.mark.parametrize("count", [2, 9, 60])
+def test_bifurcations_do_not_depend_on_the_number_of_values(count: int) -> None:
+    """A step over the whole range led from the asymmetric orbit to the symmetric one; SciPy gives the values."""
+    first = periodic_orbit(wells(), 1, [-0.504565084, 0.09546030488], F=LOW)
+    branch = follow(wells(), "F", np.linspace(LOW, HIGH, count), first)
+    assert seen(branch) == IN_WELL
+    drives = np.linspace(LOW, HIGH, count)
+    assert branch.values.tolist() == drives[drives < 1.2862282].tolist()
+    # The divergence is -g, so the multipliers have the product exp(-g T), and no pair can pass the circle.
+    for orbit in branch.orbits:
+        assert np.prod(orbit.multipliers).real == pytest.approx(np.exp(-0.2 * 2 * np.pi / 1.05), rel=1e-9)
+
+
+@pytest.mark.parametrize("count", [2, 9])
+def test_bifurcations_of_a_skeleton_do_not_depend_on_the_number_of_values(count: int) -> None:
+    """From the stable asymmetric orbits at F = 1.28, which are mirror images, to both ends."""
+    values = [*np.linspace(LOW, 1.28, count), *np.linspace(1.28, HIGH, count)[1:]]
+    near = {"x": (-0.736, -0.716), "v": (0.103, 0.123)}
+    branches = [branch for branch in skeleton(wells(), "F", values, (1,), 1, ranges=near) if branch.bifurcations]
+    assert [seen(branch) for branch in branches] == [IN_WELL, IN_WELL]
+
+
+@pytest.mark.parametrize("count", [2, 3, 50])
+def test_a_pitchfork_and_a_fold_are_found_with_any_number_of_values(count: int) -> None:
+    """x' = f + (a + cos t) x - x^3: a pitchfork at a = 0 for f = 0, a fold at f < 0 for a = 0.3."""
+    node = Field({"x": "f + (a + cos(t))*x - x**3"}, parameters={"a": 0.3, "f": 0.0})
+    scene = Scene(node, None, None, initial={"x": 0.5}, transient=50)
+    first = periodic_orbit(scene)
+    assert seen(follow(scene, "a", np.linspace(0.3, -0.4, count), first)) == [
+        ("branch point", pytest.approx(0.0, abs=1e-8))
+    ]
+    folded = follow(scene, "f", np.linspace(0.0, -1.4, count), first)
+    assert seen(folded) == [("fold", pytest.approx(-0.0334640228, abs=1e-8))]
+
+
+@pytest.mark.parametrize("count", [2, 40])
+def test_two_doublings_in_one_step_are_found(count: int) -> None:
+    """The multiplier comes back into the circle, so that both ends of the range are stable."""
+    node = Field(
+        {"x": "v", "v": "-d*v - (1 + a*cos(w*t)**2)*x - x**3 + f0*cos(w*t)**2"},
+        parameters={"w": 1.1, "d": 0.1, "a": 1, "f0": 0.05},
+    )
+    scene = Scene(node, None, None, initial={"x": 0, "v": 0}, transient=100)
+    branch = follow(scene, "w", np.linspace(1.1, 1.33, count), periodic_orbit(scene))
+    assert seen(branch) == [("period doubling", pytest.approx(at, abs=1e-6)) for at in (1.133433, 1.310721)]
+
+
+def test_a_bifurcation_with_a_large_residual_is_none() -> None:
+    """Where a state jumps to one of another stability, a multiplier jumps over the circle; the branch is lost there."""
+    node = Field({"x": "(tanh(r*a) + cos(t))*x/2"}, parameters={"a": -1.0, "r": 1e9})
+    scene = Scene(node, None, None, initial={"x": 0.0})
+    with pytest.warns(RuntimeWarning, match="found no orbit and no bifurcation beyond a = "):
+        branch = follow(scene, "a", [-1.0, 1.5], periodic_orbit(scene, 1, [0.0]))
+    assert branch.bifurcations == ()
+    assert branch.lost == (pytest.approx(0.0, abs=1e-5),)
