@@ -106,7 +106,7 @@ class UnrolledStep(StepWriter):
             for k, (word, name, e) in enumerate(zip(words, names, body.results, strict=True)):
                 plain = self.is_plain(e)
                 if plain and k < len(states):
-                    self.let(name, lower(e.xreplace(at)))
+                    self.let(name, lane(lower(e.xreplace(at))))
                 found[word] = (e.xreplace(at) if plain else real(name)).xreplace(kept)
             own.append(found)
         self.links("y", "f", {})

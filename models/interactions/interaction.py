@@ -236,9 +236,10 @@ class _Content:
         for s in sorted(used - own, key=lambda s: s.name):
             if not s.name.endswith(("_i", "_j")) or len(s.name) < 3:
                 names = (*table, *(s.name for s in used if s.name.endswith(("_i", "_j"))))
+                meant = suggestion(s.name, names) or f", or write {s.name}_i for what the node has"
                 raise ValueError(
                     f"{what}: undeclared symbol {s.name!r}; expected symbols of both ends, the weight, t and the parameters "
-                    f"{', '.join(table) or '(none)'}; give it a default{suggestion(s.name, names)}"
+                    f"{', '.join(table) or '(none)'}; give it a default{meant}"
                 )
         for s in sorted(symbols - used, key=lambda s: s.name):
             raise ValueError(f"{what}: nothing uses the parameter {s.name!r}; use it or leave it out")

@@ -35,7 +35,7 @@ from .defaults import TimeUnit, complete
 from .dictionary import arguments, as_dict
 from .section import Section
 from .toml import write
-from .warnings import asynchrony, function_of_inputs, warnings
+from .warnings import asynchrony, function_of_inputs, unresolved_smoothing, warnings
 
 if TYPE_CHECKING:
     from ..spectra.spectrum import Spectrum
@@ -353,8 +353,8 @@ class Scene(HasDrawing, HasLatex):
                 f"{self.varied[0]} has values for {self.n} nodes, or for their links; give `parameters` for another number"
             )
         scene = Scene(**given)
-        if called_from_outside() and (scene.model, scene.varied) != (self.model, self.varied):
-            _warn(scene)
+        if called_from_outside():
+            _warn(scene, self)
         return scene
 
     def _kept_start(self, changes: Mapping[str, object]) -> Mapping[str, object] | None:
@@ -421,13 +421,21 @@ class Scene(HasDrawing, HasLatex):
         return f"Scene({', '.join(words)})"
 
 
-def _warn(scene: Scene) -> None:
-    """Warn of functions of single inputs, and if the synchronisation error is recorded where it cannot vanish."""
-    for words in filter(None, (function_of_inputs(coupling, graph) for coupling, graph in scene.model.linked)):
+def _warn(scene: Scene, before: Scene | None = None) -> None:
+    """Warn of functions of single inputs, of a synchronisation error that cannot vanish, and of friction that is not resolved.
+
+    Of a scene that was another one `before`, warn of what is new.
+    """
+    sentences = list[str]()
+    if before is None or (scene.model, scene.varied) != (before.model, before.varied):
+        sentences += (function_of_inputs(coupling, graph) for coupling, graph in scene.model.linked)
+        if Record.SYNC_ERROR in scene.record:
+            sentences += asynchrony(scene.model, scene.varied)
+    unresolved = unresolved_smoothing(scene.model, scene.parameters, scene.axes)
+    if unresolved and not (before and unresolved_smoothing(before.model, before.parameters, before.axes)):
+        sentences.append(unresolved)
+    for words in filter(None, sentences):
         warn(words)
-    if Record.SYNC_ERROR in scene.record:
-        for words in filter(None, asynchrony(scene.model, scene.varied)):
-            warn(words)
 
 
 def _nodes(given: Mapping[str, Any]) -> int | None:

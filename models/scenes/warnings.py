@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache
+from itertools import product
 from typing import Any
 
 import sympy as sp
@@ -14,11 +15,17 @@ from ..graphs.topology import Topology
 from ..inputs.names import LinkName, NodeName
 from ..interactions.coupling import Coupling, MatrixCoupling, Rates
 from ..interactions.ends import WEIGHT
+from ..mechanics.components import TIME, Node
+from ..mechanics.contact import ContactModel
 from ..networks.model import Model
+from ..sweeps.axis import Axis
+from ..sweeps.parameters import at_nodes
 
 STIFF = 100.0
 """Frequency of a mode and number of its swings above which springs are called stiff."""
 
+STEEP = 100.0
+"""Least kappa times speed of a belt at which a smoothed law is near its jump: 1 - (2/pi) atan(100) is 0.6 %."""
 
 COUNTED = 200
 """Up to so many nodes zeros of a graph with negative weights are counted by its characteristic polynomial."""
@@ -49,6 +56,7 @@ def warnings(model: Model, varied: tuple[str, ...], values: Mapping[str, Any], d
         *(_negative_weights(own) for _, own in model.linked),
         _different_nodes(graph, of_nodes),
         asynchronous,
+        unresolved_smoothing(model, values["parameters"], values["axes"]),
         *(function_of_inputs(coupling, own) for coupling, own in model.linked),
         _stiff_springs(model, values, duration),
         _equal_starts(values) if alike and not asynchronous else "",
@@ -59,6 +67,43 @@ def warnings(model: Model, varied: tuple[str, ...], values: Mapping[str, Any], d
 def asynchrony(model: Model, varied: tuple[str, ...]) -> tuple[str, str]:
     """Return why the graph and why the links of a network leave no complete synchronisation; "" if they do not."""
     return _in_parts(model.topology), _without_synchrony(model, varied) if len(model.kinds) == 1 else ""
+
+
+def unresolved_smoothing(model: Model, parameters: Mapping[str, float], axes: tuple[Axis, ...]) -> str:
+    """Return a sentence if a smoothed friction law is still near its middle at the speed of a belt; "" if none is.
+
+    A belt at rest, or whose speed depends on places or time, is not judged.  Of an axis its ends count.
+    """
+    if model.contact != ContactModel.ATAN:
+        return ""
+    ends: dict[str, tuple[float, ...]] = {name: (value,) for name, value in parameters.items()}
+    ends |= {axis.name: (min(axis.values), max(axis.values)) for axis in axes if axis.name in ends}
+    nodes = dict(zip(model.kinds, model.unlinked.nodes, strict=True))
+    least = math.inf
+    for kind, values in at_nodes(model, ends):
+        for names, product_at in _belts(nodes[kind]) if kind.friction else ():
+            sizes = [abs(product_at(*corner)) for corner in product(*(values[name] for name in names))]
+            least = min([least, *(size for size in sizes if size > 0.0)])
+    if least >= STEEP:
+        return ""
+    return (
+        f"smoothed friction: found kappa * speed of the belt = {least:.3g}; expected at least about {STEEP:.0f}, "
+        f"for (2/pi) atan(kappa w) is {2.0 / math.pi * math.atan(least):.2g} there and not 1; raise kappa, or use "
+        "contact = 'set-valued'"
+    )
+
+
+@lru_cache(maxsize=64)
+def _belts(node: Node) -> tuple[tuple[tuple[str, ...], Callable[..., float]], ...]:
+    """Kappa times the sliding velocity of a node at rest, for each of its laws: names of parameters, and function of them."""
+    kappa, found = sp.Symbol("kappa", real=True), []
+    smoothed = {a.args[0] for e in node.rhs for a in e.atoms(sp.atan) if a.has(kappa)}
+    for argument in sorted(smoothed, key=str):
+        at_rest = argument.xreplace(dict.fromkeys(node.state[len(node.state) // 2 :], sp.S.Zero))
+        if not at_rest.free_symbols & {TIME, *node.state}:
+            names = tuple(sorted(s.name for s in at_rest.free_symbols))
+            found.append((names, sp.lambdify([sp.Symbol(name, real=True) for name in names], at_rest, "math")))
+    return tuple(found)
 
 
 @lru_cache(maxsize=16)

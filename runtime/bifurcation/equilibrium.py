@@ -7,6 +7,9 @@ If a coordinate of all nodes can be shifted together (the phases of oscillators,
 equilibria are not isolated.  Unknown is then also the common speed of the shift, r(state) = speed * shift, and the correction is
 normal to the shift.  A speed other than zero makes a rigid rotation: an equilibrium in the frame that moves with it.
 
+A conserved momentum makes a line of equilibria too, free masses at any common speed: steps of least norm lead to one of
+them near the start.
+
 Where Newton's method fails, implicit Euler steps follow the motion from the same start, the longer the smaller the rates
 have become (pseudo-transient continuation), and Newton's method goes on from there.
 
@@ -55,6 +58,10 @@ MOST_RELAXED, FIRST_RATE = 500, 10.0
 WORSE, NEWTON = 1.5, 1e-6
 """Growth of the rates over a step along the motion that is repeated with a shorter one, and rates that are small enough
 for Newton's method."""
+
+SINGULAR, DAMPED = 1e-13, 1e-7
+"""Least pivot, relative to the largest, of equations that are not singular, and the damping of those that are, relative to
+their entries."""
 
 DENSE = 2000
 """Most states of which all eigenvalues are computed."""
@@ -372,10 +379,7 @@ class Search:
         return float(np.linalg.norm(gap / self.scales))
 
     def correction(self, gap: np.ndarray, rate: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return a step (states,), (shifts,) of Newton's method, or of the implicit Euler method of length 1/rate.
-
-        RuntimeError if the matrix is singular.
-        """
+        """Return a step (states,), (shifts,) of Newton's method, or of the implicit Euler method of length 1/rate."""
         matrix, count = _jacobian(self.network, self.state), self.shifts.shape[1]
         if rate:
             mass = self.network.mass(self.state)
@@ -383,7 +387,7 @@ class Search:
         if count:
             border = sparse.csc_array(self.shifts)
             matrix = sparse.block_array([[matrix, -border], [border.T, None]], format="csc")
-        change = splu(matrix).solve(np.append(-gap, np.zeros(count)))
+        change = _solved(matrix, np.append(-gap, np.zeros(count)))
         return change[: len(gap)], change[len(gap) :]
 
     def newton(self) -> bool:
@@ -393,10 +397,7 @@ class Search:
         for _ in range(MOST_STEPS):
             if not gap.any():
                 break
-            try:
-                change, turn = self.correction(gap)
-            except RuntimeError:
-                break  # singular: the residual says whether this is a solution
+            change, turn = self.correction(gap)
             for part in 0.5 ** np.arange(HALVINGS):
                 tried = self.state + part * change, self.speeds + part * turn
                 left = self.left(*tried)
@@ -440,11 +441,7 @@ class Search:
         for _ in range(MOST_RELAXED):
             if self.size(gap) <= NEWTON:
                 return
-            try:
-                change, turn = self.correction(gap, rate)
-            except RuntimeError:
-                rate *= 2.0
-                continue
+            change, turn = self.correction(gap, rate)
             tried = self.state + change, self.speeds + turn
             left = self.left(*tried)
             ratio = self.size(left) / self.size(gap)
@@ -471,6 +468,29 @@ def _at_equilibrium(
     terms = network.term_sizes(search.state) + np.abs(shifts @ search.speeds)
     speeds = np.where(np.abs(search.speeds) > EVEN * terms.max(), search.speeds, 0.0)
     return search.state, speeds, float(np.abs(search.gap).max()), search.steps
+
+
+def _solved(matrix: sparse.csc_array, right: np.ndarray) -> np.ndarray:
+    """The solution (k,) of linear equations; that of least squares and least norm if they are singular."""
+    # rows and columns whose largest entries are 1, whatever the units of states and rates
+    with np.errstate(divide="ignore"):
+        rows = 1.0 / abs(matrix).max(axis=1).toarray().ravel()
+        rows = np.where(np.isfinite(rows), rows, 1.0)
+        columns = 1.0 / abs(sparse.diags_array(rows) @ matrix).max(axis=0).toarray().ravel()
+        columns = np.where(np.isfinite(columns), columns, 1.0)
+    scaled = sparse.csc_array(sparse.diags_array(rows) @ matrix @ sparse.diags_array(columns))
+    try:
+        solver = splu(scaled)
+        pivots = np.abs(solver.U.diagonal())
+        if pivots.min(initial=1.0) > SINGULAR * pivots.max(initial=0.0):
+            return np.asarray(columns * solver.solve(rows * right))
+    except RuntimeError:  # a pivot is 0
+        pass
+    # |A y - b|^2 + DAMPED^2 |y|^2 is least where DAMPED r = b - A y and A' r = DAMPED y
+    damping = DAMPED * sparse.eye_array(len(right), format="csc")
+    augmented = sparse.block_array([[damping, scaled], [scaled.T, -damping]], format="csc")
+    found = splu(augmented).solve(np.append(rows * right, np.zeros(len(right))))
+    return np.asarray(columns * found[len(right) :])
 
 
 def _speeds(rates: np.ndarray, shifts: np.ndarray) -> np.ndarray:

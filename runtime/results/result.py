@@ -111,8 +111,9 @@ class Result(_Deferred, Labelled):
         names, sets = self.data.integrator.values, self.data.methods.values
         steps = self.data.method_steps.values.reshape(sets.size, -1)
         parts = []
-        for code, count in zip(*np.unique(sets, return_counts=True), strict=True):
-            ran = [k for k in range(len(names)) if int(code) >> k & 1]
+        codes, counts = np.unique(sets, return_counts=True)
+        for code, count in zip(codes.tolist(), counts.tolist(), strict=True):
+            ran = [k for k in range(len(names)) if code >> k & 1]
             mean = steps[sets.ravel() == code].mean(axis=0)
             words = ", then ".join(f"{names[k]} ({mean[k]:.4g} steps)" for k in ran) or "no step"
             parts.append(words if count == sets.size else f"{words} in {count} cell{'s' * (count > 1)}")

@@ -145,6 +145,8 @@ def _readable(path: Path) -> Iterator[None]:
         yield
     except Exception as problem:
         words = " ".join(str(problem).split()) or type(problem).__name__
+        if not isinstance(problem, OSError):  # what stopped a package says nothing of the file
+            words = "it ends before its data do, or they do not fit its head; restore it from a copy"
         raise OSError(f"cannot read {path}, the file is damaged: {words}") from problem
 
 

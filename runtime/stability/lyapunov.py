@@ -322,6 +322,11 @@ class VisibleStates:
         self.integrator.state = np.pad(state, ((0, 0), (0, self.hidden)))
 
     @property
+    def control(self) -> np.ndarray:
+        """What steers the integrator."""
+        return self.integrator.control
+
+    @property
     def steps(self) -> int:
         """Steps that were taken."""
         return self.integrator.steps

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import sympy as sp
 
+from synchain.codegen.driver.columns import Control
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
@@ -32,8 +33,11 @@ that may turn by more."""
 FIRST = 1e-6
 """First step of a path, relative to the shortest time that the start lets guess."""
 
-SAMPLES, LOOKED = 4096, 64
-"""Most steps of a path in which turns are counted, and steps between two counts."""
+SAMPLES, LOOKED, OFTEN = 4096, 64, 8
+"""Most steps of a path in which turns are counted, steps between two counts, and between two looks for an even drift."""
+
+NOISE = 10.0
+"""Change of rates that do not change, relative to what they change by over the extent, in units of the tolerance."""
 
 CLEAR = 1 / 32
 """Least rise of a turn, relative to the extent of its component."""
@@ -193,12 +197,12 @@ def shortest_time(rates: RateFunctions, state: np.ndarray) -> float:
 def turns_of(integrator: VariationalIntegrator, rates: RateFunctions) -> Turns:
     """Return the mean return time of an undriven orbit, or the slowest rate of the equilibrium that it comes to.
 
-    A turn of a component lasts from one top to the next, with a fall and a rise by CLEAR of its extent at least between
+    A motion whose rates do not change any more, such as that of locked phases, is at an equilibrium that drifts.  A turn of a component lasts from one top to the next, with a fall and a rise by CLEAR of its extent at least between
     them.  The component with most turns counts; they are looked for in the later three quarters of a path.
     """
     start = integrator.state[0].copy()
     times, states, time = [0.0], [start], 0.0
-    extent = np.zeros_like(start)
+    extent, closed = np.zeros_like(start), NOISE * float(integrator.control[Control.RTOL])
     if not rests(rates, start, REST, extent):
         try:
             for k, (_, step, extent) in enumerate(path(integrator, rates, shortest_time(rates, start)), 1):
@@ -212,17 +216,36 @@ def turns_of(integrator: VariationalIntegrator, rates: RateFunctions) -> Turns:
                     break
                 if k % LOOKED == 0 and _mean_turn(np.array(times[k // 4 :]), np.array(states[k // 4 :]), ENOUGH):
                     break
+                if k % OFTEN == 0 and _drift(rates, times, states, extent, closed) is not None:
+                    break
         except FloatingPointError:  # what grows without bound is refused where it is settled
             pass
-    early = len(times) // 4
-    late = np.array(states[early:])
-    extent = extent_of(np.array(states), late[len(late) // 2 :])
+    # beside an even drift only what approaches it counts as motion: locked phases turn on at one speed
+    even = (
+        np.zeros_like(start) if rests(rates, states[-1], REST, extent) else _drift(rates, times, states, extent, closed)
+    )
+    early, path_states = len(times) // 4, np.array(states)
+    if even is not None:
+        path_states = path_states - np.outer(times, even)
+    late = path_states[early:]
+    extent = extent_of(path_states, late[len(late) // 2 :])
     unit, words = time or 2.0 * np.pi, "time in which nothing returns" if time else "nothing moves"
     if turn := _mean_turn(np.array(times[early:]), late, 1):
         unit, words = turn, "mean return time"
-    elif rests(rates, states[-1], REST, extent) and (slow := _slowest(rates, states[-1], extent)):
+    elif even is not None and (slow := _slowest(rates, states[-1], extent)):
         unit, words = 2.0 * np.pi / slow, "turn of the slowest rate"
     return Turns(unit, above(extent, rates.rounding(states[-1], unit)), words)
+
+
+def _drift(
+    rates: RateFunctions, times: list[float], states: list[np.ndarray], extent: np.ndarray, closed: float
+) -> np.ndarray | None:
+    """The rates (p,) of a motion that have not changed in the later half of its time; None if they have."""
+    first = int(np.searchsorted(times, 0.5 * times[-1]))
+    late = np.array([rates.values(state) for state in states[first:]])
+    changes = np.abs(rates.slopes(states[-1], extent)).sum(axis=1)
+    limits = np.nan_to_num(closed * changes) + DIGITS * rates.sizes(states[-1])
+    return late[-1] if len(states) > LOOKED and np.all(np.ptp(late, axis=0) <= limits) else None
 
 
 def _mean_turn(times: np.ndarray, states: np.ndarray, fewest: int) -> float:

@@ -180,7 +180,8 @@ class Basin(Labelled):
         sure = f"with confidence {self.confidence:g} {low:.4g} … {high:.4g}"
         known = [] if math.isnan(self.exponent) else [f"exponent {with_error(self.exponent, self.stderr)}"]
         if self.exponent - 2.0 * self.stderr > 0.0:
-            known.append("the synchronous state is unstable: starts that synchronised have not left it yet")
+            left = ": starts that synchronised have not left it yet" if self.count else ""
+            known.append(f"the synchronous state is unstable{left}")
         ends = (f"{n} cell{'s' * (n > 1)}: {s.message}" for s, n in self.statuses.items())
         return [first, *others, sure, *known, *ends]
 

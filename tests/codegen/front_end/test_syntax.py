@@ -17,7 +17,11 @@ from numba.core.registry import cpu_target
 from numba.core.runtime import _nrt_python, rtsys
 
 from synchain.codegen.front_end import compiler, decorator, emitter, syntax_reader, syntax_trees
+from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.machine_code.compile import _compile, _MachineCode
+from synchain.codegen.simd.addresses import ADDRESS
+from synchain.codegen.simd.lane_types import Lane
+from synchain.models import Lagrangian, Potential, Scene, chain
 
 HEAD = """import math
 import numpy as np
@@ -167,6 +171,20 @@ def test_what_is_not_read_is_refused(body: str, found: str) -> None:
     syntax_trees.execute(_module({"one": body})[1], "<text>", space)
     with pytest.raises(syntax_reader.UnreadError, match=re.escape(found)):
         syntax_reader.read(cpu_target.typing_context, space["f0"].py_func, ARGUMENTS, types.void)
+
+
+@pytest.mark.parametrize("method", ["rodas5p", "dop853"])
+def test_steps_of_free_masses_are_read(method: str) -> None:
+    """Nodes without forces have a rate that is a number, to which links add lanes."""
+    mass = Lagrangian("m*v**2/2", "0", coordinates={"x": "v"}, parameters={"m": 5})
+    toda = Potential("W*D*(exp(-(x_j-x_i)/a)+(x_j-x_i)/a)", {"a": 2, "D": 3})
+    equations = Scene(mass, toda, chain(2), initial={"x": [0, 1], "v": 0}).equations
+    space: dict[str, Any] = {}
+    syntax_trees.execute(emit(equations, method, width=1).text, "<text>", space)
+    cpu_target.typing_context.refresh()
+    lane = Lane(1)
+    arguments = (lane, lane, *[ADDRESS] * 4, types.float64, types.float64)
+    assert syntax_reader.read(cpu_target.typing_context, space["step"].py_func, arguments, lane).result == lane
 
 
 ONLY_NUMBA = ("an argument by name", "a type for each block", "a step that is not known", "a loop with another end")

@@ -88,6 +88,7 @@ def test_decimals_are_exact() -> None:
         (lambda: Rates({SOURCE.theta: W}), "found the rate of 'theta_j'; expected a state of the target"),
         (lambda: Rates({TARGET.theta: sp.S.Zero * W}), "nothing uses the weight"),
         (lambda: Rates({TARGET.theta: W, TARGET.p: sp.S.Zero}), "the rate of 'p' is 0"),
+        (lambda: Rates({"V": "g*W*(V_j - V_i)/C"}, {"g": 1}), "give it a default, or write C_i for what the node has"),
         (lambda: Rates({TARGET.theta: K * W}), "undeclared symbol 'K'; expected .* give it a default"),
         (lambda: Rates({TARGET.theta: W}, {K: 1}), "nothing uses the parameter 'K'"),
         (

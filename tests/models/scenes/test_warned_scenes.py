@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from synchain import Field, Rates, Scene, Topology, chain, from_edges, load_scene, ring
+from synchain import Field, Lagrangian, Rates, Scene, Topology, chain, from_edges, load_scene, ring, scene_names
 
 NODE = Field({"x": "-x"})
 PAIRS = from_edges([(1, 2), (3, 4)])
@@ -47,6 +47,46 @@ def test_files_warn_and_changes_of_numbers_do_not(tmp_path: Path) -> None:
 def test_scenes_that_record_no_error_do_not_warn() -> None:
     assert told(lambda: Scene(NODE, VANISHING, PAIRS, record=())) == []
     assert told(lambda: Scene(NODE, ACTING, ring(4))) == []  # equal sums of weights: there is a synchronous motion
+
+
+def belt(size: float, contact: str = "atan", speed: str = "vb") -> Scene:
+    """A block on a belt, all lengths in units of `size`."""
+    node = Lagrangian(
+        "v**2/2", "x**2/2", {"x": f"N*friction({speed} - v)"}, coordinates={"x": "v"}, friction="coulomb",
+        parameters={"N": size, "vb": 0.5 * size},
+    )  # fmt: skip
+    return Scene(node, contact=contact, record=())
+
+
+def test_smoothed_friction_that_a_slow_belt_does_not_resolve_warns() -> None:
+    (sentence,) = told(lambda: belt(1e-6))
+    assert sentence in belt(1e-6).warnings
+    assert "kappa * speed of the belt = 0.05; expected at least about 100" in sentence
+    assert told(lambda: belt(1.0)) == told(lambda: belt(1e-6, "set-valued")) == []
+    assert told(lambda: belt(1e-6, speed="vb*sin(x)")) == told(lambda: belt(1e-6, speed="vb*cos(t)")) == []
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"theta_b": 1e-5},
+        {"kappa": 10.0},
+        {"parameters": {"theta_b": [0.1, -1e-5]}},
+        {"axes": {"theta_b": [0.0, 1e-5]}},
+        {"axes": {"kappa": [1e5, 10.0]}},
+    ],
+)
+def test_numbers_that_leave_smoothed_friction_unresolved_warn_once(change: dict[str, object]) -> None:
+    scene = Scene("friction", "spring", chain(2))
+    (sentence,) = told(lambda: scene.replace(record=(), **change))
+    assert "kappa * speed of the belt = 1;" in sentence
+    with pytest.warns(RuntimeWarning):
+        again = scene.replace(record=(), **change)
+    assert told(lambda: again.replace(rtol=1e-6)) == []
+
+
+def test_shipped_scenes_resolve_their_friction() -> None:
+    assert [name for name in scene_names() if "smoothed" in " ".join(load_scene(name).warnings)] == []
 
 
 @pytest.mark.parametrize("text", ["K*tanh(W*x_j)", "K*exp(-1 - W*x_j)", "K*tanh(2*W*x_j + 1)"])

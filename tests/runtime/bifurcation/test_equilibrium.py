@@ -275,6 +275,22 @@ def test_a_rate_that_is_flat_at_the_start_is_no_shift_in_large_units() -> None:
 RELAXING = sc.Field({"x": "p - 1.2*x - x**3 + 1.41*y", "y": "-0.88*y + tanh(x)"}, parameters={"p": 0})
 
 
+TODA = sc.Potential("W*D*(exp(-(x_j-x_i)/a)+(x_j-x_i)/a)", {"a": 2, "D": 3})
+
+
+@pytest.mark.parametrize(("link", "parameters"), [("spring", {"sigma": 2.0}), ("fput", {}), (TODA, {})])
+@pytest.mark.parametrize("size", [1e-9, 1.0])
+def test_free_masses_keep_their_mean_velocity(
+    link: str | sc.Potential, parameters: dict[str, float], size: float
+) -> None:
+    """Any common velocity is an equilibrium up to a shift: the one of the start's momentum and centre is nearest to the start."""
+    mass = sc.Lagrangian("m*v**2/2", "0", coordinates={"x": "v"}, parameters={"m": 5})
+    x, v = np.array([0.0, 0.1, 0.3]), size * np.array([1e-3, 0.0, -0.4])
+    found = sc.equilibrium(sc.Scene(mass, link, sc.chain(3), initial={"x": x, "v": v}, parameters=parameters))
+    np.testing.assert_allclose(found.speeds, [v.mean()], rtol=1e-9)
+    np.testing.assert_allclose(found.state, [x.mean()] * 3 + [v.mean()] * 3, rtol=1e-9)
+
+
 def test_where_newton_fails_the_motion_leads_to_rest() -> None:
     """A pair of which the run ends at x = (-.229, -.867); a chain in a double well, begun beside a ridge."""
     graph = sc.from_sparse(sparse.coo_array([[0.0, 0.71], [-0.46, 0.0]]), adjacency=True)

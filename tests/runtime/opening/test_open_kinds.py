@@ -248,6 +248,18 @@ def test_a_damaged_file_leaves_no_traceback(monkeypatch: pytest.MonkeyPatch, tmp
     assert not ignored
 
 
+def test_a_truncated_file_is_called_that(tmp_path: Path) -> None:
+    path = tmp_path / "a.nc"
+    KINDS["Plane"].save(path)
+    whole = path.read_bytes()
+    for length in (65, 130):
+        path.write_bytes(whole[:length])
+        with pytest.raises(
+            OSError, match=r"a\.nc.* damaged.*(ends before its data|do not fit their digest).*restore it"
+        ):
+            open_result(path)
+
+
 def test_another_folder_is_not_replaced(tmp_path: Path) -> None:
     pytest.importorskip("zarr")
     (tmp_path / "a.zarr").mkdir()

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from synchain.models import Field, Scene
+from synchain.models import Field, Rates, Scene, from_edges
+from synchain.runtime import equilibrium, lyapunov_spectrum
 from synchain.runtime.stability.orbits import Orbits
 
 ROSSLER = Field(
@@ -49,3 +50,22 @@ def test_bursts_of_a_neuron_are_turns_in_any_unit(i: float, mean: float) -> None
     assert plain == pytest.approx(mean, rel=0.25)
     for s, k in ((1.0, 1e-6), (1e-3, 1e6), (1e4, 1.0)):
         assert k * unit(NEURON, (-s, 0.1 * s, 3.0 * s), i=i, s=s, k=k) == pytest.approx(plain, rel=1e-3)
+
+
+@pytest.mark.filterwarnings("ignore:coupling")
+@pytest.mark.parametrize("k", [1e-6, 1.0, 1e6])
+def test_locked_phases_that_turn_evenly_are_at_rest(k: float) -> None:
+    """Their phases never return, and their rates are constant: the slowest one of the deviations is the unit."""
+    graph = from_edges(
+        [("a", "b", 0.5), ("b", "c", 1.25), ("c", "a", 2), ("a", "d", 0.3), ("d", "c", 0.7)], directed=True
+    )
+    phase = Field({"th": "om"}, parameters={"om": 0.0})
+    link = Rates({"th": "K*W*sin(th_j - th_i - lag)"}, {"K": 2, "lag": 0.3})
+    scene = Scene(
+        phase, link, graph, initial={"th": [0.0, 1.0, 2.0, -1.0]}, record=(),
+        parameters={"om": [0.0, 0.1 * k, -0.2 * k, 0.3 * k], "K": 2.0 * k},
+    )  # fmt: skip
+    expected = equilibrium(scene).eigenvalues.real
+    found = lyapunov_spectrum(scene, periods=50)
+    np.testing.assert_allclose(found.exponent / k, expected / k, atol=2e-3)
+    assert "turn of the slowest rate" in str(found)

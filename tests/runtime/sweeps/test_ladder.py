@@ -104,6 +104,14 @@ def test_a_cell_of_a_sweep_is_its_own_run_to_the_last_bit(order: list[int]) -> N
             np.testing.assert_array_equal(found.data[name].isel(mu=k), alone.data[name], err_msg=f"{name}, mu = {mu}")
 
 
+def test_integrators_of_a_sweep_are_counted_by_cells() -> None:
+    found = run(VAN_DER_POL.replace(observe={}, record=()), mu=[1.0, 3.0, 1e3, 2e3], **QUIET)
+    parts = [part.split(" in ") for part in found.integrators.split("; ")]
+    assert sorted(cells for _, cells in parts) == ["2 cells", "2 cells"]
+    assert dict(found.summary)["integrators"] == found.integrators
+    assert found.integrators in str(found).replace("\n", " ")
+
+
 def test_the_longest_step_is_that_of_the_cell() -> None:
     """Beside a drive of 400 a slow one takes the steps that it takes alone."""
     node = Field({"x": "v", "v": "-x/10 - v/10 - x**3 + cos(w*t)"}, parameters={"w": 400.0})

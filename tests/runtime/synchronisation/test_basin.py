@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import pickle
 from concurrent.futures import Executor, Future
 
 import numpy as np
 import pytest
+from kept_values import basin as kept_basin
 
 from synchain.models import Field, chain
 from synchain.models.scenes.scene import Scene
@@ -255,3 +257,11 @@ def test_the_mode_of_a_contact_is_no_random_number():
     assert [axis.name for axis in random_starts(stick, 5).axes] == ["x_1", "x_2", "v_1", "v_2"]
     with pytest.raises(ValueError, match="unknown component 'slip'; known: x, v"):
         basin(stick, ranges={"slip": (0, 1)})
+
+
+@pytest.mark.parametrize("synchronous", [True, False])
+def test_starts_have_not_left_an_unstable_state_only_if_they_came_to_it(synchronous: bool) -> None:
+    fate = np.full(3, tuple(Fate).index(Fate.SYNCHRONOUS if synchronous else Fate.OTHER))
+    found = dataclasses.replace(kept_basin(), exponent=0.1, fate=fate)
+    assert "the synchronous state is unstable" in found.message
+    assert ("have not left it yet" in found.message) == synchronous
