@@ -252,9 +252,8 @@ class LoopedStep(StepWriter):
 
     def finish(self) -> None:
         """Compute the new state, the error and the dense output; stages that serve this alone run if DENSE."""
-        m, values = self.method, self.stages(len(self.method.c))
-        late = len(m.c) - m.stages
-        if late:
+        m = self.method
+        if len(m.c) > m.stages:
             with self.apart() as stages:
                 for i in range(m.stages, len(m.c)):
                     self.stage(i)
@@ -265,26 +264,35 @@ class LoopedStep(StepWriter):
             with self.apart() as masses:
                 self.mass.gather("y", "MASS")
             self.put(If(Name("DENSE"), tuple(masses)))
-        found = [*self.load_stages(PLACE, [1.0] * m.stages), let("old", Load("y", PLACE))]
-        found += [let("new", Name("old") + self.increment(m.b, values)), store("y_new", PLACE, "new")]
-        if len(m.e) == 1:
-            found += [let("estimate", self.increment(m.e[0], values)), *self.stiff_errors(values)]
-        found += [*self.embedded(values), let("estimate", self.scaled_error("estimate", "old", "new"))]
-        found += [let("total", Name("total") + "estimate"), let("error", call("maximum", "error", "estimate"))]
-        dense: list[Statement] = self.load_stages(PLACE, [0.0] * m.stages + [1.0] * late)
-        for j, row in enumerate(m.dense):
-            dense.append(store("dense", j * Name("DIMENSION") + PLACE, self.dense_value(row, values)))
-        self.put(STATES.over([*found, If(Name("DENSE"), tuple(dense))]))
+        loops = self.places.measured
+        if len({period for *_, period in loops}) == 1:
+            self.put(STATES.over(self.end_of(PLACE, loops[0][2])))
+        else:
+            self.put(*(loop.over([whole("k", at), *self.end_of(Name("k"), period)]) for loop, at, period in loops))
         self.put(Return((Name("error") + 0.0 * Name("total"),), "NaN or infinite where any estimate is"))
 
-    def stiff_errors(self, values: Sequence[str]) -> list[Statement]:
+    def end_of(self, place: Expression, period: float | None) -> list[Statement]:
+        """Compute the new value, the error and the dense output of the state at a place."""
+        m, values = self.method, self.stages(len(self.method.c))
+        found = [*self.load_stages(place, [1.0] * m.stages), let("old", Load("y", place))]
+        found += [let("new", Name("old") + self.increment(m.b, values)), store("y_new", place, "new")]
+        if len(m.e) == 1:
+            found += [let("estimate", self.increment(m.e[0], values)), *self.stiff_errors(values, place)]
+        found += [*self.embedded(values), let("estimate", self.scaled_error("estimate", "old", "new", period))]
+        found += [let("total", Name("total") + "estimate"), let("error", call("maximum", "error", "estimate"))]
+        dense: list[Statement] = self.load_stages(place, [float(i >= m.stages) for i in range(len(m.c))])
+        for j, row in enumerate(m.dense):
+            dense.append(store("dense", j * Name("DIMENSION") + place, self.dense_value(row, values)))
+        return [*found, If(Name("DENSE"), tuple(dense))]
+
+    def stiff_errors(self, values: Sequence[str], place: Expression) -> list[Statement]:
         """Raise the error of a state with a large pivot to that of the dense output."""
         m = self.method
         if not m.dense_error:
             return []
         factors = Name("MATRIX") if self.elimination.exact else Name("MATRIX") + "ENTRIES"
-        share = Name("shift") * Load("dense", factors + PLACE)
-        share = share * Load("dense", Name("MASS") + PLACE) if self.equations.inertial else share
+        share = Name("shift") * Load("dense", factors + place)
+        share = share * Load("dense", Name("MASS") + place) if self.equations.inertial else share
         return [If(Name("DENSE"), (let("estimate", self.stiff_error("estimate", linear(m.dense[-1], values), share)),))]
 
 

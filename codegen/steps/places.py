@@ -17,6 +17,7 @@ import numpy as np
 import sympy as sp
 from sympy.core.relational import Relational
 
+from synchain.models.dynamics.angles import periods_of_kinds
 from synchain.models.dynamics.equations import Equations, Layer
 from synchain.models.graphs.links import Link
 from synchain.models.mechanics.components import Edge, Node
@@ -73,6 +74,7 @@ class StateLayout:
 
     def __init__(self, equations: Equations) -> None:
         self.size = max(len(node.state) for node in equations.nodes)
+        self.periods = periods_of_kinds(equations)
         self.varied, self.numbered = equations.varied, tuple(equations.numbered)
         self.links = sum(len(layer.links) for layer in equations.listed)
         self.behind = (self.size + len(self.varied)) * equations.n if equations.mixed else 0
@@ -94,6 +96,15 @@ class StateLayout:
     def rows(self) -> list[tuple[Span, Expression]]:
         """Loops over all states, one for those with a time slope of one meaning, and the place of a state."""
         return [(span("i", "NODES"), self.place(c)) for c in range(self.size)]
+
+    @property
+    def measured(self) -> list[tuple[Span, Expression, float | None]]:
+        """Loops over all states, the place of a state, and the period of the states of a loop if they are angles."""
+        if len(alike := {period for periods in self.periods for period in periods}) == 1:
+            (common,) = alike
+            return [(span, place, common) for span, place in self.rows]
+        kinds = zip(self.kinds, self.periods, strict=True)
+        return [(kind.span, self.place(c), period) for kind, own in kinds for c, period in enumerate(own)]
 
     def row_of(self, c: int) -> int:
         """Which of the `rows` has state c of the nodes."""

@@ -189,9 +189,14 @@ class StepWriter(ABC):
         rows = self.method.e if len(self.method.e) > 1 else ()
         return [let(name, linear(row, values)) for name, row in zip(("e5", "e3"), rows, strict=False)]
 
-    def scaled_error(self, error: Value, old: Value, new: Value) -> Expression:
-        """The error of a state in units of its tolerance: the one estimate, or the two of `embedded` as one."""
+    def scaled_error(self, error: Value, old: Value, new: Value, period: float | None) -> Expression:
+        """The error of a state in units of its tolerance: the one estimate, or the two of `embedded` as one.
+
+        An angle with a `period` is as large as itself or the period, whichever is smaller.
+        """
         own = ("scaled", error) if len(self.method.e) == 1 else ("pair", "e5", "e3", "h")
+        if period is not None:
+            old, new = (call("minimum", call("absolute", state), period) for state in (old, new))
         return call(*own, old, new, "rtol", "atol")
 
     def dense_value(self, row: Sequence[float], values: Sequence[str]) -> Expression:

@@ -7,6 +7,8 @@ from functools import cached_property
 
 import sympy as sp
 
+from synchain.models.dynamics.angles import periods_of_states
+
 from ..program.expressions import ZERO, Expression, Load, Name, Number, Product, call, linear, plus
 from ..program.lowering import lower
 from ..program.passes import real
@@ -185,10 +187,11 @@ class UnrolledStep(StepWriter):
             if m.dense_error:
                 self.stiff_errors()
         self.put(If(Name("DENSE"), tuple(dense)))
+        periods = periods_of_states(self.equations)
         for slot, (name, e) in enumerate(zip(self.state, errors, strict=True)):
             self.put(store("y_new", slot, f"n_{name}"))
             self.put(*self.embedded(self.stages(name, m.stages)))
-            self.let(f"e_{name}", self.scaled_error(e, name, f"n_{name}"))
+            self.let(f"e_{name}", self.scaled_error(e, name, f"n_{name}", periods[slot]))
         first, *others = terms = [Name(f"e_{name}") for name in self.state]
         self.let("total", plus(*terms))
         self.let("error", first)

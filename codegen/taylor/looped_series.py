@@ -30,7 +30,7 @@ from .mass_matrix import moving, solved
 from .series import Constant, Series, State, magnitude
 from .series_graph import SeriesGraph, Template, check_jumps
 from .series_writer import Gaps, SeriesWriter
-from .simplify import absolute, add, times
+from .simplify import absolute, add, times, within
 from .step_length import SEEN, last_orders
 from .taylor_step import StepWriter, TaylorStep
 
@@ -636,14 +636,18 @@ class LoopedSeries(StepWriter):
 
     def sizes(self) -> list[Statement]:
         begun = [let(f"size_{k}", NOTHING) for k in last_orders(self.order)]
-        return [*begun, *self.states(self.size), *([SEEN] if self.watching else [])]
+        return [*begun, *self.counted_states(), *([SEEN] if self.watching else [])]
 
-    def size(self, place: Expression) -> list[Statement]:
+    def counted_states(self) -> list[Statement]:
+        """Loops that let the last coefficients of all states count."""
+        return [span.over(self.size(place, period)) for span, place, period in self.places.measured]
+
+    def size(self, place: Expression, period: float | None) -> list[Statement]:
         """Let the last coefficients of a state count, in units of its tolerance."""
         largest: Expression = absolute(Load("y", place))
         for k in (1, 2):
             largest = call("maximum", largest, absolute(of_state(place).load(Number(k))))
-        return self.waves.weighed(Outer(of_state(place)), "", Name("rtol") * largest)
+        return self.waves.weighed(Outer(of_state(place)), "", Name("rtol") * within(largest, period))
 
     def new_state(self) -> list[Statement]:
         return [let("total", NOTHING), *self.states(self.end_of)]

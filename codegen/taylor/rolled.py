@@ -334,6 +334,20 @@ class Rolled(LoopedSeries):
     def states(self, body: Callable[[Expression], Iterable[Statement]]) -> list[Statement]:
         return [span("i", "DIMENSION").over(body(Name("i")))]
 
+    def counted_states(self) -> list[Statement]:
+        members = defaultdict[float | None, list[Place]](list)
+        for c, period in enumerate(self.places.periods[0]):
+            members[period].append(("states", c * (self.order + 1)))
+        if len(members) == 1:
+            return self.states(lambda place: self.size(place, *members))
+        # angles with one period, and all other states, are loops of their own
+        found, section = list[Statement](), self.section
+        for number, (period, places) in enumerate(members.items()):
+            name = f"state{number}"
+            series = Outer(Track(f"{name}_read", None), name=f"value_{name}", period=period)
+            found += section.rows(name, {"read": places}, section.counted(series))
+        return found
+
     def statements(self) -> list[Statement]:
         """What the step does, without names of places that it finds in the table."""
         found = super().statements()

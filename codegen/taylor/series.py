@@ -95,7 +95,12 @@ class Constant(Series):
 
 @dataclass(eq=False, slots=True)
 class State(Series):
-    """A state variable: its coefficient k comes from coefficient k - 1 of its rate, outside this file."""
+    """A state variable: its coefficient k comes from coefficient k - 1 of its rate, outside this file.
+
+    period: that of an angle, None for any other state.
+    """
+
+    period: float | None = field(default=None, kw_only=True)
 
 
 @dataclass(eq=False, slots=True)

@@ -10,9 +10,9 @@ from typing import ClassVar
 from ..program.expressions import ONE, ZERO, Expression, Name, Number, call
 from ..program.statements import Statement, let
 from .event_location import Stored, closed, told
-from .series import Exponential, Kink, Order, Series
+from .series import Exponential, Kink, Order, Series, State
 from .series_graph import SeriesGraph
-from .simplify import absolute, largest, over, times
+from .simplify import absolute, largest, over, times, within
 from .step_length import distant, last_orders, unseen
 
 
@@ -170,8 +170,9 @@ class SeriesWriter(Order):
         return self.weighed(series, series.name, Name("rtol") * self.low(series))
 
     def low(self, series: Series) -> Expression:
-        """The largest of the first coefficients of a series."""
-        return largest(absolute(e) for k in range(3) if (e := self.at(series, k)) != ZERO)
+        """The largest of the first coefficients of a series, at most the period of an angle."""
+        found = largest(absolute(e) for k in range(3) if (e := self.at(series, k)) != ZERO)
+        return within(found, series.period) if isinstance(series, State) else found
 
     def weighed(self, series: Series, what: str, error: Expression) -> list[Statement]:
         """Let the last coefficients of a series count, in units of an error beside the absolute tolerance."""

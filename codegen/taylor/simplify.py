@@ -69,6 +69,11 @@ def absolute(e: Expression) -> Expression:
     return Call("absolute", (e,))
 
 
+def within(size: Expression, period: float | None) -> Expression:
+    """A size, at most the period of an angle."""
+    return size if period is None else Call("minimum", (size, Number(period)))
+
+
 def largest(values: Iterable[Expression]) -> Expression:
     """The largest of some values."""
     return extreme("maximum", list(values))

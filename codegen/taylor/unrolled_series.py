@@ -9,6 +9,7 @@ from itertools import chain, compress
 
 import sympy as sp
 
+from synchain.models.dynamics.angles import periods_of_states
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Edge, Node
 
@@ -153,7 +154,9 @@ class UnrolledSeries(StepWriter):
         self.graph, self.parts = self.lines.graph, [self.lines]
         edges = [[edge for link, edge in equations.linked() if link[0] == i] for i in range(equations.n)]
         moves = (compress(places, moving(equations.node_at(i), edges[i])) for i, places in enumerate(equations.places))
-        self.moving = {slot: State(name=self.names[slot]) for slot in sorted(chain.from_iterable(moves))}
+        periods = periods_of_states(equations)
+        slots = sorted(chain.from_iterable(moves))
+        self.moving = {slot: State(name=self.names[slot], period=periods[slot]) for slot in slots}
         still = {slot: Constant(Name(self.called[name])) for slot, name in enumerate(equations.state)}
         self.states: list[Series] = list((still | self.moving).values())
         self.noted: list[Series] = []

@@ -14,6 +14,7 @@ from synchain.codegen.driver.columns import Count, SpanColumn, SumColumn
 from synchain.codegen.integrators import Integrator, integrator
 from synchain.codegen.kernels.sweep_kernel import AUTO
 from synchain.codegen.taylor import is_analytic, is_large, is_linear, jump, may_cross_singularity, order_for, unpassed
+from synchain.models.dynamics.angles import periods_of_states
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation
 from synchain.models.graphs.links import LINK_LIMIT
@@ -185,8 +186,13 @@ class Ladder:
     def at(self, rows: CellRows, state: np.ndarray, time: np.ndarray) -> Paces:
         """Return how fast cells move at some states and times, where states are known to the tolerances."""
         rtol, atol = self.tolerances(rows)
-        noise = rtol[:, None] * np.abs(state) + atol[:, None]
+        noise = rtol[:, None] * np.minimum(np.abs(state), self.longest) + atol[:, None]
         return self.templates.paces(state, rows.numbers, time, rows.spans[:, SpanColumn.LONGEST], noise)
+
+    @cached_property
+    def longest(self) -> np.ndarray:
+        """Largest sizes of the states (dimension,) for tolerances: the period of an angle, infinity for any other state."""
+        return np.array([period or np.inf for period in periods_of_states(self.equations)])
 
     @property
     def _explicit(self) -> int:
@@ -302,8 +308,8 @@ BLOWN = 1e6
 
 
 def warn_of_steps(ladder: Ladder, buffers: Buffers, rows_of: Callable[[np.ndarray], CellRows]) -> None:
-    """Warn if no cell came to its end, if some made no step, if explicit steps were short because a cell is stiff, or if a
-    motion has no bound.
+    """Warn if no cell came to its end, if some made no step, if explicit steps were short because a cell is stiff, if a
+    motion has no bound, or if an angle turned so far that its rounding exceeds its tolerance.
     """
     status, steps, times = buffers.status, buffers.steps, buffers.sums[:, SumColumn.STOPPED_AT]
     idle = np.isin(status, (Status.STEP_UNDERFLOW, Status.STEP_BUDGET)) & (times <= 0.0)
@@ -315,19 +321,23 @@ def warn_of_steps(ladder: Ladder, buffers: Buffers, rows_of: Callable[[np.ndarra
     explicit = not (ladder.methods[-1].implicit or ladder.equations.sticks)
     whole = ~np.isin(status, (Status.STEP_UNDERFLOW, Status.DIVERGED)) & (times > 0.0)
     whole &= np.isfinite(buffers.end).all(axis=1)
-    cells = np.flatnonzero(whole & ((np.abs(buffers.end).max(axis=1) > BLOWN) | (explicit & (steps >= FEW))))
+    sizes = np.abs(buffers.end)
+    _warn_of_far_angles(ladder, np.where(whole[:, None], sizes, 0.0))
+    sizes = np.minimum(sizes, ladder.longest)
+    cells = np.flatnonzero(whole & ((sizes.max(axis=1) > BLOWN) | (explicit & (steps >= FEW))))
     if not len(cells):
         return
-    rows, end, steps, times = rows_of(cells), buffers.end[cells], steps[cells], times[cells]
+    rows, end, steps, times, sizes = rows_of(cells), buffers.end[cells], steps[cells], times[cells], sizes[cells]
     at, length = ladder.at(rows, end, times), times / np.maximum(steps, 1)
     short = (at.fastest * length > 1.0) & np.isfinite(at.fastest)
-    grown = np.abs(end).max(axis=1) > BLOWN * np.maximum(1.0, np.abs(rows.start).max(axis=1))
+    begun = np.minimum(np.abs(rows.start), ladder.longest).max(axis=1)
+    grown = sizes.max(axis=1) > BLOWN * np.maximum(1.0, begun)
     blown = grown & (at.growth >= 0.5 * at.fastest) & (at.growth * length > 0.5)
     stiff = explicit & short & ~grown & (at.fastest > STIFF * np.maximum(at.turning, at.going))
     if blown.any():
         k = int(blown.argmax())
         warn(
-            f"a state grew to {np.abs(end[k]).max():.3g} in {steps[k]} steps of a cell; expected a bounded motion; "
+            f"a state grew to {sizes[k].max():.3g} in {steps[k]} steps of a cell; expected a bounded motion; "
             "check the signs and the size of the parameters"
         )
     elif stiff.any():
@@ -336,3 +346,18 @@ def warn_of_steps(ladder: Ladder, buffers: Buffers, rows_of: Callable[[np.ndarra
             f"stiff equations: found a rate of {at.fastest[k]:.3g} beside slow motion, and {steps[k]} explicit steps in a "
             "cell; expected few; the result may be worse than rtol says; integrator = 'rodas5p' takes longer steps"
         )
+
+
+def _warn_of_far_angles(ladder: Ladder, sizes: np.ndarray) -> None:
+    """Warn if the rounding of an angle exceeds its tolerance; `sizes` (cells, dimension) are those at the ends."""
+    allowed = np.where(np.isinf(ladder.longest), np.inf, ladder.scene.rtol * ladder.longest + ladder.scene.atol)
+    shares = np.finfo(float).eps * sizes / allowed
+    if shares.max(initial=0.0) <= 1.0:
+        return
+    cell, slot = np.unravel_index(shares.argmax(), shares.shape)
+    size = sizes[cell, slot]
+    warn(
+        f"the angle {ladder.equations.state[slot]} grew to {size:.3g}, where its rounding is "
+        f"{np.finfo(float).eps * size:.2g}; expected less than its tolerance, {allowed[slot]:.2g}; write the equations in a "
+        "frame that turns along, start nearer to zero, shorten the run, or loosen rtol"
+    )
