@@ -1,8 +1,11 @@
-"""What tells that an observed value changes between points at which it seems not to: zeros of gaps, and depths."""
+"""Find fast changes of an observed value between two sample points.
+
+A value jumps or has a kink where a gap passes zero, and changes quickly where the depth of an exponential does.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
 import sympy as sp
 
@@ -11,46 +14,42 @@ from synchain.models.mechanics.jumps import JUMPING, KINKED, gaps_of
 from .rounding import magnitude
 
 NOISE = sp.Rational(3, 2) / 10**14
-"""Rounding of a value, as a part of the size of its terms (codegen/recorders/crossings.py)."""
+"""Rounding error of a value relative to its `magnitude`; codegen/recorders/crossings.py uses the same number."""
 
 SATURATING = (sp.tanh, sp.erf, sp.cosh)
-"""Functions f of which f(u), or 1/f(u), is constant but for exp(-|u|) where the size of u is large."""
+"""Functions f with f(u) or 1/f(u) constant up to a term of the order exp(-|u|) for large |u|."""
 
 
 def gaps_in(values: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:
-    """Return what passes zero where one of some values jumps or has a kink."""
+    """Return expressions that pass zero where one of the values jumps or has a kink."""
     parts = (part for e in values for part in e.atoms(*KINKED, *JUMPING, sp.atan2))
     gaps = (gap for part in parts for gap in gaps_of(part))
     return _once(-gap if gap.could_extract_minus_sign() else gap for gap in gaps)
 
 
 def depths_in(values: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:
-    """Return how many e-folds parts of some values lie below or above the size one.
-
-    An exponential below is nothing, and one above is large; one in a denominator, and what saturates, are a constant on
-    both sides.
-    """
-    return _once(depth for e in values for depth in _depths(e))
-
-
-def _depths(e: sp.Expr) -> Iterator[sp.Expr]:
-    """The depths of one value."""
-    yield from (-part.args[0] for part in e.atoms(sp.exp))
-    both = {*e.atoms(*SATURATING), *(part for power in e.atoms(sp.Pow) for part in power.base.atoms(sp.exp))}
-    yield from (sp.Abs(part.args[0]) for part in both)
+    """Return the distances, in e-folds, of the exponential parts of the values from the size one."""
+    depths: list[sp.Expr] = []
+    for e in values:
+        # exp(u) vanishes on one side of u = 0 and dominates on the other
+        depths += [-part.args[0] for part in e.atoms(sp.exp)]
+        # tanh(u) or 1/(1 + exp(u)) is constant on both sides
+        powers = {part for power in e.atoms(sp.Pow) for part in power.base.atoms(sp.exp)}
+        depths += [sp.Abs(part.args[0]) for part in {*e.atoms(*SATURATING), *powers}]
+    return _once(depths)
 
 
-def _once(found: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:
-    """Those of some expressions that are no numbers, each once, in a fixed order."""
-    return tuple(sorted({e for e in found if not e.is_number}, key=sp.default_sort_key))
+def _once(expressions: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:
+    """Drop numbers and repetitions, and sort."""
+    return tuple(sorted({e for e in expressions if not e.is_number}, key=sp.default_sort_key))
 
 
 def calmed(e: sp.Expr) -> sp.Expr:
-    """Return a value whose jumps do not see rounding: the sign of x_1 - x_2 is 0 of oscillators that move as one."""
+    """Remove rounding from arguments of `sign`: sign(x_1 - x_2) is 0 for two synchronous oscillators."""
     return e.replace(sp.sign, lambda argument: sp.sign(settled(argument)))
 
 
 def settled(e: sp.Expr) -> sp.Expr:
-    """Return an expression that is 0 where its value is rounding of its terms."""
+    """Return an expression that is 0 where its value is only rounding error of its terms."""
     size = magnitude(e)
     return e if size == sp.Abs(e) else sp.Piecewise((sp.S.Zero, sp.Abs(e) <= NOISE * size), (e, True))

@@ -1,9 +1,9 @@
-"""From a variational equation to the text of a kernel: one orbit, and any number of modes carried along it in lanes.
+"""Write the text of a kernel for a variational equation: one orbit, and deviations of many modes along it.
 
-The orbit is stepped by itself.  Each step leaves what it knows about the Jacobian, in its stages or as a series, in a
-short shared array, and from that every mode takes the same step of the same method: the result is that of the method
-applied to orbit and deviation together, whose Jacobian is lower triangular by blocks.  The orbit is scalar; a register
-holds one deviation for each of LANES modes.
+The orbit takes a step first, in scalar arithmetic, and stores the Jacobian at its stages, or as a series, in a short
+shared array. Then every mode takes the same step of the same method with these Jacobians; a register holds the
+deviations of LANES modes. The result equals the method applied to orbit and deviation together, because the Jacobian
+of both is block lower triangular.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 
 import sympy as sp
 
-from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.calculus import derivative
 from synchain.models.mechanics.components import TIME
@@ -37,7 +36,7 @@ from .driver import Driver, KernelKind
 from .sweep_kernel import AUTO, LARGEST_UNROLLED, KernelSource, describe, free_names, module, node_functions
 
 HEAD = 3
-"""First entries of the shared array: rate = 1/h, shift = 1/(gamma h), reach = gamma h."""
+"""Number of entries at the beginning of the shared array: rate = 1/h, shift = 1/(gamma h), reach = gamma h."""
 
 CARRY = '''
 @njit(error_model='numpy', cache=True)
@@ -57,10 +56,11 @@ def carry(shared, strengths, old, new, first, last, tolerance):
 '''.strip()
 
 Place = tuple[int, int]
+"""Row and column of an entry of the Jacobian A."""
 
 
 def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int | None = None) -> KernelSource:
-    """Write the kernel that carries deviations along an orbit."""
+    """Write the kernel that integrates deviations along an orbit."""
     equations = variation.orbit
     if equations.n > LARGEST_UNROLLED:
         raise ValueError(
@@ -72,30 +72,45 @@ def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int
     width = lanes.native_width() if width is None else width
     plain = tidy(equations)
     names = free_names(plain)
-    variation = _renamed(variation, plain)
-    functions, sizes, count = (_series if method.series else _stages)(variation, method, names)
+    # the matrix and the events take the names that the kernel uses
+    swap = renamed(equations, plain)
+    matrix = tuple((key, e.xreplace(swap)) for key, e in variation.matrix)
+    events = None if variation.events is None else variation.events.map(lambda e: e.xreplace(swap))
+    variation = replace(variation, orbit=plain, matrix=matrix, events=events)
+    # lengths of the shared array and of the workspace, and operations of the orbit's step
+    if method.series:
+        tangent = write_tangent(variation, method.order)
+        functions = [tangent.orbit.text, *tangent.modes]
+        shared, workspace, count = tangent.shared, tangent.orbit.workspace, tangent.orbit.operations
+    else:
+        workspace = 0
+        functions, shared, count = _stages(variation, method, names)
     deviations = f"{variation.size} deviations, {width} modes a register"
     constants = {"WIDTH": 1, "LANES": width, "DENSE": plain.sticks or method.series}
-    events = variation.events
     return KernelSource(
         describe(equations, plain, method, (), count, deviations),
         module(constants, functions, event_functions(variation, names)),
         equations,
         method,
         Driver(KernelKind.MODES, width, contacts=plain.sticks, series=method.series),
-        _dimensions(variation, method, *sizes),
+        ModeDimensions(
+            nodes=plain.n,
+            dimension=plain.dimension,
+            parameters=len(plain.parameters),
+            dense_rows=method.dense_rows,
+            workspace=workspace,
+            error_order=method.error_order,
+            repeats=0,
+            strengths=len(variation.parameters),
+            shared=shared,
+            jumps=int(events is not None and bool(events.exits)),
+        ),
         (-1,) * variation.size if events is None else tuple(events.owners),
     )
 
 
-def _series(variation: Variation, method: Integrator, names: Names) -> tuple[list[str], tuple[int, int], int]:
-    """The functions of Taylor steps, the lengths of the shared array and of the workspace, the operations of the orbit's step."""
-    made = write_tangent(variation, method.order)
-    return [made.orbit.text, *made.modes], (made.shared, made.orbit.workspace), made.orbit.operations
-
-
-def _stages(variation: Variation, method: Integrator, names: Names) -> tuple[list[str], tuple[int, int], int]:
-    """The functions of steps in stages, the lengths of the shared array and of the workspace, the operations of the orbit's."""
+def _stages(variation: Variation, method: Integrator, names: Names) -> tuple[list[str], int, int]:
+    """Return the functions of a step in stages, the length of the shared array, the operations of the orbit's step."""
     plain = variation.orbit
     blocks = analyse(plain.node, names, plain.varied)
     parts = Parts.of(variation, method.stages)
@@ -115,45 +130,32 @@ def _stages(variation: Variation, method: Integrator, names: Names) -> tuple[lis
         "The same step of the modes in one register: writes them, returns their error and their size.",
         tuple(_mode_step(variation, parts, method)),
     )
-    made = map(LANES.function, [*node_functions(writer, blocks), *functions.values()])
-    return (
-        [*made, scaling(method), LANES.function(orbit), LANES.function(modes), CARRY],
-        (parts.size, 0),
-        operations(orbit.body),
-    )
-
-
-def _renamed(variation: Variation, plain: Equations) -> Variation:
-    """The matrix and the events in the names that the kernel uses."""
-    swap = renamed(variation.orbit, plain)
-    matrix = tuple((key, e.xreplace(swap)) for key, e in variation.matrix)
-    events = None if variation.events is None else variation.events.map(lambda e: e.xreplace(swap))
-    return replace(variation, orbit=plain, matrix=matrix, events=events)
+    texts = [LANES.function(f) for f in (*node_functions(writer, blocks), *functions.values())]
+    texts += [scaling(method), LANES.function(orbit), LANES.function(modes), CARRY]
+    return texts, parts.size, operations(orbit.body)
 
 
 @dataclass(slots=True)
 class Parts:
-    """The entries of A, linear in the strengths of a mode, whose coefficients are parted into steady and moving ones.
-
-    rows: entry -> [(coefficient, strength or 1)], where a coefficient is a number or a slot symbol.
-    """
+    """The entries of the Jacobian A of a mode, linear in its strengths, and where their coefficients are stored."""
 
     stages: int
+    # entry -> [(coefficient, strength or 1)]; a coefficient is a number or the symbol of a slot
     rows: dict[Place, list[tuple[sp.Expr, sp.Expr]]] = field(default_factory=dict)
-    steady: dict[sp.Expr, str] = field(default_factory=dict)
-    moving: dict[sp.Expr, int] = field(default_factory=dict)
+    steady: dict[sp.Expr, str] = field(default_factory=dict)  # coefficients that are constant along the orbit
+    moving: dict[sp.Expr, int] = field(default_factory=dict)  # coefficients that depend on its state or on time
 
     @classmethod
     def of(cls, variation: Variation, stages: int) -> Parts:
-        """The parts of a variation."""
-        made = cls(stages)
+        """Sort the coefficients of a variation."""
+        parts = cls(stages)
         states = {real(name) for name in variation.orbit.state} | {TIME}
         for key, e in variation.matrix:
-            made.rows[key] = [(made.slot(c, states), s) for c, s in variation.parts(e)]
-        return made
+            parts.rows[key] = [(parts.slot(c, states), s) for c, s in variation.parts(e)]
+        return parts
 
     def slot(self, coefficient: sp.Expr, states: set[sp.Symbol]) -> sp.Expr:
-        """A number as it is; else the symbol of a slot: steady_0 … or, for moving ones, a0 …"""
+        """Return a number unchanged, else the symbol of its slot: steady_0 … if it is constant, a0 … if it moves."""
         if coefficient.is_number:
             return coefficient
         if not coefficient.free_symbols & states:
@@ -164,7 +166,7 @@ class Parts:
 
     @property
     def fixed(self) -> dict[Place, str]:
-        """The names of the entries that do not move and are computed once, not those that stand for themselves."""
+        """Names of the constant entries that a mode computes once; a single constant coefficient needs none."""
         return {
             (r, c): f"g{r}_{c}"
             for (r, c), terms in self.rows.items()
@@ -172,17 +174,17 @@ class Parts:
         }
 
     def at_stage(self, i: int) -> dict[Place, sp.Expr]:
-        """The entries of A at a stage: numbers, names of fixed entries, and sums with the stage's moving coefficients."""
+        """Return the entries of A at stage i: numbers, names of fixed entries, and sums with moving coefficients."""
         swap = {sp.Symbol(f"a{k}"): sp.Symbol(f"a{i + 1}_{k}") for k in self.moving.values()}
-        found = {key: self.total(key).xreplace(swap) for key in self.rows}
-        return found | {key: sp.Symbol(name) for key, name in self.fixed.items()}
+        entries = {key: self.total(key).xreplace(swap) for key in self.rows}
+        return entries | {key: sp.Symbol(name) for key, name in self.fixed.items()}
 
     def total(self, place: Place) -> sp.Expr:
-        """The sum that an entry of A is."""
+        """Add up an entry of A."""
         return sp.Add(*(coefficient * strength for coefficient, strength in self.rows[place]))
 
     def loads(self, i: int, bent: bool = False) -> list[Statement]:
-        """Load the moving coefficients at stage i, or their derivatives along it."""
+        """Load the moving coefficients at stage i, or with `bent` their derivatives along the stage."""
         word = "b" if bent else "a"
         return [let(f"{word}{i + 1}_{k}", _shared(self.value(i, k) + bent)) for k in self.moving.values()]
 
@@ -192,12 +194,13 @@ class Parts:
         return HEAD + len(self.steady) + 2 * self.stages * len(self.moving)
 
     def value(self, stage: int, k: int) -> int:
-        """Where the value of moving coefficient k at a stage lies; its derivative along the stage follows."""
+        """Return the index of moving coefficient k at a stage; its derivative along the stage is stored behind it."""
         return HEAD + len(self.steady) + 2 * (stage * len(self.moving) + k)
 
 
 def _functions(parts: Parts, state: tuple[str, ...], names: Names) -> dict[str, Function]:
-    """The functions `steady`, `moving` and `bent`: coefficients, and derivatives of the moving ones along a stage."""
+    """Write the functions `steady`, `moving` and `bent`, by their names; leave out those without results."""
+    # derivative of a moving coefficient along a stage: gradient times slope, and the explicit part in time
     along = {real(s): real(f"along_{s}") for s in state}
     lag = real("lag")
     bent = [sp.Add(*(derivative(e, s) * k for s, k in along.items()), derivative(e, TIME) * lag) for e in parts.moving]
@@ -206,18 +209,18 @@ def _functions(parts: Parts, state: tuple[str, ...], names: Names) -> dict[str, 
         "moving": ("Coefficients of the modes that move along the orbit.", list(parts.moving)),
         "bent": ("Their derivatives along a stage, `lag` the part of it in time.", bent),
     }
-    found = {}
+    functions = {}
     for name, (about, results) in described.items():
         if results:
             body = share(results, names.fresh("z"))
             used = {s.name for s in body.symbols}
             arguments = [s for s in state if s in used] + sorted(used - set(state))
-            found[name] = node_function(name, about, body, arguments, body.results)
-    return found
+            functions[name] = node_function(name, about, body, arguments, body.results)
+    return functions
 
 
 def _note(w: StepWriter, parts: Parts, functions: Mapping[str, Function], method: Integrator, i: int) -> None:
-    """Write what stage i leaves in the shared array."""
+    """Write the statements that store the coefficients at stage i in the shared array."""
 
     def called(name: str, at: Mapping[str, Value]) -> Expression:
         return call(name, *(at.get(a, a) for a in functions[name].arguments))
@@ -231,6 +234,7 @@ def _note(w: StepWriter, parts: Parts, functions: Mapping[str, Function], method
             w.put(*(store("shared", HEAD + k, _on_lane(name)) for k, name in enumerate(steady)))
     if not parts.moving:
         return
+    # moving coefficients at the state of the stage, and their derivatives along its slope
     at: dict[str, Value] = {s: f"u_{s}" for s in w.state} if i > 0 else {}
     values, slopes = (tuple(f"{word}_{i + 1}_{k}" for k in range(len(parts.moving))) for word in ("value", "bend"))
     w.put(Assign(values, called("moving", {**at, TIME.name: "now" if i > 0 else "t"})))
@@ -242,7 +246,7 @@ def _note(w: StepWriter, parts: Parts, functions: Mapping[str, Function], method
 
 
 def _on_lane(name: str) -> Expression:
-    """The same value as a register, if it does not depend on the step."""
+    """Add 0 h, which turns a value that is constant into a register."""
     return Name(name) + 0.0 * Name("h")
 
 
@@ -251,7 +255,8 @@ def _shared(k: int) -> Load:
 
 
 def _mode_step(variation: Variation, parts: Parts, method: Integrator) -> list[Statement]:
-    """The statements of the step that one register of modes takes."""
+    """Write the step of one register of modes."""
+    # load the step size, the strengths, the deviations and the constant coefficients
     size, strengths = variation.size, [s.name for s in variation.parameters]
     body: list[Statement] = [let(name, _shared(k)) for k, name in enumerate(("rate", "shift", "reach"))]
     body += [let(s, register("strengths", len(strengths), k)) for k, s in enumerate(strengths)]
@@ -259,6 +264,7 @@ def _mode_step(variation: Variation, parts: Parts, method: Integrator) -> list[S
     body += [let(name, _shared(HEAD + k)) for k, name in enumerate(parts.steady.values())]
     body += [let(name, lower(parts.total(key))) for key, name in parts.fixed.items()]
     body += parts.loads(0)
+    # all stages of a Rosenbrock method share the factors of shift - A at the beginning of the step
     steps = plan(size, set(parts.rows))
     factors = write_factors(steps, parts.at_stage(0), tuple(f"d{c}" for c in range(size)))
     body += [Comment("factors of shift - A"), *factors.statements]
@@ -280,13 +286,14 @@ def _moves(coefficient: sp.Expr) -> bool:
 
 
 def _mode_stage(parts: Parts, method: Integrator, i: int, size: int) -> list[Statement]:
-    """Stage state, A times it, and what the moving Jacobian adds."""
+    """Write the right-hand side r of stage i: A times the stage state, and the terms of the moving Jacobian."""
     body: list[Statement] = [Comment(f"stage {i + 1}")]
     if i > 0:
         body += parts.loads(i)
         body += [let(f"u_d{c}", stage_state(method.a[i], method.a[i - 1], f"d{c}")) for c in range(size)]
     body += parts.loads(i, bent=True)
     entries = parts.at_stage(i)
+    # row r: sum of A u over c, with the derivative of A along the stage times the deviation d, and C k / h
     for r in range(size):
         terms: list[sp.Expr] = []
         for (row, c), e in entries.items():
@@ -294,33 +301,17 @@ def _mode_stage(parts: Parts, method: Integrator, i: int, size: int) -> list[Sta
                 terms.append(e * sp.Symbol(f"u_d{c}" if i > 0 else f"d{c}"))
                 bends = [sp.Symbol(f"b{i + 1}_{str(a)[1:]}") * s for a, s in parts.rows[row, c] if _moves(a)]
                 terms += [sp.Add(*bends) * sp.Symbol(f"d{c}")] if bends else []
-        found = [lower(sp.Add(*terms, evaluate=False) if len(terms) > 1 else terms[0])] if terms else []
+        summands = [lower(sp.Add(*terms, evaluate=False) if len(terms) > 1 else terms[0])] if terms else []
         if i > 0:
             carried = linear(method.big_c[i], [f"k{j + 1}_d{r}" for j in range(i)])
-            found.append(Product((Name("rate"), carried)))
-        body.append(let(f"r{r}", plus(*found) if found else call("broadcast", ZERO, "LANES")))
+            summands.append(Product((Name("rate"), carried)))
+        body.append(let(f"r{r}", plus(*summands) if summands else call("broadcast", ZERO, "LANES")))
     return body
 
 
 def _largest(values: Sequence[Expression]) -> Expression:
-    """The largest absolute value."""
+    """Return the largest absolute value."""
     first, *others = (call("absolute", e) for e in values)
     for other in others:
         first = call("maximum", first, other)
     return first
-
-
-def _dimensions(variation: Variation, method: Integrator, shared: int, workspace: int) -> ModeDimensions:
-    plain = variation.orbit
-    return ModeDimensions(
-        nodes=plain.n,
-        dimension=plain.dimension,
-        parameters=len(plain.parameters),
-        dense_rows=method.dense_rows,
-        workspace=workspace,
-        error_order=method.error_order,
-        repeats=0,
-        strengths=len(variation.parameters),
-        shared=shared,
-        jumps=int(variation.events is not None and bool(variation.events.exits)),
-    )

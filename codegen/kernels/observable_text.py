@@ -1,4 +1,4 @@
-"""The function that computes the observed values of a scene at a point inside a step, and the rule of its quadrature."""
+"""Write the functions that compute observed values and sections inside a step, and the quadrature rule for them."""
 
 from __future__ import annotations
 
@@ -35,31 +35,32 @@ from .between import calmed, depths_in, gaps_in, settled
 from .rounding import magnitude
 
 LARGEST = 1.7976931348623157e308
+"""Largest finite double-precision number."""
+
 BEGINS = {NodeSum: 0.0, NodeMean: 0.0, NodeMaximum: -LARGEST, NodeMinimum: LARGEST}
-"""What the loop of a reduction begins with."""
+"""Initial value of the loop of each reduction."""
 
 
 def rule_of(method: Integrator) -> tuple[tuple[float, ...], ...]:
-    """Return the rule of Gauss and Lobatto on a panel from 0 to 1: a row for each point.
-
-    These are the point, its weight, its weights in the upper half of the Legendre coefficients of the interpolant, the last
-    one first, and a row of the matrix that turns values at all points into the Bernstein coefficients of the interpolant
-    (Farouki, *Computer Aided Geometric Design* 29, 379 (2012)).  A rule of m points is exact for polynomials of degree 2 m - 3 (Abramowitz &
-    Stegun, *Handbook of Mathematical Functions*, 1964, 25.4.32).  Steps of high order are long, and the rule has more
-    points for them.
-    """
+    """Return the Gauss-Lobatto rule on [0, 1] for a method, one row for each point."""
+    # Steps of high order are long and need more points.
     return _lobatto(11 if method.series else max(5, method.order - 1))
 
 
 @cache
 def _lobatto(count: int) -> tuple[tuple[float, ...], ...]:
-    """The rule of some number of points."""
+    """Compute a rule: point, weight, weights in Legendre coefficients (last first), row of the Bernstein matrix."""
+    # The points are -1, 1 and the roots of P'_{m-1}; the rule is exact for polynomials of degree 2 m - 3:
+    # Abramowitz & Stegun, *Handbook of Mathematical Functions*, 1964, 25.4.32. Symmetrised against rounding.
     degrees = np.arange(count)
     last = Legendre.basis(count - 1)
     inner = np.sort(last.deriv().roots().real)
     ends = np.concatenate([[-1.0], (inner - inner[::-1]) / 2.0, [1.0]])
     weights = 1.0 / (count * (count - 1) * last(ends) ** 2)
+    # Upper half of the Legendre coefficients of the interpolant, linear in the values at the points.
     legendre = weights[:, None] * legvander(ends, count - 1) * np.append(2 * degrees[:-1] + 1, count - 1)
+    # The inverse maps values at the points to Bernstein coefficients of the interpolant: Farouki,
+    # *Computer Aided Geometric Design* 29, 379 (2012).
     points = (ends + 1.0) / 2.0
     bernstein = comb(count - 1, degrees) * points[:, None] ** degrees * (1.0 - points[:, None]) ** degrees[::-1]
     rule = np.column_stack([points, weights, legendre[:, : count // 2 : -1], np.linalg.inv(bernstein)])
@@ -68,37 +69,35 @@ def _lobatto(count: int) -> tuple[tuple[float, ...], ...]:
 
 def with_rows(equations: Equations, value: sp.Expr) -> bool:
     """True if an expression has one value for each node, False if it has one for the network."""
-    own = {*equations.components, *equations.varied}
-    return any(s.name in own for s in node_symbols(value))
+    node_names = {*equations.components, *equations.varied}
+    return any(s.name in node_names for s in node_symbols(value))
 
 
 def count_of(equations: Equations, values: Sequence[sp.Expr]) -> int:
-    """Return how many numbers some expressions are."""
+    """Count the numbers that expressions yield: one for each node, or one for the network."""
     return sum(equations.n if with_rows(equations, value) else 1 for value in values)
 
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """Functions of the state that a kernel watches beside its records."""
+    """Functions of the state that a kernel evaluates inside steps."""
 
-    # values that the kernel tallies over the window (`synchain.models.dynamics.observable`)
+    # values that are tallied over the window (`synchain.models.dynamics.observable`)
     observed: tuple[sp.Expr, ...] = ()
-    # functions of which points are taken when they pass zero, each followed by the values that its points keep
+    # section functions, each followed by the values that are stored where it passes zero
     sections: tuple[tuple[sp.Expr, ...], ...] = ()
     stop: sp.Expr | None = None  # a function that ends a cell when it passes zero
-    sums: tuple[Rows, ...] = ()  # the rows that are summed in them (`RowSum`)
+    sums: tuple[Rows, ...] = ()  # the rows that the `RowSum`s of these functions add up
 
     @property
     def kept(self) -> int:
-        """The largest number of values that the points of a section keep."""
+        """Largest number of values stored at the points of a section."""
         return max((len(parts) - 1 for parts in self.sections), default=0)
 
     @property
     def events(self) -> tuple[sp.Expr, ...]:
-        """The section functions, what each keeps, filled up with zeros, what ends a cell, and the sizes of the terms.
-
-        The sizes are those of the terms of each function and of what ends a cell, 0 if it has a single one.
-        """
+        """Section functions, stored values of each, stop function, and term sizes of section and stop functions."""
+        # rows of stored values are filled up with zeros to one length; the size of a single term is 0
         rows = [[*parts[1:], *[sp.S.Zero] * (self.kept + 1 - len(parts))] for parts in self.sections]
         first, last = [parts[0] for parts in self.sections], [] if self.stop is None else [self.stop]
         sizes = [(e, magnitude(e)) for e in (*first, *last)]
@@ -107,12 +106,12 @@ class Recording:
 
     @property
     def gaps(self) -> tuple[sp.Expr, ...]:
-        """What passes zero where an observed value jumps or has a kink, 0 where it is rounding of its terms."""
+        """Expressions that pass zero where an observed value jumps or has a kink."""
         return tuple(map(settled, gaps_in(self.observed)))
 
     @property
     def depths(self) -> tuple[sp.Expr, ...]:
-        """How many e-folds parts of the observed values lie below or above the size one."""
+        """Distances, in e-folds, of exponential parts of the observed values from the size one."""
         return depths_in(self.observed)
 
     @property
@@ -124,55 +123,45 @@ class Recording:
         return bool(self.observed or self.events)
 
     def words(self, equations: Equations) -> tuple[str, ...]:
-        """Return what is watched, in words."""
-        found = [(count_of(equations, self.observed), "observed values"), (len(self.sections), "sections")]
+        """Return one text for observed values, sections and the stop, where there are any."""
+        counts = [(count_of(equations, self.observed), "observed values"), (len(self.sections), "sections")]
         stop = () if self.stop is None else ("a stop",)
-        return (*(f"{number} {what}" for number, what in found if number), *stop)
+        return (*(f"{number} {kind}" for number, kind in counts if number), *stop)
 
     def functions(self, equations: Equations, plain: Equations) -> list[Function]:
-        """Return the functions that compute what is watched inside a step, in the names of `plain`."""
+        """Write the functions `values` and `section` in the names of `plain`, if they have results."""
+        arguments = ("theta", "t", "h", "y", "y_new", "dense", "out", "dims")
         what = "The section functions at the fraction theta of the step, what their points keep, and what ends a cell."
         seen = "The observed values at the fraction theta of the step, and what tells where they change quickly."
         parts = (
             ("values", (*map(calmed, self.observed), *self.gaps, *self.depths), seen),
             ("section", self.events, what),
         )
-        return [_function(self, equations, plain, values, name, about) for name, values, about in parts if values]
+        functions = []
+        for name, values, about in parts:
+            if values:
+                body = _LoopWriter(equations, plain, self.sums).statements(values)
+                functions.append(Function(name, arguments, about, tuple(body), role=Role.ENTRY))
+        return functions
 
     def tables(self, equations: Equations) -> dict[str, str]:
-        """Return the text of the tables that the sums read, by their names: slots of a bank, or numbers."""
-        if not self.sums:
-            return {}
+        """Return the text of the tables that the sums read, by name: indices into a bank, or numbers."""
         slots = {name: k for k, name in enumerate((*equations.state, *equations.parameters))}
-        found = {}
+        tables = {}
         for k, rows in enumerate(self.sums):
             for number, (_, entries) in enumerate(rows.at):
                 values = [slots[entry] if isinstance(entry, str) else entry for entry in entries]
-                found[table_name(k, number)] = f"np.array({values!r})"
-        return found
+                tables[table_name(k, number)] = f"np.array({values!r})"
+        return tables
 
 
 def table_name(rows: int, number: int) -> str:
-    """What the table of one symbol of some rows is called."""
+    """Return the name of the table of symbol `number` of the sum `rows`."""
     return f"ROWS_{rows}_{number}"
 
 
 UNWATCHED = Recording()
-"""Nothing beside the records."""
-
-
-def _function(
-    watched: Recording, equations: Equations, plain: Equations, observed: Sequence[sp.Expr], name: str, about: str
-) -> Function:
-    """A function that writes values at the fraction theta of a step."""
-    writer = _LoopWriter(equations, plain, watched.sums)
-    return Function(
-        name,
-        ("theta", "t", "h", "y", "y_new", "dense", "out", "dims"),
-        about,
-        tuple(writer.statements(observed)),
-        role=Role.ENTRY,
-    )
+"""No functions inside steps."""
 
 
 class _LoopWriter:
@@ -180,42 +169,44 @@ class _LoopWriter:
 
     def __init__(self, equations: Equations, plain: Equations, sums: Sequence[Rows] = ()) -> None:
         self.n, self.sums, self.state = plain.n, sums, frozenset(equations.state)
-        self.own = self._places(equations.components, plain.components, equations.state, plain)
-        self.own |= self._parameters(equations.varied, plain.varied, equations)
-        self.own = {name: place for name, place in self.own.items() if name not in self.state}  # the network's own name
-        self.whole = _numbered(equations.state, plain.state, 0)
-        self.numbers = _numbered(equations.parameters, plain.parameters, plain.dimension)
+        # tables: name -> (name in the function, index in a bank). `at_node` has the components that all nodes have and
+        # the parameters with a value for each node, indexed by the loop variable i; names of the network go first.
+        self.at_node: dict[str, tuple[str, Expression]] = {}
+        for name, shown in zip(equations.components, plain.components, strict=True):
+            if len(plain.holders(shown)) == plain.n:
+                self.at_node[name] = shown, _row(equations.state.index(f"{name}_1"))
+        for name, shown in zip(equations.varied, plain.varied, strict=True):
+            first = equations.parameters.index(f"{name}_{equations.holders(name)[0] + 1}")
+            self.at_node[name] = shown, _row(equations.dimension + first)
+        self.at_node = {name: entry for name, entry in self.at_node.items() if name not in self.state}
+        self.states = _numbered(equations.state, plain.state, 0)
+        self.parameters = _numbered(equations.parameters, plain.parameters, plain.dimension)
         self.components, self.varied = equations.components, equations.varied
-        self.reduced: dict[sp.Expr, sp.Symbol] = {}
-
-    def _places(
-        self, names: Sequence[str], shown: Sequence[str], state: Sequence[str], plain: Equations
-    ) -> dict[str, tuple[str, Expression]]:
-        """Name and place of each component of node i, of those that all nodes have."""
-        whole = [(a, b) for a, b in zip(names, shown, strict=True) if len(plain.holders(b)) == plain.n]
-        return {a: (b, _row(state.index(f"{a}_1"))) for a, b in whole}
-
-    def _parameters(
-        self, names: Sequence[str], shown: Sequence[str], equations: Equations
-    ) -> dict[str, tuple[str, Expression]]:
-        """Name and place of each parameter of node i that has a value for each node."""
-        first = {name: equations.parameters.index(f"{name}_{equations.holders(name)[0] + 1}") for name in names}
-        return {a: (b, _row(equations.dimension + first[a])) for a, b in zip(names, shown, strict=True)}
+        self.reduced: dict[sp.Expr, sp.Symbol] = {}  # reductions whose loops are written, and their results
 
     def statements(self, observed: Sequence[sp.Expr]) -> list[Statement]:
-        """All statements of the function."""
-        values = [self._placed(e) for e in observed]
+        """Write all statements of a function."""
+        # `AtNode` becomes a name of the network
+        names = (*self.components, *self.varied)
+        values = [
+            e.replace(AtNode, lambda value, k: value.xreplace({real(a): real(f"{a}_{k}") for a in names}))
+            for e in observed
+        ]
         body: list[Statement] = []
         if any(e.has(TIME) for e in (*values, *(rows.value for rows in self.sums))):
             body.append(let("now", Name("t") + Name("theta") * "h"))
         summed = [self.sums[int(r.args[0])].value for e in values for r in e.atoms(RowSum)]
-        body += self._loads([*values, *summed], {**self.whole, **self.numbers})
-        while left := self._innermost(values):
-            body += self._reductions(left)
+        body += self._loads([*values, *summed], {**self.states, **self.parameters})
+        # loops of inner reductions come first: those that hold no other, in a fixed order
+        while reductions := {
+            r for e in values for r in e.atoms(Reduction) if not any(a.has(Reduction) for a in r.args)
+        }:
+            body += self._reductions(sorted(reductions, key=sp.default_sort_key))
             values = [e.xreplace(self.reduced) for e in values]
+        # a value of each node takes n entries of `out`, a value of the network takes one
         slot = 0
         for value in values:
-            if any(s.name in self.own for s in node_symbols(value)):
+            if any(s.name in self.at_node for s in node_symbols(value)):
                 inside, (computed,) = self._node_values([value])
                 inside.append(store("out", plus(Number(slot), Name("i")), computed))
                 body.append(Loop("i", Number(0), Number(self.n), tuple(inside)))
@@ -225,28 +216,14 @@ class _LoopWriter:
                 slot += 1
         return body
 
-    def _placed(self, e: sp.Expr) -> sp.Expr:
-        """The expression with the names of the network where it takes the value of one node."""
-        names = (*self.components, *self.varied)
-
-        def at_node(value: sp.Expr, number: sp.Integer) -> sp.Expr:
-            return value.xreplace({real(name): real(f"{name}_{number}") for name in names})
-
-        return e.replace(AtNode, at_node)
-
-    def _innermost(self, values: Sequence[sp.Expr]) -> list[sp.Expr]:
-        """The reductions that hold no other, in a fixed order."""
-        found = {r for e in values for r in e.atoms(Reduction) if not any(a.has(Reduction) for a in r.args)}
-        return sorted(found, key=sp.default_sort_key)
-
-    def _reductions(self, found: Sequence[sp.Expr]) -> list[Statement]:
-        """The loops that compute reductions."""
-        begins: list[Statement] = [line for r in found if isinstance(r, RowSum) for line in self._row_sum(r)]
-        found = [r for r in found if not isinstance(r, RowSum)]
-        if not found:
+    def _reductions(self, reductions: Sequence[sp.Expr]) -> list[Statement]:
+        """Write a loop for each sum over rows, and one loop over nodes for all other reductions."""
+        begins: list[Statement] = [line for r in reductions if isinstance(r, RowSum) for line in self._row_sum(r)]
+        over_nodes = [r for r in reductions if not isinstance(r, RowSum)]
+        if not over_nodes:
             return begins
-        inside, computed = self._node_values([r.args[0] for r in found])
-        for r, value in zip(found, computed, strict=True):
+        inside, computed = self._node_values([r.args[0] for r in over_nodes])
+        for r, value in zip(over_nodes, computed, strict=True):
             symbol = real(f"_total{len(self.reduced)}")
             begins.append(let(symbol.name, BEGINS[type(r)] + 0.0 * Name("theta")))
             linear = type(r) in (NodeSum, NodeMean)
@@ -256,10 +233,11 @@ class _LoopWriter:
         return [*begins, Loop("i", Number(0), Number(self.n), tuple(inside))]
 
     def _row_sum(self, r: sp.Expr) -> list[Statement]:
-        """The loop that adds up a value of some nodes or links."""
+        """Write the loop that adds up a value of selected nodes or links."""
         k = int(r.args[0])
         rows, total = self.sums[k], real(f"_total{len(self.reduced)}")
         inside: list[Statement] = []
+        # a table holds numbers, or indices of states or of parameters
         swap = {}
         for number, (s, entries) in enumerate(rows.at):
             entry: Expression = Load(table_name(k, number), Name("e"), None)
@@ -273,46 +251,44 @@ class _LoopWriter:
         return [let(total.name, 0.0 * Name("theta")), Loop("e", Number(0), Number(rows.count), tuple(inside))]
 
     def _node_values(self, values: Sequence[sp.Expr]) -> tuple[list[Statement], list[Expression]]:
-        """The statements that a loop over nodes needs for some values, and the values."""
-        loads = self._loads(values, self.own)
+        """Write the body of a loop over nodes that computes values with common parts once; return the values too."""
+        loads = self._loads(values, self.at_node)
         shown = [self._shown(e) for e in values]
         parts, results = sp.cse(shown, symbols=(real(f"_part{k}") for k in range(10**6)))
         return [*loads, *(let(s.name, lower(e)) for s, e in parts)], [lower(e) for e in results]
 
-    def _loads(self, values: Sequence[sp.Expr], places: Mapping[str, tuple[str, Expression]]) -> list[Statement]:
-        """The statements that load what has a place and is used: states, their rates, and parameters."""
+    def _loads(self, values: Sequence[sp.Expr], table: Mapping[str, tuple[str, Expression]]) -> list[Statement]:
+        """Load the states, rates and parameters of a table that occur in the values."""
         rates = {r.args[0].name for e in values for r in e.atoms(Rate)}
         plain = {s.name for e in values for s in e.xreplace({r: sp.Dummy() for r in e.atoms(Rate)}).free_symbols}
         body: list[Statement] = []
-        for name, (shown, place) in places.items():
+        for name, (shown, index) in table.items():
             if name in rates:
-                body.append(
-                    let(f"_rate_{shown}", call("slope", "theta", place, "y", "y_new", "dense", "dims") / Name("h"))
-                )
-            if name not in plain:
-                continue
-            parameter = name in self.numbers or name in self.varied
-            body.append(let(shown, Load("y", place) if parameter else _inside(place)))
+                slope = call("slope", "theta", index, "y", "y_new", "dense", "dims")
+                body.append(let(f"_rate_{shown}", slope / Name("h")))
+            if name in plain:
+                parameter = name in self.parameters or name in self.varied
+                body.append(let(shown, Load("y", index) if parameter else _inside(index)))
         return body
 
     def _shown(self, e: sp.Expr) -> sp.Expr:
-        """The expression in the names of the function."""
-        names = {name: shown for name, (shown, _) in (*self.whole.items(), *self.numbers.items(), *self.own.items())}
+        """Replace symbols by the names in the function, and reductions by their results."""
+        names = {name: shown for name, (shown, _) in {**self.states, **self.parameters, **self.at_node}.items()}
         names[TIME.name] = "now"
         rates = {r: real(f"_rate_{names[r.args[0].name]}") for r in e.atoms(Rate)}
         e = e.xreplace(self.reduced).xreplace(rates)
         return e.xreplace({real(name): real(shown) for name, shown in names.items() if name != shown})
 
 
-def _inside(place: Expression) -> Expression:
-    return call("inside", "theta", place, "y", "y_new", "dense", "dims")
+def _inside(index: Expression) -> Expression:
+    return call("inside", "theta", index, "y", "y_new", "dense", "dims")
 
 
 def _numbered(names: Sequence[str], shown: Sequence[str], first: int) -> dict[str, tuple[str, Expression]]:
-    """Name and place of variables that stand one behind another."""
+    """Map names to their names in the function and to consecutive indices."""
     return {a: (b, Number(slot)) for slot, (a, b) in enumerate(zip(names, shown, strict=True), start=first)}
 
 
 def _row(first: int) -> Expression:
-    """The place of a variable of node i, that of the first node being known."""
+    """Return the index of a variable of node i from that of the first node."""
     return plus(Number(first), Name("i")) if first else Name("i")

@@ -1,4 +1,4 @@
-"""How large the terms of an expression are, of which rounding is a part."""
+"""Estimate the rounding error of an expression from the sizes of its terms."""
 
 from __future__ import annotations
 
@@ -8,16 +8,13 @@ from synchain.models.dynamics.observable import AtNode, NodeMaximum, NodeMean, N
 from synchain.models.mechanics.jumps import JUMPING
 
 LEVEL = (sp.acos, sp.acosh, sp.asin, sp.asinh, sp.atan, sp.atan2, sp.atanh, sp.erf, sp.log, sp.tanh)
-"""Functions that turn a large argument, and its rounding, into a number of the order of one."""
+"""Functions that grow at most like a logarithm: the rounding error of a large argument adds at most 1 to the size."""
 
 
 def magnitude(e: sp.Expr) -> sp.Expr:
-    """Return a size of which the rounding of an expression is a small multiple of the unit roundoff.
-
-    It is the sum of the sizes of the terms, not the size of their sum: x_1 - x_2 is as large as the two states.  This is
-    an estimate to first order, after the running error analysis of Higham, *Accuracy and Stability of Numerical Algorithms*,
-    2nd ed. (SIAM, 2002), section 3.3.
-    """
+    """Return a size: the rounding error of an expression is a small multiple of it times the unit roundoff."""
+    # Running error analysis to first order: Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd ed.
+    # (SIAM, 2002), section 3.3. The sizes of terms are added: x_1 - x_2 has the size |x_1| + |x_2|.
     if e.is_Atom or isinstance(e, (Rate, RowSum, AtNode, *JUMPING)):
         return sp.Abs(e)
     sizes = [magnitude(a) for a in e.args]
@@ -30,5 +27,5 @@ def magnitude(e: sp.Expr) -> sp.Expr:
         return sizes[0] ** e.exp if e.exp.is_positive else sp.Abs(e)
     if isinstance(e, sp.exp):
         return e * (1 + sizes[0])
-    rest = sp.Add(*sizes)
-    return sp.Abs(e) + (sp.Min(1, rest) if isinstance(e, LEVEL) else rest)
+    of_arguments = sp.Add(*sizes)
+    return sp.Abs(e) + (sp.Min(1, of_arguments) if isinstance(e, LEVEL) else of_arguments)

@@ -1,4 +1,18 @@
-"""The text of a sweep kernel: one self-contained module from equations, an integrator and records."""
+"""Write the text of a sweep kernel.
+
+`emit` passes its arguments through six stages; the output of each stage is an input of the next ones:
+
+1. Check: raise ValueError for records that are unknown, lack an argument or exclude each other.
+2. Plan (`_planned`): Equations, integrator -> Equations, SparsePlan or None. A plan means that a step runs in loops
+   over nodes and links; None means that the step is written out.
+3. Rename (`tidy`, `free_names`): Equations -> equations with short names that are valid in Python, and unused names.
+4. Write the step (`_stages`, or `codegen/taylor`): equations, plan -> functions as text, the groups of scratch memory
+   that they use, and the number of operations of a step.
+5. Choose the driver: the operations give the number of lanes; the lanes and the kind of step give the fixed text
+   (`Driver`) that calls the functions.
+6. Assemble: functions of steps, pushes, sections and observed values -> a module (`module`), its docstring
+   (`describe`) and the sizes of its arrays (`Dimensions`): one KernelSource, which `machine_code/compile.py` compiles.
+"""
 
 from __future__ import annotations
 
@@ -29,28 +43,23 @@ from ..steps.safe_names import tidy
 from ..steps.sparse_plan import FILL_LIMIT, SparsePlan, program, workspace
 from ..steps.step import StepWriter, function_name, node_function, scaling
 from ..steps.unrolled_step import UnrolledStep
-from ..taylor import TaylorStep, is_large, write_looped, write_rolled, write_step
+from ..taylor import is_large, write_looped, write_rolled, write_step
 from .driver import RECORDERS, Driver, KernelKind, Recorder, imports
 from .observable_text import UNWATCHED, Recording, count_of, rule_of
 
 AUTO = "rodas5p"
-"""The integrator that "auto" stands for."""
+"""The integrator for "auto"."""
 
 LARGEST_UNROLLED = 8
-"""Nodes up to which a step is written out by default; larger networks are stepped through in loops."""
+"""Largest number of nodes whose steps are written out by default; steps of larger networks run in loops."""
 
 MOST_OF_LINKS = 1000
-"""Operations of all links up to which a step is written out: more take minutes to compile."""
+"""Largest number of operations of all links in a written-out step; more take minutes to compile."""
 
 
 @dataclass(frozen=True, slots=True)
 class KernelSource:
-    """The functions of a scene as the text of a module, the driver that runs them, and what its arrays mean.
-
-    `marks` says of each node how many oscillators it stands for, or of each component of a mode which contact's velocity
-    it is (-1: none).  `elimination` holds the integer arrays that a kernel of loops runs through; None if its steps are
-    written out.  `rule` has the points at which functions of the state are looked at inside a step, and the weights of its integrals.
-    """
+    """The functions of a scene as the text of a module, the driver that runs them, and the sizes of its arrays."""
 
     head: str = field(repr=False)
     code: str = field(repr=False)
@@ -58,13 +67,16 @@ class KernelSource:
     method: Integrator = field(repr=False)
     driver: Driver
     dimensions: Dimensions | ModeDimensions = field(repr=False)
+    # sweep: number of oscillators that each node represents; modes: contact whose velocity a component is, or -1
     marks: tuple[int, ...] = field(repr=False)
+    # integer arrays that the loops of a step read; None if the step is written out
     elimination: SparsePlan | None = field(default=None, repr=False, compare=False)
+    # points inside a step at which functions of the state are evaluated, with their weights (`rule_of`)
     rule: tuple[tuple[float, ...], ...] = field(default=((),), repr=False)
 
     @property
     def text(self) -> str:
-        """The module for readers, `head` before its code."""
+        """The module with its docstring `head`."""
         return f"{self.head}\n\n\n{self.code}"
 
     @property
@@ -74,7 +86,7 @@ class KernelSource:
 
     @property
     def functions(self) -> tuple[str, ...]:
-        """The functions of its module that the driver calls."""
+        """Functions of the module that the driver calls."""
         driver, sizes = self.driver, self.dimensions
         if isinstance(sizes, ModeDimensions):
             return ("step", "carry", *(("pushes", "release") if driver.contacts else ()))
@@ -87,7 +99,7 @@ class KernelSource:
 
     @property
     def recorders(self) -> tuple[Recorder, ...]:
-        """The functions that record what the scene wants."""
+        """Recorders that the records of the scene need."""
         sizes = self.dimensions
         if isinstance(sizes, ModeDimensions):
             return ()
@@ -96,7 +108,7 @@ class KernelSource:
 
     @property
     def shared(self) -> tuple[Driver | Recorder, ...]:
-        """The modules besides its own."""
+        """Modules that it shares with other kernels."""
         return (self.driver, *self.recorders)
 
     @property
@@ -106,7 +118,7 @@ class KernelSource:
 
     @property
     def kind(self) -> KernelKind:
-        """What the kernel runs."""
+        """Task of the kernel."""
         return self.driver.kind
 
     @property
@@ -122,7 +134,7 @@ class KernelSource:
 
 @lru_cache(maxsize=64)
 def _digest(*texts: str) -> str:
-    """The SHA-256 of some texts; runs ask for that of one kernel again and again."""
+    """Return the SHA-256 of texts; cached because each run needs the digest of its kernel again."""
     return hashlib.sha256("".join(texts).encode()).hexdigest()
 
 
@@ -141,20 +153,25 @@ def emit(
     """Write the kernel of these equations for one integrator, one set of records and one lane width."""
     method = AUTO if method == "auto" else method
     method = integrator(method) if isinstance(method, str) else method
-    _check_records(equations, records, section, watched, multiplicity)
+    _check_records(equations, records, section, watched, multiplicity)  # stage 1
     ordered = tuple(r for r in Record if r in records)
+    # stages 2 and 3: the plan and the names of the kernel
     equations, elimination = _planned(equations, method, unroll, fill)
     plain, looped = tidy(equations), elimination is not None
     names = free_names(plain)
+    # stage 4: the step
     if method.series:
-        series = _series(plain, method, elimination)
+        write = write_step if elimination is None else write_rolled if is_large(plain) else write_looped
+        series = write(plain, method.order)
         functions, scratch, count = [series.text], series.workspace, series.operations
         if elimination is not None and series.table:
             elimination = replace(elimination, arrays=(*elimination.arrays[:-1], np.array(series.table)))
     else:
         functions, scratch, count = _stages(plain, method, names, elimination)
+    # stage 5: the driver
     width = _suited(equations, method, count) if width is None else width
     chosen = Driver(KernelKind.SWEEP, width, looped, plain.sticks, method.series)
+    # stage 6: events and observed values, constants, sizes
     cut = _cut(equations, section) if section is not None and "section" in ordered else UNWATCHED
     events = [
         *push_functions(plain, names, looped),
@@ -176,7 +193,14 @@ def emit(
         equations,
         method,
         chosen,
-        _dimensions(plain, method, scratch)._replace(
+        Dimensions(
+            nodes=plain.n,
+            dimension=plain.dimension,
+            parameters=len(plain.parameters),
+            dense_rows=method.dense_rows,
+            workspace=scratch,
+            error_order=method.error_order,
+            repeats=int(angular_frequency(plain) is not None),
             components=len(plain.compared) if "sync_error" in ordered else 0,
             observed=count_of(equations, watched.observed),
             gaps=count_of(equations, watched.gaps),
@@ -193,7 +217,7 @@ def emit(
 
 
 def module(constants: Mapping[str, object], steps: Sequence[str], events: Sequence[Function]) -> str:
-    """The code of a kernel: what it imports, its constants, the functions of its steps, and those of events."""
+    """Join imports, constants, functions of steps and functions of events to the code of a kernel."""
     named = "\n".join(f"{name} = {value}" for name, value in constants.items())
     text = "\n\n\n".join([*steps, *map(LANES.function, events)]) + "\n"
     return "\n\n\n".join([imports(f"{named}\n{text}"), named, text])
@@ -206,7 +230,7 @@ def _check_records(
     watched: Recording,
     multiplicity: Sequence[int] | None,
 ) -> None:
-    """Raise ValueError for records that are unknown, lack what they need, or do not go together."""
+    """Raise ValueError for records that are unknown, lack an argument or exclude each other."""
     unknown = [r for r in records if r not in list(Record)]
     if unknown:
         raise ValueError(f"unknown record {unknown[0]!r}; known: {', '.join(Record)}")
@@ -223,25 +247,30 @@ def _check_records(
 
 
 MOST_DECODED = 2200
-"""Operations of a step of which two registers take as many instructions as the processor keeps decoded, some 6000.
+"""Largest number of operations of a step in two registers.
 
-`python -m benchmarks methods` times both: a longer step is up to a seventh faster in one register.
+Such a step has about 6000 instructions, as many as a processor keeps decoded. `python -m benchmarks methods` times
+both widths: a longer step is up to a seventh faster in one register.
 """
 
 
 def _suited(equations: Equations, method: Integrator, count: int) -> int:
-    """Lanes that suit the processor; a small system does not keep its pipelines busy with one register and gets two.
-
-    The steps of implicit methods are chains that use all registers earlier: two lanes slow them down beyond two states.
-    """
+    """Return the number of lanes that is fastest on this processor."""
+    # One register leaves the pipelines idle in a small system, so it gets two. The steps of implicit methods are long
+    # chains that fill all registers: two are slower beyond two states.
     most = 2 if method.implicit else 6
     moving = sum(len(equations.nodes[kind].continuous) for kind in equations.kind_of[: most + 1])
     return lanes.native_width(2 if moving <= most and count <= MOST_DECODED else 1)
 
 
 def _planned(equations: Equations, method: Integrator, unroll: int, fill: float) -> tuple[Equations, SparsePlan | None]:
-    """Return the equations as they are stepped, and the elimination that steps in loops run through."""
-    if not _is_looped(equations, method, unroll):
+    """Return the equations of the step, and the elimination program of a step in loops."""
+    # a Taylor step writes out neither large networks nor inertia without links; other steps not too many operations
+    size = {edge: sum(int(sp.count_ops(e)) for e in edge.rhs) for edge in equations.edges}
+    on_links = sum(size[edge] for _, edge in equations.linked()) if equations.n <= LARGEST_UNROLLED else 0
+    alone = method.series and (is_large(equations) or (equations.inertial and not equations.link_count))
+    looped = equations.n > unroll or alone or (not method.inexact and on_links > MOST_OF_LINKS)
+    if not looped:
         return equations, None
     if method.inexact:
         raise ValueError(f"integrator {method.name}: steps at most {unroll} nodes, found {equations.n}; use rodas5p")
@@ -255,35 +284,16 @@ def _planned(equations: Equations, method: Integrator, unroll: int, fill: float)
 
 
 def free_names(plain: Equations) -> Names:
-    """Return a supply of names that no symbol of the equations has."""
+    """Return a supply of names that differ from all symbols of the equations."""
     weights = [edge.weight.name for edge in plain.edges]
     states = [s.name for node in plain.nodes for s in node.state]
     return Names([*plain.state, *plain.parameters, *states, *plain.varied, *weights])
 
 
-def _is_looped(equations: Equations, method: Integrator, unroll: int) -> bool:
-    """True if the steps run in loops."""
-    alone = method.series and (is_large(equations) or (equations.inertial and not equations.link_count))
-    return equations.n > unroll or alone or (not method.inexact and _of_links(equations) > MOST_OF_LINKS)
-
-
-def _of_links(equations: Equations) -> int:
-    """The number of operations that the right-hand sides of all links take."""
-    size = {edge: sum(int(sp.count_ops(e)) for e in edge.rhs) for edge in equations.edges}
-    return sum(size[edge] for _, edge in equations.linked()) if equations.n <= LARGEST_UNROLLED else 0
-
-
-def _series(plain: Equations, method: Integrator, elimination: SparsePlan | None) -> TaylorStep:
-    """The Taylor step of a method."""
-    if elimination is None:
-        return write_step(plain, method.order)
-    return (write_rolled if is_large(plain) else write_looped)(plain, method.order)
-
-
 def _stages(
     plain: Equations, method: Integrator, names: Names, elimination: SparsePlan | None
 ) -> tuple[list[str], int, int]:
-    """Write a step in stages; return its functions, the groups of scratch memory that it needs, and its operations."""
+    """Write a step in stages; return its functions, its groups of scratch memory and its number of operations."""
     blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
     arguments = ["t", "h", "y", "p", "y_new", "dense", "rtol", "atol"]
     scratch = 0
@@ -294,8 +304,10 @@ def _stages(
     else:
         writer = LoopedStep(plain, blocks, method, elimination)
         writer.write()
+        # `workspace` counts the arrays that `write` has used
         scratch = workspace(writer, elimination)
         arguments += ["graph", "weights"]
+    # the step calls the functions of nodes, so they come before it
     about = "One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."
     step = Function("step", tuple(arguments), about, tuple(writer.statements), role=Role.ENTRY)
     functions = [f for k in range(len(blocks)) for f in node_functions(writer, blocks[k], k)]
@@ -305,39 +317,19 @@ def _stages(
     return [*texts, LANES.function(step)], scratch, operations(step.body)
 
 
-def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimensions:
-    return Dimensions(
-        nodes=plain.n,
-        components=0,
-        dimension=plain.dimension,
-        parameters=len(plain.parameters),
-        dense_rows=method.dense_rows,
-        workspace=scratch,
-        error_order=method.error_order,
-        repeats=int(angular_frequency(plain) is not None),
-        observed=0,
-        gaps=0,
-        depths=0,
-        sections=0,
-        kept=0,
-        sampled=0,
-        stops=0,
-    )
-
-
 def node_functions(step: StepWriter, blocks: NodeBlocks, kind: int = 0) -> list[Function]:
-    """Write the right-hand side of one node of some kind and, for an implicit step, its linearisation."""
+    """Write the right-hand side of a node of one kind and, for an implicit step, its linearisation."""
     functions = [("node", "Right-hand side of one oscillator.", blocks.rhs)]
     if step.method.implicit:
         about = "Right-hand side of one oscillator and the parts of its Jacobian that move."
         functions.append(("node_linear", about, blocks.linear))
-    made = []
+    written = []
     for name, about, body in functions:
         results = [e for e in body.results if not step.is_plain(e)]
         if results:
             arguments = [s.name for s in step.arguments(body, results)]
-            made.append(node_function(function_name(name, kind), about, body, arguments, results))
-    return made
+            written.append(node_function(function_name(name, kind), about, body, arguments, results))
+    return written
 
 
 def describe(
@@ -348,7 +340,7 @@ def describe(
     count: int,
     more: str = "",
 ) -> str:
-    """The docstring at the head of a kernel module."""
+    """Write the docstring of a kernel module."""
     names = ((*eq.state, *eq.parameters) for eq in (equations, plain))
     swapped = tuple(f"{a} as {b}" for a, b in zip(*names, strict=True) if a != b)
     rows = [
@@ -368,14 +360,14 @@ def describe(
 
 
 def _listed(names: tuple[str, ...]) -> str:
-    """Names with commas; of many the first and the last few."""
+    """Join names by commas; shorten a list of more than 40 to the first six and the last three."""
     if len(names) <= 40:
         return ", ".join(names)
     return f"{', '.join(names[:6])}, … {', '.join(names[-3:])} ({len(names)} variables)"
 
 
 def _cut(equations: Equations, section: sp.Expr) -> Recording:
-    """The section on a state as a function of the state."""
+    """Make a recording of the section function of the record 'section'."""
     section = section.xreplace({s: real(s.name) for s in section.free_symbols})
     used = {s.name for s in section.free_symbols}
     unknown = sorted(used - set(equations.state) - set(equations.parameters) - {"t"})
