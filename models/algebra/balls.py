@@ -1,4 +1,4 @@
-"""Certified values: SymPy expressions and algebraic numbers in balls of Arb, and their decimals.
+"""Certified values: balls of Arb around SymPy expressions and algebraic numbers, and their decimals.
 
 Arb: F. Johansson, IEEE Trans. Comput. 66, 1281 (2017).
 """
@@ -18,7 +18,7 @@ Ball: TypeAlias = Any
 """flint.arb if the number is real, flint.acb if it is complex (flint has no types)."""
 
 _MOST = 2**20
-"""Bits at which a number that still cannot be told from zero is given up."""
+"""Largest working precision in bits of `accurate`; a number that may be zero there is refused."""
 
 
 @contextmanager
@@ -49,7 +49,7 @@ def accurate(ball_at: Callable[[int], Ball], bits: int) -> Ball:
     while working < _MOST:
         ball = ball_at(working)
         with precision(working):
-            radius = _radius(ball)
+            radius = ball.rad() if isinstance(ball, arb) else ball.real.rad() + ball.imag.rad()
             if radius == 0 or radius * arb(2) ** bits < abs(ball).lower():
                 return ball
         working *= 2
@@ -99,16 +99,13 @@ def _decimal(x: Ball, digits: int) -> sp.Float:
 
 
 def _part(part: arb, whole: acb, bits: int) -> arb:
-    """A real or imaginary part, or 0 if it is smaller than 2**-bits of the modulus."""
+    """Return a real or imaginary part, or 0 if it is smaller than 2**-bits of the modulus."""
     with precision(2 * bits):
         return arb(0) if abs(part).upper() * arb(2) ** (bits - 4) < abs(whole).lower() else part.mid()
 
 
-def _radius(ball: Ball) -> arb:
-    return ball.rad() if isinstance(ball, arb) else ball.real.rad() + ball.imag.rad()
-
-
 def _ball(e: sp.Expr) -> Ball:
+    """Evaluate an expression at the present precision."""
     if e.is_Rational:
         return arb(to_flint(e))
     if e is sp.pi:
@@ -121,11 +118,21 @@ def _ball(e: sp.Expr) -> Ball:
             total = total + _ball(part) if isinstance(e, sp.Add) else total * _ball(part)
         return total
     if isinstance(e, sp.exp):
-        return _exponential(e.args[0])
+        # rational multiples of π go to Arb as rationals, so that π is not rounded
+        turn = e.args[0] / (sp.pi * sp.I)
+        if turn.is_Rational:
+            ratio = to_flint(turn)
+            return acb(arb.cos_pi_fmpq(ratio), arb.sin_pi_fmpq(ratio))
+        return _ball(e.args[0]).exp()
     if isinstance(e, sp.Pow) and e.exp.is_Rational:
         return _power(_ball(e.base), to_flint(e.exp))
     if isinstance(e, (sp.sin, sp.cos)):
-        return _circular(e)
+        turn = e.args[0] / sp.pi
+        if turn.is_Rational:
+            ratio = to_flint(turn)
+            return arb.sin_pi_fmpq(ratio) if isinstance(e, sp.sin) else arb.cos_pi_fmpq(ratio)
+        inner = _ball(e.args[0])
+        return inner.sin() if isinstance(e, sp.sin) else inner.cos()
     raise TypeError(f"{e} has no certified value; expected rationals, roots, pi, I, sin, cos and exp only")
 
 
@@ -135,20 +142,3 @@ def _power(base: Ball, exponent: fmpq) -> Ball:
     if isinstance(base, arb) and base > 0:
         return base.sqrt() if exponent == fmpq(1, 2) else base ** arb(exponent)
     return acb(base) ** acb(exponent)
-
-
-def _circular(e: sp.Expr) -> Ball:
-    turn = e.args[0] / sp.pi
-    if turn.is_Rational:
-        ratio = to_flint(turn)
-        return arb.sin_pi_fmpq(ratio) if isinstance(e, sp.sin) else arb.cos_pi_fmpq(ratio)
-    inner = _ball(e.args[0])
-    return inner.sin() if isinstance(e, sp.sin) else inner.cos()
-
-
-def _exponential(exponent: sp.Expr) -> Ball:
-    turn = exponent / (sp.pi * sp.I)
-    if turn.is_Rational:
-        ratio = to_flint(turn)
-        return acb(arb.cos_pi_fmpq(ratio), arb.sin_pi_fmpq(ratio))
-    return _ball(exponent).exp()

@@ -1,7 +1,7 @@
 """Exact arithmetic of sums of cosines of rational angles with rational factors.
 
 Such sums lie in a cyclotomic field: two are equal if the cyclotomic polynomial divides the
-difference, and the conjugates of one are had by multiplying all its angles (L. C. Washington,
+difference, and multiplying all angles of one gives its conjugates (L. C. Washington,
 Introduction to Cyclotomic Fields, Springer, 1997, chapter 2).
 """
 
@@ -24,7 +24,7 @@ from .lazy import LazyEigenvalues
 from .rationals import to_flint, to_fraction, to_sympy
 
 _HUGE = 10**300
-"""Rational numbers above it are infinite as floats."""
+"""`near` returns infinity for rational numbers above this bound; floats end at 1.8e308."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +70,7 @@ class AngleSum:
         return self._turned(lambda t, b: b < 0)
 
     def _turned(self, when: Callable[[Fraction, Fraction], bool]) -> AngleSum:
+        # cos(2πt) = -cos(2π(1/2 - t))
         half, counts = Fraction(1, 2), dict[Fraction, Fraction]()
         for t, b in self.terms:
             turn, factor = (half - t, -b) if when(t, b) else (t, b)
@@ -110,6 +111,7 @@ class AngleSum:
         """Return whether the number is 0, decided exactly."""
         if not self.terms:
             return self.shift == 0
+        # write the sum as a polynomial in exp(2πi/m); it is 0 if the cyclotomic polynomial divides it
         m = self.modulus
         coefficients = [fmpq(0)] * m
         coefficients[0] = to_flint(self.shift)
@@ -122,8 +124,8 @@ class AngleSum:
 
 
 def _collected(shift: Fraction, parts: Iterable[tuple[Fraction, Fraction]]) -> AngleSum:
-    """Add up parts: angles in the first half turn, rational cosines in the shift."""
-    turns = [(turn, b) for turn, b in parts]
+    """Add up (t, b) of any angles t: fold them into the first half turn, rational cosines into the shift."""
+    turns = list(parts)
     unit = lcm(*(turn.denominator for turn, _ in turns))
     return folded_sum(shift, [(int(turn * unit) % unit, b) for turn, b in turns], unit)
 
@@ -141,7 +143,7 @@ def folded_sum(shift: Fraction, parts: Iterable[tuple[int, Fraction]], unit: int
 
 
 _RATIONAL = {1: 2, 2: -2, 3: -1, 4: 0, 6: 1}
-"""2 cos(2πt) by the denominator of t if it is rational."""
+"""2 cos(2πt) by the denominator of t, for the t of which it is rational (Niven's theorem)."""
 
 
 def merged(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[AngleSum, int]]:
@@ -152,6 +154,7 @@ def merged(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[AngleSum, int]
     counts: dict[AngleSum, int] = {}
     for number, times in numbers:
         counts[number] = counts.get(number, 0) + times
+    # floats that differ by more than rounding prove numbers different: collect the others in groups
     ordered = sorted(counts, key=lambda number: number.near, reverse=True)
     groups: list[list[AngleSum]] = []
     for number in ordered:
@@ -159,14 +162,15 @@ def merged(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[AngleSum, int]
             groups[-1].append(number)
         else:
             groups.append([number])
-    found = []
+    distinct = []
+    # compare the numbers of a group exactly
     for group in groups:
         different: dict[AngleSum, int] = {}
         for number in group:
             same = next((other for other in different if (other + -number).vanishes()), number)
             different[same] = different.get(same, 0) + counts[number]
-        found += list(different.items())
-    return found
+        distinct += list(different.items())
+    return distinct
 
 
 def box(sizes: Sequence[int], closed: Sequence[bool]) -> LazyEigenvalues[tuple[sp.Expr, int]]:
@@ -175,9 +179,12 @@ def box(sizes: Sequence[int], closed: Sequence[bool]) -> LazyEigenvalues[tuple[s
     Directions of one kind and size are taken in one order only.  Only numbers whose floats are too
     near to each other are compared exactly.
     """
+    # one wave (r, how often) for each 2 cos(2πr/unit) of each direction; equal directions in one order only
     kinds = Counter(zip(sizes, closed, strict=True))
     unit = lcm(*(size if ring else 2 * size for size, ring in kinds))
     waves = [list(combinations_with_replacement(_waves(*kind, unit), times)) for kind, times in kinds.items()]
+
+    # count how often each multiset of cosines occurs: len! / (repetitions)! orders, times the waves' own counts
     counts: dict[tuple[int, ...], int] = {}
     for choice in product(*waves):
         folded, times = list[int](), 1
@@ -186,56 +193,55 @@ def box(sizes: Sequence[int], closed: Sequence[bool]) -> LazyEigenvalues[tuple[s
             for (r, often), same in Counter(group).items():
                 folded += [r] * same
                 times = times * often**same // factorial(same)
-        key = _cancelled(folded, unit)
+        # cosines of r and unit/2 - r add up to 0: write all such pairs as (0, unit/2), so equal sums meet early
+        left, paired = sorted(folded), list[int]()
+        while left:
+            r = left.pop()
+            if 2 * r != unit - 2 * r and unit % 2 == 0 and unit // 2 - r in left:
+                left.remove(unit // 2 - r)
+                paired += [0, unit // 2]
+            else:
+                paired.append(r)
+        key = tuple(sorted(paired))
         counts[key] = counts.get(key, 0) + times
+
+    # order by floats; compare exactly only within groups of sums that rounding may have swapped
     near = [2 * cos(2 * pi * r / unit) for r in range(unit // 2 + 1)]
-    places = sorted(((fsum(near[r] for r in key), key) for key in counts), reverse=True)
+    ordered = sorted(((fsum(near[r] for r in key), key) for key in counts), reverse=True)
     shift = -2 * len(sizes)
 
     def number(key: tuple[int, ...]) -> AngleSum:
         return folded_sum(Fraction(shift), [(r, Fraction(1)) for r in key], unit)
 
-    found: list[tuple[tuple[int, ...], int]] = []
+    eigenvalues: list[tuple[tuple[int, ...], int]] = []
     start = 0
-    for end in range(1, len(places) + 1):  # the sums of cosines in `near` are within 2 each
-        if end == len(places) or places[end - 1][0] - places[end][0] > 1e-12 * len(sizes):
-            found += _told_apart([(number(key), key, counts[key]) for _, key in places[start:end]])
+    for end in range(1, len(ordered) + 1):  # the sums of cosines in `near` are within 2 each
+        if end == len(ordered) or ordered[end - 1][0] - ordered[end][0] > 1e-12 * len(sizes):
+            eigenvalues += _told_apart([(number(key), key, counts[key]) for _, key in ordered[start:end]])
             start = end
-    return LazyEigenvalues(len(found), prod(sizes), lambda k: (expression(number(found[k][0])), found[k][1]))
+    return LazyEigenvalues(
+        len(eigenvalues), prod(sizes), lambda k: (expression(number(eigenvalues[k][0])), eigenvalues[k][1])
+    )
 
 
 def _waves(size: int, ring: bool, unit: int) -> list[tuple[int, int]]:
-    """(r, how often) for each 2 cos(2πr/unit) of a chain or ring, 0 <= r <= unit/2."""
+    """Return (r, how often) for each 2 cos(2πr/unit) of a chain or ring, 0 <= r <= unit/2."""
     if ring:
         return [(k * (unit // size), 1 if k in (0, size - k) else 2) for k in range(size // 2 + 1)]
     return [(k * (unit // (2 * size)), 1) for k in range(size)]
 
 
-def _cancelled(turns: Sequence[int], unit: int) -> tuple[int, ...]:
-    """The turns, ascending; pairs r, unit/2 - r, whose cosines add up to 0, are written alike."""
-    left = sorted(turns)
-    found = list[int]()
-    while left:
-        r = left.pop()
-        if 2 * r != unit - 2 * r and unit % 2 == 0 and unit // 2 - r in left:
-            left.remove(unit // 2 - r)
-            found += [0, unit // 2]
-        else:
-            found.append(r)
-    return tuple(sorted(found))
-
-
 def _told_apart(group: Sequence[tuple[AngleSum, tuple[int, ...], int]]) -> list[tuple[tuple[int, ...], int]]:
-    """Nearly equal numbers, descending, equal ones once, multiplicities added; decided exactly."""
+    """Sort nearly equal numbers, the largest first; merge equal ones and add their multiplicities."""
     if len(group) == 1:
         return [group[0][1:]]
     different: list[tuple[AngleSum, tuple[int, ...], int]] = []
     for a, key, times in group:
-        place = next((i for i, (b, _, _) in enumerate(different) if (a + -b).vanishes()), None)
-        if place is None:
+        same = next((i for i, (b, _, _) in enumerate(different) if (a + -b).vanishes()), None)
+        if same is None:
             different.append((a, key, times))
         else:
-            different[place] = (*different[place][:2], different[place][2] + times)
+            different[same] = (*different[same][:2], different[same][2] + times)
 
     def order(x: tuple[AngleSum, tuple[int, ...], int], y: tuple[AngleSum, tuple[int, ...], int]) -> int:
         return (y[0] + -x[0]).sign()
@@ -267,30 +273,28 @@ def read(number: sp.Expr) -> AngleSum | None:
 
     None if it is none, or has radicals other than those of `cosines.cosine`.
     """
-    found = AngleSum.rational(0)
+    total = AngleSum.rational(0)
     for part in sp.Add.make_args(number):
         factor, core = part.as_coeff_Mul()
         if not factor.is_Rational:
             return None
         b = to_fraction(factor)
-        known = _atoms().get(core)
-        if known is not None:
-            found += AngleSum(known.shift * b, tuple((t, x * b) for t, x in known.terms))
+        radical = _atoms().get(core)
+        if radical is not None:
+            total += AngleSum(radical.shift * b, tuple((t, x * b) for t, x in radical.terms))
             continue
         form = cosines.linear_cosine(part)
         if form is None:
             return None
-        found += AngleSum.cosine(*form)
-    return found
+        total += AngleSum.cosine(*form)
+    return total
 
 
 @lru_cache(maxsize=1)
 def _atoms() -> dict[sp.Expr, AngleSum]:
-    """1 and the radicals that `cosines.cosine` writes.
+    """Return 1 and the radicals that `cosines.cosine` writes, as sums of cosines."""
 
-    √5 = 1 + 4 cos(2π/5), √6 = 2 cos(π/12) + 2 cos(5π/12).
-    """
-
+    # √5 = 1 + 4 cos(2π/5), √6 = 2 cos(π/12) + 2 cos(5π/12)
     def c(*turns: tuple[int, int]) -> AngleSum:
         return sum((AngleSum.cosine(0, 1, k, m) for k, m in turns), AngleSum.rational(0))
 
@@ -327,13 +331,15 @@ def minimal_polynomial(number: AngleSum) -> fmpq_poly:
         if power is not None:
             break
         bits *= 2
-    whole = fmpq_poly(power)
-    part = whole / whole.gcd(whole.derivative())
+    # the square-free part, in the variable of the number itself
+    product = fmpq_poly(power)
+    part = product / product.gcd(product.derivative())
     scaled = part(fmpq_poly([0, scale]))
     return scaled / scaled[scaled.degree()]
 
 
 def _conjugate(number: AngleSum, unit: int, scale: int) -> Ball:
+    """Return a ball around scale times the conjugate with all angles multiplied by `unit`."""
     total = arb(to_flint(number.shift * scale))
     for t, b in number.terms:
         total += 2 * arb(to_flint(b * scale)) * arb.cos_pi_fmpq(to_flint(2 * unit * t))

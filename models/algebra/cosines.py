@@ -1,7 +1,7 @@
 """Numbers a + 2 b cos(2πk/m) and a + b exp(2πik/m) with rational a and b.
 
-Short real radicals if they exist (m = 1 … 6, 8, 10, 12, 16, 20, 24), otherwise the sine or
-cosine itself: the radicals of other angles are long or need complex cube roots (casus
+They are written as short real radicals if these exist (m = 1 … 6, 8, 10, 12, 16, 20, 24), otherwise
+as the sine or cosine: the radicals of other angles are long or need complex cube roots (casus
 irreducibilis).
 """
 
@@ -28,7 +28,7 @@ _SHORT = {
     (1, 24): "sqrt(6)/2 + sqrt(2)/2", (5, 24): "sqrt(6)/2 - sqrt(2)/2",
     (7, 24): "sqrt(2)/2 - sqrt(6)/2", (11, 24): "-sqrt(6)/2 - sqrt(2)/2",
 }  # fmt: skip
-"""2 cos(2πk/m) by (k, m)."""
+"""2 cos(2πk/m) as text for SymPy, by (k, m) in lowest terms."""
 
 
 def is_short(k: int, m: int) -> bool:
@@ -67,8 +67,8 @@ def linear_cosine(expression: sp.Expr) -> tuple[Fraction, Fraction, int, int] | 
 
     None for any other expression.
     """
-    shift, rest = expression.as_coeff_Add()
-    factor, core = rest.as_coeff_Mul()
+    shift, scaled = expression.as_coeff_Add()
+    factor, core = scaled.as_coeff_Mul()
     squared = isinstance(core, sp.Pow) and core.exp == 2
     function = core.base if squared else core
     if not (shift.is_Rational and factor.is_Rational and isinstance(function, (sp.sin, sp.cos))):
@@ -84,8 +84,8 @@ def linear_cosine(expression: sp.Expr) -> tuple[Fraction, Fraction, int, int] | 
 
 def linear_exponential(expression: sp.Expr) -> tuple[Fraction, Fraction, int, int] | None:
     """Return the a, b, k, m of an expression a + b exp(2πik/m); None for any other."""
-    shift, rest = expression.as_coeff_Add()
-    factor, core = rest.as_coeff_Mul()
+    shift, scaled = expression.as_coeff_Add()
+    factor, core = scaled.as_coeff_Mul()
     if not (shift.is_Rational and factor.is_Rational and isinstance(core, sp.exp)):
         return None
     turn = core.args[0] / (2 * sp.pi * sp.I)
@@ -127,14 +127,21 @@ def cosine_roots(polynomial: fmpq_poly) -> list[sp.Expr] | None:
     """
     degree = polynomial.degree()
     for m in _moduli(2 * degree):
-        fit = _fit(polynomial, fmpq_poly(fmpz_poly.cos_minpoly(m)))
-        if fit is not None and minimal_polynomial(*fit, m) == polynomial:
-            return [cosine(*fit, k, m) for k in range(m // 2 + 1) if gcd(k, m) == 1]
+        # b² is the ratio of the spreads; b < 0 is b > 0 with another m, since -2 cos x = 2 cos(π - x)
+        (mean, spread), (psi_mean, psi_spread) = _moments(polynomial), _moments(fmpq_poly(fmpz_poly.cos_minpoly(m)))
+        square = spread / psi_spread
+        top, bottom = isqrt(max(int(square.p), 0)), isqrt(int(square.q))
+        if not top or top * top != int(square.p) or bottom * bottom != int(square.q):
+            continue
+        b = Fraction(top, bottom)
+        a = to_fraction(mean) - b * to_fraction(psi_mean)
+        if minimal_polynomial(a, b, m) == polynomial:
+            return [cosine(a, b, k, m) for k in range(m // 2 + 1) if gcd(k, m) == 1]
     return None
 
 
 def _moduli(value: int) -> Iterator[int]:
-    """All m >= 3 with φ(m) = value; m < 6 φ(m) holds far beyond the degrees in reach."""
+    """Return all m >= 3 with φ(m) = value, by a sieve; m < 6 φ(m) holds for all degrees that occur here."""
     last = 6 * value
     totient = list(range(last + 1))
     for p in range(2, last + 1):
@@ -144,22 +151,8 @@ def _moduli(value: int) -> Iterator[int]:
     return (m for m in range(3, last + 1) if totient[m] == value)
 
 
-def _fit(polynomial: fmpq_poly, psi: fmpq_poly) -> tuple[Fraction, Fraction] | None:
-    """The rational (a, b), b > 0, that map mean and spread of the roots of psi to the polynomial's.
-
-    b < 0 is not needed: it is b > 0 with another m, since -2 cos x = 2 cos(π - x).
-    """
-    (mean, spread), (psi_mean, psi_spread) = _moments(polynomial), _moments(psi)
-    square = spread / psi_spread
-    top, bottom = isqrt(max(int(square.p), 0)), isqrt(int(square.q))
-    if top and top * top == int(square.p) and bottom * bottom == int(square.q):
-        b = Fraction(top, bottom)
-        return to_fraction(mean) - b * to_fraction(psi_mean), b
-    return None
-
-
 def _moments(polynomial: fmpq_poly) -> tuple[fmpq, fmpq]:
-    """Mean and mean square deviation of the roots of a monic polynomial."""
+    """Return mean and mean square deviation of the roots of a monic polynomial."""
     d = polynomial.degree()
     first, second = polynomial[d - 1], polynomial[d - 2]
     mean = -first / d
@@ -184,6 +177,7 @@ def biquadratic(monic: fmpq_poly) -> list[sp.Expr] | None:
 
     They are a ± sqrt(b ± sqrt(c)), or a ± sqrt(b) ± sqrt(c).
     """
+    # without its cubic term z⁴ + p z² + q, if the linear term vanishes as well
     shift = monic[3] / 4
     even = monic(fmpq_poly([-shift, 1]))
     p, q, discriminant = even[2], even[0], even[2] ** 2 - 4 * even[0]

@@ -1,4 +1,4 @@
-"""Exact comparison of algebraic numbers, by a bound on how near to zero a difference can be.
+"""Exact comparison of algebraic numbers by a lower bound on differences that are not zero.
 
 Every number is written as U/L with algebraic integers U and L; u and l bound all conjugates of U
 and L, and D bounds the degree of the field that holds them.  If U is not 0, its norm is a whole
@@ -25,12 +25,12 @@ Number: TypeAlias = sp.Expr | Root
 """Rationals, roots, I, sin and cos of rational multiples of pi, exp of those of I*pi, combined."""
 
 MOST_BITS = 2**19
-"""Numbers whose bound needs more bits than this are refused."""
+"""Numbers are refused if their comparison needs more bits than this."""
 
 
 @dataclass(slots=True)
 class _Field:
-    """Generators of the field of some numbers: a root of unity, radicals (base, q), roots."""
+    """Generators of a number field: a root of unity, radicals (base, q), roots of polynomials."""
 
     unity: int = 1
     radicals: set[tuple[sp.Expr, int]] = field(default_factory=set)
@@ -58,7 +58,7 @@ def sign(a: tuple[Number, ...], b: tuple[Number, ...]) -> int:
 
 
 def _compared(a: tuple[Number, ...], b: tuple[Number, ...]) -> Ball:
-    """A ball around the difference of two products: without 0, or 0 if they are equal."""
+    """Return a ball around the difference of two products that excludes 0, or 0 if they are equal."""
     needed = _bits((a, b))
     bits = 64
     while True:
@@ -76,10 +76,10 @@ def _compared(a: tuple[Number, ...], b: tuple[Number, ...]) -> Ball:
 
 
 def _product_ball(factors: tuple[Number, ...], bits: int) -> acb:
-    found = acb(1)
+    product = acb(1)
     for factor in factors:
-        found = found * acb(_ball(factor, bits))
-    return found
+        product = product * acb(_ball(factor, bits))
+    return product
 
 
 def check_size(number: sp.Expr) -> None:
@@ -88,9 +88,9 @@ def check_size(number: sp.Expr) -> None:
 
 
 def _bits(products: tuple[tuple[Number, ...], ...]) -> int:
-    """So many bits that a sum or difference of these products below 2**-bits is 0."""
+    """Return bits such that a sum or difference of these products is 0 if it is below 2**-bits."""
     generated = _Field()
-    up, low = _sum([_measured(factors, generated) for factors in products])
+    up, low = _sum([_product([_measure(x, generated) for x in factors]) for factors in products])
     needed = (generated.degree - 1) * up + low
     if needed > MOST_BITS:
         raise ValueError(
@@ -100,17 +100,16 @@ def _bits(products: tuple[tuple[Number, ...], ...]) -> int:
     return math.ceil(needed * (1 + 1e-9)) + 8
 
 
-def _measured(factors: tuple[Number, ...], generated: _Field) -> tuple[float, float]:
-    """(log2 u, log2 l) of a product."""
-    parts = [_measure(x, generated) for x in factors]
+def _product(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Return (log2 u, log2 l) of a product from those of its factors."""
     return sum(up for up, _ in parts), sum(low for _, low in parts)
 
 
 def _measure(x: Number, generated: _Field) -> tuple[float, float]:
-    """(log2 u, log2 l) of a number, both at least 0; what it is made of goes into the field."""
+    """Return (log2 u, log2 l) of a number, both at least 0; add its generators to the field."""
     if isinstance(x, Root):
         generated.roots[(x.polynomial, x.index)] = len(x.polynomial) - 1
-        leading = x.polynomial[-1]
+        leading = x.polynomial[-1]  # times it the root is an algebraic integer; Cauchy bounds its conjugates
         return math.log2(leading + max(map(abs, x.polynomial))), math.log2(leading)
     if x.is_Rational:
         return math.log2(max(abs(int(x.p)), 1)), math.log2(int(x.q))
@@ -119,7 +118,7 @@ def _measure(x: Number, generated: _Field) -> tuple[float, float]:
         return 0.0, 0.0
     if isinstance(x, (sp.Add, sp.Mul)):
         parts = [_measure(part, generated) for part in x.args]
-        return _sum(parts) if isinstance(x, sp.Add) else (sum(up for up, _ in parts), sum(low for _, low in parts))
+        return _sum(parts) if isinstance(x, sp.Add) else _product(parts)
     if isinstance(x, (sp.sin, sp.cos)):
         _unity(x.args[0] / sp.pi, generated)
         return 1.0, 1.0
@@ -134,9 +133,9 @@ def _measure(x: Number, generated: _Field) -> tuple[float, float]:
 
 
 def _sum(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """(log2 u, log2 l) of a sum: over the common denominator each U meets the L of all others."""
+    """Return (log2 u, log2 l) of a sum: over the common denominator each U meets the L of all others."""
     low = sum(low for _, low in parts)
-    return max(up + low - own for up, own in parts) + math.log2(len(parts)), low
+    return max(up + low - own_low for up, own_low in parts) + math.log2(len(parts)), low
 
 
 def _unity(turn: sp.Expr, generated: _Field) -> None:
@@ -148,10 +147,10 @@ def _unity(turn: sp.Expr, generated: _Field) -> None:
 def _power(x: sp.Pow, generated: _Field) -> tuple[float, float]:
     up, low = _measure(x.base, generated)
     p, q = int(x.exp.p), int(x.exp.q)
-    if p < 0:
+    if p < 0:  # L/U
         up, low = low, up
     up, low = up * abs(p), low * abs(p)
-    if q > 1:
+    if q > 1:  # (U/L)^(1/q) = (U L^(q-1))^(1/q) / L
         generated.radicals.add((x.base, q))
         up = (up + (q - 1) * low) / q
     return up, low

@@ -3,7 +3,7 @@
 Aberth's method improves all roots at once, each as if the others were divided out (O. Aberth, Math.
 Comp. 27, 339, 1973).  It starts on the circles that the sizes of the coefficients suggest (D. A.
 Bini, Numer. Algorithms 13, 179, 1996), or on the real axis if Newton's inequalities allow that all
-roots are real.  Nothing of this is trusted: within d |f/f'| of any point lies a root of f, of degree
+roots are real.  A proof follows: within d |f/f'| of any point lies a root of f, of degree
 d (D. A. Bini, G. Fiorentino, Numer. Algorithms 23, 127, 2000), and d discs that do not touch hold
 one root each.
 """
@@ -21,13 +21,13 @@ from flint import acb, acb_poly, arb, arb_poly, fmpq, fmpz, fmpz_poly
 from .balls import Ball, disjoint, precision
 
 _IDLE = {arb: 30, acb: 200}
-"""Steps without another root that settles, after which the iteration ends; 10 and 70 suffice."""
+"""Steps of Aberth's method without a newly converged root after which it gives up; in tests 10 and 70 suffice."""
 _DIGITS = 2.0**-44
-"""Relative size of the step after which Newton's method takes over."""
+"""Relative step size below which a root has converged in floats; Newton's method in balls follows."""
 _SHARP = 160
-"""Bits of the discs."""
+"""Relative accuracy of the discs in bits."""
 _LARGE = 900.0
-"""Radii of starts are floats from 2**-900 to 2**900."""
+"""Start radii must lie between 2**-900 and 2**900, so that no float overflows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Disc:
         return self.within(1)
 
     def within(self, times: int) -> acb:
-        """A ball that holds the disc of so many times the radius."""
+        """A ball that holds the disc enlarged by a factor."""
         return acb(_wide(self.x, times * self.radius), _wide(self.y, times * self.radius))
 
 
@@ -56,14 +56,14 @@ def discs(f: fmpz_poly) -> list[Disc] | None:
     # values of the polynomial cancel least about the mean of its roots
     mean = -f[f.degree() - 1] // (f.degree() * f[f.degree()])
     shifted = [(middle, f(fmpz_poly([middle, 1]))) for middle in (mean, fmpz(0))]
-    real = all(_newton_inequalities(g) for _, g in shifted)
+    real = all(_may_be_real(g) for _, g in shifted)
     full = 2 * f.degree() + f.height_bits()
     for bits in sorted({min(_usual(f), full), full}):
         with precision(bits + _SHARP + 64):
             for middle, g in shifted:
-                found = _isolated(g, real)
-                if found is not None:
-                    moved = [Disc(disc.x + middle, disc.y, disc.radius) for disc in found]
+                isolated = _isolated(g, real)
+                if isolated is not None:
+                    moved = [Disc(disc.x + middle, disc.y, disc.radius) for disc in isolated]
                     return sorted(moved, key=lambda disc: (disc.y != 0, disc.x, disc.y))
     return None
 
@@ -72,10 +72,10 @@ def sharpened(f: fmpz_poly, disc: Disc, room: fmpq, bits: int) -> acb:
     """Return a ball around a root, of radius below 2**-bits times its modulus."""
     with precision(2 * f.degree() + f.height_bits() + 2 * bits + 64):
         start = acb(disc.x, disc.y)
-        found = _sharp(acb_poly(f), acb_poly(f.derivative()), start, bits + 4)
-        if found is None or not abs(acb(found.x, found.y) - start) + arb(found.radius) < arb(room):
+        isolated = _sharp(acb_poly(f), acb_poly(f.derivative()), start, bits + 4)
+        if isolated is None or not abs(acb(isolated.x, isolated.y) - start) + arb(isolated.radius) < arb(room):
             raise ValueError(f"no root near {complex(start)}; expected one within {float(arb(room)):.3g}")
-        return found.ball
+        return isolated.ball
 
 
 def sign(f: fmpz_poly, x: fmpq) -> int:
@@ -97,69 +97,65 @@ def dyadic(ball: arb) -> fmpq:
 
 
 def _usual(f: fmpz_poly) -> int:
-    """Bits that usually cancel in a value of f between its roots: a few for each root."""
+    """Estimate the bits that cancel in a value of f between its roots: four for each root."""
     return 4 * int(f.degree()) + 64
 
 
 def _isolated(f: fmpz_poly, real: bool) -> list[Disc] | None:
-    """One proved disc for each root, from starts on the axis (if `real`), then on circles."""
+    """Return one proved disc for each root, from starts on the real axis if `real`, else on circles."""
     radii = _radii(f)
     if radii is None:
         return None
-    found = _proved(f, arb, _on_axis(radii)) if real else None
-    return found or _proved(f, acb, _on_circles(radii))
+    if real:  # starts on both sides of 0, no two of them equal
+        starts: list[complex] = [r * (1 + 1e-3 * k / len(radii)) * (-1) ** k for k, r in enumerate(radii)]
+        isolated = _proved(f, arb, starts)
+        if isolated:
+            return isolated
+    # starts at equal angles on each circle
+    starts = [cmath.rect(r, 2 * math.pi * k / radii.count(r) + 0.7 + radii.index(r)) for k, r in enumerate(radii)]
+    return _proved(f, acb, starts)
 
 
 def _proved(f: fmpz_poly, kind: type, starts: Sequence[complex]) -> list[Disc] | None:
-    """Discs that do not touch each other, by Aberth's method; None if one is missing."""
+    """Return discs that do not touch each other, by Aberth's method; None if one is missing."""
     value, slope = (arb_poly(p) if kind is arb else acb_poly(p) for p in (f, f.derivative()))
-    found = []
+    isolated = []
     for z in _aberth(value, slope, kind, list(starts)) or ():
         disc = _sharp(value, slope, _point(kind, z), _SHARP)
         if disc is None:
             return None
-        found.append(disc)
-    if len(found) != f.degree() or not disjoint([disc.within(4) for disc in found]):
+        isolated.append(disc)
+    if len(isolated) != f.degree() or not disjoint([disc.within(4) for disc in isolated]):
         return None
-    return [_on_its_side(disc) for disc in found]
+    # A disc that meets the real axis holds a real root: its mirror image holds the conjugate root, and no other disc
+    # is near, so both are one root.
+    return [
+        disc if abs(disc.y) > disc.radius else Disc(disc.x, fmpq(0), disc.radius + abs(disc.y)) for disc in isolated
+    ]
 
 
-def _on_its_side(disc: Disc) -> Disc:
-    """The disc, its centre put on the real axis if it meets the axis: then its root is real.
-
-    The mirror image of the disc holds the mirror image of its root, and no other disc is near: the
-    two are one root.
-    """
-    return disc if abs(disc.y) > disc.radius else Disc(disc.x, fmpq(0), disc.radius + abs(disc.y))
-
-
-def _newton_inequalities(f: fmpz_poly) -> bool:
-    """Whether all roots may be real.
-
-    Some are complex if c_k² < c_(k-1) c_(k+1) (1 + 1/k) (1 + 1/(d - k)) for some k.
-    """
+def _may_be_real(f: fmpz_poly) -> bool:
+    """Test Newton's inequalities, c_k² >= c_(k-1) c_(k+1) (1 + 1/k) (1 + 1/(d - k)): real roots meet them."""
     c, d = f.coeffs(), f.degree()
     return all(c[k] * c[k] * k * (d - k) >= c[k - 1] * c[k + 1] * (k + 1) * (d - k + 1) for k in range(1, d))
 
 
 def _aberth(value: Ball, slope: Ball, kind: type, z: list[complex]) -> list[complex] | None:
-    """All roots to about 2**-44 of themselves.
-
-    None if the iteration does not settle, or the precision is too low.
-    """
+    """Return all roots to about 2**-44 of their moduli; None without convergence or precision."""
     number = float if kind is arb else complex
     moving, idle = list(range(len(z))), 0
     while idle < _IDLE[kind]:
         still = []
         for k in moving:
             at = _point(kind, z[k])
-            try:
+            try:  # Newton's step, corrected for all other roots
                 ball = value(at) / slope(at)
                 newton = number(ball.mid())
                 others = sum([1 / (z[k] - w) for w in z[:k] + z[k + 1 :]])
                 step = newton / (1 - newton * others)
             except (ZeroDivisionError, OverflowError, ValueError):
                 return None
+            # the ball of f/f' must be narrow beside the step, or the step must be negligible
             error = float(abs(ball - ball.mid()).upper())
             if not (cmath.isfinite(step) and error <= 2.0**-8 * abs(newton) + _DIGITS * abs(z[k])):
                 return None
@@ -174,11 +170,15 @@ def _aberth(value: Ball, slope: Ball, kind: type, z: list[complex]) -> list[comp
 
 
 def _radii(f: fmpz_poly) -> list[float] | None:
-    """The approximate modulus of each root, ascending; None if one is beyond the range of floats.
+    """Return the approximate modulus of each root, ascending; None if one is beyond the range of floats."""
+    # log2 |coefficient| over its index; floats hold the leading 60 bits
+    points = []
+    for k, c in enumerate(f.coeffs()):
+        if c != 0:
+            shift = max(abs(int(c)).bit_length() - 60, 0)
+            points.append((k, math.log2(abs(int(c)) >> shift) + shift))
 
-    They are slopes of the upper hull of log |coefficient| over its place.
-    """
-    points = [(k, _log2(int(c))) for k, c in enumerate(f.coeffs()) if c != 0]
+    # the moduli are the slopes of the upper hull of these points
     hull: list[tuple[int, float]] = []
     for k, y in points:
         while len(hull) > 1 and (hull[-1][1] - hull[-2][1]) * (k - hull[-2][0]) <= (y - hull[-2][1]) * (
@@ -186,32 +186,17 @@ def _radii(f: fmpz_poly) -> list[float] | None:
         ):
             hull.pop()
         hull.append((k, y))
-    found = [0.0] * hull[0][0]
+    moduli = [0.0] * hull[0][0]
     for (i, low), (j, high) in pairwise(hull):
         size = (low - high) / (j - i)
         if abs(size) > _LARGE:
             return None
-        found += [2.0**size] * (j - i)
-    return found
-
-
-def _on_circles(radii: Sequence[float]) -> list[complex]:
-    """Starts at equal angles on each circle."""
-    return [cmath.rect(r, 2 * math.pi * k / radii.count(r) + 0.7 + radii.index(r)) for k, r in enumerate(radii)]
-
-
-def _on_axis(radii: Sequence[float]) -> list[complex]:
-    """Starts on both sides of 0, no two of them equal."""
-    return [r * (1 + 1e-3 * k / len(radii)) * (-1) ** k for k, r in enumerate(radii)]
-
-
-def _log2(c: int) -> float:
-    shift = max(abs(c).bit_length() - 60, 0)
-    return math.log2(abs(c) >> shift) + shift
+        moduli += [2.0**size] * (j - i)
+    return moduli
 
 
 def _sharp(value: Ball, slope: Ball, z: Ball, bits: int) -> Disc | None:
-    """Newton's method until d |f/f'| is at most 2**-bits of the modulus."""
+    """Iterate Newton's method until d |f/f'| is at most 2**-bits of the modulus; None if it fails."""
     for _ in range(bits.bit_length() + 8):
         step = value(z) / slope(z)
         if not step.is_finite():

@@ -1,4 +1,4 @@
-"""Sequences whose items are made when they are asked for, for spectra of a million nodes."""
+"""Sequences that compute an item when it is read, for spectra of a million nodes."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ T = TypeVar("T", covariant=True)
 
 @dataclass(frozen=True, slots=True)
 class LazyEigenvalues(Sequence[T]):
-    """The distinct real eigenvalues of a graph, the largest first, each made when it is asked for.
+    """The distinct real eigenvalues of a graph, the largest first, each computed when it is read.
 
     A slice is a list of its items.
     """
 
     length: int  # number of items
     n: int  # number of nodes of the graph
-    make: Callable[[int], T]  # gives the item at a place, from 0
+    make: Callable[[int], T]  # computes the item at an index from 0
 
     def __len__(self) -> int:
         return self.length
 
     @overload
-    def __getitem__(self, place: int) -> T: ...
+    def __getitem__(self, index: int) -> T: ...
     @overload
-    def __getitem__(self, place: slice) -> list[T]: ...
-    def __getitem__(self, place: int | slice) -> T | list[T]:
-        places = range(self.length)[place]
-        return self.make(places) if isinstance(places, int) else [self.make(k) for k in places]
+    def __getitem__(self, index: slice) -> list[T]: ...
+    def __getitem__(self, index: int | slice) -> T | list[T]:
+        indices = range(self.length)[index]
+        return self.make(indices) if isinstance(indices, int) else [self.make(k) for k in indices]
 
     def __repr__(self) -> str:
         return f"LazyEigenvalues({self.length} items)"

@@ -1,7 +1,7 @@
 """Minimal polynomials of algebraic numbers, and products of (z - number) over sets of conjugates.
 
 Two numbers a + 2 b cos(2πk/m) with b > 0 and one a, b and m (k/m in lowest terms) are conjugate:
-all of them multiply to one polynomial, which is known without their values.
+the polynomial of all of them follows without their values.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ _X = sp.Symbol("x")
 def multiplied(numbers: Iterable[tuple[AngleSum, int]]) -> fmpq_poly | None:
     """Return the product of (z - number)^times."""
     rationals: dict[Fraction, int] = {}
+    # collect the numbers by their sets of conjugates (a, b, m), b > 0: -2b cos(2πt) = 2b cos(2π(1/2 - t))
     classes: dict[tuple[Fraction, Fraction, int], dict[int, int]] = {}
     for number, times in numbers:
         if not number.terms:
@@ -40,6 +41,7 @@ def multiplied(numbers: Iterable[tuple[AngleSum, int]]) -> fmpq_poly | None:
     for value, times in rationals.items():
         product *= fmpq_poly([-value.numerator, value.denominator]) ** times / fmpz(value.denominator) ** times
     for (a, b, m), members in classes.items():
+        # a set of conjugates multiplies to a rational polynomial if it is complete, all equally often
         counts = set(members.values())
         if len(counts) != 1 or 2 * len(members) != int(fmpz(m).euler_phi()):
             return None
@@ -81,9 +83,9 @@ def minimal_polynomial(number: sp.Expr | Root) -> fmpq_poly:
 
 
 def _surd(number: sp.Expr) -> fmpq_poly | None:
-    """The minimal polynomial of a + b sqrt(c) with rational a, b and c > 0; None for any other number."""
-    a, rest = number.as_coeff_Add()
-    b, root = rest.as_coeff_Mul()
+    """Return the minimal polynomial of a + b sqrt(c) with rational a, b and c > 0; None for any other number."""
+    a, scaled_root = number.as_coeff_Add()
+    b, root = scaled_root.as_coeff_Mul()
     if not (a.is_Rational and b.is_Rational and root.is_Pow and root.exp == sp.S.Half and root.base.is_Rational):
         return None
     return fmpq_poly([to_flint(a**2 - b**2 * root.base), to_flint(-2 * a), 1])

@@ -1,4 +1,4 @@
-"""Rational numbers of Python, FLINT and SymPy, turned into each other."""
+"""Conversions of rational numbers between Python, FLINT and SymPy."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Algebraic numbers: an irreducible integer polynomial and an enclosure of one of its roots.
 
-A real root is held between two rationals where the polynomial changes sign, a complex root in a
-disc that holds no other; both are refined to any accuracy.  `isolation.py` isolates the roots or,
-should that fail, Arb (F. Johansson, IEEE Trans. Comput. 66, 1281, 2017).  Real roots are refined
+A real root lies between two rationals where the polynomial changes sign, a complex root in a disc
+without another root; both are refined to any accuracy.  `isolation.py` isolates the roots, or Arb if
+`isolation.py` fails (F. Johansson, IEEE Trans. Comput. 66, 1281, 2017).  Real roots are refined
 exactly: secant guesses, proved by signs (J. Abbott, ACM Commun. Comput. Algebra 48, 3, 2014).
 """
 
@@ -29,7 +29,7 @@ Polynomial = tuple[int, ...]
 _X = sp.Symbol("x")
 
 _WRITTEN = 14_000
-"""Bits up to which Python turns whole numbers into decimals and back by default (4300 digits)."""
+"""Longest integer in bits that Python converts to decimals and back by default (4300 digits)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,9 +37,9 @@ class Root:
     """One root of an irreducible polynomial of degree >= 2."""
 
     polynomial: Polynomial  # integer coefficients, constant first; primitive, the leading one positive
-    # place of the root among SymPy's CRootOf: real roots ascending, then complex ones. It stands in the text of the
-    # number, and so in tables and JSON. `complex_order` finds it without SymPy's own isolation, which takes minutes
-    # where Aberth's method takes a second
+    # index of the root among SymPy's CRootOf: real roots ascending, then complex ones. The text of the number, and so
+    # tables and JSON, contain it. `complex_order` computes it without SymPy's isolation, which takes minutes where
+    # Aberth's method takes a second
     index: int
 
     @property
@@ -129,11 +129,11 @@ class ComplexRootOf(sp.CRootOf):  # type: ignore[misc]  # SymPy has no types
 
     @property
     def precedence(self) -> int:
-        """How tightly the printed text holds together: that of a sum, -1.5 - 0.9*I."""
+        """The precedence of the printed text: that of a sum, -1.5 - 0.9*I."""
         return int(PRECEDENCE["Add"])
 
     def _sympystr(self, printer: object) -> str:
-        # SymPy makes such roots anew, without their decimal, where it rebuilds an expression.
+        # SymPy creates such roots anew, without their decimal, when it rebuilds an expression.
         if not hasattr(self, "shown"):
             coefficients = tuple(int(c) for c in self.poly.all_coeffs()[::-1])
             return f"CRootOf({polynomial_text(coefficients)}, {self.index})"
@@ -147,15 +147,15 @@ class ComplexRootOf(sp.CRootOf):  # type: ignore[misc]  # SymPy has no types
 
 @lru_cache(maxsize=512)
 def _expression(root: Root) -> sp.Expr:
-    found = ComplexRootOf(sp.Poly(list(root.polynomial[::-1]), _X), root.index)
+    root_of = ComplexRootOf(sp.Poly(list(root.polynomial[::-1]), _X), root.index)
     # SymPy takes a factor out of some polynomials: their root is a number times that of another one.
-    factor, part = found.as_coeff_Mul()
+    factor, part = root_of.as_coeff_Mul()
     if isinstance(part, ComplexRootOf):
         value = nearest(root.enclosure) / float(factor)
         part.shown = f"{value.real:.16g}"
         if isinstance(value, complex):
             part.shown += f" {'-' if value.imag < 0 else '+'} {abs(value.imag):.16g}*I"
-    return found
+    return root_of
 
 
 @lru_cache(maxsize=4096)
@@ -165,7 +165,7 @@ def _sharpened(root: ComplexRoot, bits: int) -> acb:
 
 
 def _by_arb(f: fmpz_poly) -> list[Disc]:
-    """Discs around the roots by Arb's own isolation: a second at degree 100, minutes at 200."""
+    """Isolate the roots by Arb: a second at degree 100, minutes at degree 200."""
     with precision(128):
         found = [root for root, _ in f.complex_roots()]
         reals = sorted((ball for ball in found if ball.imag == 0), key=lambda ball: dyadic(ball.real))
@@ -182,43 +182,44 @@ def roots(polynomial: Polynomial) -> tuple[Root, ...]:
     isolated = discs(f) or _by_arb(f)
     reals = [disc for disc in isolated if disc.y == 0]
     upper = [disc for disc in isolated if disc.y > 0]
-    found: list[Root] = [
+    numbers: list[Root] = [
         RealRoot(polynomial, i, to_fraction(d.x - d.radius), to_fraction(d.x + d.radius)) for i, d in enumerate(reals)
     ]
     with precision(256):
         balls = [disc.ball for disc in upper]
-    for place, k in enumerate(complex_order(polynomial, balls)):
+    for pair, k in enumerate(complex_order(polynomial, balls)):
         x, y, room = (to_fraction(part) for part in (upper[k].x, upper[k].y, _room(upper[k], isolated)))
-        found.append(ComplexRoot(polynomial, len(reals) + 2 * place, (x, -y), room))
-        found.append(ComplexRoot(polynomial, len(reals) + 2 * place + 1, (x, y), room))
-    return tuple(found)
+        numbers.append(ComplexRoot(polynomial, len(reals) + 2 * pair, (x, -y), room))
+        numbers.append(ComplexRoot(polynomial, len(reals) + 2 * pair + 1, (x, y), room))
+    return tuple(numbers)
 
 
 def _room(disc: Disc, others: list[Disc]) -> fmpq:
-    """At least a quarter of the distance to the next disc, within which there is no other root."""
+    """Return a distance from the disc within which there is no other root: a quarter of the nearest gap."""
     gaps = (max(abs(disc.x - other.x), abs(disc.y - other.y)) for other in others if other is not disc)
     return max(min(gaps) / 4, disc.radius)
 
 
 @lru_cache(maxsize=4096)
 def _refined(root: RealRoot, bits: int) -> tuple[fmpq, fmpq]:
-    """Narrow the bracket to 2**-bits: guess by the secant, prove by signs, square the step."""
+    """Narrow the bracket of a real root to 2**-bits of its modulus (Abbott 2014)."""
     f, low, high = fmpz_poly(list(root.polynomial)), to_flint(root.low), to_flint(root.high)
     if low * high > 0 and (high - low) * 2**bits <= min(abs(low), abs(high)):
         return low, high
     at_low, at_high = f(low), f(high)
     pieces = 2**16
     while low * high <= 0 or (high - low) * 2**bits > min(abs(low), abs(high)):
+        # the secant picks one of `pieces` equal parts of the bracket
         step = (high - low) / pieces
         guess = (at_low / (at_low - at_high) * pieces + fmpq(1, 2)).floor()
         end = low + step * min(max(guess, 1), pieces - 1)
         value = f(end)
         other = end + step if value * at_low > 0 else end - step
         at_other = f(other)
-        if value * at_other < 0:
+        if value * at_other < 0:  # the part holds the root: square the number of parts
             (low, at_low), (high, at_high) = sorted([(end, value), (other, at_other)])
             pieces = min(pieces * pieces, 2**bits)
-        else:
+        else:  # a wrong guess: divide coarser, and bisect
             pieces = max(4, isqrt(pieces))
             middle = (low + high) / 2
             value = f(middle)
@@ -233,49 +234,50 @@ def complex_order(polynomial: tuple[int, ...], upper: Sequence[acb]) -> list[int
     """Return the positions of the roots above the real axis in SymPy's order."""
     if len(upper) < 2:
         return list(range(len(upper)))
-    given = sp.Poly(list(polynomial[::-1]), sp.Symbol("x"))
+    as_sympy = sp.Poly(list(polynomial[::-1]), sp.Symbol("x"))
     # SymPy may count the roots of a rescaled polynomial
-    scale, inner = sp.CRootOf(given, 0).as_coeff_Mul()
+    scale, inner = sp.CRootOf(as_sympy, 0).as_coeff_Mul()
     coefficients = [abs(int(c)) for c in inner.poly.all_coeffs()]
     bound = 2 * max(Fraction(c, coefficients[0]) for c in coefficients)
     shrink = acb(to_flint(1 / scale))
     boxes = _leaves({k: ball * shrink for k, ball in enumerate(upper)}, (-bound, Fraction(0), bound, bound))
     if boxes is None:  # a root on the border of a box
-        return _ask_sympy(given, upper)
+        return _ask_sympy(as_sympy, upper)
     return [k for _, k in sorted(boxes)]
 
 
 def _leaves(
     roots: dict[int, acb], box: tuple[Fraction, Fraction, Fraction, Fraction]
 ) -> list[tuple[tuple[Fraction, Fraction], int]] | None:
-    """The lower left corner of the box of each root; None if a root may be on a border."""
-    found, boxes = [], [(roots, box)]
+    """Return the lower left corner of the box of each root; None if a root may be on a border."""
+    corners, boxes = [], [(roots, box)]
     while boxes:
         inside, (left, low, right, top) = boxes.pop()
         if len(inside) == 1:
-            found.append(((left, low), next(iter(inside))))
+            corners.append(((left, low), next(iter(inside))))
             continue
+        # halve the longer side
         upright = right - left > top - low
         middle = (left + right) / 2 if upright else (low + top) / 2
         border = arb(to_flint(middle))
         first: dict[int, acb] = {}
         second: dict[int, acb] = {}
         for k, ball in inside.items():
-            place = ball.real if upright else ball.imag
-            if place.overlaps(border):
+            coordinate = ball.real if upright else ball.imag
+            if coordinate.overlaps(border):
                 return None
-            (first if place < border else second)[k] = ball
+            (first if coordinate < border else second)[k] = ball
         halves = (
             ((left, low, middle, top), (middle, low, right, top))
             if upright
             else ((left, low, right, middle), (left, middle, right, top))
         )
         boxes += [(part, half) for part, half in zip((first, second), halves, strict=True) if part]
-    return found
+    return corners
 
 
 def _ask_sympy(polynomial: sp.Poly, upper: Sequence[acb]) -> list[int]:
-    """The same order from SymPy's values: slow, but exact for roots on a border."""
+    """Return the same order from SymPy's values: slow, but exact for roots on a border."""
     centres = [complex(float(ball.real.mid()), float(ball.imag.mid())) for ball in upper]
     first = polynomial.degree() - 2 * len(upper)
     values = [complex(sp.CRootOf(polynomial, first + 2 * i + 1).evalf(20)) for i in range(len(upper))]

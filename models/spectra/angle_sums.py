@@ -1,4 +1,4 @@
-"""Spectra as sums of cosines of rational angles, which the rules of products and of other matrices of a graph add exactly."""
+"""Spectra as sums of cosines of rational angles: products of graphs and other matrices of a graph add them exactly."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from .matrix import Matrix
 from .solve import spectrum
 
 SMALL = 100
-"""Most rows of a matrix without a closed form whose eigenvalues are computed for it."""
+"""Largest number of rows of a matrix without a closed form whose eigenvalues `angle_sums` computes."""
 
 
 def angle_sums(matrix: Matrix) -> list[tuple[AngleSum, int]] | None:
@@ -15,6 +15,6 @@ def angle_sums(matrix: Matrix) -> list[tuple[AngleSum, int]] | None:
     pairs = matrix.closed_form()
     if pairs is None and matrix.n > SMALL:
         return None
-    known = [(e.exact, e.multiplicity) for e in spectrum(matrix)] if pairs is None else pairs
-    found = [(read(number), times) for number, times in known]
-    return None if any(a is None for a, _ in found) else [(a, times) for a, times in found if a is not None]
+    exact_pairs = [(e.exact, e.multiplicity) for e in spectrum(matrix)] if pairs is None else pairs
+    sums = [(read(number), times) for number, times in exact_pairs]
+    return None if any(a is None for a, _ in sums) else [(a, times) for a, times in sums if a is not None]

@@ -29,15 +29,15 @@ Transfer: TypeAlias = tuple[Polynomial, Polynomial, Polynomial, Polynomial]
 """A 2 x 2 matrix of polynomials, row by row."""
 
 Branch: TypeAlias = tuple[Polynomial, Polynomial]
-"""Of some branches of a node: Π P_k, and Σ_k b_k Q_k Π_(j != k) P_j; see `forest`."""
+"""(Π P_k, Σ_k b_k Q_k Π_(j != k) P_j) over some branches k of a node; see `forest`."""
 
 
 def characteristic(graph: Matrix) -> fmpq_poly:
     """Return the exact characteristic polynomial det(z - G)."""
-    given = graph.entries
-    scale = lcm(*(number.denominator for _, _, number in given))
+    numbers = graph.entries
+    scale = lcm(*(number.denominator for _, _, number in numbers))
     entries = {(i, i): 0 for i in range(graph.n)}
-    entries |= {(i, j): number.numerator * (scale // number.denominator) for i, j, number in given}
+    entries |= {(i, j): number.numerator * (scale // number.denominator) for i, j, number in numbers}
     polynomial = sparse(graph.n, entries, fmpz_poly)
     if polynomial is None:
         rows = [[entries.get((i, j), 0) for j in range(graph.n)] for i in range(graph.n)]
@@ -64,13 +64,14 @@ def cyclic(n: int, entries: Entries, polynomial: Callable[[list[int]], Polynomia
     def at(i: int, j: int) -> int:
         return entries.get((i % n, j % n), 0)
 
+    # transfer matrices ((z - a_j, -b_(j-1) c_(j-1)), (1, 0)); the trace of their product, less both cycles
     one, zero = polynomial([1]), polynomial([0])
     steps: list[Transfer] = [
         (polynomial([-at(j, j), 1]), polynomial([-at(j - 1, j) * at(j, j - 1)]), one, zero) for j in range(n)
     ]
-    whole = pairwise_product(steps, lambda first, last: _times(last, first))
+    product_matrix = pairwise_product(steps, lambda first, last: _times(last, first))
     down, up = prod(at(i, i - 1) for i in range(n)), prod(at(i - 1, i) for i in range(n))
-    return whole[0] + whole[3] - polynomial([down + up])
+    return product_matrix[0] + product_matrix[3] - polynomial([down + up])
 
 
 def forest(n: int, entries: Entries, polynomial: Callable[[list[int]], Polynomial] = fmpz_poly) -> Polynomial | None:
@@ -94,7 +95,7 @@ def forest(n: int, entries: Entries, polynomial: Callable[[list[int]], Polynomia
 
 
 def _parents_first(n: int, entries: Entries) -> list[tuple[int, int]] | None:
-    """The nodes of a forest with their parents (-1 of a root), parents first; None of a cycle."""
+    """Return the nodes of a forest with their parents (-1 for a root), parents first; None if there is a cycle."""
     near: list[set[int]] = [set() for _ in range(n)]
     for i, j in entries:
         if i != j:

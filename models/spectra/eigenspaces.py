@@ -92,51 +92,52 @@ def eigenspaces(matrix: Matrix) -> tuple[Eigenspace, ...]:
     """Return the eigenspaces of a matrix in the order of its spectrum."""
     if matrix.n > LARGEST:
         raise ValueError(f"eigenspaces of {matrix.name}: found {matrix.n} nodes; expected at most {LARGEST}")
-    found: dict[tuple[fmpq, ...], tuple[Vector, ...]] = {}
+    bases: dict[tuple[fmpq, ...], tuple[Vector, ...]] = {}
     spaces = []
     for eigenvalue in spectrum(matrix):
         polynomial = minimal_polynomial(eigenvalue.number)
         key = tuple(polynomial.coeffs())
-        if key not in found:
-            found[key] = _basis(matrix, polynomial)
-            check(matrix, polynomial, found[key])
-            if eigenvalue.geometric not in (None, len(found[key])):
+        if key not in bases:
+            bases[key] = _basis(matrix, polynomial)
+            check(matrix, polynomial, bases[key])
+            if eigenvalue.geometric not in (None, len(bases[key])):
                 raise ProofError(
-                    f"eigenspaces of {matrix.name}: found {len(found[key])} eigenvectors of {eigenvalue}; expected "
+                    f"eigenspaces of {matrix.name}: found {len(bases[key])} eigenvectors of {eigenvalue}; expected "
                     f"{eigenvalue.geometric}"
                 )
-        spaces.append(Eigenspace(eigenvalue, found[key]))
+        spaces.append(Eigenspace(eigenvalue, bases[key]))
     return tuple(spaces)
 
 
 def _basis(matrix: Matrix, polynomial: fmpq_poly) -> tuple[Vector, ...]:
-    """Eigenvectors that every root of a monic irreducible polynomial has."""
-    given, kernel = _rational(matrix), _kernel(value_at(matrix, polynomial))
-    degree, span, basis = int(polynomial.degree()), list[list[fmpq]](), list[Vector]()
+    """Compute the eigenvectors that all roots of a monic irreducible polynomial share."""
+    rational, kernel = _rational(matrix), _kernel(value_at(matrix, polynomial))
+    degree, independent, basis = int(polynomial.degree()), list[list[fmpq]](), list[Vector]()
     for start in kernel:
-        if degree > 1 and fmpq_mat([*span, start]).rank() == len(span):
+        if degree > 1 and fmpq_mat([*independent, start]).rank() == len(independent):
             continue
+        # b_(d-1) = v, b_(k-1) = G b_k + p_k v
         parts = [fmpq_mat(matrix.n, 1, start)]
         for k in range(degree - 1, 0, -1):
-            parts.append(given * parts[-1] + parts[0] * polynomial[k])
+            parts.append(rational * parts[-1] + parts[0] * polynomial[k])
         columns = [[part[i, 0] for i in range(matrix.n)] for part in reversed(parts)]
-        span += columns
+        independent += columns
         basis.append(_whole(columns))
     return tuple(basis)
 
 
 def _rational(matrix: Matrix) -> fmpq_mat:
-    """The matrix in the numbers of FLINT."""
+    """Convert the matrix to rational numbers of FLINT."""
     rows = fmpq_mat(matrix.n, matrix.n)
     for i, j, number in matrix.entries:
         rows[i, j] = to_flint(number)
     return rows
 
 
-def _kernel(whole: fmpz_mat) -> list[list[fmpq]]:
-    """A basis of the vectors that a matrix turns to 0: each is 1 at a column of its own without a pivot."""
-    reduced, below, rank = whole.rref()
-    n, pivots = whole.ncols(), list[int]()
+def _kernel(matrix: fmpz_mat) -> list[list[fmpq]]:
+    """Return a basis of the null space: each vector is 1 at one column without a pivot, 0 at the others."""
+    reduced, below, rank = matrix.rref()
+    n, pivots = matrix.ncols(), list[int]()
     for i in range(rank):
         start = pivots[-1] + 1 if pivots else 0
         pivots.append(next(j for j in range(start, n) if reduced[i, j]))
@@ -150,10 +151,10 @@ def _kernel(whole: fmpz_mat) -> list[list[fmpq]]:
 
 
 def _whole(columns: Sequence[Sequence[fmpq]]) -> Vector:
-    """Entries from the coefficients of 1, γ …, multiplied to whole numbers without a common factor."""
-    numbers = [number for column in columns for number in column]
-    below = lcm(*(int(number.q) for number in numbers))
-    above = gcd(*(int(number.p) * (below // int(number.q)) for number in numbers))
+    """Scale columns of coefficients of 1, γ … to coprime integers and return one entry a row."""
+    coefficients = [number for column in columns for number in column]
+    below = lcm(*(int(number.q) for number in coefficients))
+    above = gcd(*(int(number.p) * (below // int(number.q)) for number in coefficients))
     return tuple(
         tuple(int(number.p) * (below // int(number.q)) // above for number in entry)
         for entry in zip(*columns, strict=True)
@@ -162,16 +163,17 @@ def _whole(columns: Sequence[Sequence[fmpq]]) -> Vector:
 
 def check(matrix: Matrix, polynomial: fmpq_poly, basis: Sequence[Vector]) -> None:
     """Raise ProofError if vectors are no independent eigenvectors of the roots of a monic polynomial."""
-    given, degree = _rational(matrix), int(polynomial.degree())
+    rational, degree = _rational(matrix), int(polynomial.degree())
     for vector in basis:
-        found = given * fmpq_mat([list(map(fmpq, entry)) for entry in vector])
+        image = rational * fmpq_mat([list(map(fmpq, entry)) for entry in vector])
         for i, entry in enumerate(vector):
-            for k in range(degree):
+            for k in range(degree):  # G b_k = b_(k-1) - p_k b_(d-1)
                 expected = (entry[k - 1] if k else 0) - polynomial[k] * entry[-1]
-                if found[i, k] != expected:
+                if image[i, k] != expected:
                     raise ProofError(
                         f"eigenspaces of {matrix.name}: entry {i} of G v and of γ v differ for the roots γ of {polynomial}"
                     )
+    # independent over Q(γ) if all b_k are independent over the rationals
     parts = [[entry[k] for entry in vector] for vector in basis for k in range(degree)]
     if int(fmpz_mat(parts).rank()) != len(parts):
         raise ProofError(f"eigenspaces of {matrix.name}: eigenvectors of the roots of {polynomial} are dependent")

@@ -146,7 +146,7 @@ class Eigenvalue:
 
 
 def _number(value: float | complex | Fraction | sp.Expr) -> Eigenvalue | None:
-    """A number with its float; None for one that is not finite."""
+    """Return a number as an eigenvalue; None if it is not finite."""
     if isinstance(value, complex):
         real, imaginary = _number(value.real), _number(value.imag)
         return None if real is None or imaginary is None else Eigenvalue(real.number + sp.I * imaginary.number, 1)
@@ -159,9 +159,9 @@ def _number(value: float | complex | Fraction | sp.Expr) -> Eigenvalue | None:
 
 def distinct(claims: Sequence[Eigenvalue]) -> bool:
     """Return True if all eigenvalues are proved distinct, False if two agree to 4000 bits."""
-    numbers = [claim.number for claim in claims]
-    brackets = sorted((number.low, number.high) for number in numbers if isinstance(number, RealRoot))
-    if len(brackets) == len(numbers) and all(first[1] <= second[0] for first, second in pairwise(brackets)):
+    values = [claim.number for claim in claims]
+    brackets = sorted((number.low, number.high) for number in values if isinstance(number, RealRoot))
+    if len(brackets) == len(values) and all(first[1] <= second[0] for first, second in pairwise(brackets)):
         return True  # no end is a root
     for bits in (64, 256, 1024, 4096):
         balls = [claim.enclosure(bits) for claim in claims]
@@ -186,10 +186,8 @@ def ordered(claims: Sequence[Eigenvalue]) -> tuple[Eigenvalue, ...]:
 
 
 def _complex_order(a: Eigenvalue, b: Eigenvalue) -> int:
-    """Below 0 if `a` comes first: by real part, downwards, |imaginary part|, lower conjugate.
-
-    Parts that agree to 1024 bits of the moduli are taken to be equal.
-    """
+    """Compare by real part, downwards, then |imaginary part|, then lower conjugate first; below 0 if a comes first."""
+    # floats decide if they differ by more than rounding; parts that agree to 1024 bits count as equal
     gap, room = b.value.real - a.value.real, 2.0**-50 * (abs(a.value) + abs(b.value))
     if room < abs(gap) < math.inf:
         return 1 if gap > 0 else -1
@@ -205,13 +203,13 @@ def _complex_order(a: Eigenvalue, b: Eigenvalue) -> int:
 
 
 def _conjugate(a: Eigenvalue, b: Eigenvalue) -> bool:
-    """True if one number is the mirror image of the other, to 256 bits."""
+    """Return whether two numbers are complex conjugates, to 256 bits."""
     with precision(512):
         return bool(acb(a.enclosure(256)).conjugate().overlaps(acb(b.enclosure(256))))
 
 
 def _midpoint(e: Eigenvalue, bits: int = 4200) -> fmpq:
-    """The exact middle of a ball around a real eigenvalue."""
+    """Return the exact midpoint of a ball around a real eigenvalue."""
     mantissa, exponent = e.enclosure(bits).mid().man_exp()
     return fmpq(mantissa) * fmpq(2) ** int(exponent)
 

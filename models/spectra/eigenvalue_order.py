@@ -1,7 +1,7 @@
 """Exact comparison of the coupling strengths at which modes of a network are lost.
 
 A mode with the real eigenvalue gamma reaches the strength alpha at sigma = alpha / |gamma|.
-Certified balls tell two such values apart; minimal polynomials prove that two are equal.
+Certified balls separate two different values; minimal polynomials prove that two are equal.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from fractions import Fraction
 
 from flint import arb, arb_poly, fmpq_poly
 
-from ..algebra.balls import Ball, precision
+from ..algebra.balls import precision
 from ..algebra.minimal_polynomials import minimal_polynomial
 from ..algebra.rationals import to_flint
 from .eigenvalue import Eigenvalue
@@ -33,21 +33,14 @@ def compare(alpha: Fraction, gamma: Eigenvalue, other_alpha: Fraction, other_gam
             if scaled < here or scaled > here:
                 return 1 if scaled < here else -1
         if bits == 256:
-            polynomial = _one_polynomial(gamma, other_gamma, alpha / other_alpha)
-        if polynomial is not None and _one_root(polynomial, here.union(scaled), bits):
-            return 0
+            # equal numbers have one minimal polynomial: that of gamma against that of factor * other_gamma
+            p, q = minimal_polynomial(gamma.number), minimal_polynomial(other_gamma.number)
+            ratio = to_flint(alpha / other_alpha)
+            polynomial = p if p == q(fmpq_poly([0, 1 / ratio])) * ratio ** q.degree() else None
+        if polynomial is not None:
+            # the polynomial is monotone on the ball around both, so both are its only root there
+            with precision(2 * bits + 64):
+                slope = arb_poly(polynomial.derivative())(here.union(scaled))
+                if slope > 0 or slope < 0:
+                    return 0
         bits *= 2
-
-
-def _one_polynomial(gamma: Eigenvalue, other: Eigenvalue, factor: Fraction) -> fmpq_poly | None:
-    """The minimal polynomial of gamma if it is also that of factor * other, else None."""
-    p, q = minimal_polynomial(gamma.number), minimal_polynomial(other.number)
-    ratio = to_flint(factor)
-    return p if p == q(fmpq_poly([0, 1 / ratio])) * ratio ** q.degree() else None
-
-
-def _one_root(polynomial: fmpq_poly, ball: Ball, bits: int) -> bool:
-    """True if the polynomial is proved monotone on the ball: it has at most one root there."""
-    with precision(2 * bits + 64):
-        slope = arb_poly(polynomial.derivative())(ball)
-        return bool(slope > 0 or slope < 0)

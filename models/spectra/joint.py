@@ -25,7 +25,7 @@ from .matrix import Matrix
 from .solve import DENSE_LIMIT, spectrum
 
 BITS = (64, 256, 1024)
-"""Precisions at which sums of eigenvalues are told apart."""
+"""Precisions in bits at which sums of eigenvalues are separated, tried in this order."""
 
 PRIME, TRIED = 97, 100
 """Factors t = k/PRIME of a further matrix are tried, k = 1, 2, …; few of them make two sums equal."""
@@ -72,10 +72,10 @@ class _Combination:
 
     @property
     def entries(self) -> tuple[tuple[int, int, Fraction], ...]:
-        found = {(i, j): number for i, j, number in self.first.entries}
+        sums = {(i, j): number for i, j, number in self.first.entries}
         for i, j, number in self.second.entries:
-            found[i, j] = found.get((i, j), Fraction(0)) + self.factor * number
-        return tuple((i, j, number) for (i, j), number in found.items() if number)
+            sums[i, j] = sums.get((i, j), Fraction(0)) + self.factor * number
+        return tuple((i, j, number) for (i, j), number in sums.items() if number)
 
     @property
     def link_count(self) -> int:
@@ -126,7 +126,7 @@ def joint_spectrum(graphs: Sequence[Matrix]) -> tuple[JointEigenvalue, ...]:
 
 @lru_cache(maxsize=32)
 def _joint(graphs: tuple[Matrix, ...]) -> tuple[JointEigenvalue, ...]:
-    """The same of graphs that are known to be a sequence."""
+    """Compute `joint_spectrum` of a tuple of graphs, which a cache can hold."""
     _check(graphs)
     modes: Modes = tuple(((e,), e) for e in spectrum(graphs[0]))
     combined = graphs[0]
@@ -139,17 +139,17 @@ def _check(graphs: Sequence[Matrix]) -> None:
     """Raise ValueError unless the graphs have the same nodes and their matrices commute."""
     sizes = sorted({graph.n for graph in graphs})
     if len(sizes) != 1:
-        found = " and ".join(map(str, sizes)) or "no"
-        raise ValueError(f"joint spectrum: found graphs of {found} nodes; expected graphs on the same nodes")
+        node_counts = " and ".join(map(str, sizes)) or "no"
+        raise ValueError(f"joint spectrum: found graphs of {node_counts} nodes; expected graphs on the same nodes")
     if len(graphs) == 1:
         return
     if sizes[0] > DENSE_LIMIT:
         raise ValueError(f"joint spectrum: found {sizes[0]} nodes; expected at most {DENSE_LIMIT} for several graphs")
     itself = fmpq_poly([0, 1])
-    whole = [value_at(graph, itself) for graph in graphs]
-    for i, first in enumerate(whole):
+    matrices = [value_at(graph, itself) for graph in graphs]
+    for i, first in enumerate(matrices):
         for j in range(i):
-            if whole[j] * first != first * whole[j]:
+            if matrices[j] * first != first * matrices[j]:
                 raise ValueError(
                     f"joint spectrum of {graphs[j].name}({sizes[0]}) and {graphs[i].name}({sizes[0]}): found matrices that do "
                     "not commute; expected graphs with common modes, such as any undirected graph and a complete one"
@@ -157,36 +157,31 @@ def _check(graphs: Sequence[Matrix]) -> None:
 
 
 def _joined(modes: Modes, combined: Matrix, graph: Matrix) -> tuple[Modes, Matrix]:
-    """The modes with their eigenvalues on one more graph, and the combination whose eigenvalues are theirs."""
-    own = tuple(spectrum(graph))
-    pairs = [(parts, e) for parts, _ in modes for e in own]
+    """Return the modes with their eigenvalues on one more graph, and the combination A + t B that names them."""
+    # the first t for which the balls around all sums a + t b are disjoint
+    eigenvalues = tuple(spectrum(graph))
+    pairs = [(parts, e) for parts, _ in modes for e in eigenvalues]
     for bits, k in product(BITS, range(1, TRIED)):
         factor = Fraction(k, PRIME)
-        sums = _sums([number for _, number in modes], own, factor, bits)
         with precision(2 * bits):
+            share, second = fmpq(k, PRIME), [b.enclosure(bits) for b in eigenvalues]
+            sums = [acb(a.enclosure(bits) + share * b) for _, a in modes for b in second]
             if disjoint(sums):
                 break
     else:
         raise ProofError(
             f"joint spectrum of {graph.name}({graph.n}): found equal sums for {TRIED} factors; expected one"
         )
+    # each eigenvalue of A + t B lies in the ball of one pair (a, b)
     combined = _Combination(combined, graph, factor)
-    found = []
+    extended = []
     for number in spectrum(combined):
         with precision(2 * bits):
             ball = acb(number.enclosure(bits))
-            at = [pair for pair, own_sum in zip(pairs, sums, strict=True) if ball.overlaps(own_sum)]
+            at = [pair for pair, pair_sum in zip(pairs, sums, strict=True) if ball.overlaps(pair_sum)]
         if len(at) != 1:
             raise ProofError(
                 f"joint spectrum of {graph.name}({graph.n}): found {len(at)} pairs for {number}; expected one"
             )
-        found.append(((*at[0][0], at[0][1]), number))
-    return tuple(found), combined
-
-
-def _sums(first: Sequence[Eigenvalue], second: Sequence[Eigenvalue], factor: Fraction, bits: int) -> list[acb]:
-    """Balls that hold the sums a + t b of all pairs."""
-    with precision(2 * bits):
-        share = fmpq(factor.numerator, factor.denominator)
-        pairs = product((a.enclosure(bits) for a in first), [b.enclosure(bits) for b in second])
-        return [acb(a + share * b) for a, b in pairs]
+        extended.append(((*at[0][0], at[0][1]), number))
+    return tuple(extended), combined

@@ -23,7 +23,7 @@ def blocks(graph: Matrix, polynomial: fmpq_poly, multiplicity: int) -> Blocks:
     if multiplicity == 1 or graph.diagonalisable:
         return ((1, multiplicity),)
     first = power = value_at(graph, polynomial)
-    sums, longer = [0], [multiplicity]  # of min(size, k); number of blocks longer than k
+    sums, longer = [0], [multiplicity]  # Σ min(size, k) over the blocks; number of blocks longer than k
     while sums[-1] < multiplicity:
         sums.append((graph.n - int(power.rank())) // polynomial.degree())
         longer.append(sums[-1] - sums[-2])
@@ -48,23 +48,23 @@ def nullity(graph: Matrix, polynomial: fmpq_poly) -> int:
 
 @lru_cache(maxsize=4)
 def _whole(graph: Matrix) -> tuple[fmpz_mat, int]:
-    """G times the common denominator of its entries, and that denominator."""
+    """Return G times the common denominator of its entries, and that denominator."""
     scale = lcm(*(number.denominator for _, _, number in graph.entries))
-    whole = fmpz_mat(graph.n, graph.n)
+    scaled = fmpz_mat(graph.n, graph.n)
     for i, j, number in graph.entries:
-        whole[i, j] = int(number * scale)
-    return whole, scale
+        scaled[i, j] = int(number * scale)
+    return scaled, scale
 
 
 def value_at(graph: Matrix, polynomial: fmpq_poly) -> fmpz_mat:
     """Return a multiple of p(G) with whole entries, p a polynomial with rational coefficients."""
     g, scale = _whole(graph)
-    whole = polynomial.numer()
-    d, n = whole.degree(), graph.n
+    coefficients = polynomial.numer()
+    d, n = coefficients.degree(), graph.n
     value = fmpz_mat(n, n)
-    for k in range(d, -1, -1):
+    for k in range(d, -1, -1):  # Horner's scheme, times scale**d
         value = value * g
-        shift = int(whole[k]) * scale ** (d - k)
+        shift = int(coefficients[k]) * scale ** (d - k)
         value = value + fmpz_mat([[shift * (i == j) for j in range(n)] for i in range(n)])
     return value
 

@@ -26,13 +26,13 @@ from .eigenvalue import ProofError
 from .matrix import Matrix
 
 PRIMES = 3
-"""Number of primes."""
+"""Number of primes that `check_modulo` takes."""
 
 BITS = 61
-"""Primes lie between 2**BITS and twice that."""
+"""The primes lie between 2**BITS and 2**(BITS + 1), so that residues fit into 64 bits."""
 
 LONGEST = 10_000
-"""Most terms of a square root as a sum of roots of unity."""
+"""Largest number of roots of unity to which `_surd` expands a square root."""
 
 Powers = tuple[Fraction, tuple[tuple[Fraction, Fraction], ...]]
 """shift + Σ b exp(2πit) as (shift, ((t, b), …))."""
@@ -43,24 +43,24 @@ def check_modulo(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]]) -> float |
 
     A hash of the closed form picks the primes.
     """
-    numbers = [(_powers(sp.sympify(number)), times) for number, times in pairs]
-    known = [(powers, times) for powers, times in numbers if powers is not None]
-    if len(known) != len(numbers):
+    all_powers = [(_powers(sp.sympify(number)), times) for number, times in pairs]
+    claims = [(powers, times) for powers, times in all_powers if powers is not None]
+    if len(claims) != len(all_powers):
         return None
-    m = lcm(1, *(t.denominator for (_, terms), _ in known for t, _ in terms))
+    m = lcm(1, *(t.denominator for (_, terms), _ in claims for t, _ in terms))
     seed = f"{graph.name} {graph.n} {graph.options} {graph.link_count} {m}"
     for p, _ in zip(_primes(m, seed), range(PRIMES), strict=False):
-        found = _claimed(known, m, p)
-        if found != _characteristic(graph, p):
+        claimed = _claimed(claims, m, p)
+        if claimed != _characteristic(graph, p):
             raise ProofError(
                 f"spectrum of {graph.name} {graph.n}: the eigenvalues do not multiply out to the characteristic "
                 f"polynomial modulo {p}: correct the closed form"
             )
-    return _error_probability(graph, known, m) ** PRIMES
+    return _error_probability(graph, claims, m) ** PRIMES
 
 
 def _powers(number: sp.Expr) -> Powers | None:
-    """A number as a sum of roots of unity."""
+    """Return a number as a sum of roots of unity; None if it has no such form here."""
     form = cosines.linear_exponential(number)
     if form is not None:
         a, b, k, m = form
@@ -81,9 +81,9 @@ def _powers(number: sp.Expr) -> Powers | None:
 
 
 def _surd(number: sp.Expr) -> Powers | None:
-    """a + b √c, c = 1 mod 4, by the sum Σ exp(2πik²/c) = √c of Gauss (Washington 1997, chapter 6); else None."""
-    a, rest = number.as_coeff_Add()
-    b, root = rest.as_coeff_Mul()
+    """Expand a + b √c, c = 1 mod 4, by Gauss: Σ exp(2πik²/c) = √c (Washington 1997, chapter 6); else None."""
+    a, scaled_root = number.as_coeff_Add()
+    b, root = scaled_root.as_coeff_Mul()
     if not (a.is_Rational and b.is_Rational and root.is_Pow and root.exp == sp.S.Half and root.base.is_Integer):
         return None
     c, factor = int(root.base), to_fraction(b)
@@ -93,11 +93,11 @@ def _surd(number: sp.Expr) -> Powers | None:
 
 
 def _primes(m: int, seed: str) -> Iterator[int]:
-    """Primes p = 1 mod m of BITS + 1 bits, each search begun at a place that a hash gives."""
+    """Yield primes p = 1 mod m of BITS + 1 bits; a hash gives the start of each search."""
     count = 0
     while True:
-        place = int.from_bytes(sha256(f"{seed} {count}".encode()).digest()[:8], "big") % 2**BITS
-        p = 2**BITS + place - place % m + (1 - 2**BITS) % m
+        start = int.from_bytes(sha256(f"{seed} {count}".encode()).digest()[:8], "big") % 2**BITS
+        p = 2**BITS + start - start % m + (1 - 2**BITS) % m
         while not fmpz(p).is_prime():
             p += m
         count += 1
@@ -106,28 +106,29 @@ def _primes(m: int, seed: str) -> Iterator[int]:
 
 
 def _unit(m: int, p: int) -> int:
-    """A root of unity of order m modulo p."""
-    parts = [int(q) for q, _ in fmpz(m).factor()]
+    """Return a root of unity of order m modulo p: no power m/q of it, q a prime factor of m, is 1."""
+    prime_factors = [int(q) for q, _ in fmpz(m).factor()]
     candidates = (pow(g, (p - 1) // m, p) for g in range(2, p))
-    return next(z for z in candidates if all(pow(z, m // q, p) != 1 for q in parts))
+    return next(z for z in candidates if all(pow(z, m // q, p) != 1 for q in prime_factors))
 
 
 def _residue(x: Fraction, p: int) -> int:
     return x.numerator * (1 if x.denominator == 1 else pow(x.denominator, -1, p)) % p
 
 
-def _claimed(numbers: Sequence[tuple[Powers, int]], m: int, p: int) -> nmod_poly:
-    """The product of (z - number)^times modulo p."""
+def _claimed(claims: Sequence[tuple[Powers, int]], m: int, p: int) -> nmod_poly:
+    """Return the product of (z - number)^times modulo p."""
     unit = _unit(m, p)
     factors = []
-    for (shift, terms), times in numbers:
+    for (shift, terms), times in claims:
         value = _residue(shift, p) + sum(_residue(b, p) * pow(unit, int(t * m), p) for t, b in terms)
         factors.append(nmod_poly([-value % p, 1], p) ** times)
     return pairwise_product(factors, mul)
 
 
 def _characteristic(graph: Matrix, p: int) -> nmod_poly:
-    """det(z - G) modulo p."""
+    """Return det(z - G) modulo p."""
+    # weights repeat: convert each only once
     residues: dict[Fraction, int] = {}
     entries = {(i, i): 0 for i in range(graph.n)}
     for row, column, number in graph.entries:
@@ -144,14 +145,15 @@ def _characteristic(graph: Matrix, p: int) -> nmod_poly:
     return nmod_mat(graph.n, graph.n, flat, p).charpoly()
 
 
-def _error_probability(graph: Matrix, numbers: Sequence[tuple[Powers, int]], m: int) -> float:
-    """About the largest share of primes that divide the norm of a coefficient of the difference."""
-    parts = [x for (a, terms), _ in numbers for x in (a, *(b for _, b in terms))]
+def _error_probability(graph: Matrix, claims: Sequence[tuple[Powers, int]], m: int) -> float:
+    """Estimate the largest share of primes that divide the norm of a coefficient of the difference."""
+    # bound the coefficients by the largest eigenvalue: row sums of G, and the claimed numbers themselves
+    parts = [x for (a, terms), _ in claims for x in (a, *(b for _, b in terms))]
     scale = lcm(*{x.denominator for x in (*parts, *(w for _, _, w in graph.entries))})
     rows = [0.0] * graph.n
     for row, _, number in graph.entries:
         rows[row] += abs(number.numerator) / number.denominator
-    largest = max(*rows, *(float(abs(a) + sum(abs(b) for _, b in c)) for (a, c), _ in numbers))
+    largest = max(*rows, *(float(abs(a) + sum(abs(b) for _, b in c)) for (a, c), _ in claims))
     units = int(fmpz(m).euler_phi())
     bad = units * (graph.n * log2(1 + scale * largest) + 1) / BITS
     # There are about 2**BITS / (units * log of one) primes.

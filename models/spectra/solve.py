@@ -32,7 +32,7 @@ from .modular import check_modulo
 from .spectrum import Spectrum
 
 DENSE_LIMIT = 1000
-"""Largest matrix without a closed form."""
+"""Largest number of rows of a matrix without a closed form; exact factors of larger ones take too long."""
 
 
 class Proof(StrEnum):
@@ -55,7 +55,12 @@ def spectrum(graph: Matrix, proof: Proof | None = None) -> Spectrum:
     """Return the exact spectrum of a rational matrix."""
     try:
         pairs = graph.closed_form()
-        return _by_factors(graph) if pairs is None else _by_pairs(graph, pairs, proof or Proof.of_size(graph.n))
+        if pairs is None:
+            return _by_factors(graph)
+        proof = proof or Proof.of_size(graph.n)
+        if proof is Proof.EXACT:
+            return _proved(graph, [_with_blocks(graph, pair) for pair in pairs], characteristic(graph))
+        return _unverified(graph, pairs, check_modulo(graph, pairs) if proof is Proof.MODULAR else None)
     except ProofError as error:
         if isinstance(graph.name, OwnFile):
             raise ValueError(f"{graph.name.place}: {error}") from None
@@ -68,7 +73,7 @@ def has_closed_form(graph: Matrix) -> bool:
 
 
 def _by_factors(graph: Matrix) -> Spectrum:
-    """The roots of the irreducible factors of the characteristic polynomial."""
+    """Compute the roots of the irreducible factors of the characteristic polynomial."""
     if graph.n > DENSE_LIMIT:
         raise ValueError(
             f"topology {graph.name}: n = {graph.n} without a closed form; expected at most {DENSE_LIMIT} "
@@ -77,21 +82,14 @@ def _by_factors(graph: Matrix) -> Spectrum:
     polynomial = characteristic(graph)
     claims = []
     for factor, count in polynomial.factor()[1]:
-        whole = tuple(int(c) for c in factor.numer().coeffs())
+        coefficients = tuple(int(c) for c in factor.numer().coeffs())
         jordan = blocks(graph, factor, count)
-        claims += [Eigenvalue(number, count, jordan) for number in written(factor) or roots(whole)]
+        claims += [Eigenvalue(number, count, jordan) for number in written(factor) or roots(coefficients)]
     return _proved(graph, claims, polynomial)
 
 
-def _by_pairs(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]], proof: Proof) -> Spectrum:
-    """The spectrum of a closed form."""
-    if proof is Proof.EXACT:
-        return _proved(graph, [_with_blocks(graph, pair) for pair in pairs], characteristic(graph))
-    return _unverified(graph, pairs, check_modulo(graph, pairs) if proof is Proof.MODULAR else None)
-
-
 def _unverified(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]], error_probability: float | None) -> Spectrum:
-    """The spectrum of a closed form that is not multiplied out over the rationals."""
+    """Return the spectrum of a closed form that is not multiplied out over the rationals."""
     if isinstance(pairs, LazyEigenvalues):
         lazy = LazyEigenvalues(len(pairs), pairs.n, lambda k: _candidate(pairs[k], True))
         return Spectrum(lazy, error_probability=error_probability)
@@ -101,12 +99,12 @@ def _unverified(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]], error_proba
 
 
 def _candidate(pair: tuple[sp.Expr, int], simple: bool) -> Eigenvalue:
-    """An eigenvalue of a closed form; its Jordan blocks are known if all are `simple`."""
+    """Return an eigenvalue of a closed form; its Jordan blocks have size 1 if `simple`, else they are not computed."""
     return Eigenvalue(sp.sympify(pair[0]), pair[1], ((1, pair[1]),) if simple else None)
 
 
 def _with_blocks(graph: Matrix, pair: tuple[sp.Expr, int]) -> Eigenvalue:
-    """An eigenvalue of a closed form with its Jordan blocks."""
+    """Return an eigenvalue of a closed form with its Jordan blocks."""
     number, count = sp.sympify(pair[0]), pair[1]
     if count == 1 or graph.diagonalisable:
         return _candidate(pair, graph.diagonalisable)
@@ -114,13 +112,14 @@ def _with_blocks(graph: Matrix, pair: tuple[sp.Expr, int]) -> Eigenvalue:
 
 
 def _proved(graph: Matrix, claims: Sequence[Eigenvalue], polynomial: fmpq_poly) -> Spectrum:
-    """The spectrum of eigenvalues that multiply out to the polynomial; else ProofError."""
+    """Return the spectrum if the eigenvalues multiply out to the polynomial; else raise ProofError."""
     check(claims, polynomial, f"{graph.name} {graph.n}")
     return Spectrum(ordered(claims), verified=True)
 
 
 def check(claims: Iterable[Eigenvalue], characteristic: fmpq_poly, name: str) -> None:
     """Multiply eigenvalues out; ProofError if that is not the exact characteristic polynomial."""
+    # collect the eigenvalues by their minimal polynomials: each group must be all its roots, equally often
     groups: dict[tuple[int, ...], list[Eigenvalue]] = {}
     for claim in claims:
         groups.setdefault(_key(claim.number), []).append(claim)
@@ -144,7 +143,7 @@ def check(claims: Iterable[Eigenvalue], characteristic: fmpq_poly, name: str) ->
 
 
 def _key(number: Number) -> tuple[int, ...]:
-    """The minimal polynomial with coprime integer coefficients, the leading one positive."""
+    """Return the minimal polynomial with coprime integer coefficients, the leading one positive."""
     if isinstance(number, Root):
         return number.polynomial
     return tuple(int(c) for c in minimal_polynomial(number).numer().coeffs())

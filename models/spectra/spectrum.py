@@ -60,11 +60,11 @@ class Spectrum(HasLatex):
         return len(self.eigenvalues)
 
     @overload
-    def __getitem__(self, place: int) -> Eigenvalue: ...
+    def __getitem__(self, index: int) -> Eigenvalue: ...
     @overload
-    def __getitem__(self, place: slice) -> Sequence[Eigenvalue]: ...
-    def __getitem__(self, place: int | slice) -> Eigenvalue | Sequence[Eigenvalue]:
-        return self.eigenvalues[place]
+    def __getitem__(self, index: slice) -> Sequence[Eigenvalue]: ...
+    def __getitem__(self, index: int | slice) -> Eigenvalue | Sequence[Eigenvalue]:
+        return self.eigenvalues[index]
 
     def __iter__(self) -> Iterator[Eigenvalue]:
         return iter(self.eigenvalues)
@@ -191,8 +191,8 @@ def table(spectrum: Spectrum, limit: int | None = None) -> str:
     wide = [max(len(line[k]) for line in (head, *lines)) for k in range(3)]
     rows = [f"{a:<{wide[0]}}  {b:>{wide[1]}}  {c:>{wide[2]}}" for a, b, c in (head, *lines)]
     if spectrum.defective:
-        words = ("Jordan blocks", *(_blocks(e) for e in shown))
-        rows = [f"{row}  {word}" for row, word in zip(rows, words, strict=True)]
+        block_texts = ("Jordan blocks", *(_blocks(e) for e in shown))
+        rows = [f"{row}  {word}" for row, word in zip(rows, block_texts, strict=True)]
     if many:
         rows.insert(half + 1, f"… ({len(spectrum) - 2 * half} more)")
     state = "proved" if spectrum.verified else "not proved (closed form of a large graph)"
@@ -208,7 +208,7 @@ def table(spectrum: Spectrum, limit: int | None = None) -> str:
 
 
 def _blocks(e: Eigenvalue) -> str:
-    """Sizes of blocks, as 3, 1 (2 times)."""
+    """Return sizes of Jordan blocks as text, such as 3, 1 (2 times)."""
     if e.blocks is None:
         return "not computed"
     return ", ".join(f"{size}" if times == 1 else f"{size} ({times} times)" for size, times in e.blocks)

@@ -1,6 +1,6 @@
 """Spectra of matrices of rational functions: characteristic polynomial, factors, and roots where it factors.
 
-What is said holds for symbols as such: for particular numbers eigenvalues may coincide.
+All results hold for generic symbols; for particular numbers eigenvalues may coincide.
 """
 
 from __future__ import annotations
@@ -54,23 +54,22 @@ class SymbolicSpectrum:
 
 def symbolic_spectrum(matrix: sp.ImmutableDenseMatrix, name: str) -> SymbolicSpectrum:
     """Return the characteristic polynomial of a matrix of rational functions, factored."""
-    given = DomainMatrix.from_Matrix(matrix)
-    coefficients = [given.domain.to_sympy(c) for c in given.charpoly()]
+    over_field = DomainMatrix.from_Matrix(matrix)
+    coefficients = [over_field.domain.to_sympy(c) for c in over_field.charpoly()]
     polynomial = sp.Poly(coefficients, Z)
-    whole = sp.numer(sp.together(polynomial.as_expr()))
-    factors = [(sp.Poly(f, Z), count) for f, count in sp.factor_list(whole)[1] if f.has(Z)]
-    monic = tuple((_monic(f), count) for f, count in sorted(factors, key=lambda f: (f[0].degree(), str(f[0]))))
+    numerator = sp.numer(sp.together(polynomial.as_expr()))
+    factors = [(sp.Poly(f, Z), count) for f, count in sp.factor_list(numerator)[1] if f.has(Z)]
+    monic = tuple(
+        (sp.Poly([sp.cancel(c / f.LC()) for c in f.all_coeffs()], Z), count)
+        for f, count in sorted(factors, key=lambda f: (f[0].degree(), str(f[0])))
+    )
     if sp.cancel(sp.expand(_product(monic)) - polynomial.as_expr()) != 0:
         raise ProofError(f"spectrum of {name}: the factors do not multiply to the characteristic polynomial")
     return SymbolicSpectrum(polynomial, monic)
 
 
-def _monic(f: sp.Poly) -> sp.Poly:
-    return sp.Poly([sp.cancel(c / f.LC()) for c in f.all_coeffs()], Z)
-
-
 def _roots(factor: sp.Poly) -> list[sp.Expr]:
-    """The roots of a monic factor of degree 1 or 2; none of a higher one."""
+    """Return the roots of a monic factor of degree 1 or 2; none of a higher one."""
     c = factor.all_coeffs()
     if len(c) == 2:
         return [-c[1]]

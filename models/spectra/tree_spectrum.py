@@ -50,7 +50,7 @@ def kirchhoff_index(graph: WeightedGraph) -> Fraction:
 
 
 def _lowest(graph: WeightedGraph, what: str) -> tuple[Fraction, Fraction]:
-    """The coefficients of z and z² of det(z - G)."""
+    """Return the coefficients of z and z² of det(z - G)."""
     if graph.asymmetry:
         raise ValueError(f"{what}: found {graph.asymmetry} in {graph.name}; expected an undirected graph")
     if graph.n > DENSE_LIMIT:
