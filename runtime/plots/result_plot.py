@@ -23,9 +23,9 @@ CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
 REALISATION = "realisation"
 """Name of the axis of random realisations."""
 FINEST = 1000
-"""Largest number of values per axis of a map: a figure has fewer pixels."""
+"""Largest number of drawn values per axis of a map; longer axes are thinned."""
 ROUNDING = 1e-9
-"""Draw synchronisation errors below this value as zero: solvers leave errors of this size."""
+"""Draw synchronisation errors below this value as zero."""
 MARKED = 60
 """Largest number of cells drawn with a dot each: more dots would hide the line."""
 
