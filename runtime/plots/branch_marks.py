@@ -14,6 +14,7 @@ MARKERS = {
     BifurcationKind.GRAZING: "^",
     BifurcationKind.STICK_LOSS: "v",
 }
+"""Marker of each kind of bifurcation."""
 STABLE: dict[str, Any] = {"linestyle": "-", "linewidth": 1.2}
 UNSTABLE: dict[str, Any] = {"linestyle": "--", "dashes": (2.5, 1.2), "linewidth": 0.8}
 MARK: dict[str, Any] = {

@@ -45,7 +45,7 @@ def as_csv(table: Table) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(table.columns)
-    writer.writerows([_cell(value) for value in row] for row in table.rows)
+    writer.writerows([_csv_text(value) for value in row] for row in table.rows)
     return text.getvalue()
 
 
@@ -54,8 +54,7 @@ def status_names(status: xr.DataArray) -> list[str]:
     return [Status(int(code)).name.lower() for code in np.ravel(status.values)]
 
 
-def _cell(value: object) -> str:
-    """Text of one entry."""
+def _csv_text(value: object) -> str:
     if value is None:
         return ""
     if isinstance(value, (float, np.floating)):

@@ -34,9 +34,10 @@ from .result_plot import draw_result
 from .style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, bands, note, symbol
 
 SAMPLES = 400
-"""Samples of an orbit in a period of the drive."""
+"""Points per drive period of a drawn orbit: enough for a smooth curve."""
 
 DOTS: dict[str, Any] = {"linestyle": "none", "marker": "."}
+"""Style of points without a line."""
 
 
 def drawn(value: object, ax: Axes | None, **options: Any) -> Axes:
@@ -72,32 +73,33 @@ def _(value: Plane, axes: Axes) -> Axes:
 
 @_draw.register
 def _(value: Exponents, axes: Axes) -> Axes:
-    """Exponents over a strength as a line, over two numbers of a mode as dots, else in order."""
-    label, numbers = r"exponent $\Lambda$ per unit of $\tau$", value.alpha.reshape(len(value.alpha), -1)
-    columns = np.concatenate([numbers.real, numbers.imag], axis=1).T if np.iscomplexobj(numbers) else numbers.T
+    """Draw exponents over a strength as a line, over two strengths of a mode as dots, else in order."""
+    label, strengths = r"exponent $\Lambda$ per unit of $\tau$", value.alpha.reshape(len(value.alpha), -1)
+    columns = np.concatenate([strengths.real, strengths.imag], axis=1).T if np.iscomplexobj(strengths) else strengths.T
+    # two strengths, or real and imaginary part of one: coloured dots in their plane, white at zero
     if len(columns) == 2:
         names = (r"$\alpha$", r"$\beta$") if value.alpha.ndim == 1 else (r"$\alpha_1$", r"$\alpha_2$")
         colour = finite(value.exponent)
         top = float(np.nanmax(np.abs(colour), initial=0.0)) or 1.0
-        look: dict[str, Any] = {"cmap": "RdBu_r", "s": 14.0, "edgecolors": BLACK, "linewidths": 0.3}
-        dots = axes.scatter(columns[0], columns[1], c=colour, vmin=-top, vmax=top, **look)
+        style: dict[str, Any] = {"cmap": "RdBu_r", "s": 14.0, "edgecolors": BLACK, "linewidths": 0.3}
+        dots = axes.scatter(columns[0], columns[1], c=colour, vmin=-top, vmax=top, **style)
         axes.set(xlabel=names[0], ylabel=names[1])
         axes.figure.colorbar(dots, ax=axes, label=label)
         return axes
     axes.axhline(0.0, color=BLACK, linewidth=0.6)
-    places = value.alpha if value.on_a_line else np.arange(len(value.alpha))
-    axes.errorbar(places, finite(value.exponent), 2 * finite(value.stderr), color=BLUE)
+    x = value.alpha if value.on_a_line else np.arange(len(value.alpha))
+    axes.errorbar(x, finite(value.exponent), 2 * finite(value.stderr), color=BLUE)
     axes.set(xlabel=r"strength of a mode $\alpha$" if value.on_a_line else "number of the mode", ylabel=label)
     return axes
 
 
 @_draw.register
 def _(value: Thresholds, axes: Axes) -> Axes:
-    """Share of synchronous starts over sigma; grey: at least half; bars: the probe's prediction,
-    and where exponents are negative, with two standard errors.
-    """
+    """Draw the share of synchronous starts over sigma, with predicted intervals above."""
+    # grey where at least half of the starts synchronise
     bands(axes, value.direct.intervals)
     axes.plot(value.direct.x, value.direct.share, color=BLUE, drawstyle="steps-mid", label="simulated")
+    # intervals above the curve: predicted by the probe, and of negative exponents with two standard errors
     for k, (low, high) in enumerate(value.predicted):
         axes.plot([low, high], [1.06, 1.06], color=ORANGE, marker="|", label="" if k else "predicted by the probe")
     for k, (ends, errors) in enumerate(zip(value.exponents.intervals, value.exponents.errors, strict=True)):
@@ -112,7 +114,7 @@ def _(value: Thresholds, axes: Axes) -> Axes:
 
 @_draw.register
 def _(value: Basin, axes: Axes) -> Axes:
-    """First two components of the first node at the start, by what became of it."""
+    """Draw the first two initial components of the first node, coloured by the fate of the start."""
     initial, names = value.data.initial.values[:, :2, 0], [str(name) for name in value.data.component.values[:2]]
     across, up = (initial[:, 0], initial[:, -1])
     colours = (BLUE, GREEN, ORANGE, PURPLE, BLACK, GREY)
@@ -139,12 +141,12 @@ def _(value: Lyapunov, axes: Axes) -> Axes:
 
 @_draw.register
 def _(value: ClusterExponents, axes: Axes) -> Axes:
-    """The exponent of each block with two standard errors, coloured by its verdict."""
+    """Draw the exponent of each block with two standard errors, coloured by its verdict."""
     colours = {BlockVerdict.STABLE: BLUE, BlockVerdict.UNDECIDED: GREY, BlockVerdict.UNSTABLE: ORANGE}
     axes.axhline(0.0, color=BLACK, linewidth=0.6)
     for k, verdict in enumerate(value.verdicts):
         axes.errorbar([k + 1], finite(value.exponent[[k]]), 2 * value.stderr[[k]], color=colours[verdict], fmt="o")
-    names = [f"block {k + 1}\nclusters {', '.join(str(c + 1) for c in own)}" for k, own in enumerate(value.intertwined)]
+    names = [f"block {k + 1}\nclusters {', '.join(str(c + 1) for c in row)}" for k, row in enumerate(value.intertwined)]
     axes.set_xticks(range(1, len(names) + 1), names)
     axes.set_ylabel("exponent per unit of time")
     axes.margins(x=0.2)
@@ -153,7 +155,7 @@ def _(value: ClusterExponents, axes: Axes) -> Axes:
 
 @_draw.register
 def _(value: Equilibrium, axes: Axes) -> Axes:
-    """The eigenvalues in the complex plane; those that grow stand out."""
+    """Draw the eigenvalues in the complex plane, orange where perturbations grow."""
     grows = value.eigenvalues.real > 0.0 if value.growing else np.zeros(len(value.eigenvalues), dtype=bool)
     axes.axvline(0.0, color=BLACK, linewidth=0.6)
     for chosen, colour in ((~grows, BLUE), (grows, ORANGE)):
@@ -165,7 +167,8 @@ def _(value: Equilibrium, axes: Axes) -> Axes:
 
 @_draw.register
 def _(value: PeriodicOrbit, axes: Axes) -> Axes:
-    """The closed curve of the first two components; a dot begins each period."""
+    """Draw the closed curve of the first two components, with a dot at the start of each period."""
+    # integrate one node without links over the period of the orbit
     start = {name: [x] for name, x in zip(value.components, value.state.tolist(), strict=True)}
     one = value.scene.replace(
         topology=Topology("one", 1, ()),
@@ -196,24 +199,25 @@ def _(value: Skeleton, axes: Axes) -> Axes:
 
 
 def _branches(branches: tuple[Branch, ...], axes: Axes) -> Axes:
-    """First component at the start of a period: solid where stable, dashed where unstable."""
+    """Draw the first component at the start of a period: solid where stable, dashed where unstable."""
+    # one colour for each number of drive periods; `legend` holds one entry for each style that is drawn
     colours = (PURPLE, BLUE, ORANGE, GREEN)
     counts = sorted({branch.orbits[0].periods for branch in branches})
-    seen: dict[str, dict[str, Any]] = {
+    legend: dict[str, dict[str, Any]] = {
         f"{n} drive period{'s' * (n > 1)}": {"color": colours[k % len(colours)]} for k, n in enumerate(counts)
     }
     for branch in branches:
         colour = colours[counts.index(branch.orbits[0].periods) % len(colours)]
         for stable, values, states in stretches(branch):
             axes.plot(values, states[:, 0], color=colour, **(STABLE if stable else UNSTABLE))
-            seen["stable" if stable else "unstable"] = {"color": BLACK, **(STABLE if stable else UNSTABLE)}
+            legend["stable" if stable else "unstable"] = {"color": BLACK, **(STABLE if stable else UNSTABLE)}
         for turn in branch.bifurcations:
             axes.plot([turn.value], [turn.orbit.state[0]], color=colour, marker=MARKERS[turn.kind], **MARK)
-            seen[str(turn.kind)] = {"color": BLACK, "marker": MARKERS[turn.kind], **MARK}
+            legend[str(turn.kind)] = {"color": BLACK, "marker": MARKERS[turn.kind], **MARK}
     if branches:
         name = symbol(branches[0].orbits[0].components[0])
         axes.set(xlabel=symbol(branches[0].name), ylabel=f"{name} at the beginning of a period")
-        handles = [Line2D([], [], label=label, **style) for label, style in seen.items()]
+        handles = [Line2D([], [], label=label, **style) for label, style in legend.items()]
         axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=6)
     return axes
 
@@ -222,25 +226,26 @@ def stretches(branch: Branch) -> list[tuple[bool, np.ndarray, np.ndarray]]:
     """Cut a branch at its bifurcations into stretches of one stability."""
     orbits = [(float(value), orbit, False) for value, orbit in zip(branch.values, branch.orbits, strict=True)]
     turns = [(float(turn.value), turn.orbit, True) for turn in branch.bifurcations]
-    found: list[tuple[bool, list[tuple[float, np.ndarray]]]] = []
+    lines: list[tuple[bool, list[tuple[float, np.ndarray]]]] = []
     ends: list[tuple[float, np.ndarray]] = []
-    for value, orbit, turned in sorted(orbits + turns, key=lambda each: each[0]):
+    for value, orbit, at_bifurcation in sorted(orbits + turns, key=lambda each: each[0]):
         point = (value, orbit.state)
-        if turned:
-            if found and not ends:
-                found[-1][1].append(point)
+        if at_bifurcation:
+            # the bifurcation ends this stretch and begins the next one
+            if lines and not ends:
+                lines[-1][1].append(point)
             ends = [point]
-        elif not found or ends or found[-1][0] != orbit.stable:
-            found.append((orbit.stable, [*ends, point]))
+        elif not lines or ends or lines[-1][0] != orbit.stable:
+            lines.append((orbit.stable, [*ends, point]))
             ends = []
         else:
-            found[-1][1].append(point)
-    return [(s, np.array([v for v, _ in line]), np.array([state for _, state in line])) for s, line in found]
+            lines[-1][1].append(point)
+    return [(s, np.array([v for v, _ in line]), np.array([state for _, state in line])) for s, line in lines]
 
 
 @_draw.register
 def _(value: Probe, axes: Axes) -> Axes:
-    """Strengths in the complex plane: filled if synchronous, open if not."""
+    """Draw strengths in the complex plane: dots where synchronous, crosses where not."""
     good = value.synchronous
     axes.plot(value.alpha[good], value.beta[good], **DOTS, markersize=7.0, color=BLUE, label="synchronous")
     crosses: dict[str, Any] = {"linestyle": "none", "marker": "x", "markersize": 5.0}

@@ -1,9 +1,9 @@
-"""Where the nodes of a graph are drawn: by its family, or by eigenvectors of its Laplacian.
+"""Positions of the nodes of a drawn graph: by its family, or by eigenvectors of its Laplacian.
 
-The eigenvectors of the two smallest eigenvalues above 0 place joined nodes near each other (Hall,
-Management Sci. 17, 219 (1970); Koren, Comput. Math. Appl. 49, 1867 (2005)).  Where eigenvalues are
-equal these places coincide or depend on rounding, so up to DENSE nodes are then moved until their
-distances are like the lengths of the shortest paths between them, by majorisation of the stress
+The eigenvectors of the two smallest eigenvalues above 0 place linked nodes near each other (Hall,
+Management Sci. 17, 219 (1970); Koren, Comput. Math. Appl. 49, 1867 (2005)).  Positions coincide or
+depend on rounding if eigenvalues are equal.  Graphs of at most DENSE nodes are therefore improved by
+majorisation of the stress, which fits distances to lengths of shortest paths
 (Gansner, Koren & North, Lecture Notes in Computer Science 3383, 239 (2005)).
 """
 
@@ -18,21 +18,21 @@ from synchain.models.graphs.links import join
 from synchain.models.graphs.topology import Topology
 
 DENSE = 300
-"""Largest graph with dense matrices."""
+"""Largest number of nodes with dense matrices."""
 
 ROUNDS = 80
-"""Steps of the majorisation."""
+"""Number of steps of the majorisation."""
 
 
 def positions(graph: Topology) -> np.ndarray:
-    """Return the places (n, 2) of the nodes in a box of side 2 about the origin."""
+    """Return the positions (n, 2) of the nodes in a box of side 2 about the origin."""
     rule = graph.rule
     layout = _FAMILIES.get(rule.family.name) if isinstance(rule, FamilyRule) else None
-    return _fitted(_spectral(graph) if layout is None else layout(graph))
+    return _fit(_spectral(graph) if layout is None else layout(graph))
 
 
 def _circle(count: int) -> np.ndarray:
-    """Points (count, 2) clockwise from the top."""
+    """Return points (count, 2) on a circle, clockwise from the top."""
     angle = 0.5 * np.pi - 2.0 * np.pi * np.arange(count) / max(count, 1)
     return np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
@@ -46,12 +46,12 @@ def _line(graph: Topology) -> np.ndarray:
 
 
 def _hub(graph: Topology) -> np.ndarray:
-    """The first node in the middle of the others."""
+    """Put the first node into the middle of the others."""
     return np.concatenate([np.zeros((1, 2)), _circle(graph.n - 1)])
 
 
 def _lattice(graph: Topology) -> np.ndarray:
-    """Rows and columns; a grid of other than two directions by its eigenvectors."""
+    """Put a grid of two dimensions into rows and columns, any other one by its eigenvectors."""
     rule = graph.rule
     assert isinstance(rule, FamilyRule)
     sides = dict(rule.options).get("shape") or (rule.family.sides(graph.n) if rule.family.sides else (graph.n,))
@@ -62,13 +62,13 @@ def _lattice(graph: Topology) -> np.ndarray:
 
 
 def _rails(graph: Topology) -> np.ndarray:
-    """Even nodes above odd ones."""
+    """Put even nodes above odd ones."""
     rung, rail = np.divmod(np.arange(graph.n), 2)
     return np.stack([rung, -rail], axis=1).astype(float)
 
 
 def _levels(graph: Topology) -> np.ndarray:
-    """A binary tree with its root at the top: node i has the children 2 i + 1 and 2 i + 2."""
+    """Put the root of a binary tree at the top: node i has the children 2 i + 1 and 2 i + 2."""
     number = np.arange(1, graph.n + 1)
     level = np.floor(np.log2(number)).astype(int)
     place = (number - 2**level + 0.5) / 2.0**level
@@ -76,7 +76,7 @@ def _levels(graph: Topology) -> np.ndarray:
 
 
 def _sides(graph: Topology) -> np.ndarray:
-    """Two columns, one for each group."""
+    """Put the two groups into two columns."""
     rule = graph.rule
     assert isinstance(rule, FamilyRule)
     left = int(str(dict(rule.options).get("left") or graph.n // 2))
@@ -96,11 +96,11 @@ _FAMILIES: dict[str, Callable[[Topology], np.ndarray]] = {
     "tree": _levels,
     "complete_bipartite": _sides,
 }
-"""The layout of each family that has one of its own."""
+"""Layouts of families; other graphs are drawn by eigenvectors."""
 
 
 def _spectral(graph: Topology) -> np.ndarray:
-    """The connected parts side by side, each by its eigenvectors; nearly no links: a circle."""
+    """Put the connected parts side by side, each by its eigenvectors; a graph of nearly no links on a circle."""
     part = np.array(join(graph.n, ((target, source) for target, source, _ in graph.links)))
     numbers = np.unique(part)
     if len(numbers) > graph.n // 2:
@@ -109,15 +109,15 @@ def _spectral(graph: Topology) -> np.ndarray:
     left = 0.0
     for number in numbers:
         members = np.flatnonzero(part == number)
-        own = _fitted(_eigenvectors(graph, members)) * np.sqrt(len(members))
-        width = float(np.ptp(own[:, 0]))
-        place[members] = own + np.array([left - own[:, 0].min(), 0.0])
-        left += width + 0.6 * np.sqrt(len(members)) + 0.4
+        # the area of a part grows with the number of its nodes
+        layout = _fit(_eigenvectors(graph, members)) * np.sqrt(len(members))
+        place[members] = layout + np.array([left - layout[:, 0].min(), 0.0])
+        left += float(np.ptp(layout[:, 0])) + 0.6 * np.sqrt(len(members)) + 0.4
     return place
 
 
 def _eigenvectors(graph: Topology, members: np.ndarray) -> np.ndarray:
-    """The second and third eigenvector (m, 2) of the Laplacian, without signs and directions."""
+    """Return the second and third eigenvector (m, 2) of the Laplacian of absolute weights, as an undirected graph."""
     if len(members) <= 3:
         return _circle(len(members))
     index = np.full(graph.n, -1)
@@ -129,32 +129,33 @@ def _eigenvectors(graph: Topology, members: np.ndarray) -> np.ndarray:
     adjacency = coo_array((weights, (rows, columns)), shape=(len(members),) * 2).tocsr()
     laplacian = csgraph.laplacian(0.5 * (adjacency + adjacency.T))
     if len(members) <= DENSE:
-        start = _fitted(np.asarray(np.linalg.eigh(laplacian.toarray())[1][:, 1:3]))
-        return _settled(start, csgraph.shortest_path(adjacency, directed=False, unweighted=True))
+        start = _fit(np.asarray(np.linalg.eigh(laplacian.toarray())[1][:, 1:3]))
+        return _majorise(start, csgraph.shortest_path(adjacency, directed=False, unweighted=True))
     from scipy.sparse.linalg import eigsh
 
+    # the Laplacian is singular, so the shift lies just below 0; a fixed start gives the same drawing every time
     start = np.random.default_rng(0).normal(size=len(members))
     shift = -1e-3 * float(weights.mean())
     values, vectors = eigsh(laplacian.tocsc(), k=3, sigma=shift, v0=start)
     return np.asarray(vectors[:, np.argsort(values)[1:3]])
 
 
-def _settled(place: np.ndarray, far: np.ndarray) -> np.ndarray:
-    """Places moved until their distances are like `far` (m, m), by ROUNDS of majorisation."""
-    count = len(place)
-    scale = float(far.max()) / 2.0
-    place = scale * place + 0.05 * scale * _circle(count)  # none coincide
-    weight = np.divide(1.0, far**2, where=far > 0.0, out=np.zeros_like(far))
+def _majorise(place: np.ndarray, path_lengths: np.ndarray) -> np.ndarray:
+    """Move nodes by majorisation until their distances approach the lengths (m, m) of shortest paths."""
+    scale = float(path_lengths.max()) / 2.0
+    place = scale * place + 0.05 * scale * _circle(len(place))  # separate coinciding nodes
+    # each step solves L_w x = L_pull x_old, weights 1/d² (Gansner, Koren & North)
+    weight = np.divide(1.0, path_lengths**2, where=path_lengths > 0.0, out=np.zeros_like(path_lengths))
     inverse = np.linalg.pinv(np.diag(weight.sum(axis=1)) - weight)
     for _ in range(ROUNDS):
         now = np.linalg.norm(place[:, None] - place[None], axis=2)
-        pull = np.divide(weight * far, now, where=now > 0.0, out=np.zeros_like(now))
+        pull = np.divide(weight * path_lengths, now, where=now > 0.0, out=np.zeros_like(now))
         place = inverse @ ((np.diag(pull.sum(axis=1)) - pull) @ place)
     return np.asarray(place)
 
 
-def _fitted(place: np.ndarray) -> np.ndarray:
-    """Places moved and scaled, alike in both directions, into a box of side 2 about the origin."""
+def _fit(place: np.ndarray) -> np.ndarray:
+    """Shift and scale positions into a box of side 2 about the origin, without distortion."""
     low, high = place.min(axis=0), place.max(axis=0)
     size = float((high - low).max()) or 1.0
     return np.asarray((place - 0.5 * (low + high)) * (2.0 / size))

@@ -35,13 +35,13 @@ LETTERS = 4
 """Most letters of a label in a node."""
 
 POINTS = 60.0
-"""Points of a new figure for each unit of the places."""
+"""Size of a new figure: points per unit of the layout."""
 
 THIN, THICK = 0.7, 3.2
-"""Widths of lines, in points."""
+"""Line widths in points of the smallest and the largest weight."""
 
 BEND = 0.18
-"""How far a bent line leaves the straight one, as a part of its length."""
+"""Distance of a bent line from the straight one, divided by its length."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,45 +51,45 @@ class Line:
     source: int  # nodes, counted from 0
     target: int
     width: float  # in points
-    arrow: bool  # whether it runs one way, leaves the straight line, has a negative weight
-    bent: bool
-    negative: bool
+    arrow: bool  # True if the link runs one way
+    bent: bool  # True if the line is an arc
+    negative: bool  # True if the weight is negative
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
     """A graph that is ready to be drawn."""
 
-    place: np.ndarray  # (n, 2)
+    positions: np.ndarray  # (n, 2)
     lines: tuple[Line, ...]
-    kind: tuple[int, ...]  # the kind of each node
-    names: tuple[str, ...]  # the kinds
-    labels: Sequence[int] | Sequence[str]  # what the nodes are called
+    kind: tuple[int, ...]  # kind of each node
+    names: tuple[str, ...]  # names of the kinds
+    labels: Sequence[int] | Sequence[str]  # labels of the nodes
 
     @classmethod
     def of(cls, value: HasDrawing) -> Picture:
         """Lay out a graph, or that of a scene with its kinds of nodes."""
         graph = graph_of(value)
-        place = positions(graph)
+        layout = positions(graph)
         kinds: tuple[int, ...] = (0,) * graph.n
         names: tuple[str, ...] = ("",)
         if isinstance(value, Scene):
             kinds, names = value.equations.kind_of, tuple(kind.oscillator.name for kind in value.model.kinds)
-        return cls(place, _lines(graph, place), kinds, names, graph.labels)
+        return cls(layout, _lines(graph, layout), kinds, names, graph.labels)
 
-    def inscription(self, i: int) -> str:
-        """The label of a node as it fits into its circle."""
+    def short_label(self, i: int) -> str:
+        """Return the label of a node, cut to LETTERS."""
         text = str(self.labels[i])
         return text if len(text) <= LETTERS else f"{text[: LETTERS - 1]}…"
 
     @property
     def radius(self) -> float:
-        """Radius of a node in the units of the places."""
-        count = len(self.place)
-        nearest = 2.0 / np.sqrt(count)
+        """Radius of a node in units of the layout: 0.4 of the smallest distance between nodes, within limits."""
+        count = len(self.positions)
+        nearest = 2.0 / np.sqrt(count)  # estimate for large graphs
         if 1 < count <= SVG_NODES:
-            apart = np.linalg.norm(self.place[:, None] - self.place[None], axis=2)
-            nearest = float((apart + np.diag(np.full(count, np.inf))).min())
+            distances = np.linalg.norm(self.positions[:, None] - self.positions[None], axis=2)
+            nearest = float((distances + np.diag(np.full(count, np.inf))).min())
         return float(np.clip(0.4 * nearest, 0.012, 0.11))
 
 
@@ -98,8 +98,8 @@ def graph_of(value: HasDrawing) -> Topology:
     return value.topology if isinstance(value, Scene) else check_instance("graph", value, Topology, "a graph")
 
 
-def _lines(graph: Topology, place: np.ndarray) -> tuple[Line, ...]:
-    """The lines of a graph; two links of equal weight are one line without an arrow."""
+def _lines(graph: Topology, layout: np.ndarray) -> tuple[Line, ...]:
+    """Return the lines of a graph; opposite links of equal weight become one line without an arrow."""
     weight = {(target, source): w for target, source, w in graph.links}
     largest = max((abs(w) for w in weight.values()), default=0)
     uneven = len({abs(w) for w in weight.values()}) > 1
@@ -109,21 +109,22 @@ def _lines(graph: Topology, place: np.ndarray) -> tuple[Line, ...]:
         if back == w and target > source:
             continue
         width = THIN + (THICK - THIN) * float(abs(w) / largest) if uneven else 1.2
-        bent = (back is not None and back != w) or _hides(place, source, target)
+        bent = (back is not None and back != w) or _hits_node(layout, source, target)
         lines.append(Line(source, target, width, back != w, bent, w < 0))
     return tuple(lines)
 
 
-def _hides(place: np.ndarray, i: int, j: int) -> bool:
-    """True if the straight line between two nodes passes through a third one."""
-    way = place[j] - place[i]
-    length = float(way @ way)
-    if length == 0.0 or len(place) > SVG_NODES:
+def _hits_node(positions: np.ndarray, i: int, j: int) -> bool:
+    """Return True if the straight line between two nodes passes through a third one."""
+    direction = positions[j] - positions[i]
+    length_squared = float(direction @ direction)
+    if length_squared == 0.0 or len(positions) > SVG_NODES:
         return False
-    rest = place - place[i]
-    along = rest @ way / length
-    aside = np.abs(rest[:, 0] * way[1] - rest[:, 1] * way[0]) / np.sqrt(length)
-    return bool(np.any((along > 1e-6) & (along < 1.0 - 1e-6) & (aside < 0.01)))
+    offsets = positions - positions[i]
+    # coordinate along the line from 0 to 1, and distance from the line, of every node
+    along = offsets @ direction / length_squared
+    distance = np.abs(offsets[:, 0] * direction[1] - offsets[:, 1] * direction[0]) / np.sqrt(length_squared)
+    return bool(np.any((along > 1e-6) & (along < 1.0 - 1e-6) & (distance < 0.01)))
 
 
 def draw_graph(value: HasDrawing, ax: Axes | None = None) -> Axes:
@@ -135,7 +136,8 @@ def draw_graph(value: HasDrawing, ax: Axes | None = None) -> Axes:
 
     picture = Picture.of(value)
     with canvas(ax) as axes:
-        place, straight = picture.place, [line for line in picture.lines if not (line.arrow or line.bent)]
+        # straight lines as one collection, which draws fast
+        place, straight = picture.positions, [line for line in picture.lines if not (line.arrow or line.bent)]
         axes.add_collection(
             LineCollection(
                 [place[[line.source, line.target]] for line in straight],
@@ -144,6 +146,7 @@ def draw_graph(value: HasDrawing, ax: Axes | None = None) -> Axes:
                 zorder=1,
             )
         )
+        # arcs and arrows one by one
         for line in picture.lines:
             if line.arrow or line.bent:
                 patch = FancyArrowPatch(
@@ -164,19 +167,18 @@ def draw_graph(value: HasDrawing, ax: Axes | None = None) -> Axes:
 
 
 def _nodes(axes: Axes, picture: Picture) -> None:
-    """Draw the nodes with their colours and labels, and name several kinds."""
-    place, kind = picture.place, np.array(picture.kind)
-    size = (2.0 * POINTS * picture.radius) ** 2
+    """Draw the nodes with their colours and labels, with a legend if there are several kinds."""
+    place, kind = picture.positions, np.array(picture.kind)
+    size = (2.0 * POINTS * picture.radius) ** 2  # matplotlib takes the square of the diameter in points
     for k, name in enumerate(picture.names):
-        own = kind == k
-        colour = COLOURS[k % len(COLOURS)]
-        axes.scatter(place[own, 0], place[own, 1], s=size, color=colour, zorder=2, label=name, linewidths=0.0)
+        x, y = place[kind == k].T
+        axes.scatter(x, y, s=size, color=COLOURS[k % len(COLOURS)], zorder=2, label=name, linewidths=0.0)
     if picture.radius >= NUMBERED:
         for i, (x, y) in enumerate(place.tolist()):
             axes.text(
                 x,
                 y,
-                picture.inscription(i),
+                picture.short_label(i),
                 color="white",
                 ha="center",
                 va="center_baseline",
@@ -202,12 +204,13 @@ def svg(value: HasDrawing, width: int = 300) -> str:
             "<code>draw()</code> draws them</p>"
         )
     picture = Picture.of(value)
-    low, high = picture.place.min(axis=0), picture.place.max(axis=0)
+    # the box around all nodes; SVG counts y downwards
+    low, high = picture.positions.min(axis=0), picture.positions.max(axis=0)
     margin = picture.radius + 0.14
     (left, bottom), (across, up) = low - margin, high - low + 2 * margin
     scale = width / max(across, up)
     body = [_svg_line(picture, line, scale) for line in picture.lines]
-    body += [_svg_node(picture, i, scale) for i in range(len(picture.place))]
+    body += [_svg_node(picture, i, scale) for i in range(len(picture.positions))]
     box = f"{scale * left:.1f} {-scale * (bottom + up):.1f} {scale * across:.1f} {scale * up:.1f}"
     label = escape(f"{graph.name} of {graph.n} nodes", quote=True)
     return (
@@ -217,11 +220,12 @@ def svg(value: HasDrawing, width: int = 300) -> str:
 
 
 def _svg_line(picture: Picture, line: Line, scale: float) -> str:
-    """One line, with a head at its target if it runs one way."""
-    a, b = (picture.place[i] * [scale, -scale] for i in (line.source, line.target))
+    """Return one line, with an arrow head at its target if the link runs one way."""
+    a, b = (picture.positions[i] * [scale, -scale] for i in (line.source, line.target))
     colour = NEGATIVE if line.negative else "currentColor"
-    way = b - a
-    bend = 0.5 * (a + b) + 2 * BEND * np.array([-way[1], way[0]]) * 0.5 if line.bent else 0.5 * (a + b)
+    # a quadratic Bézier curve; an arrow ends at the edge of the node
+    direction = b - a
+    bend = 0.5 * (a + b) + 2 * BEND * np.array([-direction[1], direction[0]]) * 0.5 if line.bent else 0.5 * (a + b)
     into = (b - bend) / (np.hypot(*(b - bend)) or 1.0)
     tip = b - into * picture.radius * scale if line.arrow else b
     path = f"M{a[0]:.1f} {a[1]:.1f}Q{bend[0]:.1f} {bend[1]:.1f} {tip[0]:.1f} {tip[1]:.1f}"
@@ -235,8 +239,8 @@ def _svg_line(picture: Picture, line: Line, scale: float) -> str:
 
 
 def _svg_node(picture: Picture, i: int, scale: float) -> str:
-    """One node with its label if there are few."""
-    (x, y), k = picture.place[i] * [scale, -scale], picture.kind[i]
+    """Return one node, with its label if the circle is large enough."""
+    (x, y), k = picture.positions[i] * [scale, -scale], picture.kind[i]
     name = picture.names[k]
     title = f"<title>{escape(f'node {picture.labels[i]}' + (f', {name}' if name else ''))}</title>"
     colour = COLOURS[k % len(COLOURS)]
@@ -246,5 +250,5 @@ def _svg_node(picture: Picture, i: int, scale: float) -> str:
     size = min(picture.radius * scale * 1.1, 12.0)
     return dot + (
         f'<text x="{x:.1f}" y="{y + 0.35 * size:.1f}" fill="#fff" font-size="{size:.1f}" text-anchor="middle" '
-        f'font-family="sans-serif">{escape(picture.inscription(i))}</text>'
+        f'font-family="sans-serif">{escape(picture.short_label(i))}</text>'
     )

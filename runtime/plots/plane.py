@@ -15,7 +15,7 @@ from .exponent import finite
 from .style import BLACK, symbol
 
 FAR = 100.0
-"""Largest coupling of the rays, beyond every plane of interest."""
+"""Coupling at the end of a ray, beyond every plane of interest; the limits of the axes cut the ray."""
 AXES = {"alpha": r"$\alpha=-\sigma\,\mathrm{Re}\,\gamma$", "beta": r"$\beta=-\sigma\,\mathrm{Im}\,\gamma$"}
 """Labels of axes that are strengths of a mode."""
 RAY: dict[str, Any] = {"color": BLACK, "linestyle": "--", "linewidth": 0.8}
@@ -30,18 +30,19 @@ DOT: dict[str, Any] = {
 }
 
 
-def draw_plane(axes: Axes, found: Plane) -> Axes:
+def draw_plane(axes: Axes, plane: Plane) -> Axes:
     """Draw exponents in colours, blue if negative, with a line at zero."""
-    value = finite(found.exponent)
+    value = finite(plane.exponent)
     cmap, norm = _colours(value)
-    painted = axes.pcolormesh(found.across, found.up, value.T, norm=norm, cmap=cmap, shading="nearest", rasterized=True)
-    for k, line in enumerate(found.contours):
+    labels = [AXES[name] if name in plane.strengths else symbol(name) for name in plane.names]
+    painted = axes.pcolormesh(plane.across, plane.up, value.T, norm=norm, cmap=cmap, shading="nearest", rasterized=True)
+    for k, line in enumerate(plane.contours):
         axes.plot(line[:, 0], line[:, 1], color=BLACK, linewidth=1.1, label="" if k else r"$\Lambda=0$")
     axes.set(
-        xlim=(found.across[0], found.across[-1]),
-        ylim=(found.up[0], found.up[-1]),
-        xlabel=_label(found, found.names[0]),
-        ylabel=_label(found, found.names[1]),
+        xlim=(plane.across[0], plane.across[-1]),
+        ylim=(plane.up[0], plane.up[-1]),
+        xlabel=labels[0],
+        ylabel=labels[1],
     )
     bar = axes.figure.colorbar(painted, ax=axes, aspect=30, pad=0.02)
     bar.set_label(r"exponent $\Lambda$ per unit of $\tau$")
@@ -49,43 +50,38 @@ def draw_plane(axes: Axes, found: Plane) -> Axes:
     return axes
 
 
-def _label(found: Plane, name: str) -> str:
-    """An axis as a formula."""
-    return AXES[name] if name in found.strengths else symbol(name)
-
-
 def _colours(value: np.ndarray) -> tuple[str, TwoSlopeNorm]:
-    """Colours that are white at zero and symmetric about it; the darker half alone for values of one sign that differ."""
-    known = value[np.isfinite(value)]
-    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
+    """Return a colour map that is white at zero, and its scale; half of the map if all values have one sign."""
+    numbers = value[np.isfinite(value)]
+    low, high = (float(numbers.min()), float(numbers.max())) if numbers.size else (0.0, 0.0)
     if low * high > 0 and not np.isclose(low, high):
         return ("Blues_r", TwoSlopeNorm(high, low, 0.0)) if high < 0 else ("Reds", TwoSlopeNorm(low, 0.0, high))
     size = max(-low, high) or 1.0
     return "RdBu_r", TwoSlopeNorm(0.0, -size, size)
 
 
-def plane_table(found: Plane) -> Table:
+def plane_table(plane: Plane) -> Table:
     """Return exponent and standard error, per unit of time, at every point of the grid."""
     rows = [
-        (a, b, found.exponent[i, j], found.stderr[i, j])
-        for i, a in enumerate(found.across)
-        for j, b in enumerate(found.up)
+        (a, b, plane.exponent[i, j], plane.stderr[i, j])
+        for i, a in enumerate(plane.across)
+        for j, b in enumerate(plane.up)
     ]
-    return Table((*found.names, "exponent", "stderr"), tuple(rows))
+    return Table((*plane.names, "exponent", "stderr"), tuple(rows))
 
 
-def draw_rays(axes: Axes, found: Plane, sigma: float | None = None) -> Axes:
+def draw_rays(axes: Axes, plane: Plane, sigma: float | None = None) -> Axes:
     """Draw the ray of every mode of the scene's network.
 
     Of conjugate modes only the one with beta >= 0 is seen if the plane ends at beta = 0.
     """
-    graph = found.scene.topology
+    graph = plane.scene.topology
     still: dict[str, Any] = {"scalex": False, "scaley": False}
     for mode in transversal_modes(graph):
         unit = -complex(mode.eigenvalue.value)
         (ray,) = axes.plot([0.0, FAR * unit.real], [0.0, FAR * unit.imag], **RAY, **still)
         ray.set_label(rf"$-\sigma\gamma_k$ of {graph.name}({graph.n})" if mode.number == 1 else "")
-        if sigma is not None and _within(found, sigma * unit):
+        if sigma is not None and _within(plane, sigma * unit):
             (dot,) = axes.plot(sigma * unit.real, sigma * unit.imag, **DOT, **still)
             dot.set_label(rf"$\sigma={sigma:.3g}$")
     handles = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
@@ -101,7 +97,7 @@ def draw_rays(axes: Axes, found: Plane, sigma: float | None = None) -> Axes:
     return axes
 
 
-def _within(found: Plane, point: complex) -> bool:
-    """True if a point lies in the drawn part of the plane."""
-    across, up = (row[0] <= value <= row[-1] for row, value in ((found.across, point.real), (found.up, point.imag)))
+def _within(plane: Plane, point: complex) -> bool:
+    """Return True if a point lies in the drawn part of the plane."""
+    across, up = (row[0] <= value <= row[-1] for row, value in ((plane.across, point.real), (plane.up, point.imag)))
     return bool(across and up)

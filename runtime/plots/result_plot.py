@@ -13,18 +13,21 @@ from synchain.models.inputs.names import NodeName
 
 from ..results.result import Result
 from ..support.status import Status
+from .canvas import SIZE
 from .style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, context, failures, new_figure, note, symbol
 
 KINDS = ("error", "section", "map", "phase", "end")
+"""Kinds of plot; the names of observables are kinds too."""
 CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
-SIZE = (4.8, 3.4)
+"""Colours of oscillators, in turn."""
 REALISATION = "realisation"
+"""Name of the axis of random realisations."""
 FINEST = 1000
-"""Most values of each axis of a map that are drawn; a figure has fewer points than that."""
+"""Largest number of drawn values per axis of a map; longer axes are thinned."""
 ROUNDING = 1e-9
-"""Synchronisation errors below this value are drawn as zero."""
+"""Draw synchronisation errors below this value as zero."""
 MARKED = 60
-"""Most cells that are each marked by a dot."""
+"""Largest number of cells drawn with a dot each: more dots would hide the line."""
 
 
 def draw_result(result: Result, ax: Axes | None = None, kind: str | None = None) -> Axes:
@@ -34,8 +37,8 @@ def draw_result(result: Result, ax: Axes | None = None, kind: str | None = None)
     phase portrait shows the first cell. Cells that did not finish are omitted and counted above the
     axes.
     """
-    if kind is not None and kind not in (known := (*KINDS, *result.scene.observe)):
-        raise ValueError(f"unknown kind of plot {kind!r}; known: {', '.join(known)}{suggestion(kind, known)}")
+    if kind is not None and kind not in (choices := (*KINDS, *result.scene.observe)):
+        raise ValueError(f"unknown kind of plot {kind!r}; known: {', '.join(choices)}{suggestion(kind, choices)}")
     possible, kinds = _possible(result)
     chosen = kind or possible[0]
     if chosen not in possible:
@@ -43,22 +46,19 @@ def draw_result(result: Result, ax: Axes | None = None, kind: str | None = None)
     with context():
         axes = new_figure(SIZE).add_subplot() if ax is None else ax
         observed = chosen not in kinds
-        cut, words = _cut(result, 2 if chosen == "map" or (observed and REALISATION in result.data.status.dims) else 1)
+        cut, remark = _cut(result, 2 if chosen == "map" or (observed and REALISATION in result.data.status.dims) else 1)
         if observed:
-            drawn = _observed(axes, cut, result, chosen)
+            _observed(axes, cut, result, chosen)
         else:
-            drawn = {"error": _error, "section": _section, "map": _map, "phase": _phase, "end": _end}[chosen](
-                axes, cut, result
-            )
+            draw = {"error": _error, "section": _section, "map": _map, "phase": _phase, "end": _end}[chosen]
+            draw(axes, cut, result)
         failed = int((result.data.status != Status.FINISHED).sum())
-        note(axes, "; ".join(filter(None, [words, failures(failed, result.data.status.size)])))
-    return drawn
+        note(axes, "; ".join(filter(None, [remark, failures(failed, result.data.status.size)])))
+    return axes
 
 
 def _possible(result: Result) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """What a result has numbers for, the most specific first, and which of that are kinds of plot, no
-    observables.
-    """
+    """Return the possible plots, the most specific first, and those of them that draw no observable."""
     count, data = result.data.status.ndim, result.data
     kinds = []
     if count >= 2:
@@ -73,6 +73,7 @@ def _possible(result: Result) -> tuple[tuple[str, ...], tuple[str, ...]]:
         kinds.append("phase")
     kinds.append("end")
     observed = [name for name in result.scene.observe if count and name in data and name not in kinds]
+    # observables come before the default plots unless the user asked for a record
     if "sync_error" in data or "section" in data:
         return (*kinds[:-1], *observed, "end"), tuple(kinds)
     return (*observed, *kinds), tuple(kinds)
@@ -81,47 +82,48 @@ def _possible(result: Result) -> tuple[tuple[str, ...], tuple[str, ...]]:
 def _cut(result: Result, keep: int) -> tuple[xr.Dataset, str]:
     """Select the last `keep` axes of a result; cells that did not finish become NaN."""
     data = result.data
+    # fix the leading axes at their first value
     leading = data.status.dims[: max(data.status.ndim - keep, 0)]
-    words = ", ".join(f"{symbol(str(name))} = {float(data[name][0]):.4g}" for name in leading)
+    remark = ", ".join(f"{symbol(str(name))} = {float(data[name][0]):.4g}" for name in leading)
     data = data.isel({name: 0 for name in leading})
+    # thin the axes of a map to FINEST values
     steps = {str(d): -(-data.sizes[d] // FINEST) for d in data.status.dims if keep > 1}
     data = data.isel({name: slice(None, None, step) for name, step in steps.items()})
     thinned = ", ".join(f"every {step}th {symbol(name)}" for name, step in steps.items() if step > 1)
-    words = "; ".join(filter(None, [words, thinned]))
+    remark = "; ".join(filter(None, [remark, thinned]))
     good = data.status == Status.FINISHED
-    numbers = [name for name, values in data.items() if values.dtype.kind == "f"]
-    return data.assign({name: data[name].where(good) for name in numbers}), words
+    floats = [name for name, values in data.items() if values.dtype.kind == "f"]
+    return data.assign({name: data[name].where(good) for name in floats}), remark
 
 
 def _along(data: xr.Dataset, result: Result) -> tuple[np.ndarray, str]:
-    """Values and name of the axis of a one-dimensional result."""
+    """Return values and name of the axis of a one-dimensional result."""
     name = result.scene.axes[0].name if result.scene.zipped else str(data.status.dims[0])
     return data[name].values, name
 
 
-def _joined(x: np.ndarray, name: str) -> dict[str, Any]:
-    """The style of values over an axis: a line, with dots if they are few; dots alone of realisations, which have no order."""
-    apart = name == REALISATION
-    return {"linestyle": "none" if apart else "-", "marker": "." if apart or len(x) <= MARKED else None}
+def _line_style(x: np.ndarray, name: str) -> dict[str, Any]:
+    """Style values over an axis: a line, with dots if they are few; dots alone for realisations, which have no order."""
+    unordered = name == REALISATION
+    return {"linestyle": "none" if unordered else "-", "marker": "." if unordered or len(x) <= MARKED else None}
 
 
-def _error(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
-    """Synchronisation error over the axis."""
+def _error(axes: Axes, data: xr.Dataset, result: Result) -> None:
+    """Draw the synchronisation error over the axis."""
     x, name = _along(data, result)
     order = np.argsort(x, kind="stable")
-    axes.plot(x[order], data.sync_error.values[order], color=BLUE, **_joined(x, name))
+    axes.plot(x[order], data.sync_error.values[order], color=BLUE, **_line_style(x, name))
     axes.set(xlabel=symbol(name), ylabel="average synchronisation error")
-    if np.nanmax(data.sync_error.values, initial=0.0) < ROUNDING:  # nothing but rounding: no landscape of it
+    if np.nanmax(data.sync_error.values, initial=0.0) < ROUNDING:  # do not enlarge rounding errors to the full height
         axes.set_ylim(-0.05 * ROUNDING, ROUNDING)
-    return axes
 
 
-def _observed(axes: Axes, data: xr.Dataset, result: Result, name: str) -> Axes:
-    """An observable over the axis: a line for each node, or for each realisation and their mean."""
+def _observed(axes: Axes, data: xr.Dataset, result: Result, name: str) -> None:
+    """Draw an observable over the axis: a line for each node, or for each realisation and their mean."""
     x, along = _along(data, result)
     order = np.argsort(x, kind="stable")
     values = data[name].values[order].reshape(len(x), -1)
-    style = _joined(x, along)
+    style = _line_style(x, along)
     if REALISATION in data.status.dims[1:]:
         axes.plot(x[order], values, color=SKY, linewidth=0.5)
         axes.plot(x[order], values.mean(axis=1), color=BLUE, **style, label="mean of the realisations")
@@ -130,14 +132,17 @@ def _observed(axes: Axes, data: xr.Dataset, result: Result, name: str) -> Axes:
         for i, line in enumerate(values.T):
             axes.plot(x[order], line, color=CYCLE[i % len(CYCLE)], **style)
     axes.set(xlabel=symbol(along), ylabel=name.replace("_", " "))
-    return axes
 
 
-def _section(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
-    """First state other than the section's, over the axis if there is one, else its return map."""
-    states = result.scene.equations.state
-    state = next((name for name in states if name != result.scene.section.variable), states[0])
-    y = _state(data.section, state).values
+def _section(axes: Axes, data: xr.Dataset, result: Result) -> None:
+    """Draw the first state other than the section's: over the axis if there is one, else as a return map."""
+    states, section = result.scene.equations.state, result.scene.section
+    state = next((name for name in states if name != section.variable), states[0])
+    node_name = NodeName.parse(state)
+    assert node_name is not None
+    y = data.section.sel(component=node_name.base).isel(node=node_name.index).values
+    # the section for an axis label: its state as a formula, its direction, and its level if that is not 0
+    where = f"{symbol(section.variable)}{str(section).removeprefix(section.variable)}"
     dots: dict[str, Any] = {
         "linestyle": "none",
         "marker": ".",
@@ -147,22 +152,16 @@ def _section(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
     }
     if data.status.ndim == 0:
         axes.plot(y[:-1], y[1:], markersize=3.0, **dots)
-        axes.set(xlabel=f"{symbol(state)} at {_section_words(result)}", ylabel=f"{symbol(state)} the next time")
-        return _widen(axes)
+        axes.set(xlabel=f"{symbol(state)} at {where}", ylabel=f"{symbol(state)} the next time")
+        _widen(axes)
+        return
     x, name = _along(data, result)
     axes.plot(np.repeat(x, y.shape[1]), y.reshape(-1), markersize=float(np.clip(700.0 / len(x), 1.0, 3.0)), **dots)
-    axes.set(xlabel=symbol(name), ylabel=f"{symbol(state)} at {_section_words(result)}")
-    return axes
+    axes.set(xlabel=symbol(name), ylabel=f"{symbol(state)} at {where}")
 
 
-def _section_words(result: Result) -> str:
-    """The section for an axis label: state as a formula, direction and a level other than 0."""
-    section = result.scene.section
-    return f"{symbol(section.variable)}{str(section).removeprefix(section.variable)}"
-
-
-def _map(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
-    """Colours over the last two axes: error, else number of section points, else final state."""
+def _map(axes: Axes, data: xr.Dataset, result: Result) -> None:
+    """Draw colours over the last two axes: the error, else the number of section points, else the final state."""
     if "sync_error" in data:
         values, label = data.sync_error, "average synchronisation error"
     elif "section_count" in data:
@@ -174,68 +173,61 @@ def _map(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
     painted = axes.pcolormesh(values[along], values[down], values, shading="nearest", cmap="cividis", rasterized=True)
     axes.set(xlabel=symbol(along), ylabel=symbol(down), facecolor="0.8")
     axes.figure.colorbar(painted, ax=axes, label=label)
-    return axes
 
 
-def _phase(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
-    """Velocity over position in the first cell; for many oscillators colours over time."""
+def _phase(axes: Axes, data: xr.Dataset, result: Result) -> None:
+    """Draw velocity over position in the first cell; for many oscillators draw colours over time."""
     data = data.isel({name: 0 for name in data.status.dims})
-    first, second = (_own(data.trajectory, result, k) for k in (0, 1))
+    first, second = (_node_states(data.trajectory, result, k) for k in (0, 1))
     n = result.scene.n
-    if n > len(CYCLE):
+    if n > len(CYCLE):  # more curves than colours
         time = data.time.values
         painted = axes.pcolormesh(
             time, np.arange(1, n + 1), first.values.T, shading="nearest", cmap="cividis", rasterized=True
         )
         axes.set(xlabel="time", ylabel="oscillator")
-        axes.figure.colorbar(painted, ax=axes, label=_common(first))
-        return axes
+        axes.figure.colorbar(painted, ax=axes, label=_symbols(first))
+        return
     for i, (x, y) in enumerate(zip(first.values.T, second.values.T, strict=True)):
         axes.plot(x, y, color=CYCLE[i], linewidth=0.7, label="oscillator " * (i == 0) + str(i + 1))
-    axes.set(xlabel=_common(first), ylabel=_common(second))
-    return _legend(axes, result)
+    axes.set(xlabel=_symbols(first), ylabel=_symbols(second))
+    _legend(axes, result)
 
 
-def _state(values: xr.DataArray, name: str) -> xr.DataArray:
-    """One state of a variable, by its name such as "x_1"."""
-    parts = NodeName.parse(name)
-    assert parts is not None
-    return values.sel(component=parts.base).isel(node=parts.index)
-
-
-def _own(values: xr.DataArray, result: Result, k: int) -> xr.DataArray:
-    """First (`k` = 0) or second state of each oscillator; the first one if there is no other. Nodes are the last axis."""
+def _node_states(values: xr.DataArray, result: Result, k: int) -> xr.DataArray:
+    """Return the first (`k` = 0) or second state of each node, the first one if a node has no second; nodes last."""
     equations = result.scene.equations
-    held = [{s.name for s in node.state} for node in equations.nodes]
-    names = [[name for name in equations.components if name in own] for own in held]
-    chosen = [names[kind][min(k, len(names[kind]) - 1)] for kind in equations.kind_of]
+    state_names = [{s.name for s in node.state} for node in equations.nodes]
+    components = [[name for name in equations.components if name in names] for names in state_names]
+    chosen = [components[kind][min(k, len(components[kind]) - 1)] for kind in equations.kind_of]
     return values.sel(component=xr.DataArray(chosen, dims="node"), node=values.node).transpose(..., "node")
 
 
-def _common(states: xr.DataArray) -> str:
-    """Name of states of several oscillators without their numbers; several names with commas."""
+def _symbols(states: xr.DataArray) -> str:
+    """Return the symbols of states without numbers of nodes, separated by commas."""
     return ", ".join(dict.fromkeys(symbol(str(name)) for name in states.component.values))
 
 
-def _end(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
-    """Final states of every oscillator, over the axis if there is one."""
-    first, second = (_own(data.end, result, k) for k in (0, 1))
+def _end(axes: Axes, data: xr.Dataset, result: Result) -> None:
+    """Draw the final states of every oscillator, over the axis if there is one."""
+    first, second = (_node_states(data.end, result, k) for k in (0, 1))
     along = _along(data, result) if data.status.ndim else None
     x, y = (first, second) if along is None else (np.broadcast_to(along[0][:, None], first.shape), first)
     for i, color in enumerate(CYCLE[: result.scene.n]):  # one line of each colour, as there may be many oscillators
         across, up = (np.asarray(values)[..., i :: len(CYCLE)].ravel() for values in (x, y))
         axes.plot(across, up, linestyle="none", marker=".", color=color, label="oscillator " * (i == 0) + str(i + 1))
     labels = (
-        (f"{_common(first)} at the end", f"{_common(second)} at the end")
+        (f"{_symbols(first)} at the end", f"{_symbols(second)} at the end")
         if along is None
-        else (symbol(along[1]), f"{_common(first)} at the end")
+        else (symbol(along[1]), f"{_symbols(first)} at the end")
     )
     axes.set(xlabel=labels[0], ylabel=labels[1])
-    return _legend(_widen(axes), result)
+    _widen(axes)
+    _legend(axes, result)
 
 
-def _legend(axes: Axes, result: Result) -> Axes:
-    """Colours of the oscillators above the axes, if there are several but no more than colours."""
+def _legend(axes: Axes, result: Result) -> None:
+    """Explain the colours of the oscillators above the axes, if there are several and each has its own colour."""
     if 1 < result.scene.n <= len(CYCLE):
         axes.legend(
             loc="lower left",
@@ -245,13 +237,11 @@ def _legend(axes: Axes, result: Result) -> Axes:
             columnspacing=1.0,
             borderpad=0.2,
         )
-    return axes
 
 
-def _widen(axes: Axes) -> Axes:
-    """Widen the limits to a hundredth of the numbers, so that rounding errors show no pattern."""
-    for low, high, put in ((*axes.get_xlim(), axes.set_xlim), (*axes.get_ylim(), axes.set_ylim)):
+def _widen(axes: Axes) -> None:
+    """Widen the limits to a hundredth of the plotted values, so that rounding errors show no pattern."""
+    for low, high, set_limits in ((*axes.get_xlim(), axes.set_xlim), (*axes.get_ylim(), axes.set_ylim)):
         least = 0.01 * max(abs(low), abs(high), 1e-3)
         if high - low < least:
-            put(0.5 * (low + high - least), 0.5 * (low + high + least))
-    return axes
+            set_limits(0.5 * (low + high - least), 0.5 * (low + high + least))

@@ -29,6 +29,7 @@ GREY = "#d9d9d9"
 COLUMN = 3.46
 """Width of one column in inches."""
 DPI = 300
+"""Resolution of PNG files, in dots per inch."""
 
 SETTINGS: dict[str, Any] = {
     "font.family": "sans-serif",
@@ -67,6 +68,7 @@ SETTINGS: dict[str, Any] = {
     "path.simplify": True,
     "image.composite_image": True,
 }
+"""Settings of matplotlib for all figures; those that are not listed have matplotlib's defaults."""
 
 
 @contextmanager
@@ -110,16 +112,16 @@ def bands(axes: Axes, intervals: Sequence[Interval], *, horizontal: bool = False
 
 def bracket(axes: Axes, intervals: Sequence[Interval], height: float, color: str, text: str = "") -> None:
     """Draw thin bars with end strokes over intervals; the limits of x must be set before."""
-    place = axes.get_xaxis_transform()
+    transform = axes.get_xaxis_transform()  # x in data, y as a fraction of the height
     first, last = axes.get_xlim()
     for low, high in intervals:
-        stroke = 1.0 if high - low > 0.01 * (last - first) else 0.4  # ragged ends are a fringe of thin strokes
+        stroke = 1.0 if high - low > 0.01 * (last - first) else 0.4  # narrow intervals side by side: thin strokes
         axes.plot(
             [low, high],
             [height, height],
             color=color,
             linewidth=1.0,
-            transform=place,
+            transform=transform,
             zorder=4,
             marker="|",
             markersize=4.0,
@@ -130,7 +132,7 @@ def bracket(axes: Axes, intervals: Sequence[Interval], height: float, color: str
         axes.annotate(
             text,
             (intervals[-1][1], height),
-            xycoords=place,
+            xycoords=transform,
             xytext=(4, 0),
             textcoords="offset points",
             color=color,

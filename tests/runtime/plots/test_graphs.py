@@ -169,4 +169,4 @@ def test_matplotlib_is_loaded_by_drawing_alone() -> None:
 
 def test_shipped_scenes_are_drawn() -> None:
     for name in ("figure_4a", "huygens"):
-        assert len(Picture.of(load_scene(name)).place) == load_scene(name).n
+        assert len(Picture.of(load_scene(name)).positions) == load_scene(name).n
