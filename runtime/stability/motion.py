@@ -39,6 +39,9 @@ SAMPLES, LOOKED, OFTEN = 4096, 64, 8
 NOISE = 10.0
 """Change of rates that do not change, relative to what they change by over the extent, in units of the tolerance."""
 
+EVEN = 1e-3
+"""Largest change of the speed of an even drift, relative to it."""
+
 CLEAR = 1 / 32
 """Least rise of a turn, relative to the extent of its component."""
 
@@ -197,8 +200,9 @@ def shortest_time(rates: RateFunctions, state: np.ndarray) -> float:
 def turns_of(integrator: VariationalIntegrator, rates: RateFunctions) -> Turns:
     """Return the mean return time of an undriven orbit, or the slowest rate of the equilibrium that it comes to.
 
-    A motion whose rates do not change any more, such as that of locked phases, is at an equilibrium that drifts.  A turn of a component lasts from one top to the next, with a fall and a rise by CLEAR of its extent at least between
-    them.  The component with most turns counts; they are looked for in the later three quarters of a path.
+    A motion whose rates do not change any more, such as that of locked phases, is at an equilibrium that drifts.  A turn
+    of a component lasts from one top to the next, with a fall and a rise by CLEAR of its extent at least between them.
+    The component with most turns counts; they are looked for in the later three quarters of a path.
     """
     start = integrator.state[0].copy()
     times, states, time = [0.0], [start], 0.0
@@ -241,11 +245,18 @@ def _drift(
     rates: RateFunctions, times: list[float], states: list[np.ndarray], extent: np.ndarray, closed: float
 ) -> np.ndarray | None:
     """The rates (p,) of a motion that have not changed in the later half of its time; None if they have."""
+    if len(states) <= LOOKED:
+        return None
     first = int(np.searchsorted(times, 0.5 * times[-1]))
     late = np.array([rates.values(state) for state in states[first:]])
     changes = np.abs(rates.slopes(states[-1], extent)).sum(axis=1)
     limits = np.nan_to_num(closed * changes) + DIGITS * rates.sizes(states[-1])
-    return late[-1] if len(states) > LOOKED and np.all(np.ptp(late, axis=0) <= limits) else None
+    if np.any(np.ptp(late, axis=0) > limits):
+        return None
+    # the slow part of a relaxation oscillation looks alike beside its jumps: wait until the motion has come far at one speed
+    far = SHARE * np.abs(states[-1] - states[first]) >= extent
+    even = np.ptp(late, axis=0) <= EVEN * np.abs(late[-1])
+    return late[-1] if np.any(far & even & (extent > 0.0)) and np.all(even | ~far) else None
 
 
 def _mean_turn(times: np.ndarray, states: np.ndarray, fewest: int) -> float:

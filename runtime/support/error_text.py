@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import numpy as np
 
+LONGEST = 15
+"""Most decimals that are written out; a smaller number has an exponent."""
+
 
 def with_error(value: float, error: float = 0.0) -> str:
     """Return a number with its error: the error to two significant digits, the value to the same decimal place.
@@ -30,6 +33,8 @@ def with_error(value: float, error: float = 0.0) -> str:
     # the decimal place of the error's second digit, after rounding: 0.0996 is 0.10
     rounded = f"{error:.1e}"
     place = 1 - int(rounded.partition("e")[2])
+    if place > LONGEST:
+        return f"{value:.4g} ± {rounded}"
     decimals = max(place, 0)
     spread = f"{float(rounded):.{decimals}f}" if place <= 6 else rounded
     return f"{round(value, place):z.{decimals}f} ± {spread}"
