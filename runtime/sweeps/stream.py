@@ -291,7 +291,8 @@ def _run_blocks(
     layout = layout_of(log.about, scene)
     scheduler = BlockScheduler(layout, log.done, _Disk(layout, log), prepared, reporter)
     try:
-        drop_leftovers(path)
+        for whole in (path, log.path):
+            drop_leftovers(whole)
         reporter.start(log.counts, prepared.compiling)
         scheduler.run()
         return write_result(log, path, scene)

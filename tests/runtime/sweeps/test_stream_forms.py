@@ -150,6 +150,13 @@ def test_kills_between_blocks(ending: str, tmp_path: Path) -> None:
     assert kept + done > 0
 
 
+@pytest.mark.parametrize("name", [".a-1x2y.nc", ".a-1x2y.partial"])
+def test_what_a_killed_writer_left_is_deleted(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(b"half of it")
+    stream(MAP, tmp_path / "a.nc", show_progress=False)
+    assert [part.name for part in tmp_path.iterdir()] == ["a.nc"]
+
+
 @pytest.mark.parametrize("ending", FURTHER)
 def test_a_disk_that_is_full_when_the_result_is_written(ending: str, tmp_path: Path, monkeypatch: Any) -> None:
     path = tmp_path / f"a{ending}"
