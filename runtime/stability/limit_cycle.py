@@ -72,7 +72,7 @@ def _returns(orbit: Orbits, rates: RateFunctions, start: np.ndarray) -> Iterator
     def side(state: np.ndarray) -> float:
         return float(normal @ (state[0] - start))
 
-    for before, step, extent in islice(path(integrator, rates, shortest_time(rates, start)), SAMPLES):
+    for before, step, extent, _ in islice(path(integrator, rates, shortest_time(rates, start)), SAMPLES):
         if side(before) < 0.0 <= side(integrator.state):
             yield time + _passage(integrator, before, step, side), np.maximum(extent, NEAR * orbit.extent)
         time += step

@@ -6,6 +6,7 @@ All lengths here follow the motion under x -> s x + c for each component, and al
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
@@ -154,11 +155,12 @@ def rests(rates: RateFunctions, state: np.ndarray, closed: float, extent: np.nda
 
 def path(
     integrator: VariationalIntegrator, rates: RateFunctions, shortest: float
-) -> Iterator[tuple[np.ndarray, float, np.ndarray]]:
+) -> Iterator[tuple[np.ndarray, float, np.ndarray, np.ndarray]]:
     """Advance a single orbit by steps in which no component moves by more than a share of its extent, and the motion does not turn round.
 
-    Yield, after each step, the state before it, its length and the extent (p,) so far.  Steps of the shortest length may
-    move by more, as the first ones do, and so may turns at a jump of the rates.  The absolute tolerance follows the extent.
+    Yield, after each step, the state before it, its length, the extent (p,) so far and the rates (p,) after it.  Steps of
+    the shortest length may move by more, as the first ones do, and so may turns at a jump of the rates.  The absolute
+    tolerance follows the extent.
     """
     step, low, high = shortest, integrator.state[0].copy(), integrator.state[0].copy()
     speed, last, few = rates.values(low), shortest, math.inf
@@ -174,7 +176,7 @@ def path(
             integrator.state, step = before, max(shortest, 0.5 * step)
             continue
         low, high, speed, last, few = lower, higher, velocity, step, taken
-        yield before, step, extent
+        yield before, step, extent, velocity
         step *= 1.5 if np.all(2.0 * moved <= extent) else 1.0
 
 
@@ -205,14 +207,15 @@ def turns_of(integrator: VariationalIntegrator, rates: RateFunctions) -> Turns:
     The component with most turns counts; they are looked for in the later three quarters of a path.
     """
     start = integrator.state[0].copy()
-    times, states, time = [0.0], [start], 0.0
+    times, states, velocities, time = [0.0], [start], [rates.values(start)], 0.0
     extent, closed = np.zeros_like(start), NOISE * float(integrator.control[Control.RTOL])
     if not rests(rates, start, REST, extent):
         try:
-            for k, (_, step, extent) in enumerate(path(integrator, rates, shortest_time(rates, start)), 1):
+            for k, (_, step, extent, velocity) in enumerate(path(integrator, rates, shortest_time(rates, start)), 1):
                 time += step
                 times.append(time)
                 states.append(integrator.state[0])
+                velocities.append(velocity)
                 if not np.isfinite(time) or k == SAMPLES:
                     break
                 still = np.all(np.abs(states[-1] - states[-2]) <= STILL * extent)
@@ -220,14 +223,13 @@ def turns_of(integrator: VariationalIntegrator, rates: RateFunctions) -> Turns:
                     break
                 if k % LOOKED == 0 and _mean_turn(np.array(times[k // 4 :]), np.array(states[k // 4 :]), ENOUGH):
                     break
-                if k % OFTEN == 0 and _drift(rates, times, states, extent, closed) is not None:
+                if k % OFTEN == 0 and _drift(rates, times, states, velocities, extent, closed) is not None:
                     break
         except FloatingPointError:  # what grows without bound is refused where it is settled
             pass
     # beside an even drift only what approaches it counts as motion: locked phases turn on at one speed
-    even = (
-        np.zeros_like(start) if rests(rates, states[-1], REST, extent) else _drift(rates, times, states, extent, closed)
-    )
+    at_rest = rests(rates, states[-1], REST, extent)
+    even = np.zeros_like(start) if at_rest else _drift(rates, times, states, velocities, extent, closed)
     early, path_states = len(times) // 4, np.array(states)
     if even is not None:
         path_states = path_states - np.outer(times, even)
@@ -242,21 +244,27 @@ def turns_of(integrator: VariationalIntegrator, rates: RateFunctions) -> Turns:
 
 
 def _drift(
-    rates: RateFunctions, times: list[float], states: list[np.ndarray], extent: np.ndarray, closed: float
+    rates: RateFunctions,
+    times: list[float],
+    states: list[np.ndarray],
+    velocities: list[np.ndarray],
+    extent: np.ndarray,
+    closed: float,
 ) -> np.ndarray | None:
     """The rates (p,) of a motion that have not changed in the later half of its time; None if they have."""
     if len(states) <= LOOKED:
         return None
-    first = int(np.searchsorted(times, 0.5 * times[-1]))
-    late = np.array([rates.values(state) for state in states[first:]])
-    changes = np.abs(rates.slopes(states[-1], extent)).sum(axis=1)
-    limits = np.nan_to_num(closed * changes) + DIGITS * rates.sizes(states[-1])
-    if np.any(np.ptp(late, axis=0) > limits):
-        return None
+    first = bisect_left(times, 0.5 * times[-1])
     # the slow part of a relaxation oscillation looks alike beside its jumps: wait until the motion has come far at one speed
-    far = SHARE * np.abs(states[-1] - states[first]) >= extent
-    even = np.ptp(late, axis=0) <= EVEN * np.abs(late[-1])
-    return late[-1] if np.any(far & even & (extent > 0.0)) and np.all(even | ~far) else None
+    far = (SHARE * np.abs(states[-1] - states[first]) >= extent) & (extent > 0.0)
+    if not far.any():
+        return None
+    changes, last = np.ptp(velocities[first:], axis=0), velocities[-1]
+    if np.any(changes[far] > EVEN * np.abs(last[far])):
+        return None
+    swing = np.abs(rates.slopes(states[-1], extent)).sum(axis=1)
+    limits = np.nan_to_num(closed * swing) + DIGITS * rates.sizes(states[-1])
+    return last if np.all(changes <= limits) else None
 
 
 def _mean_turn(times: np.ndarray, states: np.ndarray, fewest: int) -> float:
