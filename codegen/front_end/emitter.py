@@ -37,7 +37,7 @@ class ReadFunction:
     result: types.Type  # the type of what it returns
     local: frozenset[str]  # the variables of one block alone
     arrays: dict[str, types.Type]  # the variables that keep arrays alive, and their types
-    calls: tuple[Any, ...]  # what it calls
+    calls: tuple[Any, ...]
 
     def write(self, lower: lowering.Lower, arguments: Sequence[Value]) -> None:
         """Write the code of the function, whose arguments have these values."""

@@ -79,7 +79,7 @@ class Claim:
 
     line: int  # number of the line in the file
     text: str  # the line
-    graph: Topology  # the graph
+    graph: Topology
     numbers: tuple[Claimed, ...]  # the claimed eigenvalues; none if parts are claimed
     n: int | None = None  # the size, if the line has a range of sizes
     parts: tuple[PartClaim, ...] = ()  # the claims about parts of the spectrum

@@ -25,7 +25,7 @@ from .parts import verify_parts
 class Verdict:
     """The result of the comparison of a claim."""
 
-    claim: Claim  # the claim
+    claim: Claim
     problems: tuple[str, ...]  # a sentence for each error
     proved: bool = True  # whether the spectrum was proved; False if a closed form was taken on trust
     parts: str = ""  # the claimed parts as they are, in words

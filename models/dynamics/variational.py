@@ -42,7 +42,7 @@ LOG_VOLUME = sp.Symbol("log_volume", real=True)
 class Variation:
     """A linear system d' = A d of small deviations along an orbit."""
 
-    orbit: Equations  # the equations of the orbit
+    orbit: Equations
     size: int  # the number of deviations; slip states of contacts do not deviate
     # the non-zero entries of A by (row, column), in the symbols of the orbit (x_1 …), its parameters, t and
     # `parameters`

@@ -101,8 +101,8 @@ class GraphMatrices(Matrix, Protocol):
 class GraphMatrix(Exact):
     """A matrix of a graph beside its connectivity matrix G."""
 
-    graph: GraphMatrices  # the graph
-    kind: MatrixKind  # the matrix
+    graph: GraphMatrices
+    kind: MatrixKind
 
     def __post_init__(self) -> None:
         if self.kind in (MatrixKind.ADJACENCY, MatrixKind.LAPLACIAN):

@@ -140,7 +140,7 @@ class LagrangianCoupling:
     """
 
     name: str  # what messages and scene files call it
-    parameters: FrozenDict[Parameter]  # its parameters
+    parameters: FrozenDict[Parameter]
     potential: sp.Expr = sp.S.Zero  # the energy stored, Rayleigh's function and the kinetic energy of a link
     dissipation: sp.Expr = sp.S.Zero
     kinetic: sp.Expr = sp.S.Zero

@@ -37,7 +37,7 @@ class Node:
     # the states. With set-valued friction the third state is the mode, which only events change
     state: tuple[sp.Symbol, ...]
     rhs: tuple[sp.Expr, ...]  # the right-hand side of each state: its rate where M is the identity
-    parameters: tuple[sp.Symbol, ...]  # the parameters
+    parameters: tuple[sp.Symbol, ...]
     contact: Contact | None = None  # what decides between stick and slip
     # the friction coefficient as a function of `SLIDING`; it is for printing alone
     law: sp.Expr | None = field(default=None, compare=False)

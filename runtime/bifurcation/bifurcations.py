@@ -65,7 +65,7 @@ class Bifurcation:
     """A bifurcation on a branch of periodic orbits."""
 
     value: float  # value of the parameter
-    kind: BifurcationKind  # kind of the bifurcation
+    kind: BifurcationKind
     # how far `orbit` is from the bifurcation: the distance of its multiplier from -1, from 1 or, for Neimark-Sacker,
     # from the unit circle; the gap in grazing; the excess of the load in stick loss. `follow` accepts 1e-6 at most
     residual: float
@@ -137,7 +137,7 @@ def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
 class OrbitPair:
     """Two orbits of the same phases on an arc, between which test functions of the orbit have zeros."""
 
-    arc: Arc  # arc of the orbits
+    arc: Arc
     values: tuple[float, float]  # values of the parameter
     orbits: tuple[PeriodicOrbit, PeriodicOrbit]  # orbit at each value
 

@@ -191,8 +191,12 @@ def find_turn(arc: Arc, beyond: float) -> tuple[BifurcationKind, float, Periodic
     shortest = SHORTEST * length
     for _ in range(MOST_STEPS):
         there = way.point(length)
-        astray = there is None or not way.length(there - way.guess(length)) < FIT * length
-        if there is None or astray or _slip_states(way.orbit(there)) != slip_states:
+        # Refuse a point that is far from its prediction, or whose orbit has other phases.
+        if (
+            there is None
+            or not way.length(there - way.guess(length)) < FIT * length
+            or _slip_states(way.orbit(there)) != slip_states
+        ):
             length *= 0.25
             if length < shortest:
                 return None

@@ -17,7 +17,7 @@ from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
 
 from ..plots.csv_table import Table
-from ..plots.plane import draw_plane, draw_rays, plane_table
+from ..plots.plane import draw_plane, draw_rays
 from ..plots.style import COLUMN
 from ..stability.msf import Plane, plane
 from .exponent_figure import HIGHEST, effort
@@ -57,7 +57,13 @@ def compute(name: str, runs: FigureRuns) -> Rays:
 
 def table(data: Rays) -> Table:
     """Return exponent and standard error, per unit of time, at every point of the grid."""
-    return plane_table(data.found)
+    function = data.found
+    rows = [
+        (a, b, function.exponent[i, j], function.stderr[i, j])
+        for i, a in enumerate(function.across)
+        for j, b in enumerate(function.up)
+    ]
+    return Table((*function.names, "exponent", "stderr"), tuple(rows))
 
 
 def ranges(data: Rays) -> Table:

@@ -50,7 +50,7 @@ class Place:
     """An orbit of a branch."""
 
     value: float  # value of the parameter
-    orbit: PeriodicOrbit  # orbit
+    orbit: PeriodicOrbit
     x: np.ndarray  # (k,): positions at the section
     phases: str = ""  # phases of stick and slip in words
     kind: BifurcationKind | None = None  # kind of a bifurcation at this orbit

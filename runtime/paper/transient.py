@@ -32,7 +32,7 @@ LENGTHS = (1.0, 0.3, 0.1, 3.0)
 class Trial:
     """Sweeps over the same values of sigma after transients of different length."""
 
-    row: Published  # published row
+    row: Published
     transients: tuple[float, ...]  # lengths in drive periods
     sweeps: tuple[Sweep, ...]  # one sweep for each length
 

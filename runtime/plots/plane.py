@@ -10,7 +10,6 @@ from matplotlib.colors import TwoSlopeNorm
 
 from ..prediction.mode_windows import transversal_modes
 from ..stability.msf import Plane
-from .csv_table import Table
 from .exponent import finite
 from .style import BLACK, symbol
 
@@ -58,16 +57,6 @@ def _colours(value: np.ndarray) -> tuple[str, TwoSlopeNorm]:
         return ("Blues_r", TwoSlopeNorm(high, low, 0.0)) if high < 0 else ("Reds", TwoSlopeNorm(low, 0.0, high))
     size = max(-low, high) or 1.0
     return "RdBu_r", TwoSlopeNorm(0.0, -size, size)
-
-
-def plane_table(plane: Plane) -> Table:
-    """Return exponent and standard error, per unit of time, at every point of the grid."""
-    rows = [
-        (a, b, plane.exponent[i, j], plane.stderr[i, j])
-        for i, a in enumerate(plane.across)
-        for j, b in enumerate(plane.up)
-    ]
-    return Table((*plane.names, "exponent", "stderr"), tuple(rows))
 
 
 def draw_rays(axes: Axes, plane: Plane, sigma: float | None = None) -> Axes:

@@ -18,7 +18,7 @@ VECTOR_LIMIT = 2000
 class NetworkMode:
     """A distinct non-zero eigenvalue of a network."""
 
-    graph: Topology = field(repr=False)  # network
+    graph: Topology = field(repr=False)
     number: int  # position in the spectrum, counted with multiplicities; 0 is the synchronous motion
     eigenvalue: Eigenvalue  # eigenvalue gamma
 

@@ -29,6 +29,9 @@ Variable = tuple[str, tuple[str, ...], np.ndarray]
 STATE = ("component", "node")
 """The dimensions of a state."""
 
+START_STATE = "start_state"
+"""Variable of the states that the cells started from, if those are not the scene's."""
+
 END_TIME, DRIVE_PHASE = "end_time", "drive_phase"
 """Coordinates of each cell: when it stopped, and how far into a period of the drive that was."""
 

@@ -21,7 +21,20 @@ from ..support.files import understood
 from ..support.status import Status
 from .certificate import Certificate
 from .labelled import Labelled
-from .labels import COUNTS, STATE, SUMS, TOLERANCES, States, alike, changed, dimensions, labelled, scene_of, variables
+from .labels import (
+    COUNTS,
+    START_STATE,
+    STATE,
+    SUMS,
+    TOLERANCES,
+    States,
+    alike,
+    changed,
+    dimensions,
+    labelled,
+    scene_of,
+    variables,
+)
 from .store import read_data, write_data
 
 if TYPE_CHECKING:
@@ -272,11 +285,17 @@ def gather(
     spans: np.ndarray,
     buffers: Buffers,
     certificate: Certificate | None = None,
+    starts: np.ndarray | None = None,
 ) -> Result:
-    """Return the labelled result of all cells. Shapes: spans (cells, len(SpanColumn))."""
+    """Return the labelled result of all cells. Shapes: spans (cells, len(SpanColumn)), starts (cells, dimension)."""
 
     def make() -> xr.Dataset:
-        found = list(variables(scene, spans, buffers, certificate, buffers.most_points))
-        return labelled(scene, found, scene.shape, attributes())
+        recorded = list(variables(scene, spans, buffers, certificate, buffers.most_points))
+        data = labelled(scene, recorded, scene.shape, attributes())
+        if starts is None:
+            return data
+        table = States.of(scene).table(starts.reshape(*scene.shape, -1))
+        about = {"long_name": "states that the cells started from"}
+        return data.assign({START_STATE: ((*dimensions(scene), *STATE), table, about)})
 
     return Result._deferred(make, scene)

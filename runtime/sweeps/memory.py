@@ -11,7 +11,7 @@ from ..cells.layout import Layout
 from ..cells.observable_arrays import Sections
 from ..engines.choice import warn_of_steps
 from ..engines.job import Start
-from ..results.labels import STATE, States, dimensions
+from ..results.labels import START_STATE
 from ..results.result import Result, gather
 from ..support.progress import Reporter
 from ..support.status import tally
@@ -19,9 +19,6 @@ from .errors import SweepFailed, SweepInterrupted
 from .pool import Task, worker_lost
 from .prepare import PreparedRun
 from .scheduler import BlockScheduler
-
-START = "start_state"
-"""Variable of the states that the cells started from, if those are not the scene's."""
 
 
 @dataclass(slots=True)
@@ -103,20 +100,19 @@ class Memory:
         """Return the cells so far."""
         prepared, scene = self.prepared, self.prepared.scene
         spans = prepared.reduction.planner.spans(np.arange(scene.cells))
-        result = gather(
-            scene, lambda: prepared.attributes, spans, prepared.reduction.expand(self.buffers), prepared.certificate
+        return gather(
+            scene,
+            lambda: prepared.attributes,
+            spans,
+            prepared.reduction.expand(self.buffers),
+            prepared.certificate,
+            prepared.reduction.planner.starts,
         )
-        starts = prepared.reduction.planner.starts
-        if starts is None:
-            return result
-        table = States.of(scene).table(starts.reshape(*scene.shape, -1))
-        about = {"long_name": "states that the cells started from"}
-        return Result(result.data.assign({START: ((*dimensions(scene), *STATE), table, about)}), scene)
 
 
 def _expect_starts(earlier: Result, starts: np.ndarray | None) -> None:
     """Raise ValueError if an earlier result started from other states than those of all cells, None for the scene's."""
-    begun = earlier.states(START).reshape(earlier.scene.cells, -1) if START in earlier.data else None
+    begun = earlier.states(START_STATE).reshape(earlier.scene.cells, -1) if START_STATE in earlier.data else None
     alike = begun is starts if begun is None or starts is None else np.array_equal(begun, starts)
     if not alike:
         raise ValueError(

@@ -291,8 +291,8 @@ def _run_blocks(
     layout = layout_of(log.about, scene)
     scheduler = BlockScheduler(layout, log.done, _Disk(layout, log), prepared, reporter)
     try:
-        for whole in (path, log.path):
-            drop_leftovers(whole)
+        for target in (path, log.path):
+            drop_leftovers(target)
         reporter.start(log.counts, prepared.compiling)
         scheduler.run()
         return write_result(log, path, scene)
