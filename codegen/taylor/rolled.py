@@ -1,4 +1,4 @@
-"""A Taylor step of one large node: loops over series of one kind, which tables of places tell apart.
+"""A Taylor step of one large node: loops over series of one kind, whose places stand in a table.
 
 A step that is written out has a statement for each coefficient of each series; from a hundred series on it takes some ten
 seconds to compile.  Here series are ranked by what they need of the same order, and those of one rank and kind are one
@@ -80,8 +80,8 @@ MEMORY = (Name("dense"), Name("where"), Name("at_states"))
 ROW = "at_row"
 """The variable of loops; no symbol of a model begins like that."""
 
-FOUND = ("name", "inverse", "beyond")
-"""Fields that a recurrence sets."""
+COMPUTED = ("name", "inverse", "beyond")
+"""Fields of a series that its recurrence sets."""
 
 Place = tuple[str, int]
 """A group of the workspace: the name of a part, and how far behind its beginning the group stands."""
@@ -91,8 +91,8 @@ Place = tuple[str, int]
 class Run:
     """Series of one rank and kind, and `model`, which stands for any of them in their loop.
 
-    columns: by name, where the members have their own coefficients and find those that they read; kept: what the model
-    computes once in a step.
+    columns: by name, the places of the coefficients of the members and of those that they read; kept: names of values that
+    the model computes once in a step.
     """
 
     members: list[Series]
@@ -175,12 +175,12 @@ class RolledSection(SeriesLoop):
         return "factors", self.factors.setdefault(e, len(self.factors))
 
     def room(self) -> dict[str, int]:
-        found = {s.name: self.order + 1 for s in self.graph.series}
+        rooms = {s.name: self.order + 1 for s in self.graph.series}
         for run in self.runs:
             hints = [f"hint_{run.model.base.name}"] if isinstance(run.model, Kink) else []
-            found |= dict.fromkeys([*run.kept, *hints], len(run.members))
-        found |= {f"size_{s.name}": 1 for s in self.graph.series if isinstance(s, Linear)} if self.graph.kinks else {}
-        return found | {"factors": len(self.factors), "one": 1}
+            rooms |= dict.fromkeys([*run.kept, *hints], len(run.members))
+        rooms |= {f"size_{s.name}": 1 for s in self.graph.series if isinstance(s, Linear)} if self.graph.kinks else {}
+        return rooms | {"factors": len(self.factors), "one": 1}
 
     # -- loops ----------------------------------------------------------------------------------------------------
 
@@ -204,8 +204,8 @@ class RolledSection(SeriesLoop):
 
     def over(self, series: Sequence[Series], name: str, body: Callable[[Series], list[Statement]]) -> list[Statement]:
         """A loop that reads some series, one after another."""
-        found = body(Outer(Track(f"{name}_read", None), name=f"value_{name}")) if series else []
-        return self.rows(name, {"read": [self.place_of(s) for s in series]}, found) if found else []
+        statements = body(Outer(Track(f"{name}_read", None), name=f"value_{name}")) if series else []
+        return self.rows(name, {"read": [self.place_of(s) for s in series]}, statements) if statements else []
 
     def run(self, statements: list[Statement]) -> list[Statement]:
         return statements
@@ -213,27 +213,27 @@ class RolledSection(SeriesLoop):
     # -- coefficients ---------------------------------------------------------------------------------------------
 
     def coefficients(self, order: Expression) -> list[Statement]:
-        self.k, found = order, list[Statement]()
+        self.k, statements = order, list[Statement]()
         for run in self.runs:
             self.current = run
             match run.model:
                 case Linear():
-                    found += self.sums_of(run)
+                    statements += self.sums_of(run)
                 case Product() | Square():
-                    found += self.products_of(run)
+                    statements += self.products_of(run)
                 case _:
-                    found += self.recurrence(run)
+                    statements += self.recurrence(run)
         self.current = None
         moving = {k: e for k, (_, e) in enumerate(self.rates) if not isinstance(e, Constant)}
         columns = {"from": [self.place_of(e) for e in moving.values()], "to": [("rates", k) for k in moving]}
-        found += self.rows("rate", columns, [Store("dense", Name("at_rate_to"), self.here("rate_from"))])
+        statements += self.rows("rate", columns, [Store("dense", Name("at_rate_to"), self.here("rate_from"))])
         for place, rate in self.rates:
             if isinstance(rate, Constant):
-                found.append(Store("dense", plus(Name("at_rates"), place), lane(self.of(rate))))
+                statements.append(Store("dense", plus(Name("at_rates"), place), lane(self.of(rate))))
         if order != START:
-            return found
+            return statements
         numbers = [Store("dense", plus(Name("at_factors"), Number(k)), lane(e)) for e, k in self.factors.items()]
-        return [*numbers, Store("dense", Name("at_one"), lane(Number(1.0))), *found]
+        return [*numbers, Store("dense", Name("at_one"), lane(Number(1.0))), *statements]
 
     def here(self, name: str) -> Expression:
         """The coefficient of the order that is written, at a place with a name."""
@@ -263,11 +263,11 @@ class RolledSection(SeriesLoop):
             terms += [(self.factor(s.constant), ("one", 0))] if first and s.constant != ZERO else []
             ends.append(len(terms))
         places = [self.enter(run.columns["out"]), self.enter(ends), self.enter([e for pair in terms for e in pair])]
-        found: list[Statement] = [Do(call("sums", *MEMORY, *map(Number, places), Number(len(run.members)), self.k))]
+        calls: list[Statement] = [Do(call("sums", *MEMORY, *map(Number, places), Number(len(run.members)), self.k))]
         if first and not self.kinked.isdisjoint(run.members):
             sizes = self.enter([(f"size_{s.name}", 0) for s in run.members])
-            found.append(Do(call("sizes", *MEMORY, Number(sizes), *map(Number, places[1:]), Number(len(run.members)))))
-        return found
+            calls.append(Do(call("sizes", *MEMORY, Number(sizes), *map(Number, places[1:]), Number(len(run.members)))))
+        return calls
 
     def products_of(self, run: Run) -> list[Statement]:
         """The call that makes products and squares."""
@@ -341,28 +341,28 @@ class Rolled(LoopedSeries):
         if len(members) == 1:
             return self.states(lambda place: self.size(place, *members))
         # angles with one period, and all other states, are loops of their own
-        found, section = list[Statement](), self.section
+        loops, section = list[Statement](), self.section
         for number, (period, places) in enumerate(members.items()):
             name = f"state{number}"
             series = Outer(Track(f"{name}_read", None), name=f"value_{name}", period=period)
-            found += section.rows(name, {"read": places}, section.counted(series))
-        return found
+            loops += section.rows(name, {"read": places}, section.counted(series))
+        return loops
 
     def statements(self) -> list[Statement]:
         """What the step does, without names of places that it finds in the table."""
-        found = super().statements()
-        used = mentioned(s for s in found if not _part(s))
-        return [s for s in found if not _part(s) or _part(s) in used]
+        statements = super().statements()
+        used = mentioned(s for s in statements if not _part(s))
+        return [s for s in statements if not _part(s) or _part(s) in used]
 
     def step(self, *more: str) -> TaylorStep:
-        made = super().step(*more)
+        written = super().step(*more)
         # LLVM takes a minute for dozens of passages within a function
-        called = [text.replace(f"{PLAIN}\ndef passage", f"{APART}\ndef passage") for text in made.called]
+        called = [text.replace(f"{PLAIN}\ndef passage", f"{APART}\ndef passage") for text in written.called]
         called += [SIZES] if self.section.graph.kinks else []
         begin = dict(zip(self.room(), accumulate(self.room().values(), initial=0), strict=False))
         table = self.section.table
         return replace(
-            made, called=tuple(called), table=tuple(e if isinstance(e, int) else begin[e[0]] + e[1] for e in table)
+            written, called=tuple(called), table=tuple(e if isinstance(e, int) else begin[e[0]] + e[1] for e in table)
         )
 
 
@@ -394,7 +394,7 @@ def _statics(series: Series) -> tuple[object, ...]:
         return (Linear,)
     if isinstance(series, Product | Square):
         return (Product,)
-    parts = [(part.name, getattr(series, part.name)) for part in fields(series) if part.name not in FOUND]
+    parts = [(part.name, getattr(series, part.name)) for part in fields(series) if part.name not in COMPUTED]
     return (type(series), *(e.value if isinstance(e, Constant) else e for name, e in parts if not _moves(e)))
 
 

@@ -35,7 +35,7 @@ def periods_of_kinds(equations: Equations) -> tuple[Periods, ...]:
             else:
                 turns[kind][number[s]].add(period)
     return tuple(
-        tuple(_common(found) if found and c not in bare[kind] else None for c, found in enumerate(turns[kind]))
+        tuple(_common(periods) if periods and c not in bare[kind] else None for c, periods in enumerate(turns[kind]))
         for kind in range(len(equations.nodes))
     )
 
@@ -43,10 +43,10 @@ def periods_of_kinds(equations: Equations) -> tuple[Periods, ...]:
 @lru_cache(maxsize=64)
 def periods_of_states(equations: Equations) -> Periods:
     """Return the period of each state of the network, None for a state that is no angle; see `periods_of_kinds`."""
-    by_kind, found = periods_of_kinds(equations), dict[int, float | None]()
+    by_kind, periods = periods_of_kinds(equations), dict[int, float | None]()
     for kind, places in zip(equations.kind_of, equations.places, strict=True):
-        found.update(zip(places, by_kind[kind], strict=True))
-    return tuple(found[slot] for slot in range(equations.dimension))
+        periods.update(zip(places, by_kind[kind], strict=True))
+    return tuple(periods[slot] for slot in range(equations.dimension))
 
 
 def _uses(equations: Equations) -> Iterator[tuple[int, Iterable[sp.Expr], tuple[sp.Symbol, ...]]]:
