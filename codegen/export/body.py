@@ -184,7 +184,7 @@ def _places(block: tuple[tuple[sp.Expr, ...], ...]) -> dict[Place, sp.Expr]:
     return {place: e for place, e in table.items() if e != 0}
 
 
-def _body(table: dict, every: bool = False) -> ExportBody:
+def _body(table: dict[Any, Any], every: bool = False) -> ExportBody:
     """Common parts are computed once: w1, w2, …, which no symbol of a portable model is called."""
     kept = {place: sp.sympify(e) for place, e in table.items() if every or e != 0}
     names = (real(f"w{k}") for k in range(1, 1_000_000))

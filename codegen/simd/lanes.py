@@ -52,7 +52,7 @@ The other way round it asks some dozen operators of arrays, texts and dates firs
 PAIRS = [(Lane, Lane), (Lane, types.Float), (types.Float, Lane), (Lane, types.Integer), (types.Integer, Lane)]
 
 
-def _define_operator(function: Callable, emit: Callable, result: type) -> None:
+def _define_operator(function: Callable[..., Any], emit: Callable[..., Any], result: type) -> None:
     """Give a binary operator its meaning on lanes; numbers are broadcast."""
 
     @infer_global(function)
@@ -167,7 +167,7 @@ def _lower_neg(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.fneg(args[0])
 
 
-def _define_logic(function: Callable, name: str) -> None:
+def _define_logic(function: Callable[..., Any], name: str) -> None:
     @infer_global(function)
     class _Typing(AbstractTemplate):
         metadata = FIRST
@@ -198,7 +198,7 @@ def _lower_invert(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.not_(args[0])
 
 
-def _on_lanes(emit: Callable, arity: int) -> Any:
+def _on_lanes(emit: Callable[..., Any], arity: int) -> Any:
     """An intrinsic on lanes that `emit` builds; numbers among the arguments are broadcast."""
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:

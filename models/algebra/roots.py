@@ -117,7 +117,7 @@ def _short(x: Fraction) -> str:
     return str(x) if longest < 100 else f"a fraction of {longest} bits"
 
 
-class ComplexRootOf(sp.CRootOf):  # type: ignore[misc]  # SymPy has no types
+class ComplexRootOf(sp.CRootOf):
     """SymPy's CRootOf, equal to it, printed as a decimal: polynomials fill pages."""
 
     __slots__ = ("shown",)

@@ -9,13 +9,12 @@ from typing import Any, TypeAlias, get_args, get_origin, get_type_hints
 
 from ..definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from ..definitions.loader import load_friction_law, load_oscillator, read_coupling
-from ..dynamics.network import KAPPA
 from ..graphs.families import Family, family
 from ..graphs.families import names as families
 from ..inputs import plugins
 from ..inputs.plugins import PluginKind
 from ..inputs.words import Word
-from ..mechanics.contact import ContactModel
+from ..mechanics.contact import KAPPA, ContactModel
 from ..mechanics.parameter import Parameter
 from ..networks.model import MOST_NODES
 from ..sweeps.axis import LIMIT as AXIS_LIMIT

@@ -7,7 +7,7 @@ named, any other becomes a variable of its own.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from fractions import Fraction
@@ -113,9 +113,10 @@ class _ValueReader:
             return np.array(self.data[part].values, dtype=np.dtype(tree["dtype"]))
         if tag == "enum":
             return self.classes[part[0]](part[1])
-        return {
+        readers: dict[str, Callable[[], Any]] = {
             "complex": lambda: complex(*part),
             "fraction": lambda: Fraction(part),
             "graph": lambda: graph_of(part),
             "table": lambda: FrozenDict({name: self.value(item) for name, item in part.items()}),
-        }.get(tag, lambda: self.scenes[part])()
+        }
+        return readers[tag]() if tag in readers else self.scenes[part]
