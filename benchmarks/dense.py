@@ -38,7 +38,7 @@ def case_of(name: str, periods: int = PERIODS) -> Case:
 
 def measure(quick: bool = False) -> list[tuple[object, ...]]:
     """Return the rows of the table, in the order of COLUMNS."""
-    present = peers.present(peers.names())
+    present = peers.present()
     rows: list[tuple[object, ...]] = []
     for name in CASES[:1] if quick else CASES:
         case = case_of(name, 4 if quick else PERIODS)

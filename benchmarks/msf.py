@@ -43,7 +43,7 @@ from synchain.runtime.support.execution import Execution
 
 from . import peers
 from .kit.tables import markdown
-from .peers import _jitcode_transversal as jitcode
+from .peers import jitcode_transversal
 
 COLUMNS = (
     "what",
@@ -71,6 +71,7 @@ SIDE = 60
 """Strengths a side of the plane, alpha from 0 to 1.2 and beta from 0 to 0.6; negative beta would
 say the same again.
 """
+PEER = "jitcode_lsoda"  # needs the same packages as JiTCODE's transversal exponents
 RTOL = 1e-6
 SETTLED, LONGEST = 300, 1e6
 PRECISION = 5e-3
@@ -115,8 +116,7 @@ CASES = (
 
 def notes() -> list[str]:
     """A line for the peer where it cannot run, with the reason and the remedy."""
-    why = peers.absent(jitcode)
-    return [f"skipped: {jitcode.NAME} ({why})"] if why else []
+    return peers.skipped([PEER])
 
 
 def measure(quick: bool = False) -> list[Row]:
@@ -126,7 +126,7 @@ def measure(quick: bool = False) -> list[Row]:
     rows = [row for contact in LAWS for row in _one_thread(orbit_rows, contact, quick)]
     for case in CASES[:1] if quick else CASES:
         rows += _one_thread(_own_rows, case, quick)
-        if not peers.absent(jitcode):
+        if peers.present([PEER]):
             rows += _one_thread(_peer_rows, case, quick)
     return rows
 
@@ -259,7 +259,7 @@ def _own_row(case: Case, values: Sequence[float] | np.ndarray, quick: bool) -> R
 
 
 def _peer_rows(case: Case, quick: bool) -> list[Row]:
-    growths = jitcode.prepare(case.scene, case.method, RTOL)
+    growths = jitcode_transversal.prepare(case.scene, case.method, RTOL)
     rows = []
     for alpha in case.alphas:
         found = []
@@ -268,11 +268,11 @@ def _peer_rows(case: Case, quick: bool) -> list[Row]:
             batches = _averaged(growths, case, scene, alpha, _bar(quick))
             mean, error = float(batches.mean()[0, 0]), float(batches.error()[0])
             found.append((time.process_time() - begin, batches.periods, mean, error))
-        rows.append(_timed(case, f"{jitcode.NAME} {case.method}", [alpha], found))
+        rows.append(_timed(case, f"JiTCODE {case.method}", [alpha], found))
     return rows
 
 
-def _averaged(growths: jitcode.Growths, case: Case, scene: Scene, alpha: float, bar: float) -> Batches:
+def _averaged(growths: jitcode_transversal.Growths, case: Case, scene: Scene, alpha: float, bar: float) -> Batches:
     """Batches of growth up to the error bar, as `exponents` takes them."""
     unit = unit_of_time(scene)
     start = np.array([numbers[0] for numbers in scene.initial.values()])
@@ -322,7 +322,7 @@ def summary(rows: Sequence[Sequence[object]]) -> str:
     columns = (
         "system",
         "alpha",
-        f"{jitcode.NAME}, seconds",
+        "JiTCODE, seconds",
         "synchain, seconds",
         "ratio",
         "synchain, one of a thousand, milliseconds",

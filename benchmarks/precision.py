@@ -104,12 +104,12 @@ def case_of(name: str) -> Case:
 
 def notes() -> list[str]:
     """A line for each peer that cannot run here, with the reason and the remedy."""
-    return peers.skipped(peers.names())
+    return peers.skipped()
 
 
 def measure(quick: bool = False) -> list[tuple[object, ...]]:
     """Return the rows of the table, in the order of COLUMNS."""
-    present = peers.present(peers.names())
+    present = peers.present()
     rows: list[tuple[object, ...]] = []
     with tqdm(total=len(CASES) * (1 + len(present)), unit="curve", disable=None) as bar:
         for name in CASES:

@@ -25,7 +25,7 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability.orbits import unit_of_time
 
 from . import peers
-from .peers._problem import Problem
+from .peers.problem import Problem
 
 COLUMNS = ("stage", "oscillators", "seconds")
 SIZES = (2, 4)
@@ -97,8 +97,8 @@ def peer_times(n: int) -> list[tuple[str, float]]:
     found = []
     for peer in peers.present(COMPILING):
         begin = time.perf_counter()
-        peer.prepare(Problem(scene))(*peer.TOLERANCES[0], end)
-        found.append((peer.NAME, time.perf_counter() - begin))
+        peer.prepare(Problem(scene))(*peer.tolerances[0], end)
+        found.append((peer.name, time.perf_counter() - begin))
     return found
 
 

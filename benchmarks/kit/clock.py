@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from types import ModuleType
 
 import numpy as np
 
-from ..peers._problem import Problem, Solve
+from ..peers.peer import Peer
+from ..peers.problem import Problem, Solve
 from .cases import Case
 
 SHORTEST = 0.2
@@ -74,17 +74,16 @@ def _seconds(run: Callable[[], object], repetitions: int) -> float:
     return (time.process_time() - begin) / repetitions
 
 
-def curve(peer: ModuleType, case: Case, quick: bool, read_all: bool = False) -> Iterator[Point]:
+def curve(peer: Peer, case: Case, quick: bool, read_all: bool = False) -> Iterator[Point]:
     """Yield a point for each tolerance of a peer, loose first; a failure is a point with NaN and a
     remark.  The timed run has one end, or with `read_all` all times of the case.
     """
-    lanes = getattr(peer, "CELLS", 1)
-    tolerances = peer.TOLERANCES[:: max(2, len(peer.TOLERANCES) // 2)] if quick else peer.TOLERANCES
+    tolerances = peer.tolerances[:: max(2, len(peer.tolerances) // 2)] if quick else peer.tolerances
     begin = time.perf_counter()
     try:
         solve = peer.prepare(Problem(case.scene))
     except Exception as problem:  # a peer may fail in any way; the table says how
-        yield _failed(peer.NAME, lanes, tolerances[0], time.perf_counter() - begin, problem)
+        yield _failed(peer.name, peer.cells, tolerances[0], time.perf_counter() - begin, problem)
         return
     prepared = time.perf_counter() - begin
     for rtol, atol in tolerances:
@@ -94,10 +93,10 @@ def curve(peer: ModuleType, case: Case, quick: bool, read_all: bool = False) -> 
             compiled = prepared + max(0.0, time.perf_counter() - begin - 2.0 * cost)
             periods, error, seconds = _measure(solve, rtol, atol, case, cost, quick, read_all)
         except Exception as problem:
-            yield _failed(peer.NAME, lanes, (rtol, atol), prepared, problem)
+            yield _failed(peer.name, peer.cells, (rtol, atol), prepared, problem)
             continue
         remark = "" if periods == case.periods else f"{periods} of {case.periods} periods"
-        yield Point(peer.NAME, lanes, rtol, atol, error, seconds / lanes, periods, compiled, remark=remark)
+        yield Point(peer.name, peer.cells, rtol, atol, error, seconds / peer.cells, periods, compiled, remark=remark)
         if cost > (0.05 * GIVE_UP if quick else GIVE_UP):
             return
 

@@ -1,55 +1,94 @@
-"""Other programs that solve the benchmark's problems, one file each; a new peer is a new file.
+"""Other programs that solve the benchmark's problems.
 
-A file holds `NAME`; `PACKAGE`, what to install; `REQUIRES`, the modules it imports and the programs
-it starts, as {"module": (…), "program": (…)}; `TOLERANCES`, the pairs (rtol, atol) tried, loose
-first; and `prepare(problem) -> solve`, which may compile and is timed apart.
-`solve(rtol, atol, times) -> states` integrates from the start of the problem to ascending times
-(m,) and returns states (m, dimension); it raises an error where the solver gives up. Optional:
-`CELLS`, how many copies of the problem one call solves together (default 1), and
-`missing() -> str`, why the peer cannot run beyond the modules and programs, empty where it can.
+`PEERS` is the table of them: a new peer is a row, and a function that prepares it in a file of this folder.
 """
 
 from __future__ import annotations
 
-import importlib
-import shutil
 from collections.abc import Iterable
-from types import ModuleType
+from functools import partial
 
-from synchain.runtime.support import folder
+from . import boost_cash_karp, diffrax_kvaerno5, heyoka_solvers, jitcode_solvers, numbalsoda_solvers, scipy_solvers
+from . import sundials_solvers as sundials
+from .peer import Peer, ladder
 
-__all__ = ["absent", "load", "names", "present", "skipped"]
+__all__ = ["PEERS", "Peer", "present", "skipped"]
+
+HEYOKA_TOLERANCES = tuple((10.0 * tol, tol) for tol in (1e-6, 1e-8, 1e-10, 1e-12, 1e-14))
+PAPER_TOLERANCES = ((1e-6, 1e-8), (1e-9, 1e-12), (1e-12, 1e-15))  # the last pair is that of the source paper
+NUMBALSODA = "numbalsoda (its build needs gfortran)"
+JITCODE = "jitcode and a C compiler"
+LANES = 8  # trajectories that heyoka integrates together
+
+PEERS = {
+    "boost_cash_karp": Peer(
+        "Cash-Karp, C++ Boost Odeint",
+        "g++ and the headers of Boost (libboost-dev)",
+        boost_cash_karp.prepare,
+        PAPER_TOLERANCES,
+        programs=("g++",),
+        fault=boost_cash_karp.fault,
+    ),
+    "diffrax_kvaerno5": Peer(
+        "diffrax Kvaerno5", "diffrax", diffrax_kvaerno5.prepare, ladder(4, 10, 2), modules=("jax", "diffrax")
+    ),
+    "heyoka_batch": Peer(
+        "heyoka Taylor batch",
+        "heyoka",
+        partial(heyoka_solvers.prepare, lanes=LANES),
+        HEYOKA_TOLERANCES,
+        modules=("heyoka",),
+        cells=LANES,
+    ),
+    "heyoka_taylor": Peer(
+        "heyoka Taylor", "heyoka", partial(heyoka_solvers.prepare, lanes=1), HEYOKA_TOLERANCES, modules=("heyoka",)
+    ),
+    "jitcode_dop853": Peer(
+        "JiTCODE DOP853",
+        JITCODE,
+        partial(jitcode_solvers.prepare, method="dop853", jacobian=False),
+        ladder(5, 12),
+        modules=("jitcode", "symengine"),
+    ),
+    "jitcode_lsoda": Peer(
+        "JiTCODE LSODA",
+        JITCODE,
+        partial(jitcode_solvers.prepare, method="lsoda", jacobian=True),
+        ladder(5, 13),
+        modules=("jitcode", "symengine"),
+    ),
+    "numbalsoda_dop853": Peer(
+        "numbalsoda DOP853", NUMBALSODA, numbalsoda_solvers.dop853, ladder(5, 12), modules=("numbalsoda",)
+    ),
+    "numbalsoda_lsoda": Peer(
+        "numbalsoda LSODA", NUMBALSODA, numbalsoda_solvers.lsoda, ladder(5, 13), modules=("numbalsoda",)
+    ),
+    "scipy_bdf": Peer("SciPy BDF", "scipy", partial(scipy_solvers.implicit, method="BDF"), ladder(4, 12, 2)),
+    "scipy_lsoda": Peer("SciPy LSODA (odeint)", "scipy", scipy_solvers.lsoda, ladder(5, 13)),
+    "scipy_radau": Peer("SciPy Radau", "scipy", partial(scipy_solvers.implicit, method="Radau"), ladder(4, 12, 2)),
+    "sundae_adams": Peer(
+        "CVODE Adams (scikit-SUNDAE)",
+        "scikit-sundae",
+        partial(sundials.prepare, method="Adams"),
+        ladder(5, 12),
+        modules=("sksundae.cvode",),
+    ),
+    "sundae_bdf": Peer(
+        "CVODE BDF (scikit-SUNDAE)",
+        "scikit-sundae",
+        partial(sundials.prepare, method="BDF"),
+        ladder(5, 13),
+        modules=("sksundae.cvode",),
+    ),
+}
 
 
-def names() -> tuple[str, ...]:
-    """Names of all peers: the files of this folder."""
-    return folder.names(__path__)
+def present(names: Iterable[str] = PEERS) -> list[Peer]:
+    """Return the peers of these names that can run here."""
+    return [PEERS[name] for name in names if not PEERS[name].absence()]
 
 
-def load(name: str) -> ModuleType:
-    """Return the peer of that name; ValueError for an unknown one."""
-    return folder.load("peer", name, __name__, __path__)
-
-
-def absent(peer: ModuleType) -> str:
-    """Why a peer cannot run here and what to install, in one line; empty where it can run."""
-    for program in peer.REQUIRES.get("program", ()):
-        if shutil.which(program) is None:
-            return f"no program {program!r} on the path; install {peer.PACKAGE}"
-    for module in peer.REQUIRES.get("module", ()):
-        try:
-            importlib.import_module(module)
-        except (ImportError, OSError) as problem:  # OSError: a shared library that does not load
-            return f"{' '.join(str(problem).split())}; install {peer.PACKAGE}"
-    return str(peer.missing()) if hasattr(peer, "missing") else ""
-
-
-def present(chosen: Iterable[str]) -> list[ModuleType]:
-    """The peers of these names that can run here."""
-    return [peer for peer in map(load, chosen) if not absent(peer)]
-
-
-def skipped(chosen: Iterable[str]) -> list[str]:
-    """A line for each of these peers that cannot run here, with the reason and the remedy."""
-    found = [(peer.NAME, absent(peer)) for peer in map(load, chosen)]
-    return [f"skipped: {name} ({why})" for name, why in found if why]
+def skipped(names: Iterable[str] = PEERS) -> list[str]:
+    """Return a line for each of these peers that cannot run here, with the reason and what to install."""
+    reasons = {PEERS[name].name: PEERS[name].absence() for name in names}
+    return [f"skipped: {name} ({reason})" for name, reason in reasons.items() if reason]

@@ -16,12 +16,7 @@ from string import Template
 import numpy as np
 import sympy as sp
 
-from ._problem import Problem, Solve
-
-NAME = "Cash-Karp, C++ Boost Odeint"
-PACKAGE = "g++ and the headers of Boost (libboost-dev)"
-REQUIRES = {"program": ("g++",)}
-TOLERANCES = ((1e-6, 1e-8), (1e-9, 1e-12), (1e-12, 1e-15))
+from .problem import Problem, Solve
 
 SOURCE = Template("""
 #include <array>
@@ -52,13 +47,13 @@ extern "C" int solve(double rtol, double atol, const double *y0, const double *t
 """)
 
 
-def missing() -> str:
-    """Why the headers cannot be used; empty where they can."""
+def fault() -> str:
+    """Return why the headers cannot be used; empty where they can."""
     text = "#include <boost/numeric/odeint.hpp>\n"
     done = subprocess.run(
         ["g++", "-x", "c++", "-E", "-", "-o", "-"], input=text, capture_output=True, text=True, check=False
     )
-    return "" if done.returncode == 0 else f"no boost/numeric/odeint.hpp; install {PACKAGE}"
+    return "" if done.returncode == 0 else "no boost/numeric/odeint.hpp"
 
 
 def prepare(problem: Problem) -> Solve:

@@ -9,12 +9,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from ._problem import Problem, Solve, ladder
-
-NAME = "diffrax Kvaerno5"
-PACKAGE = "diffrax"
-REQUIRES = {"module": ("jax", "diffrax")}
-TOLERANCES = ladder(4, 10, 2)
+from .problem import Problem, Solve
 
 
 def prepare(problem: Problem) -> Solve:

@@ -6,16 +6,19 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from statistics import fmean
 
 import numpy as np
 import pytest
 
 from benchmarks import msf
-from benchmarks.peers import _jitcode_transversal as jitcode
+from benchmarks.peers import PEERS, jitcode_transversal
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability import orbits
+
+ABSENT = replace(PEERS[msf.PEER], modules=("a_peer_that_nobody_has",))
 
 pytestmark = pytest.mark.long
 
@@ -23,16 +26,16 @@ pytestmark = pytest.mark.long
 @pytest.fixture(scope="module")
 def rows() -> list[dict[str, object]]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(jitcode.REQUIRES, "module", ("a_peer_that_nobody_has",))
+        patch.setitem(PEERS, msf.PEER, ABSENT)
         found = msf.measure(quick=True)
     return [dict(zip(msf.COLUMNS, row, strict=True)) for row in found]
 
 
 def test_without_the_peer_its_rows_are_left_out_and_it_is_named(rows, monkeypatch) -> None:
     assert {row["program"] for row in rows} == {"synchain"}
-    monkeypatch.setitem(jitcode.REQUIRES, "module", ("a_peer_that_nobody_has",))
+    monkeypatch.setitem(PEERS, msf.PEER, ABSENT)
     (line,) = msf.notes()
-    assert line.startswith("skipped: JiTCODE (No module named 'a_peer_that_nobody_has'")
+    assert line.startswith("skipped: JiTCODE LSODA (No module named 'a_peer_that_nobody_has'")
     assert line.endswith("install jitcode and a C compiler)")
 
 
@@ -128,7 +131,7 @@ def test_the_peer_has_the_exponent_of_a_linear_oscillator_in_closed_form() -> No
     """x'' = -x - alpha v: growth -alpha/2 on average, whatever the direction of the deviation."""
     pytest.importorskip("jitcode")
     scene = Scene(oscillator="harmonic", coupling="damper", topology=topology("chain", 2), record=())
-    growths = jitcode.prepare(scene, "dopri5", 1e-8)
+    growths = jitcode_transversal.prepare(scene, "dopri5", 1e-8)
     for alpha in (0.2, 0.6):
         turn = math.pi / math.sqrt(1 - alpha**2 / 4)  # after which every direction is back
         found = list(itertools.islice(growths(alpha, np.array([1.0, 0.0]), turn, 2), 10))
@@ -137,4 +140,4 @@ def test_the_peer_has_the_exponent_of_a_linear_oscillator_in_closed_form() -> No
 
 def test_the_peer_takes_two_oscillators() -> None:
     with pytest.raises(ValueError, match="found 3 oscillators; expected two"):
-        jitcode.prepare(Scene(topology=topology("chain", 3), record=()), "lsoda", 1e-6)
+        jitcode_transversal.prepare(Scene(topology=topology("chain", 3), record=()), "lsoda", 1e-6)

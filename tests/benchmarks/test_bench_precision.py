@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 import benchmarks
-from benchmarks import dense, peers, precision
+from benchmarks import dense, precision
 from benchmarks.kit import computed
 from benchmarks.kit.cases import CASES, normal_modes, read_case
 from benchmarks.kit.clock import LONGEST, QUICK, TIMED, curve, timed_periods
 from benchmarks.kit.compare import table, time_at
-from benchmarks.peers import _numbalsoda
-from benchmarks.peers._problem import Problem
+from benchmarks.peers import PEERS, Peer, numbalsoda_solvers
+from benchmarks.peers.problem import Problem
 from synchain.codegen.simd.lane_types import native_width
 
 SMOOTH, STIFF = "smooth, n = 2", "friction, n = 2"
@@ -158,13 +158,13 @@ def marked(peer):
     return pytest.param(peer, marks=[pytest.mark.long] if peer.startswith("boost") else [])
 
 
-@pytest.mark.parametrize("peer", [marked(peer) for peer in peers.names()])
+@pytest.mark.parametrize("peer", [marked(peer) for peer in PEERS])
 def test_peers_solve_the_smooth_case(peer):
-    module = peers.load(peer)
-    if why := peers.absent(module):
-        pytest.skip(f"{module.NAME}: {why}")
+    solver = PEERS[peer]
+    if why := solver.absence():
+        pytest.skip(f"{solver.name}: {why}")
     case = read_case(SMOOTH).within(6)
-    states = module.prepare(Problem(case.scene))(*module.TOLERANCES[len(module.TOLERANCES) // 2], case.times)
+    states = solver.prepare(Problem(case.scene))(*solver.tolerances[len(solver.tolerances) // 2], case.times)
     assert states.shape == case.states.shape
     assert np.abs(states - case.states).max() < 1e-6
 
@@ -181,7 +181,7 @@ def test_the_callback_of_numbalsoda_is_the_right_hand_side(monkeypatch):
     rhs, _ = problem.compiled()
     expected, out, unused = np.empty(4), np.empty(4), np.zeros(1)
     rhs(0.7, problem.y0, expected)
-    callback = _numbalsoda.compiled(problem)
+    callback = numbalsoda_solvers.compiled(problem)
     place = ctypes.POINTER(ctypes.c_double)
     function = ctypes.CFUNCTYPE(None, ctypes.c_double, place, place, place)(callback.address)
     function(0.7, *(a.ctypes.data_as(place) for a in (problem.y0, out, unused)))
@@ -189,29 +189,21 @@ def test_the_callback_of_numbalsoda_is_the_right_hand_side(monkeypatch):
     assert np.abs(expected).max() > 0.1
 
 
-@pytest.mark.parametrize("peer", peers.names())
-def test_peers_have_what_the_runner_reads(peer):
-    module = peers.load(peer)
-    assert module.NAME
-    assert module.PACKAGE
-    assert set(module.REQUIRES) <= {"module", "program"}
-    assert list(module.TOLERANCES) == sorted(module.TOLERANCES, reverse=True)
-    assert all(rtol > atol > 0.0 for rtol, atol in module.TOLERANCES)
+@pytest.mark.parametrize("peer", PEERS.values(), ids=PEERS)
+def test_tolerances_of_peers_are_tried_loose_first(peer):
+    assert list(peer.tolerances) == sorted(peer.tolerances, reverse=True)
+    assert all(rtol > atol > 0.0 for rtol, atol in peer.tolerances)
 
 
 def test_missing_peers_are_named_with_the_remedy(monkeypatch):
-    lost = types.SimpleNamespace(NAME="Solver X", PACKAGE="solver-x", REQUIRES={"module": ("no_such_module_x",)})
-    tool = types.SimpleNamespace(NAME="Solver Y", PACKAGE="y-tools", REQUIRES={"program": ("no-such-program-y",)})
-    monkeypatch.setattr(peers, "names", lambda: ("x", "y"))
-    monkeypatch.setattr(peers, "load", {"x": lost, "y": tool}.get)
-    first, second = precision.notes()
-    assert first == "skipped: Solver X (No module named 'no_such_module_x'; install solver-x)"
-    assert second == "skipped: Solver Y (no program 'no-such-program-y' on the path; install y-tools)"
-
-
-def test_unknown_peers_are_refused():
-    with pytest.raises(ValueError, match=r"unknown peer 'matlab'; known: .*scipy_radau"):
-        peers.load("matlab")
+    monkeypatch.setitem(PEERS, "x", Peer("Solver X", "solver-x", None, (), modules=("no_such_module_x",)))
+    monkeypatch.setitem(PEERS, "y", Peer("Solver Y", "y-tools", None, (), programs=("no-such-program-y",)))
+    monkeypatch.setitem(PEERS, "z", Peer("Solver Z", "z-lib", None, (), fault=lambda: "no z.h"))
+    assert set(precision.notes()) >= {
+        "skipped: Solver X (No module named 'no_such_module_x'; install solver-x)",
+        "skipped: Solver Y (no program 'no-such-program-y' on the path; install y-tools)",
+        "skipped: Solver Z (no z.h; install z-lib)",
+    }
 
 
 def exact(error, gives_up=lambda rtol: False, cells=1):
@@ -225,7 +217,7 @@ def exact(error, gives_up=lambda rtol: False, cells=1):
         return np.array(rows) + error * rtol
 
     tolerances = ((1e-4, 1e-5), (1e-6, 1e-7))
-    return types.SimpleNamespace(NAME="X", CELLS=cells, TOLERANCES=tolerances, prepare=lambda problem: solve)
+    return Peer("X", "x", lambda problem: solve, tolerances, cells=cells)
 
 
 def test_a_curve_has_a_point_a_tolerance_with_its_error():
@@ -253,7 +245,7 @@ def test_a_peer_that_cannot_be_prepared_is_one_row():
     def prepare(problem):
         raise OSError("no compiler")
 
-    peer = types.SimpleNamespace(NAME="X", TOLERANCES=((1e-4, 1e-5), (1e-6, 1e-7)), prepare=prepare)
+    peer = Peer("X", "x", prepare, ((1e-4, 1e-5), (1e-6, 1e-7)))
     (point,) = curve(peer, read_case(SMOOTH), quick=False)
     assert point.remark == "failed: no compiler"
 
@@ -295,7 +287,8 @@ def test_ratios_are_to_the_fastest_own_method_with_full_lanes():
 def test_every_case_runs_and_its_table_and_figure_are_written(monkeypatch, tmp_path):
     methods = (precision.Method("rodas5p", True, ((1e-5, 1e-6), (1e-6, 1e-7)), longest=10),)
     monkeypatch.setattr(precision, "METHODS", methods)
-    monkeypatch.setattr(peers, "names", lambda: ("scipy_lsoda",))
+    for peer in set(PEERS) - {"scipy_lsoda"}:
+        monkeypatch.delitem(PEERS, peer)
     rows = precision.measure(quick=True)
     assert {row[0] for row in rows} == {*CASES, *computed.SMOOTH}
     assert {row[1] for row in rows} == {"rodas5p", "SciPy LSODA (odeint)"}

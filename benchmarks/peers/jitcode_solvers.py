@@ -10,7 +10,7 @@ from contextlib import chdir
 import numpy as np
 import sympy as sp
 
-from ._problem import Problem, Solve
+from .problem import Problem, Solve
 
 
 def prepare(problem: Problem, method: str, jacobian: bool) -> Solve:

@@ -1,5 +1,4 @@
-"""What a peer is given: start, numbers, and right-hand side and Jacobian as text in its language or
-compiled by Numba.
+"""The problem that a peer solves: start, parameters, right-hand side and Jacobian, as text or compiled by Numba.
 
 All of it is printed from the derived equations, after the elimination of common subexpressions; no
 peer has equations typed in by hand. The parameters are constants in the text, so that a compiler
@@ -20,11 +19,6 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.scenes.scene import Scene
 
 Solve = Callable[[float, float, np.ndarray], np.ndarray]
-
-
-def ladder(first: int, last: int, step: int = 1) -> tuple[tuple[float, float], ...]:
-    """Tolerances 10^-first … 10^-last as pairs (rtol, atol), atol a tenth of rtol."""
-    return tuple((float(f"1e-{k}"), float(f"1e-{k + 1}")) for k in range(first, last + 1, step))
 
 
 @dataclass(frozen=True, slots=True)

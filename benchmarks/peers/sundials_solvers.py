@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._problem import Problem, Solve
+from .problem import Problem, Solve
 
 
 def prepare(problem: Problem, method: str) -> Solve:

@@ -19,11 +19,7 @@ import sympy as sp
 
 from synchain.models.scenes.scene import Scene
 
-from ._problem import Problem
-
-NAME = "JiTCODE"
-PACKAGE = "jitcode and a C compiler"
-REQUIRES = {"module": ("jitcode", "symengine")}
+from .problem import Problem
 
 Growths = Callable[[float, np.ndarray, float, int], Iterator[float]]
 """growths(alpha, start (components,), block, skipped): the logarithms of the growth over one block

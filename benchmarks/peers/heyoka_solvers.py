@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from ._problem import Problem, Solve
+from .problem import Problem, Solve
 
 
 def prepare(problem: Problem, lanes: int) -> Solve:
