@@ -76,10 +76,10 @@ def _with_work(equations: Equations, exact: EnergyTerms) -> Equations:
         raise ValueError("the balance is for springs; found links that lose energy")
     work, here, there = (sp.Symbol(f"work{end}", real=True) for end in ("", "_i", "_j"))
     power = share.power
-    if node.contact is not None:  # the force of friction in stick is whatever holds the body
+    if node.events:  # the force of friction in stick is whatever holds the body
         x, v = node.state[:2]
         power = total_derivative(share.energy, (x,), (v,), (node.rhs[1],), TIME)
-    single = Node((*node.state, work), (*node.rhs, power), node.parameters, node.contact)
+    single = Node((*node.state, work), (*node.rhs, power), node.parameters, node.events)
     if edge is not None:
         rates = (*edge.rhs, _link_power(node, edge))
         edge = Edge((*edge.here, here), (*edge.there, there), edge.weight, rates, edge.parameters)
@@ -90,7 +90,7 @@ def _link_power(node: Node, edge: Edge) -> sp.Expr:
     """What stick adds to the work on an oscillator: friction holds it against its links, which the
     node does not know.
     """
-    if node.contact is None:
+    if not node.events:
         return sp.S.Zero
     velocity, mode = edge.here[1:3]
     return -velocity * (edge.rhs[1].xreplace({mode: sp.S.One}) - edge.rhs[1])

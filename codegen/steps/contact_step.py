@@ -11,7 +11,7 @@ from synchain.models.dynamics.periodicity import gaps
 from synchain.models.dynamics.saltation import Entry, Events
 from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import TIME, Edge, Node
-from synchain.models.mechanics.contact import Contact
+from synchain.models.mechanics.events import Event
 
 from ..program.expressions import ZERO, Compare, Expression, Load, Name, Number, Product, call, plus
 from ..program.lowering import lower
@@ -48,8 +48,8 @@ def push_functions(equations: Equations, names: Names, looped: bool = False) -> 
     return [Function("pushes", ("t", "y", "p", "out", *network), about, tuple(body), role=Role.ENTRY)]
 
 
-def _columns(contact: Contact) -> tuple[sp.Expr, ...]:
-    return contact.sliding, contact.speed, contact.up, contact.down, contact.pushed, contact.pulled
+def _columns(event: Event) -> tuple[sp.Expr, ...]:
+    return event.level, event.target, *event.limits, *event.departures
 
 
 def _sides(found: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:
@@ -64,8 +64,8 @@ def _ordered(template: Node | Edge) -> list[sp.Expr]:
 
 
 def _written_out(equations: Equations, names: Names) -> list[Statement]:
-    contacts = [found for i in range(equations.n) if (found := equations.contact_at(i)) is not None]
-    forces = [e for column in zip(*map(_columns, contacts), strict=True) for e in column]
+    events = [event for i in range(equations.n) for event in equations.events_at(i)]
+    forces = [e for column in zip(*map(_columns, events), strict=True) for e in column]
     zeros = [e.xreplace(equations.at_node(i)) for i in range(equations.n) for e in _ordered(equations.node_at(i))]
     zeros += [e.xreplace(equations.at_link(link, edge)) for link, edge in equations.linked() for e in _ordered(edge)]
     body = share([*forces, *_sides(zeros)], names.fresh("z"))
@@ -81,12 +81,11 @@ def _looped(equations: Equations, names: Names) -> list[Statement]:
     Jumps in time with numbers that differ from node to node, or link to link, are left to step control.
     """
     node, nodes = equations.node, span("i", "NODES")
-    if node.contact is None:
-        return []
+    (event,) = node.events
     varied = (real(name) for name in equations.varied)
     fixed = Hoist(frozenset((*node.state, *varied)), names.fresh("fixed"), frozenset({TIME}))
-    body = share([fixed.apply(e) for e in _columns(node.contact)], names.fresh("z"))
-    force, link = _force(equations, node.contact)
+    body = share([fixed.apply(e) for e in _columns(event)], names.fresh("z"))
+    force, link = _force(equations, event)
     differing = set(map(real, (*equations.varied, *equations.numbered)))
     parts: tuple[Node | Edge, ...] = (node, *equations.edges)
     zeros = [e for part in parts for e in _ordered(part) if not e.free_symbols & differing]
@@ -105,7 +104,7 @@ def _looped(equations: Equations, names: Names) -> list[Statement]:
     return [*before, nodes.over(own), unpacked, span("e", "target.size").over(force)]
 
 
-def _force(equations: Equations, contact: Contact) -> tuple[list[Statement], tuple[sp.Expr, ...]]:
+def _force(equations: Equations, event: Event) -> tuple[list[Statement], tuple[sp.Expr, ...]]:
     """Statements that add the force of one link on a body that sticks, and the expressions they hold."""
     if not equations.edges:
         return [], ()
@@ -113,7 +112,7 @@ def _force(equations: Equations, contact: Contact) -> tuple[list[Statement], tup
     (joint,) = at.joints
     edge, swap = joint.edge, named(joint)
     velocity, mode = edge.here[1], edge.here[2]
-    force = edge.rhs[1].xreplace({mode: sp.S.One, velocity: contact.speed})
+    force = edge.rhs[1].xreplace({mode: sp.S.One, velocity: event.target})
     found = [*link_ends(edge, edge.weight.name), *at.of_link(edge, force.free_symbols)]
     for place, states in (("i", edge.here), ("j", edge.there)):
         found += [let(swap[s].name, Load("y", at.place(k, place))) for k, s in enumerate(states) if force.has(s)]

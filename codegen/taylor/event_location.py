@@ -111,7 +111,7 @@ SOONEST = let("nearest", 1e-13 * call("maximum", "t", 1.0) / "scale")
 
 def jumps(equations: Equations) -> bool:
     """True if slip of some contact begins with a jump of acceleration."""
-    return any(node.contact is not None and node.contact.jumps for node in equations.nodes)
+    return any(event.jumps for node in equations.nodes for event in node.events)
 
 
 def loose(exact: bool) -> Statement:

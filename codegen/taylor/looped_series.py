@@ -329,16 +329,14 @@ def polynomial(name: str, degree: int, coefficient: Callable[[Expression], Expre
 
 
 def with_gaps(node: Node) -> list[sp.Expr]:
-    """The rates of a node, and the two gaps of its contact if it has one."""
-    if node.contact is None:
-        return list(node.rhs)
-    return [*node.rhs, *node.contact.gaps(node.state[2])]
+    """The rates of a node, and the two gaps of each event."""
+    return [*node.rhs, *(gap for event in node.events for gap in event.gaps)]
 
 
 def with_pushes(joint: Joint) -> list[sp.Expr]:
     """What a link adds to the rates of a node, and to the gaps of its contact if it has one: forces on a body that sticks."""
     edge = joint.edge
-    if joint.target.contact is None:
+    if not joint.target.events:
         return list(edge.rhs)
     mode = edge.here[2]
     push = (1 - mode**2) * edge.rhs[1].xreplace({mode: sp.S.One})
@@ -397,8 +395,7 @@ class LoopedSeries(StepWriter):
         # what the node is as a source of links that are summed stands in memory for them
         self.node_part, self.lent = section, series[size:]
         section.lent += [s for s in series[size:] if not isinstance(s, Constant)]
-        if node.contact is not None:
-            section.contacts.append(gaps_of(self.called[node.state[2].name]))
+        section.contacts += [gaps_of(self.called[event.mode.name]) for event in node.events]
         return section
 
     def of_links(self, edge: Edge, rates: Iterable[sp.Expr], more: Iterable[sp.Symbol] = ()) -> Hoisted:

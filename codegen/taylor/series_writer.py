@@ -18,7 +18,7 @@ from .step_length import distant, last_orders, unseen
 
 @dataclass(frozen=True, slots=True)
 class Gaps:
-    """The two gaps of a contact (`Contact.gaps`), by its mode, and the sizes of the terms that they begin with.
+    """The two gaps of a contact (`Event.gaps`), by its mode, and the sizes of the terms that they begin with.
 
     names: what these sizes are called; stuck: what is called 1 in stick, 0 in slip; room: memory for one of the series.
     """

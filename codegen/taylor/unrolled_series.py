@@ -207,10 +207,9 @@ class UnrolledSeries(StepWriter):
         eq, shared = self.equations, self.supply.fresh("shared_")
         moving, swap = self.of_network()
         for i in range(eq.n):
-            if (contact := eq.contact_at(i)) is not None:
-                mode = eq.symbols(i)[2]
-                rise, fall = self.graph.read(Template.of(contact.gaps(mode), moving, shared), moving, swap)
-                word, room = self.called[mode.name], Number(self.lines.room + 2 * (self.order + 1))
+            for event in eq.events_at(i):
+                rise, fall = self.graph.read(Template.of(event.gaps, moving, shared), moving, swap)
+                word, room = self.called[event.mode.name], Number(self.lines.room + 2 * (self.order + 1))
                 names = (f"size_{word}_rise", f"size_{word}_fall")
                 yield Gaps(word, f"stuck_{word}", (rise, fall), names, (Name(names[0]), Name(names[1])), room)
 

@@ -52,8 +52,7 @@ def periods_of_states(equations: Equations) -> Periods:
 def _uses(equations: Equations) -> Iterator[tuple[int, Iterable[sp.Expr], tuple[sp.Symbol, ...]]]:
     """Yield kinds of nodes with the expressions that their states enter, and what the states are called there."""
     for kind, node in enumerate(equations.nodes):
-        closing = node.contact.expressions if node.contact is not None else ()
-        yield kind, (*node.rhs, *closing, *(e for row in node.inertia for e in row)), node.state
+        yield kind, node.expressions, node.state
     for (target, source), edge in equations.edge_of:
         yield target, edge.expressions, edge.here
         yield source, edge.expressions, edge.there

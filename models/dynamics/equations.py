@@ -19,7 +19,7 @@ from ..inputs.display import HasLatex
 from ..inputs.names import LinkName
 from ..interactions.separation import separated
 from ..mechanics.components import Block, Edge, Node
-from ..mechanics.contact import Contact
+from ..mechanics.events import Event
 
 Ends = tuple[int, int]
 """The kinds of a link's target and source."""
@@ -236,7 +236,7 @@ class Equations(_Cached, HasLatex):
     @property
     def sticks(self) -> bool:
         """True if friction is set-valued, so that nodes stick and slip."""
-        return any(node.contact is not None for node in self.nodes)
+        return any(node.events for node in self.nodes)
 
     @cached_property
     def dimension(self) -> int:
@@ -331,16 +331,17 @@ class Equations(_Cached, HasLatex):
         theirs = {s: _numbered(of, source) for s, of in edge.theirs}
         return {**here, **there, **own, **theirs, edge.weight: sp.Rational(weight.numerator, weight.denominator)}
 
-    def contact_at(self, i: int) -> Contact | None:
-        """The conditions of stick and slip of node `i` under the forces of its links, if it has a contact."""
-        contact = self.node_at(i).contact
-        if contact is None:
-            return None
-        velocity, mode = self.symbols(i)[1:3]
-        own = contact.map(lambda e: e.xreplace(self.at_node(i)))
+    def events_at(self, i: int) -> tuple[Event, ...]:
+        """Return the events of node `i` (0-based) under the forces of its links, in the symbols of the network."""
+        node = self.node_at(i)
+        if not node.events:
+            return ()
+        velocity, at_node = self.symbols(i)[1], self.at_node(i)
         links = [pair for pair in self.linked() if pair[0][0] == i]
         force = sp.Add(*(edge.rhs[1].xreplace(self.at_link(link, edge)) for link, edge in links))
-        return own.under(force.xreplace({mode: sp.S.One, velocity: own.speed}))
+        events = (event.map(lambda e: e.xreplace(at_node)) for event in node.events)
+        # Links act on a body in slip, mode**2 times their force; on the held body they act with the whole force.
+        return tuple(e.under(force.xreplace({e.mode: sp.S.One, velocity: e.target})) for e in events)
 
     def rhs(self) -> tuple[sp.Expr, ...]:
         """The right-hand side in state order.  The algebra grows with n: meant for small n."""
@@ -416,8 +417,7 @@ class Equations(_Cached, HasLatex):
         large = any(len(pairs) > DIGEST_LIMIT for _, pairs in self.fields)
         links = repr([layer.links for layer in self.layers] if large else tuple(self.links))
         parts = [_text(first.state, first.rhs, first.parameters), str(self.n), links]
-        if first.contact is not None:
-            parts.append("; ".join(map(sp.srepr, first.contact.expressions)))
+        parts += ["; ".join(map(sp.srepr, event.expressions)) for event in first.events]
         parts += [sp.srepr(sp.Matrix(node.inertia)) for node in self.nodes if node.inertia]
         parts += [f"varied {' '.join(self.varied)}"] if self.varied else []
         if others:  # a single kind adds nothing

@@ -23,7 +23,8 @@ from ..interactions.link import edge
 from ..interactions.separation import separated
 from ..mechanics.calculus import cancelled, expanded
 from ..mechanics.components import WEIGHT_NUMBER, Block, Edge, Node
-from ..mechanics.contact import KAPPA, SLIDING, SLIP, ContactModel, FrictionLaw, regularise, set_valued
+from ..mechanics.contact import KAPPA, SLIDING, ContactModel, FrictionLaw, regularise
+from ..mechanics.events import set_valued
 from ..mechanics.lagrangian import LARGEST_BY_MINORS, Mechanics, check_masses_exist, coupled, solve_masses
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
 from ..mechanics.oscillator import FieldModel, LagrangianModel, Oscillator
@@ -93,9 +94,9 @@ def _sticking(
     w = sp.Dummy("w", real=True)
     coefficient = friction_coefficient(law, ContactModel.SET_VALUED)
     (place,), (velocity,) = system.coordinates, system.velocities
-    rate, contact = set_valued(found[0], FRICTION, coefficient(w), w, static_coefficient(law), place, velocity)
-    rates = (velocity, SLIP**2 * rate, sp.S.Zero)
-    return Node((place, velocity, SLIP), rates, parameters, contact, coefficient(SLIDING))
+    rate, event = set_valued(found[0], FRICTION, coefficient(w), w, static_coefficient(law), place, velocity)
+    rates = (velocity, event.mode**2 * rate, sp.S.Zero)
+    return Node((place, velocity, event.mode), rates, parameters, (event,), coefficient(SLIDING))
 
 
 def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str, remedy: str = "rename it") -> None:

@@ -67,15 +67,15 @@ def _releases(orbit: Equations) -> tuple[tuple[Release, Release], ...]:
 
     Raises ValueError for links that act on velocities.
     """
-    alone = orbit.node.contact
-    if alone is None or not alone.jumps:
+    if not any(event.jumps for event in orbit.node.events):
         return ()
+    (alone,) = orbit.node.events
     _check_release(orbit.edges)
     releases = []
     for i in range(orbit.n):
-        contact = orbit.contact_at(i) or alone
-        sides = ((contact.up, contact.pushed, alone.up), (contact.down, contact.pulled, alone.down))
-        up, down = (_release(orbit, i, contact.speed, *side) for side in sides)
+        (event,) = orbit.events_at(i)
+        sides = zip(event.limits, event.departures, alone.limits, strict=True)
+        up, down = (_release(orbit, i, event.target, *side) for side in sides)
         releases.append((up, down))
     return tuple(releases)
 

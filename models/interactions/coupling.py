@@ -184,7 +184,7 @@ class LagrangianCoupling:
             half = len(node.state) // 2
             if self.between is not None and other is None:
                 raise ValueError(f"coupling {str(self)!r} joins {' and '.join(self.between)}; found nodes of one kind")
-            if node.contact is None and node.rhs[:half] != node.state[half:]:
+            if not node.events and node.rhs[:half] != node.state[half:]:
                 name = node.state[0].name
                 raise ValueError(
                     f"coupling {str(self)!r} joins coordinates with velocities; found a node of {node.state} without "

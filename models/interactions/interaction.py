@@ -180,7 +180,7 @@ class Potential:
         """Raise ValueError for nodes without velocities, unknown names and an energy of velocities."""
         for node in (single, other or single):
             half = len(node.state) // 2
-            if node.contact is None and node.rhs[:half] != node.state[half:]:
+            if not node.events and node.rhs[:half] != node.state[half:]:
                 raise ValueError(
                     f"coupling '{self}' needs coordinates with velocities; found a node of {node.state}; expected Rates, "
                     "which say what a link adds to each state"

@@ -16,7 +16,6 @@ from functools import lru_cache
 import sympy as sp
 
 from ..mechanics.components import TIME, Block, Edge, Node
-from ..mechanics.contact import SLIP
 from ..mechanics.lagrangian import balance, mass_matrix, solve_masses
 from ..mechanics.nondimensional import nondimensional
 from ..mechanics.oscillator import FieldModel, Oscillator
@@ -44,9 +43,10 @@ def edge(
     one-way link has no potential: the force that the template gives its target acts there, and nothing acts back on
     the source.  Set-valued friction takes up the force of a link while its target sticks.
     """
-    if single.contact is not None:
+    if single.events:
         plain = Node(single.state[:2], (single.state[1], sp.S.Zero), single.parameters)
-        return _on_sliding(edge(coupling, plain, oscillator))
+        (event,) = single.events
+        return _on_sliding(edge(coupling, plain, oscillator), event.mode)
     coupling.check_ends(single, other)
     pair = Pair((single, other or single), (oscillator, partner or oscillator))
     terms = coupling.terms(pair)
@@ -112,13 +112,13 @@ def _inertia(pair: Pair, masses: sp.Matrix) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _on_sliding(plain: Edge) -> Edge:
+def _on_sliding(plain: Edge, mode: sp.Symbol) -> Edge:
     """A link between nodes with a mode: it acts on the velocity of a target that slips."""
     if plain.rhs[0] != 0:
         raise ValueError("set-valued contact: a link acts on the rate of the position; expected forces alone")
     if plain.inertia:
         raise ValueError("set-valued contact: a link has inertia; expected forces alone; use contact 'atan'")
-    modes = (sp.Symbol(f"{SLIP.name}_i", real=True), sp.Symbol(f"{SLIP.name}_j", real=True))
+    modes = (sp.Symbol(f"{mode.name}_i", real=True), sp.Symbol(f"{mode.name}_j", real=True))
     here, there = (*plain.here, modes[0]), (*plain.there, modes[1])
     rates = (sp.S.Zero, modes[0] ** 2 * plain.rhs[1], sp.S.Zero)
     return replace(plain, here=here, there=there, rhs=rates)

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import sympy as sp
 
 from .calculus import derivative
-from .contact import SLIP, Contact
+from .events import Event
 
 TIME = sp.Symbol("t", real=True)
 """Non-dimensional time, the one time symbol of all equations."""
@@ -34,11 +34,10 @@ def _vanishes(e: sp.Expr) -> bool:
 class Node:
     """One uncoupled oscillator: M d(state)/dt = rhs(state, t; parameters)."""
 
-    # the states. With set-valued friction the third state is the mode, which only events change
-    state: tuple[sp.Symbol, ...]
+    state: tuple[sp.Symbol, ...]  # moving states, and behind them the mode of an event, which only events change
     rhs: tuple[sp.Expr, ...]  # the right-hand side of each state: its rate where M is the identity
     parameters: tuple[sp.Symbol, ...]
-    contact: Contact | None = None  # what decides between stick and slip
+    events: tuple[Event, ...] = ()  # set-valued friction has one; a node has at most one
     # the friction coefficient as a function of `SLIDING`; it is for printing alone
     law: sp.Expr | None = field(default=None, compare=False)
     inertia: Block = ()  # m(state; parameters), a row and a column for each state; empty if M is the identity
@@ -47,15 +46,15 @@ class Node:
         _differ("node", (TIME, *self.state, *self.parameters))
         known = {TIME, *self.state, *self.parameters}
         _check("node", self.rhs, len(self.state), known)
-        if self.contact is not None:
-            if self.state[2:3] != (SLIP,):
+        for event in self.events:
+            if self.state[2:3] != (event.mode,):
                 raise ValueError(f"a node with set-valued friction has the states x, v, slip, …; found {self.state}")
-            _check("contact", self.contact.expressions, len(self.contact.expressions), known)
+            _check("contact", event.expressions, len(event.expressions), known)
         if self.inertia:
             self._check_inertia(known - {TIME})
 
     def _check_inertia(self, known: set[sp.Symbol]) -> None:
-        if self.contact is not None:
+        if self.events:
             raise ValueError("node: found set-valued friction beside a mass matrix; expected one coordinate")
         size = len(self.state)
         if len(self.inertia) != size:
@@ -76,14 +75,14 @@ class Node:
 
     @property
     def continuous(self) -> tuple[sp.Symbol, ...]:
-        """The states that change continuously: those before the mode of a contact, or all."""
-        return self.state if self.contact is None else self.state[:2]
+        """The states that change continuously: those before the mode of an event, or all."""
+        return self.state[:2] if self.events else self.state
 
     @property
     def expressions(self) -> tuple[sp.Expr, ...]:
-        """The right-hand side, the conditions of the contact and the entries of M."""
-        contact = () if self.contact is None else self.contact.expressions
-        return (*self.rhs, *contact, *(e for row in self.inertia for e in row))
+        """The right-hand side, the conditions of events and the entries of M."""
+        conditions = (e for event in self.events for e in event.expressions)
+        return (*self.rhs, *conditions, *(e for row in self.inertia for e in row))
 
     @property
     def constant_inertia(self) -> bool:
@@ -93,9 +92,9 @@ class Node:
     def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Node:
         """Return the node with every symbol and expression changed."""
         state, rhs, parameters = (tuple(map(change, part)) for part in (self.state, self.rhs, self.parameters))
-        contact = None if self.contact is None else self.contact.map(change)
+        events = tuple(event.map(change) for event in self.events)
         inertia = tuple(tuple(map(change, row)) for row in self.inertia)
-        return Node(state, rhs, tuple(p for p in parameters if p.is_Symbol), contact, inertia=inertia)
+        return Node(state, rhs, tuple(p for p in parameters if p.is_Symbol), events, inertia=inertia)
 
     def without_unused_parameters(self, kept: Container[sp.Symbol] = ()) -> Node:
         """The same without the parameters that do not occur, but those that are `kept` for the links."""

@@ -169,7 +169,7 @@ def _in_slip(equations: Equations) -> Equations:
 
 
 def _node_in_slip(node: Node) -> Node:
-    rate = node.rhs[1] if node.contact is None else node.contact.shown
+    rate = node.events[0].shown if node.events else node.rhs[1]
     return Node(node.state[:2], (node.rhs[0], rate), node.parameters, law=node.law)
 
 

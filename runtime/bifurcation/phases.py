@@ -22,7 +22,7 @@ from numpy.polynomial import Polynomial
 
 from synchain.models.graphs.families import topology
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.contact import Contact
+from synchain.models.mechanics.events import Event
 from synchain.models.scenes.scene import Scene
 
 from ..cells.run_keywords import ONE_CELL
@@ -57,8 +57,8 @@ class Phases:
 
 def phases_of(scene: Scene, state: np.ndarray, periods: int) -> Phases | None:
     """Determine the phases of a periodic orbit. Shapes: state (components,)."""
-    contact = scene.equations.node.contact
-    if contact is None:
+    events = scene.equations.node.events
+    if not events:
         return None
     single = scene.replace(
         **{**ONE_CELL, "record": ("trajectory",)},
@@ -72,7 +72,7 @@ def phases_of(scene: Scene, state: np.ndarray, periods: int) -> Phases | None:
     once = np.asarray(run(single, show_progress=False, workers=1).trajectory.sel(node=1).values, dtype=float)[:-1]
     path = np.concatenate([once, once])  # two cycles, so that each phase is seen whole
     t, slip = np.arange(len(path)) * ((scene.period or 0.0) / SAMPLES), np.round(path[:, 2]).astype(int)
-    held, slides = _margins(scene, contact)
+    held, slides = _margins(scene, events[0])
     values = np.where(slip == 0, held(path[:, 0], t), slip * slides(path[:, 1]))
     changes = np.flatnonzero(slip[1:] != slip[:-1]) + 1
     if len(changes) == 0:
@@ -94,9 +94,9 @@ Function = Callable[..., np.ndarray]
 """A function of arrays."""
 
 
-def _margins(scene: Scene, contact: Contact) -> tuple[Function, Function]:
+def _margins(scene: Scene, event: Event) -> tuple[Function, Function]:
     """Functions for the distance of the load from the limits of friction, and the speed."""
-    up, down, sliding = _functions(contact, tuple(scene.equations.node.state), tuple(scene.parameters))
+    up, down, sliding = _functions(event, tuple(scene.equations.node.state), tuple(scene.parameters))
     numbers = list(scene.parameters.values())
     return (
         lambda place, t: np.minimum(up(place, 0.0, t, *numbers), -down(place, 0.0, t, *numbers)),
@@ -105,10 +105,10 @@ def _margins(scene: Scene, contact: Contact) -> tuple[Function, Function]:
 
 
 @lru_cache(maxsize=16)
-def _functions(contact: Contact, state: tuple[sp.Symbol, ...], names: tuple[str, ...]) -> tuple[Function, ...]:
+def _functions(event: Event, state: tuple[sp.Symbol, ...], names: tuple[str, ...]) -> tuple[Function, ...]:
     """Both limits and the sliding velocity as functions of state, time and parameters."""
     symbols = [*state[:2], TIME, *(sp.Symbol(name, real=True) for name in names)]
-    return tuple(sp.lambdify(symbols, e, "numpy") for e in (contact.up, contact.down, contact.sliding))
+    return tuple(sp.lambdify(symbols, e, "numpy") for e in (*event.limits, event.level))
 
 
 def _least(values: np.ndarray) -> float:

@@ -22,16 +22,16 @@ def with_modes(equations: Equations, start: np.ndarray, numbers: np.ndarray) -> 
     Shapes: start (cells, 3 n), numbers (cells, parameters).
     """
     n = equations.n
-    contact = equations.node.contact if equations.sticks else None
-    if contact is None:
+    if not equations.sticks:
         return start
+    (event,) = equations.node.events
     states = np.array(start, dtype=float)
     values = {sp.Symbol(p, real=True): c[:, None] for p, c in zip(equations.parameters, numbers.T, strict=True)}
     values[TIME] = np.zeros((len(states), 1))
     own = _own(equations, values)
     node_values = values | own | {s: states[:, k * n : (k + 1) * n] for k, s in enumerate(equations.node.state)}
-    sliding, up, down = (_at(e, node_values, (len(states), n)) for e in (contact.sliding, contact.up, contact.down))
-    push = _link_forces(equations, contact.speed, states, values, own)
+    sliding, up, down = (_at(e, node_values, (len(states), n)) for e in (event.level, *event.limits))
+    push = _link_forces(equations, event.target, states, values, own)
     stuck = np.where(up + push < 0.0, 1.0, np.where(down + push > 0.0, -1.0, 0.0))
     states[:, 2 * n :] = np.where(sliding == 0.0, stuck, np.sign(sliding))
     return states

@@ -283,12 +283,12 @@ def test_parameters_are_those_of_the_equations(oscillator: str, friction: str | 
     single = node(oscillator, friction, contact)
     table = parameters(oscillator, friction, contact)
     assert tuple(table) == tuple(s.name for s in single.parameters)
-    conditions = () if single.contact is None else single.contact.expressions
+    conditions = tuple(e for event in single.events for e in event.expressions)
     if friction is not None and contact != "set-valued":  # only set-valued contacts know a static coefficient
         conditions = (static_coefficient(law_of(friction)) or sp.S.Zero,)
     used = set().union(*(e.free_symbols for e in (*single.rhs, *conditions)))
     assert {s.name for s in single.parameters} == {s.name for s in used} - {s.name for s in single.state} - {"t"}
-    first, last = single.state[0].name, single.state[-1 if single.contact is None else 1].name
+    first, last = single.state[0].name, single.continuous[-1].name
     springs = FORCES if is_lagrangian(oscillator) else ()
     if friction and oscillator != "friction":  # each law and contact meets all couplings there, and one of them here
         springs = springs[len(friction) % len(springs) :][:1]

@@ -11,7 +11,8 @@ from scipy.integrate import quad
 from synchain.models.definitions.inline import Lagrangian, friction_law
 from synchain.models.dynamics.reduction import substitute_constants
 from synchain.models.graphs.families import topology
-from synchain.models.mechanics.contact import SLIP, set_valued
+from synchain.models.mechanics.contact import SLIP
+from synchain.models.mechanics.events import set_valued
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.run import run
@@ -33,11 +34,11 @@ def test_the_derived_node_is_the_smooth_one_away_from_the_jump() -> None:
         found = exact.rhs[1].xreplace({SLIP: sp.Integer(sign)}).xreplace(at)
         assert sp.simplify(found - plain.rhs[1].xreplace(at)) == 0
     assert exact.rhs[1].xreplace({SLIP: sp.S.Zero}) == 0
-    assert exact.contact is not None
-    assert exact.contact.speed == ground
+    (event,) = exact.events
+    assert event.target == ground
     epsilon, mu_s = (sp.Symbol(name, real=True) for name in ("epsilon", "mu_s"))
-    assert sp.simplify(exact.contact.up - exact.contact.down - 2 * epsilon * mu_s) == 0
-    assert not exact.contact.jumps
+    assert sp.simplify(event.limits[0] - event.limits[1] - 2 * epsilon * mu_s) == 0
+    assert not event.jumps
 
 
 @pytest.mark.parametrize(
@@ -87,10 +88,10 @@ EDGE = sp.Abs(W) - sp.Rational(1, 5)
     ],
 )  # fmt: skip
 def test_friction_in_slip_is_the_law(law: sp.Expr) -> None:
-    rate, contact = set_valued(FORCE(-V), FORCE, law, W, None, X, V)
+    rate, event = set_valued(FORCE(-V), FORCE, law, W, None, X, V)
     slow = law.xreplace({W: sp.Rational(1, 10**9)})
     for value in (sp.Rational(-2, 3), sp.Rational(3, 2)):
-        assert (contact.pushed - slow).xreplace({MU: value}).evalf() == pytest.approx(0, abs=1e-8)
+        assert (event.departures[0] - slow).xreplace({MU: value}).evalf() == pytest.approx(0, abs=1e-8)
         for w in map(sp.Rational, ("-1", "-0.3", "-0.1", "0.1", "0.3", "1")):
             found = rate.xreplace({V: -w, SLIP: sp.sign(w), MU: value})
             assert float(found) == pytest.approx(float(law.xreplace({W: w, MU: value})))
