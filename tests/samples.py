@@ -18,7 +18,8 @@ from pendula import pendulum, telescope
 from synchain import one_way_ring
 from synchain.codegen import driver
 from synchain.codegen.driver.columns import COUNTS
-from synchain.codegen.kernels.sweep_kernel import KernelSource, emit
+from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.sweep_kernel import SweepKernel, emit
 from synchain.codegen.machine_code.compile import Kernel, load
 from synchain.models import Potential, Rates, chain, ends, ring, star
 from synchain.models.definitions.loader import load_oscillator
@@ -219,9 +220,9 @@ def numbers(equations: Equations, **changed: float) -> list[float]:
     return [{**TABLE, **changed}[name] for name in equations.parameters]
 
 
-def source_of(text: str, looped: bool = False) -> KernelSource:
+def source_of(text: str, looped: bool = False) -> SweepKernel:
     """A kernel whose text is a test's own."""
-    return replace(emit(harmonic_chain(2), "cash_karp", (), width=1, unroll=0 if looped else 8), code=text)
+    return replace(emit(harmonic_chain(2), "cash_karp", Recording(()), width=1, unroll=0 if looped else 8), code=text)
 
 
 @functools.cache
@@ -234,7 +235,7 @@ def kernel(
     **options: float,
 ) -> Kernel:
     """The compiled kernel; tests that ask for the same one share it.  `options` are `unroll` and `fill` of `emit`."""
-    return load(emit(equations, method, records, section, width, **options))
+    return load(emit(equations, method, Recording(records, section), width, **options))
 
 
 @dataclass(frozen=True, slots=True)
@@ -362,11 +363,11 @@ class Step:
 class Interpreted:
     """The functions of a scene, and the dense output of its driver, as plain Python of width 1."""
 
-    source: KernelSource
+    source: SweepKernel
     names: dict[str, Any]
 
     @classmethod
-    def of(cls, source: KernelSource, functions: dict[str, Any]) -> Interpreted:
+    def of(cls, source: SweepKernel, functions: dict[str, Any]) -> Interpreted:
         return cls(source, plain(f"{driver.text('driver.dense')}\n\n\n{source.text}", functions))
 
     def inside(self, theta: Any, c: int, step: Step) -> Any:

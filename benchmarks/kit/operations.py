@@ -12,7 +12,7 @@ import ast
 import inspect
 from dataclasses import dataclass, field
 
-from synchain.codegen.kernels.sweep_kernel import KernelSource
+from synchain.codegen.kernels.kernel_text import KernelSource
 from synchain.codegen.simd import elementary
 
 PRIMITIVE = {"fma": 2, "multiply_add": 2, "sqrt": 1} | dict.fromkeys(
@@ -116,7 +116,7 @@ def operations(source: KernelSource) -> int:
     """Operations of one step in one lane, from the text of a kernel that is written out; ValueError
     for one with loops.
     """
-    if source.looped:
+    if source.driver.looped:
         raise ValueError("operations are counted in unrolled kernels alone; found one that loops over its nodes")
     counter = Counter()
     counter.read(inspect.getsource(elementary))

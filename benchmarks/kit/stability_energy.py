@@ -9,6 +9,7 @@ import math
 import numpy as np
 import sympy as sp
 
+from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.machine_code.compile import load
 from synchain.models.dynamics.equations import Equations
@@ -63,7 +64,9 @@ def _worked(scene: Scene, exact: EnergyTerms) -> tuple[np.ndarray, float]:
     rtol, atol = (float(own[0]) for own in tolerances(scene, scene.equations, cells.numbers))
     control = control_array(rtol, atol, math.inf, scene.max_steps)
     buffers = Buffers.empty(1, whole.dimension, 0, 0)
-    load(emit(whole, integrator, ())).drive(0, 1, start, cells.numbers, cells.spans, control, *buffers.arrays())
+    load(emit(whole, integrator, Recording(()))).drive(
+        0, 1, start, cells.numbers, cells.spans, control, *buffers.arrays()
+    )
     if buffers.counts[0, 0] != Status.FINISHED:
         return np.full(whole.dimension, math.nan), math.nan
     return buffers.end[0, :-n], math.fsum(buffers.end[0, -n:])

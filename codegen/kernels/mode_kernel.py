@@ -10,7 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
+import numpy as np
 import sympy as sp
 
 from synchain.models.dynamics.variational import Variation
@@ -28,12 +30,12 @@ from ..simd import lanes
 from ..steps.blocks import analyse
 from ..steps.contact_step import event_functions, register
 from ..steps.elimination import plan, write_factors, write_solve
-from ..steps.safe_names import renamed, tidy
 from ..steps.step import StepWriter, node_function, scaling
 from ..steps.unrolled_step import UnrolledStep, stage_state
 from ..taylor import write_tangent
 from .driver import Driver, KernelKind
-from .sweep_kernel import AUTO, LARGEST_UNROLLED, KernelSource, describe, free_names, module, node_functions
+from .kernel_text import KernelSource, NamedEquations, describe, module
+from .sweep_kernel import AUTO, LARGEST_UNROLLED, node_functions
 
 HEAD = 3
 """Number of entries at the beginning of the shared array: rate = 1/h, shift = 1/(gamma h), reach = gamma h."""
@@ -59,7 +61,24 @@ Place = tuple[int, int]
 """Row and column of an entry of the Jacobian A."""
 
 
-def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int | None = None) -> KernelSource:
+@dataclass(frozen=True, slots=True)
+class ModeKernel(KernelSource):
+    """A kernel that carries the deviations of modes along orbits."""
+
+    dimensions: ModeDimensions = field(repr=False)
+    # contact whose velocity a component of a deviation is, -1 for other components
+    owners: tuple[int, ...] = field(repr=False)
+
+    @property
+    def functions(self) -> tuple[str, ...]:
+        return ("step", "carry", *(("pushes", "release") if self.driver.contacts else ()))
+
+    @property
+    def arguments(self) -> tuple[Any, ...]:
+        return self.dimensions, np.array(self.owners, np.int64)
+
+
+def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int | None = None) -> ModeKernel:
     """Write the kernel that integrates deviations along an orbit."""
     equations = variation.orbit
     if equations.n > LARGEST_UNROLLED:
@@ -70,10 +89,10 @@ def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int
     if not (method.series or method.implicit):
         raise ValueError(f"tangent dynamics: found integrator {method.name}; expected a Rosenbrock or a Taylor method")
     width = lanes.native_width() if width is None else width
-    plain = tidy(equations)
-    names = free_names(plain)
+    named = NamedEquations.of(equations)
+    plain, names = named.plain, named.free()
     # the matrix and the events take the names that the kernel uses
-    swap = renamed(equations, plain)
+    swap = {real(a): real(b) for a, b in named.renamed}
     matrix = tuple((key, e.xreplace(swap)) for key, e in variation.matrix)
     events = None if variation.events is None else variation.events.map(lambda e: e.xreplace(swap))
     variation = replace(variation, orbit=plain, matrix=matrix, events=events)
@@ -87,8 +106,8 @@ def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int
         functions, shared, count = _stages(variation, method, names)
     deviations = f"{variation.size} deviations, {width} modes a register"
     constants = {"WIDTH": 1, "LANES": width, "DENSE": plain.sticks or method.series}
-    return KernelSource(
-        describe(equations, plain, method, (), count, deviations),
+    return ModeKernel(
+        describe(named, method, (), count, deviations),
         module(constants, functions, event_functions(variation, names)),
         equations,
         method,

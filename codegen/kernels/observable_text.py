@@ -24,6 +24,7 @@ from synchain.models.dynamics.observable import (
     RowSum,
     node_symbols,
 )
+from synchain.models.dynamics.record import Record
 from synchain.models.mechanics.components import TIME
 
 from ..integrators import Integrator
@@ -32,6 +33,7 @@ from ..program.lowering import lower
 from ..program.passes import real
 from ..program.statements import Function, Loop, Role, Statement, let, store
 from .between import calmed, depths_in, gaps_in, settled
+from .kernel_text import NamedEquations
 from .rounding import magnitude
 
 LARGEST = 1.7976931348623157e308
@@ -80,26 +82,65 @@ def count_of(equations: Equations, values: Sequence[sp.Expr]) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """Functions of the state that a kernel evaluates inside steps."""
+    """The records of a kernel, and the functions of the state that it evaluates inside steps for them."""
 
+    records: tuple[str, ...] = ("sync_error",)  # words of `Record`
+    section: sp.Expr | None = None  # section function of the record "section", whose points are whole states
     # values that are tallied over the window (`synchain.models.dynamics.observable`)
     observed: tuple[sp.Expr, ...] = ()
     # section functions, each followed by the values that are stored where it passes zero
     sections: tuple[tuple[sp.Expr, ...], ...] = ()
     stop: sp.Expr | None = None  # a function that ends a cell when it passes zero
     sums: tuple[Rows, ...] = ()  # the rows that the `RowSum`s of these functions add up
+    multiplicity: tuple[int, ...] | None = None  # oscillators that each node represents in the synchronisation error
+
+    def check(self, equations: Equations) -> None:
+        """Raise ValueError for records that are unknown, lack an argument or exclude each other."""
+        unknown = [r for r in self.records if r not in list(Record)]
+        if unknown:
+            raise ValueError(f"unknown record {unknown[0]!r}; known: {', '.join(Record)}")
+        if "section" in self.records:
+            if self.sections or self.stop is not None:
+                raise ValueError("the record 'section' beside functions of the state: found both; expected one of them")
+            if self.section is None:
+                raise ValueError("the record 'section' needs a section function, for example v_1")
+            known = {*equations.state, *equations.parameters, TIME.name}
+            unknown = sorted({s.name for s in self.section.free_symbols} - known)
+            if unknown:
+                raise ValueError(
+                    f"section function {self.section}: unknown symbol {unknown[0]!r}; use the state, parameters and t"
+                )
+        if "sync_error" in self.records:
+            if not equations.common:
+                raise ValueError(
+                    "the record 'sync_error' compares states of one name, and these nodes have none in common"
+                )
+            if self.multiplicity is not None and len(self.multiplicity) != equations.n:
+                raise ValueError(
+                    f"multiplicity has {len(self.multiplicity)} entries; expected one for each of {equations.n} nodes"
+                )
+
+    @property
+    def event_sections(self) -> tuple[tuple[sp.Expr, ...], ...]:
+        """The section of the record "section", or else `sections`."""
+        if self.section is None or "section" not in self.records:
+            return self.sections
+        return ((self.section.xreplace({s: real(s.name) for s in self.section.free_symbols}),),)
 
     @property
     def kept(self) -> int:
-        """Largest number of values stored at the points of a section."""
+        """Largest number of values stored at the points of a section; -1 if the points are whole states."""
+        if "section" in self.records:
+            return -1
         return max((len(parts) - 1 for parts in self.sections), default=0)
 
     @property
     def events(self) -> tuple[sp.Expr, ...]:
         """Section functions, stored values of each, stop function, and term sizes of section and stop functions."""
         # rows of stored values are filled up with zeros to one length; the size of a single term is 0
-        rows = [[*parts[1:], *[sp.S.Zero] * (self.kept + 1 - len(parts))] for parts in self.sections]
-        first, last = [parts[0] for parts in self.sections], [] if self.stop is None else [self.stop]
+        sections = self.event_sections
+        rows = [[*parts[1:], *[sp.S.Zero] * (self.kept + 1 - len(parts))] for parts in sections]
+        first, last = [parts[0] for parts in sections], [] if self.stop is None else [self.stop]
         sizes = [(e, magnitude(e)) for e in (*first, *last)]
         terms = [sp.S.Zero if size == sp.Abs(e) else size for e, size in sizes]
         return (*first, *(e for row in rows for e in row), *last, *terms)
@@ -115,34 +156,39 @@ class Recording:
         return depths_in(self.observed)
 
     @property
+    def has_functions(self) -> bool:
+        """True if the kernel evaluates functions of the state inside steps."""
+        return bool(self.observed or self.event_sections) or self.stop is not None
+
+    @property
     def has_rates(self) -> bool:
         """True if a rate of a state occurs."""
         return any(e.has(Rate) for e in (*self.observed, *self.events))
 
-    def __bool__(self) -> bool:
-        return bool(self.observed or self.events)
-
-    def words(self, equations: Equations) -> tuple[str, ...]:
-        """Return one text for observed values, sections and the stop, where there are any."""
+    def summary(self, equations: Equations) -> tuple[str, ...]:
+        """Return the records in their order, and one text for observed values, sections and the stop each."""
         counts = [(count_of(equations, self.observed), "observed values"), (len(self.sections), "sections")]
+        ordered = (record for record in Record if record in self.records)
         stop = () if self.stop is None else ("a stop",)
-        return (*(f"{number} {kind}" for number, kind in counts if number), *stop)
+        return (*ordered, *(f"{number} {kind}" for number, kind in counts if number), *stop)
 
-    def functions(self, equations: Equations, plain: Equations) -> list[Function]:
-        """Write the functions `values` and `section` in the names of `plain`, if they have results."""
+    def functions(self, named: NamedEquations) -> list[Function]:
+        """Write the functions `values` and `section`, if they have results."""
         arguments = ("theta", "t", "h", "y", "y_new", "dense", "out", "dims")
-        what = "The section functions at the fraction theta of the step, what their points keep, and what ends a cell."
-        seen = "The observed values at the fraction theta of the step, and what tells where they change quickly."
-        parts = (
-            ("values", (*map(calmed, self.observed), *self.gaps, *self.depths), seen),
-            ("section", self.events, what),
-        )
-        functions = []
-        for name, values, about in parts:
-            if values:
-                body = _LoopWriter(equations, plain, self.sums).statements(values)
-                functions.append(Function(name, arguments, about, tuple(body), role=Role.ENTRY))
-        return functions
+        texts = {
+            "values": "The observed values at the fraction theta of the step, and what tells where they change quickly.",
+            "section": (
+                "The section functions at the fraction theta of the step, what their points keep, and what ends a cell."
+            ),
+        }
+        results = {"values": (*map(calmed, self.observed), *self.gaps, *self.depths), "section": self.events}
+        return [
+            Function(
+                name, arguments, texts[name], tuple(_LoopWriter(named, self.sums).statements(values)), role=Role.ENTRY
+            )
+            for name, values in results.items()
+            if values
+        ]
 
     def tables(self, equations: Equations) -> dict[str, str]:
         """Return the text of the tables that the sums read, by name: indices into a bank, or numbers."""
@@ -160,14 +206,15 @@ def table_name(rows: int, number: int) -> str:
     return f"ROWS_{rows}_{number}"
 
 
-UNWATCHED = Recording()
-"""No functions inside steps."""
+SYNC_ERROR = Recording()
+"""The synchronisation error, and no functions inside steps."""
 
 
 class _LoopWriter:
     """Writes the loops over nodes, those of inner reductions first."""
 
-    def __init__(self, equations: Equations, plain: Equations, sums: Sequence[Rows] = ()) -> None:
+    def __init__(self, named: NamedEquations, sums: Sequence[Rows]) -> None:
+        equations, plain = named.original, named.plain
         self.n, self.sums, self.state = plain.n, sums, frozenset(equations.state)
         # tables: name -> (name in the function, index in a bank). `at_node` has the components that all nodes have and
         # the parameters with a value for each node, indexed by the loop variable i; names of the network go first.

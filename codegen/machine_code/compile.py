@@ -37,7 +37,7 @@ from ..driver import dimensions
 from ..driver.dimensions import Dimensions, ModeDimensions
 from ..front_end import decorator, syntax_trees
 from ..kernels.driver import Driver, KernelKind, Recorder
-from ..kernels.sweep_kernel import KernelSource
+from ..kernels.kernel_text import KernelSource
 from ..simd import lane_types
 from ..simd.addresses import ADDRESS
 from ..simd.lane_types import Lane, Mask, has_fma
@@ -274,19 +274,7 @@ def _kernel(source: KernelSource) -> Kernel:
         compiled = _modules[source.code] = _module(source.code, "kernel", wanted, _what(source))
     found = ChainMap(compiled.functions, *(r.functions for r in recorders))
     functions = Functions(known[source.driver.entry].args[0], [found.get(name) for name in source.driver.functions])
-    if source.kind is KernelKind.MODES:
-        own: tuple[Any, ...] = (functions, source.dimensions, np.array(source.marks, np.int64))
-    else:
-        loops = source.elimination
-        network = () if loops is None else (loops.arrays, loops.weights)
-        own = (
-            functions,
-            source.dimensions,
-            np.array(source.marks, np.float64),
-            np.array(source.rule),
-            network,
-        )
-    return Kernel(source, compiled, driver, own)
+    return Kernel(source, compiled, driver, (functions, *source.arguments))
 
 
 def _what(source: KernelSource) -> str:

@@ -72,12 +72,6 @@ def tidy(equations: Equations) -> Equations:
     )
 
 
-def renamed(equations: Equations, plain: Equations) -> dict[sp.Symbol, sp.Symbol]:
-    """Return what the states and parameters of some equations are called in others that have the same."""
-    old, new = ((*eq.state, *eq.parameters) for eq in (equations, plain))
-    return {real(a): real(b) for a, b in zip(old, new, strict=True)}
-
-
 def _clashes(name: str) -> bool:
     """True for words of the generated code and for names that Python would not read as they are written."""
     written = name.isidentifier() and unicodedata.normalize("NFKC", name) == name

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,16 +21,17 @@ from synchain.models.scenes.scene import Scene, Section
 def watched(scene: Scene) -> Recording:
     """Return what the kernel of a scene watches: observables, sections and a stop, the energy in them as sums."""
     sections = Sections(scene)
-    found = Recording(ObservableArrays(scene).values, sections.values, sections.stop)
-    if has_own_energy(scene.model) or not any(e.has(ENERGY) for e in (*found.observed, *found.events)):
-        return found
+    recording = Recording((), None, ObservableArrays(scene).values, sections.values, sections.stop)
+    if has_own_energy(scene.model) or not any(e.has(ENERGY) for e in (*recording.observed, *recording.events)):
+        return recording
     value, sums = exact_energy(scene).rows()
     swap = {ENERGY: value}
-    return Recording(
-        tuple(e.xreplace(swap) for e in found.observed),
-        tuple(tuple(e.xreplace(swap) for e in parts) for parts in found.sections),
-        None if found.stop is None else found.stop.xreplace(swap),
-        sums,
+    return replace(
+        recording,
+        observed=tuple(e.xreplace(swap) for e in recording.observed),
+        sections=tuple(tuple(e.xreplace(swap) for e in parts) for parts in recording.sections),
+        stop=None if recording.stop is None else recording.stop.xreplace(swap),
+        sums=sums,
     )
 
 

@@ -15,6 +15,7 @@ from fractions import Fraction
 from functools import lru_cache
 
 import numpy as np
+import sympy as sp
 
 from synchain.codegen.driver.columns import PointColumn, SumColumn
 from synchain.codegen.kernels.observable_text import Recording
@@ -86,15 +87,12 @@ class ReducedScene:
     scene: Scene
     planner: Planner = field(repr=False)  # lays out its cells
     equations: Equations = field(repr=False)  # the equations that the kernel steps
-    records: tuple[str, ...]  # what the kernel records
+    recording: Recording = field(repr=False)  # records, observables, sections and stop of the kernel
     merge: NodeMerge = field(repr=False)  # which oscillators are stepped as one
     numbers: np.ndarray = field(repr=False)  # columns of the whole network's parameters that are left
-    # how many oscillators each node stands for, if the synchronisation error needs it
-    multiplicity: tuple[int, ...] | None
     skipped: tuple[str, ...]  # sentences: what was left out, and what was not and why
     kept: tuple[str, ...]
     jumps: bool  # whether a cell that repeats itself leaves out whole cycles
-    watched: Recording = field(repr=False)  # what the kernel watches: observables, sections and a stop
 
     @property
     def dimension(self) -> int:
@@ -131,13 +129,6 @@ class ReducedScene:
                 f"{IN_MEMORY * 8 / 1e9:.0f} GB; write it to a file with stream, whose memory does not grow with the sweep, "
                 "or take fewer cells"
             )
-
-    def section_variable(self) -> str:
-        """Return the state variable of the reduced network that stands for the scene's section
-        variable.
-        """
-        whole = self.scene.equations.state.index(self.scene.section.variable)
-        return self.equations.state[int(self.merge.places[whole])]
 
     def rows(self, whole: CellRows) -> CellRows:
         """Return the rows of the reduced network out of those of the whole one."""
@@ -187,18 +178,22 @@ def reduce_scene(
     for node, k in enumerate(classes):
         seen.setdefault(k, node)
     first = [seen[k] for k in range(equations.n)]
+    merge, section = _node_merge(whole, equations, classes, together), None
+    if "section" in scene.record:
+        # the section variable of the class of its node
+        variable = equations.state[int(merge.places[whole.state.index(scene.section.variable)])]
+        section = sp.Symbol(variable, real=True) - sp.Rational(repr(scene.section.level))
+    records = tuple(r for r in scene.record if not (together and r == "sync_error"))
     return ReducedScene(
         scene,
         Planner(scene, starts),
         equations,
-        tuple(r for r in scene.record if not (together and r == "sync_error")),
-        _node_merge(whole, equations, classes, together),
+        replace(found, records=records, section=section, multiplicity=_multiplicity(scene, classes)),
+        merge,
         _columns(whole, equations, first),
-        _multiplicity(scene, classes),
         tuple(skipped),
         tuple(kept),
         reduce,
-        found,
     )
 
 
@@ -393,12 +388,12 @@ def _unwritten(reduction: ReducedScene) -> list[str]:
         found.append("coupling: no links")
     if "sync_error" not in scene.record:
         found.append("synchronisation error: not recorded")
-    elif "sync_error" not in reduction.records:
+    elif "sync_error" not in reduction.recording.records:
         found.append("synchronisation error: 0 between oscillators that are stepped as one")
     if "section" not in scene.record:
         found.append("section: not recorded; no search for crossings")
     if "trajectory" not in scene.record:
         found.append("trajectory: not recorded; no samples")
-    if not reduction.records:
+    if not reduction.recording.records:
         found.append("dense output: no record needs states inside a step")
     return found

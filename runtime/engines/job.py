@@ -44,8 +44,8 @@ from synchain.codegen.driver.clock_slots import (
 )
 from synchain.codegen.driver.columns import Control, Count, SpanColumn, SumColumn
 from synchain.codegen.integrators import Integrator
-from synchain.codegen.kernels.observable_text import UNWATCHED, Recording
-from synchain.codegen.kernels.sweep_kernel import KernelSource, emit
+from synchain.codegen.kernels.observable_text import SYNC_ERROR, Recording
+from synchain.codegen.kernels.sweep_kernel import SweepKernel, emit
 from synchain.codegen.machine_code.compile import Kernel, load
 from synchain.codegen.machine_code.installation import InstallationError
 from synchain.codegen.machine_code.processor import processor, told_apart
@@ -85,7 +85,7 @@ class Job(Protocol):
 class Problem(Protocol):
     """What a job integrates."""
 
-    def source(self, width: int) -> KernelSource:
+    def source(self, width: int) -> SweepKernel:
         """Return the text of its kernel."""
 
     def job(self, spec: JobSpec, kernel: Kernel) -> Job:
@@ -104,7 +104,7 @@ class JobSpec:
     code: tuple[str, ...]  # files of code that are allowed to run
 
     @classmethod
-    def of(cls, problem: Problem, source: KernelSource) -> JobSpec:
+    def of(cls, problem: Problem, source: SweepKernel) -> JobSpec:
         """Return the specification of a job of this process."""
         return cls(problem, source.width, source.digest, versions(), processor(), allowed_code())
 
@@ -155,7 +155,7 @@ class SweepSpec:
     reduction: ReducedScene
     room: int | None = None
 
-    def source(self, width: int) -> KernelSource:
+    def source(self, width: int) -> SweepKernel:
         """Return the text of the kernel."""
         return write_kernel(self.reduction, width)
 
@@ -289,14 +289,12 @@ class RowsSpec:
     equations: Equations
     integrator: Integrator | str
     control: np.ndarray  # (len(Control)
-    # how many oscillators each node stands for in the synchronisation error
-    multiplicity: tuple[int, ...] | None = None
-    records: tuple[str, ...] = ("sync_error",)  # ("sync_error",), or none if all oscillators are stepped as one
-    watched: Recording = UNWATCHED  # holds the stop of a scene, if it has one
+    # the record is the synchronisation error, or none if all oscillators are stepped as one; a scene may have a stop
+    recording: Recording = SYNC_ERROR
 
-    def source(self, width: int | None = None) -> KernelSource:
+    def source(self, width: int | None = None) -> SweepKernel:
         """Return the text of the kernel."""
-        return emit(self.equations, self.integrator, self.records, None, width, self.multiplicity, watched=self.watched)
+        return emit(self.equations, self.integrator, self.recording, width)
 
     def job(self, spec: JobSpec, kernel: Kernel) -> RowsJob:
         """Return the job that runs the kernel."""

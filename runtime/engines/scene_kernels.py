@@ -5,14 +5,10 @@ from __future__ import annotations
 from functools import lru_cache
 from weakref import WeakKeyDictionary
 
-import sympy as sp
-
 from synchain.codegen.integrators import Integrator
-from synchain.codegen.kernels.observable_text import Recording
-from synchain.codegen.kernels.sweep_kernel import KernelSource, emit
+from synchain.codegen.kernels.sweep_kernel import SweepKernel, emit
 from synchain.codegen.machine_code.compile import Kernel, load
 from synchain.codegen.simd.lane_types import WIDTHS
-from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.checks import check_integer
 from synchain.models.inputs.keywords import warn
 from synchain.models.scenes.scene import Scene
@@ -42,7 +38,7 @@ def kernel(scene: Scene, width: int | None = None, reduce: bool | ReducedScene =
     return load(kernel_source(scene, width, reduce))
 
 
-def kernel_source(scene: Scene, width: int | None = None, reduce: bool | ReducedScene = True) -> KernelSource:
+def kernel_source(scene: Scene, width: int | None = None, reduce: bool | ReducedScene = True) -> SweepKernel:
     """Return the text of a scene's kernel without compiling it; parameters and errors as for
     `kernel`.
     """
@@ -65,7 +61,7 @@ def chosen_integrator(reduction: ReducedScene) -> Integrator:
     return ladder_of(reduction).main(reduction.rows(reduction.planner.sample()))
 
 
-def write_kernel(reduction: ReducedScene, width: int | None = None, method: Integrator | None = None) -> KernelSource:
+def write_kernel(reduction: ReducedScene, width: int | None = None, method: Integrator | None = None) -> SweepKernel:
     """Return the text of the kernel that integrates what is left of a scene; `width` as for
     `kernel`.  By default the integrator is the one that most cells begin with.
     """
@@ -73,26 +69,15 @@ def write_kernel(reduction: ReducedScene, width: int | None = None, method: Inte
     width = 1 if width is None and scene.cells == 1 else width
     if width is not None and check_integer("width", width, 1) not in WIDTHS:
         raise ValueError(f"width = {width}; expected one of {', '.join(map(str, WIDTHS))}")
-    section = None
-    if "section" in scene.record:
-        section = sp.Symbol(reduction.section_variable(), real=True) - sp.Rational(repr(scene.section.level))
     method = chosen_integrator(reduction) if method is None else method
-    recorded = (reduction.records, section, width, reduction.multiplicity)
-    return _emitted(reduction.equations, method, recorded, reduction.watched)
+    return _emitted(reduction.equations, method, reduction.recording, width)
 
 
-@lru_cache(maxsize=32)
-def _emitted(
-    equations: Equations,
-    method: Integrator,
-    recorded: tuple[tuple[str, ...], sp.Expr | None, int | None, tuple[int, ...] | None],
-    watched: Recording,
-) -> KernelSource:
-    """The text of a kernel; runs that differ in numbers alone share it."""
-    return emit(equations, method, *recorded, watched=watched)
+_emitted = lru_cache(maxsize=32)(emit)
+"""`emit`; runs that differ only in numbers share a kernel."""
 
 
-def warn_of_chords(source: KernelSource) -> None:
+def warn_of_chords(source: SweepKernel) -> None:
     """Warn if states between steps are recorded by an integrator that has only straight lines
     there.
     """

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from synchain.codegen.driver.columns import Count, SumColumn
-from synchain.codegen.kernels.sweep_kernel import KernelSource
+from synchain.codegen.kernels.sweep_kernel import SweepKernel
 from synchain.codegen.machine_code.compile import load
 from synchain.models.scenes.scene import Scene
 
@@ -51,7 +51,7 @@ class Trials:
     scene : Scene
         Says how long a cell runs.
     problem : RowsSpec
-    source : KernelSource
+    source : SweepKernel
         The kernel of the problem.
     execution : Execution
         Runs all rounds; each has a bar of its own.
@@ -63,7 +63,7 @@ class Trials:
         self,
         scene: Scene,
         problem: RowsSpec,
-        source: KernelSource,
+        source: SweepKernel,
         execution: Execution,
         expand: Callable[[Buffers], Buffers] | None = None,
     ) -> None:
@@ -79,9 +79,7 @@ class Trials:
         strongest = reduction.rows(reduction.planner.extremes())
         source = write_kernel(reduction, method=chosen_for_rows(reduction.scene, reduction.equations, strongest))
         control = control_of(reduction.planner, reduction.jumps)
-        problem = RowsSpec(
-            reduction.equations, source.method, control, reduction.multiplicity, reduction.records, reduction.watched
-        )
+        problem = RowsSpec(reduction.equations, source.method, control, reduction.recording)
         return cls(reduction.scene, problem, source, execution, reduction.expand)
 
     def __enter__(self) -> Trials:

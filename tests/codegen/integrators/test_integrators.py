@@ -15,6 +15,7 @@ from samples import DIGITS, Interpreted, take_step, waving
 
 from synchain.codegen import integrators
 from synchain.codegen.integrators import Integrator
+from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.models.scenes import defaults
 
@@ -239,7 +240,7 @@ def test_a_wrong_digit_is_noticed(m):
 
 @functools.cache
 def generated(name: str) -> Interpreted:
-    return Interpreted.of(emit(waving(), name, ("trajectory",), width=1), DIGITS)
+    return Interpreted.of(emit(waving(), name, Recording(("trajectory",)), width=1), DIGITS)
 
 
 DAMPING = [mpf(1) / 5]

@@ -10,6 +10,7 @@ import sympy as sp
 from variational_reference import transversal_equations
 
 from synchain.codegen.kernels.mode_kernel import emit_modes
+from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.machine_code.compile import load
 from synchain.models.dynamics.equations import Equations
@@ -75,7 +76,7 @@ def test_modes_are_those_of_the_extended_system(name: str, coupling: str, state:
     """Orbit and deviation as one state in an ordinary kernel, whose Jacobian SymPy derives anew."""
     s = scene(name, coupling)
     made = transversal_equations(s.equations)
-    kernel = load(emit(made, "rodas5p", (), width=1))
+    kernel = load(emit(made, "rodas5p", Recording(()), width=1))
     length = s.period or 6.0
     size = len(state)
     alphas = np.array([0.0, 0.3, 0.9])

@@ -9,10 +9,10 @@ from itertools import product
 import pytest
 
 import synchain as sc
+from synchain.codegen.kernels.kernel_text import NamedEquations
 from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.program.functions import LANES
 from synchain.codegen.program.printers import Lanes
-from synchain.codegen.steps.safe_names import tidy
 from synchain.models.dynamics.observable_text import KNOWN, as_observable
 
 INSIDE = ("rate(v)", "x", "x_2", "rate(x_1)", "nodes.mean(x*rate(v))", "mu", "t")
@@ -46,7 +46,7 @@ def undefined(text: str) -> set[str]:
 def written(text: str) -> str:
     equations = SCENE.equations
     value = as_observable("o", f"mean({text})").value
-    return "\n".join(Lanes().function(f) for f in Recording((value,)).functions(equations, tidy(equations)))
+    return "\n".join(Lanes().function(f) for f in Recording(observed=(value,)).functions(NamedEquations.of(equations)))
 
 
 def test_functions_in_all_places_read_what_is_defined() -> None:

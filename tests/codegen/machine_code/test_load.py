@@ -33,6 +33,7 @@ from synchain.codegen.front_end import compiler, decorator, syntax_reader
 from synchain.codegen.kernels import driver
 from synchain.codegen.kernels.driver import Driver, KernelKind
 from synchain.codegen.kernels.mode_kernel import emit_modes
+from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.machine_code import cache
 from synchain.codegen.machine_code import compile as loading
@@ -44,7 +45,7 @@ from synchain.runtime.cli import main
 
 x, v = real("x", "v")
 SWING = Equations.of_equal_nodes(Node((x, v), (v, -x), ()), None, 1)
-REAL = emit(SWING, "cash_karp", (), width=1)
+REAL = emit(SWING, "cash_karp", Recording(()), width=1)
 TINY = """
 from synchain.codegen.simd import broadcast, njit
 
@@ -330,14 +331,14 @@ def test_the_kernel_keeps_its_text(compiled_folder, folder):
 
 
 def test_digests_are_stable_and_tell_kernels_apart():
-    assert emit(SWING, "cash_karp", (), width=1).digest == REAL.digest
+    assert emit(SWING, "cash_karp", Recording(()), width=1).digest == REAL.digest
     others = [
-        emit(SWING, "dop853", (), width=1),
-        emit(SWING, "cash_karp", (), width=2),
-        emit(SWING, "cash_karp", ("trajectory",), width=1),
-        emit(SWING, "cash_karp", ("section",), sp.Symbol("v_1"), width=1),
-        emit(friction_chain(1), "cash_karp", (), width=1),
-        emit(harmonic_chain(2), "cash_karp", (), width=1),
+        emit(SWING, "dop853", Recording(()), width=1),
+        emit(SWING, "cash_karp", Recording(()), width=2),
+        emit(SWING, "cash_karp", Recording(("trajectory",)), width=1),
+        emit(SWING, "cash_karp", Recording(("section",), sp.Symbol("v_1")), width=1),
+        emit(friction_chain(1), "cash_karp", Recording(()), width=1),
+        emit(harmonic_chain(2), "cash_karp", Recording(()), width=1),
     ]
     assert len({REAL.digest, *(o.digest for o in others)}) == len(others) + 1
 
@@ -438,7 +439,7 @@ def test_the_common_drivers_are_those_of_common_scenes():
     for records in ((), ("sync_error",), ("section",), ("trajectory",), ("sync_error", "section")):
         for method, network in (("rodas5p", friction_chain), ("taylor", harmonic_chain)):
             for n in (1, 4):
-                used |= {*emit(network(n), method, records if n > 1 else (), speed).shared}
+                used |= {*emit(network(n), method, Recording(records if n > 1 else (), speed)).shared}
     assert used <= {*common}
     assert {made.width for made in used} == {lanes.native_width(), lanes.native_width(2)}
     assert emit_modes(network_variation(friction_chain(2))).driver in common

@@ -13,6 +13,7 @@ from samples import CASES, FLOATS, TABLE, Interpreted, friction_chain, path, rea
 from sympy.functions.elementary.piecewise import ExprCondPair
 
 from synchain.codegen import integrators
+from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.program.passes import Hoist, Names, StraightLine
 from synchain.codegen.steps.blocks import analyse
@@ -127,7 +128,7 @@ def test_names_avoid_those_that_are_taken():
 
 
 def test_constants_are_computed_before_the_stages():
-    text = emit(friction_chain(2), "rodas5p", ("sync_error",), width=1).text
+    text = emit(friction_chain(2), "rodas5p", Recording(("sync_error",)), width=1).text
     step = ast.parse(text[text.index("def step") :].strip().split("\n\n\n")[0])
     names = [
         s.targets[0].id for s in ast.walk(step) if isinstance(s, ast.Assign) and isinstance(s.targets[0], ast.Name)
@@ -161,7 +162,9 @@ def numbers_of(eq: Equations, method: str, looped: bool) -> list[float]:
     """Everything that a step writes, and a section function of state, parameters and time."""
     state, first, last = real(eq.state[2], eq.parameters[0], eq.parameters[6])
     section = state * first - TIME * last
-    kernel = Interpreted.of(emit(eq, method, ("section",), section, width=1, unroll=0 if looped else 8), FLOATS)
+    kernel = Interpreted.of(
+        emit(eq, method, Recording(("section",), section), width=1, unroll=0 if looped else 8), FLOATS
+    )
     made = program(eq)
     y, graph = [0.3, 0.1, -0.2, 0.5], (made.arrays, made.weights) if looped else ()
     step = take_step(kernel, 0.3, 0.2, y, VALUES, 0.0, 1.0, *graph)

@@ -17,6 +17,7 @@ from synchain.codegen import simd
 from synchain.codegen.integrators import integrator
 from synchain.codegen.kernels.driver import RECORDERS, Driver, KernelKind, Recorder, imports
 from synchain.codegen.kernels.mode_kernel import emit_modes
+from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.program.lowering import UnprintableError
 from synchain.codegen.steps.safe_names import tidy
@@ -31,8 +32,11 @@ V_1 = sp.Symbol("v_1", real=True)
 
 
 def test_golden_kernels(golden):
-    golden("chain_2_rodas5p.txt", emit(friction_chain(2), "rodas5p", ("sync_error", "section"), V_1, width=8).text)
-    golden("chain_1_dop853.txt", emit(friction_chain(1), "dop853", (), width=4).text)
+    golden(
+        "chain_2_rodas5p.txt",
+        emit(friction_chain(2), "rodas5p", Recording(("sync_error", "section"), V_1), width=8).text,
+    )
+    golden("chain_1_dop853.txt", emit(friction_chain(1), "dop853", Recording(()), width=4).text)
     variation = mode(Scene(oscillator="duffing", topology=chain(2)).equations)
     golden("modes_taylor_6.txt", emit_modes(variation, integrator("taylor", 6), width=8).text)
 
@@ -64,17 +68,20 @@ def test_a_module_imports_what_its_code_names(name):
 
 
 def test_scenes_of_the_same_kind_share_a_driver():
-    few, many = (emit(friction_chain(n), "rodas5p", ("section",), V_1, width=4) for n in (1, 5))
+    few, many = (emit(friction_chain(n), "rodas5p", Recording(("section",), V_1), width=4) for n in (1, 5))
     other = emit(
-        CASES["tanh pair"], "cash_karp", ("section",), sp.Symbol(CASES["tanh pair"].state[0], real=True), width=4
+        CASES["tanh pair"],
+        "cash_karp",
+        Recording(("section",), sp.Symbol(CASES["tanh pair"].state[0], real=True)),
+        width=4,
     )
     assert few.driver == many.driver == other.driver
     assert few.dimensions != many.dimensions
     ways = {
         few.driver,
-        emit(friction_chain(1), "rodas5p", (), width=4).driver,
-        emit(friction_chain(1), "rodas5p", ("section",), V_1, width=8).driver,
-        emit(friction_chain(2), "rodas5p", ("section",), V_1, width=4, unroll=0).driver,
+        emit(friction_chain(1), "rodas5p", Recording(()), width=4).driver,
+        emit(friction_chain(1), "rodas5p", Recording(("section",), V_1), width=8).driver,
+        emit(friction_chain(2), "rodas5p", Recording(("section",), V_1), width=4, unroll=0).driver,
     }
     assert few.recorders == other.recorders == (Recorder("cut", 4, False),)
     assert len({driver.text for driver in ways}) == 3
@@ -86,7 +93,7 @@ def written() -> str:
     for eq in (CASES["looped"], CASES["friction 3"]):
         section = sp.Symbol(eq.state[-1], real=True) - sp.Rational(1, 3)
         for method in ("cash_karp", "rodas5p"):
-            source = emit(eq, method, ("section", "trajectory"), section, width=2)
+            source = emit(eq, method, Recording(("section", "trajectory"), section), width=2)
             texts += [source.text, source.driver.text]
     smooth = tidy(CASES["looped"])
     return "\n".join([*texts, write_step(smooth, 8).text, write_looped(smooth, 8).text])
@@ -105,7 +112,7 @@ def test_text_does_not_depend_on_the_hash_seed():
 
 
 def test_the_header_says_what_runs():
-    source = emit(friction_chain(2), "rodas5p", ("section", "sync_error"), V_1)
+    source = emit(friction_chain(2), "rodas5p", Recording(("section", "sync_error"), V_1))
     head = source.text.split('"""')[1]
     assert "2 oscillators, 2 links, rodas5p" in head
     assert source.equations.digest[:16] in head
@@ -116,16 +123,16 @@ def test_the_header_says_what_runs():
 
 
 def test_records_that_are_not_wanted_cost_nothing():
-    source = emit(friction_chain(1), "cash_karp", (), width=4)
+    source = emit(friction_chain(1), "cash_karp", Recording(()), width=4)
     assert source.recorders == ()
     for record, name in (("sync_error", "observe"), ("section", "cut"), ("trajectory", "sample")):
-        wanted = emit(friction_chain(1), "cash_karp", (record,), V_1, width=4)
+        wanted = emit(friction_chain(1), "cash_karp", Recording((record,), V_1), width=4)
         assert wanted.recorders == (Recorder(name, 4, False),)
         assert wanted.driver == source.driver
     assert "\nDENSE = False\n" in source.text
     assert "def section(" not in source.text
-    assert "def section(" in emit(friction_chain(1), "cash_karp", ("section",), V_1, width=4).text
-    assert "\nDENSE = True\n" in emit(friction_chain(1), "cash_karp", ("trajectory",), width=4).text
+    assert "def section(" in emit(friction_chain(1), "cash_karp", Recording(("section",), V_1), width=4).text
+    assert "\nDENSE = True\n" in emit(friction_chain(1), "cash_karp", Recording(("trajectory",)), width=4).text
 
 
 def test_unforced_equations_have_no_time_terms():
@@ -148,7 +155,7 @@ def test_slopes_without_state_are_lanes():
 
 def test_unknown_names_are_refused():
     with pytest.raises(ValueError, match=r"unknown record 'sync'; known: sync_error, section, trajectory"):
-        emit(friction_chain(1), "rodas5p", ("sync",))
+        emit(friction_chain(1), "rodas5p", Recording(("sync",)))
     with pytest.raises(
         ValueError,
         match=r"unknown integrator 'rk4'; known: cash_karp, dop853, rodas4, rodas5p, rodas6p, ros34pw2, taylor",
@@ -158,13 +165,13 @@ def test_unknown_names_are_refused():
 
 def test_sections_are_checked():
     with pytest.raises(ValueError, match="record 'section' needs a section function, for example v_1"):
-        emit(friction_chain(1), "rodas5p", ("section",))
+        emit(friction_chain(1), "rodas5p", Recording(("section",)))
     with pytest.raises(
         ValueError, match=r"section function v_2: unknown symbol 'v_2'; use the state, parameters and t"
     ):
-        emit(friction_chain(1), "rodas5p", ("section",), sp.Symbol("v_2", real=True))
+        emit(friction_chain(1), "rodas5p", Recording(("section",), sp.Symbol("v_2", real=True)))
     with pytest.raises(UnprintableError, match="floating-point number"):
-        emit(friction_chain(1), "rodas5p", ("section",), V_1 - sp.Float(0.5))
+        emit(friction_chain(1), "rodas5p", Recording(("section",), V_1 - sp.Float(0.5)))
 
 
 def test_what_cannot_be_printed_is_refused():

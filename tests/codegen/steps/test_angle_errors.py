@@ -10,6 +10,7 @@ from turning import NETWORKS, network, starts
 
 import synchain as sc
 from synchain.codegen.integrators import integrator, names
+from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.steps.places import by_joint
 from synchain.codegen.steps.sparse_plan import program
@@ -22,7 +23,7 @@ WAYS = [(name, looped) for name in STEPPED for looped in (False, True) if not (i
 @pytest.mark.parametrize("name", NETWORKS)
 def test_full_turns_change_no_error_of_a_step(name: str, method: str, looped: bool) -> None:
     equations = network(name)
-    kernel = Interpreted.of(emit(equations, method, (), width=1, unroll=0 if looped else 8), FLOATS)
+    kernel = Interpreted.of(emit(equations, method, Recording(()), width=1, unroll=0 if looped else 8), FLOATS)
     assert kernel.source.driver.looped is looped
     weights = [float(weight) for _, _, weight in by_joint(equations)]
     graph = (program(equations).arrays, weights) if looped else ()
@@ -34,5 +35,5 @@ def test_full_turns_change_no_error_of_a_step(name: str, method: str, looped: bo
 @pytest.mark.parametrize("method", STEPPED)
 def test_the_text_of_a_step_holds_no_period_where_no_state_is_an_angle(method: str) -> None:
     fields = (sc.Field({"q": "sin(q) + q/1000"}), sc.Field({"q": "sin(q) + 1/1000"}))
-    texts = [emit(sc.Scene(f, None).equations, method, (), width=1).code for f in fields]
+    texts = [emit(sc.Scene(f, None).equations, method, Recording(()), width=1).code for f in fields]
     assert [repr(2 * math.pi) in text for text in texts] == [False, True]

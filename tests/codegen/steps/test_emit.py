@@ -31,6 +31,7 @@ from samples import (
 )
 
 from synchain.codegen import integrators
+from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.program import lowering
 from synchain.codegen.program.expressions import Expression, call
@@ -258,13 +259,13 @@ def test_a_step_is_what_its_definition_says(case, method, looped, exact_numbers)
     refusal = refused(eq, m, looped)
     if refusal:
         with pytest.raises(ValueError, match=refusal):
-            emit(eq, method, (), width=1, unroll=unroll)
+            emit(eq, method, Recording(()), width=1, unroll=unroll)
         return
     if looped and m.inexact:
         with pytest.raises(ValueError, match="steps at most 0 nodes"):
-            emit(eq, method, (), width=1, unroll=unroll)
+            emit(eq, method, Recording(()), width=1, unroll=unroll)
         return
-    kernel = Interpreted.of(emit(eq, method, ("trajectory",), width=1, unroll=unroll), EXACT)
+    kernel = Interpreted.of(emit(eq, method, Recording(("trajectory",)), width=1, unroll=unroll), EXACT)
     assert kernel.source.driver.looped is looped
     weights = [mpf(w.numerator) / w.denominator for _, _, w in by_joint(eq)]
     graph = (program(eq).arrays, np.array(weights, object)) if looped else ()
@@ -303,7 +304,7 @@ def test_equations_agree_with_differences(case):
 def test_node_functions_of_the_friction_oscillator(exact_numbers):
     # `node` and `node_linear` by themselves; what they are given is computed at the beginning of the step
     eq = friction_chain(1)
-    text = emit(eq, "rodas5p", (), width=1).text
+    text = emit(eq, "rodas5p", Recording(()), width=1).text
     head, _ = text.split("    # factors of shift - J\n")  # the step is the last function
     space = plain(head + "    return locals()\n", EXACT)
     for seed in range(6):
@@ -322,7 +323,7 @@ def test_a_section_function_is_evaluated_inside_the_step(exact_numbers):
     eq = third_order()
     x, z, a = real("x_1", "z_1", "a")
     section = x * z - a * TIME**2 + sp.Rational(1, 10)
-    kernel = Interpreted.of(emit(eq, "rodas5p", ("section",), section, width=1), EXACT)
+    kernel = Interpreted.of(emit(eq, "rodas5p", Recording(("section",), section), width=1), EXACT)
     y, p = states(eq, 4)
     t, h, theta = mpf(1) / 3, mpf(1) / 8, mpf(3) / 7
     step = take_step(kernel, t, h, y, p)
@@ -332,7 +333,7 @@ def test_a_section_function_is_evaluated_inside_the_step(exact_numbers):
 
 
 def test_dense_output_meets_both_ends():
-    kernel = Interpreted.of(emit(waving(), "dop853", ("trajectory",), width=1), DIGITS)
+    kernel = Interpreted.of(emit(waving(), "dop853", Recording(("trajectory",)), width=1), DIGITS)
     y = [mpf(1), mpf(0)]
     step = take_step(kernel, mpf(0), mpf(1) / 4, y, [mpf(1) / 5])
     for c in range(2):
@@ -345,7 +346,7 @@ def test_dense_output_meets_both_ends():
 def test_an_undefined_estimate_is_never_accepted(broken, method):
     # two nodes without links: what is wrong with one leaves the estimates of the other small
     unlinked = Equations.of_equal_nodes(harmonic_chain(2).node, None, 2)
-    kernel = Interpreted.of(emit(unlinked, method, (), width=1), DIGITS)
+    kernel = Interpreted.of(emit(unlinked, method, Recording(()), width=1), DIGITS)
     tiny = mpf(10) ** -6
     assert take_step(kernel, mpf(0), tiny, [mpf(1)] * 4, [], mpf(1), mpf(1)).error < 1
     for slot in range(4):

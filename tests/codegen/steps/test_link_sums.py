@@ -10,6 +10,7 @@ import sympy as sp
 from samples import FLOATS, Interpreted, real, take_step
 
 from synchain.codegen.integrators import integrator
+from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.models.dynamics.equations import Equations, Layer
 from synchain.models.mechanics.components import Edge, Node
@@ -59,7 +60,7 @@ def exact(equations: Equations, y: list[float], p: list[float]) -> np.ndarray:
 def test_sums_by_nodes_are_the_right_hand_side(name: str) -> None:
     equations = network(name)
     y, p = numbers(equations)
-    source = emit(equations, integrator("dop853"), (), width=1, unroll=0)
+    source = emit(equations, integrator("dop853"), Recording(()), width=1, unroll=0)
     assert "sum_0_0" in source.text
     kernel, plan = Interpreted.of(source, FLOATS), source.elimination
     h = 1e-7
@@ -71,10 +72,10 @@ def test_sums_by_nodes_are_the_right_hand_side(name: str) -> None:
 def test_series_and_stages_agree(name: str) -> None:
     equations = network(name)
     y, p = numbers(equations)
-    n, stages = equations.n, emit(equations, integrator("dop853"), (), width=1, unroll=0)
+    n, stages = equations.n, emit(equations, integrator("dop853"), Recording(()), width=1, unroll=0)
     kernel, plan = Interpreted.of(stages, FLOATS), stages.elimination
     new = np.array(take_step(kernel, 0.0, 0.02, y, p, 1e-12, 1e-12, plan.arrays, plan.weights).y_new)
-    series = emit(equations, integrator("taylor", 12), (), width=1, unroll=0)
+    series = emit(equations, integrator("taylor", 12), Recording(()), width=1, unroll=0)
     kernel, plan = Interpreted.of(series, {**FLOATS, "truncated": float, "log": np.log}), series.elimination
     y_new, dense = [None] * (2 * n), [None] * (series.dimensions.dense_rows * 2 * n + series.dimensions.workspace)
     kernel.names["step"](0.0, 0.02, 0.02, y, [*y, *p], y_new, dense, 1e-12, 1e-12, plan.arrays, plan.weights)
@@ -83,6 +84,8 @@ def test_series_and_stages_agree(name: str) -> None:
 
 def test_each_node_has_its_functions_once() -> None:
     """The sine of a phase serves gravity, and both ends of all links."""
-    text = emit(network("sine with a lag beside a spring"), integrator("taylor", 8), (), width=1, unroll=0).text
+    text = emit(
+        network("sine with a lag beside a spring"), integrator("taylor", 8), Recording(()), width=1, unroll=0
+    ).text
     step = text[text.index("# order 0") : text.index("# all further orders")]
     assert (step.count(" = sin(x)"), step.count(" = cos(x)")) == (1, 1)

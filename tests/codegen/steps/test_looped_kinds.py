@@ -11,6 +11,7 @@ from samples import FLOATS, Interpreted, clocks, take_step
 from scipy.integrate import solve_ivp
 
 from synchain.codegen.export.python import to_python
+from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.steps.places import by_joint
 from synchain.codegen.steps.sparse_plan import program
@@ -62,7 +63,7 @@ def test_loops_do_what_the_written_statements_do(case: str, method: str) -> None
     y, p = random.uniform(-1, 1, equations.dimension), random.uniform(0.5, 1.5, len(equations.parameters))
     ends = []
     for limit in (8, 0):
-        kernel = Interpreted.of(emit(equations, method, (), width=1, unroll=limit, fill=fill), FLOATS)
+        kernel = Interpreted.of(emit(equations, method, Recording(()), width=1, unroll=limit, fill=fill), FLOATS)
         assert kernel.source.driver.looped is (limit == 0)
         weights = [float(weight) for _, _, weight in by_joint(equations)]
         state, t, h = list(y), 0.0, 0.05
@@ -115,7 +116,7 @@ def test_forty_clocks_on_a_beam_move_as_their_exported_equations_say() -> None:
 @pytest.mark.parametrize("method", ["dop853", "rodas5p"])
 def test_the_text_of_a_kernel_does_not_grow_with_its_kinds_of_nodes(method: str) -> None:
     for make in (lambda n: pairs(n).equations, lambda n: hanging(n).equations):
-        small, large = (emit(make(n), method, (), width=2).code for n in (12, 120))
+        small, large = (emit(make(n), method, Recording(()), width=2).code for n in (12, 120))
         body = [re.sub(r"\d+", "0", text) for text in (small, large)]
         assert body[0] == body[1]
 

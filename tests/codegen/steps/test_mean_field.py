@@ -12,6 +12,7 @@ import sympy as sp
 from samples import FLOATS, Interpreted, plain, real, take_step
 
 from synchain.codegen.integrators import integrator
+from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.program.printers import LANES
 from synchain.codegen.steps.fields import compensated
@@ -52,7 +53,7 @@ def stepped(equations: Equations, method: str, far: float = 0.0) -> np.ndarray:
     y = [*(far + rng.normal(size=n)), *rng.normal(size=n)]
     p = [*rng.uniform(0.5, 1.5, n), *[0.7] * (len(equations.parameters) - n)]
     chosen = integrator(method, 12) if method == "taylor" else integrator(method)
-    source = emit(equations, chosen, (), width=1, unroll=0)
+    source = emit(equations, chosen, Recording(()), width=1, unroll=0)
     kernel, plan = Interpreted.of(source, TRUNCATED), source.elimination
     if method != "taylor":
         return np.array(take_step(kernel, 0.3, 0.1, y, p, 1e-9, 1e-9, plan.arrays, plan.weights).y_new)
@@ -94,7 +95,9 @@ def test_two_fields_have_sums_of_their_own(method: str) -> None:
 
 
 def test_the_text_does_not_grow_and_lists_no_link() -> None:
-    few, many = (emit(network("sine with a lag", n, False), "dop853", (), width=1, unroll=0) for n in (20, 10**4))
+    few, many = (
+        emit(network("sine with a lag", n, False), "dop853", Recording(()), width=1, unroll=0) for n in (20, 10**4)
+    )
     assert len(many.text) - len(few.text) < 100
     assert many.elimination is not None
     assert many.elimination.weights.size == 0
@@ -112,12 +115,12 @@ def test_equations_of_many_nodes_list_no_link() -> None:
 
 
 def test_rosenbrock_steps_list_the_pairs_or_refuse() -> None:
-    found = emit(network("springs", 20, False), "rodas5p", (), width=1)
+    found = emit(network("springs", 20, False), "rodas5p", Recording(()), width=1)
     assert found.equations.fields == ()
     assert found.elimination is not None
     assert found.elimination.weights.size == 380
     with pytest.raises(ValueError, match=r"rodas5p: found a mean field of 3000 nodes, .* use dop853 or taylor"):
-        emit(network("springs", 3000, False), "rodas5p", (), width=1)
+        emit(network("springs", 3000, False), "rodas5p", Recording(()), width=1)
 
 
 def test_all_pairs_need_a_link_that_separates() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from samples import FLOATS, Interpreted
 
+from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
@@ -15,7 +16,7 @@ OWN = {"epsilon": [0.3, 0.34, 0.4], "theta_b": [0.2, 0.25, 0.3], "mu_s": [0.3, 0
 
 def pushes(scene: Scene, looped: bool) -> np.ndarray:
     """The six groups of numbers, by plain Python."""
-    source = emit(scene.equations, "dop853", (), width=1, unroll=0 if looped else 8)
+    source = emit(scene.equations, "dop853", Recording(()), width=1, unroll=0 if looped else 8)
     state = [0.3, -0.2, 0.1, 0.1, 0.25, -0.4, 1.0, 0.0, -1.0]
     numbers = [scene.parameters[name] for name in scene.equations.parameters]
     out = [0.0] * 6 * scene.n

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from variational_reference import transversal_equations
 
 from synchain.codegen.export.python import to_python
+from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.models import Field, chain, ring, star
 from synchain.models.dynamics.equations import Equations
@@ -274,7 +275,7 @@ def test_the_text_of_a_kernel_does_not_grow_with_the_network() -> None:
     texts = []
     for n in (30, 300):
         made = scene(topology=chain(n), parameters={"sigma": 0.1, "delta": np.linspace(0.1, 0.2, n)})
-        texts.append(emit(made.equations, "rodas5p", (), width=2).text)
+        texts.append(emit(made.equations, "rodas5p", Recording(()), width=2).text)
     assert abs(len(texts[1]) - len(texts[0])) < 300  # numbers of three digits in place of two
 
 

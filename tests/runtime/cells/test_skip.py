@@ -96,7 +96,7 @@ def test_all_fixed_numbers_folded():
 def test_equal_starts_are_one_oscillator_without_synchronisation_error():
     scene = DUFFING.replace(initial={"x": 0.5, "v": 0.1}, axes={"sigma": [0.1, 0.3]})
     result = compare(scene, nodes=1)
-    assert reduce_scene(scene).records == ("section", "trajectory")
+    assert reduce_scene(scene).recording.records == ("section", "trajectory")
     assert (result.sync_error == 0).all()
     assert int(result.section_count.min()) > 2
 
@@ -116,10 +116,10 @@ def test_mirrored_start_of_a_chain_with_its_synchronisation_error():
 @pytest.mark.long
 def test_synchronisation_error_and_section_of_a_star():
     ends = DUFFING.replace(topology=ring(4), initial={"x": [0.5, 0.1, 0.5, 0.1]})
-    assert reduce_scene(ends).multiplicity == (2, 2)
+    assert reduce_scene(ends).recording.multiplicity == (2, 2)
     start = {"x": [0.5, 0.1, 0.1, 0.1, 0.2]}
     scene = DUFFING.replace(topology=star(5), initial=start, section="v_3 rising 0.01")
-    assert reduce_scene(scene).multiplicity == (1, 3, 1)
+    assert reduce_scene(scene).recording.multiplicity == (1, 3, 1)
     result = compare(scene, nodes=3)
     trajectory = result.states("trajectory").reshape(scene.samples, 2, scene.n)
     distances = np.sqrt(((trajectory - trajectory[:, :, :1]) ** 2).sum(axis=1)).sum(axis=1)
@@ -357,7 +357,7 @@ def test_operations_are_counted_with_the_functions_they_call():
 @pytest.mark.parametrize("case", bench.CASES, ids=lambda case: case.name)
 def test_every_case_of_the_benchmark_skips_something(case):
     fewer, more = bench.scenes(case, quick=True)
-    assert fewer.skipped or len(fewer.records) < len(more.records)
+    assert fewer.skipped or len(fewer.recording.records) < len(more.recording.records)
     counts = [bench.operations(kernel_source(chosen.scene, reduce=chosen)) for chosen in (fewer, more)]
     assert counts[0] > 0
     assert counts[0] < counts[1] or case.fold_all

@@ -6,6 +6,7 @@ import numpy as np
 from samples import run_cells
 
 from synchain.codegen.driver.columns import Count
+from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.machine_code.compile import load
 from synchain.models import chain
@@ -31,7 +32,7 @@ def test_an_event_costs_no_second_step_and_is_where_another_method_finds_it() ->
 
 def test_loops_have_the_events_of_steps_that_are_written_out() -> None:
     method = chosen_integrator(reduce_scene(PAIR))
-    written, looped = (load(emit(PAIR.equations, method, (), width=WIDTH, unroll=most)) for most in (8, 0))
+    written, looped = (load(emit(PAIR.equations, method, Recording(()), width=WIDTH, unroll=most)) for most in (8, 0))
     scene = PAIR.replace(
         parameters={"u": 0.5, "theta_b": 0.01, "sigma": 0.3}
     )  # both limits of static friction are reached
