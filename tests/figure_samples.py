@@ -127,10 +127,10 @@ def parabola(omega: float, alpha: np.ndarray) -> Exponents:
 
 def drawn(name: str, runs: figure_runs.FigureRuns) -> tuple[Any, Any]:
     """Axes and data of a figure."""
-    drawing = load(name)
-    data = drawing.compute(runs)
+    module = load(name)
+    data = module.compute(name, runs)
     with style.context():
-        return drawing.draw(drawing.layout(style.new_figure(drawing.size)), data), data
+        return module.draw(style.new_figure(module.SIZE), data), data
 
 
 def rows(path: Path) -> list[dict[str, str]]:

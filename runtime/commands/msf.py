@@ -112,7 +112,7 @@ def execute(arguments: Namespace) -> int:
 
 def _write(found: MSF | Plane, folder: Path) -> list[Path]:
     """Write numbers and plot, over complex strengths with the rays of modes; return both paths."""
-    from ..plots.csv_table import Table, as_csv
+    from ..plots.csv_table import as_csv
     from ..plots.plane import draw_rays
     from ..plots.style import context
     from ..stability.msf import Plane
@@ -120,7 +120,7 @@ def _write(found: MSF | Plane, folder: Path) -> list[Path]:
 
     paths = [folder / f"{type(found).__name__.lower()}{ending}" for ending in (".csv", ".png")]
     numbers = found.data[["exponent", "stderr"]].to_dataframe().reset_index()
-    write_text(paths[0], as_csv(Table(tuple(numbers.columns), tuple(numbers.itertuples(index=False, name=None)))))
+    write_text(paths[0], as_csv(tuple(numbers.columns), numbers.itertuples(index=False, name=None)))
     with context(), whole_file(paths[1]) as temporary:
         axes, scene = found.plot(), found.scene
         if isinstance(found, Plane) and found.has_windows:

@@ -7,19 +7,18 @@ attractors.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from synchain.models.scenes.file import load_scene
 
-from ..plots.csv_table import Table, status_names
+from ..plots.csv_table import as_csv, status_names
 from ..plots.style import BLACK, COLUMN, ORANGE, bands, bracket, failures, note
 from ..results.result import Result
 from ..support.status import Status
 from .figure_runs import FigureRuns
-from .published import published
+from .published import published_ranges
 from .sync_error import synchronous
 
 NAMES = ("figure_3", "figure_4d", "figure_4e", "figure_4f")
@@ -28,80 +27,58 @@ SIZE = (COLUMN, 2.5)
 LABELS = {"omega": r"drive frequency $\omega$", "sigma": r"coupling $\sigma$"}
 
 
-@dataclass(frozen=True, slots=True)
-class Diagram:
-    """A swept result with section points."""
-
-    result: Result  # result with one axis
-    axis: str  # name of the axis
-    published: tuple[tuple[float, float], ...]  # ranges of the axis that the paper calls synchronous
-
-
-def compute(name: str, runs: FigureRuns) -> Diagram:
+def compute(name: str, runs: FigureRuns) -> Result:
     """Run the scene of a figure; several oscillators also record their synchronisation error."""
     plain, _, direction = name.removeprefix("figure_").partition("_")
     scene = load_scene(f"figure_{plain}")
     if scene.n > 1:
         scene = scene.replace(record=("sync_error", "section"))
-    if direction:
-        scene = scene.replace(continuation=direction)
-    row = published(scene.n, scene.parameters["omega"]) if scene.n > 1 else None
-    return Diagram(runs.run(scene), scene.axes[0].name, row.intervals if row else ())
+    return runs.run(scene.replace(continuation=direction) if direction else scene)
 
 
-def points(data: Diagram) -> tuple[np.ndarray, np.ndarray]:
-    """Collect the section points of all finished cells. Shapes: returns points (k, 2), cell (k,)."""
-    result = data.result
-    values = result.data[data.axis].values
+def points(result: Result) -> np.ndarray:
+    """Collect axis value and section point of all finished cells. Shapes: returns (k, 2)."""
+    values = result.data[result.scene.axes[0].name].values
     x = result.section.sel(component="x", node=1).values
     good = np.isfinite(x) & (result.status.values == Status.FINISHED)[:, None]
-    cell = np.broadcast_to(np.arange(len(values))[:, None], x.shape)[good]
-    return np.stack([values[cell], x[good]], axis=1), cell
+    return np.stack([np.broadcast_to(values[:, None], x.shape)[good], x[good]], axis=1)
 
 
-def table(data: Diagram) -> Table:
+def texts(data: Result) -> dict[str, str]:
     """Return one row for each section point; a cell without any has one row with its status."""
-    result = data.result
-    states, section = result.scene.equations.state, result.states("section")
+    axis, states, section = data.scene.axes[0].name, data.scene.equations.state, data.states("section")
     rows: list[tuple[object, ...]] = []
-    names = status_names(result.status)
-    for k, value in enumerate(result.data[data.axis].values):
-        count = int(result.section_count.values[k]) if names[k] == "finished" else 0
-        for j in range(count):
-            rows.append((value, result.section_time.values[k, j], *section[k, j], names[k]))
+    for k, (value, status) in enumerate(zip(data.data[axis].values, status_names(data.status), strict=True)):
+        count = int(data.section_count.values[k]) if status == "finished" else 0
+        rows += [(value, data.section_time.values[k, j], *section[k, j], status) for j in range(count)]
         if count == 0:
-            rows.append((value, None, *[None] * len(states), names[k]))
-    return Table((data.axis, "time", *states, "status"), tuple(rows))
+            rows.append((value, None, *[None] * len(states), status))
+    return {".csv": as_csv((axis, "time", *states, "status"), rows)}
 
 
-def draw(axes: Axes, data: Diagram) -> Axes:
+def draw(figure: Figure, data: Result) -> Axes:
     """Draw section points as dots, synchronous ranges in grey, the published range as a bar."""
-    found, _ = points(data)
-    values = data.result.data[data.axis].values
-    if "sync_error" in data.result.data:
-        bands(axes, synchronous(data.result))
+    axes, axis = figure.add_subplot(), data.scene.axes[0].name
+    x, y = points(data).T
+    values = data.data[axis].values
+    if "sync_error" in data.data:
+        bands(axes, synchronous(data))
     axes.plot(
-        found[:, 0],
-        found[:, 1],
+        x,
+        y,
         linestyle="none",
         marker=".",
-        markersize=_size(len(values)),
+        markersize=float(np.clip(700.0 / max(len(values), 1), 0.9, 2.2)),  # larger for few columns of dots
         color=BLACK,
         markeredgewidth=0.0,
         rasterized=True,
     )
-    axes.set(
-        xlim=(values.min(), values.max()), xlabel=LABELS.get(data.axis, data.axis), ylabel=r"$\chi_1$ at the section"
-    )
-    if data.published and len(found):
-        low, high = found[:, 1].min(), found[:, 1].max()
+    axes.set(xlim=(values.min(), values.max()), xlabel=LABELS[axis], ylabel=r"$\chi_1$ at the section")
+    published = published_ranges(data.scene) if data.scene.n > 1 else ()
+    if published and len(y):  # room for the bar above the dots
+        low, high = y.min(), y.max()
         axes.set_ylim(low - 0.05 * (high - low), high + 0.16 * (high - low))
-    bracket(axes, data.published, 0.95, ORANGE, "published")
-    failed = int((data.result.status.values != Status.FINISHED).sum())
+    bracket(axes, published, 0.95, ORANGE, "published")
+    failed = int((data.status.values != Status.FINISHED).sum())
     note(axes, failures(failed, len(values)))
     return axes
-
-
-def _size(cells: int) -> float:
-    """Marker size in points: larger for few columns of dots."""
-    return float(np.clip(700.0 / max(cells, 1), 0.9, 2.2))

@@ -7,16 +7,16 @@ contour.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
 
-from ..plots.csv_table import Table
+from ..plots.csv_table import as_csv
 from ..plots.plane import draw_plane, draw_rays
 from ..plots.style import COLUMN
 from ..stability.msf import Plane, plane
@@ -26,18 +26,11 @@ from .figure_runs import FigureRuns
 NAMES = ("msf_plane",)
 SIZE = (COLUMN, 2.5)
 OMEGA, SIGMA, NODES = 1.40, 0.13, 4
+"""Frequency, coupling at which the modes are marked, and size of the network (a choice)."""
 TOP = 0.6
 """Largest imaginary part."""
 FINE = 161
 """Real parts of the full grid."""
-
-
-@dataclass(frozen=True, slots=True)
-class Rays:
-    """A function over the plane with the modes of its scene's network."""
-
-    found: Plane  # master stability function
-    sigma: float  # coupling at which the modes are marked
 
 
 def uneven_ring(n: int, back: Fraction = Fraction(1, 2)) -> Topology:
@@ -46,33 +39,29 @@ def uneven_ring(n: int, back: Fraction = Fraction(1, 2)) -> Topology:
     return Topology("uneven ring", n, tuple(sorted(links)))
 
 
-def compute(name: str, runs: FigureRuns) -> Rays:
+def compute(name: str, runs: FigureRuns) -> Plane:
     """Compute the function at one frequency; the lower half of the plane mirrors the upper."""
     scene = Scene(topology=uneven_ring(NODES), parameters={"omega": OMEGA})
     grid = runs.quality.grid
     count = FINE if grid is None else min(grid // 2 + 1, FINE)  # the square of a line's effort
     alpha, beta = np.linspace(0.0, HIGHEST, count), np.linspace(0.0, TOP, count // 2 + 1)
-    return Rays(plane(scene, alpha, beta, **effort(runs)), SIGMA)
+    return plane(scene, alpha, beta, **effort(runs))
 
 
-def table(data: Rays) -> Table:
-    """Return exponent and standard error, per unit of time, at every point of the grid."""
-    function = data.found
-    rows = [
-        (a, b, function.exponent[i, j], function.stderr[i, j])
-        for i, a in enumerate(function.across)
-        for j, b in enumerate(function.up)
+def texts(data: Plane) -> dict[str, str]:
+    """Return exponents with standard errors, per unit of time, and the zero contour line by line."""
+    points = [
+        (a, b, data.exponent[i, j], data.stderr[i, j]) for i, a in enumerate(data.across) for j, b in enumerate(data.up)
     ]
-    return Table((*function.names, "exponent", "stderr"), tuple(rows))
+    contour = [(k, a, b) for k, line in enumerate(data.contours) for a, b in line]
+    return {
+        ".csv": as_csv((*data.names, "exponent", "stderr"), points),
+        "_ranges.csv": as_csv(("line", "alpha", "beta"), contour),
+    }
 
 
-def ranges(data: Rays) -> Table:
-    """Return the zero contour, line by line."""
-    rows = [(k, a, b) for k, line in enumerate(data.found.contours) for a, b in line]
-    return Table(("line", "alpha", "beta"), tuple(rows))
-
-
-def draw(axes: Axes, data: Rays) -> Axes:
+def draw(figure: Figure, data: Plane) -> Axes:
     """Draw the plane with the rays of its scene's network."""
-    draw_plane(axes, data.found)
-    return draw_rays(axes, data.found, data.sigma)
+    axes = figure.add_subplot()
+    draw_plane(axes, data)
+    return draw_rays(axes, data, SIGMA)

@@ -8,7 +8,7 @@ inside, a darker band leads down from there: the predicted range of sigma.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import sympy as sp
@@ -21,7 +21,7 @@ from matplotlib.ticker import MaxNLocator
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 
-from ..plots.csv_table import Table
+from ..plots.csv_table import as_csv
 from ..plots.exponent import finite
 from ..plots.style import BLACK, BLUE, COLUMN, GREEN, GREY, ORANGE, PURPLE, bands, bracket, failures, note
 from ..prediction.intervals import Interval, intersect, scale
@@ -29,7 +29,7 @@ from ..stability.msf import MSF
 from ..synchronisation.threshold import Sweep
 from .exponent_figure import curve
 from .figure_runs import FigureRuns
-from .published import published
+from .published import published_ranges
 
 NAMES = ("figure_5", "figure_6", "figure_7", "figure_8")
 SIZE = (COLUMN, 4.0)
@@ -37,47 +37,36 @@ LINES = ((BLUE, "-"), (PURPLE, "--"), (GREEN, "-."), (BLACK, ":"))
 DARK = "#bdbdbd"
 
 
-@dataclass(frozen=True, slots=True)
-class Projection:
+class Projection(NamedTuple):
     """Probe, network and ranges of one figure."""
 
     scene: Scene  # network
     probe: Sweep  # two-oscillator probe in alpha
     network: Sweep  # network in sigma
-    predicted: tuple[Interval, ...]  # ranges of sigma predicted from the probe, and published
-    published: tuple[Interval, ...]
+    predicted: tuple[Interval, ...]  # ranges of sigma predicted from the probe
+    published: tuple[Interval, ...]  # ranges of sigma
     exponent: MSF  # master stability function
 
 
 def compute(name: str, runs: FigureRuns) -> Projection:
     """Sweep the probe and the network of a figure's scene, and compute the exponents."""
     scene = load_scene(name)
-    row = published(scene.n, scene.parameters["omega"])
+    predicted = tuple(runs.predicted(scene))
     return Projection(
-        scene,
-        runs.pair(scene),
-        runs.network(scene),
-        tuple(runs.predicted(scene)),
-        row.intervals if row else (),
-        curve(scene, runs),
+        scene, runs.pair(scene), runs.network(scene), predicted, published_ranges(scene), curve(scene, runs)
     )
 
 
-def table(data: Projection) -> Table:
-    """Return errors (median over the starts), shares and status; exponents and their errors."""
+def texts(data: Projection) -> dict[str, str]:
+    """Return errors (median over the starts), shares, status and exponents; and all ranges."""
     rows: list[tuple[object, ...]] = []
-    for what, sweep in (("probe", data.probe), ("network", data.network)):
+    for name, sweep in (("probe", data.probe), ("network", data.network)):
         for x, error, share in zip(sweep.x, sweep.error, sweep.share, strict=True):
-            place = (x, None) if what == "probe" else (None, x)
-            rows.append((what, *place, error, share, "finished" if np.isfinite(error) else "failed", None, None))
-    found = data.exponent
-    for x, value, error in zip(found.alpha, found.exponent, found.stderr, strict=True):
-        rows.append(("exponent", x, None, None, None, "finished", value, error))
-    return Table(("curve", "alpha", "sigma", "e_avg", "share", "status", "exponent", "stderr"), tuple(rows))
-
-
-def ranges(data: Projection) -> Table:
-    """Return the synchronous ranges of probe and exponent in alpha, of the network in sigma."""
+            alpha, sigma = (x, None) if name == "probe" else (None, x)
+            status = "finished" if np.isfinite(error) else "failed"
+            rows.append((name, alpha, sigma, error, share, status, None, None))
+    for alpha, value, stderr in zip(data.exponent.alpha, data.exponent.exponent, data.exponent.stderr, strict=True):
+        rows.append(("exponent", alpha, None, None, None, "finished", value, stderr))
     groups = (
         ("probe", "alpha", data.probe.intervals),
         ("exponent", "alpha", data.exponent.intervals),
@@ -85,36 +74,33 @@ def ranges(data: Projection) -> Table:
         ("measured", "sigma", data.network.intervals),
         ("published", "sigma", data.published),
     )
-    rows = [(what, variable, low, high) for what, variable, found in groups for low, high in found]
-    return Table(("range", "variable", "low", "high"), tuple(rows))
+    ranges = [(name, variable, *ends) for name, variable, intervals in groups for ends in intervals]
+    return {
+        ".csv": as_csv(("curve", "alpha", "sigma", "e_avg", "share", "status", "exponent", "stderr"), rows),
+        "_ranges.csv": as_csv(("range", "variable", "low", "high"), ranges),
+    }
 
 
-def layout(figure: Figure) -> tuple[Axes, Axes, Axes]:
-    """Add axes for the probe (top left), lines (top right) and the network (below the lines)."""
+def draw(figure: Figure, data: Projection) -> tuple[Axes, Axes, Axes]:
+    """Draw the probe (top left), the lines (top right) and the network (below the lines)."""
     figure.set_layout_engine("none")  # the panels stand so close that the bands run through
     left, middle, right = (0.12, 0.345), 0.375, 0.885
     rays = figure.add_axes((middle, 0.40, right - middle, 0.51))
     probe = figure.add_axes((left[0], 0.40, left[1] - left[0], 0.51), sharey=rays)
     network = figure.add_axes((middle, 0.11, right - middle, 0.265), sharex=rays)
-    return probe, rays, network
-
-
-def draw(axes: tuple[Axes, Axes, Axes], data: Projection) -> tuple[Axes, Axes, Axes]:
-    """Draw probe, lines and network into the three axes of `layout`."""
-    probe, rays, network = axes
     _draw_probe(probe, data)
     _draw_exponent(probe, data)
     _draw_rays(rays, data)
     _draw_network(network, data)
-    _explain(probe, data)
+    _draw_legend(probe, data)
     failed = sum(int((~np.isfinite(s.error)).sum()) for s in (data.probe, data.network))
     note(rays, failures(failed, len(data.probe.x) + len(data.network.x)))
-    return axes
+    return probe, rays, network
 
 
 def _draw_probe(axes: Axes, data: Projection) -> None:
     bands(axes, data.probe.intervals, horizontal=True)
-    error = _finite(data.probe.error)
+    error = finite(data.probe.error)
     axes.plot(error, data.probe.x, color=BLACK, linewidth=0.8)
     top = float(np.nanmax(error, initial=0.0)) or 1.0
     axes.set(xlim=(1.12 * top, -0.04 * top), ylabel=r"$|\alpha|$")
@@ -125,16 +111,16 @@ def _draw_probe(axes: Axes, data: Projection) -> None:
 
 
 def _draw_exponent(axes: Axes, data: Projection) -> None:
-    """The exponent against its own axis below the panel, with a dot where it changes its sign."""
-    found, value = data.exponent, finite(data.exponent.exponent)
-    own = axes.twiny()
+    """Draw the exponent against an axis below the panel, with a dot where it changes its sign."""
+    alpha, value = data.exponent.alpha, finite(data.exponent.exponent)
+    twin = axes.twiny()
     axes.xaxis.tick_top()
-    own.axvline(0.0, color=BLUE, linewidth=0.5, linestyle=":")
-    own.plot(value, found.alpha, color=BLUE, linewidth=0.7)
-    ends = [end for interval in found.intervals for end in interval if found.alpha[0] < end < found.alpha[-1]]
-    own.plot(
-        [0.0] * len(ends),
-        ends,
+    twin.axvline(0.0, color=BLUE, linewidth=0.5, linestyle=":")
+    twin.plot(value, alpha, color=BLUE, linewidth=0.7)
+    roots = [end for interval in data.exponent.intervals for end in interval if alpha[0] < end < alpha[-1]]
+    twin.plot(
+        [0.0] * len(roots),
+        roots,
         linestyle="none",
         marker="o",
         markersize=2.6,
@@ -143,16 +129,17 @@ def _draw_exponent(axes: Axes, data: Projection) -> None:
         markeredgewidth=0.8,
     )
     low, high = float(np.nanmin(value, initial=0.0)), float(np.nanmax(value, initial=0.0))
-    room = 0.08 * (high - low) or 1.0
-    own.set_xlim(high + room, low - room)
-    own.xaxis.set_label_position("bottom")
-    own.xaxis.tick_bottom()
-    own.set_xticks([0.0, *([float(f"{0.65 * low:.0e}")] if low < 0.0 else [])])
-    own.set_xlabel(r"$\Lambda$", labelpad=1, color=BLUE)
-    own.tick_params(axis="x", colors=BLUE, labelsize=6.5)
+    margin = 0.08 * (high - low) or 1.0
+    twin.set_xlim(high + margin, low - margin)
+    twin.xaxis.set_label_position("bottom")
+    twin.xaxis.tick_bottom()
+    twin.set_xticks([0.0, *([float(f"{0.65 * low:.0e}")] if low < 0.0 else [])])
+    twin.set_xlabel(r"$\Lambda$", labelpad=1, color=BLUE)
+    twin.tick_params(axis="x", colors=BLUE, labelsize=6.5)
 
 
 def _draw_rays(axes: Axes, data: Projection) -> None:
+    """Draw the line alpha = sigma |gamma_k| of each mode, thick inside the probe's ranges."""
     low, high = 0.0, max(data.scene.axes[0].values)
     ceiling = float(data.probe.x[-1])
     bands(axes, data.probe.intervals, horizontal=True)
@@ -164,6 +151,7 @@ def _draw_rays(axes: Axes, data: Projection) -> None:
         axes.plot([low, high], [0.0, high * size], color=color, linestyle=dashes, linewidth=0.7)
         for a, b in intersect(scale(data.probe.intervals, 1.0 / size), [(low, high)]):
             axes.plot([a, b], [a * size, b * size], color=color, linewidth=1.8, solid_capstyle="butt")
+        # the exact eigenvalue at the end of its line
         axes.annotate(
             f"${sp.latex(-mode.exact, order='rev-lex')}$",
             (high, min(high * size, ceiling)),
@@ -184,7 +172,7 @@ def _draw_rays(axes: Axes, data: Projection) -> None:
 
 def _draw_network(axes: Axes, data: Projection) -> None:
     bands(axes, data.predicted, color=DARK)
-    error = _finite(data.network.error)
+    error = finite(data.network.error)
     axes.plot(data.network.x, error, color=BLACK, linewidth=0.8)
     top = float(np.nanmax(error, initial=0.0)) or 1.0
     axes.set(ylim=(-0.04 * top, 1.42 * top), xlabel=r"coupling $\sigma$", ylabel=r"$e_{\mathrm{avg}}$")
@@ -193,11 +181,11 @@ def _draw_network(axes: Axes, data: Projection) -> None:
     bracket(axes, data.published, 0.80, ORANGE)
 
 
-def _explain(axes: Axes, data: Projection) -> None:
+def _draw_legend(axes: Axes, data: Projection) -> None:
     """Draw the legend in the empty corner below the probe."""
     bars = [
-        Line2D([], [], color=color, marker="|", markersize=4, label=what)
-        for what, color in (("measured", BLUE), ("published", ORANGE))
+        Line2D([], [], color=color, marker="|", markersize=4, label=name)
+        for name, color in (("measured", BLUE), ("published", ORANGE))
     ]
     grey = [Patch(color=GREY, label="probe"), Patch(color=DARK, label="predicted")]
     title = f"$n={data.scene.n}$\n$\\omega={data.scene.parameters['omega']:.2f}$\nsynchronous:"
@@ -214,7 +202,3 @@ def _explain(axes: Axes, data: Projection) -> None:
         alignment="left",
     )
     legend.set_in_layout(False)
-
-
-def _finite(values: np.ndarray) -> np.ndarray:
-    return np.where(np.isfinite(values), values, np.nan)

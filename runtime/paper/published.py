@@ -6,26 +6,20 @@ friction oscillators, Eur. Phys. J. Special Topics (2016).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
+
+from synchain.models.scenes.scene import Scene
 
 from ..prediction.intervals import Interval
 
 
-@dataclass(frozen=True, slots=True)
-class Published:
+class Published(NamedTuple):
     """Published synchronous ranges of a chain."""
 
     n: int  # number of oscillators
     omega: float  # drive frequency
-    intervals: tuple[Interval, ...]  # synchronous ranges of sigma
+    intervals: tuple[Interval, ...]  # synchronous ranges of sigma, rising and disjoint
     remark: str  # remark of the paper
-
-    def __post_init__(self) -> None:
-        if self.n < 2 or not self.omega > 0:
-            raise ValueError(f"published row n = {self.n}, omega = {self.omega}; expected n >= 2 and omega > 0")
-        ends = [end for interval in self.intervals for end in interval]
-        if ends != sorted(ends):
-            raise ValueError(f"published intervals {self.intervals}; expected them in rising order and disjoint")
 
 
 PUBLISHED = (
@@ -48,8 +42,14 @@ NOT_PERIODIC = (1.40, 1.55)
 def published(n: int, omega: float) -> Published | None:
     """Return the published row for n oscillators at omega, or None if the paper has none."""
     for row in PUBLISHED:
-        if row.n == n and row.omega == omega:
+        if (row.n, row.omega) == (n, omega):
             return row
     if n >= 5 and omega in NOT_PERIODIC:
         return Published(n, omega, (), "none: the ratio of the eigenvalues outgrows the range of alpha")
     return None
+
+
+def published_ranges(scene: Scene) -> tuple[Interval, ...]:
+    """Return the published synchronous ranges of sigma for a scene's chain; empty if there are none."""
+    row = published(scene.n, scene.parameters["omega"])
+    return row.intervals if row else ()

@@ -10,10 +10,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from synchain.models.scenes.file import load_scene
@@ -25,15 +26,17 @@ from ..bifurcation.branches import Branch
 from ..bifurcation.periodic import PeriodicOrbit
 from ..bifurcation.skeleton import skeleton
 from ..plots.branch_marks import MARK, MARKERS, STABLE, UNSTABLE
-from ..plots.csv_table import Table
+from ..plots.csv_table import as_csv
 from ..plots.style import BLACK, BLUE, COLUMN, ORANGE, PURPLE
+from ..results.result import Result
 from ..sweeps.run import run
-from .bifurcation_figure import Diagram, points
+from .bifurcation_figure import points
 from .figure_runs import FigureRuns
 
 EXTRA = ("skeleton",)
 SIZE = (COLUMN, 3.3)
 LOW, HIGH = 1.0, 1.9
+"""Frequencies of the diagram."""
 PERIODS = (1, 2, 4)
 COLOURS = {1: PURPLE, 2: ORANGE, 4: BLUE}
 CLOUD = "#b4b4b4"
@@ -46,8 +49,8 @@ FULL = (901, 121, 16)
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """An orbit of a branch."""
+class BranchPoint:
+    """An orbit of a branch, or the orbit at one of its bifurcations."""
 
     value: float  # value of the parameter
     orbit: PeriodicOrbit
@@ -57,128 +60,132 @@ class Place:
     residual: float = 0.0  # residual of the bifurcation
 
 
-@dataclass(frozen=True, slots=True)
-class SkeletonFigure:
+class SkeletonFigure(NamedTuple):
     """Bifurcation diagram with the branches of orbits."""
 
-    diagram: Diagram  # motion
-    branches: tuple[tuple[Place, ...], ...]  # orbits of each branch in the order of the parameter
+    motion: Result  # section points over omega
+    branches: tuple[tuple[BranchPoint, ...], ...]  # points of each branch in the order of the parameter
 
 
 def compute(name: str, runs: FigureRuns) -> SkeletonFigure:
     """Run the scene of figure 3 with set-valued friction and find its skeleton."""
     scene = load_scene("figure_3").replace(contact="set-valued")
-    cloud, values, looks = FULL
-    grid = runs.quality.grid
-    values, looks = (values, looks) if grid is None else (max(3, (grid + 1) // 3), max(1, grid // 12))
-    swept = scene.replace(axes=(Axis.between("omega", LOW, HIGH, cloud),))
-    found = skeleton(
+    cloud, values, searched = FULL
+    if (grid := runs.quality.grid) is not None:
+        values, searched = max(3, (grid + 1) // 3), max(1, grid // 12)
+    branches = skeleton(
         scene.replace(axes=()),
         "omega",
         np.linspace(LOW, HIGH, values),
         PERIODS,
-        looks,
+        searched,
         show_progress=runs.execution.show_progress,
         progress=runs.execution.progress,
     )
-    return SkeletonFigure(Diagram(runs.run(swept), "omega", ()), tuple(_placed(scene, branch) for branch in found))
+    motion = runs.run(scene.replace(axes=(Axis.between("omega", LOW, HIGH, cloud),)))
+    return SkeletonFigure(motion, tuple(_branch_points(scene, branch) for branch in branches))
 
 
-def _placed(scene: Scene, branch: Branch) -> tuple[Place, ...]:
-    """Orbits of a branch and at its bifurcations, with their points at the section."""
-    found = [
-        Place(float(value), orbit, np.empty(0), phases.words)
+def _branch_points(scene: Scene, branch: Branch) -> tuple[BranchPoint, ...]:
+    """Return the orbits of a branch and at its bifurcations, with their points at the section."""
+    orbits = [
+        BranchPoint(float(value), orbit, np.empty(0), phases.words)
         for value, orbit, phases in zip(branch.values, branch.orbits, branch.phases, strict=True)
     ]
-    found += [Place(each.value, each.orbit, np.empty(0), "", each.kind, each.residual) for each in branch.bifurcations]
-    found.sort(key=lambda place: place.value)
-    crossed = _crossings(scene, branch.name, [place.orbit for place in found])
-    return tuple(replace(place, x=x) for place, x in zip(found, crossed, strict=True))
-
-
-def _crossings(scene: Scene, name: str, orbits: list[PeriodicOrbit]) -> list[np.ndarray]:
-    """Positions at which orbits cross the scene's section, in the order of time.
-
-    Two of the longest cycles are run, and the first half of the crossings is kept, so that a
-    crossing at the start is counted once.
-    """
-    state = np.array([orbit.state for orbit in orbits])
-    values = [orbit.scene.parameters[name] for orbit in orbits]
-    axes = {name: values, "x_1": state[:, 0].tolist(), "v_1": state[:, 1].tolist()}
+    turns = [BranchPoint(t.value, t.orbit, np.empty(0), "", t.kind, t.residual) for t in branch.bifurcations]
+    branch_points = sorted([*orbits, *turns], key=lambda point: point.value)
+    # Run two of the longest cycles and keep the first half of the crossings: a crossing at the start
+    # is then counted once.
+    states = np.array([point.orbit.state for point in branch_points])
+    starts = {
+        branch.name: [point.orbit.scene.parameters[branch.name] for point in branch_points],
+        "x_1": states[:, 0].tolist(),
+        "v_1": states[:, 1].tolist(),
+    }
     twice = scene.replace(
-        axes=tuple(Axis(key, value) for key, value in axes.items()),
+        axes=tuple(Axis(key, values) for key, values in starts.items()),
         zipped=True,
         transient=0.0,
-        window=2.0 * max(orbit.periods for orbit in orbits),
+        window=2.0 * max(point.orbit.periods for point in branch_points),
         rtol=1e-11,
     )
-    found = run(twice, show_progress=False)
-    each = found.section.sel(component="x", node=1).values
-    return [x[: (int(count) + 1) // 2] for x, count in zip(each, found.section_count.values, strict=True)]
+    result = run(twice, show_progress=False)
+    counts = (result.section_count.values.astype(int) + 1) // 2
+    crossings = result.section.sel(component="x", node=1).values
+    return tuple(replace(p, x=x[:count]) for p, x, count in zip(branch_points, crossings, counts, strict=True))
 
 
-def _periods(branch: tuple[Place, ...]) -> int:
-    """Drive periods of a branch's orbits; the orbit from which the branch is born has fewer."""
-    return max(place.orbit.periods for place in branch)
+def _periods(branch: tuple[BranchPoint, ...]) -> int:
+    """Return the drive periods of a branch's orbits; the orbit that a branch is born from has fewer."""
+    return max(point.orbit.periods for point in branch)
 
 
-def table(data: SkeletonFigure) -> Table:
-    """Return one row for each orbit and crossing of the section."""
-    rows = []
+def texts(data: SkeletonFigure) -> dict[str, str]:
+    """Return all orbits by their crossings of the section, and all bifurcations as CSV and Markdown."""
+    orbits: list[tuple[object, ...]] = []
+    turns: list[tuple[int, int, BifurcationKind, float, float, float]] = []
     for number, branch in enumerate(data.branches):
-        for place in branch:
-            value, orbit = complex(place.orbit.multipliers[0]), place.orbit
-            own = (number, orbit.periods, place.value), (value.real, value.imag, orbit.residual, place.phases)
-            rows += [(*own[0], x, *own[1]) for x in place.x if place.kind is None]
-    columns = ("branch", "periods", "omega", "x_1", "multiplier_re", "multiplier_im", "residual", "phases")
-    return Table(columns, tuple(rows))
-
-
-def ranges(data: SkeletonFigure) -> Table:
-    """Return one row for each bifurcation of each branch, at its lowest point at the section."""
-    rows = [
-        (number, place.orbit.periods, place.kind, place.value, place.residual, min(place.x, default=math.nan))
-        for number, branch in enumerate(data.branches)
-        for place in branch
-        if place.kind is not None
-    ]
-    return Table(("branch", "periods", "kind", "omega", "residual", "x_1"), tuple(rows))
-
-
-def document(data: SkeletonFigure) -> str:
-    """Return the bifurcations as a table in Markdown; a shared one is listed once."""
+        for point in branch:
+            orbit = point.orbit
+            if point.kind is not None:
+                lowest = min(point.x, default=math.nan)
+                turns.append((number, orbit.periods, point.kind, point.value, point.residual, lowest))
+                continue
+            multiplier = complex(orbit.multipliers[0])
+            for x in point.x:
+                numbers = (multiplier.real, multiplier.imag, orbit.residual)
+                orbits.append((number, orbit.periods, point.value, x, *numbers, point.phases))
+    # In Markdown a bifurcation that two branches share is listed once.
     lines = ["| ω | drive periods | kind | residual |", "|---|---|---|---|"]
-    last: tuple[Any, ...] = (None, math.nan)
-    for _, periods, kind, value, residual, _ in sorted(ranges(data).rows, key=lambda row: row[3]):
-        if kind != last[0] or not abs(value - last[1]) < SAME:
+    last_kind, last_value = None, math.nan
+    for _, periods, kind, value, residual, _ in sorted(turns, key=lambda turn: turn[3]):
+        if kind != last_kind or not abs(value - last_value) < SAME:
             lines.append(f"| {value:.10f} | {periods} | {kind} | {residual:.0e} |")
-        last = kind, value
-    return "\n".join(lines) + "\n"
+        last_kind, last_value = kind, value
+    columns = ("branch", "periods", "omega", "x_1", "multiplier_re", "multiplier_im", "residual", "phases")
+    return {
+        ".csv": as_csv(columns, orbits),
+        "_ranges.csv": as_csv(("branch", "periods", "kind", "omega", "residual", "x_1"), turns),
+        ".md": "\n".join(lines) + "\n",
+    }
 
 
-def draw(axes: Axes, data: SkeletonFigure) -> Axes:
+def draw(figure: Figure, data: SkeletonFigure) -> Axes:
     """Draw the motion as grey dots, stable orbits as lines, unstable ones dashed."""
-    _diagram(axes, data, 0.9)
+    axes = figure.add_subplot()
+    _draw_diagram(axes, data, 0.9)
     axes.set(xlim=(LOW, HIGH), xlabel=r"drive frequency $\omega$", ylabel=r"$\chi_1$ at the section")
     if CROWDED[0][0] > LOW and CROWDED[0][1] < HIGH:
         inset = axes.inset_axes(INSET)
-        _diagram(inset, data, 1.6)
+        _draw_diagram(inset, data, 1.6)
         inset.set(xlim=CROWDED[0], ylim=CROWDED[1])
         inset.tick_params(labelsize=5.5, pad=2)
         inset.locator_params(nbins=3)
         axes.indicate_inset_zoom(inset, edgecolor=BLACK, linewidth=0.5)
-    axes.figure.legend(
-        handles=_key(data), loc="outside upper center", ncols=3, handlelength=1.8, columnspacing=1.2, borderpad=0.1
+    # legend of the colours, lines and marks that occur
+    periods = sorted({_periods(branch) for branch in data.branches})
+    kinds = {point.kind for branch in data.branches for point in branch}
+    handles = [
+        *(Line2D([], [], color=COLOURS.get(n, BLACK), label=f"{n} drive period{'s' * (n > 1)}") for n in periods),
+        Line2D([], [], color=BLACK, label="stable", **STABLE),
+        Line2D([], [], color=BLACK, label="unstable", **UNSTABLE),
+        Line2D([], [], color=CLOUD, marker=".", linestyle="none", label="motion"),
+        *(
+            Line2D([], [], markeredgecolor=BLACK, marker=marker, label=kind, **MARK)
+            for kind, marker in MARKERS.items()
+            if kind in kinds
+        ),
+    ]
+    figure.legend(
+        handles=handles, loc="outside upper center", ncols=3, handlelength=1.8, columnspacing=1.2, borderpad=0.1
     )
     return axes
 
 
-def _diagram(axes: Axes, data: SkeletonFigure, size: float) -> None:
+def _draw_diagram(axes: Axes, data: SkeletonFigure, size: float) -> None:
     """Draw motion, branches and bifurcations."""
-    cloud, _ = points(data.diagram)
     axes.plot(
-        cloud[:, 0],
-        cloud[:, 1],
+        *points(data.motion).T,
         linestyle="none",
         marker=".",
         markersize=size,
@@ -191,45 +198,38 @@ def _diagram(axes: Axes, data: SkeletonFigure, size: float) -> None:
         colour = COLOURS.get(_periods(branch), BLACK)
         for stable, line in curves(branch):
             axes.plot(*np.array(line).T, color=colour, zorder=3, **(STABLE if stable else UNSTABLE))
-        for place in branch:
-            if place.kind is not None:
-                across = np.full(len(place.x), place.value)
-                axes.plot(across, place.x, markeredgecolor=colour, **MARK, marker=MARKERS[place.kind])
+        for point in branch:
+            if point.kind is not None:
+                omega = np.full(len(point.x), point.value)
+                axes.plot(omega, point.x, markeredgecolor=colour, **MARK, marker=MARKERS[point.kind])
 
 
-def curves(branch: tuple[Place, ...]) -> list[tuple[bool, list[tuple[float, float]]]]:
-    """Cut a branch into curves at the section if its stability or the number of crossings changes."""
-    made: list[tuple[bool, list[tuple[float, float]]]] = []
-    order, style = branch[0].x, None
+def curves(branch: tuple[BranchPoint, ...]) -> list[tuple[bool, list[tuple[float, float]]]]:
+    """Cut a branch into curves at the section if its stability or the number of crossings changes.
+
+    Each curve is its stability and its points (parameter, position).
+    """
+    lines: list[tuple[bool, list[tuple[float, float]]]] = []
+    crossings, last_stable = branch[0].x, None  # crossings in the order of the lines that are being drawn
     for before, after in pairwise(branch):
-        if len(order) != len(after.x):
-            order, style = after.x, None
+        if len(crossings) != len(after.x):
+            crossings, last_stable = after.x, None
             continue
-        ends = min((np.roll(after.x, k) for k in range(len(order))), key=lambda x: float(np.abs(x - order).max()))
+        # Crossings come in the order of time from a phase of the drive: match them by rotation.
+        shifted = (np.roll(after.x, k) for k in range(len(crossings)))
+        ends = min(shifted, key=lambda x: float(np.abs(x - crossings).max()))
         stable = _stable(before, after)
-        if stable != style:
-            made += [(stable, [(before.value, float(x))]) for x in order]
-        for (_, line), x in zip(made[len(made) - len(order) :], ends, strict=True):
+        if stable != last_stable:
+            lines += [(stable, [(before.value, float(x))]) for x in crossings]
+        for (_, line), x in zip(lines[len(lines) - len(crossings) :], ends, strict=True):
             line.append((after.value, float(x)))
-        order, style = ends, stable
-    return made
+        crossings, last_stable = ends, stable
+    return lines
 
 
-def _stable(before: Place, after: Place) -> bool:
-    """True if the orbits between two places are stable, by the one that is not at a bifurcation."""
-    own = next((place for place in (before, after) if place.kind is None), None)
-    return own.orbit.stable if own else max(abs(place.orbit.multipliers[0]) for place in (before, after)) < 1.0 + SAME
-
-
-def _key(data: SkeletonFigure) -> list[Line2D]:
-    """Legend of the colours, lines and marks that occur."""
-    counts = sorted({_periods(branch) for branch in data.branches})
-    found = {place.kind for branch in data.branches for place in branch}
-    kinds = [kind for kind in MARKERS if kind in found]
-    return [
-        *(Line2D([], [], color=COLOURS.get(n, BLACK), label=f"{n} drive period{'s' if n > 1 else ''}") for n in counts),
-        Line2D([], [], color=BLACK, label="stable", **STABLE),
-        Line2D([], [], color=BLACK, label="unstable", **UNSTABLE),
-        Line2D([], [], color=CLOUD, marker=".", linestyle="none", label="motion"),
-        *(Line2D([], [], markeredgecolor=BLACK, marker=MARKERS[kind], label=kind, **MARK) for kind in kinds),
-    ]
+def _stable(before: BranchPoint, after: BranchPoint) -> bool:
+    """Return whether the orbits between two points are stable, judged by one that is at no bifurcation."""
+    for point in (before, after):
+        if point.kind is None:
+            return point.orbit.stable
+    return bool(max(abs(point.orbit.multipliers[0]) for point in (before, after)) < 1.0 + SAME)

@@ -2,69 +2,56 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from synchain.models.scenes.file import load_scene
 
-from ..plots.csv_table import Table, status_names
+from ..plots.csv_table import as_csv, status_names
 from ..plots.style import BLUE, COLUMN, ORANGE, bands, bracket, failures, note
 from ..prediction.intervals import Interval, grid_intervals
 from ..results.result import Result
 from ..support.status import Status
 from ..synchronisation.criterion import PAPER
 from .figure_runs import FigureRuns
-from .published import published
+from .published import published_ranges
 
 NAMES = ("figure_4a", "figure_4b", "figure_4c")
 SIZE = (COLUMN, 2.2)
 
 
-@dataclass(frozen=True, slots=True)
-class Errors:
-    """A result swept over sigma, and the published synchronous ranges."""
-
-    result: Result
-    published: tuple[Interval, ...]
-
-
-def compute(name: str, runs: FigureRuns) -> Errors:
+def compute(name: str, runs: FigureRuns) -> Result:
     """Run the scene of a figure, with its section so that figures 4d-f share the runs."""
-    scene = load_scene(name)
-    row = published(scene.n, scene.parameters["omega"])
-    return Errors(runs.run(scene.replace(record=("sync_error", "section"))), row.intervals if row else ())
+    return runs.run(load_scene(name).replace(record=("sync_error", "section")))
 
 
 def synchronous(result: Result, tolerance: float = PAPER.tolerance) -> list[Interval]:
-    """Find the ranges of the first axis with an average error below a tolerance."""
+    """Find the ranges of the first axis with an average error below a tolerance.
+
+    A range ends half a step beyond its last value.
+    """
     x = result.data[result.scene.axes[0].name].values
     good = (result.status.values == Status.FINISHED) & (result.sync_error.values < tolerance)
     middles = 0.5 * (x[1:] + x[:-1])
-    lower, upper = np.append(x[:1], middles), np.append(middles, x[-1:])
-    left, right = dict(zip(x, lower, strict=True)), dict(zip(x, upper, strict=True))
-    return [(float(left[a]), float(right[b])) for a, b in grid_intervals(x, good)]
+    lower = dict(zip(x, np.append(x[:1], middles), strict=True))
+    upper = dict(zip(x, np.append(middles, x[-1:]), strict=True))
+    return [(float(lower[a]), float(upper[b])) for a, b in grid_intervals(x, good)]
 
 
-def table(data: Errors) -> Table:
+def texts(data: Result) -> dict[str, str]:
     """Return coupling, errors (average, largest, at the end of the window) and status."""
-    result = data.result
-    return Table.of(
-        sigma=result.data["sigma"].values,
-        e_avg=result.sync_error.values,
-        e_max=result.sync_error_max.values,
-        e_end=result.sync_error_end.values,
-        status=status_names(result.status),
-    )
+    errors = (data.sync_error.values, data.sync_error_max.values, data.sync_error_end.values)
+    rows = zip(data.data["sigma"].values, *errors, status_names(data.status), strict=True)
+    return {".csv": as_csv(("sigma", "e_avg", "e_max", "e_end", "status"), rows)}
 
 
-def draw(axes: Axes, data: Errors) -> Axes:
+def draw(figure: Figure, data: Result) -> Axes:
     """Draw the error as a line, synchronous ranges in grey, the published range as a bar."""
-    result = data.result
-    sigma, good = result.data["sigma"].values, result.status.values == Status.FINISHED
-    error = np.where(good, result.sync_error.values, np.nan)
-    bands(axes, synchronous(result))
+    axes = figure.add_subplot()
+    sigma, good = data.data["sigma"].values, data.status.values == Status.FINISHED
+    error = np.where(good, data.sync_error.values, np.nan)
+    bands(axes, synchronous(data))
     axes.plot(sigma, error, color=BLUE, linewidth=0.8)
     top = float(np.nanmax(error)) if good.any() else 1.0
     axes.set(
@@ -73,6 +60,6 @@ def draw(axes: Axes, data: Errors) -> Axes:
         xlabel=r"coupling $\sigma$",
         ylabel=r"$e_{\mathrm{avg}}$",
     )
-    bracket(axes, data.published, 0.93, ORANGE, "published")
+    bracket(axes, published_ranges(data.scene), 0.93, ORANGE, "published")
     note(axes, failures(int((~good).sum()), len(sigma)))
     return axes

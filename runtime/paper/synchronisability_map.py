@@ -10,7 +10,7 @@ Source: Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,13 +20,13 @@ from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
 
-from ..plots.csv_table import Table
+from ..plots.csv_table import as_csv
 from ..plots.style import COLUMN, ORANGE
 from ..prediction.mode_windows import transversal_modes
 from ..stability.exponents import exponents
 from .exponent_figure import effort
 from .figure_runs import FigureRuns
-from .published import PAIRS, published
+from .published import PUBLISHED
 
 NAMES = ("synchronisability_map",)
 SIZE = (COLUMN, 4.7)
@@ -35,8 +35,7 @@ LOW, HIGH, SIGMA = 1.0, 1.8, 0.6
 """Frequencies, and the largest coupling."""
 
 
-@dataclass(frozen=True, slots=True)
-class Map:
+class Map(NamedTuple):
     """The function of one oscillator at several frequencies."""
 
     omega: np.ndarray  # (omegas,): frequencies
@@ -48,17 +47,22 @@ class Map:
 
 def compute(name: str, runs: FigureRuns) -> Map:
     """Compute the exponents of all strengths at each frequency."""
-    grid = runs.quality.grid or 241
-    omega = np.linspace(LOW, HIGH, grid // 2 + 1 if runs.quality.grid else 161)
+    quality = runs.quality
+    grid = quality.grid or 241
+    omega = np.linspace(LOW, HIGH, grid // 2 + 1 if quality.grid else 161)
     sigma = np.linspace(0.0, SIGMA, grid)
     steepest = max(mode.size for graph in _graphs() for mode in transversal_modes(graph))
     alpha = np.linspace(0.0, SIGMA * steepest, 2 * grid - 1)
-    options = {**effort(runs), "precision": 10.0 * runs.quality.resolution, "transient": 100.0}
-    options.update(periods=runs.quality.criterion.transient, starts=min(runs.quality.criterion.starts, 3))
+    options = effort(runs) | {
+        "precision": 10.0 * quality.resolution,
+        "transient": 100.0,
+        "periods": quality.criterion.transient,
+        "starts": min(quality.criterion.starts, 3),
+    }
     pair = Scene(topology=topology("chain", 2))
-    found = [exponents(pair, alpha, omega=float(value), **options) for value in omega]
-    kinds = tuple("; ".join(dict.fromkeys(a.kind for a in e.attractors)) for e in found)
-    return Map(omega, alpha, sigma, np.array([e.by_start for e in found]), kinds)
+    functions = [exponents(pair, alpha, omega=float(value), **options) for value in omega]
+    kinds = tuple("; ".join(dict.fromkeys(a.kind for a in e.attractors)) for e in functions)
+    return Map(omega, alpha, sigma, np.array([e.by_start for e in functions]), kinds)
 
 
 def _graphs() -> list[Topology]:
@@ -71,52 +75,42 @@ def largest_exponent(data: Map, graph: Topology) -> np.ndarray:
     Shapes: returns (omegas, sigmas).
     """
     strengths = [data.sigma * mode.size for mode in transversal_modes(graph)]
-    worst = [[[np.interp(x, data.alpha, row) for x in strengths] for row in starts] for starts in data.exponent]
-    return np.asarray(np.median(np.max(worst, axis=2), axis=1))
+    # (omegas, starts, modes, sigmas)
+    by_mode = [[[np.interp(x, data.alpha, row) for x in strengths] for row in starts] for starts in data.exponent]
+    return np.asarray(np.median(np.max(by_mode, axis=2), axis=1))
 
 
-def table(data: Map) -> Table:
+def texts(data: Map) -> dict[str, str]:
     """Return the largest exponent, per unit of time, of each network at every point."""
-    columns = {f"{graph.name}_{graph.n}": largest_exponent(data, graph).reshape(-1) for graph in _graphs()}
-    omega, sigma = (part.reshape(-1) for part in np.meshgrid(data.omega, data.sigma, indexing="ij"))
-    motion = np.repeat(np.array(data.attractors, dtype=object), len(data.sigma))
-    return Table.of(omega=omega, sigma=sigma, **columns, motion=motion)
-
-
-def layout(figure: Figure) -> list[Axes]:
-    """Add one pair of axes for each network, two side by side."""
-    return list(figure.subplots(3, 2, sharex=True, sharey=True).flat)
-
-
-def draw(axes: list[Axes], data: Map) -> list[Axes]:
-    """Draw stable points in colours, others white, published ranges of chains as bars."""
     graphs = _graphs()
+    omega, sigma = np.meshgrid(data.omega, data.sigma, indexing="ij")
+    motion = np.repeat(np.array(data.attractors, dtype=object), len(data.sigma))
+    columns = [omega.reshape(-1), sigma.reshape(-1), *(largest_exponent(data, g).reshape(-1) for g in graphs), motion]
+    names = ("omega", "sigma", *(f"{graph.name}_{graph.n}" for graph in graphs), "motion")
+    return {".csv": as_csv(names, zip(*columns, strict=True))}
+
+
+def draw(figure: Figure, data: Map) -> list[Axes]:
+    """Draw stable points in colours, others white, published ranges of chains as bars."""
+    panels, graphs = list(figure.subplots(3, 2, sharex=True, sharey=True).flat), _graphs()
     values = [largest_exponent(data, graph) for graph in graphs]
     stable = np.concatenate([-v[(v < 0) & np.isfinite(v)] for v in values])
     top = float(np.quantile(stable, 0.99)) if stable.size else 1.0
-    for panel, graph, value in zip(axes, graphs, values, strict=True):
+    for panel, graph, value in zip(panels, graphs, values, strict=True):
         speed = np.where(value < 0, np.minimum(-value, top), np.nan)
-        painted = panel.pcolormesh(
+        mesh = panel.pcolormesh(
             data.omega, data.sigma, speed.T, shading="nearest", cmap="cividis_r", vmin=0.0, vmax=top, rasterized=True
         )
         panel.set_title(f"{graph.name}({graph.n})", fontsize=7.5, pad=3)
         panel.set(xlim=(data.omega[0], data.omega[-1]), ylim=(0.0, data.sigma[-1]))
         panel.tick_params(labelsize=7)
-        _published(panel, graph)
-    figure = axes[0].figure
+        for row in PUBLISHED:
+            if (graph.name, graph.n) == ("chain", row.n):
+                for ends in row.intervals:
+                    panel.plot([row.omega] * 2, ends, color=ORANGE, linewidth=1.2, marker="_", markersize=4.0)
     figure.supxlabel(r"drive frequency $\omega$ (white: not stable; orange: published)", fontsize=8.0)
     figure.supylabel(r"coupling $\sigma$", fontsize=8.0)
-    bar = figure.colorbar(painted, ax=axes, location="top", aspect=35, shrink=0.9, pad=0.02, extend="max")
+    bar = figure.colorbar(mesh, ax=panels, location="top", aspect=35, shrink=0.9, pad=0.02, extend="max")
     bar.set_label(r"rate of synchronisation $-\max\,\Lambda(\sigma|\gamma_k|)$ per unit of $\tau$", fontsize=7.5)
     bar.ax.tick_params(labelsize=7)
-    return axes
-
-
-def _published(panel: Axes, graph: Topology) -> None:
-    """Draw the published ranges of a chain as bars at their frequency."""
-    if graph.name != "chain":
-        return
-    for omega in PAIRS:
-        row = published(graph.n, omega)
-        for low, high in row.intervals if row else ():
-            panel.plot([omega, omega], [low, high], color=ORANGE, linewidth=1.2, marker="_", markersize=4.0)
+    return panels

@@ -8,11 +8,12 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 
-from ..plots.csv_table import Table
+from ..plots.csv_table import as_csv
 from ..plots.exponent import finite
 from ..plots.style import BLACK, BLUE, COLUMN, GREEN, ORANGE, PURPLE, failures
 from ..prediction.intervals import Interval, intersect
@@ -26,15 +27,14 @@ from .published import NOT_PERIODIC, PUBLISHED, Published, published
 
 NAMES = ("thresholds",)
 SIZE = (COLUMN, 4.8)
-KINDS = (
-    ("measured", BLUE, 0.3),
-    ("predicted", GREEN, 0.1),
-    ("exponents", PURPLE, -0.1),
-    ("published", ORANGE, -0.3),
-)
-FOUND = ("measured", "predicted", "exponents")
+KINDS = {"measured": (BLUE, 0.3), "predicted": (GREEN, 0.1), "exponents": (PURPLE, -0.1), "published": (ORANGE, -0.3)}
+"""Kinds of ranges, with the colour and the height of their bars."""
+COMPUTED = ("measured", "predicted", "exponents")
 GAP = 0.001
 """Largest gap in sigma that is bridged, since the ends of chaotic ranges are ragged."""
+
+Ends = tuple[float | None, float | None]
+"""Ends of a range; None where there is no range, or no published number."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,45 +46,61 @@ class ThresholdRow:
     measured: tuple[Interval, ...]  # ranges of sigma
     predicted: tuple[Interval, ...]
     windows: ExponentWindows  # ranges of sigma with negative exponents
-    published: Published | None  # published ranges
+    row: Published | None  # row of the paper
     failed: int  # number of values of sigma without an error measure, and of all
     cells: int
 
-    @property
-    def printed(self) -> tuple[Interval, ...]:
-        """The published ranges."""
-        return self.published.intervals if self.published else ()
+    def ranges(self, kind: str) -> tuple[Interval, ...]:
+        """Return the ranges of one of KINDS."""
+        return {
+            "measured": self.measured,
+            "predicted": self.predicted,
+            "exponents": self.windows.intervals,
+            "published": self.row.intervals if self.row else (),
+        }[kind]
+
+    def ends(self, kind: str) -> Ends:
+        """Return the ends of the range that is compared: the nearest to the published one."""
+        intervals, printed = self.ranges(kind), self.ranges("published")
+        if kind == "published":
+            return intervals[0] if intervals else (None, None)
+        # Exponents are smooth in sigma: their gaps are no raggedness.
+        return nearest(intervals if kind == "exponents" else joined(intervals), printed) or (None, None)
+
+    def differences(self, kind: str) -> Ends:
+        """Return the distances of the ends of a kind from the published ones."""
+        low, high = (
+            None if end is None or printed is None else end - printed
+            for end, printed in zip(self.ends(kind), self.ends("published"), strict=True)
+        )
+        return low, high
 
     @property
-    def exponents(self) -> tuple[Interval, ...]:
-        """The ranges with negative exponents."""
-        return self.windows.intervals
-
-    @property
-    def errors(self) -> tuple[float | None, float | None]:
+    def errors(self) -> Ends:
         """Standard errors of the ends of the nearest range with negative exponents."""
-        found = nearest(self.exponents, self.printed)
-        return (None, None) if found is None else self.windows.errors[self.exponents.index(found)]
+        intervals = self.ranges("exponents")
+        interval = nearest(intervals, self.ranges("published"))
+        return (None, None) if interval is None else self.windows.errors[intervals.index(interval)]
 
     @property
     def remark(self) -> str:
         """Remark of the paper, and remarks on the ranges."""
-        words = [self.published.remark] if self.published else []
+        remarks = [self.row.remark] if self.row else []
         if self.n == 2:
-            words.append("the probe itself")
+            remarks.append("the probe itself")
         bridged = joined(self.measured)
         gaps, more = len(self.measured) - len(bridged), len(bridged) - 1
         if gaps > 0:
-            words.append(f"{gaps} narrow gap{'s' * (gaps > 1)} bridged")
+            remarks.append(f"{gaps} narrow gap{'s' * (gaps > 1)} bridged")
         if more > 0:
-            words.append(f"{more} more range{'s' * (more > 1)} measured")
+            remarks.append(f"{more} more range{'s' * (more > 1)} measured")
         if not self.measured and not self.predicted:
-            words.append("none predicted, none measured")
+            remarks.append("none predicted, none measured")
         if self.windows.absent:
-            words.append(f"exponents {self.windows.text()}")
+            remarks.append(f"exponents {self.windows.text()}")
         if self.failed:
-            words.append(failures(self.failed, self.cells))
-        return "; ".join(words)
+            remarks.append(failures(self.failed, self.cells))
+        return "; ".join(remarks)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,16 +115,14 @@ def compute(name: str, runs: FigureRuns) -> Comparison:
     """Measure the published rows, and longer chains at frequencies without periodic motion."""
     cases = [(row.n, row.omega) for row in PUBLISHED]
     cases += [(n, omega) for n in runs.quality.networks for omega in NOT_PERIODIC]
-    return Comparison(tuple(_row(n, omega, runs) for n, omega in cases), runs.quality)
-
-
-def _row(n: int, omega: float, runs: FigureRuns) -> ThresholdRow:
-    scene = scene_of(n, omega, runs)
-    found = runs.network(scene)
-    predicted = tuple(runs.predicted(scene))
-    windows = windows_of(scene, runs)
-    failed = int((~np.isfinite(found.error)).sum())
-    return ThresholdRow(n, omega, found.intervals, predicted, windows, published(n, omega), failed, len(found.x))
+    rows = []
+    for n, omega in cases:
+        scene = scene_of(n, omega, runs)
+        sweep, predicted, windows = runs.network(scene), tuple(runs.predicted(scene)), windows_of(scene, runs)
+        failed = int((~np.isfinite(sweep.error)).sum())
+        row = published(n, omega)
+        rows.append(ThresholdRow(n, omega, sweep.intervals, predicted, windows, row, failed, len(sweep.x)))
+    return Comparison(tuple(rows), runs.quality)
 
 
 def windows_of(scene: Scene, runs: FigureRuns) -> ExponentWindows:
@@ -124,71 +138,44 @@ def scene_of(n: int, omega: float, runs: FigureRuns) -> Scene:
     return runs.chain(n, omega)
 
 
-def joined(found: tuple[Interval, ...], gap: float = GAP) -> tuple[Interval, ...]:
+def joined(intervals: tuple[Interval, ...], gap: float = GAP) -> tuple[Interval, ...]:
     """Bridge gaps of up to `gap` between neighbouring ranges."""
-    kept: list[Interval] = []
-    for low, high in found:
-        start = kept.pop()[0] if kept and low - kept[-1][1] <= gap else low
-        kept.append((start, high))
-    return tuple(kept)
+    bridged: list[Interval] = []
+    for low, high in intervals:
+        start = bridged.pop()[0] if bridged and low - bridged[-1][1] <= gap else low
+        bridged.append((start, high))
+    return tuple(bridged)
 
 
-def nearest(found: tuple[Interval, ...], printed: tuple[Interval, ...]) -> Interval | None:
+def nearest(intervals: tuple[Interval, ...], printed: tuple[Interval, ...]) -> Interval | None:
     """Return the range with the largest overlap with published ones, else the widest."""
 
     def merit(interval: Interval) -> tuple[float, float]:
-        shared = sum(b - a for a, b in intersect([interval], printed))
-        return shared, interval[1] - interval[0]
+        overlap = sum(b - a for a, b in intersect([interval], printed))
+        return overlap, interval[1] - interval[0]
 
-    return max(found, key=merit, default=None)
-
-
-def table(data: Comparison) -> Table:
-    """Return one row for each chain: nearest ranges, differences, all ranges, the criterion."""
-    columns = ["n", "omega"]
-    columns += [f"{kind}_{end}" for kind, _, _ in KINDS for end in ("low", "high")]
-    columns += ["exponents_low_error", "exponents_high_error"]
-    columns += [f"{kind}_minus_published_{end}" for kind in FOUND for end in ("low", "high")]
-    columns += [*(f"all_{kind}" for kind in FOUND), "status", "remark", "resolution"]
-    columns += [field.name for field in fields(Criterion)]
-    criterion = [getattr(data.quality.criterion, field.name) for field in fields(Criterion)]
-    rows = []
-    for row in data.rows:
-        *found, printed = _ends(row)
-        differences = [_difference(a, b) for ends in found for a, b in zip(ends, printed, strict=True)]
-        status = f"{row.failed} of {row.cells} failed" if row.failed else "finished"
-        rows.append(
-            (
-                row.n,
-                row.omega,
-                *(end for ends in found for end in ends),
-                *printed,
-                *row.errors,
-                *differences,
-                *(_listed(getattr(row, kind), 6) for kind in FOUND),
-                status,
-                row.remark,
-                data.quality.resolution,
-                *criterion,
-            )
-        )
-    return Table(tuple(columns), tuple(rows))
+    return max(intervals, key=merit, default=None)
 
 
-def _ends(row: ThresholdRow) -> tuple[tuple[float | None, float | None], ...]:
-    none = (None, None)
-    printed = row.printed[0] if row.printed else none
-    gaps = {"exponents": 0.0}
-    found = (nearest(joined(getattr(row, kind), gaps.get(kind, GAP)), row.printed) for kind in FOUND)
-    return *(ends or none for ends in found), printed
+def texts(data: Comparison) -> dict[str, str]:
+    """Return one row for each chain, as CSV with all ranges and the criterion, and as Markdown."""
+    records = [_record(row, data.quality) for row in data.rows]
+    return {".csv": as_csv(tuple(records[0]), [tuple(record.values()) for record in records]), ".md": document(data)}
 
 
-def _difference(found: float | None, printed: float | None) -> float | None:
-    return None if found is None or printed is None else found - printed
-
-
-def _listed(intervals: tuple[Interval, ...], digits: int) -> str:
-    return "; ".join(f"[{a:z.{digits}f}, {b:z.{digits}f}]" for a, b in intervals)
+def _record(row: ThresholdRow, quality: Quality) -> dict[str, object]:
+    """Return the columns of one row of the CSV."""
+    record: dict[str, object] = {"n": row.n, "omega": row.omega}
+    for kind in KINDS:
+        record[f"{kind}_low"], record[f"{kind}_high"] = row.ends(kind)
+    record["exponents_low_error"], record["exponents_high_error"] = row.errors
+    for kind in COMPUTED:
+        record[f"{kind}_minus_published_low"], record[f"{kind}_minus_published_high"] = row.differences(kind)
+    for kind in COMPUTED:
+        record[f"all_{kind}"] = "; ".join(f"[{a:z.6f}, {b:z.6f}]" for a, b in row.ranges(kind))
+    record["status"] = f"{row.failed} of {row.cells} failed" if row.failed else "finished"
+    criterion = {field.name: getattr(quality.criterion, field.name) for field in fields(Criterion)}
+    return record | {"remark": row.remark, "resolution": quality.resolution} | criterion
 
 
 def document(data: Comparison) -> str:
@@ -201,34 +188,19 @@ def document(data: Comparison) -> str:
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in data.rows:
-        *found, printed = _ends(row)
-        cells = [str(row.n), f"{row.omega:.2f}", *map(_shown, found[:2]), _with_errors(row, found[2]), _shown(printed)]
-        for ends in found:
-            pairs = [_difference(a, b) for a, b in zip(ends, printed, strict=True)]
-            cells.append(", ".join(f"{d:+z.4f}" for d in pairs if d is not None) or "-")
+        measured, predicted, printed = (_range_text(row.ends(kind)) for kind in ("measured", "predicted", "published"))
+        cells = [str(row.n), f"{row.omega:.2f}", measured, predicted, _exponents_text(row), printed]
+        for kind in COMPUTED:
+            cells.append(", ".join(f"{d:+z.4f}" for d in row.differences(kind) if d is not None) or "-")
         lines.append("| " + " | ".join([*cells, row.remark]) + " |")
-    return "\n".join([*lines, "", _how(data.quality), ""])
-
-
-def _shown(ends: tuple[float | None, float | None]) -> str:
-    return "none" if None in ends else f"[{ends[0]:z.4f}, {ends[1]:z.4f}]"
-
-
-def _with_errors(row: ThresholdRow, ends: tuple[float | None, float | None]) -> str:
-    if row.windows.absent:
-        return "not computed"
-    pairs = zip(ends, row.errors, strict=True)
-    words = [with_error(end, error or 0.0) for end, error in pairs if end is not None]
-    return f"[{', '.join(words)}]" if words else "none"
-
-
-def _how(quality: Quality) -> str:
-    c = quality.criterion
-    return (
+    c = data.quality.criterion
+    criterion = (
         f"Criterion: sigma counts as synchronous where at least half of {c.starts} starts (the stated one and copies "
         f"moved by up to {c.reach:g} in position, seed {c.seed}) end with an average synchronisation error below "
         f"{c.tolerance:g}, over {c.window:g} drive periods after a transient of {c.transient:g}, with rtol = {c.rtol:g}. "
-        f"Ends are refined to {quality.resolution:g} in sigma.\n\n"
+        f"Ends are refined to {data.quality.resolution:g} in sigma."
+    )
+    kinds = (
         "Measured: direct simulation of the chain. Predicted: the two-oscillator probe's ranges of alpha, projected "
         "through every non-zero eigenvalue of the chain. Exponents: the ranges of alpha with a negative transversal "
         "exponent, projected in the same way, with the errors of their ends, those of averages and of the interpolation "
@@ -236,19 +208,30 @@ def _how(quality: Quality) -> str:
         f"transient nor tolerance. Gaps of up to {GAP:g} within a measured or predicted range are bridged; where there are "
         "several ranges, the one nearest to the published is shown. `thresholds.csv` lists all ranges as found."
     )
+    return "\n".join([*lines, "", criterion, "", kinds, ""])
 
 
-def draw(axes: Axes, data: Comparison) -> Axes:
+def _range_text(ends: Ends) -> str:
+    return "none" if None in ends else f"[{ends[0]:z.4f}, {ends[1]:z.4f}]"
+
+
+def _exponents_text(row: ThresholdRow) -> str:
+    if row.windows.absent:
+        return "not computed"
+    pairs = zip(row.ends("exponents"), row.errors, strict=True)
+    ends = [with_error(end, error or 0.0) for end, error in pairs if end is not None]
+    return f"[{', '.join(ends)}]" if ends else "none"
+
+
+def draw(figure: Figure, data: Comparison) -> Axes:
     """Draw bars over sigma, one of each kind for each chain, with two standard errors of exponents."""
-    rows = data.rows
+    axes, rows = figure.add_subplot(), data.rows
     for k, row in enumerate(rows):
-        for kind, color, shift in KINDS:
-            height = len(rows) - k + shift
-            found = row.printed if kind == "published" else getattr(row, kind)
-            for low, high in found:
+        for kind, (color, shift) in KINDS.items():
+            for ends in row.ranges(kind):
                 axes.plot(
-                    [low, high],
-                    [height, height],
+                    ends,
+                    [len(rows) - k + shift] * 2,
                     color=color,
                     linewidth=3.0,
                     solid_capstyle="butt",
@@ -256,17 +239,18 @@ def draw(axes: Axes, data: Comparison) -> Axes:
                     markersize=3.6,
                     markeredgewidth=0.8,
                 )
-        for window, errors in zip(row.exponents, row.windows.errors, strict=True):
-            places, spread = [len(rows) - k - 0.1] * 2, 2 * finite(np.array(errors))
-            axes.errorbar(window, places, xerr=spread, fmt="none", ecolor=BLACK, elinewidth=0.6)
-        if not any(getattr(row, kind) for kind in (*FOUND, "printed")):
+        heights = [len(rows) - k + KINDS["exponents"][1]] * 2
+        for ends, errors in zip(row.ranges("exponents"), row.windows.errors, strict=True):
+            spread = 2 * finite(np.array(errors))
+            axes.errorbar(ends, heights, xerr=spread, fmt="none", ecolor=BLACK, elinewidth=0.6)
+        if not any(row.ranges(kind) for kind in KINDS):
             axes.annotate("none of any kind", (0.004, len(rows) - k), fontsize=6.5, va="center")
-    for kind, color, _ in KINDS:
+    for kind, (color, _) in KINDS.items():
         axes.plot([], [], color=color, linewidth=3.0, label=kind)
     for k in range(len(rows) - 1):
         axes.axhline(len(rows) - k - 0.5, color="0.85", linewidth=0.5)
-    ends = [b for row in rows for _, b in (*row.measured, *row.predicted, *row.exponents, *row.printed)]
-    axes.set(xlim=(0.0, 1.08 * max(ends, default=1.0)), ylim=(0.4, len(rows) + 0.6), xlabel=r"coupling $\sigma$")
+    highest = max((high for row in rows for kind in KINDS for _, high in row.ranges(kind)), default=1.0)
+    axes.set(xlim=(0.0, 1.08 * highest), ylim=(0.4, len(rows) + 0.6), xlabel=r"coupling $\sigma$")
     axes.set_yticks([len(rows) - k for k in range(len(rows))], [rf"$n={r.n}$, $\omega={r.omega:.2f}$" for r in rows])
     axes.tick_params(axis="y", length=0)
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, handlelength=1.2, columnspacing=1.0)

@@ -6,16 +6,15 @@ range.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ..plots.csv_table import Table
+from ..plots.csv_table import as_csv
 from ..plots.style import COLUMN, ORANGE
-from ..prediction.intervals import Interval
 from ..synchronisation.threshold import Sweep
 from .figure_runs import FigureRuns
 from .published import NOT_PERIODIC, PUBLISHED, Published
@@ -23,13 +22,11 @@ from .threshold_table import scene_of
 
 EXTRA = ("transient",)
 SIZE = (COLUMN, 3.6)
-ROWS = tuple(row for row in PUBLISHED if row.omega in NOT_PERIODIC)
-LENGTHS = (1.0, 0.3, 0.1, 3.0)
+LENGTHS = (0.1, 0.3, 1.0, 3.0)
 """Transients in units of that of the quality."""
 
 
-@dataclass(frozen=True, slots=True)
-class Trial:
+class Trial(NamedTuple):
     """Sweeps over the same values of sigma after transients of different length."""
 
     row: Published
@@ -39,43 +36,38 @@ class Trial:
 
 def compute(name: str, runs: FigureRuns) -> tuple[Trial, ...]:
     """Sweep sigma around the published ends of the rows without periodic motion."""
-    transients = tuple(sorted(factor * runs.quality.criterion.transient for factor in LENGTHS))
+    transients = tuple(factor * runs.quality.criterion.transient for factor in LENGTHS)
+    step = 0.001 if runs.quality.grid is None else 0.004
+    offsets = step * np.arange(-round(0.02 / step), round(0.02 / step) + 1)
     trials = []
-    for row in ROWS:
-        scene, sigma = scene_of(row.n, row.omega, runs), _grid(row.intervals[0], runs)
-        trials.append(Trial(row, transients, tuple(runs.after(scene, sigma, length) for length in transients)))
+    for row in PUBLISHED:
+        if row.omega in NOT_PERIODIC:
+            scene, ends = scene_of(row.n, row.omega, runs), row.intervals[0]
+            # values within 0.02 of either end, and a few between
+            values = np.concatenate([*(end + offsets for end in ends), np.linspace(*ends, 6)])
+            sigma = np.unique(np.round(values, 6))
+            trials.append(Trial(row, transients, tuple(runs.after(scene, sigma, length) for length in transients)))
     return tuple(trials)
 
 
-def _grid(interval: Interval, runs: FigureRuns) -> np.ndarray:
-    """Values of sigma within 0.02 of either end, and a few between."""
-    step = 0.001 if runs.quality.grid is None else 0.004
-    near = [end + step * np.arange(-round(0.02 / step), round(0.02 / step) + 1) for end in interval]
-    return np.unique(np.round(np.concatenate([*near, np.linspace(*interval, 6)]), 6))
-
-
-def table(data: tuple[Trial, ...]) -> Table:
+def texts(data: tuple[Trial, ...]) -> dict[str, str]:
     """Return error (median over the starts) and share of synchronised starts for every point."""
-    rows = []
-    for trial in data:
-        for transient, sweep in zip(trial.transients, trial.sweeps, strict=True):
-            for sigma, error, share in zip(sweep.x, sweep.error, sweep.share, strict=True):
-                status = "finished" if np.isfinite(error) else "failed"
-                rows.append((trial.row.n, trial.row.omega, transient, sigma, error, share, status))
-    return Table(("n", "omega", "transient", "sigma", "e_avg", "share", "status"), tuple(rows))
+    rows = [
+        (trial.row.n, trial.row.omega, transient, sigma, error, share, "finished" if np.isfinite(error) else "failed")
+        for trial in data
+        for transient, sweep in zip(trial.transients, trial.sweeps, strict=True)
+        for sigma, error, share in zip(sweep.x, sweep.error, sweep.share, strict=True)
+    ]
+    return {".csv": as_csv(("n", "omega", "transient", "sigma", "e_avg", "share", "status"), rows)}
 
 
-def layout(figure: Figure) -> list[Axes]:
-    """Add one pair of axes for each row."""
-    return list(figure.subplots(2, 2, sharey=True).flat)
-
-
-def draw(axes: list[Axes], data: tuple[Trial, ...]) -> list[Axes]:
+def draw(figure: Figure, data: tuple[Trial, ...]) -> list[Axes]:
     """Draw the share of synchronised starts over sigma and transient, published ends as lines."""
-    for panel, trial in zip(axes, data, strict=True):
+    panels = list(figure.subplots(2, 2, sharey=True).flat)
+    for panel, trial in zip(panels, data, strict=True):
         share = np.array([sweep.share for sweep in trial.sweeps])
         heights = np.arange(len(trial.transients))
-        painted = panel.pcolormesh(
+        mesh = panel.pcolormesh(
             trial.sweeps[0].x, heights, share, shading="nearest", cmap="Greys", vmin=0.0, vmax=1.25, rasterized=True
         )
         for end in trial.row.intervals[0]:
@@ -84,11 +76,10 @@ def draw(axes: list[Axes], data: tuple[Trial, ...]) -> list[Axes]:
         panel.set_title(rf"$n={trial.row.n}$, $\omega={trial.row.omega:.2f}$", fontsize=7.5, pad=3)
         panel.tick_params(labelsize=6.5)
         panel.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
-    figure = axes[0].figure
     figure.supxlabel(r"coupling $\sigma$ (orange: published ends)", fontsize=8)
     figure.supylabel("transient (drive periods)", fontsize=8)
-    bar = figure.colorbar(painted, ax=axes, location="top", shrink=0.6, aspect=30, boundaries=np.linspace(0, 1, 101))
+    bar = figure.colorbar(mesh, ax=panels, location="top", shrink=0.6, aspect=30, boundaries=np.linspace(0, 1, 101))
     bar.set_label("share of starts that synchronised", fontsize=7)
     bar.set_ticks([0, 0.5, 1])
     bar.ax.tick_params(labelsize=6.5)
-    return axes
+    return panels

@@ -83,9 +83,9 @@ def test_numbers_of_the_exponents_are_written(simulation: Simulation, tmp_path: 
 def test_one_function_serves_every_figure_of_the_same_runs_and_no_other(simulation: Simulation) -> None:
     runs = FigureRuns(TINY)
     for name in ("figure_5", "figure_7", "msf"):
-        load(name).compute(runs)
+        load(name).compute(name, runs)
     assert [omega for kind, omega, _ in simulation.functions] == [1.15, 1.4, 1.55]
-    assert exponent_figure.curve(load_scene("figure_8"), runs) is load("msf").compute(runs)[1]
+    assert exponent_figure.curve(load_scene("figure_8"), runs) is load("msf").compute("msf", runs)[1]
     exponent_figure.curve(load_scene("figure_8"), FigureRuns(TINY))
     assert len(simulation.functions) == 4
 
@@ -107,7 +107,7 @@ def test_effort_follows_the_quality() -> None:
 
 
 def test_the_plane_shows_contour_rays_and_dots(simulation: Simulation, tmp_path: Path) -> None:
-    axes, data = drawn("msf_plane", FigureRuns(TINY))
+    axes, _ = drawn("msf_plane", FigureRuns(TINY))
     assert [kind for kind, _, _ in simulation.functions] == ["plane"]
     contour = next(line for line in axes.lines if line.get_label() == r"$\Lambda=0$")
     radius = np.hypot(contour.get_xdata() - 0.345, contour.get_ydata())  # (alpha - 0.09)(alpha - 0.6) + beta^2 = 0
@@ -119,7 +119,9 @@ def test_the_plane_shows_contour_rays_and_dots(simulation: Simulation, tmp_path:
     }
     # weights 1 and 1/2 round four nodes: gamma = -3, -3/2 ± i/2
     np.testing.assert_allclose(
-        sorted(dots), [(1.5 * data.sigma, 0.5 * data.sigma), (3.0 * data.sigma, 0.0)], atol=1e-12
+        sorted(dots),
+        [(1.5 * plane_figure.SIGMA, 0.5 * plane_figure.SIGMA), (3.0 * plane_figure.SIGMA, 0.0)],
+        atol=1e-12,
     )
     rays = [line for line in axes.lines if line.get_linestyle() == "--"]
     slopes = sorted(line.get_ydata()[1] / line.get_xdata()[1] for line in rays)

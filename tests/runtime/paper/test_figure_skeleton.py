@@ -14,7 +14,7 @@ from synchain.runtime.paper import load, names, skeleton_figure
 from synchain.runtime.paper import make as maker
 from synchain.runtime.paper.figure_runs import FigureRuns, Quality
 from synchain.runtime.paper.make import make
-from synchain.runtime.paper.skeleton_figure import Place, SkeletonFigure, curves
+from synchain.runtime.paper.skeleton_figure import BranchPoint, SkeletonFigure, curves
 from synchain.runtime.plots import style
 
 SMALL = Quality(points=5, grid=9)
@@ -33,7 +33,7 @@ def narrow(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @cache
 def small() -> SkeletonFigure:
-    data: SkeletonFigure = load("skeleton").compute(FigureRuns(SMALL, workers=1))
+    data: SkeletonFigure = load("skeleton").compute("skeleton", FigureRuns(SMALL, workers=1))
     return data
 
 
@@ -52,7 +52,7 @@ def test_the_orbit_runs_through_the_motion_and_beyond() -> None:
     (branch,) = small().branches
     assert [place.kind for place in branch] == [None, None, "period doubling", None]
     assert branch[2].value == pytest.approx(DOUBLING, abs=1e-11)
-    cloud, _ = skeleton_figure.points(small().diagram)
+    cloud = skeleton_figure.points(small().motion)
     for place in (branch[0], branch[-1]):
         own = cloud[np.abs(cloud[:, 0] - place.value) < 1e-9, 1]
         assert len(own) > 40
@@ -69,9 +69,8 @@ def test_stable_pieces_are_lines_and_unstable_ones_dashed() -> None:
     assert (stable, unstable) == (True, False)
     assert [value for value, _ in before] == pytest.approx([1.2, 1.22, DOUBLING])
     assert [value for value, _ in after] == pytest.approx([DOUBLING, 1.24])
-    drawing = load("skeleton")
     with style.context():
-        axes = drawing.draw(drawing.layout(style.new_figure(drawing.size)), small())
+        axes = skeleton_figure.draw(style.new_figure(skeleton_figure.SIZE), small())
     styles = {line.get_linestyle() for line in axes.lines}
     assert {"-", "--", "None"} <= styles
     (mark,) = (line for line in axes.lines if line.get_marker() == skeleton_figure.MARKERS["period doubling"])
@@ -90,7 +89,7 @@ def test_curves_stay_apart_where_crossings_change_places() -> None:
     """Of two crossings that one is first which the period of the drive begins with; the curves go on all the same."""
     (branch,) = small().branches
     pairs = ([0.6, 0.7], [0.71, 0.61], [0.62, 0.72], [0.63])
-    made = curves(tuple(Place(1.0 + k, branch[0].orbit, np.array(x)) for k, x in enumerate(pairs)))
+    made = curves(tuple(BranchPoint(1.0 + k, branch[0].orbit, np.array(x)) for k, x in enumerate(pairs)))
     assert [[x for _, x in line] for _, line in made] == [[0.6, 0.61, 0.62], [0.7, 0.71, 0.72]]
 
 

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from threading import Barrier, Event
-from typing import Any
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -19,12 +18,12 @@ from figure_samples import TINY, Simulation, drawn, pretend, rows, words
 
 from synchain.models.scenes.file import load_scene, scene_names
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.paper import Drawing, load, names, projection, sync_error
+from synchain.runtime.paper import load, names, projection, sync_error
 from synchain.runtime.paper import make as maker
 from synchain.runtime.paper.figure_runs import FULL, QUICK, FigureRuns, Quality, thin
 from synchain.runtime.paper.make import make
 from synchain.runtime.plots import style
-from synchain.runtime.plots.csv_table import Table, as_csv
+from synchain.runtime.plots.csv_table import as_csv
 from synchain.runtime.support import progress
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.run import run
@@ -68,11 +67,10 @@ def test_all_figures_of_the_paper_are_there() -> None:
 
 @pytest.mark.parametrize("name", names(extra=True))
 def test_every_figure_keeps_the_contract(name: str) -> None:
-    drawing = load(name)
-    assert isinstance(drawing, Drawing)
-    for function in ("compute", "table", "draw"):
-        assert callable(getattr(drawing.module, function))
-    width, height = drawing.size
+    module = load(name)
+    for function in ("compute", "texts", "draw"):
+        assert callable(getattr(module, function))
+    width, height = module.SIZE
     assert width == style.COLUMN
     assert 1.5 < height < 5.0
 
@@ -135,7 +133,7 @@ def test_a_figure_is_written_as_png_svg_and_csv(name: str, tmp_path: Path, simul
 def test_all_figures_are_made_without_names(
     tmp_path: Path, simulation: Simulation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(maker, "produce", lambda drawing, runs, folder: [folder / drawing.name])
+    monkeypatch.setattr(maker, "produce", lambda name, data, folder: [folder / name])
     assert make(None, tmp_path) == make([], tmp_path) == [tmp_path / name for name in PAPER]
 
 
@@ -178,22 +176,22 @@ def test_the_bar_is_shown_when_wanted(
 
 
 class Pretended:
-    """A drawing whose data a function of its runs makes."""
+    """A module whose data a function of its runs makes."""
 
-    def __init__(self, name: str, compute: Callable[[FigureRuns], object]) -> None:
-        self.name, self.compute = name, compute
+    def __init__(self, compute: Callable[[FigureRuns], object]) -> None:
+        self.compute = lambda name, runs: compute(runs)
 
 
 def written(
     monkeypatch: pytest.MonkeyPatch,
     folder: Path,
-    produce: Callable[[Pretended, object, Path], list[Path]] = lambda drawing, data, folder: [],
+    produce: Callable[[str, object, Path], list[Path]] = lambda name, data, folder: [],
     workers: int = 2,
     **figures: Callable[[FigureRuns], object],
 ) -> None:
     """Make figures whose data functions make."""
-    drawings = {name: Pretended(name, compute) for name, compute in figures.items()}
-    monkeypatch.setattr(maker, "load", drawings.__getitem__)
+    modules = {name: Pretended(compute) for name, compute in figures.items()}
+    monkeypatch.setattr(maker, "load", modules.__getitem__)
     monkeypatch.setattr(maker, "produce", produce)
     make(list(figures), folder, workers=workers, show_progress=False)
 
@@ -229,7 +227,7 @@ def test_an_interrupt_ends_the_figures_of_other_threads(monkeypatch: pytest.Monk
             ended.append(True)
             raise
 
-    def interrupted(drawing: Pretended, data: object, folder: Path) -> list[Path]:
+    def interrupted(name: str, data: object, folder: Path) -> list[Path]:
         assert begun.wait(20.0)
         raise KeyboardInterrupt
 
@@ -258,10 +256,8 @@ def test_figures_at_a_time_share_their_runs() -> None:
 
 def test_a_table_has_rows_as_long_as_its_head() -> None:
     with pytest.raises(ValueError, match="a row of 1 entries; expected 2: a, b"):
-        Table(("a", "b"), ((1,),))
-    table = Table.of(a=[1.0, math.nan], b=["x", None], c=[1 / 3, math.inf])
-    assert as_csv(table) == "a,b,c\n1,x,0.333333333333\n,,\n"
-    assert table.column("b") == ("x", None)
+        as_csv(("a", "b"), [(1,)])
+    assert as_csv(("a", "b", "c"), [(1.0, "x", 1 / 3), (math.nan, None, math.inf)]) == "a,b,c\n1,x,0.333333333333\n,,\n"
 
 
 # -- numbers -----------------------------------------------------------------------------------------------------
@@ -275,14 +271,6 @@ def test_thinning_keeps_both_ends() -> None:
     assert set(few) < set(scene.axes[0].values)
     assert thin(scene, None) == scene
     assert thin(scene, 10_000) == scene
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"), [({"points": 1}, "points = 1"), ({"resolution": 0.0}, "resolution = 0")]
-)
-def test_a_quality_checks_itself(changes: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        Quality(**changes)
 
 
 def test_full_quality_keeps_the_scenes_and_quick_is_coarser() -> None:
@@ -300,7 +288,7 @@ def test_full_quality_keeps_the_scenes_and_quick_is_coarser() -> None:
 def test_figures_share_their_runs(simulation: Simulation) -> None:
     runs = FigureRuns(TINY)
     for name in names():
-        load(name).compute(runs)
+        load(name).compute(name, runs)
     assert len(simulation.runs) == 4  # figure 3 and three frequencies of figure 4
     assert sorted(omega for omega, _ in simulation.probes) == [1.15, 1.4, 1.55]
     assert sorted(omega for kind, omega, _ in simulation.functions if kind == "msf") == [1.15, 1.4, 1.55]
@@ -316,7 +304,7 @@ def test_figures_share_their_runs(simulation: Simulation) -> None:
 
 
 def test_the_friction_law_is_that_of_the_equations() -> None:
-    data = load("figure_1b").compute(FigureRuns(TINY))
+    data = load("figure_1b").compute("figure_1b", FigureRuns(TINY))
     scene = load_scene("figure_1b")
     p = dict(scene.parameters)
     equations = scene.equations
@@ -376,8 +364,8 @@ def test_bifurcation_diagram_and_its_numbers(
 @pytest.mark.parametrize("direction", ["up", "down"])
 def test_diagrams_can_be_continued(direction: str, simulation: Simulation) -> None:
     runs = FigureRuns(TINY)
-    load("figure_4e").compute(runs)
-    load(f"figure_4e_{direction}").compute(runs)
+    load("figure_4e").compute("figure_4e", runs)
+    load(f"figure_4e_{direction}").compute(f"figure_4e_{direction}", runs)
     assert [scene.continuation for scene in simulation.runs] == ["none", direction]
     assert f"figure_4e_{direction}" not in names()
 
