@@ -23,7 +23,8 @@ from synchain.models.interactions.coupling import Rates
 from synchain.models.interactions.ends import ends
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
-from synchain.runtime.cells.plan import Planner, control_of
+from synchain.runtime.cells.plan import Planner
+from synchain.runtime.engines.control import control_of
 from synchain.runtime.engines.scene_kernels import kernel
 
 from .scaling import apart, peak_memory

@@ -32,8 +32,9 @@ import numpy as np
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
-from synchain.runtime.cells.plan import control_array, plan, tolerances
+from synchain.runtime.cells.plan import plan
 from synchain.runtime.cells.run_keywords import Given
+from synchain.runtime.engines.control import control_array, tolerances
 from synchain.runtime.engines.scene_kernels import kernel
 from synchain.runtime.stability.averages import Averaging, Batches
 from synchain.runtime.stability.exponents import average, coupled_cell, exponents

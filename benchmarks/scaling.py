@@ -24,7 +24,8 @@ from synchain.codegen.simd.lane_types import native_width
 from synchain.models.graphs.families import family, topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
-from synchain.runtime.cells.plan import control_array, plan
+from synchain.runtime.cells.plan import plan
+from synchain.runtime.engines.control import control_array
 from synchain.runtime.engines.scene_kernels import kernel
 from synchain.runtime.sweeps.run import run
 

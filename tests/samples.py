@@ -27,7 +27,8 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.cells.plan import control_array, plan, tolerances
+from synchain.runtime.cells.plan import plan
+from synchain.runtime.engines.control import control_array, tolerances
 
 TABLE = {"theta_b": 0.1, "mu_s": 0.3, "mu_k": 0.15, "a": 2.5, "kappa": 1e5, "epsilon": 2.0, "u": 0.1, "omega": 1.15,
          "sigma": 0.1}  # fmt: skip

@@ -13,9 +13,11 @@ import numpy as np
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.machine_code.compile import Kernel
 from synchain.runtime.cells.buffers import Buffers
+from synchain.runtime.cells.drive_times import longest_steps
 from synchain.runtime.cells.initial_modes import with_modes
-from synchain.runtime.cells.plan import FIRST_STEP, control_array, longest_steps
+from synchain.runtime.cells.plan import FIRST_STEP
 from synchain.runtime.cells.reduce import as_reduction
+from synchain.runtime.engines.control import control_array
 from synchain.runtime.engines.scene_kernels import chosen_integrator, kernel
 
 from .cases import Case

@@ -18,7 +18,8 @@ from synchain.models.mechanics.lagrangian import total_derivative
 from synchain.models.networks.energy_terms import EnergyTerms
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
-from synchain.runtime.cells.plan import control_array, plan, tolerances
+from synchain.runtime.cells.plan import plan
+from synchain.runtime.engines.control import control_array, tolerances
 from synchain.runtime.results.energy_of_states import energy_function
 from synchain.runtime.support.status import Status
 

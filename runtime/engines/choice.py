@@ -23,9 +23,10 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
 from ..cells.paces import Paces, Templates
-from ..cells.plan import CellRows, first_step, scale_of_atol, tolerances
+from ..cells.plan import CellRows
 from ..cells.stiffness_rates import eigenvalue_rates, mode_rates
 from ..support.status import Status
+from .control import first_step, scale_of_atol, tolerances
 
 STIFF = 30.0
 """How many times faster than it turns and goes on a motion decays from where Rosenbrock steps are the faster ones, by

@@ -10,39 +10,14 @@ from __future__ import annotations
 
 import importlib.metadata
 import io
-import math
 import pickle
-import threading
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
 
-from synchain.codegen.driver.cells import REPEATING
-from synchain.codegen.driver.clock_slots import (
-    ACCEPTED,
-    BOUND,
-    CHANGE,
-    CLOCK,
-    CYCLE,
-    DUE,
-    END,
-    LEFT,
-    LOOK,
-    LOOKS,
-    MEMORY,
-    PERIOD,
-    POWER,
-    REJECTED,
-    SAVED_AT,
-    START,
-    STEP,
-    STOP,
-    TIME,
-    UNTIL,
-)
-from synchain.codegen.driver.columns import Control, Count, SpanColumn, SumColumn
+from synchain.codegen.driver.columns import Control, SpanColumn
 from synchain.codegen.integrators import Integrator
 from synchain.codegen.kernels.observable_text import SYNC_ERROR, Recording
 from synchain.codegen.kernels.sweep_kernel import SweepKernel, emit
@@ -51,18 +26,15 @@ from synchain.codegen.machine_code.installation import InstallationError
 from synchain.codegen.machine_code.processor import processor, told_apart
 from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.plugins import allow_code, allowed_code
-from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
 from ..cells.paces import Templates
-from ..cells.plan import FIRST_STEP, CellRows, control_of
+from ..cells.plan import CellRows
 from ..cells.reduce import ReducedScene
-from ..support.status import Status
-from .choice import Ladder, first_steps
-from .scene_kernels import ladder_of, write_kernel
-
-LARGEST_ROOM = 2**25
-"""Numbers that the room for section points of a block has at first, 268 MB."""
+from .choice import first_steps
+from .engine import Engine
+from .ladder_engine import LadderEngine, run_rows
+from .scene_kernels import write_kernel
 
 Start = tuple[np.ndarray, np.ndarray]
 """States (cells, dimension) to start from in place of the scene's, and for which cells (cells,)
@@ -148,9 +120,7 @@ class JobSpec:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SweepSpec:
-    """The sweep of a scene, or what is left of it to integrate; `room` are section points to make
-    room for at first.
-    """
+    """The sweep of a reduced scene; `room` are section points to make room for at first."""
 
     reduction: ReducedScene
     room: int | None = None
@@ -161,134 +131,37 @@ class SweepSpec:
 
     def job(self, spec: JobSpec, kernel: Kernel) -> SweepJob:
         """Return the job that runs the kernel."""
-        return SweepJob(spec, kernel, self.reduction, self.room)
+        return SweepJob(spec, kernel, self.reduction, LadderEngine(self.reduction, kernel, self.room))
 
 
 @dataclass(slots=True)
 class SweepJob:
-    """The kernels of a scene, ready to run any cells of its sweep.
-
-    `room` are section points of a cell to make room for at first; by default two a period, as far
-    as memory allows.  Cells with more are run again with what they need.  `kernel` is that of the integrator with which
-    most cells begin; those of others are made when the first cell needs them.
-    """
+    """Lay out cells of a sweep as rows, which an engine integrates."""
 
     spec: JobSpec
-    kernel: Kernel
+    kernel: Kernel  # with which most cells begin; the attributes of results name it
     reduction: ReducedScene
-    room: int | None = None
-    control: np.ndarray = field(init=False)
-    ladder: Ladder = field(init=False)
-    kernels: dict[str, Kernel] = field(init=False)
-    controls: dict[tuple[float, float], np.ndarray] = field(init=False, default_factory=dict)
-    lock: threading.Lock = field(init=False, default_factory=threading.Lock)
-
-    def __post_init__(self) -> None:
-        self.control = control_of(self.reduction.planner, self.reduction.jumps)
-        self.ladder = ladder_of(self.reduction)
-        self.kernels = {self.kernel.origin.integrator: self.kernel}
+    engine: Engine
 
     def cancel(self) -> None:
         """End all cells that run in this process."""
-        with self.lock:
-            for control in (self.control, *self.controls.values()):
-                control[Control.CANCEL] = 1.0
+        self.engine.cancel()
 
     def run(self, cells: np.ndarray, start: Start | None = None, near: np.ndarray | None = None) -> Buffers:
         """Run cells of the sweep. Shapes: near (cells,)."""
-        reduction = self.reduction
-        rows = reduction.rows(reduction.planner.rows(cells, near))
+        rows = self.reduction.rows(self.reduction.planner.rows(cells, near))
         if start is not None:
             rows = replace(rows, start=np.where(start[1][:, None], start[0], rows.start))
-        room = first_room(reduction.scene, len(cells) * (reduction.point_size + 1)) if self.room is None else self.room
-        buffers = self._climb(rows, room)
-        short = np.flatnonzero(buffers.point_counts > room)
-        if len(short):
-            buffers.put(short, self._climb(rows.take(short), buffers.most_points))
-        buffers.points = np.ascontiguousarray(buffers.points[:, : buffers.most_points])
-        return buffers
-
-    def _climb(self, rows: CellRows, room: int) -> Buffers:
-        """Run rows with room for so many section points of each, each with the integrators that suit it."""
-        reduction, ladder = self.reduction, self.ladder
-        buffers = reduction.empty(len(rows), room, reduction.observed.tallies)
-        buffers.tolerances[:] = np.stack(ladder.tolerances(rows), axis=1)
-        method = ladder.first(rows)
-        rows = replace(rows, spans=ladder.steps(rows, method))
-        if len(ladder.methods) > 1:
-            buffers.lanes = np.zeros((len(rows), lane_size(reduction.equations)))
-        went = np.zeros(len(rows))  # steps and time at the last pause
-        begun = np.zeros(len(rows))
-        before = np.zeros(len(rows))
-        cells = np.arange(len(rows))
-        while len(cells):
-            earlier = buffers.steps[cells]
-            for k in np.unique(method[cells]):
-                self._drive(int(k), cells[method[cells] == k], rows, buffers)
-            taken = buffers.steps[cells] - earlier
-            buffers.counts[cells, Count.BY_METHOD + ladder.columns[method[cells]]] += taken
-            cells = cells[np.isin(buffers.status[cells], (Status.PAUSED, Status.STEP_UNDERFLOW))]
-            if self.control[Control.CANCEL] != 0.0:
-                buffers.counts[cells, Count.STATUS] = Status.INTERRUPTED
-                break
-            if len(ladder.methods) == 1 or not len(cells):
-                break
-            time, steps = buffers.sums[cells, SumColumn.STOPPED_AT], buffers.steps[cells]
-            lengths = (time - begun[cells]) / np.maximum(steps - went[cells], 1.0)
-            begun[cells], went[cells] = time, steps
-            looked, found = rows.take(cells), buffers.take(cells)
-            following = ladder.further(looked, found, method[cells], lengths)
-            sliding = (following == method[cells]) & ladder.sliding(looked, found, lengths, before[cells])
-            buffers.counts[cells[sliding], Count.STATUS] = Status.STEP_BUDGET
-            following[sliding], before[cells] = -1, lengths
-            cells, lengths, following = (own[following >= 0] for own in (cells, lengths, following))
-            buffers.counts[cells, Count.STATUS] = Status.PAUSED
-            handed = following != method[cells]
-            hand_over(buffers.lanes, cells[handed], lengths[handed], ladder, following[handed])
-            method[cells] = following
-        buffers.sums = reduction.observed.summary(buffers.sums)
-        buffers.lanes = np.empty((0, 0))
-        return buffers
-
-    def _drive(self, method: int, cells: np.ndarray, rows: CellRows, buffers: Buffers) -> None:
-        """Run some cells by one method, those of the same tolerances at once."""
-        kernel = self._kernel(self.ladder.methods[method])
-        pairs, which = np.unique(buffers.tolerances[cells], axis=0, return_inverse=True)
-        for k, (own_rtol, own_atol) in enumerate(pairs):
-            own, control = cells[which.reshape(-1) == k], self._control(float(own_rtol), float(own_atol))
-            if len(own) == len(rows):
-                _drive(kernel, rows, control, buffers)
-            else:
-                part = buffers.take(own)
-                _drive(kernel, rows.take(own), control, part)
-                buffers.put(own, part)
-
-    def _control(self, rtol: float, atol: float) -> np.ndarray:
-        """The control array for some tolerances, which `cancel` reaches."""
-        with self.lock:
-            if (rtol, atol) not in self.controls:
-                control = self.controls[rtol, atol] = self.control.copy()
-                control[Control.RTOL], control[Control.ATOL] = rtol, atol
-            return self.controls[rtol, atol]
-
-    def _kernel(self, method: Integrator) -> Kernel:
-        """The kernel of a method; lanes do not change results, so that all but a single cell take what suits it."""
-        with self.lock:
-            if method.name not in self.kernels:
-                width = 1 if self.spec.width == 1 else None
-                self.kernels[method.name] = load(write_kernel(self.reduction, width, method))
-            return self.kernels[method.name]
+        return self.engine.run(rows)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RowsSpec:
-    """Equations without a sweep, whose cells come as rows; the synchronisation error is the only
-    record.
-    """
+    """Equations without a sweep, whose cells come as rows; the synchronisation error is the only record."""
 
     equations: Equations
     integrator: Integrator | str
-    control: np.ndarray  # (len(Control)
+    control: np.ndarray  # (len(Control),)
     # the record is the synchronisation error, or none if all oscillators are stepped as one; a scene may have a stop
     recording: Recording = SYNC_ERROR
 
@@ -303,7 +176,7 @@ class RowsSpec:
 
 @dataclass(slots=True)
 class RowsJob:
-    """A kernel, ready to run any rows."""
+    """A kernel, ready to run any rows: a job, and an `Engine` of one integrator."""
 
     spec: JobSpec
     kernel: Kernel
@@ -320,36 +193,8 @@ class RowsJob:
             spans = rows.spans.copy()
             spans[:, SpanColumn.FIRST_STEP] = first_steps(Templates(self.kernel.equations), rows)
             rows = replace(rows, spans=spans)
-        _drive(self.kernel, rows, self.control, buffers)
+        run_rows(self.kernel, rows, self.control, buffers)
         return buffers
-
-
-def _drive(kernel: Kernel, rows: CellRows, control: np.ndarray, buffers: Buffers) -> None:
-    """Run all rows into the buffers."""
-    kernel.drive(0, len(rows), rows.start, rows.numbers, rows.spans, control, *buffers.arrays())
-
-
-def lane_size(equations: Equations) -> int:
-    """Return how many numbers the lane of a cell holds: clock, state, parameters, and a saved state with what repeats."""
-    return CLOCK + 2 * equations.dimension + len(equations.parameters) + len(REPEATING)
-
-
-def hand_over(lanes: np.ndarray, cells: np.ndarray, length: np.ndarray, ladder: Ladder, method: np.ndarray) -> None:
-    """Let lanes go on by another method from the state that they have reached.
-
-    The new method begins with the mean length of the last steps, and stops at the ends of all periods unless it is a
-    series.  What the old one found to repeat itself need not repeat itself now.
-    """
-    lane = lanes[cells]
-    time, until = lane[:, TIME], lane[:, UNTIL]
-    first = np.where(length > 0.0, length, FIRST_STEP * np.minimum(1.0, until))
-    lane[:, STEP], lane[:, MEMORY], lane[:, CHANGE] = first, 0.0, np.inf
-    lane[:, CYCLE], lane[:, POWER], lane[:, DUE], lane[:, BOUND] = 0.0, 1.0, 0.0, lane[:, PERIOD]
-    lane[:, SAVED_AT] = -np.inf
-    lane[:, LEFT] = np.where(lane[:, LEFT] > 0.0, -1.0, lane[:, LEFT])
-    lane[:, STOP] = np.minimum(np.where(time < lane[:, START], lane[:, START], lane[:, END]), lane[:, BOUND])
-    lane[:, LOOK] = np.where(method < len(ladder.methods) - 1, LOOKS * (lane[:, ACCEPTED] + lane[:, REJECTED]), np.inf)
-    lanes[cells] = lane
 
 
 @cache
@@ -357,13 +202,3 @@ def versions() -> str:
     """Return the versions that a result depends on."""
     names = ("synchain", "numba", "numpy", "sympy")
     return ", ".join(f"{name} {importlib.metadata.version(name)}" for name in names)
-
-
-def first_room(scene: Scene, row: int) -> int:
-    """Return the section points to make room for at first: two a period, if one more needs `row`
-    numbers.
-    """
-    if "section" not in scene.record and not scene.sections:
-        return 0
-    periods = scene.window if scene.time_unit == "period" else scene.window / math.pi
-    return int(min(2.0 * max(len(scene.sections), 1) * periods, 1e6, LARGEST_ROOM // row)) + 8

@@ -23,10 +23,11 @@ from synchain.codegen.simd.lane_types import native_width
 from synchain.models.dynamics.variational import Variation
 from synchain.models.scenes.scene import Scene
 
+from ..cells.drive_times import by_place, half_swing, periods
 from ..cells.initial_modes import local_clock
-from ..cells.plan import by_place, control_array, first_step, half_swing, periods, tolerances
 from ..cells.stiffness_rates import mode_rates
 from ..engines.choice import chosen_for_modes, warn_of_stiff_modes
+from ..engines.control import control_array, first_step, tolerances
 from ..support.status import Status
 from ..support.threads import worker_count
 from .averages import SLACK, TRIED, error_of_steps

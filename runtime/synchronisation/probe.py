@@ -27,9 +27,10 @@ from synchain.models.interactions.link import strength
 from synchain.models.mechanics.components import Edge
 from synchain.models.scenes.scene import Scene
 
-from ..cells.plan import CellRows, Planner, control_of
+from ..cells.plan import CellRows, Planner
 from ..cells.run_keywords import Given
 from ..engines.choice import chosen_for_rows
+from ..engines.control import control_of
 from ..engines.job import RowsSpec
 from ..results.labelled import Labelled, dataset, scene_text
 from ..stability.transversal_modes import unused_axes

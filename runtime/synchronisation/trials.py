@@ -17,9 +17,10 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
 from ..cells.layout import block_size
-from ..cells.plan import CellRows, control_of
+from ..cells.plan import CellRows
 from ..cells.reduce import ReducedScene
 from ..engines.choice import chosen_for_rows
+from ..engines.control import control_of
 from ..engines.job import JobSpec, RowsSpec
 from ..engines.scene_kernels import write_kernel
 from ..support.execution import Execution

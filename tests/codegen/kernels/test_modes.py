@@ -19,7 +19,7 @@ from synchain.models.graphs.families import topology
 from synchain.models.mechanics.components import Node
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
-from synchain.runtime.cells.plan import control_array
+from synchain.runtime.engines.control import control_array
 from synchain.runtime.stability.variational_integrator import VariationalIntegrator
 
 OMEGA = 1.4

@@ -19,7 +19,8 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.bifurcation.branches import follow
 from synchain.runtime.bifurcation.periodic import periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton
-from synchain.runtime.cells.plan import by_place, half_swing, plan
+from synchain.runtime.cells.drive_times import by_place, half_swing
+from synchain.runtime.cells.plan import plan
 from synchain.runtime.stability.cluster_exponents import cluster_exponents
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum

@@ -22,7 +22,7 @@ from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.cli import main
 from synchain.runtime.commands.run import _nothing_to_do
 from synchain.runtime.console.arguments import spaced
-from synchain.runtime.engines import job
+from synchain.runtime.engines import ladder_engine
 from synchain.runtime.engines.scene_kernels import warn_of_chords, write_kernel
 from synchain.runtime.prediction.synchronisability import Window
 from synchain.runtime.support.error_text import interval_text, with_error
@@ -152,11 +152,11 @@ def test_a_sweep_that_does_not_fit_is_refused_before_memory_is_taken():
 def test_the_room_for_section_points_is_bounded():
     """Two a period, and never more than LARGEST_ROOM numbers for the cells of a block together."""
     short = PAIR.replace(record=("section",), window=100 * np.pi)
-    assert job.first_room(short, 64 * 5) == 200 + 8
-    assert job.first_room(PAIR, 64 * 5) == 0
+    assert ladder_engine.first_room(short, 64 * 5) == 200 + 8
+    assert ladder_engine.first_room(PAIR, 64 * 5) == 0
     long = PAIR.replace(record=("section",), window=1e8)
-    assert 64 * 5 * (job.first_room(long, 64 * 5) - 8) <= job.LARGEST_ROOM
-    assert job.first_room(long, 5) == 1_000_000 + 8
+    assert 64 * 5 * (ladder_engine.first_room(long, 64 * 5) - 8) <= ladder_engine.LARGEST_ROOM
+    assert ladder_engine.first_room(long, 5) == 1_000_000 + 8
 
 
 @pytest.mark.filterwarnings("error")

@@ -13,8 +13,9 @@ import xarray as xr
 from synchain.models import chain
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.cells.plan import plan, tolerances
+from synchain.runtime.cells.plan import plan
 from synchain.runtime.cells.reduce import reduce_scene
+from synchain.runtime.engines.control import tolerances
 from synchain.runtime.engines.scene_kernels import kernel
 from synchain.runtime.opening.open import open_result
 from synchain.runtime.support.execution import Execution

@@ -1,0 +1,84 @@
+"""How steps are controlled: tolerances, first steps, and the array that hands them to a kernel."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from synchain.codegen.driver.columns import Control
+from synchain.models.dynamics.equations import Equations
+from synchain.models.inputs.names import NodeName
+from synchain.models.scenes.scene import Scene
+
+from ..cells.plan import FIRST_STEP, Planner
+
+GROWN = 0.1
+"""Longest first step of a Rosenbrock method, in times in which the fastest growth is by a factor e: a choice."""
+
+DIRECTIONS = {"falling": -1.0, "rising": 1.0, "both": 0.0}
+"""The numbers of a kernel for the directions of a section."""
+
+
+def control_array(
+    rtol: float, atol: float, max_step: float, max_steps: float, direction: float = 0.0, jumps: bool = True
+) -> np.ndarray:
+    """Return the array (Control.FURTHER,) of a kernel's limits; without `jumps` no cell skips whole cycles."""
+    control = np.zeros(Control.FURTHER)
+    control[Control.RTOL], control[Control.ATOL] = rtol, atol
+    control[Control.FIRST_STEP], control[Control.MAX_STEP] = FIRST_STEP, max_step
+    control[Control.MAX_STEPS], control[Control.DIRECTION] = max_steps, direction
+    control[Control.NO_JUMPS] = float(not jumps)
+    return control
+
+
+def control_of(planner: Planner, jumps: bool) -> np.ndarray:
+    """Return the control array of a scene's sweep, with the tolerances of its strictest cell and a direction per section."""
+    scene = planner.scene
+    rtol, atol = (float(column.min()) for column in tolerances(scene, scene.equations, planner.extremes().numbers))
+    directions = [DIRECTIONS[section.direction] for section in scene.sections.values() or (scene.section,)]
+    control = control_array(rtol, atol, math.inf, scene.max_steps, directions[0], jumps)
+    return np.concatenate([control, directions[1:]])
+
+
+def first_step(growth: float) -> float:
+    """Return the length of the first step of a Rosenbrock method, by how fast motions grow where it begins.
+
+    A step much longer than the time of growth damps fast growth as it does fast decay, and the estimate of the error with
+    it: the motion would stay at an equilibrium that repels.  Steps that lengthen with the solution resolve the growth.
+    """
+    return min(FIRST_STEP, GROWN / max(growth, GROWN))
+
+
+def tolerances(scene: Scene, equations: Equations, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return (rtol, atol), each (cells,), of the integration; `numbers` (cells, parameters) are those of the equations.
+
+    A smoothed jump of friction is 1/kappa wide in velocity; with steps that do not resolve this width oscillators slip
+    through it.  With contact "atan" rtol is therefore at most 1/kappa and atol at most 0.1/kappa (not below 1e-13), for
+    the largest kappa of the nodes.
+    """
+    rtol, atol = np.full(len(numbers), scene.rtol), np.full(len(numbers), scene.atol)
+    names = _names_of(scene, "kappa")
+    columns = [k for k, name in enumerate(equations.parameters) if name in names]
+    if scene.contact == "atan" and columns and len(numbers):
+        width = 1.0 / np.maximum(numbers[:, columns].max(axis=1), 1e-300)
+        rtol, atol = np.minimum(rtol, np.maximum(width, 1e-13)), np.minimum(atol, np.maximum(0.1 * width, 1e-13))
+    return rtol, atol
+
+
+def _names_of(scene: Scene, name: str) -> set[str]:
+    """Return the names of a parameter in a scene: one, a_1 … a_n if nodes differ, k_1_2 … if links do."""
+    if name not in scene.varied:
+        return {name}
+    links = scene.model.link_names(name)
+    return {*map(str, links.values())} or {str(NodeName(name, i)) for i in scene.model.holders(name)}
+
+
+def scale_of_atol(size: np.ndarray) -> np.ndarray:
+    """Return the factor of a default atol, a tenth of rtol, for motions of some sizes: a power of ten, at most 1.
+
+    Below size 0.1 atol is between a tenth of rtol times the size and all of it, in decades that end at 0.1, 0.01 and so on.
+    Motions above keep the atol of size 1: for a motion of size 1e9 it is next to nothing beside rtol times the size, so
+    that steps are as exact as rtol demands and only a little shorter.  A size of 0 is unknown.
+    """
+    return np.asarray(10.0 ** np.floor(np.log10(np.where((size > 0.0) & (size < 0.1), 10.0 * size, 1.0))))
