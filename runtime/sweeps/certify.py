@@ -32,9 +32,9 @@ from ..stability.exponents import along, coupled_cell
 from ..stability.orbits import Orbits, unit_of_time, within
 from ..stability.transversal_modes import shared_orbits, transversal_modes
 from ..support.execution import Execution
-from .errors import SweepFailed, SweepInterrupted
+from .errors import sweep_errors
 from .memory import Memory
-from .pool import Task, worker_lost
+from .pool import Task
 from .prepare import PreparedRun
 from .scheduler import BlockScheduler
 
@@ -53,7 +53,7 @@ ALIKE, CLOSE = 0.25, 1e-3
 
 @dataclass(slots=True)
 class _Ends:
-    """Keeps where the cells of a sweep end, of what is left of the network and of all of it."""
+    """Store where the cells of a sweep end: states of the reduced network (`left`) and of the whole one."""
 
     layout: Layout
     reduction: ReducedScene
@@ -62,16 +62,16 @@ class _Ends:
     finished: np.ndarray
 
     def missing(self, block: int) -> np.ndarray:
-        """Numbers of all cells of a block."""
+        """Return the numbers of all cells of a block."""
         return self.layout.rows(block)
 
     def ends(self, block: int) -> Start:
-        """The final states of a block, and which of its cells finished."""
+        """Return the final states of a block, and which of its cells finished."""
         rows = self.layout.rows(block)
         return self.left[rows], self.finished[rows]
 
     def put(self, task: Task, buffers: Buffers) -> None:
-        """Keep the ends of a block."""
+        """Store the ends of a block."""
         self.left[task.cells], self.finished[task.cells] = buffers.end, buffers.finished
         self.whole[task.cells] = self.reduction.expand(buffers).end
 
@@ -86,17 +86,10 @@ def certified(prepared: PreparedRun) -> PreparedRun:
     quiet = replace(prepared.execution, show_progress=False, progress=None)
     reporter = quiet.reporter(scene.cells)
     workers = quiet.workers if quiet.executor is None else None
-    try:
+    with sweep_errors(scene.cells, lambda: (0, Memory.of(prepared, None).result())):
         BlockScheduler(layout, np.zeros(layout.blocks, dtype=bool), ends, prepared, reporter).run()
         states = np.where(finished[:, None], ends.whole, Planner(scene).rows(np.arange(scene.cells)).start)
         return replace(prepared, certificate=certify(scene, states, workers=workers))
-    except (Exception, KeyboardInterrupt) as problem:
-        if isinstance(problem, KeyboardInterrupt):
-            raise SweepInterrupted(0, scene.cells, Memory.of(prepared, None).result()) from None
-        if not worker_lost(problem):
-            raise
-        nothing = Memory.of(prepared, None).result()
-        raise SweepFailed(f"the workers are lost ({problem})", 0, scene.cells, nothing) from problem
 
 
 def certify(

@@ -23,17 +23,17 @@ Start: TypeAlias = Result | xr.DataArray | Mapping[str, object] | Sequence[float
 """What a run may start from."""
 
 START_TIME = "start_time"
-"""What a result calls the time of the earlier run at which it started."""
+"""The name in results of the time of the earlier run at which they started."""
 
 WHOLE = 1e-9
-"""Largest distance of a time from a whole number of drive periods, in periods."""
+"""Largest distance of a time from a whole number of drive periods, in periods: a choice far above rounding."""
 
 CELLS = 65536
-"""Cells of a continued sweep that are looked at together."""
+"""Cells of a continued sweep whose periods are computed together, which bounds the memory."""
 
 
 def started(scene: Scene, start: Start) -> tuple[Scene, float]:
-    """Return the scene with the states of one cell as its start, and when they were reached."""
+    """Return the scene with the states of one cell as its start, and the time at which they were reached."""
     if isinstance(start, Mapping):
         return scene.replace(initial=start), 0.0
     if isinstance(start, list | tuple | np.ndarray):
@@ -76,14 +76,18 @@ def starts_of_cells(scene: Scene, start: Result | xr.DataArray) -> tuple[np.ndar
             f"start: found the states of several cells; expected those of one, as continuation = {str(scene.continuation)!r} "
             "starts cells from others; set continuation = 'none'"
         )
-    # Coordinates along the axes, of draws too, say which cell is which.
-    own = xr.Dataset(coords=coordinates(scene)).coords
+    # Coordinates along the axes and draws identify the cells.
+    expected = xr.Dataset(coords=coordinates(scene)).coords
     for name, values in end.coords.items():
         along = set(values.dims) & set(dims)
-        if along and name in own and not (values.dims == own[name].dims and np.array_equal(values, own[name])):
+        if (
+            along
+            and name in expected
+            and not (values.dims == expected[name].dims and np.array_equal(values, expected[name]))
+        ):
             raise ValueError(
                 f"start: found cells of {name} = {_listed(values.values.ravel().tolist())}; expected those of the sweep, "
-                f"{_listed(own[name].values.ravel().tolist())}; choose one cell, e.g. result.end.isel({next(iter(along))}=-1)"
+                f"{_listed(expected[name].values.ravel().tolist())}; choose one cell, e.g. result.end.isel({next(iter(along))}=-1)"
             )
     for name in set(end.dims) & set(dims):
         size = scene.shape[dims.index(name)]
@@ -94,14 +98,21 @@ def starts_of_cells(scene: Scene, start: Result | xr.DataArray) -> tuple[np.ndar
     table = _along(end.sel(labels), dims, STATE)
     starts = States.of(scene).flat(np.broadcast_to(table, (*scene.shape, *table.shape[-2:]))).reshape(scene.cells, -1)
     modes = [k for k, name in enumerate(scene.equations.state) if name.rpartition("_")[0] == SLIP.name]
-    starts[:, modes] = np.array(scene.y0)[modes]  # they follow from the other states
+    starts[:, modes] = np.array(scene.y0)[modes]  # slip modes follow from the other states
     _expect_finite(np.delete(starts, modes, axis=1))
     time = end.coords.get(END_TIME, xr.zeros_like(end.isel({name: 0 for name in STATE}, drop=True)))
     return starts, np.broadcast_to(_along(time, dims), scene.shape).astype(float)
 
 
+def with_start_times(result: Result, times: float | np.ndarray) -> Result:
+    """Return a result with the time of the earlier run at which it started, as an attribute, or as a coordinate (axes)."""
+    if isinstance(times, float):
+        return Result(result.data.assign_attrs({START_TIME: times}), result.scene)
+    return Result(result.data.assign_coords({START_TIME: (dimensions(result.scene), times)}), result.scene)
+
+
 def _end(start: Start) -> object:
-    """The final states of a result, of which all cells finished; any other start as it is."""
+    """Return the final states of a result, of which all cells finished; any other start unchanged."""
     if not isinstance(start, Result):
         return start
     if not start.success:
@@ -110,7 +121,7 @@ def _end(start: Start) -> object:
 
 
 def _along(values: xr.DataArray, dims: tuple[str, ...], more: tuple[str, ...] = ()) -> np.ndarray:
-    """Values along the dimensions of a sweep, of length 1 where they lack one, then along others."""
+    """Return values along the dimensions of a sweep, of length 1 where they lack one, then along others."""
     missing = [name for name in dims if name not in values.dims]
     return values.expand_dims(missing).transpose(*dims, *more).values
 
@@ -121,7 +132,7 @@ def _expect_finite(states: np.ndarray) -> None:
 
 
 def expect_whole_periods(planner: Planner) -> None:
-    """Refuse a continued sweep in which the drive is amid a period at the end of a cell, as each cell begins with one."""
+    """Refuse a continued sweep in which a cell ends amid a period of the drive: the next cell begins with a new period."""
     scene = planner.scene
     if not (scene.continued and scene.forced) or scene.time_unit == "period":
         return
@@ -142,7 +153,7 @@ def expect_whole_periods(planner: Planner) -> None:
 
 
 def _in_order(scene: Scene, start: Sequence[float] | np.ndarray) -> xr.DataArray:
-    """States in the order of the equations with their labels."""
+    """Label states in the order of the equations."""
     values, names = row("start", start), scene.equations.state
     if len(values) != len(names):
         raise ValueError(f"start: found {len(values)} numbers; expected {len(names)}, of {_listed(names)}")
@@ -162,10 +173,10 @@ def _check_labels(scene: Scene, end: xr.DataArray) -> None:
         )
     expected = {"component": tuple(scene.equations.components), "node": tuple(scene.topology.labels)}
     for name, labels in expected.items():
-        found = tuple(end.coords[name].values.tolist()) if name in end.dims and name in end.coords else ()
-        if set(found) != set(labels) or len(found) != len(labels):
+        present = tuple(end.coords[name].values.tolist()) if name in end.dims and name in end.coords else ()
+        if set(present) != set(labels) or len(present) != len(labels):
             raise ValueError(
-                f"start: found the {name}s {_listed(found)}; expected {_listed(labels)}, those of the scene"
+                f"start: found the {name}s {_listed(present)}; expected {_listed(labels)}, those of the scene"
             )
 
 
@@ -184,5 +195,5 @@ def _check_phases(scene: Scene, end: xr.DataArray) -> None:
 
 
 def _listed(labels: Sequence[object]) -> str:
-    words = [str(label) for label in labels[:8]]
-    return ", ".join([*words, *(["…"] if len(labels) > len(words) else [])]) or "none"
+    texts = [str(label) for label in labels[:8]]
+    return ", ".join([*texts, *(["…"] if len(labels) > len(texts) else [])]) or "none"

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, CancelledError
+from contextlib import contextmanager
+
 from ..results.result import Result
+
+ELSEWHERE = ("distributed", "dask", "tornado", "mpi4py")
+"""Packages whose errors mean that workers, or the connection to them, are lost."""
 
 
 class SweepInterrupted(KeyboardInterrupt):
-    """Ctrl-C during a sweep; `finished` of `cells` had finished, `result` holds them if no file
-    does.
-    """
+    """Ctrl-C during a sweep; `finished` of `cells` had finished, `result` holds them if no file does."""
 
     def __init__(self, finished: int, cells: int, result: Result | None = None) -> None:
         super().__init__(f"interrupted with {finished} of {cells} cells finished")
@@ -23,10 +28,38 @@ class SweepInterrupted(KeyboardInterrupt):
 
 
 class SweepFailed(RuntimeError):
-    """A worker or the disk has failed; `finished` of `cells` had finished, `result` holds them if
-    no file does.
-    """
+    """A worker or the disk has failed; `finished` of `cells` had finished, `result` holds them if no file does."""
 
     def __init__(self, reason: str, finished: int, cells: int, result: Result | None = None) -> None:
         super().__init__(f"{reason}; {finished} of {cells} cells had finished")
         self.reason, self.finished, self.cells, self.result = reason, finished, cells, result
+
+
+def worker_lost(problem: BaseException) -> bool:
+    """Return whether an error means that a worker, or the connection to it, is lost."""
+    return isinstance(problem, BrokenExecutor | CancelledError) or type(problem).__module__.split(".")[0] in ELSEWHERE
+
+
+def reason_of(problem: Exception) -> str | None:
+    """Return why workers are lost; None for any other error."""
+    return f"the workers are lost ({problem})" if worker_lost(problem) else None
+
+
+@contextmanager
+def sweep_errors(
+    cells: int,
+    finished: Callable[[], tuple[int, Result | None]],
+    reason: Callable[[Exception], str | None] = reason_of,
+) -> Iterator[None]:
+    """Turn Ctrl-C into SweepInterrupted, and errors that have a reason into SweepFailed, with the cells that finished."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        count, result = finished()
+        raise SweepInterrupted(count, cells, result) from None
+    except Exception as problem:
+        text = reason(problem)
+        if text is None:
+            raise
+        count, result = finished()
+        raise SweepFailed(text, count, cells, result) from problem

@@ -11,12 +11,13 @@ from ..cells.layout import Layout
 from ..cells.observable_arrays import Sections
 from ..engines.choice import warn_of_steps
 from ..engines.job import Start
+from ..engines.scene_kernels import ladder_of
 from ..results.labels import START_STATE
 from ..results.result import Result, gather
 from ..support.progress import Reporter
 from ..support.status import tally
-from .errors import SweepFailed, SweepInterrupted
-from .pool import Task, worker_lost
+from .errors import sweep_errors
+from .pool import Task
 from .prepare import PreparedRun
 from .scheduler import BlockScheduler
 
@@ -34,20 +35,23 @@ class Memory:
         """Return arrays for all cells, with those of an earlier result that finished."""
         reduction = prepared.reduction
         cells = reduction.scene.cells
-        if earlier is not None:
-            _expect_starts(earlier, reduction.planner.starts)
         if earlier is None:
             return cls(prepared, prepared.layout(), reduction.empty(cells, 0))
+        begun, starts = None, reduction.planner.starts
+        if START_STATE in earlier.data:
+            begun = earlier.states(START_STATE).reshape(earlier.scene.cells, -1)
+        if not (begun is starts if begun is None or starts is None else np.array_equal(begun, starts)):
+            raise ValueError(
+                "the result to resume started from other states; give the start of that run, or run without resume"
+            )
         dimension = len(reduction.scene.y0)
-        kept = Sections(reduction.scene).width(dimension)
-        whole = Buffers.empty(cells, dimension, 0, reduction.samples, reduction.observed.numbers, kept)
-        earlier.restore(reduction.scene, whole, reduction.equations)
-        return cls(prepared, prepared.layout(), reduction.merge.contract(whole))
+        point_size = Sections(reduction.scene).width(dimension)
+        network = Buffers.empty(cells, dimension, 0, reduction.samples, reduction.observed.numbers, point_size)
+        earlier.restore(reduction.scene, network, reduction.equations)
+        return cls(prepared, prepared.layout(), reduction.merge.contract(network))
 
     def done(self) -> np.ndarray:
-        """True for each block (blocks,) that has finished, with those that it needed; in a
-        continued sweep clears others.
-        """
+        """Return True for each block (blocks,) that has finished with those before it; clear the others of a continued sweep."""
         finished = self.buffers.finished
         done = np.zeros(self.layout.blocks, dtype=bool)
         for block in range(self.layout.blocks):
@@ -58,12 +62,12 @@ class Memory:
         return done
 
     def missing(self, block: int) -> np.ndarray:
-        """Numbers of the cells of a block that have not finished."""
+        """Return the numbers of the cells of a block that have not finished."""
         rows = self.layout.rows(block)
         return np.asarray(rows[~self.buffers.finished[rows]])
 
     def ends(self, block: int) -> Start:
-        """The final states of a block, and which of its cells finished."""
+        """Return the final states of a block, and which of its cells finished."""
         rows = self.layout.rows(block)
         return self.buffers.end[rows], self.buffers.finished[rows]
 
@@ -74,27 +78,17 @@ class Memory:
     def run(self, reporter: Reporter) -> None:
         """Run the blocks that have not finished."""
         scheduler = BlockScheduler(self.layout, self.done(), self, self.prepared, reporter)
+        reduction = self.prepared.reduction
         try:
-            reporter.start(tally(self.buffers.status[self.buffers.finished]), self.prepared.compiling)
-            scheduler.run()
-            self.warn()
-        except (Exception, KeyboardInterrupt) as problem:
-            if not (isinstance(problem, KeyboardInterrupt) or worker_lost(problem)):
-                raise
-            count, result = int(self.buffers.finished.sum()), self.result()
-            if isinstance(problem, KeyboardInterrupt):
-                raise SweepInterrupted(count, result.scene.cells, result) from None
-            reason = f"the workers are lost ({problem})"
-            raise SweepFailed(reason, count, result.scene.cells, result) from problem
+            with sweep_errors(reduction.scene.cells, lambda: (int(self.buffers.finished.sum()), self.result())):
+                reporter.start(tally(self.buffers.status[self.buffers.finished]), self.prepared.compiling)
+                scheduler.run()
+                # Rows are not kept; those of cells with short steps are laid out again.
+                warn_of_steps(
+                    ladder_of(reduction), self.buffers, lambda cells: reduction.rows(reduction.planner.rows(cells))
+                )
         finally:
             reporter.close()
-
-    def warn(self) -> None:
-        """Warn of cells that came to no end, and of steps that were short."""
-        reduction = self.prepared.reduction
-        warn_of_steps(
-            self.prepared.job.ladder, self.buffers, lambda cells: reduction.rows(reduction.planner.rows(cells))
-        )
 
     def result(self) -> Result:
         """Return the cells so far."""
@@ -107,14 +101,4 @@ class Memory:
             prepared.reduction.expand(self.buffers),
             prepared.certificate,
             prepared.reduction.planner.starts,
-        )
-
-
-def _expect_starts(earlier: Result, starts: np.ndarray | None) -> None:
-    """Raise ValueError if an earlier result started from other states than those of all cells, None for the scene's."""
-    begun = earlier.states(START_STATE).reshape(earlier.scene.cells, -1) if START_STATE in earlier.data else None
-    alike = begun is starts if begun is None or starts is None else np.array_equal(begun, starts)
-    if not alike:
-        raise ValueError(
-            "the result to resume started from other states; give the start of that run, or run without resume"
         )

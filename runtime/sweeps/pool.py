@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import BrokenExecutor, CancelledError, Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
@@ -17,10 +17,7 @@ from ..support.execution import Execution
 from .worker import forget, run_block
 
 LOOK = 0.2
-"""Seconds after which a wait for a block looks whether Ctrl-C was pressed."""
-
-ELSEWHERE = ("distributed", "dask", "tornado", "mpi4py")
-"""Packages whose errors say that workers or the way to them are gone."""
+"""Seconds between two checks for Ctrl-C while waiting for a block: a choice below what a user notices."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,21 +30,21 @@ class Task:
 
 
 Running = Future[Buffers | None]
-"""A task that is with a worker; None is the answer of one that does not know the job yet."""
+"""A task that was sent to a worker; its result is None if the worker has no job of that key yet."""
 
 Finish = Callable[[Task, Buffers], Task | None]
-"""Takes the results of a task; returns the task that has waited for it, if there is one."""
+"""Store the results of a task; return the task that waited for it, or None."""
 
 
 class WorkerPool:
-    """Workers and the job that they work on; `limit` tasks are with them at a time, two for each."""
+    """Workers and their job; at most `limit` tasks, two for each worker, are sent at a time."""
 
     def __init__(self, job: Job, execution: Execution) -> None:
         self.job = job
         self.limit = 2 * execution.size
         self.owned = execution.executor is None
         self.executor = ThreadPoolExecutor(execution.size) if execution.executor is None else execution.executor
-        # interpreters of one process are a kind of threads to the library, but share nothing
+        # InterpreterPoolExecutor inherits ThreadPoolExecutor, but its interpreters share no memory.
         kinds = {kind.__name__ for kind in type(self.executor).__mro__}
         self.shared = "ThreadPoolExecutor" in kinds and "InterpreterPoolExecutor" not in kinds
         self.key = uuid.uuid4().hex
@@ -61,10 +58,9 @@ class WorkerPool:
         self.close()
 
     def run(self, tasks: Iterator[Task], finish: Finish) -> None:
-        """Run the tasks and those that `finish` adds.
+        """Run the tasks and those that `finish` adds; raise the error of a worker.
 
-        On Ctrl-C the blocks in flight are finished first if that is possible; a second Ctrl-C
-        leaves them.  Raises what a worker raised.
+        On Ctrl-C finish the blocks in flight first if that is possible; a second Ctrl-C abandons them.
         """
         arrived: SimpleQueue[Running] = SimpleQueue()
         flying: dict[Running, Task] = {}
@@ -77,7 +73,11 @@ class WorkerPool:
         try:
             self._fill(flying, tasks, send)
             while flying:
-                future = _next(arrived)
+                # A wait without a timeout would block Ctrl-C on some systems.
+                try:
+                    future = arrived.get(timeout=LOOK)
+                except Empty:
+                    continue
                 buffers = future.result()
                 task = flying.pop(future)
                 following = None if buffers is None else finish(task, buffers)
@@ -88,15 +88,20 @@ class WorkerPool:
                 self._fill(flying, tasks, send)
         except BaseException as problem:
             self.cancel()
-            waited = [future for future in flying if not future.cancel()]
-            if isinstance(problem, KeyboardInterrupt) and not worker_lost(problem):
-                _drain(waited, flying, finish)
+            running = [future for future in flying if not future.cancel()]
+            if isinstance(problem, KeyboardInterrupt):
+                # Keep the blocks that were running and still succeed.
+                for future in running:
+                    while not future.done():
+                        with suppress(TimeoutError):
+                            future.exception(timeout=LOOK)
+                    succeeded = not future.cancelled() and future.exception() is None
+                    if succeeded and (buffers := future.result()) is not None:
+                        finish(flying[future], buffers)
             raise
 
     def submit(self, task: Task, introduce: bool = False) -> Running:
-        """Give a task to a worker; the first ones, and with `introduce`, come with the
-        specification of the job.
-        """
+        """Send a task to a worker; the first ones, and with `introduce`, with the specification of the job."""
         if self.shared:
             return self.executor.submit(self.job.run, *task.arguments)
         introduce = introduce or self.sent < self.limit
@@ -121,26 +126,3 @@ class WorkerPool:
             if task is None:
                 return
             send(task)
-
-
-def _next(arrived: SimpleQueue[Running]) -> Running:
-    """The next future that is done."""
-    while True:
-        with suppress(Empty):
-            return arrived.get(timeout=LOOK)
-
-
-def _drain(waited: list[Running], flying: dict[Running, Task], finish: Finish) -> None:
-    """Wait for the blocks that are being run and keep those that succeed."""
-    for future in waited:
-        while not future.done():
-            with suppress(TimeoutError):
-                future.exception(timeout=LOOK)
-        done = not future.cancelled() and future.exception() is None
-        if done and (buffers := future.result()) is not None:
-            finish(flying[future], buffers)
-
-
-def worker_lost(problem: BaseException) -> bool:
-    """True if an error says that a worker, or the way to it, is gone."""
-    return isinstance(problem, BrokenExecutor | CancelledError) or type(problem).__module__.split(".")[0] in ELSEWHERE

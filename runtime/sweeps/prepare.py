@@ -1,6 +1,4 @@
-"""From what is left of a scene to a job that can run: the text of its kernel, the exponents of its
-cells, machine code.
-"""
+"""From a reduced scene to a job that can run: write the text of its kernel, compile it or load it."""
 
 from __future__ import annotations
 
@@ -22,7 +20,7 @@ from .continued_start import expect_whole_periods
 
 @dataclass(frozen=True, slots=True)
 class PreparedRun:
-    """A sweep that is ready to run."""
+    """A sweep with compiled kernel, ready to run."""
 
     job: SweepJob
     certificate: Certificate | None  # the exponents of all cells, if the run is certified
@@ -31,7 +29,7 @@ class PreparedRun:
 
     @property
     def reduction(self) -> ReducedScene:
-        """What is left of the scene to integrate."""
+        """The reduced scene, which is integrated."""
         return self.job.reduction
 
     @property
@@ -41,7 +39,7 @@ class PreparedRun:
 
     @property
     def attributes(self) -> dict[str, object]:
-        """How the result came about."""
+        """The provenance of the result."""
         job, spec = self.job, self.job.spec
         return provenance(self.scene, job.kernel, self.reduction.skipped, spec.versions, spec.processor)
 

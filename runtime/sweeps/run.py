@@ -1,4 +1,20 @@
-"""Runs a scene in memory: scene, reduction, kernel, blocks, result."""
+"""Run a scene in memory.
+
+The stages of `run`; the output of each is the input of the next.
+
+1. *Scene*: ``Given.sweep`` (cells/run_keywords), Scene → Scene.  Fix or sweep parameters and initial states, add draws, take the
+   states of an earlier run as the start.
+2. *Reduction*: ``as_reduction`` (cells/reduce), Scene → ReducedScene.  Leave out terms that vanish in every cell and merge
+   oscillators that move as one, exactly.  Its planner lays out cells as rows of numbers.
+3. *Kernel*: ``prepare`` (sweeps/prepare), ReducedScene → PreparedRun.  Choose the integrator by the rates of some cells
+   (engines/choice), write the text of the kernel (codegen/kernels), compile it or load it (codegen/machine_code).
+4. *Certificate*, if asked for: ``certified`` (sweeps/certify), PreparedRun → PreparedRun with transversal exponents.
+5. *Blocks*: ``Memory.run`` (sweeps/memory), PreparedRun → Buffers.  The scheduler gives blocks of cells to workers; the planner
+   makes rows of each block, and an `Engine` (engines/engine) integrates the rows into buffers.
+6. *Result*: ``Memory.result``, Buffers → Result.  Expand to the whole network and label (results/labels).
+
+`stream` has the same stages, with a file in place of the memory.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +28,11 @@ from synchain.models.scenes.scene import Scene, check_scene
 
 from ..cells.reduce import ReducedScene, as_reduction
 from ..cells.run_keywords import Given
-from ..results.labels import dimensions
 from ..results.result import Result
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .certify import certified as with_certificate
-from .continued_start import START_TIME, Start, several, started, starts_of_cells
+from .continued_start import Start, several, started, starts_of_cells, with_start_times
 from .memory import Memory
 from .prepare import prepare
 
@@ -54,12 +69,12 @@ def run(
         the same values of the axes; an axis that the result lacks starts all its values from one
         cell.  Components and nodes must be those of the scene.  Time counts from 0 again, so the
         drive must have been at the beginning of a period; the attribute `start_time` of the data,
-        a coordinate if there were several cells, says which time of the earlier run that was.
+        a coordinate if there were several cells, is that time of the earlier run.
     width : int, optional
         Number of lanes: 1, 2, 4, 8 or 16 (default: what the processor has, one for a single cell).
     reduce : bool or Reduction
         Whether to leave out, exactly, what the scene does not need (docs/skips.md).  False
-        integrates it as it stands; a Reduction of this scene is taken as it is.
+        integrates all of it; a Reduction of this scene is used unchanged.
     certified : bool
         Add the transversal exponent of every cell and a verdict on its synchronisation, and end
         cells early that are certain to stay synchronous (see `synchain.runtime.sweeps.certify`).
@@ -96,29 +111,31 @@ def run(
     SweepFailed
         If the workers are lost; its `result` has the cells that had finished.
     """
-    begun: float | np.ndarray | None = None
+    # 1. Scene: one state to start from is the start of the scene, which axes of initial states then replace.
+    start_times: float | np.ndarray | None = None
     starts = None
     if start is not None and not several(start):
-        scene, begun = started(check_scene(scene), start)
+        scene, start_times = started(check_scene(scene), start)
     scene = Given(run, parameters, axes).sweep(scene, realisations=realisations, draws=draws, rng=rng)
     if start is not None and several(start):
-        starts, begun = starts_of_cells(scene, start)
+        starts, start_times = starts_of_cells(scene, start)
         if check_flag("certified", certified):
             raise ValueError("certified: found a start of several cells; expected that of one; leave one of them out")
     if resume is not None:
         check_instance("resume", resume, Result, "an earlier Result, e.g. from open_result")
     execution = Execution(workers, executor, show_progress, progress)
     reporter = execution.reporter(scene.cells)
+    # 2. Reduction
     reduction = as_reduction(scene, reduce, starts)
     reduction.check_memory()
+    # 3. Kernel
     prepared = prepare(reduction, execution, width=width)
+    # 4. Certificate
     if check_flag("certified", certified):
         prepared = with_certificate(prepared)
+    # 5. Blocks
     memory = Memory.of(prepared, resume)
     memory.run(reporter)
+    # 6. Result
     result = memory.result()
-    if begun is None:
-        return result
-    if starts is None:
-        return Result(result.data.assign_attrs({START_TIME: begun}), result.scene)
-    return Result(result.data.assign_coords({START_TIME: (dimensions(result.scene), begun)}), result.scene)
+    return result if start_times is None else with_start_times(result, start_times)

@@ -1,6 +1,4 @@
-"""Schedules the blocks of a sweep that are not finished: which can run, and where they go when they
-have ended.
-"""
+"""Schedule the unfinished blocks of a sweep: which can run, and where they go when they have ended."""
 
 from __future__ import annotations
 
@@ -20,24 +18,21 @@ from .prepare import PreparedRun
 
 
 class Sink(Protocol):
-    """Keeps blocks that have ended."""
+    """Store blocks that have ended: in memory, on disk, or their ends alone."""
 
     def missing(self, block: int) -> np.ndarray:
-        """Numbers of the cells of a block that are still to run."""
+        """Return the numbers of the cells of a block that are still to run."""
 
     def ends(self, block: int) -> Start:
-        """The final states of a block that the sink has, and which of its cells finished."""
+        """Return the final states of a stored block, and which of its cells finished."""
 
     def put(self, task: Task, buffers: Buffers) -> None:
-        """Keep the cells of a block; cells that Ctrl-C cut short may be among them."""
+        """Store the cells of a block; cells that Ctrl-C cut short may be among them."""
 
 
 @dataclass(slots=True)
 class BlockScheduler:
-    """Schedules the unfinished blocks of a sweep, stores results in `sink` and reports progress.
-
-    done (blocks,): which blocks the sink has.
-    """
+    """Schedule the blocks that are not `done` (blocks,), store them in `sink` and report progress."""
 
     layout: Layout
     done: np.ndarray
@@ -46,24 +41,22 @@ class BlockScheduler:
     reporter: Reporter
 
     def run(self) -> None:
-        """Run all blocks that the sink does not have; raises what a worker raises, and
-        KeyboardInterrupt on Ctrl-C.
-        """
+        """Run all blocks that the sink lacks; raise the errors of workers, and KeyboardInterrupt on Ctrl-C."""
         if self.done.all():
             return
         with WorkerPool(self.prepared.job, self.prepared.execution) as pool:
             pool.run(self.tasks(), self.finish)
 
     def tasks(self) -> Iterator[Task]:
-        """Yield the blocks that can run at once: unfinished, and in no need of an unfinished one."""
-        done = self.done.copy()  # a block that finishes meanwhile brings the one that needs it along
+        """Yield the unfinished blocks that depend on no unfinished one."""
+        done = self.done.copy()  # `finish` returns the block that depends on one that finishes meanwhile
         for block in np.flatnonzero(~done).tolist():
             needed = self.layout.before(block)
             if needed is None or done[needed]:
                 yield self._task(block, None if needed is None else self.sink.ends(needed))
 
     def finish(self, task: Task, buffers: Buffers) -> Task | None:
-        """Keep a block; returns the one that has waited for it, if there is one."""
+        """Store a block; return the one that depends on it, or None."""
         self.sink.put(task, buffers)
         if not buffers.ended:
             return None
@@ -75,6 +68,6 @@ class BlockScheduler:
         return self._task(following, (buffers.end, buffers.finished))
 
     def _task(self, block: int, start: Start | None) -> Task:
-        """The task of a block that starts from these states."""
+        """Return the task of a block that starts from these states."""
         cells, certificate = self.sink.missing(block), self.prepared.certificate
         return Task(block, cells, (cells, start, None if certificate is None else certificate.near[cells]))

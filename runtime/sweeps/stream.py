@@ -1,5 +1,6 @@
-"""Runs a scene to a file: blocks go to disk as they end, so a crash loses at most the blocks being
-computed.
+"""Run a scene to a file: blocks go to disk as they end, so that a crash loses at most the blocks being computed.
+
+The stages are those of `run.py`; `claim` decides before them whether a file is begun, continued or complete.
 """
 
 from __future__ import annotations
@@ -35,17 +36,15 @@ from ..support.files import drop_leftovers, understood
 from ..support.progress import Hook, Progress, Reporter
 from ..support.status import Status, tally
 from .certify import certified as with_certificate
-from .errors import SweepFailed, SweepInterrupted
-from .pool import Task, worker_lost
+from .errors import SweepFailed, reason_of, sweep_errors, worker_lost
+from .pool import Task
 from .prepare import PreparedRun, prepare
 from .scheduler import BlockScheduler
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Streamed(Labelled):
-    """A finished run: its file, how its cells ended, and how many have each verdict (certified runs
-    only).
-    """
+    """A finished run: its file, how its cells ended, and how many have each verdict (certified runs only)."""
 
     path: Path
     scene: Scene
@@ -191,9 +190,7 @@ def claim(
     overwrite: bool = False,
     certified: bool = False,
 ) -> str:
-    """Return what can be done about a result at `path`: "begin", "continue", or nothing because it
-    is "complete".
-    """
+    """Return what to do about a result at `path`: "begin", "continue", or nothing because it is "complete"."""
     for name, value in (("resume", resume), ("overwrite", overwrite), ("certified", certified)):
         check_flag(name, value)
     target = check_path("path", path)
@@ -230,9 +227,7 @@ def claim(
 def _check_same(
     reduction: ReducedScene, certified: bool, path: Path, attributes: Mapping[str, object], exponents: bool
 ) -> None:
-    """Raise ValueError if a file, with its attributes and with or without exponents, is not that of
-    this run.
-    """
+    """Raise ValueError if a file with these attributes, with or without exponents, belongs to another run."""
     again = "repeat the options of that run, choose another path (--out), or replace it with overwrite (--overwrite)"
     if not alike(scene_of(attributes), reduction.scene):
         raise ValueError(f"{path} belongs to another scene ({short_repr(attributes['title'])}); {again}")
@@ -252,7 +247,7 @@ def _check_same(
 
 
 def _finished(path: Path, scene: Scene, reporter: Reporter) -> Streamed:
-    """The run whose result is there already."""
+    """Return the run of a complete result."""
     with understood(path), opened(path) as file:
         reporter.start(tally(file["status"].values.ravel()))
         verdicts = verdicts_in(file)
@@ -262,17 +257,17 @@ def _finished(path: Path, scene: Scene, reporter: Reporter) -> Streamed:
 
 @dataclass(slots=True)
 class _Disk:
-    """Keeps the blocks of a sweep in a block log."""
+    """Store the blocks of a sweep in a block log."""
 
     layout: Layout
     log: BlockLog
 
     def missing(self, block: int) -> np.ndarray:
-        """Numbers of all cells of a block: a log has whole blocks only."""
+        """Return the numbers of all cells of a block: a log has whole blocks only."""
         return self.layout.rows(block)
 
     def ends(self, block: int) -> Start:
-        """The final states of a block, and which of its cells finished."""
+        """Return the final states of a block, and which of its cells finished."""
         buffers = self.log.read(block)
         return buffers.end, buffers.finished
 
@@ -285,32 +280,26 @@ class _Disk:
 def _run_blocks(
     prepared: PreparedRun, log: BlockLog, reporter: Reporter, path: str | os.PathLike[str]
 ) -> dict[str, int]:
-    """Run what the log lacks, then write the result; returns the verdicts."""
+    """Run the blocks that the log lacks, write the result, and return the verdicts."""
     scene = prepared.scene
     _check_kernel(prepared, log)
     layout = layout_of(log.about, scene)
     scheduler = BlockScheduler(layout, log.done, _Disk(layout, log), prepared, reporter)
-    try:
+
+    def reason(problem: Exception) -> str | None:
+        """Return why workers, their installations or the disk failed; None for any other error."""
+        if isinstance(problem, InstallationError):
+            return str(problem)
+        if worker_lost(problem) or not isinstance(problem, OSError):
+            return reason_of(problem)
+        return f"cannot write {problem.filename or log.path}: {problem.strerror}" if problem.strerror else str(problem)
+
+    with sweep_errors(scene.cells, lambda: (int(log.counts.sum()), None), reason):
         for target in (path, log.path):
             drop_leftovers(target)
         reporter.start(log.counts, prepared.compiling)
         scheduler.run()
         return write_result(log, path, scene)
-    except KeyboardInterrupt:
-        raise SweepInterrupted(int(log.counts.sum()), scene.cells) from None
-    except Exception as problem:
-        if not (worker_lost(problem) or isinstance(problem, OSError | InstallationError)):
-            raise
-        raise SweepFailed(_reason(problem, log), int(log.counts.sum()), scene.cells) from problem
-
-
-def _reason(problem: Exception, log: BlockLog) -> str:
-    """Why a sweep failed, in words."""
-    if isinstance(problem, InstallationError):
-        return str(problem)
-    if worker_lost(problem) or not isinstance(problem, OSError):
-        return f"the workers are lost ({problem})"
-    return f"cannot write {problem.filename or log.path}: {problem.strerror}" if problem.strerror else str(problem)
 
 
 def _check_kernel(prepared: PreparedRun, log: BlockLog) -> None:

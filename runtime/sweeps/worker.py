@@ -1,6 +1,4 @@
-"""The worker of a pool that does not share the memory of the main program: it rebuilds jobs and runs
-their blocks.
-"""
+"""Rebuild jobs and run their blocks in a worker that does not share the memory of the main program."""
 
 from __future__ import annotations
 
@@ -12,7 +10,7 @@ from ..engines.job import Job, JobSpec
 
 
 class JobCache:
-    """The jobs that a process remembers: the last `size` ones; an older one is sent to it again."""
+    """The last `size` jobs of a process; an older one is sent to it again."""
 
     def __init__(self, size: int = 8) -> None:
         self.size = size
@@ -20,7 +18,7 @@ class JobCache:
         self.lock = threading.Lock()
 
     def run(self, key: str, spec: bytes | None, *block: object) -> Buffers | None:
-        """Run a block of a job."""
+        """Run a block of a job; return None if there is neither the job nor its specification."""
         with self.lock:
             job = self.jobs.get(key)
             if job is None and spec is not None:
@@ -30,7 +28,7 @@ class JobCache:
         return None if job is None else job.run(*block)
 
     def forget(self, key: str) -> None:
-        """Drop a job; its cells that still run end."""
+        """Drop a job, and cancel its cells that still run."""
         with self.lock:
             job = self.jobs.pop(key, None)
         if job is not None:
@@ -46,5 +44,5 @@ def run_block(key: str, spec: bytes | None, *block: object) -> Buffers | None:
 
 
 def forget(key: str) -> None:
-    """Drop a job of this process; its cells that still run end."""
+    """Drop a job of this process, and cancel its cells that still run."""
     _CACHE.forget(key)
