@@ -44,7 +44,7 @@ ARROWS = {
     "models.couplings": "mechanics",
     "codegen.front_end": "",
     "codegen.simd": "front_end",
-    "codegen.integrators": "",
+    "codegen.integrators": "models",
     "codegen.driver": "simd",
     "codegen.recorders": "driver simd",
     "codegen.program": "",

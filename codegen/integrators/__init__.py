@@ -2,7 +2,8 @@
 
 A file holds KIND ("rosenbrock" or "explicit"), ORDER, ERROR_ORDER, DENSE_ORDER, SOURCE and the
 coefficients.  Everything else (number of stages, stiff accuracy, sums that can be reused) is
-computed from them.
+computed from them.  Installed packages announce such modules as entry points of the group
+``synchain.integrators``.
 """
 
 from __future__ import annotations
@@ -12,10 +13,19 @@ import pkgutil
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
+from types import ModuleType
+
+from synchain.models.inputs.entry_points import announced
 
 __all__ = ["Integrator", "IntegratorKind", "integrator", "names"]
 
 Row = tuple[float, ...]
+
+GROUP = "synchain.integrators"
+"""The group of entry points of integrators."""
+
+NEEDED = ("KIND", "ORDER", "ERROR_ORDER", "DENSE_ORDER", "SOURCE", "A", "B", "C", "E", "DENSE")
+"""The names that the module of an integrator with stages must have."""
 
 
 class IntegratorKind(StrEnum):
@@ -129,10 +139,32 @@ class Integrator:
         return len(self.b)
 
 
-@cache
 def names() -> tuple[str, ...]:
-    """Names of all integrators: the files of this folder."""
-    return tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))
+    """Return the names of all integrators: the files of this folder and entry points of installed packages."""
+    return tuple(sorted({*_shipped(), *announced(GROUP)}))
+
+
+@cache
+def _shipped() -> tuple[str, ...]:
+    return tuple(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_"))
+
+
+def _module(name: str) -> ModuleType:
+    """Return the module of an integrator; shipped names come first."""
+    if name in _shipped():
+        return importlib.import_module(f".{name}", __name__)
+    entry = announced(GROUP)[name]
+    try:
+        module: ModuleType = entry.load()
+    except Exception as error:
+        raise ValueError(f"integrator {name!r} of the entry point {entry.value!r}: {error}") from error
+    missing = [key for key in NEEDED if not hasattr(module, key)]
+    if missing:
+        raise ValueError(
+            f"integrator {name!r} of the entry point {entry.value!r}: found no {', '.join(missing)}; expected a module such as "
+            "synchain.codegen.integrators.dop853"
+        )
+    return module
 
 
 @cache
@@ -149,11 +181,11 @@ def integrator(name: str, order: int | None = None) -> Integrator:
     Raises
     ------
     ValueError
-        If no file of this folder has the name.
+        If there is no integrator of the name, or the module of an entry point lacks a part of a tableau.
     """
     if name not in names():
         raise ValueError(f"unknown integrator {name!r}; known: {', '.join(names())}")
-    data = importlib.import_module(f".{name}", __name__)
+    data = _module(name)
     if data.KIND == IntegratorKind.TAYLOR:
         order = data.ORDER if order is None else order
         return Integrator(name, IntegratorKind.TAYLOR, order, order, order, data.SOURCE, (), (), (), (), ())

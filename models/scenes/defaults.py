@@ -13,6 +13,7 @@ import sympy as sp
 
 from ..dynamics.record import Record
 from ..inputs.checks import check_choice, check_integer, check_number, check_text, short_repr
+from ..inputs.entry_points import announced
 from ..inputs.frozen import FrozenDict
 from ..inputs.words import Word
 from ..mechanics.components import WEIGHT_NUMBER
@@ -38,7 +39,7 @@ class TimeUnit(Word):
 
 
 METHODS = Path(__file__).parents[2] / "codegen" / "integrators"
-"""The folder of the integrators, one file each; it is listed here, and read by the code generator alone."""
+"""The folder of the integrators, one file each: listed here, imported by the code generator alone."""
 
 LIMITS: Mapping[str, tuple[Any, Any]] = {
     "transient": (0.0, sys.float_info.max),
@@ -54,10 +55,14 @@ LIMITS: Mapping[str, tuple[Any, Any]] = {
 """The range of each number that belongs to a keyword, both ends in it."""
 
 
-@cache
 def integrators() -> tuple[str, ...]:
-    """Return the names of all integrators."""
-    return tuple(sorted(m.name for m in pkgutil.iter_modules([str(METHODS)]) if not m.name.startswith("_")))
+    """Return the names of all integrators: shipped files, and entry points of installed packages."""
+    return tuple(sorted({*_shipped_integrators(), *announced("synchain.integrators")}))
+
+
+@cache
+def _shipped_integrators() -> tuple[str, ...]:
+    return tuple(m.name for m in pkgutil.iter_modules([str(METHODS)]) if not m.name.startswith("_"))
 
 
 def complete(given: Mapping[str, Any]) -> dict[str, Any]:
