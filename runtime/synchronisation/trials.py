@@ -25,8 +25,8 @@ from ..engines.job import JobSpec, RowsSpec
 from ..engines.scene_kernels import write_kernel
 from ..support.execution import Execution
 from ..support.status import CODES, Status, tally
-from ..sweeps.errors import SweepFailed, SweepInterrupted
-from ..sweeps.pool import Task, WorkerPool, worker_lost
+from ..sweeps.errors import SweepFailed, SweepInterrupted, worker_lost
+from ..sweeps.pool import Task, WorkerPool
 
 Rows = Callable[[np.ndarray], CellRows]
 """Lays out cells by their numbers (count,)."""
