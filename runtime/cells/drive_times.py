@@ -95,5 +95,6 @@ def _half_swings(equations: Equations, values: Mapping[str, np.ndarray], end: np
         for exprs in (drive.gaps, drive.rises)
     )
     if not (gaps or rises):
-        return longest
-    return np.minimum(longest, shortest_stays(gaps, rises, values, _periods(drive, values, rows), end))
+        return np.asarray(longest)
+    shortest = shortest_stays(gaps, rises, values, _periods(drive, values, rows), end)
+    return np.asarray(np.minimum(longest, shortest))
