@@ -1,27 +1,29 @@
-"""From expressions to blocks of statements: what depends on parameters alone, on time, and on the state is parted.
+"""The equations of a node as straight-line blocks, sorted by how often they run.
 
-A block of the first kind runs once a step, one of the second once for each stage time, the third once for each node
+Terms in parameters alone run once a step, terms in time once for each stage time, terms in the state once for each node
 and stage.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import sympy as sp
 
 from synchain.models.mechanics.components import TIME, Node
 
+from ..program.lowering import lower
 from ..program.passes import Hoist, Names, StraightLine, real, share
+from ..program.statements import Statement, let
 
 
 @dataclass(frozen=True, slots=True)
 class NodeBlocks:
-    """One node, sorted by how often its parts must run.
+    """The blocks of one kind of node.
 
-    `constants` and `timed` are statements; `rhs` gives d(state)/dt; `linear` gives rhs, then the entries of the Jacobian
-    row by row, then the partial time derivative.  Results may be plain symbols or numbers: those need no code.
+    `constants` and `timed` are assignments. `rhs` ends in d(state)/dt; `linear` ends in d(state)/dt, the Jacobian row by
+    row and the partial time derivative. Results that are symbols or numbers need no code.
     """
 
     constants: tuple[tuple[sp.Symbol, sp.Expr], ...]
@@ -31,35 +33,32 @@ class NodeBlocks:
 
 
 def analyse(node: Node, names: Names, varied: Iterable[str] = ()) -> NodeBlocks:
-    """Part the equations of a node into constants, time terms and state terms.
-
-    What depends on parameters with a value for each node, `varied`, is computed with the state.
-    """
+    """Split the equations of a node; parameters with a value for each node, `varied`, count as states."""
     size = len(node.state)
     entries = [e for row in node.jacobian() for e in row]
     outputs = [*node.rhs, *entries, *node.time_derivative()]
     moving = frozenset(node.state) | {real(name) for name in varied}
+    # first everything without a state, time itself included
     waves = Hoist(moving, names.fresh("hoisted_"), frozenset({TIME}))
     outputs = [waves.apply(e) for e in outputs]
+    # then the parts without time, of the rest and of the time terms
     steady = Hoist(moving | {TIME} | set(waves.table.values()), names.fresh("fixed_"))
-    timed: dict[sp.Symbol, sp.Expr] = {}
-    fixed: dict[sp.Symbol, sp.Expr] = {}
-    for e, symbol in waves.table.items():
-        (timed if e.has(TIME) else fixed)[symbol] = e
-    timed = {symbol: steady.apply(e) for symbol, e in timed.items()}
-    constants = {**fixed, **{s: e for e, s in steady.table.items()}}
-    rename = _number(list(constants), names.fresh("p")) | _number(list(timed), names.fresh("w"))
+    timed = {symbol: steady.apply(e) for e, symbol in waves.table.items() if e.has(TIME)}
+    fixed = {symbol: e for e, symbol in waves.table.items() if not e.has(TIME)}
+    fixed |= {symbol: e for e, symbol in steady.table.items()}
+    # short names in one numbering for symbols of two tables
+    short = dict(zip(fixed, names.fresh("p"), strict=False)) | dict(zip(timed, names.fresh("w"), strict=False))
     inner = names.fresh("z")
-    rhs = share([e.xreplace(rename) for e in outputs[:size]], inner)
-    linear = share([e.xreplace(rename) for e in outputs], inner)
+    rhs = share([e.xreplace(short) for e in outputs[:size]], inner)
+    linear = share([e.xreplace(short) for e in outputs], inner)
     return NodeBlocks(
-        constants=tuple((rename[s], e) for s, e in constants.items()),
-        timed=tuple((rename[s], e.xreplace(rename)) for s, e in timed.items()),
+        constants=tuple((short[s], e) for s, e in fixed.items()),
+        timed=tuple((short[s], e.xreplace(short)) for s, e in timed.items()),
         rhs=rhs,
         linear=linear,
     )
 
 
-def _number(symbols: list[sp.Symbol], supply: Iterator[sp.Symbol]) -> dict[sp.Symbol, sp.Symbol]:
-    """New names in one numbering for symbols that came from two tables."""
-    return {symbol: next(supply) for symbol in symbols}
+def assigned(body: StraightLine) -> list[Statement]:
+    """Lower the assignments of a straight line."""
+    return [let(s.name, lower(e)) for s, e in body.statements]

@@ -17,7 +17,7 @@ from ..program.expressions import ZERO, Compare, Expression, Load, Name, Number,
 from ..program.lowering import lower
 from ..program.passes import Hoist, Names, real, share
 from ..program.statements import Assign, Function, If, Role, Statement, accumulate, let, store
-from .fields import assigned
+from .blocks import assigned
 from .places import link_ends, named, places, span
 from .safe_names import NAMES
 from .step import lane

@@ -20,8 +20,9 @@ from synchain.models.mechanics.components import Edge, Node
 
 from ..program.expressions import Load, Name, Value, as_expression, plus
 from ..program.lowering import lower
-from ..program.passes import StraightLine, real, share
+from ..program.passes import real, share
 from ..program.statements import Statement, accumulate, let, store
+from .blocks import assigned
 from .places import Joint, StateLayout, link_ends, named, span
 from .step import NOW, lane
 
@@ -234,8 +235,3 @@ def compensated(total: str, value: Value) -> Iterator[Statement]:
     yield let(new, Name(total) + part)
     yield let(rest, (Name(new) - Name(total)) - Name(part))
     yield let(total, new)
-
-
-def assigned(body: StraightLine) -> list[Statement]:
-    """The statements of a body."""
-    return [let(s.name, lower(e)) for s, e in body.statements]

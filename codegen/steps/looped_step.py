@@ -76,7 +76,7 @@ class LoopedStep(StepWriter):
             base["FIELD"] = base["MATRIX"] + self.matrices if self.solves else base["MATRIX"]
         self.put(Assign(NAMES, Name("graph"), whole=True))
         self.put(*(whole(name, place) for name, place in base.items()))
-        self.parameters(but=self.equations.single)
+        self.parameters(skipped=self.equations.single)
         if not self.method.implicit:
             self.mass.opening()
 

@@ -1,4 +1,4 @@
-"""One step of an integrator as a program: its stages, whatever holds the state, registers or memory."""
+"""The stages of one step, common to writers that keep states in registers and in memory."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from ..program.expressions import ZERO, Expression, Load, Name, Negation, Number
 from ..program.lowering import lower
 from ..program.passes import StraightLine, real
 from ..program.statements import Assign, Comment, Function, Return, Role, Statement, let, operations
-from .blocks import NodeBlocks
+from .blocks import NodeBlocks, assigned
 
 LARGEST_INLINED = 400
-"""Operations of a function up to which its body stands in each stage; copies of longer ones take long to compile."""
+"""Most operations of a function that is inlined into each stage: copies of longer ones take long to compile."""
 
 NOW = {TIME: real("now")}
-"""What the time of a stage is called in the expressions of links."""
+"""Renames the time in expressions of links to the time of a stage."""
 
 SCALED = '''
 @njit(error_model="numpy", forceinline=True)
@@ -42,55 +42,56 @@ def pair(e5, e3, h, old, new, rtol, atol):
 
 
 def scaling(method: Integrator) -> str:
-    """The text of the function that measures errors of a method by the tolerance."""
+    """Return the text of the function that divides errors of a method by the tolerance."""
     return SCALED if len(method.e) == 1 else PAIR
 
 
 def function_name(name: str, kind: int) -> str:
-    """The name of a node function for nodes of some kind: node, node2, node2_linear."""
+    """Return the name of a node function for one kind of node: node, node2, node2_linear."""
     return name if kind == 0 else name.replace("node", f"node{kind + 1}", 1)
 
 
 def node_function(
     name: str, about: str, body: StraightLine, arguments: Sequence[str], results: Sequence[sp.Expr]
 ) -> Function:
-    """A small inlined function of lanes: statements first, results last."""
-    statements = [let(s.name, lower(e)) for s, e in body.statements]
-    return function_of(name, arguments, about, [*statements, Return(tuple(map(lower, results)))])
+    """Write a function of lanes that runs a straight line and returns its results."""
+    return function_of(name, arguments, about, [*assigned(body), Return(tuple(map(lower, results)))])
 
 
 def function_of(name: str, arguments: Sequence[str], about: str, body: Sequence[Statement]) -> Function:
-    """A function of lanes that the stages of a step call; each of them takes over the body of a small one."""
+    """Write a function of lanes for the stages of a step, inlined if it is small."""
     role = Role.INLINED if operations(body) <= LARGEST_INLINED else Role.CALLED
     return Function(name, tuple(arguments), about, tuple(body), role)
 
 
 def lane(e: Expression, width: str = "WIDTH") -> Expression:
-    """The same value as a register: numbers are spread over its lanes."""
+    """Broadcast a number to a register; other values are registers already."""
     return call("broadcast", e, width) if isinstance(e, Number) else e
 
 
 def prefix(vector: str) -> str:
-    """What stands before the name of a state in a vector; nothing at the start of the step."""
+    """Return the prefix of state names in a vector, none for `y`, the state at the start of the step."""
     return "" if vector == "y" else f"{vector}_"
 
 
 def entry(r: sp.Symbol, c: sp.Symbol) -> str:
-    """The name of d(rhs of r)/dc: j_vx, and j_speed_by_place where letters run together."""
+    """Return the name of d(rhs of r)/dc: j_vx, and j_speed_by_place where letters run together."""
     return f"j_{r.name}{c.name}" if len(r.name) == len(c.name) == 1 else f"j_{r.name}_by_{c.name}"
 
 
 def linearised(state: Sequence[sp.Symbol]) -> list[str]:
-    """The names of rates, of the entries of their Jacobian row by row, and of their time derivatives."""
+    """Return the names of rates, of Jacobian entries row by row, and of time derivatives."""
     entries = (entry(r, c) for r in state for c in state)
     return [*(f"f_{r.name}" for r in state), *entries, *(f"ft_{r.name}" for r in state)]
 
 
 class StepWriter(ABC):
-    """Writes one step of `method` for `equations`, whose kinds of nodes were analysed into `kinds`.
+    """Collects the statements of one step of `method`; `kinds` are the blocks of the kinds of nodes.
 
-    The stages are the same for every network.  `Unrolled` keeps each state in a register and writes every node out,
-    `Looped` keeps them in memory and runs over nodes and links.
+    `write` is the same for every network. Subclasses decide where states are kept: `UnrolledStep` in registers, node by
+    node; `LoopedStep` in memory, with loops over nodes and links.
+    A Rosenbrock method solves (shift M - J) k_i = M (f(y + sum a_ij k_j) + rate sum c_ij k_j) + d_i h f_t: Hairer &
+    Wanner, Solving Ordinary Differential Equations II (Springer, 1996), section IV.7.
     """
 
     def __init__(self, equations: Equations, kinds: Sequence[NodeBlocks], method: Integrator) -> None:
@@ -98,13 +99,18 @@ class StepWriter(ABC):
         self.state = equations.state
         self.statements: list[Statement] = []
         self.functions: list[Function] = []
+        # symbols with a value for each node: states, parameters of single nodes, and what node functions assign
+        bodies = (body for blocks in kinds for body in (blocks.rhs, blocks.linear))
+        self.inner = {s for body in bodies for s, _ in body.statements}
+        self.states = list(dict.fromkeys(s for node in equations.nodes for s in node.state))
+        self.of_nodes = {*self.states, *map(real, equations.varied), *self.inner}
 
     def put(self, *statements: Statement) -> None:
         """Append statements."""
         self.statements += statements
 
     def let(self, name: str, value: Value) -> None:
-        """Append the statement that gives a variable its value."""
+        """Append an assignment."""
         self.statements.append(let(name, value))
 
     def note(self, text: str) -> None:
@@ -113,7 +119,7 @@ class StepWriter(ABC):
 
     @contextmanager
     def apart(self) -> Iterator[list[Statement]]:
-        """Collect what is appended meanwhile, for a block or a function of its own."""
+        """Collect statements in a list for an inner block or another function."""
         outside, self.statements = self.statements, []
         try:
             yield self.statements
@@ -128,7 +134,7 @@ class StepWriter(ABC):
     # -- the method -------------------------------------------------------------------------------------------
 
     def write(self, after: Callable[[int], None] | None = None) -> None:
-        """Write the step; `after` may write more after each stage."""
+        """Write the step; `after` may append statements after each stage."""
         self.opening()
         if self.method.implicit:
             gamma = self.method.gamma  # (shift - J) k = …; reach = 1/shift, rate = 1/h
@@ -143,23 +149,28 @@ class StepWriter(ABC):
         self.finish()
 
     def stage(self, i: int) -> None:
-        """Write one stage: state, right-hand side, and what the method makes of it."""
+        """Write one stage: its state, its right-hand side, its rates."""
+        c, first = self.method.c, int(self.method.implicit)
         self.note(f"stage {i + 1}")
         if i > 0:
             self.advance(i)
-        if i > 0 or not self.method.implicit:
-            self.stage_time(i)
+        # the first stage of a Rosenbrock method takes the right-hand side of the linearisation
+        if i >= first:
+            # consecutive stages at one time share its time terms
+            if i == first or c[i] != c[i - 1]:
+                self.let("now", linear((c[i],), ["h"], "t"))
+                self.timed("now", self.wanted([blocks.rhs for blocks in self.kinds]))
             out = "f" if self.method.implicit else f"k{i + 1}"
             self.slopes("u" if i > 0 else "y", out)
         self.solve(i)
 
     @abstractmethod
     def opening(self) -> None:
-        """Load what the step needs."""
+        """Load the state and the parameters."""
 
     @abstractmethod
     def linearise(self) -> None:
-        """Compute slopes and Jacobian at the start, and factorise."""
+        """Compute right-hand side and Jacobian at the start, and factorise."""
 
     @abstractmethod
     def advance(self, i: int) -> None:
@@ -167,45 +178,51 @@ class StepWriter(ABC):
 
     @abstractmethod
     def slopes(self, base: str, out: str) -> None:
-        """Compute the right-hand side at one vector of states into another."""
+        """Compute the right-hand side at the states in vector `base` into vector `out`."""
 
     @abstractmethod
     def solve(self, i: int) -> None:
-        """Turn the slopes of stage i into its rates."""
+        """Turn the right-hand side of stage i into its rates."""
 
     @abstractmethod
     def finish(self) -> None:
         """Compute the new state, the error and the dense output."""
 
-    # -- nodes and time ---------------------------------------------------------------------------------------
+    # -- one state variable -----------------------------------------------------------------------------------
 
     def increment(self, row: Sequence[float], values: Sequence[str]) -> Expression:
-        """What a row of coefficients adds to the state at the start: stages of explicit methods are rates."""
+        """Return sum row_j k_j, times h for explicit methods, as their stages are rates and not increments."""
         total = linear(row, values)
         return total if self.method.implicit else Product((Name("h"), total))
 
+    def dense_value(self, row: Sequence[float], values: Sequence[str]) -> Expression:
+        """Return a coefficient of the dense output as a register; it may be the number zero."""
+        value = lane(linear(row, values))
+        return value if self.method.implicit else Product((Name("h"), value))
+
     def embedded(self, values: Sequence[str]) -> list[Statement]:
-        """The two estimates of the error of a state, if there are two."""
+        """Compute the two error estimates of methods that have two."""
         rows = self.method.e if len(self.method.e) > 1 else ()
         return [let(name, linear(row, values)) for name, row in zip(("e5", "e3"), rows, strict=False)]
 
     def scaled_error(self, error: Value, old: Value, new: Value, period: float | None) -> Expression:
-        """The error of a state in units of its tolerance: the one estimate, or the two of `embedded` as one.
-
-        An angle with a `period` is as large as itself or the period, whichever is smaller.
-        """
-        own = ("scaled", error) if len(self.method.e) == 1 else ("pair", "e5", "e3", "h")
+        """Return the error in units of the tolerance; an angle counts as no larger than its `period`."""
+        estimates = ("scaled", error) if len(self.method.e) == 1 else ("pair", "e5", "e3", "h")
         if period is not None:
             old, new = (call("minimum", call("absolute", state), period) for state in (old, new))
-        return call(*own, old, new, "rtol", "atol")
+        return call(*estimates, old, new, "rtol", "atol")
 
-    def dense_value(self, row: Sequence[float], values: Sequence[str]) -> Expression:
-        """What a row of the dense output holds of a state: stages of explicit methods are rates."""
-        value = lane(linear(row, values))
-        return value if self.method.implicit else Product((Name("h"), value))
+    def stiff_error(self, error: Value, last: Expression, share: Expression) -> Expression:
+        """Return the error, raised to that of the dense output in the part of the state that is not stiff.
+
+        The bound is dense_error (1 - 2 share) |last|, `last` the last row of the dense output. `share` is the shift over
+        the pivot: one where the state is not stiff.
+        """
+        stiff = self.method.dense_error * (Number(1.0) - 2.0 * share) * call("absolute", last)
+        return call("maximum", call("absolute", error), stiff)
 
     def time_slope(self, i: int, slope: Expression) -> list[Expression]:
-        """What a time slope adds to stage i of an implicit method."""
+        """Return the term d_i h f_t of stage i of a Rosenbrock method, its sign folded; none if it is zero."""
         weight = self.method.d[i]
         if weight == 0.0 or slope == ZERO:
             return []
@@ -214,74 +231,43 @@ class StepWriter(ABC):
         term = Product((Number(abs(weight)), Name("h"), slope))
         return [Negation(term) if weight < 0 else term]
 
-    def stiff_error(self, error: Value, last: Expression, share: Expression) -> Expression:
-        """The error of a state, at least that of its dense output times 1 - 2 share: the share that is not stiff.
-
-        `last` is the last row of the dense output, `share` the shift over the pivot: one where the state is not stiff.
-        """
-        stiff = self.method.dense_error * (Number(1.0) - 2.0 * share) * call("absolute", last)
-        return call("maximum", call("absolute", error), stiff)
-
-    def first_of(self, blocks: NodeBlocks) -> StraightLine:
-        """What is evaluated of a node of some kind at the start of a step."""
-        return blocks.linear if self.method.implicit else blocks.rhs
+    # -- nodes and time ---------------------------------------------------------------------------------------
 
     def is_plain(self, e: sp.Expr) -> bool:
-        """True where a result needs no function: a number, a parameter term, or one bare state symbol."""
-        own = {s for node in self.equations.nodes for s in node.state}
-        inner = own | self.inner | self.varied
-        return (e.is_Symbol and e not in self.inner) or not e.free_symbols & inner
-
-    @property
-    def inner(self) -> set[sp.Symbol]:
-        """Symbols defined inside the node functions."""
-        bodies = (body for blocks in self.kinds for body in (blocks.rhs, blocks.linear))
-        return {s for body in bodies for s, _ in body.statements}
-
-    @property
-    def varied(self) -> set[sp.Symbol]:
-        """The parameters of the template that have a value for each node."""
-        return {real(name) for name in self.equations.varied}
+        """True for a result that needs no function: a number, a parameter term, or one bare state."""
+        return (e.is_Symbol and e not in self.inner) or not e.free_symbols & self.of_nodes
 
     def arguments(self, body: StraightLine, results: Sequence[sp.Expr]) -> list[sp.Symbol]:
-        """What a node function must be given: state first, then the rest by name."""
+        """Return the arguments of a node function: states first, then other symbols by name."""
         used = StraightLine(body.statements, tuple(results)).symbols
-        states = dict.fromkeys(s for node in self.equations.nodes for s in node.state)
-        own = [s for s in states if s in used]
-        return own + sorted((s for s in used if s not in own), key=lambda s: s.name)
+        states = [s for s in self.states if s in used]
+        return states + sorted(used.difference(states), key=lambda s: s.name)
+
+    def node_call(
+        self, function: str, kind: int, body: StraightLine, targets: Sequence[str], at: Mapping[sp.Symbol, sp.Symbol]
+    ) -> list[Statement]:
+        """Assign the results of a node function to `targets`, its arguments renamed by `at`; leave out plain results."""
+        pairs = [(name, e) for name, e in zip(targets, body.results, strict=True) if not self.is_plain(e)]
+        arguments = (at.get(s, s).name for s in self.arguments(body, [e for _, e in pairs]))
+        value = call(function_name(function, kind), *arguments)
+        return [Assign(tuple(name for name, _ in pairs), value)] if pairs else []
+
+    def wanted(self, bodies: Sequence[StraightLine]) -> set[sp.Symbol]:
+        """Return the time terms that some bodies use."""
+        return {s for blocks in self.kinds for s, _ in blocks.timed} & {s for body in bodies for s in body.symbols}
 
     def timed(self, time: str, wanted: set[sp.Symbol]) -> None:
-        """Statements for the time terms in use, at the time of that name."""
+        """Compute the time terms `wanted` at the time in variable `time`."""
         for symbol, e in (pair for blocks in self.kinds for pair in blocks.timed):
             if symbol in wanted:
                 self.let(symbol.name, lower(e.xreplace({TIME: sp.Symbol(time)})))
 
-    def stage_time(self, i: int) -> None:
-        """The time of stage i and the time terms of the right-hand side, unless the stage before had the same time."""
-        c, first = self.method.c, int(self.method.implicit)
-        if i == first or c[i] != c[i - 1]:
-            self.let("now", linear((c[i],), ["h"], "t"))
-            self.timed("now", self.wanted([blocks.rhs for blocks in self.kinds]))
-
-    def wanted(self, bodies: Sequence[StraightLine]) -> set[sp.Symbol]:
-        """Time terms that some bodies use."""
-        return {s for blocks in self.kinds for s, _ in blocks.timed} & {s for body in bodies for s in body.symbols}
-
-    def parameters(self, but: Container[str] = ()) -> None:
-        """Load the parameters, `but` some, and compute what depends on them alone."""
-        for slot, name in enumerate(self.equations.parameters):
-            if name not in but:
-                self.let(name, Load("p", Number(len(self.state) + slot)))
+    def parameters(self, skipped: Container[str] = ()) -> None:
+        """Load the parameters but those `skipped`, and compute the terms in parameters alone."""
+        for slot, name in enumerate(self.equations.parameters, start=len(self.state)):
+            if name not in skipped:
+                self.let(name, Load("p", Number(slot)))
         for blocks in self.kinds:
-            used = self.first_of(blocks).symbols
-            wanted = used.union(*(e.free_symbols for s, e in blocks.timed if s in used))
-            self.put(*(let(symbol.name, lower(e)) for symbol, e in blocks.constants if symbol in wanted))
-
-    def node_call(
-        self, function: str, kind: int, body: StraightLine, found: Sequence[str], at: Mapping[sp.Symbol, sp.Symbol]
-    ) -> list[Statement]:
-        """The call of a node function at some names of its arguments; plain results among those `found` need none."""
-        pairs = [(name, e) for name, e in zip(found, body.results, strict=True) if not self.is_plain(e)]
-        given = (at.get(s, s).name for s in self.arguments(body, [e for _, e in pairs]))
-        value = call(function_name(function, kind), *given)
-        return [Assign(tuple(name for name, _ in pairs), value)] if pairs else []
+            body = blocks.linear if self.method.implicit else blocks.rhs
+            used = body.symbols.union(*(e.free_symbols for s, e in blocks.timed if s in body.symbols))
+            self.put(*(let(symbol.name, lower(e)) for symbol, e in blocks.constants if symbol in used))
