@@ -36,7 +36,7 @@ from ..simd import lanes
 from ..steps.blocks import NodeBlocks, analyse
 from ..steps.contact_step import push_functions
 from ..steps.looped_step import LoopedStep
-from ..steps.sparse_plan import FILL_LIMIT, SparsePlan, program, workspace
+from ..steps.sparse_plan import FILL_LIMIT, SparsePlan, program
 from ..steps.step import StepWriter, function_name, node_function, scaling
 from ..steps.unrolled_step import UnrolledStep
 from ..taylor import is_large, write_looped, write_rolled, write_step
@@ -219,10 +219,9 @@ def _stages(
         writer = UnrolledStep(plain, blocks, method)
         writer.write()
     else:
-        writer = LoopedStep(plain, blocks, method, elimination)
-        writer.write()
-        # `workspace` counts the arrays that `write` has used
-        scratch = workspace(writer, elimination)
+        loops = LoopedStep(plain, blocks, method, elimination)
+        loops.write()
+        writer, scratch = loops, loops.workspace
         arguments += ["graph", "weights"]
     # the step calls the functions of nodes, so they come before it
     about = "One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."

@@ -18,7 +18,7 @@ from ..program.lowering import lower
 from ..program.passes import Hoist, Names, real, share
 from ..program.statements import Assign, Function, If, Role, Statement, accumulate, let, store
 from .blocks import assigned
-from .places import link_ends, named, places, span
+from .places import StateLayout, link_ends, named, span
 from .safe_names import NAMES
 from .step import lane
 
@@ -94,7 +94,7 @@ def _looped(equations: Equations, names: Names) -> list[Statement]:
     before = [*_parameters(equations, used), *(let(s.name, lane(lower(e))) for e, s in fixed.table.items())]
     before += assigned(sides)
     before += [store("out", SIDES * Name("NODES") + k, lane(lower(e))) for k, e in enumerate(sides.results)]
-    at = places(equations)
+    at = StateLayout(equations)
     own: list[Statement] = [let(s.name, Load("y", at.place(k))) for k, s in enumerate(node.state) if s in used]
     own += [*at.own(body.symbols), *assigned(body)]
     own += [store("out", at.place(k), lane(lower(e))) for k, e in enumerate(body.results)]
@@ -108,7 +108,7 @@ def _force(equations: Equations, event: Event) -> tuple[list[Statement], tuple[s
     """Statements that add the force of one link on a body that sticks, and the expressions they hold."""
     if not equations.edges:
         return [], ()
-    at = places(equations)
+    at = StateLayout(equations)
     (joint,) = at.joints
     edge, swap = joint.edge, named(joint)
     velocity, mode = edge.here[1], edge.here[2]

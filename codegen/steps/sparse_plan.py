@@ -1,7 +1,9 @@
 """The elimination of a large network as integer arrays that a few small loops run through.
 
+    Equations ─patterns of the blocks of nodes and links─▶ _Network ─pivots and fill─▶ SparsePlan
+
 Chains, rings, stars and trees have an elimination without or almost without fill: it is exact, and its cost grows with the
-number of links.  Where the fill of the exact elimination exceeds FILL_LIMIT (large grids, random graphs: it grows faster
+number of links. Where the fill of the exact elimination exceeds FILL_LIMIT (large grids, random graphs: it grows faster
 than the network), the factors keep no more than the first level of fill (J. A. Meijerink, H. A. van der Vorst, Math.
 Comput. 31, 148, 1977; levels: Y. Saad, Iterative Methods for Sparse Linear Systems, SIAM, 2003, section 10.3.3), and the
 kernel refines every solution to rounding.
@@ -11,7 +13,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import accumulate, pairwise
 
@@ -23,27 +25,27 @@ from synchain.models.graphs.links import Link
 from synchain.models.mechanics.components import Edge, Node
 
 from .elimination import EliminationPlan, Entry
-from .fields import link_sums, mean_fields
 from .mass_solve import added_masses, momentum_slopes, turned_masses
-from .places import by_joint, by_kind, joint_numbers, link_table, places, table
-from .step import StepWriter
+from .places import by_joint, by_kind, joint_numbers, where_table
 
 FILL_LIMIT = 3.0
-"""Entries of the exact factors for each entry of the matrix, above which the elimination is incomplete."""
+"""Most entries of exact factors for each entry of the matrix; beyond it the elimination is incomplete. A choice."""
 
 Pattern = tuple[Entry, ...]
+"""Row and column of the non-zero entries of a small block."""
 
 
 @dataclass(frozen=True, slots=True)
 class SparsePlan:
     """Integer arrays in the order of NAMES, weights of the links, the number of matrix entries, exact or incomplete.
 
-    target, source (links,): ends of each link.  node_slot (components**2 * n,), here_slot, there_slot
-    (components**2 * links,): where the entries of the node's block and of a link's two blocks stand in the matrix, -1 where
-    there is none; where nodes are of several kinds, components are those of the node that has most, nodes and links are
-    numbered as codegen/steps/places.py says, and `where` is its table, also of links that differ in a parameter.
-    order (dimension,): pivots; place (dimension,): its inverse.  The off-diagonal entries of pivot order[q] are row_start[q] … row_start[q + 1] - 1, those from after_start[q]
-    on belong to later pivots; column: of each entry.
+    target, source (links,): ends of each link.
+    node_slot (size**2 * n,), here_slot, there_slot (size**2 * links,): slots in the matrix of the entries of a node's block,
+    of a link's block by its target and by its source, -1 for zeros; `size` is that of the node with most states.
+    order (dimension,): pivots; place (dimension,): its inverse.
+    row_start (dimension + 1,): the off-diagonal entries of pivot order[q] are row_start[q] … row_start[q + 1] - 1.
+    after_start (dimension,): those from after_start[q] on belong to later pivots. column (entries,): column of each.
+    where: see codegen/steps/places.py.
     """
 
     arrays: tuple[np.ndarray, ...]
@@ -52,146 +54,155 @@ class SparsePlan:
     exact: bool
 
 
-def block_pattern(block: Iterable[Iterable[object]]) -> tuple[Entry, ...]:
-    """Row and column of the non-zero entries of a small block."""
+@dataclass(frozen=True, slots=True)
+class _Network:
+    """The structure of the matrix: what equations with other symbols or numbers share.
+
+    size: the most states of a node. kinds, joints: blocks of each kind of node and of each joint, and how many have them.
+    links: in the order of the kernel. where (size, n) and more: the array of that name.
+    """
+
+    n: int
+    size: int
+    kinds: tuple[tuple[Pattern, int], ...]
+    joints: tuple[tuple[tuple[Pattern, Pattern], int], ...]
+    links: tuple[Link, ...]
+    mixed: bool
+    where: tuple[int, ...]
+
+
+def block_pattern(block: Iterable[Iterable[object]]) -> Pattern:
+    """Return row and column of the non-zero entries of a small block."""
     return tuple((a, b) for a, row in enumerate(block) for b, e in enumerate(row) if e != 0)
 
 
 def program(equations: Equations, fill: float = FILL_LIMIT, solves: bool = True) -> SparsePlan:
     """Plan the elimination of (s - J) for a network; time and memory grow with its links.
 
-    Equations that differ only in what their symbols are called, or in numbers, share the program.  The factors are exact
-    unless they would have more than `fill` entries for each entry of the matrix.  A method that `solves` nothing has a
-    matrix without entries.
+    The factors are exact unless they would have more than `fill` entries for each entry of the matrix. A method that
+    `solves` nothing has a matrix without entries.
     """
-    size = max(len(node.state) for node in equations.nodes)
     edges = [edge for layer in equations.listed for _, edge in layer.edge_of]
-    own = tuple(_node_pattern(node) if solves else () for node in equations.nodes)
-    joined = tuple(
-        tuple(tuple(sorted(pattern)) if solves else () for pattern in _link_patterns(edge)) for edge in edges
-    )
-    where = tuple(table(equations).tolist()) if equations.mixed else ()
+    of_nodes = [_node_pattern(node) if solves else () for node in equations.nodes]
+    of_links = [_link_patterns(edge) if solves else ((), ()) for edge in edges]
     numbers = {i: k for k, i in enumerate(by_kind(equations))}
-    links = tuple((numbers[target], numbers[source], weight) for target, source, weight in by_joint(equations))
-    counts = tuple(map(equations.kind_of.count, range(len(own))))
-    shares = tuple(map(joint_numbers(equations).count, range(len(joined))))
-    found = _program(equations.n, size, own, joined, links, fill, counts, shares, where)
-    if not equations.numbered:
-        return found
-    *arrays, places = found.arrays
-    return replace(found, arrays=(*arrays, np.concatenate([places, link_table(equations)])))
+    joints = joint_numbers(equations)
+    network = _Network(
+        equations.n,
+        max(len(node.state) for node in equations.nodes),
+        tuple((pattern, equations.kind_of.count(k)) for k, pattern in enumerate(of_nodes)),
+        tuple((patterns, joints.count(k)) for k, patterns in enumerate(of_links)),
+        tuple((numbers[target], numbers[source], weight) for (target, source, weight), _ in by_joint(equations)),
+        equations.mixed,
+        tuple(where_table(equations).tolist()),
+    )
+    return _plan(network, fill)
 
 
 def _node_pattern(node: Node) -> Pattern:
-    """Where a node has entries of shift M - J."""
+    """Return the entries of shift M - J, J with d(M F)/dy at any rates F, of one node."""
     turned = turned_masses(node, [sp.Dummy(real=True) for _ in node.state])
     return tuple(sorted({*block_pattern(node.jacobian()), *block_pattern(added_masses(node)), *block_pattern(turned)}))
 
 
-def _link_patterns(edge: Edge) -> tuple[set[Entry], set[Entry]]:
-    """Where a link has entries of shift M - J, by its target and by its source."""
-    here, there = set(block_pattern(edge.jacobian_here())), set(block_pattern(edge.jacobian_there()))
+def _link_patterns(edge: Edge) -> tuple[Pattern, Pattern]:
+    """Return the entries of shift M - J of one link, by its target and by its source."""
     rates = [sp.Dummy(real=True) for _ in (*edge.here, *edge.there)]
     turned = momentum_slopes(edge, rates[: len(edge.here)], rates[len(edge.here) :])
+    here, there = set(block_pattern(edge.jacobian_here())), set(block_pattern(edge.jacobian_there()))
     for blocks in (edge.inertia, turned):
         for pattern, block in zip((here, there), blocks, strict=False):
             pattern.update(block_pattern(block))
-    return here, there
+    return tuple(sorted(here)), tuple(sorted(there))
 
 
 @lru_cache(maxsize=4)
-def _program(
-    n: int,
-    size: int,
-    own: tuple[Pattern, ...],
-    joined: tuple[tuple[Pattern, Pattern], ...],
-    links: tuple[Link, ...],
-    fill: float,
-    counts: tuple[int, ...],
-    shares: tuple[int, ...],
-    where: tuple[int, ...],
-) -> SparsePlan:
-    """The program of a network of `counts` nodes of each kind and `shares` links of each joint."""
-    stands = np.array(where, np.int64).reshape(-1, n)[:size] if where else np.arange(n * size).reshape(size, n)
-    dimension = int((stands >= 0).sum())
-    nodes, (target, source) = np.arange(n), (np.array([link[side] for link in links], np.int64) for side in (0, 1))
-    alike = _Blocks(stands, nodes, nodes, own, _spans(counts))
-    spans = _spans(shares)
-    ends = [
-        _Blocks(stands, target, end, tuple(pair[k] for pair in joined), spans) for k, end in enumerate((target, source))
+def _plan(network: _Network, fill: float) -> SparsePlan:
+    """Plan the elimination of one structure."""
+    n, size, where = network.n, network.size, np.array(network.where, np.int64)
+    # (size, n) number of each state in the whole state, -1 where a node has fewer
+    states = where[: size * n].reshape(size, n) if network.mixed else np.arange(n * size).reshape(size, n)
+    dimension = int((states >= 0).sum())
+    # the blocks of nodes, and those of links by their target and by their source
+    nodes, (target, source) = np.arange(n), (np.array([link[k] for link in network.links], np.int64) for k in (0, 1))
+    counts = [count for _, count in network.joints]
+    blocks = [
+        _Blocks.of(states, nodes, nodes, [pattern for pattern, _ in network.kinds], [c for _, c in network.kinds])
     ]
-    parts = [part for blocks in (alike, *ends) for part in blocks.entries()]
+    for k, end in enumerate((target, source)):
+        blocks.append(_Blocks.of(states, target, end, [patterns[k] for patterns, _ in network.joints], counts))
+    parts = [np.stack([rows, columns]) for each in blocks for *_, rows, columns in each.entries()]
     pattern = np.unique(np.concatenate(parts, axis=1), axis=1) if parts else np.zeros((2, 0), np.int64)
+    # pivots, and the off-diagonal entries of the factors, sorted by pivot of the row and of the column
     pivots, entries, exact = _factors(dimension, pattern, fill)
     place = np.empty(dimension, np.int64)
     place[pivots] = np.arange(dimension)
     keys = np.unique(place[entries[0]] * dimension + place[entries[1]])
-    columns = keys % dimension
     starts = np.searchsorted(keys, np.arange(dimension + 1) * dimension)
     middles = np.searchsorted(keys, np.arange(dimension) * (dimension + 1))
-    slots = [blocks.slots(place, keys) for blocks in (alike, *ends)]
-    arrays = (target, source, *slots, pivots, place, starts, middles, pivots[columns], where)
-    weights = np.array([float(link[2]) for link in links])
+    slots = [each.slots(place, keys) for each in blocks]
+    arrays = (target, source, *slots, pivots, place, starts, middles, pivots[keys % dimension], where)
+    weights = np.array([float(link[2]) for link in network.links])
     return SparsePlan(tuple(np.ascontiguousarray(a, np.int64) for a in arrays), weights, dimension + len(keys), exact)
 
 
 @dataclass(frozen=True, slots=True)
 class _Blocks:
-    """The blocks of nodes, or of one end of links: rows and columns by node, a pattern for each of some spans of them.
+    """The blocks of nodes, or of one end of links, in the matrix.
 
-    where (most states of a node, nodes): the place of a state in the whole state.
+    states (size, n): number of a state in the whole state. rows, columns (blocks,): nodes. parts: ranges of blocks with
+    one pattern.
     """
 
-    where: np.ndarray
+    states: np.ndarray
     rows: np.ndarray
     columns: np.ndarray
-    patterns: tuple[Pattern, ...]
-    spans: tuple[slice, ...]
+    parts: tuple[tuple[Pattern, slice], ...]
 
-    def entries(self) -> Iterator[np.ndarray]:
-        """Rows and columns (2, count) of the entries, one place in the pattern after another."""
-        for pattern, span in zip(self.patterns, self.spans, strict=False):
+    @classmethod
+    def of(
+        cls, states: np.ndarray, rows: np.ndarray, columns: np.ndarray, patterns: list[Pattern], counts: list[int]
+    ) -> _Blocks:
+        """Give blocks in a row `counts` times each pattern."""
+        ranges = [slice(a, b) for a, b in pairwise(accumulate(counts, initial=0))]
+        return cls(states, rows, columns, tuple(zip(patterns, ranges, strict=True)))
+
+    def entries(self) -> Iterator[tuple[int, int, slice, np.ndarray, np.ndarray]]:
+        """Yield row and column in the block, the range of blocks, rows and columns in the matrix."""
+        for pattern, part in self.parts:
             for a, b in pattern:
-                yield np.stack([self.where[a][self.rows[span]], self.where[b][self.columns[span]]])
+                yield a, b, part, self.states[a][self.rows[part]], self.states[b][self.columns[part]]
 
     def slots(self, place: np.ndarray, keys: np.ndarray) -> np.ndarray:
-        """Slots of every block entry: (a * size + b) * count + number of the node or link."""
-        size, dimension = len(self.where), len(place)
+        """Return the slot of every entry in the matrix, -1 for zeros: (a*size + b)*blocks + number of the block."""
+        size, dimension = len(self.states), len(place)
         table = np.full((size * size, len(self.rows)), -1, np.int64)
-        for pattern, span in zip(self.patterns, self.spans, strict=False):
-            for a, b in pattern:
-                rows, columns = self.where[a][self.rows[span]], self.where[b][self.columns[span]]
-                found = dimension + np.searchsorted(keys, place[rows] * dimension + place[columns])
-                table[a * size + b, span] = np.where(rows == columns, rows, found)
+        for a, b, part, rows, columns in self.entries():
+            # the diagonal comes first, by state; then the other entries, by key
+            off = dimension + np.searchsorted(keys, place[rows] * dimension + place[columns])
+            table[a * size + b, part] = np.where(rows == columns, rows, off)
         return table.reshape(-1)
 
 
-def _spans(counts: Sequence[int]) -> tuple[slice, ...]:
-    """Parts of a numbering of these lengths, one after another."""
-    ends = list(accumulate(counts, initial=0))
-    return tuple(slice(a, b) for a, b in pairwise(ends))
-
-
 def _factors(dimension: int, pattern: np.ndarray, fill: float) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Pivots, off-diagonal entries (2, count) of the factors, and whether they are exact."""
+    """Return pivots, off-diagonal entries (2, count) of the factors, and whether they are exact."""
     off = pattern[:, pattern[0] != pattern[1]]
     if not off.size:
         return np.arange(dimension), off, True
     rows, columns = off.tolist()
-    listed = set(pattern[0, pattern[0] == pattern[1]].tolist())
-    found = _eliminate_all(dimension, rows, columns, listed, fill * (dimension + len(rows)) - dimension)
-    if found is not None:
-        steps = found
+    on_diagonal = set(pattern[0, pattern[0] == pattern[1]].tolist())
+    steps = _eliminate_all(dimension, rows, columns, on_diagonal, fill * (dimension + len(rows)) - dimension)
+    if steps is not None:
         lower = [(r, k) for k, below in zip(steps.order, steps.below, strict=True) for r in below]
         upper = [(k, c) for k, after in zip(steps.order, steps.after, strict=True) for c in after]
         return np.array(steps.order, np.int64), np.array([*lower, *upper], np.int64).reshape(-1, 2).T, True
-    late = np.isin(np.arange(dimension), list(listed))
-    pivots = np.argsort(late, kind="stable")
+    # too much fill: rows without a diagonal entry of J come first, the rest in its order
+    pivots = np.argsort(np.isin(np.arange(dimension), list(on_diagonal)), kind="stable")
     return pivots, _first_level(dimension, off, pivots), False
 
 
 def _first_level(dimension: int, off: np.ndarray, pivots: np.ndarray) -> np.ndarray:
-    """The pattern with the fill that its own entries cause: (r, k) and (k, c) with pivot k before both make (r, c)."""
+    """Return the pattern and the fill of its own entries: (r, k) and (k, c) with pivot k before both make (r, c)."""
     place = np.empty(dimension, np.int64)
     place[pivots] = np.arange(dimension)
     rows, columns = place[off]
@@ -200,91 +211,67 @@ def _first_level(dimension: int, off: np.ndarray, pivots: np.ndarray) -> np.ndar
     lower = np.stack([rows[below][down], columns[below][down]])  # by pivot
     right = np.argsort(rows[after], kind="stable")
     upper = np.stack([rows[after][right], columns[after][right]])
+    # pair each entry (r, k) below with all entries (k, c) after: `left` repeats the first, `offset` counts the second
     start = np.searchsorted(upper[0], np.arange(dimension + 1))
     counts = (start[1:] - start[:-1])[lower[1]]
-    which = np.repeat(np.arange(lower.shape[1]), counts)
-    offset = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
-    fill = np.stack([lower[0][which], upper[1][start[lower[1][which]] + offset]])
+    left = np.repeat(np.arange(lower.shape[1]), counts)
+    offset = np.arange(len(left)) - np.repeat(np.cumsum(counts) - counts, counts)
+    fill = np.stack([lower[0][left], upper[1][start[lower[1][left]] + offset]])
     fill = fill[:, fill[0] != fill[1]]
     keys = np.unique(np.concatenate([rows * dimension + columns, fill[0] * dimension + fill[1]]))
     return pivots[np.stack(np.divmod(keys, dimension))]
 
 
 def order(size: int, pattern: set[Entry]) -> EliminationPlan:
-    """Pivots by least degree in the symmetrised pattern, rows without a diagonal entry of J first; O(fill log n)."""
+    """Order pivots by least degree in the symmetrised pattern, rows without a diagonal entry of J first; O(fill log n)."""
     off = [(r, c) for r, c in sorted(pattern) if r != c]
-    found = _eliminate_all(size, [r for r, _ in off], [c for _, c in off], {r for r, c in pattern if r == c}, np.inf)
-    if found is None:
+    rows, columns = [r for r, _ in off], [c for _, c in off]
+    steps = _eliminate_all(size, rows, columns, {r for r, c in pattern if r == c}, np.inf)
+    if steps is None:
         raise RuntimeError("an elimination without a limit of fill was given up; this is a mistake in the program")
-    return found
+    return steps
 
 
 def _eliminate_all(
-    size: int, row_of: list[int], column_of: list[int], listed: set[int], limit: float
+    size: int, row_of: Sequence[int], column_of: Sequence[int], on_diagonal: set[int], limit: float
 ) -> EliminationPlan | None:
-    """The exact elimination, None as soon as its off-diagonal entries exceed the limit."""
+    """Return the exact elimination, None as soon as its off-diagonal entries exceed the limit."""
     rows: list[set[int]] = [set() for _ in range(size)]
     columns: list[set[int]] = [set() for _ in range(size)]
     for r, c in zip(row_of, column_of, strict=True):
         rows[r].add(c)
         columns[c].add(r)
     near = [rows[k] | columns[k] for k in range(size)]
-    heap = [(k in listed, len(near[k]), k) for k in range(size)]
+    heap = [(k in on_diagonal, len(near[k]), k) for k in range(size)]
     heapq.heapify(heap)
-    done, found, below, after, count = bytearray(size), [], [], [], len(row_of)
+    done, pivots, below, after, count = bytearray(size), [], [], [], len(row_of)
     while heap:
         _, degree, k = heapq.heappop(heap)
         if done[k] or degree != len(near[k]):
             continue  # an outdated entry: the current one is in the heap as well
         done[k] = 1
-        found.append(k)
+        pivots.append(k)
         below.append(tuple(sorted(columns[k])))
         after.append(tuple(sorted(rows[k])))
-        count += _eliminate(k, rows, columns, near)
+        # each row with an entry in column k gets the entries of row k, and loses that of k
+        for r in columns[k]:
+            count -= len(rows[r])
+            rows[r] |= rows[k]
+            rows[r].discard(r)
+            count += len(rows[r])
+            rows[r].discard(k)
+            near[r] |= rows[k]
+            near[r].discard(r)
+        for c in rows[k]:
+            columns[c].discard(k)
+            columns[c] |= columns[k]
+            columns[c].discard(c)
+            near[c] |= columns[k]
+            near[c].discard(c)
         if count > limit:
             return None
         for j in near[k]:
-            heapq.heappush(heap, (j in listed, len(near[j]), j))
+            near[j].discard(k)
+            heapq.heappush(heap, (j in on_diagonal, len(near[j]), j))
         rows[k] = columns[k] = near[k] = set()
-    return EliminationPlan(tuple(found), tuple(below), tuple(after))
-
-
-def _eliminate(k: int, rows: list[set[int]], columns: list[set[int]], near: list[set[int]]) -> int:
-    """Take pivot k out of the pattern, add the fill that it causes and return how much that is."""
-    fill = 0
-    for r in columns[k]:
-        fill -= len(rows[r])
-        rows[r] |= rows[k]
-        rows[r].discard(r)
-        fill += len(rows[r])
-        rows[r].discard(k)
-        near[r] |= rows[k]
-        near[r].discard(r)
-    for c in rows[k]:
-        columns[c].discard(k)
-        columns[c] |= columns[k]
-        columns[c].discard(c)
-        near[c] |= columns[k]
-        near[c].discard(c)
-    for j in near[k]:
-        near[j].discard(k)
-    return fill
-
-
-def workspace(w: StepWriter, elimination: SparsePlan) -> int:
-    """Groups of scratch memory: stages, stage state, slopes, time slopes and, for implicit methods, the matrix.
-
-    Factors of an incomplete elimination stand beside the matrix, exact ones replace it.  Where M is not the
-    identity, an implicit method keeps it too, and the rates at the start if M depends on the state.  A mean field keeps what nodes are as sources, links that
-    are summed by nodes their sums too.
-    """
-    vectors = (len(w.method.c) + 3) * w.equations.dimension
-    vectors += sum(len(field.alike) for field in mean_fields(w.equations)) * w.equations.n
-    if not w.method.implicit:
-        vectors += sum(links.kept for links in link_sums(w.equations, places(w.equations).joints)[0]) * w.equations.n
-    if not w.method.implicit and not w.equations.inertial:
-        return vectors
-    matrix = elimination.entries if elimination.exact else 2 * elimination.entries
-    if not w.method.implicit or not w.equations.inertial:
-        return vectors + matrix
-    return vectors + 2 * matrix + (0 if w.equations.constant_mass else w.equations.dimension)
+    return EliminationPlan(tuple(pivots), tuple(below), tuple(after))

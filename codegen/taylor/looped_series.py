@@ -22,7 +22,7 @@ from ..program.lowering import lower
 from ..program.passes import Hoist, Names, real
 from ..program.statements import Assign, Comment, Loop, Statement, Store, let, whole
 from ..steps.fields import LinkSums, MeanField, compensated, link_sums, mean_fields
-from ..steps.places import Joint, NodeKindLayout, Span, link_ends, places, span, theirs
+from ..steps.places import Joint, NodeKindLayout, Span, StateLayout, link_ends, span, theirs
 from ..steps.safe_names import NAMES
 from ..steps.step import lane
 from .event_location import Stored, further
@@ -354,7 +354,7 @@ class LoopedSeries(StepWriter):
         named |= {s for edge in eq.edges for s in (edge.weight, *edge.parameters)}
         words = {*(s.name for s in named), *eq.parameters}
         super().__init__(equations, order, words)
-        self.places, self.fields = places(equations), mean_fields(equations)
+        self.places, self.fields = StateLayout(equations), mean_fields(equations)
         self.names = Names([*words, *self.called.values(), *(s + end for s in words for end in ("_here", "_there"))])
         self.varied = [real(name) for name in eq.differing]
         self.waves = SeriesLoop(SeriesGraph(self.names), order)

@@ -25,7 +25,7 @@ def test_full_turns_change_no_error_of_a_step(name: str, method: str, looped: bo
     equations = network(name)
     kernel = Interpreted.of(emit(equations, method, Recording(()), width=1, unroll=0 if looped else 8), FLOATS)
     assert kernel.source.driver.looped is looped
-    weights = [float(weight) for _, _, weight in by_joint(equations)]
+    weights = [float(weight) for (_, _, weight), _ in by_joint(equations)]
     graph = (program(equations).arrays, weights) if looped else ()
     # without atol, so that sizes of states alone decide
     near, far = (take_step(kernel, 0.0, 0.7, list(y), [], 1e-8, 0.0, *graph).error for y in starts(equations))

@@ -267,7 +267,7 @@ def test_a_step_is_what_its_definition_says(case, method, looped, exact_numbers)
         return
     kernel = Interpreted.of(emit(eq, method, Recording(("trajectory",)), width=1, unroll=unroll), EXACT)
     assert kernel.source.driver.looped is looped
-    weights = [mpf(w.numerator) / w.denominator for _, _, w in by_joint(eq)]
+    weights = [mpf(w.numerator) / w.denominator for (_, _, w), _ in by_joint(eq)]
     graph = (program(eq).arrays, np.array(weights, object)) if looped else ()
     for seed in seeds(case):
         t, y, p, _, jacobian, _ = placed(case, seed)

@@ -65,7 +65,7 @@ def test_loops_do_what_the_written_statements_do(case: str, method: str) -> None
     for limit in (8, 0):
         kernel = Interpreted.of(emit(equations, method, Recording(()), width=1, unroll=limit, fill=fill), FLOATS)
         assert kernel.source.driver.looped is (limit == 0)
-        weights = [float(weight) for _, _, weight in by_joint(equations)]
+        weights = [float(weight) for (_, _, weight), _ in by_joint(equations)]
         state, t, h = list(y), 0.0, 0.05
         for _ in range(10):
             graph = (program(equations, fill).arrays, weights) if limit == 0 else ()
