@@ -1,8 +1,10 @@
-"""Sparse Gaussian elimination of (s - J), planned from the pattern of J and written out as statements.
+"""Sparse Gaussian elimination of (shift M - J), planned from the pattern of J and written out as statements.
 
-The plan picks pivots on the diagonal by least fill (Markowitz, Management Science 3, 255, 1957), so positions of a
+    pattern ─plan─▶ EliminationPlan;  entries ─write_factors─▶ Factors;  right-hand side ─write_solve─▶ statements
+
+The plan picks pivots on the diagonal by least fill (Markowitz, Management Science 3, 255, 1957). So positions of a
 mechanical network are eliminated before velocities, a chain or any tree causes no fill, and a ring or a star costs
-what it must.  No numerical pivoting: s is chosen by the step control, and a bad pivot shows up as a rejected step.
+what it must. No numerical pivoting: the step control chooses the shift, and a bad pivot shows up as a rejected step.
 An infinite pivot, as of sqrt(x) at 0, would make the step and its error 0; its inverse is NaN, and so the error is.
 """
 
@@ -18,43 +20,51 @@ from ..program.lowering import lower
 from ..program.statements import Statement, let
 
 Entry = tuple[int, int]
+"""Row and column of an entry of a matrix."""
+
 Entries = dict[Entry, sp.Expr]
+
+SOLVES = 8
+"""Solutions for each factorisation in the cost of a plan: Rosenbrock methods have six to eight stages."""
 
 
 @dataclass(frozen=True, slots=True)
 class EliminationPlan:
-    """Elimination order with, for each pivot, the rows below it and the columns after it in its row."""
+    """Pivots in their order, and for each the rows below it and the columns after it in its row."""
 
     order: tuple[int, ...]
     below: tuple[tuple[int, ...], ...]
     after: tuple[tuple[int, ...], ...]
 
+    @property
+    def multiplications(self) -> int:
+        """The cost of one factorisation and its solutions."""
+        pairs = list(zip(self.below, self.after, strict=True))
+        return sum(len(b) * (1 + len(a)) for b, a in pairs) + SOLVES * sum(1 + len(b) + len(a) for b, a in pairs)
+
 
 def plan(size: int, pattern: set[Entry]) -> EliminationPlan:
-    """Order the pivots 0 … size-1 and list the fill.
+    """Order the pivots 0 … size-1 by least Markowitz cost and list the fill.
 
-    Two orders are tried, by least Markowitz cost from the start or after all rows without a diagonal entry of J, whose
-    pivots need no division; the one with fewer multiplications is taken, the second where they are equal.
+    A second order begins with the rows without a diagonal entry of J, whose pivots need no division. It is taken where
+    it is not more expensive.
     """
     first = frozenset(k for k in range(size) if (k, k) not in pattern)
-    return min((_order(size, pattern, first), _order(size, pattern, frozenset())), key=_multiplications)
+    plans = (_ordered(size, pattern, first), _ordered(size, pattern, frozenset()))
+    return min(plans, key=lambda each: each.multiplications)
 
 
-def _multiplications(steps: EliminationPlan) -> int:
-    """Cost of one factorisation and eight solves."""
-    pairs = list(zip(steps.below, steps.after, strict=True))
-    return sum(len(b) * (1 + len(a)) for b, a in pairs) + 8 * sum(1 + len(b) + len(a) for b, a in pairs)
-
-
-def _order(size: int, pattern: set[Entry], first: frozenset[int]) -> EliminationPlan:
+def _ordered(size: int, pattern: set[Entry], first: frozenset[int]) -> EliminationPlan:
+    """Order the pivots, those in `first` before others."""
     rows = {i: {i} | {c for r, c in pattern if r == i} for i in range(size)}
     columns = {i: {i} | {r for r, c in pattern if c == i} for i in range(size)}
-    left = set(range(size))
+    remaining = set(range(size))
     order, below, after = [], [], []
-    while left:
-        pivot = min(left, key=lambda k: (k not in first, (len(rows[k]) - 1) * (len(columns[k]) - 1), k))
-        left.remove(pivot)
+    while remaining:
+        pivot = min(remaining, key=lambda k: (k not in first, (len(rows[k]) - 1) * (len(columns[k]) - 1), k))
+        remaining.remove(pivot)
         down, right = sorted(columns[pivot] - {pivot}), sorted(rows[pivot] - {pivot})
+        # each row below gets the entries of the pivot's row
         for r in down:
             rows[r] |= set(right)
             rows[r].discard(pivot)
@@ -67,36 +77,9 @@ def _order(size: int, pattern: set[Entry], first: frozenset[int]) -> Elimination
     return EliminationPlan(tuple(order), tuple(below), tuple(after))
 
 
-class _FactorWriter:
-    """Statements of the factors; equal right-hand sides share one name."""
-
-    def __init__(self, labels: tuple[str, ...]) -> None:
-        self.labels = labels
-        self.statements: list[Statement] = []
-        self.names: dict[Expression, Name] = {}
-
-    def let(self, name: str, e: Expression) -> Name:
-        if e not in self.names:
-            self.names[e] = Name(name)
-            self.statements.append(let(name, e))
-        return self.names[e]
-
-    def entry(self, kind: str, r: int, c: int) -> str:
-        return f"{kind}_{self.labels[r]}" if r == c else f"{kind}_{self.labels[r]}_{self.labels[c]}"
-
-    def inverse(self, k: int, e: Expression) -> Name:
-        """The inverse of a pivot, NaN of an infinite one."""
-        pivot = self.let(self.entry("pivot", k, k), e)
-        return self.let(self.entry("inv", k, k), 1.0 / pivot + 0.0 * pivot)
-
-    def atomic(self, name: str, e: Expression) -> Expression:
-        """A name for an entry, or itself where that is a unit or already a name."""
-        return e if e in (ONE, negative(ONE)) or isinstance(e, Name) else self.let(name, e)
-
-
 @dataclass(frozen=True, slots=True)
 class Factors:
-    """Statements that factorise, and the names (or 1.0, -1.0) that the solution uses."""
+    """Statements that factorise, and the names (or 1.0, -1.0) of the factors."""
 
     statements: tuple[Statement, ...]
     lower: dict[Entry, Expression]
@@ -110,63 +93,80 @@ def write_factors(
     labels: tuple[str, ...],
     mass: Mapping[Entry, sp.Expr] | None = None,
 ) -> Factors:
-    """Write the elimination of (shift M - J), `mass` the entries of M, None or empty where it is the identity.
-
-    `reach` is 1/shift, the inverse of the pivot shift where J has no diagonal entry.
-    """
+    """Write the elimination of (shift M - J), `mass` the entries of M, None or empty where it is the identity."""
     shift = sp.Symbol("shift")
     scaled = {(k, k): shift for k in steps.order} if not mass else {key: shift * e for key, e in mass.items()}
     return write_elimination(steps, scaled, jacobian, labels)
 
 
 def write_elimination(
-    steps: EliminationPlan, matrix: Mapping[Entry, sp.Expr], taken: Mapping[Entry, sp.Expr], labels: tuple[str, ...]
+    steps: EliminationPlan,
+    matrix: Mapping[Entry, sp.Expr],
+    subtracted: Mapping[Entry, sp.Expr],
+    labels: tuple[str, ...],
 ) -> Factors:
-    """Write the elimination of `matrix` minus `taken`; a symmetric matrix alone takes half the operations, L D L^T."""
-    writer = _FactorWriter(labels)
-    entries = {key: lower(matrix.get(key, sp.S.Zero) - taken.get(key, sp.S.Zero)) for key in sorted({*matrix, *taken})}
-    value = {
-        key: writer.atomic(writer.entry("m", *key), e) for key, e in entries.items() if key[0] != key[1] and e != ZERO
-    }
-    symmetric = not taken and all(entries.get((c, r), ZERO) == e for (r, c), e in entries.items())
+    """Write the elimination of `matrix` minus `subtracted`; a symmetric matrix takes half the operations, L D L^T."""
+    statements: list[Statement] = []
+    names: dict[Expression, Name] = {}
+
+    def assign(name: str, e: Expression) -> Name:
+        # equal expressions, of equal nodes, share one name
+        if e not in names:
+            names[e] = Name(name)
+            statements.append(let(name, e))
+        return names[e]
+
+    def label(kind: str, r: int, c: int) -> str:
+        return f"{kind}_{labels[r]}" if r == c else f"{kind}_{labels[r]}_{labels[c]}"
+
+    both = sorted({*matrix, *subtracted})
+    entries = {key: lower(matrix.get(key, sp.S.Zero) - subtracted.get(key, sp.S.Zero)) for key in both}
+    symmetric = not subtracted and all(entries.get((c, r), ZERO) == e for (r, c), e in entries.items())
     diagonal = {k: entries[k, k] for k in steps.order}
+    # off-diagonal entries by name; units and names stay
+    value: dict[Entry, Expression] = {}
+    for key, e in entries.items():
+        if key[0] != key[1] and e != ZERO:
+            value[key] = e if e in (ONE, negative(ONE)) or isinstance(e, Name) else assign(label("m", *key), e)
     below: dict[Entry, Expression] = {}
     inverse: dict[int, Expression] = {}
     for k, down, right in zip(steps.order, steps.below, steps.after, strict=True):
-        pivot = diagonal[k]
-        inverse[k] = Name("reach") if pivot == Name("shift") else writer.inverse(k, pivot)
+        if diagonal[k] == Name("shift"):
+            inverse[k] = Name("reach")  # 1/shift, which the step has
+        else:
+            pivot = assign(label("pivot", k, k), diagonal[k])
+            inverse[k] = assign(label("inv", k, k), 1.0 / pivot + 0.0 * pivot)  # NaN of an infinite pivot
         for r in down:
-            below[r, k] = writer.let(writer.entry("l", r, k), times(value[r, k], inverse[k]))
+            below[r, k] = assign(label("l", r, k), times(value[r, k], inverse[k]))
             for c in right:
-                old = diagonal[r] if r == c else value.get((r, c))
-                new = less(old, below[r, k], value[k, c])
+                new = less(diagonal[r] if r == c else value.get((r, c)), below[r, k], value[k, c])
                 if r == c:
                     diagonal[r] = new
                 elif symmetric and c < r:
                     value[r, c] = value[c, r]
                 else:
-                    value[r, c] = writer.let(writer.entry("m", r, c) + f"_{k}", new)
+                    value[r, c] = assign(label("m", r, c) + f"_{k}", new)
     upper = {(k, c): value[k, c] for k, right in zip(steps.order, steps.after, strict=True) for c in right}
-    return Factors(tuple(writer.statements), below, upper, inverse)
+    return Factors(tuple(statements), below, upper, inverse)
 
 
 def write_solve(
     steps: EliminationPlan, factors: Factors, right: Mapping[int, str], result: Mapping[int, str]
 ) -> list[Statement]:
     """Write the solution: names `right` of the right-hand sides are overwritten, `result` names the unknowns."""
-    found: list[Statement] = []
+    statements: list[Statement] = []
     for k, down in zip(steps.order, steps.below, strict=True):
-        found += [let(right[r], less(Name(right[r]), factors.lower[r, k], Name(right[k]))) for r in down]
+        statements += [let(right[r], less(Name(right[r]), factors.lower[r, k], Name(right[k]))) for r in down]
     for k, after in zip(reversed(steps.order), reversed(steps.after), strict=True):
-        rest: Expression = Name(right[k])
+        value: Expression = Name(right[k])
         for c in after:
-            rest = less(rest, factors.upper[k, c], Name(result[c]))
-        found.append(let(result[k], Product((rest, factors.inverse[k]))))
-    return found
+            value = less(value, factors.upper[k, c], Name(result[c]))
+        statements.append(let(result[k], Product((value, factors.inverse[k]))))
+    return statements
 
 
 def times(x: Expression, y: Expression) -> Expression:
-    """x*y with signs and unit factors folded."""
+    """Return x*y with signs and unit factors folded."""
     for one, other in ((x, y), (y, x)):
         if one == ONE:
             return other
@@ -178,6 +178,6 @@ def times(x: Expression, y: Expression) -> Expression:
 
 
 def less(start: Expression | None, x: Expression, y: Expression) -> Expression:
-    """start - x*y, tidied; without a start -x*y."""
+    """Return start - x*y with signs and unit factors folded; without a start -x*y."""
     change = negative(times(x, y))
     return change if start is None else plus(start, change)

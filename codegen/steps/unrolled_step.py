@@ -1,4 +1,13 @@
-"""A step for a small network, written out node by node, its states in registers."""
+"""The statements of a step for a small network, written out node by node, its states in registers.
+
+The prefix of a name says which vector a state belongs to:
+
+    x_1     at the start        u_x_1    in a stage             n_x_1    at the end
+    f_x_1   right-hand side     k2_x_1   rate of stage 2        r_x_1    right-hand side of linear equations
+    g_x_1   what a mass matrix makes of a vector (mass_solve)   e_x_1    error
+
+Jacobian entries of nodes and links are added before they are lowered, so that zeros and units cost nothing.
+"""
 
 from __future__ import annotations
 
@@ -13,32 +22,26 @@ from ..program.expressions import ZERO, Expression, Load, Name, Number, Product,
 from ..program.lowering import lower
 from ..program.passes import real
 from ..program.statements import If, Return, let, store
-from .blocks import NodeBlocks
 from .elimination import Entries, plan, times, write_factors, write_solve
 from .mass_solve import Mass
 from .step import NOW, StepWriter, entry, lane, linearised, prefix
 
 
 class UnrolledStep(StepWriter):
-    """Names its vectors by prefixes: x_1 at the start, u_x_1 in a stage, f_x_1 the slope, k2_x_1 of stage 2, n_x_1 new."""
+    """Keeps each state of each vector in a register."""
 
     @cached_property
     def mass(self) -> Mass:
-        """What is written about M."""
+        """The mass matrix."""
         return Mass(self)
 
-    def of(self, i: int) -> NodeBlocks:
-        """The blocks of node i."""
-        return self.kinds[self.equations.kind_of[i]]
-
     def at(self, i: int, base: str) -> dict[sp.Symbol, sp.Symbol]:
-        """The names of the states of node i in a vector, and of the parameters that it has for itself."""
+        """Rename the states of node i to those in a vector, and its parameters to those of node i."""
         states = self.equations.node_at(i).state
-        found = {s: real(f"{prefix(base)}{s.name}_{i + 1}") for s in states}
-        return {**self.equations.at_node(i), **found}
+        return {**self.equations.at_node(i), **{s: real(f"{prefix(base)}{s.name}_{i + 1}") for s in states}}
 
     def stages(self, name: str, count: int) -> list[str]:
-        """Names of the first `count` stage values of one state variable."""
+        """Return the names of the first `count` rates of one state."""
         return [f"k{j + 1}_{name}" for j in range(count)]
 
     def opening(self) -> None:
@@ -51,17 +54,17 @@ class UnrolledStep(StepWriter):
 
     def slopes(self, base: str, out: str) -> None:
         """Compute the right-hand side at one vector of states into another."""
-        for i in range(self.equations.n):
-            body, names = self.of(i).rhs, self.at(i, base)
+        for i, kind in enumerate(self.equations.kind_of):
+            body, names = self.kinds[kind].rhs, self.at(i, base)
             targets = [f"{prefix(out)}{s.name}_{i + 1}" for s in self.equations.node_at(i).state]
-            self.put(*self.node_call("node", self.equations.kind_of[i], body, targets, names))
+            self.put(*self.node_call("node", kind, body, targets, names))
             for target, e in zip(targets, body.results, strict=True):
                 if self.is_plain(e):
                     self.let(target, lane(lower(e.xreplace(names))))
         self.links(base, out)
 
     def links(self, base: str, out: str, at: Mapping[sp.Symbol, sp.Symbol] = NOW) -> None:
-        """Add what the links contribute to the right-hand side, `at` the time of a stage or at that of the start."""
+        """Add the rates of all links, one sum for each state; `at` renames the time."""
         eq, terms = self.equations, dict[str, list[Expression]]()
         staged = {real(n): real(prefix(base) + n) for n in self.state} | dict(at)
         for link, edge in eq.linked():
@@ -75,62 +78,60 @@ class UnrolledStep(StepWriter):
     # -- linearisation ----------------------------------------------------------------------------------------
 
     def linearise(self) -> None:
-        """Right-hand side, Jacobian and time derivative at the start, and the factors of shift*M - J."""
+        """Compute right-hand side, Jacobian and time derivative at the start, and the factors of shift*M - J."""
         if self.method.inexact:
             self.mass.refuse(f"integrator {self.method.name}")
-        own = self.linear_nodes()
-        entries = self.mass.at_start(self.gather(own))
+        eq, results = self.equations, self.linear_nodes()
+        entries = self.mass.at_start(self.jacobian(results))
         self.steps = plan(len(self.state), set(entries) | self.mass.coupled)
         self.factors = write_factors(self.steps, entries, tuple(self.state), self.mass.entries)
         self.note(f"factors of {'shift*M - J' if self.mass.entries else 'shift - J'}")
         self.put(*self.factors.statements)
+        # partial time derivative by state: that of the node, then those of its links
         self.time_slopes = {
-            k: lower(own[i][f"ft_{s.name}"])
-            for i, places in enumerate(self.equations.places)
-            for k, s in zip(places, self.equations.node_at(i).state, strict=True)
+            k: lower(results[i][f"ft_{s.name}"])
+            for i, places in enumerate(eq.places)
+            for k, s in zip(places, eq.node_at(i).state, strict=True)
         }
-        for k, e in self.equations.link_time_derivative():
+        for k, e in eq.link_time_derivative():
             self.time_slopes[k] = lower(e) if self.time_slopes[k] == ZERO else plus(self.time_slopes[k], lower(e))
 
     def linear_nodes(self) -> list[dict[str, sp.Expr]]:
-        """Write right-hand side, Jacobian and time derivative at the start; return the value of each entry, by node."""
+        """Write right-hand side, Jacobian and time derivative at the start; return the results of each node by name."""
         eq = self.equations
         self.note("right-hand side, Jacobian and time derivative at the start")
         self.timed("t", self.wanted([blocks.linear for blocks in self.kinds]))
-        kept = self.keep_times()
-        own: list[dict[str, sp.Expr]] = []
-        for i in range(eq.n):
-            states, body, at = eq.node_at(i).state, self.of(i).linear, self.at(i, "y")
-            words = linearised(states)[: len(body.results)]
-            names = [f"{word}_{i + 1}" for word in words]
-            self.put(*self.node_call("node_linear", eq.kind_of[i], body, names, at))
-            found = {}
-            for k, (word, name, e) in enumerate(zip(words, names, body.results, strict=True)):
-                plain = self.is_plain(e)
-                if plain and k < len(states):
+        # stages assign the time terms again, so bare ones in the results are copied
+        plain = [e for blocks in self.kinds for e in blocks.linear.results if self.is_plain(e)]
+        overwritten = self.wanted([blocks.rhs for blocks in self.kinds]) & {s for e in plain for s in e.free_symbols}
+        copies = {s: real(f"at_{s.name}") for s in sorted(overwritten, key=lambda s: s.name)}
+        self.put(*(let(copy.name, s.name) for s, copy in copies.items()))
+        results: list[dict[str, sp.Expr]] = []
+        for i, kind in enumerate(eq.kind_of):
+            state, body, at = eq.node_at(i).state, self.kinds[kind].linear, self.at(i, "y")
+            keys = linearised(state)[: len(body.results)]
+            names = [f"{key}_{i + 1}" for key in keys]
+            self.put(*self.node_call("node_linear", kind, body, names, at))
+            values = {}
+            for k, (key, name, e) in enumerate(zip(keys, names, body.results, strict=True)):
+                # rates are variables, as links add to them; plain entries of J need none
+                if self.is_plain(e) and k < len(state):
                     self.let(name, lane(lower(e.xreplace(at))))
-                found[word] = (e.xreplace(at) if plain else real(name)).xreplace(kept)
-            own.append(found)
+                values[key] = (e.xreplace(at) if self.is_plain(e) else real(name)).xreplace(copies)
+            results.append(values)
         self.links("y", "f", {})
-        return own
+        return results
 
-    def keep_times(self) -> dict[sp.Symbol, sp.Symbol]:
-        """Keep time terms that stand for themselves in the linearisation, where stages give these names other values."""
-        results = [e for blocks in self.kinds for e in blocks.linear.results if self.is_plain(e)]
-        moved = self.wanted([blocks.rhs for blocks in self.kinds]) & {s for e in results for s in e.free_symbols}
-        kept = {s: real(f"at_{s.name}") for s in sorted(moved, key=lambda s: s.name)}
-        self.put(*(let(there.name, here.name) for here, there in kept.items()))
-        return kept
-
-    def gather(self, own: list[dict[str, sp.Expr]]) -> Entries:
-        """Entries of the whole Jacobian: those of the nodes by name, plus what the links add."""
+    def jacobian(self, results: list[dict[str, sp.Expr]]) -> Entries:
+        """Return the non-zero entries of the Jacobian: those of nodes by name, plus those of links."""
         eq = self.equations
         entries: Entries = {}
         for i, places in enumerate(eq.places):
             state = eq.node_at(i).state
             for row, r in zip(places, state, strict=True):
                 for column, c in zip(places, state, strict=True):
-                    entries[row, column] = own[i][entry(r, c)]
+                    entries[row, column] = results[i][entry(r, c)]
+        # a W-method (inexact) leaves out entries between nodes: its elimination is one of each node
         node = {k: i for i, places in enumerate(eq.places) for k in places}
         for key, e in eq.link_jacobian():
             if node[key[0]] == node[key[1]] or not self.method.inexact:
@@ -140,43 +141,48 @@ class UnrolledStep(StepWriter):
     # -- stages -----------------------------------------------------------------------------------------------
 
     def advance(self, i: int) -> None:
-        """Compute the state of stage i > 0; a row of `a` equal to `b` is the new state itself."""
+        """Compute the state of stage i > 0."""
         m = self.method
         for name in self.state:
             if m.implicit:
                 self.let(f"u_{name}", stage_state(m.a[i], m.a[i - 1], name))
-            elif i >= m.stages and m.a[i] == m.b:
+            elif i >= m.stages and m.a[i] == m.b:  # a stage of the dense output at the new state
                 self.let(f"u_{name}", f"n_{name}")
             else:
                 self.let(f"u_{name}", Name(name) + self.increment(m.a[i], self.stages(name, i)))
 
     def solve(self, i: int) -> None:
-        """Turn the slopes of stage i into its rates."""
+        """Turn the right-hand side of stage i into its rates."""
         m = self.method
         if not m.implicit:
             self.mass.explicit("u" if i else "y", f"k{i + 1}")
             return
-        rights, results = {}, {}
         sums = {name: linear(m.big_c[i], self.stages(name, i)) for name in self.state} if i > 0 else {}
-        known = self.mass.known(sums, i)
+        coupled = self.mass.stage_terms(sums, i)
         for slot, name in enumerate(self.state):
-            terms = [known.get(name, Name(f"f_{name}"))]
-            if i > 0 and name not in known:
+            terms = [coupled.get(name, Name(f"f_{name}"))]
+            if i > 0 and name not in coupled:
                 terms.append(Product((Name("rate"), sums[name])))
             self.let(f"r_{name}", plus(*terms, *self.time_slope(i, self.time_slopes[slot])))
-            rights[slot], results[slot] = f"r_{name}", f"k{i + 1}_{name}"
+        rights, results = ({k: f"{p}_{name}" for k, name in enumerate(self.state)} for p in ("r", f"k{i + 1}"))
         self.put(*write_solve(self.steps, self.factors, rights, results))
 
     # -- end --------------------------------------------------------------------------------------------------
 
     def finish(self) -> None:
-        """Compute the new state and the error; stages that serve the dense output alone run if DENSE."""
+        """Compute the new state, the error and the dense output."""
         m = self.method
         self.note("new state and error")
-        errors = [self.new_state(name) for name in self.state]
+        errors: list[Expression] = []  # the first estimate
+        for name in self.state:
+            values = self.stages(name, m.stages)
+            by_rates = Name(name) + self.increment(m.b, values)
+            self.let(f"n_{name}", stage_state(m.b, m.a[-1], name) if m.implicit else by_rates)
+            errors.append(self.increment(m.e[0], values))
         if m.dense_error:
             self.put(*(let(f"e_{name}", e) for name, e in zip(self.state, errors, strict=True)))
             errors = [Name(f"e_{name}") for name in self.state]
+        # the dense output, and stages that serve it alone
         with self.apart() as dense:
             for i in range(m.stages, len(m.c)):
                 self.stage(i)
@@ -192,6 +198,7 @@ class UnrolledStep(StepWriter):
             self.put(store("y_new", slot, f"n_{name}"))
             self.put(*self.embedded(self.stages(name, m.stages)))
             self.let(f"e_{name}", self.scaled_error(e, name, f"n_{name}", periods[slot]))
+        # the largest error; `total` keeps NaN, which a maximum may lose
         first, *others = terms = [Name(f"e_{name}") for name in self.state]
         self.let("total", plus(*terms))
         self.let("error", first)
@@ -199,25 +206,19 @@ class UnrolledStep(StepWriter):
         self.put(Return((Name("error") + 0.0 * Name("total"),), "NaN or infinite where any estimate is"))
 
     def stiff_errors(self) -> None:
-        """Raise the errors of states with large pivots to that of the dense output."""
+        """Raise the errors of states to those of the dense output, which a large pivot does not damp."""
         self.note("the dense output has errors of its own where the state is stiff")
+        last = self.method.dense[-1]
         for slot, name in enumerate(self.state):
             pivot, mass = self.factors.inverse[slot], self.mass.entries.get((slot, slot), sp.S.One)
             if pivot != Name("reach"):
                 self.let(f"f_{name}", times(lower(mass), Name("shift") * pivot))
-                last = linear(self.method.dense[-1], self.stages(name, len(self.method.dense[-1])))
-                self.let(f"e_{name}", self.stiff_error(f"e_{name}", last, Name(f"f_{name}")))
-
-    def new_state(self, name: str) -> Expression:
-        """Compute the new value of one state variable; returns its error, the first one of two."""
-        m, values = self.method, self.stages(name, self.method.stages)
-        last = stage_state(m.b, m.a[-1], name) if m.implicit else Name(name) + self.increment(m.b, values)
-        self.let(f"n_{name}", last)
-        return self.increment(m.e[0], values)
+                value = linear(last, self.stages(name, len(last)))
+                self.let(f"e_{name}", self.stiff_error(f"e_{name}", value, Name(f"f_{name}")))
 
 
 def stage_state(row: Sequence[float], previous: Sequence[float], name: str) -> Expression:
-    """y + sum a_j k_j, written as the previous stage's state plus its increment where the rows allow that."""
+    """Return y + sum a_j k_j, as the state of the previous stage plus its rate where the rows allow that."""
     names = [f"k{j + 1}_{name}" for j in range(len(row))]
     if len(previous) > 0 and tuple(row) == (*previous, 1.0):
         return Name(f"u_{name}") + names[-1]
