@@ -25,7 +25,7 @@ Entry = tuple[int, int]
 Entries = dict[Entry, sp.Expr]
 
 SOLVES = 8
-"""Solutions for each factorisation in the cost of a plan: Rosenbrock methods have six to eight stages."""
+"""Solutions for each factorisation in the cost of a plan: the stages of rodas5p."""
 
 
 @dataclass(frozen=True, slots=True)

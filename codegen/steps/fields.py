@@ -1,13 +1,18 @@
-"""The statements of a mean field: a loop over the nodes that adds up what they are as sources, and one that applies the sums.
+"""Links that are sums of products of both ends, as loops over nodes in place of a loop over pairs.
 
-The sums are compensated, so that their error does not grow with the number of nodes (W. Kahan, Commun. ACM 8, 40 (1965)).
-Links in a list whose rates are products of both ends take a loop over the nodes, one over the links that adds up, and one over
-the nodes that applies the sums of each.
+    rate of node i = sum over k of target_k(i) * (sum over j of source_k(j))
+
+`MeanField`: links of all pairs. One loop over the nodes adds up the sources, one applies the sums. The sums are compensated,
+so that their error does not grow with the number of nodes (W. Kahan, Commun. ACM 8, 40 (1965)).
+`LinkSums`: links in a list. One loop over the nodes computes the sources, one over the links adds them up at the targets, one
+over the nodes applies the sums of each node.
+
+Both keep one number of each node for each function in the part FIELD of the workspace, meanwhile.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 
@@ -18,21 +23,22 @@ from synchain.models.graphs.links import AllPairs
 from synchain.models.interactions.separation import Separated, Summed, separated, summed
 from synchain.models.mechanics.components import Edge, Node
 
-from ..program.expressions import Load, Name, Value, as_expression, plus
+from ..program.expressions import Expression, Load, Name, Value, as_expression
 from ..program.lowering import lower
-from ..program.passes import real, share
-from ..program.statements import Statement, accumulate, let, store
+from ..program.passes import StraightLine, real, share
+from ..program.statements import Loop, Statement, accumulate, let, store
 from .blocks import assigned
-from .places import Joint, StateLayout, link_ends, named, span
+from .places import Joint, StateLayout, add_to, link_ends, named, span
 from .step import NOW, lane
 
 
 @dataclass(frozen=True, slots=True)
 class MeanField:
-    """The links of all pairs of a network, as what is done with them: sums, factors that all nodes share, and rates.
+    """The links of all pairs of a network, as sums over the nodes.
 
-    sums: the functions of the source that are summed, by names.  shared: sums of these with factors that no node has for
-    itself, by names.  rates: what is added to the rates of a node, in these names and functions of the node.
+    shifted: states of which differences alone matter. sums: functions of the source that are summed, by the names of the
+    sums. shared: sums times factors that all nodes share, by name. rates: the rates of a node, in these names and functions
+    of the node.
     """
 
     edge: Edge
@@ -44,17 +50,19 @@ class MeanField:
 
     @classmethod
     def of(cls, number: int, edge: Edge, node: Node, pairs: AllPairs, parts: Separated) -> MeanField:
-        """The mean field of this number among those of a network."""
+        """Make the mean field of this number in a network."""
         weight = {edge.weight: sp.Rational(pairs.weight.numerator, pairs.weight.denominator)}
         symbols = {e: real(f"sum_{number}_{k}") for k, e in enumerate(parts.sources) if e != 1}
         totals = {sp.S.One: sp.Integer(pairs.n), **symbols}
         shared: dict[sp.Expr, sp.Symbol] = {}
         rates = []
-        for own, row in zip(parts.own, parts.products, strict=True):
+        for itself, row in zip(parts.own, parts.products, strict=True):
+            # the sums with one function of the target are added before they are multiplied by it
             grouped: dict[sp.Expr, sp.Expr] = {}
             for factor, target, source in row:
                 grouped[target] = grouped.get(target, sp.S.Zero) + factor.xreplace(weight) * totals[source]
-            rate = -own.xreplace(weight)
+            # the sums run over all nodes; a node has no link with itself
+            rate = -itself.xreplace(weight)
             for target, total in grouped.items():
                 s = shared.setdefault(total, real(f"sum_{number}_of_{len(shared)}"))
                 rate += target.xreplace(weight) * s
@@ -65,59 +73,53 @@ class MeanField:
     @property
     def alike(self) -> dict[sp.Symbol, sp.Expr]:
         """The functions of the source that occur as functions of the target too, by the names of their sums."""
-        swap = {**dict(zip(self.edge.there, self.edge.here, strict=True)), **dict(self.edge.theirs)}
-        found = {s: e.xreplace(swap) for s, e in self.sums.items()}
-        return {s: e for s, e in found.items() if not e.is_Symbol and any(rate.has(e) for rate in self.rates)}
+        functions = {s: e.xreplace(_as_target(self.edge)) for s, e in self.sums.items()}
+        return {s: e for s, e in functions.items() if not e.is_Symbol and any(rate.has(e) for rate in self.rates)}
 
-    def statements(self, places: StateLayout, base: str, out: str, kept: int = 0) -> list[Statement]:
-        """Both loops, at one vector of states; they add to the slopes in `out`.
+    def statements(self, places: StateLayout, base: str, out: str, start: int = 0) -> list[Statement]:
+        """Write both loops at one vector of states, and what all nodes share between them; they add to the vector `out`.
 
-        What a node is as a source and as a target is computed once, and stands in FIELD behind `kept` others meanwhile.
+        Functions of the source and of the target are computed once, and kept in the rows of FIELD from `start` on.
         """
         names = (real(f"sum_part_{k}") for k in count())
         swap = named(Joint(self.edge, self.node, self.node, span("e", 0))) | NOW
-        found = places.read(self.node, base, "_first", "0") if self.shifted else []
-        at = {s: Name("FIELD") + k * Name("NODES") for k, s in enumerate(self.alike, start=kept)}
+        rows = _rows(self.alike, start)
+        # 1. the sums, of states that are counted from those of the first node
+        statements = places.read(self.node, base, "_first", "0") if self.shifted else []
         used = {s for e in self.sums.values() for s in e.free_symbols}
         body = share([e.xreplace(swap) for e in self.sums.values()], names)
-        there = self.states(places, base, "_there", "j")
-        there += places.of_source(self.edge, used)
-        there += assigned(body)
+        loop = [*self._states(places, base, "_there", "j"), *places.of_source(self.edge, used), *assigned(body)]
         for total, e in zip(self.sums, body.results, strict=True):
-            found += [let(total.name, 0.0 * Name("h")), let(f"{total}_rest", 0.0 * Name("h"))]
-            if total in at:
-                there += [let(f"{total}_own", lower(e)), store("dense", at[total] + "j", f"{total}_own")]
+            statements += [let(total.name, 0.0 * Name("h")), let(f"{total}_rest", 0.0 * Name("h"))]
+            if total in rows:
+                loop += [let(f"{total}_own", lower(e)), store("dense", rows[total] + "j", f"{total}_own")]
                 e = real(f"{total}_own")
-            there += compensated(total.name, lower(e))
+            loop += compensated(total.name, lower(e))
         if self.sums:
-            found.append(span("j", "NODES").over(there))
-        found += [let(s.name, lower(e.xreplace(NOW))) for s, e in self.shared.items()]
-        own = {e: real(f"{s}_own") for s, e in self.alike.items()}
-        body = share([e.xreplace(own).xreplace(swap) for e in self.rates], names)
-        here = [*self.states(places, base, "_here", "i"), *places.own(body.symbols)]
-        here += [let(f"{s}_own", Load("dense", place + "i")) for s, place in at.items()]
-        here += assigned(body)
-        for c, e in enumerate(body.results):
-            if e != 0:
-                here.append(accumulate("dense", plus(Name(out), places.place(c)), lower(e)))
-        return [*found, span("i", "NODES").over(here)]
+            statements.append(span("j", "NODES").over(loop))
+        # 2. sums times what all nodes share
+        statements += [let(s.name, lower(e.xreplace(NOW))) for s, e in self.shared.items()]
+        # 3. the rates
+        kept = {e: real(f"{s}_own") for s, e in self.alike.items()}
+        body = share([e.xreplace(kept).xreplace(swap) for e in self.rates], names)
+        loads = [*self._states(places, base, "_here", "i"), *places.own(body.symbols)]
+        loads += [let(f"{s}_own", Load("dense", row + "i")) for s, row in rows.items()]
+        return [*statements, _applied(places, out, loads, body)]
 
-    def states(self, places: StateLayout, base: str, suffix: str, index: str) -> list[Statement]:
-        """Load the states of a node; those of which differences alone matter are counted from the first node's."""
-        found = places.read(self.node, base, suffix, index)
-        for k in self.shifted:
-            name = self.node.state[k].name
-            found.append(let(f"{name}{suffix}", Name(f"{name}{suffix}") - Name(f"{name}_first")))
-        return found
+    def _states(self, places: StateLayout, base: str, suffix: str, index: str) -> list[Statement]:
+        """Load the states of a node, those `shifted` counted from the first node's: sums of large numbers lose digits."""
+        shifted = [self.node.state[k].name for k in self.shifted]
+        moved = [let(f"{name}{suffix}", Name(f"{name}{suffix}") - Name(f"{name}_first")) for name in shifted]
+        return [*places.read(self.node, base, suffix, index), *moved]
 
 
 @dataclass(frozen=True, slots=True)
 class LinkSums:
-    """The links of a joint that are products of both ends, as functions of the source, sums over links, and rates.
+    """The part of a joint's links that is products of both ends, as sums over the links of each node.
 
-    functions: those of the source, by names.  sums: what each link multiplies one of these by, and the name of that (one if
-    there is none), by the names of the sums.  factors: functions of parameters that all links share, by names.  rates: what
-    is added to the rates of a node, in these names and functions of it.
+    functions: those of the source, by name. sums: what each link multiplies a function by, and the name of the function
+    (or one), by the names of the sums. factors: functions of parameters that all links share, by name. rates: the rates of
+    a node, in these names and functions of the node.
     """
 
     joint: Joint
@@ -128,19 +130,20 @@ class LinkSums:
 
     @classmethod
     def of(cls, number: int, joint: Joint, parts: Summed) -> LinkSums:
-        """Those of the joint of some number."""
+        """Make the sums of the joint of this number."""
         functions = {e: real(f"sum_{number}_from_{k}") for k, e in enumerate(parts.sources)}
         sums: dict[tuple[sp.Expr, sp.Expr], sp.Symbol] = {}
         factors: dict[sp.Expr, sp.Symbol] = {}
         rates = []
         for row in parts.products:
             grouped: dict[sp.Expr, sp.Expr] = {}
-            for shared, own, target, source in row:
-                part = (own, functions.get(source, sp.S.One))
+            for factor, of_link, target, source in row:
+                part = (of_link, functions.get(source, sp.S.One))
                 total = sums.setdefault(part, real(f"sum_{number}_{len(sums)}"))
-                if shared.atoms(sp.Function, sp.Pow):
-                    shared = factors.setdefault(shared, real(f"sum_{number}_by_{len(factors)}"))
-                grouped[target] = grouped.get(target, sp.S.Zero) + shared * total
+                # a function or power is computed once, outside of the loops
+                if factor.atoms(sp.Function, sp.Pow):
+                    factor = factors.setdefault(factor, real(f"sum_{number}_by_{len(factors)}"))
+                grouped[target] = grouped.get(target, sp.S.Zero) + factor * total
             rates.append(sp.Add(*(target * total for target, total in grouped.items())))
         return cls(
             joint,
@@ -152,84 +155,94 @@ class LinkSums:
 
     @property
     def kept(self) -> int:
-        """Numbers of each node that stand in memory between the loops."""
+        """The rows of FIELD: numbers of each node between the loops."""
         return len(self.functions) + len(self.sums)
 
-    @property
-    def alike(self) -> dict[sp.Expr, sp.Symbol]:
-        """What functions of the target that are functions of the source too are called."""
-        edge = self.joint.edge
-        swap = {**dict(zip(edge.there, edge.here, strict=True)), **dict(edge.theirs)}
-        return {e.xreplace(swap): s for s, e in self.functions.items()}
-
     def of_node(self) -> list[sp.Expr]:
-        """The functions, of the states and parameters of a node."""
+        """Return the functions of the source, of the states and parameters of a node."""
         edge = self.joint.edge
         swap = {**dict(zip(edge.there, self.joint.source.state, strict=True)), **dict(edge.theirs)}
         return [e.xreplace(swap) for e in self.functions.values()]
 
     def applied(self) -> list[sp.Expr]:
-        """The rates, with functions of the target by the names of those of the source where they are alike."""
-        return [e.xreplace(self.alike) for e in self.rates]
+        """Return the rates, with the functions of the target that are functions of the source too by their names."""
+        alike = {e.xreplace(_as_target(self.joint.edge)): s for s, e in self.functions.items()}
+        return [e.xreplace(alike) for e in self.rates]
 
-    def statements(self, places: StateLayout, base: str, out: str, kept: int) -> list[Statement]:
-        """The loops at one vector of states, which add to the slopes in `out`; FIELD has `kept` numbers of each node before."""
-        joint, names, nodes = self.joint, (real(f"sum_part_{k}") for k in count()), span("j", "NODES")
-        at = {s: Name("FIELD") + k * Name("NODES") for k, s in enumerate((*self.functions, *self.sums), start=kept)}
-        swap = named(joint)
+    def statements(self, places: StateLayout, base: str, out: str, start: int) -> list[Statement]:
+        """Write the loops at one vector of states; they add to the vector `out` and use the rows of FIELD from `start` on."""
+        names = (real(f"sum_part_{k}") for k in count())
+        joint, edge, nodes = self.joint, self.joint.edge, span("j", "NODES")
+        swap, rows = named(joint), _rows((*self.functions, *self.sums), start)
+        # 1. functions of the sources, and zeros
         body = share([e.xreplace(swap) for e in self.functions.values()], names)
         used = {s for e in self.functions.values() for s in e.free_symbols}
-        made = [*places.read(joint.source, base, "_there", "j"), *places.of_source(joint.edge, used), *assigned(body)]
-        made += [store("dense", at[s] + "j", lane(lower(e))) for s, e in zip(self.functions, body.results, strict=True)]
-        made += [store("dense", at[s] + "j", 0.0 * Name("h")) for s in self.sums]
-        weight = joint.edge.weight.name
-        own = {s for factor, _ in self.sums.values() for s in factor.free_symbols}
-        added = [*link_ends(joint.edge, weight), *places.of_link(joint.edge, own)]
-        added += [let(s.name, Load("dense", place + "j")) for s, place in at.items() if s in self.functions]
-        added += [accumulate("dense", at[s] + "i", lower(a * b)) for s, (a, b) in self.sums.items()]
+        first = [*places.read(joint.source, base, "_there", "j"), *places.of_source(edge, used), *assigned(body)]
+        for s, e in zip(self.functions, body.results, strict=True):
+            first.append(store("dense", rows[s] + "j", lane(lower(e))))
+        first += [store("dense", rows[s] + "j", 0.0 * Name("h")) for s in self.sums]
+        # 2. sums over the links of each target
+        used = {s for factor, _ in self.sums.values() for s in factor.free_symbols}
+        second = [*link_ends(edge, edge.weight.name), *places.of_link(edge, used)]
+        second += [let(s.name, Load("dense", rows[s] + "j")) for s in self.functions]
+        second += [accumulate("dense", rows[s] + "i", lower(a * b)) for s, (a, b) in self.sums.items()]
+        # 3. the rates
         body = share([e.xreplace(swap) for e in self.applied()], names)
-        here = [*places.read(joint.target, base, "_here", "i"), *places.own(body.symbols)]
-        here += [let(s.name, Load("dense", place + "i")) for s, place in at.items() if s in body.symbols]
-        here += assigned(body)
-        for c, e in enumerate(body.results):
-            if e != 0:
-                here.append(accumulate("dense", plus(Name(out), places.place(c)), lower(e)))
+        loads = [*places.read(joint.target, base, "_here", "i"), *places.own(body.symbols)]
+        loads += [let(s.name, Load("dense", row + "i")) for s, row in rows.items() if s in body.symbols]
         factors = [let(s.name, lower(e)) for s, e in self.factors.items()]
-        return [*factors, nodes.over(made), joint.span.over(added), span("i", "NODES").over(here)]
+        return [*factors, nodes.over(first), joint.span.over(second), _applied(places, out, loads, body)]
 
 
-def link_sums(equations: Equations, joints: Iterable[Joint]) -> tuple[list[LinkSums], list[Joint]]:
-    """Return the links that are summed by nodes, and the joints of those, or the parts of those, that are not.
+def _as_target(edge: Edge) -> dict[sp.Symbol, sp.Symbol]:
+    """Rename the states and parameters of the source to those of the target."""
+    return {**dict(zip(edge.there, edge.here, strict=True)), **dict(edge.theirs)}
 
-    Networks with several kinds of nodes, and with contacts, have all links by themselves.
-    """
-    found, rest = list[LinkSums](), list[Joint]()
-    alike = not (equations.mixed or equations.sticks)
-    for number, joint in enumerate(joints, start=len(equations.fields)):
-        parts = summed(joint.edge, equations.varied, tuple(equations.numbered)) if alike else None
-        if parts is not None:
-            found.append(LinkSums.of(number, joint, parts))
-            joint = replace(joint, edge=replace(joint.edge, rhs=parts.rest))
-        if joint.edge.acts:
-            rest.append(joint)
-    return found, rest
+
+def _rows(symbols: Iterable[sp.Symbol], start: int) -> Mapping[sp.Symbol, Expression]:
+    """Return where the numbers of the nodes for each symbol begin in FIELD."""
+    return {s: Name("FIELD") + k * Name("NODES") for k, s in enumerate(symbols, start=start)}
+
+
+def _applied(places: StateLayout, out: str, loads: Sequence[Statement], body: StraightLine) -> Loop:
+    """Write the loop that adds the rates in which `body` ends to the nodes."""
+    rates = [add_to(out, places.place(c), lower(e)) for c, e in enumerate(body.results) if e != 0]
+    return span("i", "NODES").over([*loads, *assigned(body), *rates])
 
 
 def mean_fields(equations: Equations) -> list[MeanField]:
     """Return the mean fields of a network of equal nodes."""
-    found = []
+    fields = []
     for number, (edge, pairs) in enumerate(equations.fields):
         parts = separated(edge, equations.varied)
         if parts is None:
             raise RuntimeError(
                 f"the rates {edge.rhs} of links of all pairs do not separate; this is a mistake in the program"
             )
-        found.append(MeanField.of(number, edge, equations.node, pairs, parts))
-    return found
+        fields.append(MeanField.of(number, edge, equations.node, pairs, parts))
+    return fields
+
+
+def link_sums(equations: Equations, joints: Iterable[Joint]) -> tuple[list[LinkSums], list[Joint]]:
+    """Return the sums over links, and joints with the parts that are not sums.
+
+    Networks with several kinds of nodes, and with contacts, have no sums.
+    """
+    sums, others = list[LinkSums](), list[Joint]()
+    if equations.mixed or equations.sticks:
+        return sums, [joint for joint in joints if joint.edge.acts]
+    for number, joint in enumerate(joints, start=len(equations.fields)):
+        parts = summed(joint.edge, equations.varied, tuple(equations.numbered))
+        if parts is not None:
+            sums.append(LinkSums.of(number, joint, parts))
+            joint = replace(joint, edge=replace(joint.edge, rhs=parts.rest))
+        if joint.edge.acts:
+            others.append(joint)
+    return sums, others
 
 
 def compensated(total: str, value: Value) -> Iterator[Statement]:
-    """Add a value to a sum and keep what rounding cuts off for the next one."""
+    """Add a value to a sum; keep the part that rounding cuts off, and subtract it from the next value."""
     rest, part, new = (f"{total}_{word}" for word in ("rest", "part", "new"))
     yield let(part, as_expression(value) - Name(rest))
     yield let(new, Name(total) + part)
