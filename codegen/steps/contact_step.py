@@ -1,14 +1,24 @@
-"""The functions that decide between stick and slip: what a kernel must know of each contact at a state."""
+"""The functions that decide between stick and slip, for the events of codegen/driver/contacts.py.
+
+`pushes(t, y, p, out)` writes six groups of NODES numbers, one number for the event of each node:
+
+    0  level: sliding velocity          2, 3  limits: acceleration under static friction, either way
+    1  target: velocity of the ground   4, 5  departures: acceleration at the start of slip, either way
+
+The driver keeps three more groups behind them. If anything jumps or has a kink in time, two numbers follow: they change
+where such an event passes, the first at the time t, the second soon after.
+`release` changes the velocities of deviations where a contact lets go.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.periodicity import gaps
-from synchain.models.dynamics.saltation import Entry, Events
+from synchain.models.dynamics.saltation import Events
 from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.mechanics.events import Event
@@ -22,22 +32,18 @@ from .places import StateLayout, link_ends, named, span
 from .safe_names import NAMES
 from .step import lane
 
-FORCES = (2, 3, 4, 5)
-"""The groups of `pushes` that the force of a link adds to."""
+ACCELERATIONS = (2, 3, 4, 5)
+"""The groups of `pushes` that the force of a link is added to."""
 
 SIDES = 9
-"""The group of `pushes` behind which it tells on which sides of zero the jumps and kinks in time are, now and soon."""
+"""The groups of NODES numbers before the two numbers on jumps and kinks in time."""
 
 SOON = sp.Rational(1, 10**13)
-"""The shortest step, as a part of the time: what is zero now has a side then."""
+"""The later time of these numbers is t + SOON max(1, t), a shortest step: SHORTEST in codegen/driver/contacts.py."""
 
 
 def push_functions(equations: Equations, names: Names, looped: bool = False) -> list[Function]:
-    """The function `pushes`, if there are contacts: it writes six groups of NODES numbers, in the order that it tells, and
-    two numbers behind nine groups if anything jumps or has a kink in time.
-
-    Written out, it grows with the network; `looped` it runs over nodes and links, which it takes from `graph`.
-    """
+    """Return the function `pushes` if there are contacts, written out or with loops over nodes and links."""
     if not equations.sticks:
         return []
     body = (_looped if looped else _written_out)(equations, names)
@@ -52,117 +58,119 @@ def _columns(event: Event) -> tuple[sp.Expr, ...]:
     return event.level, event.target, *event.limits, *event.departures
 
 
-def _sides(found: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:
-    """A number that changes if one of some expressions of time passes zero, at this time and soon after; none without any."""
-    signs = [3 ** (k % 30) * sp.sign(gap) for k, gap in enumerate(dict.fromkeys(found))]
+def _gaps(template: Node | Edge) -> list[sp.Expr]:
+    """Return the functions of time that pass zero at jumps and kinks, sorted."""
+    return sorted(gaps(template), key=sp.default_sort_key)
+
+
+def _sides(zeros: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:
+    """Return a number that changes if any of `zeros` passes zero, now and soon after; nothing if there are none."""
+    # signs are digits in base 3; a double keeps 30 of them apart
+    signs = [3 ** (k % 30) * sp.sign(gap) for k, gap in enumerate(dict.fromkeys(zeros))]
     now = sp.Add(*signs)
     return (now, now.xreplace({TIME: TIME + SOON * sp.Max(1, TIME)})) if signs else ()
 
 
-def _ordered(template: Node | Edge) -> list[sp.Expr]:
-    return sorted(gaps(template), key=sp.default_sort_key)
-
-
 def _written_out(equations: Equations, names: Names) -> list[Statement]:
-    events = [event for i in range(equations.n) for event in equations.events_at(i)]
-    forces = [e for column in zip(*map(_columns, events), strict=True) for e in column]
-    zeros = [e.xreplace(equations.at_node(i)) for i in range(equations.n) for e in _ordered(equations.node_at(i))]
-    zeros += [e.xreplace(equations.at_link(link, edge)) for link, edge in equations.linked() for e in _ordered(edge)]
-    body = share([*forces, *_sides(zeros)], names.fresh("z"))
+    n = equations.n
+    events = [event for i in range(n) for event in equations.events_at(i)]
+    columns = [e for column in zip(*map(_columns, events), strict=True) for e in column]
+    zeros = [e.xreplace(equations.at_node(i)) for i in range(n) for e in _gaps(equations.node_at(i))]
+    zeros += [e.xreplace(equations.at_link(link, edge)) for link, edge in equations.linked() for e in _gaps(edge)]
+    body = share([*columns, *_sides(zeros)], names.fresh("z"))
     states = [let(name, Load("y", Number(k))) for k, name in enumerate(equations.state) if real(name) in body.symbols]
-    places = [*range(len(forces)), *(SIDES * equations.n + k for k in range(2))]
+    places = [*range(len(columns)), *(SIDES * n + k for k in range(2))]
     stores = [store("out", k, lane(lower(e))) for k, e in zip(places, body.results, strict=False)]
     return [*states, *_parameters(equations, body.symbols), *assigned(body), *stores]
 
 
 def _looped(equations: Equations, names: Names) -> list[Statement]:
-    """One loop over the nodes with what is fixed for all of them before it, and one over the links.
-
-    Jumps in time with numbers that differ from node to node, or link to link, are left to step control.
-    """
-    node, nodes = equations.node, span("i", "NODES")
+    """Write a loop over the nodes and one over the links, behind the terms that all nodes share."""
+    node, places = equations.node, StateLayout(equations)
     (event,) = node.events
+    # terms without states and parameters of single nodes are computed once
     varied = (real(name) for name in equations.varied)
     fixed = Hoist(frozenset((*node.state, *varied)), names.fresh("fixed"), frozenset({TIME}))
     body = share([fixed.apply(e) for e in _columns(event)], names.fresh("z"))
-    force, link = _force(equations, event)
+    forces, force = _force(equations, places, event)
+    # jumps in time with numbers that differ from node to node, or link to link, are left to step control
     differing = set(map(real, (*equations.varied, *equations.numbered)))
     parts: tuple[Node | Edge, ...] = (node, *equations.edges)
-    zeros = [e for part in parts for e in _ordered(part) if not e.free_symbols & differing]
+    zeros = [e for part in parts for e in _gaps(part) if not e.free_symbols & differing]
     sides = share(_sides(zeros), names.fresh("side"))
-    used = body.symbols.union(sides.symbols, *(e.free_symbols for e in (*fixed.table, *link)))
-    before = [*_parameters(equations, used), *(let(s.name, lane(lower(e))) for e, s in fixed.table.items())]
-    before += assigned(sides)
-    before += [store("out", SIDES * Name("NODES") + k, lane(lower(e))) for k, e in enumerate(sides.results)]
-    at = StateLayout(equations)
-    own: list[Statement] = [let(s.name, Load("y", at.place(k))) for k, s in enumerate(node.state) if s in used]
-    own += [*at.own(body.symbols), *assigned(body)]
-    own += [store("out", at.place(k), lane(lower(e))) for k, e in enumerate(body.results)]
-    if not force:
-        return [*before, nodes.over(own)]
-    unpacked = Assign(NAMES, Name("graph"), whole=True)
-    return [*before, nodes.over(own), unpacked, span("e", "target.size").over(force)]
+    used = body.symbols.union(sides.symbols, *(e.free_symbols for e in (*fixed.table, *force)))
+    statements = [*_parameters(equations, used), *(let(s.name, lane(lower(e))) for e, s in fixed.table.items())]
+    statements += assigned(sides)
+    statements += [store("out", SIDES * Name("NODES") + k, lane(lower(e))) for k, e in enumerate(sides.results)]
+    loop: list[Statement] = [let(s.name, Load("y", places.place(k))) for k, s in enumerate(node.state) if s in used]
+    loop += [*places.own(body.symbols), *assigned(body)]
+    loop += [store("out", places.place(k), lane(lower(e))) for k, e in enumerate(body.results)]
+    statements.append(span("i", "NODES").over(loop))
+    if forces:
+        statements += [Assign(NAMES, Name("graph"), whole=True), span("e", "target.size").over(forces)]
+    return statements
 
 
-def _force(equations: Equations, event: Event) -> tuple[list[Statement], tuple[sp.Expr, ...]]:
-    """Statements that add the force of one link on a body that sticks, and the expressions they hold."""
+def _force(equations: Equations, places: StateLayout, event: Event) -> tuple[list[Statement], tuple[sp.Expr, ...]]:
+    """Return the statements that add the force of one link on a body that sticks, and that force."""
     if not equations.edges:
         return [], ()
-    at = StateLayout(equations)
-    (joint,) = at.joints
+    (joint,) = places.joints
     edge, swap = joint.edge, named(joint)
+    # in stick (mode one) the body moves with the ground
     velocity, mode = edge.here[1], edge.here[2]
     force = edge.rhs[1].xreplace({mode: sp.S.One, velocity: event.target})
-    found = [*link_ends(edge, edge.weight.name), *at.of_link(edge, force.free_symbols)]
-    for place, states in (("i", edge.here), ("j", edge.there)):
-        found += [let(swap[s].name, Load("y", at.place(k, place))) for k, s in enumerate(states) if force.has(s)]
-    found.append(let("f_link", lower(force.xreplace(swap))))
-    return [*found, *(accumulate("out", at.place(k), "f_link") for k in FORCES)], (force,)
-
-
-def event_functions(variation: Variation, names: Names) -> list[Function]:
-    """The functions that the events of set-valued friction need in a kernel that carries deviations."""
-    if variation.events is None:
-        return []
-    return [*push_functions(variation.orbit, names), *_release(variation.events, variation, names)]
-
-
-def _release(events: Events, variation: Variation, names: Names) -> list[Function]:
-    """The function `release`, which sets the velocities of the deviations in one register."""
-    equations, size, strengths = variation.orbit, variation.size, [s.name for s in variation.parameters]
-    used = set().union(*(e.free_symbols for e in events.expressions))
-    known = enumerate((*equations.state, *equations.parameters))  # the orbit is one, its numbers fill a register
-    body: list[Statement] = [
-        let(name, call("broadcast", Load("y", Number(k), None), "LANES")) for k, name in known if real(name) in used
-    ]
-    loaded = enumerate(strengths)
-    body += [let(s, register("strengths", len(strengths), k)) for k, s in loaded if real(s) in used]
-    for i, sides in enumerate(events.exits):
-        after = [
-            If(Compare(sign, Name("after"), ZERO), tuple(_gained(entries, size, names)))
-            for sign, entries in zip("><", sides, strict=True)
-        ]
-        body.append(If(Compare("==", Name("i"), Number(i)), tuple(after)))
-    about = "Where a contact begins to slip and friction drops at once, deviations that let go early have gained a velocity."
-    arguments = ("i", "after", "t", "y", "strengths", "modes", "which")
-    return [Function("release", arguments, about, tuple(body), role=Role.ENTRY)]
-
-
-def register(array: str, size: int, k: int) -> Load:
-    """Number k of the registers of one group of modes, which fill `size` registers of an array."""
-    return Load(array, size * Name("which") + k, "LANES")
-
-
-def _gained(entries: Sequence[Entry], size: int, names: Names) -> list[Statement]:
-    """Statements that put rows of a deviation together from others."""
-    body = share([e for _, e in entries], names.fresh("z"))
-    rows: dict[int, list[Expression]] = {}
-    for ((row, column), _), e in zip(entries, body.results, strict=True):
-        rows.setdefault(row, []).append(Product((lower(e), register("modes", size, column))))
-    stores = [store("modes", size * Name("which") + row, plus(*terms)) for row, terms in rows.items()]
-    return [*assigned(body), *stores]
+    loop = [*link_ends(edge, edge.weight.name), *places.of_link(edge, force.free_symbols)]
+    for index, states in (("i", edge.here), ("j", edge.there)):
+        loop += [let(swap[s].name, Load("y", places.place(k, index))) for k, s in enumerate(states) if force.has(s)]
+    loop.append(let("f_link", lower(force.xreplace(swap))))
+    return [*loop, *(accumulate("out", places.place(k), "f_link") for k in ACCELERATIONS)], (force,)
 
 
 def _parameters(equations: Equations, used: set[sp.Symbol]) -> list[Statement]:
     first = equations.dimension
     return [let(p, Load("p", Number(first + k))) for k, p in enumerate(equations.parameters) if real(p) in used]
+
+
+# -- deviations -----------------------------------------------------------------------------------------------
+
+
+def event_functions(variation: Variation, names: Names) -> list[Function]:
+    """Return the functions for the events of set-valued friction in a kernel that carries deviations."""
+    if variation.events is None:
+        return []
+    return [*push_functions(variation.orbit, names), _release(variation.events, variation, names)]
+
+
+def _release(events: Events, variation: Variation, names: Names) -> Function:
+    """Write the function `release`, which sets the velocities of the deviations in one register."""
+    equations, size, strengths = variation.orbit, variation.size, [s.name for s in variation.parameters]
+    used = set().union(*(e.free_symbols for e in events.expressions))
+    # the numbers of the one orbit fill a register; strengths differ from lane to lane
+    body: list[Statement] = [
+        let(name, call("broadcast", Load("y", Number(k), None), "LANES"))
+        for k, name in enumerate((*equations.state, *equations.parameters))
+        if real(name) in used
+    ]
+    loads = ((s, register("strengths", len(strengths), k)) for k, s in enumerate(strengths))
+    body += [let(s, load) for s, load in loads if real(s) in used]
+    for i, sides in enumerate(events.exits):
+        after = []
+        for sign, entries in zip("><", sides, strict=True):
+            gained = share([e for _, e in entries], names.fresh("z"))
+            # row = sum over columns of entry*deviation
+            rows: dict[int, list[Expression]] = {}
+            for ((row, column), _), e in zip(entries, gained.results, strict=True):
+                rows.setdefault(row, []).append(Product((lower(e), register("modes", size, column))))
+            stores = [store("modes", size * Name("which") + row, plus(*terms)) for row, terms in rows.items()]
+            after.append(If(Compare(sign, Name("after"), ZERO), (*assigned(gained), *stores)))
+        body.append(If(Compare("==", Name("i"), Number(i)), tuple(after)))
+    about = "Where a contact begins to slip and friction drops at once, deviations that let go early have gained a velocity."
+    return Function(
+        "release", ("i", "after", "t", "y", "strengths", "modes", "which"), about, tuple(body), role=Role.ENTRY
+    )
+
+
+def register(array: str, size: int, k: int) -> Load:
+    """Load register k of one group of modes, which fill `size` registers of an array."""
+    return Load(array, size * Name("which") + k, "LANES")

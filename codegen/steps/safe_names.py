@@ -1,4 +1,4 @@
-"""Which names a kernel uses for the user's symbols: their own, unless the kernel needs that word itself."""
+"""Names of the user's symbols in a kernel: unchanged, unless generated code or Python uses the word itself."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NAMES = (
     "target", "source", "node_slot", "here_slot", "there_slot", "order", "place", "row_start", "after_start", "column",
     "where",
 )  # fmt: skip
-"""What the arrays of a program are called, in the order in which a kernel takes them."""
+"""The arrays of a sparse plan, in the order in which a kernel takes them."""
 
 RESERVED = frozenset(
     {"i", "j", "k", "e", "old", "new", "graph", "weights", "pair", "factorise", "solve", "slopes", "NODES", "DIMENSION",
@@ -34,14 +34,16 @@ RESERVED = frozenset(
     | set(NAMES)
     | set(keyword.kwlist) | set(dir(builtins)) | set(elementary.__all__) | set(lanes.__all__) | set(special.__all__)
 )  # fmt: skip
-"""Words of the generated code; a user's symbol of that name gets an underscore behind it."""
+"""Words of generated code; a symbol of that name gets an underscore behind it."""
 
 PREFIXES = (
     "m_", "l_", "pivot_", "inv_", "k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8", "k9", "u_", "f_", "r_", "at_", "ft_", "n_", "j_",
     "e_", "_", "along_", "value_", "bend_", "steady_", "g_", "mass_", "sum_", *(f"node{k}" for k in range(2, 10)),
 )  # fmt: skip
+"""Beginnings of names that steps give to values of states: k2_x_1, u_x_1, j_vx_1, …"""
 
 SUFFIXES = ("_here", "_there", "_first")
+"""Ends of the names of states at both ends of a link, and at the first node."""
 
 NUMBERED = re.compile(r"_\d+$")
 """The end of a name that numbers a node: x_1 is x of the first one."""
@@ -50,21 +52,20 @@ NUMBERED = re.compile(r"_\d+$")
 def tidy(equations: Equations) -> Equations:
     """Return the same equations with symbols that the generated code can use as names."""
     nodes, edges = equations.nodes, equations.edges
-    weights = {edge.weight for edge in edges}
-    own = {s for node in nodes for s in (*node.state, *node.parameters)}
     states = {s for node in nodes for s in node.state}
-    shown = own | weights | {s for edge in edges for s in edge.parameters}
+    of_nodes = states | {s for node in nodes for s in node.parameters}
+    weights = {edge.weight for edge in edges}
+    shown = of_nodes | weights | {s for edge in edges for s in edge.parameters}
     taken = {s.name for s in shown} | {s.name for edge in edges for s in (*edge.here, *edge.there)}
     swap: dict[sp.Symbol, sp.Symbol] = {}
     for s in sorted(shown, key=str):
+        # x_1 of a user would be x of the first node
         numbered = s in states or s.name in equations.differing
         if _clashes(s.name) or (numbered and NUMBERED.search(s.name)):
-            name = _free(s.name, taken)
-            taken.add(name)
-            swap[s] = real(name)
-    in_links = dict(swap)  # within an edge this name means the weight
-    for weight in sorted(weights & own, key=str):
-        in_links[weight] = real(_free(f"{weight.name}_of_link", taken))
+            swap[s] = real(_free(s.name, taken))
+            taken.add(swap[s].name)
+    # a weight with the name of a node's symbol is renamed within links alone
+    in_links = swap | {s: real(_free(f"{s.name}_of_link", taken)) for s in sorted(weights & of_nodes, key=str)}
     if not in_links:
         return equations
     return equations.map_templates(
@@ -73,12 +74,13 @@ def tidy(equations: Equations) -> Equations:
 
 
 def _clashes(name: str) -> bool:
-    """True for words of the generated code and for names that Python would not read as they are written."""
-    written = name.isidentifier() and unicodedata.normalize("NFKC", name) == name
-    return name in RESERVED or not written or name.startswith(PREFIXES) or name.endswith(SUFFIXES)
+    """True for words of generated code and for names that Python cannot read or normalises."""
+    readable = name.isidentifier() and unicodedata.normalize("NFKC", name) == name
+    return name in RESERVED or not readable or name.startswith(PREFIXES) or name.endswith(SUFFIXES)
 
 
 def _free(name: str, taken: set[str]) -> str:
+    """Return a similar name that neither clashes nor is taken."""
     plain = "".join(c if f"a{c}".isidentifier() else "_" for c in unicodedata.normalize("NFKC", name)) or "symbol"
     if not plain.isidentifier() or plain.startswith("_"):
         plain = f"s_{plain}"
