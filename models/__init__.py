@@ -32,6 +32,7 @@ from typing import Any
 _HOMES = {
     "Axis": "sweeps.axis",
     "Clusters": "symmetries.clusters",
+    "Family": "graphs.families",
     "Field": "definitions.inline",
     "FrictionLaw": "mechanics.contact",
     "Lagrangian": "definitions.inline",
@@ -62,6 +63,7 @@ _HOMES = {
     "joint_spectrum": "spectra.joint",
     "kronecker": "graphs.products",
     "latex": "presentation.equations_text",
+    "link_energy": "definitions.inline",
     "load_scene": "scenes.file",
     "lorentzian": "sweeps.distribution",
     "maximum": "dynamics.observable",
@@ -89,6 +91,7 @@ _HOMES = {
 __all__ = [
     "Axis",
     "Clusters",
+    "Family",
     "Field",
     "FrictionLaw",
     "Lagrangian",
@@ -121,6 +124,7 @@ __all__ = [
     "joint_spectrum",
     "kronecker",
     "latex",
+    "link_energy",
     "load_scene",
     "lorentzian",
     "maximum",

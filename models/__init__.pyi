@@ -5,6 +5,7 @@ from typing import Literal, overload
 from .definitions.inline import Field as Field
 from .definitions.inline import Lagrangian as Lagrangian
 from .definitions.inline import friction_law as friction_law
+from .definitions.inline import link_energy as link_energy
 from .dynamics.observable import Observable as Observable
 from .dynamics.observable import end as end
 from .dynamics.observable import energy as energy
@@ -14,6 +15,7 @@ from .dynamics.observable import minimum as minimum
 from .dynamics.observable import nodes as nodes
 from .dynamics.observable import rate as rate
 from .dynamics.observable import variance as variance
+from .graphs.families import Family as Family
 from .graphs.products import cartesian as cartesian
 from .graphs.products import complement as complement
 from .graphs.products import kronecker as kronecker

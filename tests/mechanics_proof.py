@@ -1,26 +1,28 @@
 """Equations of whole networks by sympy.physics.mechanics, and the exact zero test that compares them with ours.
 
-Everything here starts from the energies, forces and particles of the plug-in files and from nothing that the templates do.
+Everything here starts from the energies and forces of the plug-in files and from nothing that the templates do.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
-from types import ModuleType
 
 import sympy as sp
-from parts import oscillator_of
+from parts import coupling_of, oscillator_of
 from sympy.physics import mechanics
 
-from synchain.models.definitions.definition import COUPLING, OSCILLATOR
 from synchain.models.graphs.topology import Topology
-from synchain.models.inputs.plugins import call, load
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.nondimensional import magnitude, nondimensional
+from synchain.models.mechanics.nondimensional import nondimensional
 
 T = mechanics.dynamicsymbols._t
+Q_I, Q_J, V_I, V_J, WEIGHT = sp.symbols("q_i q_j v_i v_j weight", real=True)
+
+
+def real(name: str) -> sp.Symbol:
+    return sp.Symbol(name, real=True)
 
 
 def vanishes(e: sp.Expr) -> bool:
@@ -61,8 +63,7 @@ class Whole:
 
 def whole(oscillator: str, coupling: str | None, graph: Topology, chosen: tuple[str, ...] | None = None) -> Whole:
     """Sum up nodes and links; a link of a coupling with a direction runs from the smaller to the larger number."""
-    module = load(OSCILLATOR, oscillator)
-    system = nondimensional(oscillator_of(module.__name__.rpartition(".")[2]))
+    system = nondimensional(oscillator_of(oscillator))
     names = [s.name for s in system.coordinates]
     q = [[mechanics.dynamicsymbols(f"{name}_{i + 1}") for name in names] for i in range(graph.n)]
     rates = [[x.diff(T) for x in row] for row in q]
@@ -77,40 +78,52 @@ def whole(oscillator: str, coupling: str | None, graph: Topology, chosen: tuple[
     for i, j, weight in graph.links:
         if i > j or coupling is None:
             continue
-        law = load(COUPLING, coupling)
-        given = {**{p: sp.Symbol(p, real=True) for p in law.PARAMETERS}, "weight": sp.Rational(str(weight))}
+        law = coupling_of(coupling)
+        given = {WEIGHT: sp.Rational(str(weight))}
         for k in range(len(names)):
             if chosen is not None and names[k] not in chosen:
                 continue
-            if hasattr(law, "potential"):
-                potential += call(law.potential, {"q_i": q[i][k], "q_j": q[j][k], **given})
-            if hasattr(law, "dissipation"):
-                lost = call(law.dissipation, {"v_i": rates[i][k], "v_j": rates[j][k], **given})
-                forces = [force - lost.diff(r) for force, r in zip(forces, flat, strict=True)]
-    masses = tuple(entry for values in at for entry in particles(module, values))
+            potential += law.potential.xreplace({Q_I: q[i][k], Q_J: q[j][k], **given})
+            lost = law.dissipation.xreplace({V_I: rates[i][k], V_J: rates[j][k], **given})
+            forces = [force - lost.diff(r) for force, r in zip(forces, flat, strict=True)]
+    masses = tuple(entry for values in at for entry in particles(oscillator, values))
     return Whole(tuple(x for row in q for x in row), tuple(flat), kinetic, potential, tuple(forces), masses)
 
 
-def particles(module: ModuleType, values: dict) -> Iterable[tuple[sp.Expr, ...]]:
-    """(mass, across, upward) of the masses of one node, non-dimensional: its own, or one on a line for each coordinate."""
-    system = nondimensional(oscillator_of(module.__name__.rpartition(".")[2]))
-    if not hasattr(module, "particles"):
-        for x, v in zip(system.coordinates, system.velocities, strict=True):
-            mass = system.kinetic.diff(v, 2)
-            if mass.free_symbols & {*system.coordinates, *system.velocities, TIME} or system.kinetic.diff(v, x) != 0:
-                raise ValueError(f"{module.__name__}: the masses depend on the state; give particles(…)")
-            yield mass, values[x], sp.S.Zero
+def pendulums(
+    x: sp.Expr, phi: sp.Expr, psi: sp.Expr, masses: tuple[sp.Expr, ...], lengths: tuple[sp.Expr, ...]
+) -> list[tuple[sp.Expr, ...]]:
+    """(mass, across, upward) of the masses of a double pendulum, its joint at the height 0."""
+    across, upward = x + lengths[0] * sp.sin(phi), -lengths[0] * sp.cos(phi)
+    lower = (masses[1], across + lengths[1] * sp.sin(psi), upward - lengths[1] * sp.cos(psi))
+    return [(masses[0], across, upward), lower]
+
+
+PARTICLES: dict[str, Callable[[dict[str, sp.Expr]], list[tuple[sp.Expr, ...]]]] = {
+    "double_pendulum": lambda at: pendulums(
+        sp.S.Zero, at["phi"], at["psi"], (sp.S.One, real("mass_ratio")), (sp.S.One, real("length_ratio"))
+    ),
+    "belt_double_pendulum": lambda at: [
+        (sp.S.One, at["x"], sp.S.Zero),
+        *pendulums(
+            at["x"], at["phi"], at["psi"], (real("mass_1"), real("mass_2")), (real("length_1"), real("length_2"))
+        ),
+    ],
+}
+"""The masses of oscillators whose mass matrix is full, in units of the first mass, with the coordinates by name."""
+
+
+def particles(oscillator: str, values: dict) -> Iterable[tuple[sp.Expr, ...]]:
+    """(mass, across, upward) of the masses of one node, non-dimensional: of the table, or one on a line for each coordinate."""
+    system = nondimensional(oscillator_of(oscillator))
+    if oscillator in PARTICLES:
+        yield from PARTICLES[oscillator]({x.name: values[x] for x in system.coordinates})
         return
-    physical = hasattr(module, "scales")
-    unit = magnitude if physical else lambda _: sp.S.One
-    given = {name: unit(u) for name, u in getattr(module, "UNITS", {}).items()}
-    for name, p in module.PARAMETERS.items():
-        given[getattr(module, "PHYSICAL", {}).get(name, name)] = sp.Symbol(name, real=True) * unit(p.unit)
-    for x, (_, u) in zip(system.coordinates, module.COORDINATES.values(), strict=True):
-        given[x.name] = values[x] * unit(u)
-    for mass, across, upward in call(module.particles, given):
-        found = (sp.sympify(mass) / unit("kg"), sp.sympify(across) / unit("m"), sp.sympify(upward) / unit("m"))
-        yield tuple(sp.factor_terms(sp.expand(e)) for e in found)
+    for x, v in zip(system.coordinates, system.velocities, strict=True):
+        mass = system.kinetic.diff(v, 2)
+        if mass.free_symbols & {*system.coordinates, *system.velocities, TIME} or system.kinetic.diff(v, x) != 0:
+            raise ValueError(f"{oscillator}: the masses depend on the state; write them into PARTICLES")
+        yield mass, values[x], sp.S.Zero
 
 
 @cache

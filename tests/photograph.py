@@ -849,7 +849,7 @@ def _() -> Quantities:
 def _() -> Quantities:
     seen: Quantities = {}
     for name in names(COUPLING):
-        graph = star(3) if hasattr(load(COUPLING, name), "BETWEEN") else chain(3)
+        graph = star(3) if load(COUPLING, name).between else chain(3)
         beam = [{"oscillator": "beam", "at": [1]}] if graph.name == "star" else None
         own = "clock" if beam else "duffing"
         given = Scene(oscillator=own, nodes=beam, coupling=name, topology=graph)

@@ -12,14 +12,12 @@ import sys
 import zipfile
 from collections.abc import Iterable
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
 import synchain
 from synchain import models, runtime
 from synchain.models.graphs import families
-from synchain.models.inputs.plugins import load
 
 ROOT = Path(__file__).resolve().parents[1]
 CONTRACT = [
@@ -62,13 +60,9 @@ def accepted(annotation: str) -> str:
     return " | ".join(TYPES.get(part, part) for part in annotation.split(" | "))
 
 
-def file_of(name: str) -> ModuleType:
-    return load(families.TOPOLOGY, families.TOPOLOGY.also.get(name, name))
-
-
-def arguments(module: ModuleType) -> tuple[str, ...]:
-    """What a family takes, from its plug-in file."""
-    given = inspect.signature(module.edges).parameters.values()
+def arguments(made: families.Family) -> tuple[str, ...]:
+    """What a family takes."""
+    given = inspect.signature(made.edges).parameters.values()
     options = [
         f"{p.name}: {accepted(p.annotation)} = {written(p.default)}"
         for p in given
@@ -96,15 +90,15 @@ def listed(line: str) -> str:
 
 def function_stub(name: str) -> str:
     """The stub of a family."""
-    module = file_of(name)
-    return f'{head(name, arguments(module))}\n    """{module.SUMMARY.replace(chr(34), chr(39))}."""\n'
+    made = families.family(name)
+    return f'{head(name, arguments(made))}\n    """{made.summary.replace(chr(34), chr(39))}."""\n'
 
 
 def topology_stub() -> str:
     """What `topology` takes, by the name of the family; the last form is for files and installed families."""
     takes: dict[tuple[str, ...], list[str]] = {}
     for name in shipped():
-        takes.setdefault(arguments(file_of(name)), []).append(f'"{name}"')
+        takes.setdefault(arguments(families.family(name)), []).append(f'"{name}"')
     overloads = [
         "@overload\n" + head("topology", (f"name: Literal[{', '.join(names)}]", *given)) + " ...\n"
         for given, names in sorted(takes.items(), key=lambda each: each[1])

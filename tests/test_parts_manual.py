@@ -35,7 +35,7 @@ def table(title: str) -> dict[str, list[Row]]:
 
 @pytest.mark.parametrize("kind", TABLES)
 def test_the_tables_are_those_of_the_modules(kind: PluginKind) -> None:
-    expected = {name: load(kind, name).PARAMETERS for name in names(kind)}
+    expected = {name: load(kind, name).parameters for name in names(kind)}
     if kind is COUPLING:
         expected["components"] = STRENGTH
     assert table(TABLES[kind]) == {

@@ -1,14 +1,10 @@
-"""Linear damper between equal coordinates of two oscillators."""
+"""Linear damper; force proportional to the difference of the velocities."""
 
-import sympy as sp
-
+from ..definitions.inline import link_energy
 from ..mechanics.parameter import Parameter
 
-SUMMARY = "linear damper; force proportional to the difference of the velocities"
-SOURCE = "Rayleigh, Proc. London Math. Soc. s1-4, 357 (1873): dissipation function"
-PARAMETERS = {"sigma": Parameter(0.0, "kg/s", "damping coefficient of the coupling", minimum=0)}
-
-
-def dissipation(v_i: sp.Expr, v_j: sp.Expr, weight: sp.Expr, sigma: sp.Expr) -> sp.Expr:
-    """Return Rayleigh's function sigma weight (v_i - v_j)^2 / 2, half the power lost (W, sigma in kg/s)."""
-    return sigma * weight * (v_i - v_j) ** 2 / 2
+COUPLING = link_energy(
+    R="sigma*W*(v_i - v_j)**2/2",
+    parameters={"sigma": Parameter(0.0, "kg/s", "damping coefficient of the coupling", minimum=0)},
+    source="Rayleigh, Proc. London Math. Soc. s1-4, 357 (1873): dissipation function",
+)

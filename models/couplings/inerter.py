@@ -1,14 +1,10 @@
-"""Inerter between equal coordinates of two oscillators: a force proportional to the difference of the accelerations."""
+"""Inerter; force proportional to the difference of the accelerations, so that the mass matrix is the graph's."""
 
-import sympy as sp
-
+from ..definitions.inline import link_energy
 from ..mechanics.parameter import Parameter
 
-SUMMARY = "inerter; force proportional to the difference of the accelerations, so that the mass matrix is the graph's"
-SOURCE = "Smith, IEEE Trans. Automat. Control 47, 1648 (2002)"
-PARAMETERS = {"sigma": Parameter(0.0, "kg", "inertance of the coupling", minimum=0)}
-
-
-def kinetic(v_i: sp.Expr, v_j: sp.Expr, weight: sp.Expr, sigma: sp.Expr) -> sp.Expr:
-    """Return the energy sigma weight (v_i - v_j)^2 / 2 of the inerter (J, sigma in kg)."""
-    return sigma * weight * (v_i - v_j) ** 2 / 2
+COUPLING = link_energy(
+    T="sigma*W*(v_i - v_j)**2/2",
+    parameters={"sigma": Parameter(0.0, "kg", "inertance of the coupling", minimum=0)},
+    source="Smith, IEEE Trans. Automat. Control 47, 1648 (2002)",
+)

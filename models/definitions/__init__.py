@@ -1,1 +1,1 @@
-"""How a model is said: plug-in files, expressions of a notebook, tables of a scene file. All of them make the same values."""
+"""How a model is defined: expressions of a notebook or a plug-in file, tables of a scene file. All make the same values."""

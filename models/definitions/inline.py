@@ -1,15 +1,14 @@
-"""Oscillators and friction laws of a notebook: a Lagrangian or a vector field in SymPy, without a file.
+"""Oscillators, friction laws and couplings from expressions in SymPy or text: for notebooks, scene files and plug-in files.
 
-What is made is the value that a plug-in file makes.  States are functions of time or plain symbols, the time is any
-symbol called t, decimals are what they say.  Names count: symbols of one name are one quantity, real whatever was
-assumed; a parameter that was assumed positive or nonnegative has that range.
+States are functions of time or plain symbols, the time is any symbol called t, decimals are exact: 0.1 is 1/10.  Symbols of
+one name are one quantity, real whatever was assumed; a parameter that was assumed positive or nonnegative has that range.
 """
 
 from __future__ import annotations
 
 import unicodedata
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from keyword import iskeyword
 from typing import Any, TypeAlias
@@ -20,6 +19,7 @@ from sympy.core.function import AppliedUndef
 from ..inputs.checks import (
     check_flag,
     check_instance,
+    check_keys,
     check_number,
     check_table,
     check_text,
@@ -29,12 +29,13 @@ from ..inputs.checks import (
 )
 from ..inputs.expression_text import FUNCTIONS
 from ..inputs.frozen import FrozenDict
+from ..interactions.coupling import WEIGHT, LagrangianCoupling
 from ..mechanics.components import TIME
 from ..mechanics.contact import SLIDING, ContactModel, FrictionLaw
 from ..mechanics.expression import RESERVED, exact
 from ..mechanics.lagrangian import check_masses_exist, mass_matrix
-from ..mechanics.oscillator import FRICTION, Coordinate, FieldModel, LagrangianModel, Oscillator
-from ..mechanics.parameter import Parameter
+from ..mechanics.oscillator import FRICTION, Coordinate, FieldModel, LagrangianModel, Oscillator, Scaling
+from ..mechanics.parameter import Parameter, dimension
 from .loader import load_friction_law
 
 Expression: TypeAlias = "sp.Expr | float | str"
@@ -55,6 +56,8 @@ def Lagrangian(
     contact: str | None = None,
     parameters: Given | None = None,
     initial: Given | None = None,
+    scaling: Mapping[str, Mapping[str, Any]] | None = None,
+    source: str = "",
     name: str = "oscillator",
 ) -> Oscillator:
     """Return the oscillator of a Lagrangian L = T - V with generalised forces.
@@ -84,13 +87,20 @@ def Lagrangian(
         The default of each parameter: a number, or a `Parameter` with its range.
     initial : mapping, optional
         The state around which oscillators start, 0 for the states left out.
+    scaling : mapping, optional
+        Given if the Lagrangian is in physical quantities, from which the non-dimensional equations are derived.
+        ``units`` has the SI unit of each constant, such as ``{"m": "kg", "k": "N/m"}``, and of each coordinate with a
+        unit; ``scales`` the units of mass, length and time made of the constants, ``{"kg": "m", "m": …, "s":
+        "sqrt(m/k)"}``; ``physical`` the name in the expressions of each parameter that has another name there.
+    source : str
+        Where the model was published.
     name : str
-        What messages call it.
+        Name in messages and scene files.
 
     Returns
     -------
     Oscillator
-        The same value that a plug-in file makes; its states are its attributes, ``node.x``.
+        The oscillator; its states are its attributes, ``node.x``.
 
     Raises
     ------
@@ -115,29 +125,39 @@ def Lagrangian(
     moving = _functions(what, [T, V, R, *forces, *forces.values()])
     table = _coordinates(what, coordinates, moving)
     defaults = _parameters(what, parameters)
-    names = _ModelNames.of(what, table, moving, defaults)
-    on = {names.state("Q", key, table): value for key, value in forces.items()}
-    acting = tuple(names.expression(f"force on {c}", on.get(c, 0)) for c in table)
+    scales, units = (None, {}) if scaling is None else _scaling(what, scaling, table, defaults)
+    names = _ModelNames.of(what, table, moving, defaults, scales)
+    # Energies and forces, one force for each coordinate.
     energies = [names.expression(about, e) for about, e in (("T", T), ("V", V), ("R", R))]
     for about, energy in zip("TVR", energies, strict=True):
         if energy.has(FRICTION):
             raise ValueError(f"{what}: found friction(…) in {about}; expected it in the forces Q alone")
     kinetic, potential, dissipation = energies
+    on = {names.state("Q", key, table): value for key, value in forces.items()}
+    acting = tuple(names.expression(f"force on {c}", on.get(c, 0)) for c in table)
     speeds = [sp.Symbol(speed, real=True) for speed in table.values()]
     _try(what, lambda: check_masses_exist(mass_matrix(kinetic - potential, speeds), speeds))
+    # Friction: a law or a contact needs a force with friction(…).
     law = _law(what, friction, defaults)
     rubs = any(force.has(FRICTION) for force in acting)
     for keyword, value in (("friction", law), ("contact", contact)):
         if value is not None and not rubs:
             raise ValueError(f"{what}: found {keyword} {str(value)!r}, but no force has friction(…); leave it out")
+    treatment = ContactModel.ATAN if contact is None else ContactModel.parse("contact", contact)
     own = _own_parameters(
-        what, (*energies, *acting), law if isinstance(friction, sp.Expr | int | float) else None, defaults
+        names, (*energies, *acting), law if isinstance(friction, sp.Expr | int | float) else None, defaults
     )
     model = LagrangianModel(
-        tuple(Coordinate(c, speed, "1") for c, speed in table.items()), kinetic, potential, acting, dissipation
+        tuple(Coordinate(c, speed, units.get(c, "1")) for c, speed in table.items()),
+        kinetic,
+        potential,
+        acting,
+        dissipation,
+        None if scales is None else replace(scales, physical=FrozenDict({p: scales.physical[p] for p in own})),
     )
-    treatment = ContactModel.ATAN if contact is None else ContactModel.parse("contact", contact)
-    return Oscillator(name, own, model, names.initial(initial), law, treatment)
+    return Oscillator(
+        name, own, model, names.initial(initial), law, treatment, source=check_text("source", source, 4096)
+    )
 
 
 def Field(
@@ -145,6 +165,7 @@ def Field(
     *,
     parameters: Given | None = None,
     initial: Given | None = None,
+    source: str = "",
     name: str = "field",
 ) -> Oscillator:
     """Return the oscillator of a first-order vector field of any dimension.
@@ -158,13 +179,15 @@ def Field(
         The default of each parameter: a number, or a `Parameter` with its range.
     initial : mapping, optional
         The state around which oscillators start, 0 for the states left out.
+    source : str
+        Where the model was published.
     name : str
-        What messages call it.
+        Name in messages and scene files.
 
     Returns
     -------
     Oscillator
-        The same value that a plug-in file makes; its states are its attributes, ``node.x``.
+        The oscillator; its states are its attributes, ``node.x``.
 
     Raises
     ------
@@ -191,8 +214,9 @@ def Field(
     found = tuple(names.expression(f"rate of {s}", e) for s, e in zip(table, given.values(), strict=True))
     if any(rate.has(FRICTION) for rate in found):
         raise ValueError(f"{what}: found friction(…) in a rate; expected it in the forces of a Lagrangian")
-    own = _own_parameters(what, found, None, defaults)
-    return Oscillator(name, own, FieldModel(tuple(table), found), names.initial(initial))
+    own = _own_parameters(names, found, None, defaults)
+    model = FieldModel(tuple(table), found)
+    return Oscillator(name, own, model, names.initial(initial), source=check_text("source", source, 4096))
 
 
 def friction_law(
@@ -202,6 +226,7 @@ def friction_law(
     static: Expression | None = None,
     order: Iterable[tuple[str, str]] = (),
     self_exciting: bool = False,
+    source: str = "",
     name: str = "law",
 ) -> FrictionLaw:
     """Return a friction law from its coefficient as an expression of the sliding velocity ``w``.
@@ -219,13 +244,15 @@ def friction_law(
         Pairs of parameters of which the first must not exceed the second under set-valued contact.
     self_exciting : bool
         True if the law is meant to feed energy.
+    source : str
+        Where the law was published.
     name : str
-        What messages call it.
+        Name in messages and scene files.
 
     Returns
     -------
     FrictionLaw
-        The same value that a plug-in file makes.
+        The law.
 
     Raises
     ------
@@ -250,16 +277,97 @@ def friction_law(
     for name_of in (entry for pair in pairs for entry in pair):
         if name_of not in defaults:
             raise ValueError(f"{what}: order names {name_of!r}; expected parameters: {', '.join(defaults) or 'none'}")
-    own = _own_parameters(what, used, None, defaults)
-    return FrictionLaw(name, own, coefficient, holding, pairs, check_flag("self_exciting", self_exciting))
+    own = _own_parameters(names, used, None, defaults)
+    feeds = check_flag("self_exciting", self_exciting)
+    return FrictionLaw(name, own, coefficient, holding, pairs, feeds, source=check_text("source", source, 4096))
+
+
+def link_energy(
+    V: Expression = 0,
+    *,
+    R: Expression = 0,
+    T: Expression = 0,
+    parameters: Given | None = None,
+    between: Mapping[str, Iterable[str]] | None = None,
+    source: str = "",
+    name: str = "coupling",
+) -> LagrangianCoupling:
+    """Return the coupling of the energies of a link between equal coordinates of its two ends, whatever these are called.
+
+    Parameters
+    ----------
+    V : Expr, number or str
+        The potential energy of a link of weight ``W`` between the coordinates ``q_i`` and ``q_j`` of its ends; as text,
+        ``"k*W*(q_i - q_j)**2/2"``.  Written in the difference, equal states feel exactly nothing.  Where exchanging i
+        and j changes an energy, links have a direction and the weight 1.
+    R : Expr, number or str
+        Rayleigh's function of the velocities ``v_i`` and ``v_j``, half the power lost.
+    T : Expr, number or str
+        The kinetic energy of a link in ``v_i`` and ``v_j``, which gives it inertia.
+    parameters : mapping, optional
+        The default of each parameter: a number, or a `Parameter` with its range.
+    between : mapping, optional
+        Two oscillators by name, each with those of its states that the energies contain, in place of the ends above.
+    source : str
+        Where the coupling was published.
+    name : str
+        Name in messages and scene files.
+
+    Returns
+    -------
+    LagrangianCoupling
+        The coupling; `Potential` and `Rates` make those of given states.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `Lagrangian` does, and for energies without the weight of the link.
+
+    Examples
+    --------
+    >>> from synchain.models import link_energy
+    >>> spring = link_energy("k*W*(q_i - q_j)**2/2", parameters={"k": 0.3})
+    >>> str(spring.potential)
+    'k*weight*(q_i - q_j)**2/2'
+    """
+    what = f"coupling {_called(name)!r}"
+    defaults = _parameters(what, parameters)
+    kinds, states = _joined(what, between)
+    energies = []
+    for about, value, ends in (("V", V, "q_i q_j"), ("R", R, "v_i v_j"), ("T", T, "v_i v_j")):
+        names = _ModelNames.of_link(f"{what}: {about}", states or ends.split(), defaults)
+        energies.append(names.expression("energy", value))
+    if any(e.has(FRICTION) for e in energies):
+        raise ValueError(f"{what}: found friction(…); expected it in the forces of a Lagrangian")
+    if not any(e.has(WEIGHT) for e in energies):
+        raise ValueError(f"{what}: no energy has the weight W of a link; expected it as a factor, k*W*(q_i - q_j)**2/2")
+    own = _own_parameters(replace(names, what=what), energies, None, defaults)
+    potential, dissipation, kinetic = energies
+    return LagrangianCoupling(
+        name, own, potential, dissipation, kinetic, kinds, source=check_text("source", source, 4096)
+    )
+
+
+def _joined(what: str, between: object) -> tuple[tuple[str, str] | None, list[str]]:
+    """The names of the two oscillators that a coupling joins, and the states in its energies."""
+    if between is None:
+        return None, []
+    table: Mapping[Any, Any] = check_table(f"{what}: between", between)
+    if len(table) != 2 or not all(isinstance(states, list | tuple) for states in table.values()):
+        raise ValueError(
+            f"{what}: between is {short_repr(dict(table))}; expected two oscillators and their states, "
+            "such as {'clock': ['theta'], 'beam': ['x']}"
+        )
+    (first, own), (second, others) = table.items()
+    return (str(first), str(second)), [_name(what, "state", state) for state in (*own, *others)]
 
 
 def _called(name: object) -> str:
     """The name of a model: a short text, and no path of a file of code."""
-    words = check_text("name", name)
-    if words.endswith(".py"):
-        raise ValueError(f"name: found {words!r}, which names a file of code; expected another name")
-    return words
+    text = check_text("name", name)
+    if text.endswith(".py"):
+        raise ValueError(f"name: found {text!r}, which names a file of code; expected another name")
+    return text
 
 
 # -- names -------------------------------------------------------------------------------------------------------
@@ -267,16 +375,16 @@ def _called(name: object) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _ModelNames:
-    """What the names in the expressions of one model stand for.
+    """The symbols of the names in the expressions of one model."""
 
-    `moving` has the functions of time and their derivatives with the symbols that take their places; a plain symbol
-    of the same name is refused, since SymPy's derivatives would not have seen it.
-    """
-
-    what: str
+    what: str  # the model in messages
     symbols: Mapping[str, sp.Symbol]
-    states: tuple[str, ...]
-    moving: Mapping[sp.Expr, sp.Symbol]
+    states: tuple[str, ...] = ()
+    # functions of time and their derivatives -> the symbols that take their places; a plain symbol of the same name is
+    # refused, since SymPy's derivatives would not have seen it
+    moving: Mapping[sp.Expr, sp.Symbol] = field(default_factory=dict)
+    # parameter -> its name in the expressions; parameters left out have one name
+    physical: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -284,14 +392,22 @@ class _ModelNames:
         what: str,
         table: Mapping[str, str],
         functions: Iterable[AppliedUndef],
-        parameters: Mapping[str, Parameter],
+        parameters: Iterable[str],
+        scaling: Scaling | None = None,
     ) -> _ModelNames:
-        """The names of a model: coordinates with the names of their velocities ("" for none), and parameters."""
+        """The names of a model: coordinates with the names of their velocities ("" for none), and quantities."""
         states = (*table, *filter(None, table.values()))
+        physical: Mapping[str, str] = {} if scaling is None else scaling.physical
+        # The constants that fix the scales are positive, so that SymPy takes roots of their products apart.
+        quantities = {} if scaling is None else {name: sp.Symbol(name, positive=True) for name in scaling.units}
+        for name in (physical.get(name, name) for name in parameters):
+            if name in quantities:
+                raise ValueError(f"{what}: the name {name!r} stands for two quantities; rename one")
+            quantities[name] = sp.Symbol(name, real=True)
         for state in states:
             if state in Oscillator.__dict__:
                 raise ValueError(f"{what}: the state {state!r} has the name of an attribute of nodes; rename it")
-        clash = next((s for i, s in enumerate(states) if s in states[:i] or s in parameters), None)
+        clash = next((s for i, s in enumerate(states) if s in states[:i] or s in quantities), None)
         if clash is not None:
             raise ValueError(
                 f"{what}: the name {clash!r} stands for two things; rename one, e.g. by coordinates={{x: v}}"
@@ -304,8 +420,8 @@ class _ModelNames:
             moving[function] = sp.Symbol(state, real=True)
             if table[state]:
                 moving[function.diff(function.args[0])] = sp.Symbol(table[state], real=True)
-        symbols = {name: sp.Symbol(name, real=True) for name in (*states, *parameters)}
-        return cls(what, {**symbols, TIME.name: TIME}, states, moving)
+        symbols = {name: sp.Symbol(name, real=True) for name in states}
+        return cls(what, {**symbols, **quantities, TIME.name: TIME}, states, moving, physical)
 
     @classmethod
     def of_law(cls, what: str, parameters: Mapping[str, Parameter]) -> _ModelNames:
@@ -313,10 +429,19 @@ class _ModelNames:
         if SLIDING.name in parameters:
             raise ValueError(f"{what}: the name 'w' stands for the sliding velocity; rename that parameter")
         symbols = {name: sp.Symbol(name, real=True) for name in parameters}
-        return cls(what, {SLIDING.name: SLIDING, **symbols}, (), {})
+        return cls(what, {SLIDING.name: SLIDING, **symbols})
+
+    @classmethod
+    def of_link(cls, what: str, states: Iterable[str], parameters: Mapping[str, Parameter]) -> _ModelNames:
+        """The names of the energy of a link: states of its ends, its weight under two names, and parameters."""
+        weights = {"W": WEIGHT, WEIGHT.name: WEIGHT}
+        clash = next((name for name in (*states, *weights) if name in parameters), None)
+        if clash is not None:
+            raise ValueError(f"{what}: the name {clash!r} stands for two things; rename the parameter")
+        return cls(what, {**{name: sp.Symbol(name, real=True) for name in (*states, *parameters)}, **weights})
 
     def expression(self, about: str, value: object) -> sp.Expr:
-        """The expression that a user gave, in the form that a model keeps."""
+        """The expression of a user in the form that a model keeps."""
         about = f"{self.what}: {about}"
         if not isinstance(value, sp.Expr):
             return exact(about, value, self.symbols)
@@ -408,7 +533,34 @@ def _name(what: str, role: str, key: object) -> str:
     return name
 
 
-# -- parameters --------------------------------------------------------------------------------------------------
+# -- parameters and units ----------------------------------------------------------------------------------------
+
+
+def _scaling(
+    what: str, table: object, coordinates: Mapping[str, str], parameters: Iterable[str]
+) -> tuple[Scaling, dict[str, str]]:
+    """The scaling of a table, and the units of all quantities that are no parameters."""
+    what = f"{what}: scaling"
+    given = check_table(what, table)
+    check_keys(what, given, ("units", "scales", "physical"))
+    units: dict[str, str] = {}
+    for key, unit in check_table(f"{what}: units", given.get("units", {})).items():
+        name = _name(what, "quantity", key)
+        units[name] = check_text(f"{what}: unit of {name}", unit)
+        _try(f"{what}: {name}", lambda unit=unit: dimension(unit))
+    constants = {name: unit for name, unit in units.items() if name not in coordinates}
+    # Parameters have another name in the expressions, or the same.
+    renamed = check_table(f"{what}: physical", given.get("physical", {}))
+    check_keys(f"{what}: physical", renamed, parameters)
+    physical = {name: _name(what, "quantity", renamed.get(name, name)) for name in parameters}
+    # The units of mass, length and time are made of the constants.
+    scales = check_table(f"{what}: scales", given.get("scales", {}))
+    if set(scales) != {"kg", "m", "s"}:
+        keys = ", ".join(map(repr, scales)) or "nothing"
+        raise ValueError(f"{what}: found scales of {keys}; expected those of 'kg', 'm' and 's'")
+    names = _ModelNames(what, {name: sp.Symbol(name, positive=True) for name in constants})
+    made = {str(key): names.expression(f"scale of {key}", value) for key, value in scales.items()}
+    return Scaling(FrozenDict(constants), FrozenDict(physical), FrozenDict(made)), units
 
 
 def _parameters(what: str, given: Given | None) -> dict[str, Parameter]:
@@ -456,16 +608,20 @@ def _assumed(key: object, parameter: Parameter) -> Parameter:
 
 
 def _own_parameters(
-    what: str, expressions: Iterable[sp.Expr], law: FrictionLaw | None, defaults: Mapping[str, Parameter]
+    names: _ModelNames, expressions: Iterable[sp.Expr], law: FrictionLaw | None, defaults: Mapping[str, Parameter]
 ) -> FrozenDict[Parameter]:
     """The parameters without those of a law that was written among them; ValueError if one is unused or in both."""
     used = {s.name for e in expressions for s in e.free_symbols}
     of_law = frozenset(() if law is None else law.parameters)
     for name in defaults:
-        if name in of_law and name in used:
-            raise ValueError(f"{what}: {name!r} is in the friction law and outside of it; expected it in one of them")
-        if name not in of_law and name not in used:
-            raise ValueError(f"{what}: no expression has the parameter {name!r}; use it or leave it out")
+        inside = names.physical.get(name, name)
+        if name in of_law and inside in used:
+            raise ValueError(
+                f"{names.what}: {name!r} is in the friction law and outside of it; expected it in one of them"
+            )
+        if name not in of_law and inside not in used:
+            called = repr(name) if inside == name else f"{name!r} ({inside} in the expressions)"
+            raise ValueError(f"{names.what}: no expression has the parameter {called}; use it or leave it out")
     return FrozenDict({name: parameter for name, parameter in defaults.items() if name not in of_law})
 
 

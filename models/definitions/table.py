@@ -1,78 +1,107 @@
-"""Oscillators and friction laws as tables of text and numbers, the form of scene files and results, and back."""
+"""Oscillators, friction laws and couplings as tables of text and numbers, the form of scene files and results, and back."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, fields
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import MISSING, fields, replace
 from typing import Any
 
 import sympy as sp
 
 from ..inputs.checks import check_keys, check_table, check_text, short_repr, typed_repr
+from ..interactions.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling, from_table
 from ..mechanics.components import TIME
 from ..mechanics.contact import SLIDING, ContactModel, FrictionLaw
 from ..mechanics.expression import read, written
-from ..mechanics.oscillator import FieldModel, LagrangianModel, Oscillator
+from ..mechanics.oscillator import Coordinate, FieldModel, LagrangianModel, Oscillator, Scaling
 from ..mechanics.parameter import Parameter
-from .inline import Field, Lagrangian, friction_law
-from .loader import load_friction_law, load_oscillator
+from .inline import Field, Lagrangian, friction_law, link_energy
+from .loader import load_friction_law, load_oscillator, read_coupling
 
 _COMMON = ("name", "parameters", "initial")
 _FIELD = (*_COMMON, "rates")
-_LAGRANGIAN = (*_COMMON, "coordinates", "kinetic", "potential", "forces", "dissipation", "friction", "contact")
+_LAGRANGIAN = (
+    *_COMMON,
+    "coordinates",
+    "kinetic",
+    "potential",
+    "forces",
+    "dissipation",
+    "friction",
+    "contact",
+    "scaling",
+)
 _LAW = ("name", "parameters", "force", "static", "order", "self_exciting")
+_LINK = ("name", "parameters", "energies", "on")
+_ENERGIES = ("potential", "dissipation", "kinetic")
 
 
 def oscillator_of_table(table: Mapping[object, Any]) -> Oscillator:
     """Return the oscillator of a table in a scene file."""
     first_order = "rates" in table
     check_keys("oscillator", table, _FIELD if first_order else _LAGRANGIAN)
-    given = {str(key): value for key, value in table.items()}
+    keywords = {str(key): value for key, value in table.items()}
     if first_order:
-        rates = given.pop("rates")
-        return Field(_texts("oscillator: rates", rates), **given)
+        return Field(_texts("oscillator: rates", keywords.pop("rates")), **keywords)
     for key in ("coordinates", "kinetic"):
-        if key not in given:
+        if key not in keywords:
             raise ValueError(f"oscillator: {key!r} is missing; expected coordinates and kinetic, or rates of a field")
-    law = given.pop("friction", None)
     return Lagrangian(
-        _text("oscillator: kinetic", given.pop("kinetic")),
-        _text("oscillator: potential", given.pop("potential", 0)),
-        _texts("oscillator: forces", given.pop("forces", {})),
-        _text("oscillator: dissipation", given.pop("dissipation", 0)),
-        friction=_law(law),
-        **given,
+        _text("oscillator: kinetic", keywords.pop("kinetic")),
+        _text("oscillator: potential", keywords.pop("potential", 0)),
+        _texts("oscillator: forces", keywords.pop("forces", {})),
+        _text("oscillator: dissipation", keywords.pop("dissipation", 0)),
+        friction=_law(keywords.pop("friction", None)),
+        **keywords,
     )
 
 
 def law_of_table(table: Mapping[object, Any]) -> FrictionLaw:
     """Return the friction law of a table in a scene file."""
     check_keys("friction", table, _LAW)
-    given = {str(key): value for key, value in table.items()}
-    if "force" not in given:
+    keywords = {str(key): value for key, value in table.items()}
+    if "force" not in keywords:
         raise ValueError("friction: 'force' is missing; expected the friction coefficient as a text in w")
-    order = given.pop("order", ())
+    order = keywords.pop("order", ())
     if isinstance(order, str) or not isinstance(order, Sequence) or not all(_is_pair(pair) for pair in order):
         raise TypeError(f"friction: order: found {short_repr(order)}; expected pairs of parameters")
-    force, static = _text("friction: force", given.pop("force")), given.pop("static", None)
+    force, static = _text("friction: force", keywords.pop("force")), keywords.pop("static", None)
     return friction_law(
         force,
-        given.pop("parameters", None),
+        keywords.pop("parameters", None),
         static=None if static is None else _text("friction: static", static),
         order=tuple(tuple(pair) for pair in order),
-        **given,
+        **keywords,
     )
+
+
+def coupling_of_table(table: Mapping[object, Any]) -> Coupling:
+    """Return the coupling of a table in a scene file: energies of equal coordinates, rates or a potential of given states."""
+    if "energies" not in table:
+        return from_table("coupling", table)
+    check_keys("coupling", table, _LINK)
+    keywords = {str(key): value for key, value in table.items()}
+    on = keywords.pop("on", None)
+    check_keys("coupling: energies", check_table("coupling: energies", keywords["energies"]), _ENERGIES)
+    energies = _texts("coupling: energies", keywords.pop("energies"))
+    potential, dissipation, kinetic = (energies.get(key, 0) for key in _ENERGIES)
+    coupling = link_energy(potential, R=dissipation, T=kinetic, **keywords)
+    if on is None:
+        return coupling
+    if not isinstance(on, list | tuple) or not on:
+        raise TypeError(f"coupling: on: found {typed_repr(on)}; expected a list of coordinates")
+    return replace(coupling, coordinates=tuple(check_text("coupling: on", name) for name in on))
 
 
 def _is_pair(value: object) -> bool:
     return isinstance(value, list | tuple) and len(value) == 2 and all(isinstance(entry, str) for entry in value)
 
 
-def _law(given: object) -> FrictionLaw | None:
+def _law(value: object) -> FrictionLaw | None:
     """The law of a table or a name; an expression needs the table."""
-    if given is None or isinstance(given, Mapping):
-        return None if given is None else law_of_table(given)
-    name = check_text("oscillator: friction", given, 4096)
+    if value is None or isinstance(value, Mapping):
+        return None if value is None else law_of_table(value)
+    name = check_text("oscillator: friction", value, 4096)
     return None if name == "none" else load_friction_law(name)
 
 
@@ -91,7 +120,7 @@ def _texts(what: str, table: object) -> dict[str, Any]:
 
 
 def as_name_or_table(part: Oscillator | FrictionLaw) -> str | dict[str, Any]:
-    """Return the name of an oscillator or friction law that is a plug-in's, else its table.
+    """Return the name of an oscillator or friction law that a plug-in defines, else its table.
 
     A file outside the package is a plug-in too, named by its path.
     """
@@ -107,10 +136,25 @@ def as_name_or_table(part: Oscillator | FrictionLaw) -> str | dict[str, Any]:
     return _oscillator_table(part) if isinstance(part, Oscillator) else _law_table(part)
 
 
+def as_text_or_table(coupling: Coupling | None) -> str | dict[str, Any]:
+    """Return the text of a coupling by components or of a plug-in, else its table; "none" for None."""
+    if coupling is None or isinstance(coupling, MatrixCoupling):
+        return "none" if coupling is None else str(coupling)
+    if not isinstance(coupling, LagrangianCoupling):
+        return coupling.as_dict()
+    if coupling.name.endswith(".py"):
+        return str(coupling)
+    try:
+        same = read_coupling(str(coupling)) == coupling
+    except (ValueError, TypeError):
+        same = False
+    return str(coupling) if same else _link_table(coupling)
+
+
 def _oscillator_table(node: Oscillator) -> dict[str, Any]:
-    symbols = (*node.states, *node.parameters)
-    texts = _Texts(f"oscillator {node.name!r}", (*symbols, TIME.name))
     model = node.model
+    scaling = model.scaling if isinstance(model, LagrangianModel) else None
+    texts = _Texts(f"oscillator {node.name!r}", (*node.states, *node.parameters, TIME.name), scaling)
     table: dict[str, Any] = {"name": node.name}
     if isinstance(model, FieldModel):
         table["rates"] = dict(zip(model.state, map(texts.write, model.rates), strict=True))
@@ -127,8 +171,6 @@ def _oscillator_table(node: Oscillator) -> dict[str, Any]:
 
 
 def _lagrangian_table(model: LagrangianModel, texts: _Texts) -> dict[str, Any]:
-    if model.scaling is not None:
-        raise ValueError(f"{texts.what}: found scales of its quantities and no file; expected a non-dimensional model")
     table: dict[str, Any] = {
         "coordinates": {c.name: c.velocity for c in model.coordinates},
         "kinetic": texts.write(model.kinetic),
@@ -137,7 +179,17 @@ def _lagrangian_table(model: LagrangianModel, texts: _Texts) -> dict[str, Any]:
     }
     if model.dissipation != 0:
         table["dissipation"] = texts.write(model.dissipation)
+    if model.scaling is not None:
+        table["scaling"] = _scaling_table(model.scaling, model.coordinates, texts)
     return table
+
+
+def _scaling_table(scaling: Scaling, coordinates: Iterable[Coordinate], texts: _Texts) -> dict[str, Any]:
+    return {
+        "units": {**scaling.units, **{c.name: c.unit for c in coordinates if c.unit != "1"}},
+        "scales": {unit: texts.write(e) for unit, e in scaling.scales.items()},
+        "physical": {name: inside for name, inside in scaling.physical.items() if inside != name},
+    }
 
 
 def _law_table(law: FrictionLaw) -> dict[str, Any]:
@@ -152,18 +204,35 @@ def _law_table(law: FrictionLaw) -> dict[str, Any]:
     return {**table, "parameters": _parameter_tables(law.parameters)}
 
 
+def _link_table(coupling: LagrangianCoupling) -> dict[str, Any]:
+    what = f"coupling {coupling.name!r}"
+    if coupling.between is not None:
+        raise ValueError(
+            f"{what}: found a coupling between {' and '.join(coupling.between)} and no file; write it in a file"
+        )
+    texts = _Texts(what, ("q_i", "q_j", "v_i", "v_j", WEIGHT.name, *coupling.parameters))
+    energies = zip(_ENERGIES, (coupling.potential, coupling.dissipation, coupling.kinetic), strict=True)
+    table: dict[str, Any] = {"name": coupling.name, "energies": {key: texts.write(e) for key, e in energies if e != 0}}
+    if coupling.coordinates is not None:
+        table["on"] = list(coupling.coordinates)
+    return {**table, "parameters": _parameter_tables(coupling.parameters)}
+
+
 class _Texts:
     """Writes the expressions of one part as text that is read as the same expressions."""
 
-    def __init__(self, what: str, names: Sequence[str]) -> None:
+    def __init__(self, what: str, names: Sequence[str], scaling: Scaling | None = None) -> None:
         self.what = what
         self.names = {name: sp.Symbol(name, real=True) for name in names}
+        if scaling is not None:  # physical names of parameters are real, the constants that fix the scales positive
+            self.names |= {name: sp.Symbol(name, real=True) for name in scaling.physical.values()}
+            self.names |= {name: sp.Symbol(name, positive=True) for name in scaling.units}
 
     def write(self, e: sp.Expr) -> str:
         text = written(e)
         if read(self.what, text, self.names) != e:
             raise ValueError(
-                f"{self.what}: found {short_repr(e)}, which no text says; make it with Lagrangian or Field"
+                f"{self.what}: found {short_repr(e)}, which no text makes; make it with Lagrangian, Field or link_energy"
             )
         return text
 
@@ -173,10 +242,10 @@ def _parameter_tables(parameters: Mapping[str, Parameter]) -> dict[str, Any]:
 
 
 def _parameter_table(parameter: Parameter) -> float | dict[str, Any]:
-    """The default alone, or all that was said about a parameter."""
-    told = {
-        own.name: getattr(parameter, own.name)
-        for own in fields(Parameter)
-        if own.default is MISSING or getattr(parameter, own.name) != own.default
+    """The default alone, or all fields that differ from their defaults."""
+    entries = {
+        field.name: getattr(parameter, field.name)
+        for field in fields(Parameter)
+        if field.default is MISSING or getattr(parameter, field.name) != field.default
     }
-    return float(parameter.default) if len(told) == 1 else told
+    return float(parameter.default) if len(entries) == 1 else entries

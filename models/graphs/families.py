@@ -1,20 +1,18 @@
-"""Families of graphs: what their plug-in files must hold, a file as a value, and the graphs that it makes."""
+"""Families of graphs as values, and the graphs that they make."""
 
 from __future__ import annotations
 
 import inspect
 import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import wraps
+from functools import lru_cache, wraps
 from itertools import islice
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ..inputs import plugins
 from ..inputs.options import Options, as_options
-from ..inputs.plugin_file import PluginFile
 from ..inputs.plugins import PluginKind
 from .links import LINK_LIMIT, Link
 from .topology import Topology
@@ -22,52 +20,16 @@ from .topology import Topology
 if TYPE_CHECKING:
     import sympy as sp
 
-__all__ = ["KNOWN", "TOPOLOGY", "Family", "FamilyRule", "check_topology", "family", "names", "topology"]
+__all__ = ["TOPOLOGY", "Eigenvalues", "Family", "FamilyRule", "family", "names", "topology"]
 
 Edges: TypeAlias = "Callable[..., Iterable[tuple[int, int, int | str | Fraction]]]"
-Eigenvalues: TypeAlias = "Sequence[tuple[sp.Expr, int]] | None"
-
-KNOWN = (
-    *("SUMMARY", "SOURCE", "MINIMUM", "TOO_SMALL", "DIRECTED", "CONNECTED", "ALL_TO_ALL"),
-    *("edges", "settle", "count", "expected", "spectrum", "formula", "sides"),
-)
-"""The public names that the file of a topology may define."""
-
-
-def _defaults(module: ModuleType) -> dict[str, object]:
-    """The options of a family with their defaults: the keyword-only parameters of its `edges`."""
-    found = inspect.signature(module.edges).parameters.values()
-    return {p.name: p.default for p in found if p.kind is inspect.Parameter.KEYWORD_ONLY}
-
-
-def check_topology(module: ModuleType, where: str, text: bytes) -> None:
-    """Raise ValueError if a module is no topology."""
-    file = PluginFile.of("topology", KNOWN, module, where, text)
-    file.check_names(("SUMMARY", "MINIMUM", "edges"))
-    file.check_values()
-    least = file.get("MINIMUM")
-    if isinstance(least, bool) or not isinstance(least, int):
-        raise file.wrong("MINIMUM", f"MINIMUM is {least!r}; expected the smallest number of nodes, a whole number")
-    options = _defaults(file.module)
-    for name, value in options.items():
-        if value is inspect.Parameter.empty:
-            raise file.wrong("edges", f"the option {name!r} of edges has no default; expected one, such as {name}=1")
-    if options:
-        file.need("settle")
-    for function in file.defined(("settle", "count", "expected", "spectrum")):
-        strange = [name for name in list(inspect.signature(file.get(function)).parameters)[1:] if name not in options]
-        if strange:
-            raise file.wrong(function, f"{function} asks for {strange[0]!r}, which is no option of edges")
-    for function in file.defined(("settle", "count", "expected", "spectrum")):
-        missing = [name for name in options if name not in inspect.signature(file.get(function)).parameters]
-        if missing:
-            raise file.wrong(function, f"{function} lacks the option {missing[0]!r} of edges; expected the same ones")
-
+Eigenvalues: TypeAlias = "Sequence[tuple[sp.Expr | int, int]] | None"
 
 TOPOLOGY = PluginKind(
     "topology",
     "topologies",
-    check_topology,
+    lambda: (Family,),
+    "Family(edges, minimum=…)",
     also={
         "cycle": "ring",
         "generalized_petersen": "petersen",
@@ -99,50 +61,118 @@ TOPOLOGY = PluginKind(
 class _Signature:
     """The signature of a call of a family: n, and its options with their defaults; the class has its own."""
 
-    def __get__(self, made: Family | None, owner: type[Family]) -> inspect.Signature:
-        if made is None:
+    def __get__(self, instance: Family | None, owner: type[Family]) -> inspect.Signature:
+        if instance is None:
             raise AttributeError("__signature__")
         kind = inspect.Parameter
-        options = (kind(name, kind.KEYWORD_ONLY, default=value) for name, value in made.options.items())
+        options = (kind(name, kind.KEYWORD_ONLY, default=value) for name, value in instance.options.items())
         return inspect.Signature([kind("n", kind.POSITIONAL_OR_KEYWORD, annotation=int), *options])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+@lru_cache(maxsize=256)
+def _options(edges: Edges) -> Mapping[str, object]:
+    """The keyword-only parameters of a function with their defaults."""
+    parameters = inspect.signature(edges).parameters.values()
+    return {p.name: p.default for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY}
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Family:
     """A family of graphs: a function of the number of nodes and of the options of the family.
 
-    Families are equal if their names are; that of a file outside the package stands for one text
-    of that file.  A family pickles as its name.
+    A plug-in file assigns one to TOPOLOGY.  Families are equal if their names are; the name of a file outside the package
+    includes the digest of its text.  A family pickles as its name.
+
+    Parameters
+    ----------
+    edges : callable
+        ``edges(n, **options)`` yields (i, j, weight) once for each edge, nodes from 0; of a directed family (target, source,
+        weight) once for each link.  Weights are whole numbers, Fractions or texts such as "1/2".  Its keyword-only
+        arguments are the options of the family with their defaults; None for an option that is stored only if it is set.
+    minimum : int
+        Smallest number of nodes.
+    too_small : str
+        What to do if n is below the minimum.
+    settle : callable, optional
+        ``settle(n, **options)`` checks the options, and n if the family has not all numbers of nodes, and returns the
+        options as a graph stores them.  Needed if there are options.
+    count, expected : callable, optional
+        ``count(n, **options)`` is the number of edges, so that large graphs need not be built to be counted;
+        ``expected(n, **options)`` their mean number if chance decides.
+    spectrum : callable, optional
+        ``spectrum(n, **options)`` is a sequence of (eigenvalue of adjacency minus degree, multiplicity) without
+        repetition, or None for an n without a closed form.  It is proved before it is used.
+    formula : callable, optional
+        The closed form with symbols for the sizes, a `ClosedForm`.
+    sides : callable, optional
+        ``sides(n)`` is the number of nodes in each direction of a grid.
+    directed : bool
+        True if links are one-way.
+    connected : bool
+        False if a graph may fall into parts.
+    all_to_all : bool
+        True if every pair of nodes is joined by an edge of weight 1, on which mean fields rest.
+    source : str
+        Where the graph comes from.
+    name, summary : str
+        The name of the plug-in and one line for lists; the file gives them.
+
+    Raises
+    ------
+    ValueError
+        If the options of the functions differ, or one has no default.
+
+    Examples
+    --------
+    >>> from synchain.models import Family
+    >>> pairs = Family(lambda n: ((i, i + 1, 1) for i in range(0, n - 1, 2)), minimum=2, connected=False, name="pairs")
+    >>> pairs(4).link_count
+    4
     """
 
-    name: str  # the name of the plug-in
-    summary: str  # one line for lists
-    minimum: int  # smallest number of nodes
-    # ``edges(n, **options)`` yields (i, j, weight) once for each edge, i < j; of a directed family (target, source,
-    # weight) once for each link
     edges: Edges
-    source: str = ""  # where the graph comes from
-    too_small: str = "choose a larger n"  # what to do if n is below the minimum
-    directed: bool = False  # True if links are one-way
-    connected: bool = True  # False if a graph may fall into parts
-    all_to_all: bool = False  # True if every pair of nodes is joined by an edge of weight 1
-    # the options with their defaults; None if an option is not stored unless it is set
-    options: Mapping[str, object] = field(default_factory=dict)
-    # ``settle(n, **options)`` checks the options, and n if the family has not all numbers of nodes, and returns the
-    # options as they are stored
+    minimum: int
+    too_small: str = "choose a larger n"
     settle: Callable[..., object] | None = None
-    # ``count(n, **options)`` is the number of edges; ``expected(n, **options)`` is their mean number if chance
-    # decides
     count: Callable[..., int] | None = None
     expected: Callable[..., int] | None = None
-    # ``spectrum(n, **options)`` is a sequence of (eigenvalue of G, multiplicity) without repetition, or None for an n
-    # without a closed form
     spectrum: Callable[..., Eigenvalues] | None = None
-    formula: Callable[..., Any] | None = None  # the closed form with symbols for the sizes
-    # ``sides(n)`` is the number of nodes in each direction of a grid
+    formula: Callable[..., Any] | None = None
     sides: Callable[[int], tuple[int, ...]] | None = None
+    directed: bool = False
+    connected: bool = True
+    all_to_all: bool = False
+    source: str = ""
+    name: str = ""
+    summary: str = ""
     link_limit: int = LINK_LIMIT  # greatest number of links of a graph
     __signature__ = _Signature()
+
+    def __post_init__(self) -> None:
+        if isinstance(self.minimum, bool) or not isinstance(self.minimum, int):
+            raise TypeError(f"minimum is {self.minimum!r}; expected the smallest number of nodes, a whole number")
+        for name, default in self.options.items():
+            if default is inspect.Parameter.empty:
+                raise ValueError(f"the option {name!r} of edges has no default; expected one, such as {name}=1")
+        if self.options and self.settle is None:
+            raise ValueError(
+                f"found no settle for the options {', '.join(self.options)}; expected one that checks them"
+            )
+        for function in ("settle", "count", "expected", "spectrum"):
+            if getattr(self, function) is None:
+                continue
+            taken = list(inspect.signature(getattr(self, function)).parameters)[1:]
+            for name in taken:
+                if name not in self.options:
+                    raise ValueError(f"{function} has the argument {name!r}, which is no option of edges")
+            for name in self.options:
+                if name not in taken:
+                    raise ValueError(f"{function} lacks the option {name!r} of edges; expected the same ones")
+
+    @property
+    def options(self) -> Mapping[str, object]:
+        """The options with their defaults."""
+        return _options(self.edges)
 
     def __call__(self, *n: object, **options: object) -> Topology:
         """Return the graph of `n` nodes; see `topology`."""
@@ -204,7 +234,7 @@ class Family:
             settled = self.settle(n, **{**self.options, **options})
         except (ValueError, TypeError) as error:
             raise type(error)(f"topology {self.name}: {error}") from None
-        except Exception as error:
+        except Exception as error:  # a mistake in a file from outside
             raise plugins.located(error, self.settle) from error
         if not isinstance(settled, Mapping):
             raise ValueError(
@@ -249,13 +279,14 @@ class FamilyRule:
         links.sort(key=operator.itemgetter(0, 1))
         return tuple(links)
 
-    def eigenvalues(self) -> Eigenvalues:
-        """List the eigenvalues of G with multiplicities; None if the family has no closed form.
+    def eigenvalues(self) -> Sequence[tuple[sp.Expr, int]] | None:
+        """List the eigenvalues of G with multiplicities; None if the family has no closed form."""
+        pairs = None if self.family.spectrum is None else self.family.spectrum(self.n, **dict(self.options))
+        if not isinstance(pairs, list | tuple):  # a sequence that computes its items is one of SymPy's numbers
+            return pairs
+        from sympy import Integer
 
-        Raises ValueError if a file outside the package gives no such list.
-        """
-        spectrum = self.family.spectrum
-        return None if spectrum is None else spectrum(self.n, **dict(self.options))
+        return [(Integer(value) if isinstance(value, int) else value, count) for value, count in pairs]
 
 
 def topology(name: str, n: int, **options: object) -> Topology:
@@ -296,61 +327,43 @@ def family(name: str) -> Family:
     """Return a family of graphs by its name, or by a path that `allow_code` has allowed."""
     if not isinstance(name, str):
         raise TypeError(f"topology name {name!r} is no text; expected one of {', '.join(names())}")
-    known = plugins.named(TOPOLOGY, name)
-    return _of_module(known, plugins.load(TOPOLOGY, known))
+    canonical = plugins.named(TOPOLOGY, name)
+    made: Family = plugins.load(TOPOLOGY, canonical)
+    if plugins.is_shipped(TOPOLOGY, canonical):
+        return made
+    # Errors in the functions of a file from outside name file and line.
+    guarded: dict[str, Any] = {"edges": _guarded_edges(made.edges)}
+    for key in ("count", "expected"):
+        if (function := getattr(made, key)) is not None:
+            guarded[key] = plugins.blamed(function)(function)
+    if made.spectrum is not None:
+        guarded["spectrum"] = _guarded_spectrum(made.spectrum, getattr(canonical, "place", name))
+    return replace(made, **guarded)
 
 
-_ATTRIBUTES = {
-    "SUMMARY": "summary",
-    "MINIMUM": "minimum",
-    "SOURCE": "source",
-    "TOO_SMALL": "too_small",
-    "DIRECTED": "directed",
-    "CONNECTED": "connected",
-    "ALL_TO_ALL": "all_to_all",
-    "settle": "settle",
-    "formula": "formula",
-    "sides": "sides",
-}
-"""Names of a file that a family takes as they are."""
-
-
-def _of_module(name: str, module: ModuleType) -> Family:
-    """The family of a module; errors of functions from outside the package name file and line."""
-    parts = {attribute: getattr(module, key) for key, attribute in _ATTRIBUTES.items() if hasattr(module, key)}
-    outside = not module.__name__.startswith(f"{plugins.PACKAGE}.")
-    for key in ("count", "expected", "spectrum"):
-        if hasattr(module, key):
-            function = getattr(module, key)
-            parts[key] = plugins.blamed(function)(function) if outside else function
-    if isinstance(name, plugins.OwnFile) and "spectrum" in parts:
-        parts["spectrum"] = _checked(parts["spectrum"], name.place)
-    edges = _blamed_edges(module.edges) if outside else module.edges
-    return Family(name=name, edges=edges, options=_defaults(module), **parts)
-
-
-def _blamed_edges(edges: Edges) -> Edges:
+def _guarded_edges(edges: Edges) -> Edges:
     """Edges whose errors name file and line, wrong weights too."""
 
     @wraps(edges)
-    def blamed_edges(n: int, **options: object) -> Iterator[tuple[int, int, Fraction]]:
+    def guarded(n: int, **options: object) -> Iterator[tuple[int, int, Fraction]]:
         with plugins.blamed(edges):
             yield from ((i, j, Fraction(weight)) for i, j, weight in edges(n, **options))
 
-    return blamed_edges
+    return guarded
 
 
-def _checked(spectrum: Callable[..., Eigenvalues], place: str) -> Callable[..., Eigenvalues]:
-    """A closed form that raises ValueError if it is no list of (eigenvalue, multiplicity)."""
+def _guarded_spectrum(spectrum: Callable[..., Eigenvalues], path: str) -> Callable[..., Eigenvalues]:
+    """A closed form whose errors name file and line; ValueError if it returns no list of (eigenvalue, multiplicity)."""
 
     @wraps(spectrum)
-    def checked(n: int, **options: object) -> Eigenvalues:
-        pairs: Eigenvalues = spectrum(n, **options)
-        for pair in () if pairs is None else pairs if isinstance(pairs, list | tuple) else (pairs,):
+    def guarded(n: int, **options: object) -> Eigenvalues:
+        with plugins.blamed(spectrum):
+            pairs: Eigenvalues = spectrum(n, **options)
+        for pair in () if pairs is None else pairs if isinstance(pairs, Sequence) else (pairs,):
             if not (isinstance(pair, tuple) and len(pair) == 2 and isinstance(pair[1], int) and pair[1] > 0):
                 raise ValueError(
-                    f"{place}: spectrum({n}) has {pair!r}; expected a list of (eigenvalue, multiplicity) or None"
+                    f"{path}: spectrum({n}) has {pair!r}; expected a list of (eigenvalue, multiplicity) or None"
                 )
         return pairs
 
-    return checked
+    return guarded

@@ -1,12 +1,12 @@
-"""One-file plug-ins: found by listing their directory, called with the symbols their functions ask for by name.
+"""Plug-ins: Python files that assign one value, an oscillator, a friction law, a coupling or a family of graphs.
 
 Besides the files of this package there are entry points of installed packages (groups ``synchain.oscillators``,
 ``synchain.frictions``, ``synchain.couplings``, ``synchain.topologies``), and files anywhere, named by a path that ends in
-``.py``.  Such a file is run only after `allow_code` has been called for it, so that a scene, which is data, never runs code
-by itself.
+``.py``.  Such a file is run only after `allow_code` has been called for it: a scene, which is data, never runs code by
+itself.
 
-A file outside the package is known by its text, so that an edited file is another model.  What such a file imports is
-not looked at: write a model in one file.
+A file outside the package is identified by its text, so that an edited file is another model.  Its imports are not
+compared: write a model in one file.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import inspect
 import pkgutil
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
@@ -30,47 +30,32 @@ from .checks import check_path, check_text, short_repr, suggestion
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-__all__ = [
-    "OwnFile",
-    "PluginKind",
-    "allow_code",
-    "allowed_code",
-    "blamed",
-    "call",
-    "load",
-    "located",
-    "named",
-    "names",
-    "part",
-]
-
 PACKAGE = "synchain.models"
 """The package whose folders hold the plug-ins that are shipped."""
 
 
 @dataclass(frozen=True, slots=True)
 class PluginKind:
-    """A kind of plug-in, defined by the room that knows what such a file must hold."""
+    """A kind of plug-in: where its files are, and which value they assign."""
 
-    name: str  # what a file of the kind is called in messages: "oscillator"
-    folder: str  # the folder of `synchain.models` that holds the shipped files; it names the group of entry points too
-    # called with the module of a file from outside, its name in messages and its text; raises ValueError if the
-    # module is not what the kind must be
-    check: Callable[[ModuleType, str, bytes], None] = field(compare=False, repr=False)
-    # other names of shipped files: what they name is what the file's own name names, unless there is a file of that
-    # name
+    name: str  # the kind in messages, "oscillator"; in capitals, the name that a file gives to its value: OSCILLATOR
+    folder: str  # the folder of `synchain.models` with the shipped files; it names the group of entry points too
+    # returns the types of the value; a call, since lists of plug-ins must not load SymPy
+    types: Callable[[], tuple[type, ...]] = field(compare=False, repr=False)
+    example: str = field(compare=False, repr=False)  # the right-hand side of the assignment, for messages
+    # further names of shipped files; a file of that name takes precedence
     also: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
     # names of other things that are close to a shipped file; they serve suggestions only
     near: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
-    # what a name can be besides that of a file, for the message that refuses a name
+    # what else a user may give, for the message that refuses an unknown name
     otherwise: str = field(default="", compare=False, repr=False)
 
 
 class OwnFile(str):
-    """The name of a plug-in file outside the package, as it was written, with the file and the text that it stands for.
+    """The name of a plug-in file outside the package, as the user wrote it, with the path and the digest of its text.
 
-    Two of them are equal if name, place and text are equal; none is equal to a plain text.  So whatever is kept for a
-    name is kept for one text of one file.
+    Two names are equal if name, path and digest are equal; none equals a plain text.  So a cache by name holds the
+    value of one text of one file.
     """
 
     __slots__ = ("digest", "place")
@@ -99,14 +84,14 @@ class OwnFile(str):
 
 
 _modules: dict[tuple[str, str, str], ModuleType] = {}
-"""Kind, place and digest of the text -> what came of it; scenes keep the model that they were made with."""
+"""Kind, path and digest -> the module of a file outside the package; scenes keep the model that they were made with."""
 
 _allowed: set[Path] = set()
 
 
 def names(kind: PluginKind) -> tuple[str, ...]:
     """Return the sorted names of all plug-ins of a kind."""
-    return tuple(sorted({*_own(kind), *_entry_points(kind)}))
+    return tuple(sorted({*_shipped(kind), *_entry_points(kind)}))
 
 
 def allow_code(*paths: str | Path) -> None:
@@ -137,96 +122,98 @@ def allowed_code() -> tuple[str, ...]:
 
 
 def named(kind: PluginKind, name: str) -> str:
-    """Return the own name of a plug-in; of a file outside the package an `OwnFile` of its present text.
+    """Return the canonical name of a plug-in: an `OwnFile` of the present text for a path, the file's name for a synonym.
 
-    What is an `OwnFile` already stays what it is, whatever has become of its file.
+    An `OwnFile` is returned unchanged, even if its file has been edited or removed since.
     """
-    if isinstance(name, OwnFile) or not (isinstance(name, str) and name.endswith(".py")):
-        return name if name not in kind.also or name in names(kind) else kind.also[name]
-    place = Path(name).resolve()
-    text = _text(kind, name, place)
-    own = OwnFile(name, str(place), hashlib.sha256(text).hexdigest())
-    _module(kind, own, text)
-    return own
+    if isinstance(name, OwnFile):
+        return name
+    if isinstance(name, str) and name.endswith(".py"):
+        path = Path(name).resolve()
+        text = _text(kind, name, path)
+        own = OwnFile(name, str(path), hashlib.sha256(text).hexdigest())
+        _module(kind, own, text)
+        return own
+    return kind.also[name] if name in kind.also and name not in names(kind) else name
 
 
-def load(kind: PluginKind, name: str) -> ModuleType:
-    """Return the module of a plug-in."""
-    own = named(kind, name)
-    if own in _own(kind):
-        return import_module(f"{PACKAGE}.{kind.folder}.{own}")
-    if isinstance(own, OwnFile):
-        return _module(kind, own)
-    entries = _entry_points(kind)
-    if name in entries:
-        return _entry(kind, name)
+def load(kind: PluginKind, name: str) -> Any:
+    """Return the value that a plug-in file assigns, with the plug-in's name and the summary from its docstring."""
+    name = named(kind, name)
+    if isinstance(name, OwnFile):
+        return _value(kind, name, _module(kind, name), name.place)
+    if name in _shipped(kind):
+        module = import_module(f"{PACKAGE}.{kind.folder}.{name}")
+        return _value(kind, name, module, str(module.__file__))
+    if name in _entry_points(kind):
+        return _value(kind, name, *_installed(kind, name))
     known = names(kind)
     hint = suggestion(name, known, {**kind.near, **kind.also})
     raise ValueError(f"unknown {kind.name} {short_repr(name)}; known: {', '.join(known)}{kind.otherwise}{hint}")
 
 
+def is_shipped(kind: PluginKind, name: str) -> bool:
+    """Return True for a plug-in of this package."""
+    return not isinstance(name, OwnFile) and name in _shipped(kind)
+
+
+@lru_cache(maxsize=512)
+def _value(kind: PluginKind, name: str, module: ModuleType, where: str) -> Any:
+    """The value of a module, under the name of its plug-in; ValueError if it assigns none."""
+    variable = kind.name.upper()
+    value = getattr(module, variable, None)
+    if not isinstance(value, kind.types()):
+        found = f"no {variable}" if value is None else f"{variable} = {short_repr(value)}"
+        raise ValueError(
+            f"{where}: found {found}; expected {variable} = {kind.example}; see: synchain new {kind.name} NAME"
+        )
+    if not hasattr(value, "summary"):  # rates and potentials of links have no name: a scene file holds them as tables
+        return value
+    # The summary is the first paragraph of the docstring, without its full stop.
+    summary = " ".join((inspect.getdoc(module) or "").partition("\n\n")[0].split()).removesuffix(".")
+    described: Any = value
+    return replace(described, name=name, summary=summary)
+
+
 def part(what: str, value: object) -> str:
-    """Return the name of a part of the model as text; it may be a long path to a file of code."""
+    """Return the name of a part of the model as text; a path to a file of code may be long."""
     return check_text(what, value, 1000 if isinstance(value, str) and ".py" in value else 200)
-
-
-def call(function: Callable[..., object], symbols: Mapping[str, object]) -> Any:
-    """Call a plug-in's function with those of `symbols` that its signature names."""
-    wanted = inspect.signature(function).parameters
-    for name in wanted:
-        if name not in symbols:
-            where = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
-            raise ValueError(f"{where} asks for {name!r}; known: {', '.join(symbols)}{_instead(name, symbols)}")
-    with blamed(function):
-        return function(**{name: symbols[name] for name in wanted})
 
 
 @contextmanager
 def blamed(function: Callable[..., object]) -> Iterator[None]:
-    """Within it, an error of a function from outside the package becomes a ValueError with its file and line."""
+    """Turn an error of a plug-in's function into a ValueError with its file and line."""
     try:
         yield
     except Exception as error:
-        told = located(error, function)
-        if told is error:
-            raise
-        raise told from error
+        raise located(error, function) from error
 
 
-def _instead(name: str, known: Iterable[str]) -> str:
-    """What to do about a name that a plug-in's function asks for in vain; the states of a link's ends have fixed names."""
-    ends = [other for other in known if other.endswith(("_i", "_j"))]
-    if ends and name.endswith(("_i", "_j")):
-        return f"; the ends of a link are {', '.join(ends)} whatever the coordinate is; use these names"
-    return "; correct the name or declare it as a parameter"
-
-
-def located(error: Exception, function: Callable[..., object]) -> Exception:
-    """The error of a plug-in's function: as it is from this package, else a ValueError with file and line."""
-    if str(function.__module__).startswith(f"{PACKAGE}."):
-        return error
+def located(error: Exception, function: Callable[..., object]) -> ValueError:
+    """Return a ValueError that names the file and line of an error in a plug-in's function."""
     return _located(error, inspect.getsourcefile(function) or function.__module__)
 
 
-def _own(kind: PluginKind) -> tuple[str, ...]:
+def _shipped(kind: PluginKind) -> tuple[str, ...]:
     package = import_module(f"{PACKAGE}.{kind.folder}")
     return tuple(m.name for m in pkgutil.iter_modules(package.__path__) if not m.name.startswith("_"))
 
 
 def _entry_points(kind: PluginKind) -> Mapping[str, EntryPoint]:
-    """The plug-ins that installed packages announce; none is loaded for this."""
+    """The entry points of installed packages by name; none is loaded."""
     return _announced(f"synchain.{kind.folder}", tuple(sys.path))
 
 
 @lru_cache(maxsize=8)
-def _announced(group: str, places: tuple[str, ...]) -> Mapping[str, EntryPoint]:
-    """The entry points of a group in the packages at these places, by name."""
+def _announced(group: str, paths: tuple[str, ...]) -> Mapping[str, EntryPoint]:
+    """The entry points of a group, looked up again only if `sys.path` has changed."""
     from importlib.metadata import entry_points
 
     return {entry.name: entry for entry in entry_points(group=group)}
 
 
-def _entry(kind: PluginKind, name: str) -> ModuleType:
+def _installed(kind: PluginKind, name: str) -> tuple[ModuleType, str]:
+    """The module of an entry point, and how messages call it."""
     entry = _entry_points(kind)[name]
     where = f"{kind.name} {name!r} of the entry point {entry.value!r}"
     try:
@@ -235,22 +222,11 @@ def _entry(kind: PluginKind, name: str) -> ModuleType:
         raise _located(error, "", where) from error
     if not isinstance(module, ModuleType):
         raise ValueError(f"{where}: found no module; expected a {kind.name} file; see: synchain new {kind.name} NAME")
-    _check_installed(kind, module, where)
-    return module
-
-
-@lru_cache(maxsize=64)
-def _check_installed(kind: PluginKind, module: ModuleType, where: str) -> None:
-    """Check a module of an installed package, once."""
-    try:
-        text = inspect.getsource(module).encode()
-    except (OSError, TypeError):  # it has no source, and so no names that could be looked at
-        text = b""
-    kind.check(module, where, text)
+    return module, where
 
 
 def _text(kind: PluginKind, name: str, place: Path) -> bytes:
-    """What stands in a file that may be run; ValueError if it may not, or cannot be read."""
+    """The text of a file that `allow_code` has allowed; ValueError if it is not allowed or cannot be read."""
     if not place.is_file():
         raise ValueError(f"{kind.name} {name!r}: no such file: {place}; expected a .py file; check the path")
     if place not in _allowed:
@@ -267,7 +243,7 @@ def _text(kind: PluginKind, name: str, place: Path) -> bytes:
 
 
 def _module(kind: PluginKind, own: OwnFile, text: bytes | None = None) -> ModuleType:
-    """What the text of a file of code defines, run once for each text."""
+    """The module of a file of code, run once for each text."""
     key = (kind.name, own.place, own.digest)
     if key in _modules:
         return _modules[key]
@@ -284,13 +260,12 @@ def _module(kind: PluginKind, own: OwnFile, text: bytes | None = None) -> Module
         exec(compile(text, own.place, "exec", dont_inherit=True), module.__dict__)
     except Exception as error:
         raise _located(error, own.place) from error
-    kind.check(module, own.place, text)
     _modules[key] = module
     return module
 
 
 def _located(error: Exception, file: str, what: str = "") -> ValueError:
-    """An error in a plug-in with the file and the line where it arose; without `file`, the innermost one."""
+    """A ValueError with the innermost line of `file` in an error's traceback, of any file if `file` is empty."""
     frames = traceback.extract_tb(error.__traceback__)
     places = [(frame.filename, frame.lineno) for frame in frames if file in ("", frame.filename)]
     if isinstance(error, SyntaxError) and error.filename and file in ("", error.filename):

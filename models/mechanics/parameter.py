@@ -21,7 +21,7 @@ class Parameter:
     unit : str
         The SI unit of the physical quantity behind the number, such as "N/m"; "1" if it is a number by itself.
     meaning : str
-        A phrase that says what it is; plug-in files must have one.
+        A phrase that says what it is.
     minimum, maximum : float, optional
         The range, both ends included.
     positive : bool

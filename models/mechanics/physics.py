@@ -30,7 +30,7 @@ def check_power(law: FrictionLaw, values: Mapping[str, float]) -> None:
         if w * f < 0.0:
             raise ValueError(
                 f"friction law {law.name!r}: f({w:.3g}) = {f:.3g} has the sign against the sliding velocity and feeds energy; "
-                "expected w f(w) >= 0; turn the sign of `force`, correct the parameters, or declare SELF_EXCITING = True"
+                "expected w f(w) >= 0; turn the sign of the force, correct the parameters, or write self_exciting=True"
             )
 
 
@@ -71,7 +71,7 @@ def _check_masses(oscillator: Oscillator, values: tuple[tuple[str, float], ...])
         if not numbers[: k + 1, : k + 1].det() > 0:
             raise ValueError(
                 f"oscillator {oscillator.name!r}: the mass of the velocity {velocity} is {numbers[k, k]}, and its kinetic energy "
-                "not positive; expected T > 0 for every motion; correct `kinetic` or the parameters"
+                "not positive; expected T > 0 for every motion; correct T or the parameters"
             )
 
 

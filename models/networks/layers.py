@@ -6,14 +6,14 @@ from collections.abc import Iterable, Mapping
 from itertools import islice
 
 from ..definitions.loader import load_friction_law, load_oscillator, read_coupling
-from ..definitions.table import law_of_table, oscillator_of_table
+from ..definitions.table import coupling_of_table, law_of_table, oscillator_of_table
 from ..graphs import readers
 from ..graphs.families import topology
 from ..graphs.graph_text import checked_name
 from ..graphs.topology import Topology
 from ..inputs.checks import check_integer, check_keys, check_table, short_repr
 from ..inputs.plugins import part
-from ..interactions.coupling import COUPLINGS, Coupling, from_table
+from ..interactions.coupling import COUPLINGS, Coupling
 from ..mechanics.contact import ContactModel, FrictionLaw
 from ..mechanics.oscillator import Oscillator
 from .model import Group
@@ -64,7 +64,7 @@ def as_coupling(value: object) -> Coupling | None:
     if value is None or isinstance(value, COUPLINGS):
         return value
     if isinstance(value, Mapping):
-        return from_table("coupling", value)
+        return coupling_of_table(value)
     if isinstance(value, Topology):
         raise TypeError(f"coupling: found the graph {value.name}({value.n}); expected a coupling; write topology=…")
     words = part("coupling", value)

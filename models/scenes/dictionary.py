@@ -6,14 +6,14 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from ..definitions.table import as_name_or_table
+from ..definitions.table import as_name_or_table, as_text_or_table
 from ..graphs.families import family, names, topology
 from ..graphs.graph_text import checked_name, is_composed, read_graph
 from ..graphs.readers import edge_graph
 from ..graphs.topology import Topology, from_matrix, read_matrix
 from ..inputs.checks import check_integer, check_keys, check_table, check_text, short_repr
 from ..inputs.plugins import part
-from ..interactions.coupling import Coupling, Potential, Rates, split
+from ..interactions.coupling import split
 from ..networks.model import MOST_NODES
 from ..sweeps.distribution import Draw
 from ..sweeps.draw import GRAPH, Draws, Graphs, RandomGraph
@@ -141,11 +141,13 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
         written[name] = str(values[name])
     for name in ("oscillator", "friction"):
         written[name] = "none" if values[name] is None else as_name_or_table(values[name])
-    written["coupling"], written["topology"] = _coupling(values["coupling"]), graph_table(values["topology"])
+    written["coupling"], written["topology"] = as_text_or_table(values["coupling"]), graph_table(values["topology"])
     layers = written.pop("links")
     if layers is not None:
         del written["coupling"], written["topology"]
-        written["links"] = [{"coupling": _coupling(own), "topology": graph_table(graph)} for own, graph in layers]
+        written["links"] = [
+            {"coupling": as_text_or_table(own), "topology": graph_table(graph)} for own, graph in layers
+        ]
     written["nodes"] = [group.as_dict() for group in values["nodes"]]
     if values["atol"] == values["rtol"] / 10:  # it follows rtol, in functions with a tolerance of their own too
         del written["atol"]
@@ -169,13 +171,6 @@ def _draw(drawn: Draws) -> object:
     if isinstance(drawn, Draw | RandomGraph):
         return str(drawn)
     return [*map(graph_table, drawn.graphs)] if isinstance(drawn, Graphs) else [*map(list, drawn)]
-
-
-def _coupling(coupling: Coupling | None) -> object:
-    """A coupling by its name, or as a table of expressions."""
-    if isinstance(coupling, Rates | Potential):
-        return coupling.as_dict()
-    return "none" if coupling is None else str(coupling)
 
 
 def graph_table(graph: Topology) -> dict[str, object]:

@@ -76,7 +76,9 @@ def _rows() -> dict[str, Table]:
     numbers = {"type": "array", "items": NUMBER, "minItems": 1}
     values = _either(numbers, {"type": "array", "items": numbers, "minItems": 1})
     expressions: Table = {"type": "object", "additionalProperties": NUMBER}
+    link = {"name": TEXT, "on": {"type": "array", "items": TEXT, "minItems": 1}, "parameters": {"type": "object"}}
     tables = [
+        _table({"energies": EXPRESSIONS, **link}, "energies"),
         _table({"rates": expressions, "parameters": {"type": "object"}}, "rates"),
         _table({"potential": NUMBER, "parameters": {"type": "object"}}, "potential"),
     ]
@@ -162,7 +164,7 @@ def _written_out() -> tuple[Table, Table]:
     common = {"name": TEXT, "parameters": anything, "initial": anything}
     field = _table({**common, "rates": EXPRESSIONS}, "rates")
     energies = {"coordinates": anything, "kinetic": NUMBER, "potential": NUMBER, "dissipation": NUMBER}
-    more = {"forces": EXPRESSIONS, "friction": friction, "contact": contact}
+    more = {"forces": EXPRESSIONS, "friction": friction, "contact": contact, "scaling": anything}
     lagrangian = _table({**common, **energies, **more}, "coordinates", "kinetic")
     return {"anyOf": [*_part(OSCILLATOR)["anyOf"], field, lagrangian]}, friction
 

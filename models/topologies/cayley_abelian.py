@@ -1,4 +1,6 @@
-"""Cayley graph of an abelian group: a product of cyclic groups, each element joined along generators."""
+"""Cayley graph of a product of cyclic groups (shape: their orders; one of order n); generators: their numbers one
+after another (the unit of each group).
+"""
 
 from __future__ import annotations
 
@@ -6,21 +8,9 @@ from collections.abc import Iterator
 from fractions import Fraction
 from itertools import product
 from math import lcm, prod
-from typing import TYPE_CHECKING
 
+from ..graphs.families import Eigenvalues, Family
 from ..inputs.options import integers_option
-
-if TYPE_CHECKING:
-    import sympy as sp
-
-SUMMARY = (
-    "Cayley graph of a product of cyclic groups (shape: their orders; one of order n); generators: their numbers one after "
-    "another (the unit of each group)"
-)
-MINIMUM = 2
-SOURCE = "L. Lovász, Period. Math. Hung. 6, 191 (1975); L. Babai, J. Comb. Theory B 27, 180 (1979)"
-
-CONNECTED = False
 
 _Element = tuple[int, ...]
 
@@ -91,9 +81,7 @@ def count(n: int, *, shape: tuple[int, ...] | None = None, generators: tuple[int
     return sum(n // 2 if g == _inverse(g, orders) else n for g in chosen)
 
 
-def spectrum(
-    n: int, *, shape: tuple[int, ...] | None = None, generators: tuple[int, ...] | None = None
-) -> list[tuple[sp.Expr, int]]:
+def spectrum(n: int, *, shape: tuple[int, ...] | None = None, generators: tuple[int, ...] | None = None) -> Eigenvalues:
     """Sums over the generators g of -4 sin²(π Σ k g/m) over the orders m, half of it for g = -g."""
     from ..algebra.cosine_sums import AngleSum, expressions
 
@@ -108,3 +96,14 @@ def spectrum(
             total += AngleSum.cosine(-2 * weight, weight, turn % whole, whole)
         numbers.append((total, 1))
     return expressions(numbers)
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=2,
+    settle=settle,
+    count=count,
+    spectrum=spectrum,
+    connected=False,
+    source="L. Lovász, Period. Math. Hung. 6, 191 (1975); L. Babai, J. Comb. Theory B 27, 180 (1979)",
+)

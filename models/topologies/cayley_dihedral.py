@@ -1,24 +1,14 @@
-"""Cayley graph of a dihedral group: the motions of a polygon, joined along rotations and reflections."""
+"""Cayley graph of the dihedral group of a polygon with n/2 corners; generators: rotations (1) and reflections (0),
+each by its number of corners.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
+from ..graphs.families import Eigenvalues, Family
 from ..inputs.options import integers_option
-
-if TYPE_CHECKING:
-    import sympy as sp
-
-SUMMARY = (
-    "Cayley graph of the dihedral group of a polygon with n/2 corners; generators: rotations (1) and reflections (0), each "
-    "by its number of corners"
-)
-MINIMUM = 4
-SOURCE = "L. Babai, J. Comb. Theory B 27, 180 (1979); J.-P. Serre, Linear Representations of Finite Groups (Springer, 1977), section 5.3"
-
-CONNECTED = False
 
 
 def settle(n: int, rotations: object, reflections: object) -> dict[str, object]:
@@ -61,9 +51,7 @@ def count(n: int, *, rotations: tuple[int, ...] = (1,), reflections: tuple[int, 
     return sum(n // 2 if 4 * a == n else n for a in rotations) + n // 2 * len(reflections)
 
 
-def spectrum(
-    n: int, *, rotations: tuple[int, ...] = (1,), reflections: tuple[int, ...] = (0,)
-) -> list[tuple[sp.Expr, int]] | None:
+def spectrum(n: int, *, rotations: tuple[int, ...] = (1,), reflections: tuple[int, ...] = (0,)) -> Eigenvalues:
     """Sums of -4 sin²(πka/m) over the rotations, less r, plus or minus |Σ exp(2πikb/m)| over the r reflections, m = n/2.
 
     The modulus is a cosine for two reflections; for more the characteristic polynomial is factored.
@@ -82,3 +70,15 @@ def spectrum(
             value += AngleSum.cosine(-2 * weight, weight, k * a % m, m)
         numbers += [(value + AngleSum.cosine(0, sign * half, k * gap, 2 * m), 1) for sign in (1, -1)]
     return expressions(numbers)
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=4,
+    settle=settle,
+    count=count,
+    spectrum=spectrum,
+    connected=False,
+    source="L. Babai, J. Comb. Theory B 27, 180 (1979); J.-P. Serre, Linear Representations of Finite Groups "
+    "(Springer, 1977), section 5.3",
+)

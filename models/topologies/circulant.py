@@ -1,4 +1,4 @@
-"""Circulant graph: a ring whose nodes are also joined at other distances."""
+"""circulant graph: every node joined to those at given distances round a ring (offsets, 1 and 2)."""
 
 from __future__ import annotations
 
@@ -6,18 +6,11 @@ from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
+from ..graphs.families import Eigenvalues, Family
 from ..inputs.options import integers_option
 
 if TYPE_CHECKING:
-    import sympy as sp
-
     from ..graphs.closed_forms import ClosedForm
-
-SUMMARY = "circulant graph: every node joined to those at given distances round a ring (offsets, 1 and 2)"
-MINIMUM = 3
-SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 6.4 (Cayley graphs)"
-
-CONNECTED = False
 
 
 def settle(n: int, offsets: object) -> dict[str, object]:
@@ -37,12 +30,7 @@ def edges(n: int, *, offsets: tuple[int, ...] = (1, 2)) -> Iterator[tuple[int, i
             yield min(i, j), max(i, j), 1
 
 
-def count(n: int, *, offsets: tuple[int, ...] = (1, 2)) -> int:
-    """Number of edges."""
-    return sum(n // 2 if 2 * s == n else n for s in offsets)
-
-
-def spectrum(n: int, *, offsets: tuple[int, ...] = (1, 2)) -> list[tuple[sp.Expr, int]]:
+def spectrum(n: int, *, offsets: tuple[int, ...] = (1, 2)) -> Eigenvalues:
     """Sums of -4 sin²(ksπ/n) over the offsets s (half of it for s = n/2), k = 0 … n - 1."""
     from ..algebra.cosine_sums import AngleSum, expressions
 
@@ -81,3 +69,15 @@ def formula(offsets: str | Iterable[object] = (1, 2)) -> ClosedForm:
         where=And(*limits) if letters else true,
         lowest={N: least},
     )
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=3,
+    settle=settle,
+    count=lambda n, *, offsets=(1, 2): sum(n // 2 if 2 * s == n else n for s in offsets),
+    spectrum=spectrum,
+    formula=formula,
+    connected=False,
+    source="A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 6.4 (Cayley graphs)",
+)

@@ -1,21 +1,14 @@
-"""Circular ladder: two rings, the rails, joined by rungs."""
+"""circular ladder, or prism: two rings joined node by node (n is even)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from ..graphs.families import Eigenvalues, Family
+
 if TYPE_CHECKING:
-    import sympy as sp
-
     from ..graphs.closed_forms import ClosedForm
-
-SUMMARY = "circular ladder, or prism: two rings joined node by node (n is even)"
-MINIMUM = 6
-SOURCE = (
-    "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.6 (Cartesian product of a cycle and a "
-    "path)"
-)
 
 
 def settle(n: int) -> dict[str, object]:
@@ -34,12 +27,7 @@ def edges(n: int) -> Iterator[tuple[int, int, int]]:
             yield i, i + 1, 1
 
 
-def count(n: int) -> int:
-    """Number of edges."""
-    return n + n // 2
-
-
-def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
+def spectrum(n: int) -> Eigenvalues:
     """-4 sin²(2kπ/n) and that less 2, k = 0 … n/2 - 1."""
     from ..algebra.cosine_sums import box
 
@@ -56,3 +44,15 @@ def formula() -> ClosedForm:
     wave = exp(2 * pi * I * K * floor(NODE / 2) / P)
     terms = (Term(value, S.One, rungs, wave), Term(value - 2, S.One, rungs, (-1) ** NODE * wave))
     return ClosedForm(terms, 2 * P, note="p rungs", degree=Integer(3), lowest={P: 3})
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=6,
+    settle=settle,
+    count=lambda n: n + n // 2,
+    spectrum=spectrum,
+    formula=formula,
+    source="A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.6 (Cartesian product of a "
+    "cycle and a path)",
+)

@@ -1,37 +1,14 @@
-"""Complete graph: every node is joined to every other."""
+"""complete graph: all to all."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import combinations
 from typing import TYPE_CHECKING
 
+from ..graphs.families import Family
+
 if TYPE_CHECKING:
-    import sympy as sp
-
     from ..graphs.closed_forms import ClosedForm
-
-SUMMARY = "complete graph: all to all"
-MINIMUM = 1
-ALL_TO_ALL = True
-SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.1"
-
-
-def edges(n: int) -> Iterator[tuple[int, int, int]]:
-    """Each pair once."""
-    return ((i, j, 1) for i, j in combinations(range(n), 2))
-
-
-def count(n: int) -> int:
-    """Number of edges."""
-    return n * (n - 1) // 2
-
-
-def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
-    """0 once, -n n - 1 times."""
-    from sympy import Integer
-
-    return [(Integer(0), 1)] + ([(Integer(-n), n - 1)] if n > 1 else [])
 
 
 def formula() -> ClosedForm:
@@ -43,3 +20,15 @@ def formula() -> ClosedForm:
     pairs = KroneckerDelta(NODE, 0) - KroneckerDelta(NODE, M)
     terms = (Term(S.Zero, vector=S.One), Term(-N, N - 1, (), pairs, ((M, S.One, N - 1),)))
     return ClosedForm(terms, degree=N - 1)
+
+
+TOPOLOGY = Family(
+    # Each pair once.
+    lambda n: ((i, j, 1) for i, j in combinations(range(n), 2)),
+    minimum=1,
+    count=lambda n: n * (n - 1) // 2,
+    spectrum=lambda n: [(0, 1), (-n, n - 1)][: min(n, 2)],
+    formula=formula,
+    all_to_all=True,
+    source="A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.1",
+)

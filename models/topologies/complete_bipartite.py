@@ -1,20 +1,15 @@
-"""Complete bipartite graph: two groups; every node is joined to all of the other group."""
+"""complete bipartite graph: all nodes of one group with all of another (left: size of the first, half of n)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from ..graphs.families import Eigenvalues, Family
 from ..inputs.options import integer_option
 
 if TYPE_CHECKING:
-    import sympy as sp
-
     from ..graphs.closed_forms import ClosedForm
-
-SUMMARY = "complete bipartite graph: all nodes of one group with all of another (left: size of the first, half of n)"
-MINIMUM = 2
-SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.2"
 
 
 def settle(n: int, left: object) -> dict[str, object]:
@@ -39,16 +34,14 @@ def count(n: int, *, left: int | None = None) -> int:
     return p * (n - p)
 
 
-def spectrum(n: int, *, left: int | None = None) -> list[tuple[sp.Expr, int]]:
+def spectrum(n: int, *, left: int | None = None) -> Eigenvalues:
     """0, -p q - 1 times, -q p - 1 times, -(p + q), for groups of p and q."""
-    from sympy import Integer
-
     p = left or n // 2
     counts = {0: 1}
     for value, times in ((p, n - p - 1), (n - p, p - 1), (n, 1)):
         if times:
             counts[value] = counts.get(value, 0) + times
-    return [(Integer(-value), times) for value, times in sorted(counts.items())]
+    return [(-value, times) for value, times in sorted(counts.items())]
 
 
 def formula() -> ClosedForm:
@@ -66,3 +59,14 @@ def formula() -> ClosedForm:
         Term(-P - Q, vector=Piecewise((Q, NODE < P), (-P, True))),
     )
     return ClosedForm(terms, P + Q, {"left": P}, note="p and q nodes in the two groups")
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=2,
+    settle=settle,
+    count=count,
+    spectrum=spectrum,
+    formula=formula,
+    source="A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.2",
+)

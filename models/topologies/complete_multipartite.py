@@ -1,23 +1,17 @@
-"""Complete multipartite graph: groups of nodes; every node is joined to all of the other groups."""
+"""complete multipartite graph: all nodes of each group with all of the others (parts: sizes; three, as equal as n
+allows).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
+from ..graphs.families import Eigenvalues, Family
 from ..inputs.options import integers_option
 
 if TYPE_CHECKING:
-    import sympy as sp
-
     from ..graphs.closed_forms import ClosedForm
-
-SUMMARY = "complete multipartite graph: all nodes of each group with all of the others (parts: sizes; three, as equal as n allows)"
-MINIMUM = 2
-SOURCE = (
-    "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.3.2 (the complement of complete graphs "
-    "side by side)"
-)
 
 
 def settle(n: int, parts: object) -> dict[str, object]:
@@ -43,21 +37,14 @@ def edges(n: int, *, parts: tuple[int, ...] | None = None) -> Iterator[tuple[int
         yield from ((i, j, 1) for i in range(start, end) for j in range(end, n))
 
 
-def count(n: int, *, parts: tuple[int, ...] | None = None) -> int:
-    """Number of edges."""
-    return (n * n - sum(size * size for size in _sizes(n, parts))) // 2
-
-
-def spectrum(n: int, *, parts: tuple[int, ...] | None = None) -> list[tuple[sp.Expr, int]]:
+def spectrum(n: int, *, parts: tuple[int, ...] | None = None) -> Eigenvalues:
     """0 once, -n once less than there are groups, and p - n p - 1 times for each group of p."""
-    from sympy import Integer
-
     sizes = _sizes(n, parts)
     counts = {-n: len(sizes) - 1}
     for size in sizes:
         if size > 1:
             counts[size - n] = counts.get(size - n, 0) + size - 1
-    return [(Integer(0), 1), *((Integer(value), times) for value, times in sorted(counts.items(), reverse=True))]
+    return [(0, 1), *sorted(counts.items(), reverse=True)]
 
 
 def formula(parts: str | Iterable[object] = ("p", "q", "r")) -> ClosedForm:
@@ -80,3 +67,15 @@ def formula(parts: str | Iterable[object] = ("p", "q", "r")) -> ClosedForm:
         start += size
     shown = ", ".join(map(str, sizes))
     return ClosedForm(tuple(terms), n, {"parts": sizes}, note=f"{shown} nodes in the groups")
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=2,
+    settle=settle,
+    count=lambda n, *, parts=None: (n * n - sum(size * size for size in _sizes(n, parts))) // 2,
+    spectrum=spectrum,
+    formula=formula,
+    source="A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.3.2 (the complement of "
+    "complete graphs side by side)",
+)

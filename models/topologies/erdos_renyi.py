@@ -1,4 +1,4 @@
-"""Random graph: every pair is joined with the same probability."""
+"""random graph: each pair joined with probability p (1/2), fixed by seed (0); it may fall into parts."""
 
 from __future__ import annotations
 
@@ -7,26 +7,13 @@ from collections.abc import Iterator
 from fractions import Fraction
 from math import log1p
 
+from ..graphs.families import Family
 from ..inputs.options import integer_option, probability_option
-
-SUMMARY = "random graph: each pair joined with probability p (1/2), fixed by seed (0); it may fall into parts"
-MINIMUM = 1
-SOURCE = (
-    "E. N. Gilbert, Ann. Math. Stat. 30, 1141 (1959); P. Erdős, A. Rényi, Publ. Math. Debrecen 6, 290 (1959); drawn as "
-    "V. Batagelj, U. Brandes, Phys. Rev. E 71, 036113 (2005)"
-)
-
-CONNECTED = False
 
 
 def settle(n: int, p: object, seed: object) -> dict[str, object]:
     """A probability and a whole number."""
     return {"p": probability_option("p", p), "seed": integer_option("seed", seed, 0)}
-
-
-def expected(n: int, *, p: str = "1/2", seed: int = 0) -> int:
-    """Mean number of edges."""
-    return int(Fraction(p) * (n * (n - 1) // 2))
 
 
 def edges(n: int, *, p: str = "1/2", seed: int = 0) -> Iterator[tuple[int, int, int]]:
@@ -47,3 +34,15 @@ def edges(n: int, *, p: str = "1/2", seed: int = 0) -> Iterator[tuple[int, int, 
                 i, j = i - j, j + 1
             if j < n:
                 yield i, j, 1
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=1,
+    settle=settle,
+    # Mean number of edges.
+    expected=lambda n, *, p="1/2", seed=0: int(Fraction(p) * (n * (n - 1) // 2)),
+    connected=False,
+    source="E. N. Gilbert, Ann. Math. Stat. 30, 1141 (1959); P. Erdős, A. Rényi, Publ. Math. Debrecen 6, 290 (1959); "
+    "drawn as V. Batagelj, U. Brandes, Phys. Rev. E 71, 036113 (2005)",
+)

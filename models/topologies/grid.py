@@ -1,23 +1,18 @@
-"""Grid: nodes in rows and columns, or more directions, joined to all neighbours."""
+"""grid with open ends, as square as n allows (a prime n: a chain); shape: nodes in each of any number of
+directions.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from math import isqrt, prod
 from typing import TYPE_CHECKING
 
+from ..graphs.families import Eigenvalues, Family
 from ..inputs.options import integers_option
 
 if TYPE_CHECKING:
-    import sympy as sp
-
     from ..graphs.closed_forms import ClosedForm
-
-SUMMARY = (
-    "grid with open ends, as square as n allows (a prime n: a chain); shape: nodes in each of any number of directions"
-)
-MINIMUM = 1
-SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.6 (Cartesian product of paths)"
 
 
 def settle(n: int, shape: object) -> dict[str, object]:
@@ -47,12 +42,7 @@ def edges(n: int, *, shape: tuple[int, ...] | None = None) -> Iterator[tuple[int
             step *= size
 
 
-def count(n: int, *, shape: tuple[int, ...] | None = None) -> int:
-    """Number of edges."""
-    return sum(n // size * (size - 1) for size in shape or sides(n))
-
-
-def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> Sequence[tuple[sp.Expr, int]]:
+def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> Eigenvalues:
     """Sums of -4 sin²(kπ/2m), one for each direction of m nodes, k = 0 … m - 1."""
     from ..algebra.cosine_sums import box
 
@@ -70,3 +60,16 @@ def formula(shape: str | Iterable[object] = ("p", "q")) -> ClosedForm:
 
     sizes = entries("shape", shape)
     return replace(box(one(), sizes, counters(sizes)), options={"shape": sizes})
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=1,
+    settle=settle,
+    count=lambda n, *, shape=None: sum(n // size * (size - 1) for size in shape or sides(n)),
+    spectrum=spectrum,
+    formula=formula,
+    sides=sides,
+    source="A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.6 (Cartesian product of "
+    "paths)",
+)

@@ -1,4 +1,4 @@
-"""Hamming graph: words of equal length; two are joined if they differ in one letter."""
+"""Hamming graph: the words of d (2) letters, joined if they differ in one (d = 2: the moves of a rook)."""
 
 from __future__ import annotations
 
@@ -6,16 +6,11 @@ from collections.abc import Iterator
 from math import comb
 from typing import TYPE_CHECKING
 
+from ..graphs.families import Eigenvalues, Family
 from ..inputs.options import integer_option
 
 if TYPE_CHECKING:
-    import sympy as sp
-
     from ..graphs.closed_forms import ClosedForm
-
-SUMMARY = "Hamming graph: the words of d (2) letters, joined if they differ in one (d = 2: the moves of a rook)"
-MINIMUM = 1
-SOURCE = "A. E. Brouwer, A. M. Cohen, A. Neumaier, Distance-Regular Graphs (Springer, 1989), section 9.2"
 
 
 def _letters(n: int, d: int) -> int:
@@ -49,17 +44,10 @@ def edges(n: int, *, d: int = 2) -> Iterator[tuple[int, int, int]]:
             yield from ((i, i + step * value, 1) for step in range(1, q - i // value % q))
 
 
-def count(n: int, *, d: int = 2) -> int:
-    """Number of edges: each word has d (q - 1) neighbours."""
-    return n * d * (_letters(n, d) - 1) // 2
-
-
-def spectrum(n: int, *, d: int = 2) -> list[tuple[sp.Expr, int]]:
+def spectrum(n: int, *, d: int = 2) -> Eigenvalues:
     """-q j, C(d, j) (q - 1)^j times, j = 0 … d."""
-    from sympy import Integer
-
     q = _letters(n, d)
-    return [(Integer(-q * j), comb(d, j) * (q - 1) ** j) for j in range(d + 1 if q > 1 else 1)]
+    return [(-q * j, comb(d, j) * (q - 1) ** j) for j in range(d + 1 if q > 1 else 1)]
 
 
 def formula() -> ClosedForm:
@@ -75,3 +63,15 @@ def formula() -> ClosedForm:
     term = Term(-Q * J, times, ((J, S.Zero, D),), wave, ((M, S.Zero, Q**D - 1),), letters)
     note = "words of d of q letters; m has j digits other than 0 to the base q"
     return ClosedForm((term,), Q**D, {"d": D}, note=note, degree=D * (Q - 1), lowest={Q: 2})
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=1,
+    settle=settle,
+    # Number of edges: each word has d (q - 1) neighbours.
+    count=lambda n, *, d=2: n * d * (_letters(n, d) - 1) // 2,
+    spectrum=spectrum,
+    formula=formula,
+    source="A. E. Brouwer, A. M. Cohen, A. Neumaier, Distance-Regular Graphs (Springer, 1989), section 9.2",
+)

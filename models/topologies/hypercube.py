@@ -1,4 +1,7 @@
-"""Hypercube: nodes are joined if their places differ in one digit."""
+"""hypercube where n is a power of two; for other n one digit for each prime factor (a prime n: all to all).
+
+Hypercube: nodes are joined if their places differ in one digit.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +9,10 @@ from collections.abc import Iterator
 from math import comb
 from typing import TYPE_CHECKING
 
+from ..graphs.families import Eigenvalues, Family
+
 if TYPE_CHECKING:
-    import sympy as sp
-
     from ..graphs.closed_forms import ClosedForm
-
-SUMMARY = "hypercube where n is a power of two; for other n one digit for each prime factor (a prime n: all to all)"
-MINIMUM = 1
-SOURCE = (
-    "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), sections 1.4.6 and 1.4.1 (Cartesian product of "
-    "complete graphs); any n: L. N. Bhuyan, D. P. Agrawal, IEEE Trans. Comput. C-33, 323 (1984)"
-)
 
 
 def _radices(n: int) -> list[int]:
@@ -42,15 +38,8 @@ def edges(n: int) -> Iterator[tuple[int, int, int]]:
             value *= base
 
 
-def count(n: int) -> int:
-    """Number of edges: half of n (p - 1) for each prime factor p."""
-    return n * sum(p - 1 for p in _radices(n)) // 2
-
-
-def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
+def spectrum(n: int) -> Eigenvalues:
     """-2 k, C(d, k) times, for n = 2**d; else sums of 0 or -p over the prime factors p of n."""
-    from sympy import Integer
-
     bases = _radices(n)
     counts = {0: 1}
     for p in sorted(set(bases)):
@@ -59,7 +48,7 @@ def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
             for value, count in counts.items():
                 more[value - p * k] = more.get(value - p * k, 0) + count * comb(d, k) * (p - 1) ** k
         counts = more
-    return [(Integer(value), count) for value, count in counts.items()]
+    return list(counts.items())
 
 
 def formula() -> ClosedForm:
@@ -73,3 +62,15 @@ def formula() -> ClosedForm:
     walsh = Product((-1) ** both, (J, 0, D - 1))
     term = Term(-2 * K, binomial(D, K), ((K, S.Zero, D),), walsh, ((M, S.Zero, 2**D - 1),), digits)
     return ClosedForm((term,), 2**D, note="d dimensions; m has k binary digits 1", degree=D)
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=1,
+    # Number of edges: half of n (p - 1) for each prime factor p.
+    count=lambda n: n * sum(p - 1 for p in _radices(n)) // 2,
+    spectrum=spectrum,
+    formula=formula,
+    source="A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), sections 1.4.6 and 1.4.1 (Cartesian "
+    "product of complete graphs); any n: L. N. Bhuyan, D. P. Agrawal, IEEE Trans. Comput. C-33, 323 (1984)",
+)

@@ -1,4 +1,4 @@
-"""Johnson graph: the k-subsets of a set; two are joined if they differ in one element."""
+"""Johnson graph: the subsets of k (2) elements of a set, joined if they differ in one (k = 2: triangular graph)."""
 
 from __future__ import annotations
 
@@ -6,19 +6,12 @@ from collections.abc import Iterator
 from math import comb
 from typing import TYPE_CHECKING
 
+from ..graphs.families import Eigenvalues, Family
 from ..graphs.subsets import ground_set, multiplicity, numbered, size
 from ..inputs.options import integer_option
 
 if TYPE_CHECKING:
-    import sympy as sp
-
     from ..graphs.closed_forms import ClosedForm
-
-SUMMARY = (
-    "Johnson graph: the subsets of k (2) elements of a set, joined if they differ in one (k = 2: triangular graph)"
-)
-MINIMUM = 1
-SOURCE = "A. E. Brouwer, A. M. Cohen, A. Neumaier, Distance-Regular Graphs (Springer, 1989), section 9.1"
 
 
 def settle(n: int, k: object) -> dict[str, object]:
@@ -38,18 +31,10 @@ def edges(n: int, *, k: int = 2) -> Iterator[tuple[int, int, int]]:
             yield from ((i, place[tuple(sorted((*kept, e)))], 1) for e in range(old + 1, m) if e not in subset)
 
 
-def count(n: int, *, k: int = 2) -> int:
-    """Number of edges: each subset has k (m - k) neighbours."""
-    return n * k * (ground_set(n, k) - k) // 2
-
-
-def spectrum(n: int, *, k: int = 2) -> list[tuple[sp.Expr, int]]:
+def spectrum(n: int, *, k: int = 2) -> Eigenvalues:
     """-j (m + 1 - j), C(m, j) - C(m, j - 1) times, j = 0 … the smaller of k and m - k."""
-    from sympy import Integer
-
     m = ground_set(n, k)
-    first = [(Integer(0), 1)]
-    return first + [(Integer(-j * (m + 1 - j)), comb(m, j) - comb(m, j - 1)) for j in range(1, min(k, m - k) + 1)]
+    return [(0, 1), *((-j * (m + 1 - j), comb(m, j) - comb(m, j - 1)) for j in range(1, min(k, m - k) + 1))]
 
 
 def formula(k: object = 2) -> ClosedForm:
@@ -63,3 +48,15 @@ def formula(k: object = 2) -> ClosedForm:
     note = f"the subsets of {chosen} of p elements"
     degree, lowest = chosen * (P - chosen), {P: 2 * chosen}
     return ClosedForm((term,), size(chosen), {"k": Integer(chosen)}, note=note, degree=degree, lowest=lowest)
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=1,
+    settle=settle,
+    # Number of edges: each subset has k (m - k) neighbours.
+    count=lambda n, *, k=2: n * k * (ground_set(n, k) - k) // 2,
+    spectrum=spectrum,
+    formula=formula,
+    source="A. E. Brouwer, A. M. Cohen, A. Neumaier, Distance-Regular Graphs (Springer, 1989), section 9.1",
+)

@@ -1,4 +1,4 @@
-"""Kneser graph: the k-subsets of a set; two are joined if they have no common element."""
+"""Kneser graph: the subsets of k (2) elements of a set, joined if they are disjoint (n = 10: the Petersen graph)."""
 
 from __future__ import annotations
 
@@ -7,24 +7,12 @@ from itertools import combinations
 from math import comb
 from typing import TYPE_CHECKING
 
+from ..graphs.families import Eigenvalues, Family
 from ..graphs.subsets import ground_set, multiplicity, numbered, size
 from ..inputs.options import integer_option
 
 if TYPE_CHECKING:
-    import sympy as sp
-
     from ..graphs.closed_forms import ClosedForm
-
-SUMMARY = (
-    "Kneser graph: the subsets of k (2) elements of a set, joined if they are disjoint (n = 10: the Petersen graph)"
-)
-MINIMUM = 6
-SOURCE = (
-    "C. Godsil, G. Royle, Algebraic Graph Theory (Springer, 2001), section 9.4; L. Lovász, IEEE Trans. Inf. Theory 25, 1 "
-    "(1979)"
-)
-
-CONNECTED = False
 
 
 def settle(n: int, k: object) -> dict[str, object]:
@@ -47,21 +35,14 @@ def edges(n: int, *, k: int = 2) -> Iterator[tuple[int, int, int]]:
         yield from ((i, place[other], 1) for other in combinations(rest, k))
 
 
-def count(n: int, *, k: int = 2) -> int:
-    """Number of edges: each subset has C(m - k, k) neighbours."""
-    return n * comb(ground_set(n, k) - k, k) // 2
-
-
-def spectrum(n: int, *, k: int = 2) -> list[tuple[sp.Expr, int]]:
+def spectrum(n: int, *, k: int = 2) -> Eigenvalues:
     """(-1)^j C(m - k - j, k - j) - C(m - k, k), C(m, j) - C(m, j - 1) times, j = 0 … k."""
-    from sympy import Integer
-
     m = ground_set(n, k)
     counts: dict[int, int] = {}
     for j in range(k + 1):
         value = (-1) ** j * comb(m - k - j, k - j) - comb(m - k, k)
         counts[value] = counts.get(value, 0) + comb(m, j) - (comb(m, j - 1) if j else 0)
-    return [(Integer(value), times) for value, times in sorted(counts.items(), reverse=True)]
+    return sorted(counts.items(), reverse=True)
 
 
 def formula(k: object = 2) -> ClosedForm:
@@ -75,5 +56,19 @@ def formula(k: object = 2) -> ClosedForm:
     value = (-1) ** J * binomial(P - chosen - J, chosen - J) - degree
     term = Term(value, multiplicity(), ((J, S.Zero, Integer(chosen)),))
     note = f"the subsets of {chosen} of p elements"
-    lowest = {P: MINIMUM if chosen == 1 else 2 * chosen}
+    lowest = {P: 6 if chosen == 1 else 2 * chosen}
     return ClosedForm((term,), size(chosen), {"k": Integer(chosen)}, note=note, degree=degree, lowest=lowest)
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=6,
+    settle=settle,
+    # Number of edges: each subset has C(m - k, k) neighbours.
+    count=lambda n, *, k=2: n * comb(ground_set(n, k) - k, k) // 2,
+    spectrum=spectrum,
+    formula=formula,
+    connected=False,
+    source="C. Godsil, G. Royle, Algebraic Graph Theory (Springer, 2001), section 9.4; L. Lovász, IEEE Trans. Inf. "
+    "Theory 25, 1 (1979)",
+)

@@ -1,20 +1,14 @@
-"""Ladder: two chains, the rails, joined by rungs."""
+"""ladder: two chains joined node by node (odd n: the first chain is one node longer)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from ..graphs.families import Eigenvalues, Family
+
 if TYPE_CHECKING:
-    import sympy as sp
-
     from ..graphs.closed_forms import ClosedForm
-
-SUMMARY = "ladder: two chains joined node by node (odd n: the first chain is one node longer)"
-MINIMUM = 2
-SOURCE = (
-    "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.6 (Cartesian product of two paths)"
-)
 
 
 def edges(n: int) -> Iterator[tuple[int, int, int]]:
@@ -26,12 +20,7 @@ def edges(n: int) -> Iterator[tuple[int, int, int]]:
             yield i, i + 2, 1
 
 
-def count(n: int) -> int:
-    """Number of edges."""
-    return n // 2 + n - 2
-
-
-def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]] | None:
+def spectrum(n: int) -> Eigenvalues:
     """-4 sin²(kπ/n) and that less 2, k = 0 … n/2 - 1; none for odd n."""
     if n % 2:
         return None
@@ -50,3 +39,14 @@ def formula() -> ClosedForm:
     wave = cos(pi * K * (2 * floor(NODE / 2) + 1) / (2 * P))
     terms = (Term(value, S.One, rungs, wave), Term(value - 2, S.One, rungs, (-1) ** NODE * wave))
     return ClosedForm(terms, 2 * P, note="p rungs")
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=2,
+    count=lambda n: n // 2 + n - 2,
+    spectrum=spectrum,
+    formula=formula,
+    source="A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.6 (Cartesian product of two "
+    "paths)",
+)

@@ -1,33 +1,16 @@
-"""One-way ring: every node feels the next one only."""
+"""one-way ring: every node feels the next one only."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    import sympy as sp
+from ..graphs.families import Eigenvalues, Family
 
+if TYPE_CHECKING:
     from ..graphs.closed_forms import ClosedForm
 
-SUMMARY = "one-way ring: every node feels the next one only"
-MINIMUM = 2
-SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.3 (directed cycle)"
 
-DIRECTED = True
-
-
-def edges(n: int) -> Iterator[tuple[int, int, int]]:
-    """Node i feels node i + 1, the last one the first."""
-    return ((i, (i + 1) % n, 1) for i in range(n))
-
-
-def count(n: int) -> int:
-    """Number of links."""
-    return n
-
-
-def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
+def spectrum(n: int) -> Eigenvalues:
     """-1 + exp(2πik/n), k = 0 … n - 1, each once."""
     from ..algebra.cosines import exponential
 
@@ -42,3 +25,15 @@ def formula() -> ClosedForm:
 
     value, wave = exp(2 * pi * I * K / N) - 1, exp(2 * pi * I * NODE * K / N)
     return ClosedForm((Term(value, S.One, ((K, S.Zero, N - 1),), wave),), least=2, degree=S.One)
+
+
+TOPOLOGY = Family(
+    # Node i feels node i + 1, the last one the first.
+    lambda n: ((i, (i + 1) % n, 1) for i in range(n)),
+    minimum=2,
+    count=lambda n: n,
+    spectrum=spectrum,
+    formula=formula,
+    directed=True,
+    source="A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.3 (directed cycle)",
+)

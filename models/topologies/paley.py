@@ -1,4 +1,4 @@
-"""Paley graph: the elements of a finite field; two are joined if they differ by a square."""
+"""Paley graph: the elements of a finite field (n a prime power 5, 9, 13 …), joined if they differ by a square."""
 
 from __future__ import annotations
 
@@ -6,14 +6,10 @@ from collections.abc import Iterator
 from itertools import product
 from typing import TYPE_CHECKING
 
+from ..graphs.families import Eigenvalues, Family
+
 if TYPE_CHECKING:
-    import sympy as sp
-
     from ..graphs.closed_forms import ClosedForm
-
-SUMMARY = "Paley graph: the elements of a finite field (n a prime power 5, 9, 13 …), joined if they differ by a square"
-MINIMUM = 5
-SOURCE = "C. Godsil, G. Royle, Algebraic Graph Theory (Springer, 2001), chapter 10; R. E. A. C. Paley, J. Math. Phys. 12, 311 (1933)"
 
 
 def _prime_power(n: int) -> tuple[int, int] | None:
@@ -69,12 +65,7 @@ def edges(n: int) -> Iterator[tuple[int, int, int]]:
                 yield i, j, 1
 
 
-def count(n: int) -> int:
-    """Number of edges: half of all pairs."""
-    return n * (n - 1) // 4
-
-
-def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
+def spectrum(n: int) -> Eigenvalues:
     """0 once, -(n + √n)/2 and -(n - √n)/2, (n - 1)/2 times each."""
     from sympy import Integer, sqrt
 
@@ -92,3 +83,16 @@ def formula() -> ClosedForm:
     terms = (Term(S.Zero, vector=S.One), Term((sqrt(N) - N) / 2, half), Term((-sqrt(N) - N) / 2, half))
     where = And(Eq(Mod(N, 4), 1), Eq(primenu(N), 1))
     return ClosedForm(terms, least=5, note="n a prime power that leaves 1 on division by 4", degree=half, where=where)
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=5,
+    settle=settle,
+    # Number of edges: half of all pairs.
+    count=lambda n: n * (n - 1) // 4,
+    spectrum=spectrum,
+    formula=formula,
+    source="C. Godsil, G. Royle, Algebraic Graph Theory (Springer, 2001), chapter 10; R. E. A. C. Paley, J. Math. "
+    "Phys. 12, 311 (1933)",
+)

@@ -1,22 +1,15 @@
-"""Generalised Petersen graph: a ring, and as many nodes inside that are joined a step apart."""
+"""generalised Petersen graph: a ring joined node by node to a star polygon (step, 2); n = 10: the Petersen graph."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from ..graphs.families import Family
 from ..inputs.options import integer_option
 
 if TYPE_CHECKING:
     from ..graphs.closed_forms import ClosedForm
-
-SUMMARY = (
-    "generalised Petersen graph: a ring joined node by node to a star polygon (step, 2); n = 10: the Petersen graph"
-)
-MINIMUM = 10
-SOURCE = (
-    "M. E. Watkins, J. Comb. Theory 6, 152 (1969); spectrum: R. Gera, P. Stănică, Australas. J. Comb. 49, 39 (2011)"
-)
 
 
 def settle(n: int, step: object) -> dict[str, object]:
@@ -35,11 +28,6 @@ def edges(n: int, *, step: int = 2) -> Iterator[tuple[int, int, int]]:
         yield min(i, j), max(i, j), 1
         yield i, m + i, 1
         yield m + min(i, k), m + max(i, k), 1
-
-
-def count(n: int, *, step: int = 2) -> int:
-    """Number of edges: every node has three neighbours."""
-    return n + n // 2
 
 
 def formula(step: object = 2) -> ClosedForm:
@@ -63,3 +51,15 @@ def formula(step: object = 2) -> ClosedForm:
     )
     note, lowest = f"p nodes in the ring, {chosen} is the step of those inside", {P: 2 * chosen + 1}
     return ClosedForm(terms, 2 * P, {"step": Integer(chosen)}, note=note, degree=Integer(3), lowest=lowest)
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=10,
+    settle=settle,
+    # Number of edges: every node has three neighbours.
+    count=lambda n, *, step=2: n + n // 2,
+    formula=formula,
+    source="M. E. Watkins, J. Comb. Theory 6, 152 (1969); spectrum: R. Gera, P. Stănică, Australas. J. Comb. 49, 39 "
+    "(2011)",
+)

@@ -1,16 +1,15 @@
-"""Random cubic graph: a ring whose nodes are also joined in random pairs."""
+"""random graph: three neighbours each (where n is odd, one node has two), always the same for one n.
+
+Random cubic graph: a ring whose nodes are also joined in random pairs.
+"""
 
 from __future__ import annotations
 
 import random
 from collections.abc import Iterator
 
-SUMMARY = "random graph: three neighbours each (where n is odd, one node has two), always the same for one n"
-MINIMUM = 4
-SOURCE = (
-    "B. Bollobás, F. R. K. Chung, SIAM J. Discrete Math. 1, 328 (1988); in the limit of many nodes like a uniformly "
-    "random cubic graph: R. W. Robinson, N. C. Wormald, Random Struct. Algorithms 3, 117 (1992)"
-)
+from ..graphs.families import Family
+
 _SEED = 1988
 
 
@@ -49,3 +48,11 @@ def _pairs(n: int) -> list[tuple[int, int]]:
 def _adjacent(i: int, j: int, n: int) -> bool:
     """True for neighbours in the ring."""
     return (i - j) % n in (1, n - 1)
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=4,
+    source="B. Bollobás, F. R. K. Chung, SIAM J. Discrete Math. 1, 328 (1988); in the limit of many nodes like a "
+    "uniformly random cubic graph: R. W. Robinson, N. C. Wormald, Random Struct. Algorithms 3, 117 (1992)",
+)

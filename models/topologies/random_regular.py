@@ -1,4 +1,4 @@
-"""Random regular graph: every node has the same number of neighbours, drawn at random."""
+"""random graph with the same number of neighbours at each node (degree, 4), fixed by seed (0)."""
 
 from __future__ import annotations
 
@@ -6,13 +6,9 @@ import random
 from collections.abc import Iterator
 from itertools import combinations
 
+from ..graphs.families import Family
 from ..inputs.options import integer_option
 
-SUMMARY = "random graph with the same number of neighbours at each node (degree, 4), fixed by seed (0)"
-MINIMUM = 5
-SOURCE = "A. Steger, N. C. Wormald, Comb. Probab. Comput. 8, 377 (1999)"
-
-CONNECTED = False
 _ATTEMPTS = 1000
 """Attempts at a pairing; at the highest degree drawn, half of the nodes, one in five succeeds."""
 
@@ -38,11 +34,6 @@ def edges(n: int, *, degree: int = 4, seed: int = 0) -> Iterator[tuple[int, int,
     if dense:
         return ((i, j, 1) for i, j in combinations(range(n), 2) if (i, j) not in drawn)
     return ((i, j, 1) for i, j in sorted(drawn))
-
-
-def count(n: int, *, degree: int = 4, seed: int = 0) -> int:
-    """Number of edges."""
-    return n * degree // 2
 
 
 def _drawn(n: int, degree: int, stream: random.Random) -> _Edges:
@@ -81,3 +72,13 @@ def _possible(ends: list[int], found: _Edges) -> bool:
     """True if two of the free ends can still be joined."""
     nodes = sorted(set(ends))
     return any((a, b) not in found for k, a in enumerate(nodes) for b in nodes[k + 1 :])
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=5,
+    settle=settle,
+    count=lambda n, *, degree=4, seed=0: n * degree // 2,
+    connected=False,
+    source="A. Steger, N. C. Wormald, Comb. Probab. Comput. 8, 377 (1999)",
+)

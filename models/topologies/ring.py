@@ -1,19 +1,14 @@
-"""Closed ring: a chain whose ends are joined."""
+"""closed ring (cycle graph)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from ..graphs.families import Eigenvalues, Family
+
 if TYPE_CHECKING:
-    import sympy as sp
-
     from ..graphs.closed_forms import ClosedForm
-
-SUMMARY = "closed ring (cycle graph)"
-MINIMUM = 3
-TOO_SMALL = "a ring of two would join one pair twice; two nodes joined once are chain 2"
-SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.3"
 
 
 def edges(n: int) -> Iterator[tuple[int, int, int]]:
@@ -22,12 +17,7 @@ def edges(n: int) -> Iterator[tuple[int, int, int]]:
     yield 0, n - 1, 1
 
 
-def count(n: int) -> int:
-    """Number of edges."""
-    return n
-
-
-def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
+def spectrum(n: int) -> Eigenvalues:
     """-4 sin²(kπ/n), k = 0 … n/2: twice each, but once for k = 0 and k = n/2."""
     from ..algebra.cosines import minus_four_sine_squared
     from ..algebra.lazy import LazyEigenvalues
@@ -44,3 +34,14 @@ def formula() -> ClosedForm:
     wave = exp(2 * pi * I * NODE * K / N)
     term = Term(-4 * sin(pi * K / N) ** 2, S.One, ((K, S.Zero, N - 1),), wave)
     return ClosedForm((term,), least=3, degree=Integer(2))
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=3,
+    too_small="a ring of two would join one pair twice; two nodes joined once are chain 2",
+    count=lambda n: n,
+    spectrum=spectrum,
+    formula=formula,
+    source="A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.3",
+)

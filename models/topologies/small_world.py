@@ -1,4 +1,4 @@
-"""Small world: a ring with several neighbours on either side, some edges led elsewhere."""
+"""ring with several neighbours (4), each edge led elsewhere with probability p (1/10), fixed by seed (0)."""
 
 from __future__ import annotations
 
@@ -6,13 +6,9 @@ import random
 from collections.abc import Iterator
 from fractions import Fraction
 
+from ..graphs.families import Family
 from ..inputs.options import integer_option, probability_option
 
-SUMMARY = "ring with several neighbours (4), each edge led elsewhere with probability p (1/10), fixed by seed (0)"
-MINIMUM = 5
-SOURCE = "D. J. Watts, S. H. Strogatz, Nature 393, 440 (1998)"
-
-CONNECTED = False
 _DRAWS = 10**7
 """Most random numbers of a graph: a node that is joined to nearly all others takes many."""
 
@@ -49,11 +45,6 @@ def edges(n: int, *, neighbours: int = 4, p: str = "1/10", seed: int = 0) -> Ite
     return ((i, j, 1) for i in range(n) for j in sorted(near[i]) if i < j)
 
 
-def count(n: int, *, neighbours: int = 4, p: str = "1/10", seed: int = 0) -> int:
-    """Number of edges: those that are led elsewhere are not lost."""
-    return n * neighbours // 2
-
-
 def _rewire(near: list[set[int]], i: int, old: int, stream: random.Random) -> None:
     new = i
     while new == i or new in near[i]:
@@ -62,3 +53,14 @@ def _rewire(near: list[set[int]], i: int, old: int, stream: random.Random) -> No
     near[old].remove(i)
     near[i].add(new)
     near[new].add(i)
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=5,
+    settle=settle,
+    # Number of edges: those that are led elsewhere are not lost.
+    count=lambda n, *, neighbours=4, p="1/10", seed=0: n * neighbours // 2,
+    connected=False,
+    source="D. J. Watts, S. H. Strogatz, Nature 393, 440 (1998)",
+)

@@ -1,38 +1,13 @@
-"""Star: a hub, node 0, joined to every other node."""
+"""star: a hub (the first node) and n - 1 leaves."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from ..graphs.families import Family
+
 if TYPE_CHECKING:
-    import sympy as sp
-
     from ..graphs.closed_forms import ClosedForm
-
-SUMMARY = "star: a hub (the first node) and n - 1 leaves"
-MINIMUM = 1
-SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.2 (K_{1,n-1})"
-
-
-def edges(n: int) -> Iterator[tuple[int, int, int]]:
-    """The hub and each leaf."""
-    return ((0, i, 1) for i in range(1, n))
-
-
-def count(n: int) -> int:
-    """Number of edges."""
-    return n - 1
-
-
-def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
-    """0 once, -1 n - 2 times, -n once."""
-    from sympy import Integer
-
-    if n == 1:
-        return [(Integer(0), 1)]
-    middle = [(Integer(-1), n - 2)] if n > 2 else []
-    return [(Integer(0), 1), *middle, (Integer(-n), 1)]
 
 
 def formula() -> ClosedForm:
@@ -45,3 +20,14 @@ def formula() -> ClosedForm:
     leaves = KroneckerDelta(NODE, 1) - KroneckerDelta(NODE, M)
     middle = Term(S.NegativeOne, N - 2, (), leaves, ((M, Integer(2), N - 1),))
     return ClosedForm((Term(S.Zero, vector=S.One), middle, Term(-N, vector=hub)), least=2)
+
+
+TOPOLOGY = Family(
+    # The hub and each leaf.
+    lambda n: ((0, i, 1) for i in range(1, n)),
+    minimum=1,
+    count=lambda n: n - 1,
+    spectrum=lambda n: [(0, 1), (-1, n - 2), (-n, 1)] if n > 2 else [(0, 1), (-n, 1)][:n],
+    formula=formula,
+    source="A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.2 (K_{1,n-1})",
+)

@@ -1,21 +1,17 @@
-"""Wheel: a hub, node 0, joined to every node of a ring."""
+"""wheel: a hub (the first node) joined to every node of a ring."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import chain
 from typing import TYPE_CHECKING
+
+from ..graphs.families import Eigenvalues, Family
 
 if TYPE_CHECKING:
     import sympy as sp
 
     from ..graphs.closed_forms import ClosedForm
-
-SUMMARY = "wheel: a hub (the first node) joined to every node of a ring"
-MINIMUM = 4
-SOURCE = (
-    "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.3, with the join of section 1.4.5"
-)
 
 
 def edges(n: int) -> Iterator[tuple[int, int, int]]:
@@ -24,12 +20,7 @@ def edges(n: int) -> Iterator[tuple[int, int, int]]:
     return chain(spokes, ((i, i + 1, 1) for i in range(1, n - 1)), [(1, n - 1, 1)])
 
 
-def count(n: int) -> int:
-    """Number of edges."""
-    return 2 * (n - 1)
-
-
-def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
+def spectrum(n: int) -> Eigenvalues:
     """0, -1 - 4 sin²(kπ/(n - 1)) for k = 1 … n - 2, and -n, which the rim has too up to 5 nodes."""
     from sympy import Integer
 
@@ -58,3 +49,14 @@ def formula() -> ClosedForm:
     rim = Term(-1 - 4 * sin(pi * K / (N - 1)) ** 2, S.One, ((K, S.One, N - 2),), wave)
     hub = N * KroneckerDelta(NODE, 0) - 1
     return ClosedForm((Term(S.Zero, vector=S.One), Term(-N, vector=hub), rim), least=4)
+
+
+TOPOLOGY = Family(
+    edges,
+    minimum=4,
+    count=lambda n: 2 * (n - 1),
+    spectrum=spectrum,
+    formula=formula,
+    source="A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.3, with the join of section "
+    "1.4.5",
+)

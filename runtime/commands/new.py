@@ -5,7 +5,6 @@ from __future__ import annotations
 import keyword
 import re
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 
 from ..console.arguments import folder
 from ..console.outcome import FINE, WrongUse, wrong_use
@@ -15,6 +14,7 @@ EXAMPLES = ("synchain new friction my_law", "synchain new topology caterpillar -
 
 HOMES = {"topology": "topologies", "friction": "frictions", "oscillator": "oscillators", "coupling": "couplings"}
 LENGTH = 40
+"""Most characters of a name, a choice."""
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -30,11 +30,12 @@ def execute(arguments: Namespace) -> int:
 
     from ..support.files import output_folder
 
-    _check(arguments.kind, arguments.name)
-    template = resources.files("synchain.models").joinpath("templates", f"{arguments.kind}.txt")
-    text = template.read_text(encoding="utf-8").replace("NAME", arguments.name)
+    kind, name = arguments.kind, arguments.name
+    _check(kind, name)
+    template = resources.files("synchain.models").joinpath("templates", f"{kind}.txt")
+    text = template.read_text(encoding="utf-8").replace("NAME", name)
     with wrong_use():
-        path = output_folder(arguments.dir) / f"{arguments.name}.py"
+        path = output_folder(arguments.dir) / f"{name}.py"
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
@@ -42,8 +43,15 @@ def execute(arguments: Namespace) -> int:
         raise WrongUse(f"{path} exists; expected a new file: choose another name, or remove it") from None
     except OSError as problem:
         raise WrongUse(f"cannot write {path}: {problem.strerror}; choose another --dir") from problem
+    # Say how the file is used.
+    shown = path.as_posix() if path.is_absolute() else f"./{path.as_posix()}"
+    use = f"topology({shown!r}, 6)" if kind == "topology" else f"Scene({kind}={shown!r}, …)"
     print(path)
-    print("\n".join(_next(arguments.kind, arguments.name, path)))
+    print(
+        f"  in models/{HOMES[kind]} of an editable installation it is found by its name, {name!r}, and tested; ", end=""
+    )
+    print("anywhere else:")
+    print(f"  plugins.allow_code({shown!r}); {use}")
     return FINE
 
 
@@ -59,15 +67,7 @@ def _check(kind: str, name: str) -> None:
     from synchain.models.graphs.families import TOPOLOGY
     from synchain.models.inputs import plugins
 
-    made = {own.name: own for own in (TOPOLOGY, OSCILLATOR, FRICTION_LAW, COUPLING)}[kind]
-    known = plugins.names(made)
-    if name in {*known, *made.also}:
-        raise WrongUse(f"{kind} {name!r} exists already; choose another name; known: {', '.join(known)}")
-
-
-def _next(kind: str, name: str, path: Path) -> list[str]:
-    """What to do with the file."""
-    home = f"in models/{HOMES[kind]} of an editable installation it is found by its name, {name!r}, and tested"
-    here = path.as_posix() if path.is_absolute() else f"./{path.as_posix()}"
-    use = f"topology({here!r}, 6)" if kind == "topology" else f"Scene({kind}={here!r}, …)"
-    return [f"  {home}; anywhere else:", f"  plugins.allow_code({here!r}); {use}"]
+    plugin_kind = {each.name: each for each in (TOPOLOGY, OSCILLATOR, FRICTION_LAW, COUPLING)}[kind]
+    names = plugins.names(plugin_kind)
+    if name in {*names, *plugin_kind.also}:
+        raise WrongUse(f"{kind} {name!r} exists already; choose another name; known: {', '.join(names)}")

@@ -2,6 +2,7 @@
 from synchain import models as models, runtime as runtime
 from synchain.models import Axis as Axis
 from synchain.models import Clusters as Clusters
+from synchain.models import Family as Family
 from synchain.models import Field as Field
 from synchain.models import FrictionLaw as FrictionLaw
 from synchain.models import Lagrangian as Lagrangian
@@ -53,6 +54,7 @@ from synchain.models import kneser as kneser
 from synchain.models import kronecker as kronecker
 from synchain.models import ladder as ladder
 from synchain.models import latex as latex
+from synchain.models import link_energy as link_energy
 from synchain.models import load_scene as load_scene
 from synchain.models import lorentzian as lorentzian
 from synchain.models import maximum as maximum

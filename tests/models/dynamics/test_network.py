@@ -17,19 +17,19 @@ from synchain.models.dynamics.network import network
 from synchain.models.graphs.families import names as families
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology, from_matrix
-from synchain.models.inputs.plugins import call, load, names
+from synchain.models.inputs.plugins import load, names
 from synchain.models.interactions.coupling import Coupling
 from synchain.models.mechanics.components import TIME, Node
 from synchain.models.mechanics.contact import ContactModel
 from synchain.models.mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, static_coefficient
 from synchain.models.mechanics.oscillator import Oscillator
 
-FORCES = [c for c in names(COUPLING) if not hasattr(load(COUPLING, c), "kinetic")]
+FORCES = [c for c in names(COUPLING) if not load(COUPLING, c).kinetic]
 """The couplings without inertia; tests/test_inertia.py has the others."""
 
 SPRING = coupling_of("spring")
 HARMONIC = oscillator_of("harmonic")
-Q_I, Q_J, V, WEIGHT, SIGMA = sp.symbols("q_i q_j v weight sigma", real=True)
+Q_I, Q_J, V, V_I, V_J, WEIGHT, SIGMA = sp.symbols("q_i q_j v v_i v_j weight sigma", real=True)
 WEIGHTED = from_matrix([["-5/2", 2, "1/2"], [2, -2, 0], ["1/2", 0, "-1/2"]], "weighted")
 CUT = from_matrix([[-1, 1, 0], [1, -1, 0], [0, 0, 0]], "cut")
 ONE_WAY = from_matrix([[0, 0, 0], [3, -3, 0], [0, "1/2", "-1/2"]], "one-way")
@@ -65,20 +65,17 @@ def pairs(graph: Topology) -> list[tuple[int, int, sp.Rational]]:
 
 def in_one_piece(oscillator: str, coupling: str, graph: Topology) -> list[sp.Expr]:
     """The accelerations of a network from its whole Lagrangian by sympy.physics.mechanics, in plain symbols."""
-    system, law = nondimensional(oscillator_of(oscillator)), load(COUPLING, coupling)
+    system, law = nondimensional(oscillator_of(oscillator)), coupling_of(coupling)
     x, v = system.coordinates[0], system.velocities[0]
     q = [mechanics.dynamicsymbols(f"x_{i + 1}") for i in range(graph.n)]
     rate = [mechanics.dynamicsymbols(f"x_{i + 1}", 1) for i in range(graph.n)]
-    given = {name: sp.Symbol(name, real=True) for name in law.PARAMETERS}
     at = [{x: a, v: b, TIME: mechanics.dynamicsymbols._t} for a, b in zip(q, rate, strict=True)]
     lagrangian = sp.Add(*((system.kinetic - system.potential).xreplace(values) for values in at))
     forces = [system.forces[0].xreplace(values) for values in at]
     for i, j, weight in pairs(graph):
-        if hasattr(law, "potential"):
-            lagrangian -= call(law.potential, {"q_i": q[i], "q_j": q[j], "weight": weight, **given})
-        if hasattr(law, "dissipation"):
-            lost = call(law.dissipation, {"v_i": rate[i], "v_j": rate[j], "weight": weight, **given})
-            forces = [force - lost.diff(rate[k]) for k, force in enumerate(forces)]
+        lagrangian -= law.potential.xreplace({Q_I: q[i], Q_J: q[j], WEIGHT: weight})
+        lost = law.dissipation.xreplace({V_I: rate[i], V_J: rate[j], WEIGHT: weight})
+        forces = [force - lost.diff(rate[k]) for k, force in enumerate(forces)]
     frame = mechanics.ReferenceFrame("N")
     points = [mechanics.Point(f"P{i}") for i in range(graph.n)]
     for point, speed in zip(points, rate, strict=True):
@@ -158,7 +155,7 @@ def test_connectivity_of_the_papers_chain() -> None:
 def test_connectivity_of_one_way_links_is_the_jacobian_of_the_forces(coupling: str) -> None:
     equations = assemble("harmonic", None, coupling, ONE_WAY)
     sigma = sp.Symbol("sigma", real=True)
-    kind = "v" if hasattr(load(COUPLING, coupling), "dissipation") else "x"
+    kind = "v" if coupling_of(coupling).dissipation else "x"
     felt = [rate + sp.Symbol(f"x_{i + 1}", real=True) for i, rate in enumerate(equations.rhs()[3:])]
     moving = sp.symbols(f"{kind}_1:4", real=True)
     matrix = sp.Matrix(felt).jacobian(moving) / sigma
@@ -198,20 +195,16 @@ def test_a_coupling_without_a_matrix_is_refused() -> None:
 
 @pytest.mark.parametrize("coupling", FORCES)
 def test_couplings_are_symmetric_and_called_sigma(coupling: str) -> None:
-    module = load(COUPLING, coupling)
-    assert next(iter(module.PARAMETERS)) == "sigma"
+    law = coupling_of(coupling)
+    assert next(iter(law.parameters)) == "sigma"
     single = node("harmonic")
     assert edge(coupling, single, "harmonic").oriented == (coupling == "fput")
     if coupling == "fput":
         return
-    p, q, weight = sp.symbols("p q weight", real=True)
-    given = {"weight": weight, **{name: sp.Symbol(name, real=True) for name in module.PARAMETERS}}
-    functions = [getattr(module, name) for name in ("potential", "dissipation") if hasattr(module, name)]
-    assert functions
-    for function in functions:
-        there = call(function, {"q_i": p, "q_j": q, "v_i": p, "v_j": q, **given})
-        back = call(function, {"q_i": q, "q_j": p, "v_i": q, "v_j": p, **given})
-        assert sp.expand(there - back) == 0
+    assert law.potential or law.dissipation
+    back = {Q_I: Q_J, Q_J: Q_I, V_I: V_J, V_J: V_I}
+    for energy in (law.potential, law.dissipation):
+        assert sp.expand(energy - energy.xreplace(back)) == 0
 
 
 def test_the_link_keeps_the_difference() -> None:
@@ -264,9 +257,9 @@ def models() -> list[tuple[str, str | None]]:
     """Every oscillator with every friction law that it takes."""
     found: list[tuple[str, str | None]] = []
     for name in names(OSCILLATOR):
-        module = load(OSCILLATOR, name)
-        laws = names(FRICTION_LAW) if len(getattr(module, "COORDINATES", "x")) == 1 else ("exponential",)
-        found += [(name, law) for law in laws] if module.FRICTION else [(name, None)]
+        made = oscillator_of(name)
+        laws = names(FRICTION_LAW) if len(made.coordinates) == 1 else ("exponential",)
+        found += [(name, law) for law in laws] if made.takes_friction else [(name, None)]
     return found
 
 
@@ -276,7 +269,7 @@ def models() -> list[tuple[str, str | None]]:
      for contact in (ContactModel if friction else ["atan"])],
 )  # fmt: skip
 def test_parameters_are_those_of_the_equations(oscillator: str, friction: str | None, contact: str) -> None:
-    if contact == "set-valued" and friction and len(getattr(load(OSCILLATOR, oscillator), "COORDINATES", "x")) > 1:
+    if contact == "set-valued" and friction and len(oscillator_of(oscillator).coordinates) > 1:
         with pytest.raises(ValueError, match=r"set-valued contact: .* coordinates; expected one"):
             node(oscillator, friction, contact)
         return

@@ -22,7 +22,7 @@ from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.results.energy_of_states import energy_function
 
-FORCES = [c for c in names(COUPLING) if not hasattr(load(COUPLING, c), "kinetic")]
+FORCES = [c for c in names(COUPLING) if not load(COUPLING, c).kinetic]
 """The couplings without inertia: their accelerations are the right-hand side itself."""
 
 LAGRANGIAN = [name for name in names(OSCILLATOR) if is_lagrangian(name)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,20 @@ import sympy as sp
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from synchain.models import Field, Lagrangian, Parameter, Scene, chain, friction_law, load_scene, ring, scene_names
+from synchain.models import (
+    Field,
+    Lagrangian,
+    Parameter,
+    Scene,
+    chain,
+    friction_law,
+    link_energy,
+    load_scene,
+    ring,
+    scene_names,
+    star,
+)
+from synchain.models.definitions.loader import load_oscillator, read_coupling
 from synchain.models.mechanics.contact import ContactModel
 from synchain.models.mechanics.oscillator import Oscillator
 from synchain.models.scenes.toml import toml
@@ -135,14 +149,60 @@ def test_a_scene_is_saved_under_a_name_of_toml(tmp_path: Path) -> None:
     assert not (tmp_path / "a.toml").exists()
 
 
-def test_a_model_with_scales_is_named_or_refused() -> None:
-    from dataclasses import replace
+@pytest.mark.parametrize("name", ["friction", "belt_double_pendulum", "spring_block"])
+def test_a_model_with_scales_is_a_name_or_a_table(name: str) -> None:
+    shipped = load_oscillator(name)
+    assert Scene(shipped).as_dict()["oscillator"] == name
+    scene = Scene(replace(shipped, name="mine"))
+    again = Scene.from_dict(json.loads(json.dumps(scene.as_dict())))
+    assert again == scene
+    assert again.equations.digest == Scene(name).equations.digest
 
-    from synchain.models.definitions.loader import load_oscillator
 
-    other = replace(load_oscillator("friction"), name="mine")
-    with pytest.raises(ValueError, match="oscillator 'mine': found scales of its quantities and no file"):
-        Scene(other).as_dict()
+@pytest.mark.parametrize("name", ["spring", "damper", "inerter", "fput", "friction_damper"])
+def test_energies_of_links_are_a_name_or_a_table(name: str) -> None:
+    shipped = read_coupling(f"{name} on phi")
+    assert Scene("double_pendulum", shipped, chain(2)).as_dict()["coupling"] == f"{name} on phi"
+    scene = Scene("double_pendulum", replace(shipped, name="mine"), chain(2))
+    again = Scene.from_dict(json.loads(json.dumps(scene.as_dict())))
+    assert again == scene
+    assert again.equations.digest == Scene("double_pendulum", shipped, chain(2)).equations.digest
+
+
+def test_energies_of_links_in_a_notebook_are_those_of_a_scene_file() -> None:
+    q_i, q_j, k, W = sp.symbols("q_i q_j k W")
+    spring = link_energy(k * W * (q_i - q_j) ** 2 / 2, parameters={k: 0.3})
+    table = {"energies": {"potential": "k*W*(q_i - q_j)**2/2"}, "parameters": {"k": 0.3}}
+    scene = Scene("duffing", spring, chain(2))
+    assert Scene("duffing", table, chain(2)) == scene
+    assert Scene.from_dict(scene.as_dict()) == scene
+    sigma, own = sp.symbols("sigma k", real=True)
+    assert scene.equations.edge.rhs[1] == Scene("duffing", "spring", chain(2)).equations.edge.rhs[1].subs(sigma, own)
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        (
+            {"energies": {"V": "W*q_i*q_j"}},
+            "coupling: energies: unknown key 'V'; known: potential, dissipation, kinetic",
+        ),
+        ({"energies": {"potential": True}}, "coupling: energies: potential: found True"),
+        ({"energies": {"potential": "W*q_i*q_j"}, "on": "x"}, r"coupling: on: found 'x' \(str\); expected a list"),
+        ({"energies": {"potential": "q_i*q_j"}}, "no energy has the weight W of a link"),
+        ({"energies": {"potential": "W*q_i*q_j"}, "rates": {}}, "coupling: unknown key 'rates'"),
+    ],
+)
+def test_wrong_energies_of_links_are_refused(table: dict, words: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=words):
+        Scene("duffing", table, chain(2))
+
+
+def test_a_coupling_between_two_oscillators_without_a_file_is_not_saved() -> None:
+    hanging = replace(read_coupling("hanging"), name="mine")
+    scene = Scene("clock", nodes=[{"oscillator": "beam", "at": [1]}], coupling=hanging, topology=star(3))
+    with pytest.raises(ValueError, match="coupling 'mine': found a coupling between clock and beam and no file"):
+        scene.as_dict()
 
 
 # -- hostile tables ----------------------------------------------------------------------------------------------

@@ -131,31 +131,13 @@ def test_free_decay(hold: float) -> None:
 
 # -- the oscillator of bSTAB -----------------------------------------------------------------------------------
 
-BELT_DAMPER = '''
-"""Block on a belt with a spring and a viscous damper to the ground, non-dimensional."""
+BELT_DAMPER = """
+# Stender & Hoffmann, Nonlinear Dynamics 107, 1451 (2022): block on a belt with a spring and a damper to the ground
+from synchain.models import Lagrangian
 
-from synchain.models import Parameter
-
-SUMMARY = "block on a moving belt with a viscous damper"
-SOURCE = "Stender & Hoffmann, Nonlinear Dynamics 107, 1451 (2022)"
-FRICTION = True
-PARAMETERS = {
-    "theta_b": Parameter(1.5, "1", "belt speed"),
-    "xi": Parameter(0.05, "1", "damping ratio", minimum=0),
-}
-
-
-def kinetic(v):
-    return v**2 / 2
-
-
-def potential(x):
-    return x**2 / 2
-
-
-def force(v, xi, theta_b, friction):
-    return friction(theta_b - v) - 2 * xi * v
-'''
+OSCILLATOR = Lagrangian("v**2/2", "x**2/2", {"x": "friction(theta_b - v) - 2*xi*v"}, coordinates={"x": "v"},
+                        parameters={"theta_b": 1.5, "xi": 0.05})
+"""
 STRIBECK = {"mu_s": 1.0, "mu_k": 0.5, "a": 2.0, "xi": 0.05}
 
 

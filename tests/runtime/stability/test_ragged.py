@@ -20,27 +20,11 @@ from synchain.runtime.sweeps.run import run
 pytestmark = pytest.mark.long
 
 UEDA = """
-import sympy as sp
+from synchain.models import Lagrangian
 
-from synchain.models import Parameter
-
-SUMMARY = "oscillator with a purely cubic spring, linear damping and a harmonic force"
-SOURCE = "Ueda, J. Stat. Phys. 20, 181 (1979)"
-FRICTION = False
-PARAMETERS = {
-    "h": Parameter(0.1, "1", "damping coefficient", minimum=0),
-    "u": Parameter(5.6, "1", "amplitude of the force", minimum=0),
-    "omega": Parameter(1.0, "1", "frequency of the force", minimum=0),
-}
-
-def kinetic(v):
-    return v**2 / 2
-
-def potential(x, t, u, omega):
-    return x**4 / 4 - u * x * sp.cos(omega * t)
-
-def force(v, h):
-    return -h * v
+# Ueda, J. Stat. Phys. 20, 181 (1979)
+OSCILLATOR = Lagrangian("v**2/2", "x**4/4 - u*x*cos(omega*t)", {"x": "-h*v"}, coordinates={"x": "v"},
+                        parameters={"h": 0.1, "u": 5.6, "omega": 1.0})
 """
 
 

@@ -182,10 +182,8 @@ def test_law_that_chatters_ends_with_its_status(tmp_path: Path) -> None:
     """Static friction below that of slow slip can neither hold the block nor let it go."""
     law = tmp_path / "weak_rest.py"
     law.write_text(
-        "import sympy as sp\nfrom synchain.models import Parameter\n"
-        "SUMMARY = 'rests less than it slides'\nSOURCE = 'none, 2000'\nODD = True\n"
-        "PARAMETERS = {'mu_k': Parameter(0.5, '1', 'sliding'), 'mu_s': Parameter(0.3, '1', 'at rest')}\n"
-        "def force(w, mu_k, mu_s):\n    return mu_k * sp.sign(w)\ndef static(mu_s):\n    return mu_s\n",
+        "from synchain.models import friction_law\n"
+        "FRICTION = friction_law('mu_k*sign(w)', {'mu_k': 0.5, 'mu_s': 0.3}, static='mu_s')\n",
         encoding="utf-8",
     )
     allow_code(law)

@@ -550,13 +550,8 @@ def test_other_versions_do_not_go_on_with_a_run(tmp_path, monkeypatch, interrupt
         stream(MAP, path, resume=True, show_progress=False)
 
 
-FALLING = """import sympy as sp
-from synchain.models import Parameter
-SUMMARY, SOURCE, FRICTION = "decay", "none, 2000", False
-PARAMETERS = {"rate": Parameter(1.0, "1", "rate of decay")}
-STATE = ("x",)
-def field(x, rate):
-    return (-rate * x,)
+FALLING = """from synchain.models import Field
+OSCILLATOR = Field({"x": "-rate*x"}, parameters={"rate": 1.0})
 """
 
 
@@ -583,7 +578,7 @@ def test_a_result_says_that_its_model_has_changed(own, tmp_path):
         assert open_result(path).data.end.identical(result.data.end)
         with pytest.raises(FileExistsError, match="holds the result of this scene already"):
             stream(falling(own), path, show_progress=False)
-    own.write_text(FALLING.replace("-rate * x", "-rate * x**3"))
+    own.write_text(FALLING.replace("-rate*x", "-rate*x**3"))
     with pytest.warns(UserWarning, match=r"a\.nc: the code of its model has changed since it was written"):
         opened = open_result(path)
     assert opened.data.end.identical(result.data.end)
@@ -604,7 +599,7 @@ def test_an_unfinished_run_of_an_edited_model_does_not_go_on(own, tmp_path, inte
     with pytest.raises(SweepInterrupted):
         stream(falling(own), path, show_progress=False, workers=1, progress=interrupt_at(1))
     kept = partial(path).read_bytes()
-    own.write_text(FALLING.replace("-rate * x", "-rate * x**3"))
+    own.write_text(FALLING.replace("-rate*x", "-rate*x**3"))
     with pytest.warns(UserWarning, match="the code of its model has changed"):
         open_result(partial(path))
     with pytest.raises(ValueError, match=r"a\.partial comes of another model: the code"):
@@ -617,7 +612,7 @@ def test_a_file_that_is_edited_during_a_run_leaves_the_run_as_it_is(own, tmp_pat
     stream(scene, tmp_path / "a.nc", show_progress=False)
 
     def edit(_) -> None:
-        own.write_text(FALLING.replace("'x'", "'y'").replace("(x", "(y").replace("* x", "* y").replace('"x"', '"y"'))
+        own.write_text(FALLING.replace('"x": "-rate*x"', '"y": "-rate*y"'))
 
     stream(scene, tmp_path / "b.nc", show_progress=False, progress=edit)
     assert Path(tmp_path, "b.nc").read_bytes() == Path(tmp_path, "a.nc").read_bytes()
