@@ -1,5 +1,7 @@
-"""What generated code is before it is text: expressions, statements, functions, and their printers.
+"""Generated code before it is text: expressions, statements and functions, and the passes that make and print them.
 
-Everything that must be known of a program (operations, functions and names in use) is read off its statements.  Knows
-SymPy, nothing of oscillators or integrators.
+    SymPy ─passes─▶ SymPy without repetition ─lowering─▶ Expression ─▶ Statement, Function ─printers─▶ text
+
+Operations, functions and names in use are read off the statements, not off the text. The room imports SymPy, and nothing of
+oscillators or integrators.
 """

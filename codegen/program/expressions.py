@@ -1,6 +1,7 @@
 """Expressions of a program: a tree that keeps the order of its terms, because rounding depends on it.
 
-`a + b` and `a*b` append to the sum or product on their left, as Python reads them; what stands on the right stays whole.
+`a + b` and `a*b` append to the sum or product on their left, as Python reads them; a sum or product on the right becomes one
+term or factor. `plus` flattens both sides.
 """
 
 from __future__ import annotations
@@ -11,20 +12,20 @@ from typing import ClassVar, TypeAlias
 
 
 class Expression:
-    """A value, a condition or a place; operators build larger ones."""
+    """A value, a condition or an element of an array; operators build larger expressions."""
 
     __slots__ = ()
     __match_args__: ClassVar[tuple[str, ...]] = ()
 
     @property
     def parts(self) -> tuple[Expression, ...]:
-        """The expressions that it is made of."""
+        """The expressions one level below."""
         fields = (getattr(self, name) for name in self.__match_args__)
         listed = (field if isinstance(field, tuple) else (field,) for field in fields)
         return tuple(part for parts in listed for part in parts if isinstance(part, Expression))
 
     def walk(self) -> Iterator[Expression]:
-        """Yield the expression and everything in it."""
+        """Yield the expression and all expressions below it."""
         yield self
         for part in self.parts:
             yield from part.walk()
@@ -89,7 +90,7 @@ class Quotient(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Power(Expression):
-    """A power; lanes have those with whole exponents."""
+    """A power, for languages with a mathematical library; lanes have products and roots."""
 
     base: Expression
     exponent: Expression
@@ -97,7 +98,7 @@ class Power(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Negation(Expression):
-    """The value with its sign turned."""
+    """A value with its sign changed."""
 
     value: Expression
 
@@ -112,7 +113,7 @@ class Call(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Conditional(Expression):
-    """One value if a condition holds, another if not."""
+    """One of two values, by a condition."""
 
     condition: Expression
     yes: Expression
@@ -121,7 +122,7 @@ class Conditional(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Compare(Expression):
-    """A condition on two values: <, <=, > or >=."""
+    """A comparison of two values by <, <=, > or >=."""
 
     sign: str
     left: Expression
@@ -130,7 +131,7 @@ class Compare(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Junction(Expression):
-    """Conditions that hold together, "and", or one at least, "or"."""
+    """Conditions joined by "and" or "or"."""
 
     word: str
     conditions: tuple[Expression, ...]
@@ -145,7 +146,7 @@ class Not(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Load(Expression):
-    """An element of an array, or as many from there on as a register of some width has lanes."""
+    """A register of `width` elements of an array; without a width one element."""
 
     array: str
     index: Expression
@@ -154,7 +155,7 @@ class Load(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Slice(Expression):
-    """The places of an array from `start` up to `stop`."""
+    """The indices from `start` up to `stop`."""
 
     start: Expression
     stop: Expression
@@ -179,12 +180,12 @@ def call(function: str, *arguments: Value) -> Call:
 
 
 def plus(first: Expression, *others: Expression) -> Expression:
-    """Return the sum of all terms of some expressions, in their order."""
+    """Return the sum of all terms of the expressions, in their order."""
     return Sum(tuple(term for e in (first, *others) for term in terms_of(e))) if others else first
 
 
 def product(factors: Sequence[Expression]) -> Expression:
-    """Return the product of some factors, one if there is none."""
+    """Return the product of the factors, one if there are none."""
     return Product(tuple(factors)) if len(factors) > 1 else factors[0] if factors else ONE
 
 
@@ -206,7 +207,7 @@ def scaled(factor: Value, e: Expression) -> Expression:
 
 
 def linear(row: Iterable[float], values: Iterable[Value], start: Value | None = None) -> Expression:
-    """Return start + sum row_j * value_j without zero terms and unit factors; `ZERO` where nothing is left."""
+    """Return start + sum row_j * value_j without zero terms and unit factors; `ZERO` if no term is left."""
     terms: list[Expression] = [] if start is None else [as_expression(start)]
     for weight, value in zip(row, values, strict=False):
         if weight != 0.0:

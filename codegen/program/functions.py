@@ -1,4 +1,4 @@
-"""The functions of expressions: from SymPy, and what each language calls them."""
+"""The functions of expressions, and their names in each language."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ FUNCTIONS: dict[type, str] = {
     sp.atanh: "atanh", sp.atan2: "atan2", sp.floor: "floor", sp.ceiling: "ceiling", sp.Abs: "absolute",
     sp.sign: "sign", sp.Max: "maximum", sp.Min: "minimum", sp.erf: "erf",
 }  # fmt: skip
-"""What a program calls the functions of SymPy; a square root is called "sqrt"."""
+"""Names of SymPy's functions in programs; a square root is a power there, and "sqrt" here."""
 
 NAMES = (*FUNCTIONS.values(), "sqrt")
 
 
-def _named(prefix: str, **own: str) -> Mapping[str, str]:
-    return {name: own.get(name, prefix + name) for name in NAMES}
+def _named(prefix: str, **others: str) -> Mapping[str, str]:
+    return {name: others.get(name, prefix + name) for name in NAMES}
 
 
 LANES = _named("")

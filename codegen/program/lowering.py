@@ -1,6 +1,8 @@
-"""From SymPy to the expressions of a program: the one place that decides how powers, roots and constants are computed.
+"""From SymPy to the expressions of a program: how powers, roots and constants are computed.
 
-Nothing is guessed: a function without a counterpart, a floating-point number or a constant that is not real is an error.
+`Lowering` has the rules of lanes, which compute powers as products and roots and constants as one double; `Library` has those
+of languages with a mathematical library. A function without a counterpart, a floating-point number or a constant that
+is not real is an error.
 """
 
 from __future__ import annotations
@@ -33,13 +35,16 @@ from .expressions import (
 
 SIGNS = {sp.StrictLessThan: "<", sp.LessThan: "<=", sp.StrictGreaterThan: ">", sp.GreaterThan: ">="}
 
+LARGEST_POWER = 16
+"""Largest whole exponent that lanes compute as a product. A choice."""
+
 
 class UnprintableError(ValueError):
-    """An expression that generated code cannot express; the message names the part and the remedy."""
+    """An expression without generated code; the message names the part and the remedy."""
 
 
 class Lowering:
-    """The rules of lanes: powers are products and roots where they can be; constants are folded."""
+    """The rules of lanes."""
 
     names: Mapping[str, str] = functions.LANES
 
@@ -52,6 +57,7 @@ class Lowering:
         if self.is_constant(e):
             return number(e)
         if e.is_Add:
+            # positive terms first, so that a sum begins without a sign
             terms = sorted(e.args, key=lambda term: (_is_negative(term), sp.default_sort_key(term)))
             return Sum(tuple(Negation(self(-t)) if _is_negative(t) else self(t) for t in terms))
         if e.is_Mul:
@@ -65,11 +71,11 @@ class Lowering:
         return self.function(e)
 
     def is_constant(self, e: sp.Expr) -> bool:
-        """True for a real number that can be folded into one double: a rational, pi, e, and what is made of them."""
+        """True for a real number that is folded into one double: rationals, pi, e and their functions."""
         return bool(e.is_number) and not e.atoms(sp.Float) and e.is_real is True
 
     def product(self, e: sp.Mul) -> Expression:
-        """One constant in front, what has negative powers below."""
+        """Return one constant, factors, and negative powers as divisors."""
         constants = [f for f in e.args if self.is_constant(f)]
         factors = [f for f in e.args if f not in constants]
         below = [f for f in factors if f.is_Pow and f.exp.is_number and f.exp.is_negative and f.base != sp.E]
@@ -79,7 +85,7 @@ class Lowering:
         return Quotient(top, product([self(1 / f) for f in below])) if below else top
 
     def power(self, base: sp.Expr, exponent: sp.Expr) -> Expression:
-        """A power, by its exponent."""
+        """Return a power, by its exponent."""
         if base == sp.E:
             return call("exp", self(exponent))
         if exponent.is_number and exponent.is_negative:
@@ -91,22 +97,22 @@ class Lowering:
         return self.general_power(base, exponent)
 
     def general_power(self, base: sp.Expr, exponent: sp.Expr) -> Expression:
-        """A power whose exponent is neither negative nor a half."""
+        """Return a power with an exponent that is neither negative nor half an integer."""
         if not exponent.is_Integer:
             return call("exp", self(exponent * sp.log(base)))
-        if exponent > 16:
+        if exponent > LARGEST_POWER:
             raise UnprintableError(
-                f"no printing rule for the power {base**exponent}; expected whole exponents up to 16"
+                f"no printing rule for the power {base**exponent}; expected whole exponents up to {LARGEST_POWER}"
             )
         return Product((self(base),) * int(exponent))
 
     def function(self, e: sp.Expr) -> Expression:
-        """The call of a function; Max and Min of several are nested pairs."""
+        """Return the call of a function; Max and Min of several arguments are nested pairs."""
         name = functions.FUNCTIONS.get(type(e), "")
         if name not in self.names:
-            known = ", ".join(sorted(set(self.names) - {"sqrt"}))
+            functions_here = ", ".join(sorted(set(self.names) - {"sqrt"}))
             raise UnprintableError(
-                f"no printing rule for {type(e).__name__} in {e}; known: {known}, sqrt, powers, Piecewise"
+                f"no printing rule for {type(e).__name__} in {e}; known: {functions_here}, sqrt, powers, Piecewise"
             )
         arguments = [self(a) for a in e.args]
         while len(arguments) > 2:
@@ -114,18 +120,18 @@ class Lowering:
         return Call(name, tuple(arguments))
 
     def choice(self, e: sp.Piecewise) -> Expression:
-        """The value of the first condition that holds."""
+        """Return the value of the first condition that holds, as nested choices."""
         value, condition = e.args[-1]
         if condition is not sp.true:
             raise UnprintableError(f"{e} has no value where no condition holds; end it with (value, True)")
-        found = self(value)
+        choice = self(value)
         for value, condition in reversed(e.args[:-1]):
-            found = Conditional(self.condition(condition), self(value), found)
-        return found
+            choice = Conditional(self.condition(condition), self(value), choice)
+        return choice
 
     def condition(self, e: Boolean) -> Expression:
-        """A condition, whose negations are carried inwards; a symbol names one that was computed before."""
-        e = sp.to_nnf(e, simplify=False)
+        """Return a condition; a symbol is the name of one that was computed before."""
+        e = sp.to_nnf(e, simplify=False)  # negations of names alone
         if e.is_Symbol:
             return Name(e.name)
         if isinstance(e, sp.Not) and e.args[0].is_Symbol:
@@ -145,11 +151,11 @@ class Library(Lowering):
     names = functions.C99
 
     def is_constant(self, e: sp.Expr) -> bool:
-        """True for every number; `number` refuses those that are not real."""
+        """True for every number; `number` raises an error if it is not real."""
         return bool(e.is_number) and not e.atoms(sp.Float)
 
     def product(self, e: sp.Mul) -> Expression:
-        """What has negative rational powers below, with the factor 1/q of a rational."""
+        """Return factors, with negative rational powers and the denominator of a constant as divisors."""
         coefficient = sp.Mul(*(f for f in e.args if f.is_number))
         factors = [f for f in e.args if not f.is_number]
         below = [f for f in factors if f.is_Pow and f.exp.is_Rational and f.exp < 0]
@@ -157,26 +163,26 @@ class Library(Lowering):
         under = [self(1 / f) for f in below]
         under = _flat(under) if len(under) > 1 else under
         if coefficient.is_Rational and coefficient.p == 1 and coefficient.q > 1 and above:
-            under.insert(0, number(sp.Integer(coefficient.q)))
+            under.insert(0, number(sp.Integer(coefficient.q)))  # x/3, which rounds once
         elif coefficient != 1:
             above.insert(0, number(coefficient))
         return Quotient(product(above), product(under)) if under else product(above)
 
     def power(self, base: sp.Expr, exponent: sp.Expr) -> Expression:
-        """A power, by its exponent."""
+        """Return a power, by its exponent; roots other than sqrt are powers."""
         if base == sp.E or exponent == sp.Rational(1, 2) or (exponent.is_Rational and exponent < 0):
             return super().power(base, exponent)
         return self.general_power(base, exponent)
 
     def general_power(self, base: sp.Expr, exponent: sp.Expr) -> Expression:
-        """Small powers of a variable are products."""
+        """Return a power; small ones of a variable are products."""
         if exponent.is_Integer and base.is_Symbol and exponent <= 4:
             return Product((self(base),) * int(exponent))
         return Power(self(base), Number(int(exponent)) if exponent.is_Integer else self(exponent))
 
 
 lower = Lowering()
-"""Lowers to what lanes can compute."""
+"""Lowers to expressions of lanes."""
 
 
 def number(e: sp.Expr | Fraction) -> Number:

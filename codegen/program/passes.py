@@ -1,6 +1,7 @@
-"""Passes over expressions before they are lowered: names, common subexpressions, what need not be computed again.
+"""Passes over expressions before they are lowered: names, fixed parts, common subexpressions.
 
-Repeated subexpressions get numbered names that cannot collide with the user's symbols.
+`Hoist` takes out parts that need not be computed again; `share` names subexpressions that occur twice. Their names are
+numbered and avoid those in use.
 """
 
 from __future__ import annotations
@@ -13,12 +14,12 @@ from sympy.functions.elementary.piecewise import ExprCondPair
 
 
 def real(name: str) -> sp.Symbol:
-    """Return the symbol of that name that models have."""
+    """Return the real symbol of that name; all symbols of models are real."""
     return sp.Symbol(name, real=True)
 
 
 class Names:
-    """A supply of symbols ``prefix0, prefix1, …`` that avoids the names already taken."""
+    """Symbols ``prefix0, prefix1, …`` that avoid names already taken."""
 
     def __init__(self, taken: Iterable[str]) -> None:
         self.taken = set(taken)
@@ -36,7 +37,10 @@ class Names:
 
 @dataclass
 class Hoist:
-    """Replaces maximal subexpressions that are free of `moving` symbols by names; equal ones share a name."""
+    """Replaces maximal subexpressions without `moving` symbols by names; equal ones share a name.
+
+    table: the names by expression. A bare symbol gets a name only if it is one of `renamed`.
+    """
 
     moving: frozenset[sp.Symbol]
     supply: Iterator[sp.Symbol]
@@ -47,23 +51,21 @@ class Hoist:
         """Return the expression with its fixed parts named."""
         if not e.free_symbols:
             return e
-        if isinstance(e, ExprCondPair):  # one branch of a choice is no value of its own
+        if isinstance(e, ExprCondPair):  # one branch of a Piecewise has no value outside of it
             return e.func(*(self.apply(a) for a in e.args))
         if e.is_Symbol:
             return e if e in self.moving else self.name(e)
         if not e.free_symbols & self.moving:
             return self.name(e)
         if e.is_Add or e.is_Mul:
-            fixed = [a for a in e.args if not a.free_symbols & self.moving]
-            rest = [self.apply(a) for a in e.args if a.free_symbols & self.moving]
-            whole = e.func(*fixed)
-            if whole.free_symbols:
-                return e.func(self.name(whole), *rest)
-            return e.func(whole, *rest)
+            # all fixed terms or factors become one name; numbers alone stay
+            fixed = e.func(*(a for a in e.args if not a.free_symbols & self.moving))
+            others = [self.apply(a) for a in e.args if a.free_symbols & self.moving]
+            return e.func(self.name(fixed) if fixed.free_symbols else fixed, *others)
         return e.func(*(self.apply(a) for a in e.args))
 
     def name(self, e: sp.Expr) -> sp.Expr:
-        """The symbol that stands for a fixed expression; a bare symbol gets one only if it is `renamed`."""
+        """Return the symbol of a fixed expression; e and -e share it."""
         if e.is_Symbol and e not in self.renamed:
             return e
         if e.could_extract_minus_sign() and e.is_Mul:
@@ -75,17 +77,16 @@ class Hoist:
 
 @dataclass(frozen=True, slots=True)
 class StraightLine:
-    """Straight-line statements and the expressions that they end in."""
+    """Assignments, and the expressions in which they end."""
 
     statements: tuple[tuple[sp.Symbol, sp.Expr], ...]
     results: tuple[sp.Expr, ...]
 
     @property
     def symbols(self) -> set[sp.Symbol]:
-        """Everything that the body reads and does not define."""
-        used: set[sp.Symbol] = set().union(*(e.free_symbols for e in self.results)) if self.results else set()
-        for _, e in self.statements:
-            used |= e.free_symbols
+        """The symbols that are read and not assigned."""
+        expressions = [*self.results, *(e for _, e in self.statements)]
+        used: set[sp.Symbol] = set().union(*(e.free_symbols for e in expressions))
         return used - {s for s, _ in self.statements}
 
 

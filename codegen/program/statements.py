@@ -1,4 +1,4 @@
-"""Statements of a program, and what can be read off them: operations, functions, names."""
+"""Statements of a program; the operations, functions and names in them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .expressions import Call, Expression, Load, Name, Power, Product, Quotient,
 
 @dataclass(frozen=True, slots=True)
 class Assign:
-    """Variables get the results of an expression; `whole` where these are indices."""
+    """Assign the results of an expression to variables; `whole` for indices."""
 
     targets: tuple[str, ...]
     value: Expression
@@ -20,12 +20,12 @@ class Assign:
 
 
 Index: TypeAlias = Expression | tuple[Expression, Expression]
-"""The place of an element, or its row and column."""
+"""The index of an element, or its row and column."""
 
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """A value goes to a place of an array."""
+    """Store a value in an array."""
 
     array: str
     index: Index
@@ -34,7 +34,7 @@ class Store:
 
 @dataclass(frozen=True, slots=True)
 class Accumulate:
-    """A value is added to what stands at a place of an array."""
+    """Add a value to an element of an array."""
 
     array: str
     index: Index
@@ -43,7 +43,7 @@ class Accumulate:
 
 @dataclass(frozen=True, slots=True)
 class Array:
-    """A new array of some size."""
+    """Make an array."""
 
     name: str
     size: Expression
@@ -51,7 +51,7 @@ class Array:
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """A new square matrix with ones on its diagonal."""
+    """Make a unit matrix."""
 
     name: str
     size: Expression
@@ -59,7 +59,7 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """Statements for each whole number from `start` up to `stop`, or down to it; `stop` is not one of them."""
+    """Run statements for each integer from `start` up or down to `stop`, without `stop`."""
 
     index: str
     start: Expression
@@ -70,7 +70,7 @@ class Loop:
 
 @dataclass(frozen=True, slots=True)
 class Repeat:
-    """Statements that run once, and again as long as a condition holds behind them."""
+    """Run statements once, and again while a condition holds."""
 
     body: tuple[Statement, ...]
     condition: Expression
@@ -78,7 +78,7 @@ class Repeat:
 
 @dataclass(frozen=True, slots=True)
 class If:
-    """Statements that run if a condition holds."""
+    """Run statements if a condition holds."""
 
     condition: Expression
     body: tuple[Statement, ...]
@@ -86,7 +86,7 @@ class If:
 
 @dataclass(frozen=True, slots=True)
 class Titled:
-    """Statements with a title, and variables of their own where a language has that."""
+    """Run statements below a comment; their variables are local in languages with blocks."""
 
     title: str
     body: tuple[Statement, ...]
@@ -94,21 +94,21 @@ class Titled:
 
 @dataclass(frozen=True, slots=True)
 class Comment:
-    """A line for readers."""
+    """Write a comment."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Do:
-    """A call for what it does to its arguments."""
+    """Call a function for its effect on its arguments."""
 
     call: Call
 
 
 @dataclass(frozen=True, slots=True)
 class Return:
-    """The end of a function and its results, with a remark."""
+    """Return results, with a comment."""
 
     values: tuple[Expression, ...]
     remark: str = ""
@@ -120,7 +120,7 @@ Statement: TypeAlias = (
 
 
 class Role(Enum):
-    """What becomes of a function: its callers take over its body, or call it, or a driver does."""
+    """Compilation of a function: inlined into its callers, called by them, or called by a driver."""
 
     INLINED = "inlined"
     CALLED = "called"
@@ -139,12 +139,12 @@ class Function:
 
 
 def let(name: str, value: Value) -> Assign:
-    """Return the statement that gives one variable a value."""
+    """Return the assignment of a number."""
     return Assign((name,), as_expression(value))
 
 
 def whole(name: str, value: Value) -> Assign:
-    """Return the statement that gives an index a value."""
+    """Return the assignment of an index."""
     return Assign((name,), as_expression(value), whole=True)
 
 
@@ -154,12 +154,12 @@ def store(array: str, index: Value, value: Value) -> Store:
 
 
 def accumulate(array: str, index: Value, value: Value) -> Accumulate:
-    """Return the statement that adds a value to what stands at a place."""
+    """Return the statement that adds a value to an element."""
     return Accumulate(array, as_expression(index), as_expression(value))
 
 
 def walk(statements: Iterable[Statement]) -> Iterator[Statement]:
-    """Yield all statements, those of inner blocks too."""
+    """Yield all statements, with those of inner blocks."""
     for statement in statements:
         yield statement
         if isinstance(statement, Loop | Repeat | If | Titled):
@@ -167,7 +167,7 @@ def walk(statements: Iterable[Statement]) -> Iterator[Statement]:
 
 
 def values(statements: Iterable[Statement]) -> Iterator[Expression]:
-    """Yield what is computed: neither the places where it goes, nor conditions, nor indices."""
+    """Yield computed values, without conditions and indices."""
     for statement in walk(statements):
         match statement:
             case Assign(_, value, False) | Store(_, _, value) | Accumulate(_, _, value) | Do(value):
@@ -182,37 +182,42 @@ def called(statements: Iterable[Statement]) -> set[str]:
 
 
 def targets(statements: Iterable[Statement]) -> list[str]:
-    """Return the names of the variables that get values, outside of loops, in the order in which they get them."""
+    """Return the variables assigned outside of blocks, in the order of their first assignment."""
     return list(dict.fromkeys(name for s in statements if isinstance(s, Assign) for name in s.targets))
 
 
 def mentioned(statements: Iterable[Statement]) -> set[str]:
-    """Return the names of all variables and arrays that are read or written, in places and bounds too."""
-    found = set()
+    """Return all variables and arrays that are read, and arrays that are written: in indices, bounds and conditions too."""
+    names = set()
+    fields = ("value", "index", "start", "stop", "condition", "call")
     for s in walk(statements):
-        parts = [
-            getattr(s, name) for name in ("value", "index", "start", "stop", "condition", "call") if hasattr(s, name)
-        ]
+        parts = [getattr(s, name) for name in fields if hasattr(s, name)]
         parts += s.values if isinstance(s, Return) else ()
-        found |= {s.array} if isinstance(s, Store | Accumulate) else set()
+        if isinstance(s, Store | Accumulate):
+            names.add(s.array)
+        # an index of a loop is text, no expression
         for e in (e for part in parts if isinstance(part, Expression) for e in part.walk()):
-            found |= {e.text.partition(".")[0]} if isinstance(e, Name) else {e.array} if isinstance(e, Load) else set()
-    return found
+            match e:
+                case Name(text):
+                    names.add(text.partition(".")[0])  # column of column.size
+                case Load(array):
+                    names.add(array)
+    return names
 
 
 def used(statements: Sequence[Statement]) -> set[str]:
-    """Return the names of the variables and arrays in values, and of the arrays that are written."""
-    found = {s.array for s in walk(statements) if isinstance(s, Store | Accumulate)}
+    """Return the variables and arrays in values, and the arrays that are written."""
+    names = {s.array for s in walk(statements) if isinstance(s, Store | Accumulate)}
     for value in values(statements):
         for e in value.walk():
             match e:
                 case Name(text) | Load(text):
-                    found.add(text)
-    return found
+                    names.add(text)
+    return names
 
 
 def operations(statements: Sequence[Statement]) -> int:
-    """Return how many sums, differences, products and quotients the statements hold."""
+    """Count sums, differences, products and quotients; loops and blocks count once."""
     return sum(map(_cost, values(statements))) + sum(isinstance(s, Accumulate) for s in walk(statements))
 
 
@@ -221,7 +226,7 @@ def _cost(e: Expression) -> int:
         case Load():
             return 0
         case Sum(parts) | Product(parts):
-            own = len(parts) - 1
+            cost = len(parts) - 1
         case _:
-            own = int(isinstance(e, Quotient | Power))
-    return own + sum(map(_cost, e.parts))
+            cost = int(isinstance(e, Quotient | Power))
+    return cost + sum(map(_cost, e.parts))
