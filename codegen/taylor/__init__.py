@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from .jump_series import unpassed
 from .looped_series import write_looped
+from .passable import is_analytic, is_linear, jump, may_cross_singularity, unpassed
 from .rolled import is_large, write_rolled
-from .series_graph import is_analytic, is_linear, jump, may_cross_singularity
 from .series_order import order_for
 from .tangent import TangentStep, write_tangent
 from .taylor_step import TaylorStep

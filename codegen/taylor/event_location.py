@@ -1,8 +1,17 @@
-"""Where a series leaves its side of zero: the functions of a step with kinks or contacts, and the statements that call them.
+"""Where a series leaves its side of zero: the functions that steps with kinks or contacts call, and the calls.
 
-Between kinks the solution is analytic. A step that would pass a kink ends just behind it, and the next one finds itself on
-the other side: nothing has to be remembered. A contact keeps its mode until its gap closes: the sliding velocity while it
-slips, and while it sticks the distances of its load from the limits of static friction.
+Between kinks the solution is analytic.  A step that would pass a kink ends just behind it, and the next step finds the
+series on the other side, so that nothing is remembered between steps.  A contact keeps its mode until its gap closes: the
+sliding velocity while it slips, and while it sticks the distances of its load from the limits of static friction.
+
+`passage` finds the first zero of a polynomial p in 0 < x <= ratio.  With B = sum k (k - 1) |p_k| ratio**(k - 2), a bound of
+|p''|, the parabola p(x) + p'(x) d - B d**2/2 lies below p(x + d).  Its first zero lies before that of p, so that no zero is
+skipped; near a simple zero the distances shrink quadratically, as those of Newton's method do.
+
+The numbers of the texts below are choices.  ROUNDING, 1e-15, is some four units in the last place of 1; what is closer to
+zero, as a part of its terms, begins at zero.  A passage counts from PASSED = 1e-10 of the way that the series goes in the
+step, so that what the step neglects behind the kink is of the order of 1e-20.  NEAREST = 1e-8 is the least part of a step
+that a passage leaves.  60 iterations are far more than quadratic convergence needs.
 """
 
 from __future__ import annotations
@@ -10,12 +19,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from synchain.models.dynamics.equations import Equations
-
-from ..program.expressions import ONE, ZERO, Compare, Conditional, Expression, Name, Negation, Number, Value, call, plus
-from ..program.statements import Comment, If, Repeat, Statement, called, let, mentioned
-from .simplify import absolute
-from .step_length import bounded
+from ..program.expressions import ONE, Expression, Name, Negation, Value, call, plus
+from ..program.statements import Statement, let
 
 PASSAGE = '''
 PASSED, ROUNDING, NEAREST = 1e-10, 1e-15, 1e-8
@@ -100,99 +105,39 @@ def found_side(begun, side):
 '''.strip()
 
 FUNCTIONS = {PASSAGE: {"side_of", "passage", "closing"}, CLOSING: {"closing"}, SIDES: {"side_or", "found_side"}}
-"""What a step calls that needs some functions."""
+"""The texts, and the functions that need them where a step calls them."""
 
 LATE = 1e-10
 """How late a body may be set free, as a part of the way that its load goes in a step, if slip begins without a jump."""
 
-SOONEST = let("nearest", 1e-13 * call("maximum", "t", 1.0) / "scale")
-"""How soon a step may end at a contact or a jump."""
-
-
-def jumps(equations: Equations) -> bool:
-    """True if slip of some contact begins with a jump of acceleration."""
-    return any(event.jumps for node in equations.nodes for event in node.events)
-
-
-def loose(exact: bool) -> Statement:
-    """The tolerance of loads.
-
-    One that is wrong by some part sets a body free too early or late, with less than the power 3/2 of it as velocity, unless
-    friction falls at once.
-    """
-    return let("loose", "rtol" if exact else call("math.sqrt", Name("rtol") * call("math.sqrt", "rtol")))
-
-
-def closed(mode: str, exact: bool, gaps: Sequence[Stored], stuck: str, room: Expression) -> list[Statement]:
-    """The statements that end a step where one of the two gaps of a contact closes.
-
-    `stuck` is what they call 1 in stick, 0 in slip; `room` is memory for the coefficients of a gap.
-    """
-    late = 0.0 * Name("t") if exact else LATE * Name(stuck)
-    found: list[Statement] = [let(stuck, plus(ONE, Negation(Name(mode) * Name(mode))))]
-    for side, gap in zip((ONE + 0.0 * Name("t"), Name(stuck)), gaps, strict=True):
-        where = ("dense", gap.first, room, gap.order, "passed")
-        found.append(let("passed", call("closing", side, late, gap.size, "nearest", *where)))
-    return found
-
 
 class Stored(NamedTuple):
-    """A series whose coefficients stand in memory: the size of the terms that it begins with, and where."""
+    """A series whose coefficients are in memory: the size of the terms that it begins with, their first group, its order."""
 
     size: Expression
     first: Expression
     order: int
 
     def passage(self, side: Expression, size: Expression, part: Value, nearest: Expression) -> Statement:
-        """The statement that ends a step where it passes zero."""
-        where = ("dense", self.first, self.order, "passed")
-        return let("passed", call("passage", side, size, part, nearest, *where))
+        """Return the statement that ends a step where the series passes zero."""
+        coefficients = ("dense", self.first, self.order, "passed")
+        return let("passed", call("passage", side, size, part, nearest, *coefficients))
 
 
-def approached(coefficients: Sequence[Expression], ends: Sequence[Statement]) -> list[Statement]:
-    """The statements that end a step at a kink, if any lane of the series goes as far as zero; `way` bounds how far."""
-    found = bounded(coefficients[1:])
-    start = absolute(coefficients[0]) if coefficients[0] != ZERO else ZERO
-    near = Compare("<=", start, 1.0001 * Name("way") * Name("ratio"))
-    return [*found, If(call("any_lane", near), tuple(ends))]
+def closings(mode: str, exact: bool, gaps: Sequence[Stored], stuck: str, room: Expression) -> list[Statement]:
+    """Return the statements that end a step where one of the two gaps of a contact closes.
 
-
-def settled(
-    hints: Sequence[Statement], coefficients: Sequence[Statement], sides: Sequence[Statement]
-) -> list[Statement]:
-    """The statements that make coefficients anew as long as they tell on which sides series lie that begin at zero.
-
-    Each turn tells one more side at least: what one jump sets off may leave the next one.
+    stuck: the name of what is 1 in stick, 0 in slip; room: memory for the coefficients of a gap.
     """
-    if not hints:
-        return [*coefficients]
-    inner = (*coefficients, Comment("sides of what begins at zero"), let("news", 0.0 * Name("t")), *sides)
-    return [*hints, Repeat(inner, call("any_lane", Compare(">", Name("news"), Number(0.5))))]
+    late = 0.0 * Name("t") if exact else LATE * Name(stuck)
+    statements: list[Statement] = [let(stuck, plus(ONE, Negation(Name(mode) * Name(mode))))]
+    # the first gap closes in slip too, the second one in stick alone
+    for side, gap in zip((ONE + 0.0 * Name("t"), Name(stuck)), gaps, strict=True):
+        coefficients = ("dense", gap.first, room, gap.order, "passed")
+        statements.append(let("passed", call("closing", side, late, gap.size, "nearest", *coefficients)))
+    return statements
 
 
-def told(begun: Expression, sides: Sequence[Statement], note: Statement) -> Statement:
-    """The statement that takes note of the `new` side that the coefficients of a series tell if it begins at zero."""
-    begins = Compare("<", absolute(begun), Number(0.5))
-    found = [let("new", call("found_side", begun, "side")), let("news", Name("news") + absolute(Name("new"))), note]
-    return If(call("any_lane", begins), (let("side", 0.0 * Name("t")), *sides, *found))
-
-
-def further(coefficient: Expression) -> Statement:
-    """The statement that finds the `side` of zero on which a series lies by the first coefficient that is not zero."""
+def side_by(coefficient: Expression) -> Statement:
+    """Return the statement that sets `side` by a coefficient, if those before it were zero."""
     return let("side", call("side_or", "side", call("side_of", coefficient, 0.0)))
-
-
-def first_passage(found: Sequence[Statement]) -> list[Statement]:
-    """The statements that end a step at the first of the passages that are `found` one after another."""
-    if not found:
-        return []
-    until = Conditional(Compare("<", Name("passed"), Name("ratio")), Name("passed") * "scale", Name("length"))
-    soonest = [SOONEST] if "nearest" in mentioned(found) else []
-    begun: list[Statement] = [Comment("first passage"), let("passed", "ratio"), *soonest]
-    return [*begun, *found, let("until", until), let("ratio", "passed")]
-
-
-def functions(statements: Sequence[Statement]) -> list[str]:
-    """The functions that statements call which end a step."""
-    names = called(statements)
-    return [text for text, those in FUNCTIONS.items() if names & those]

@@ -1,8 +1,12 @@
 """A Taylor step for a large network: loops over orders, nodes and links around the same recurrences.
 
-Behind the rows of the dense output stand the coefficients of the states, the rates of one order, and the coefficients of
-every series that a convolution reads: coefficient k of node i at `at_… + i*TERMS + k`, of link e at `at_… + e*TERMS + k`, of
-what depends on time alone at `at_… + k`.  A convolution reads neighbours in memory, whatever the size of the network.
+The workspace behind the rows of the dense output holds the coefficients of the states, the rates of one order, and the
+coefficients of every series that a convolution reads: coefficient k of node i at `at_… + i*TERMS + k`, of link e at
+`at_… + e*TERMS + k`, of a function of time alone at `at_… + k`.  A convolution reads neighbours in memory, whatever the size
+of the network.
+
+A section (`SeriesLoop`) is one loop of each order.  In the order of `LoopedSeries.parts`: functions of time alone, nodes of
+each kind, links of each joint, then mean fields and sums over links.  Sections read series of earlier sections from memory.
 """
 
 from __future__ import annotations
@@ -25,10 +29,11 @@ from ..steps.fields import LinkSums, MeanField, compensated, link_sums, mean_fie
 from ..steps.places import Joint, NodeKindLayout, Span, StateLayout, link_ends, span, theirs
 from ..steps.safe_names import NAMES
 from ..steps.step import lane
-from .event_location import Stored, further
+from .event_location import Stored, side_by
 from .mass_matrix import moving, solved
-from .series import Constant, Series, State, magnitude
-from .series_graph import SeriesGraph, Template, check_jumps
+from .passable import check_jumps
+from .series import MINUS, Constant, Series, State, magnitude
+from .series_graph import SeriesGraph, Template
 from .series_writer import Gaps, SeriesWriter
 from .simplify import absolute, add, times, within
 from .step_length import SEEN, last_orders
@@ -43,10 +48,10 @@ def convolution(dense, left, right, k, first, end):
         total = total + load(dense, left + j, WIDTH)*load(dense, right + (k - j), WIDTH)
     return total
 '''.strip()
-"""Loops of its own in each sum would take most of the time of a compilation."""
+"""A function, because a loop in each sum would take most of the time of a compilation."""
 
 GAPS = (Name("i"), Name("NODES") + "i")
-"""Where the two gaps of the contact of a node stand among those of one order."""
+"""The entries of the two gaps of the contact of node i among those of one order."""
 
 START, ORDER = Number(0), Name("k")
 """The order of the coefficients that a step begins with, and that of a loop over orders."""
@@ -57,49 +62,48 @@ NOTHING = 0.0 * Name("scale")
 
 @dataclass(frozen=True, slots=True)
 class Hoisted:
-    """Rates in names: of series for what depends on time alone, of constants for what depends on parameters alone."""
+    """Rates in names: of series for functions of time alone, of constants for functions of parameters alone."""
 
     rates: list[sp.Expr]
     waves: dict[sp.Symbol, Series] = field(default_factory=dict)
     constants: dict[sp.Symbol, sp.Expr] = field(default_factory=dict)
 
 
-class Track(NamedTuple):
-    """Where the coefficients of a series stand in the workspace: in a part of it, by place and order."""
+class Slot(NamedTuple):
+    """The memory of the coefficients of a series: a part of the workspace, and the number of a node, link or state."""
 
     name: str
-    place: Expression | None
+    number: Expression | None
 
     def at(self, order: Expression) -> Expression:
-        """Where that of some order stands."""
-        if self.place is None:
+        """Return the group of the coefficient of some order."""
+        if self.number is None:
             return Name(f"at_{self.name}") + order
-        return plus(Name(f"at_{self.name}"), self.place * Name("TERMS"), order)
+        return plus(Name(f"at_{self.name}"), self.number * Name("TERMS"), order)
 
     def load(self, order: Expression) -> Expression:
-        """The coefficient of some order."""
         return Load("dense", self.at(order))
 
     def store(self, order: Expression, value: Expression) -> Store:
-        """The statement that stores it."""
         return Store("dense", self.at(order), value)
 
 
 @dataclass(eq=False, slots=True)
 class Outer(State):
-    """A state, or a series of another section, and where its coefficients stand."""
+    """A state, or a series of another section, and the memory of its coefficients."""
 
-    track: Track
+    slot: Slot
 
 
 @dataclass(eq=False)
 class SeriesLoop(SeriesWriter):
-    """What is done alike for all nodes of a kind, for all links of a joint, or once, its coefficients in memory.
+    """A section: what is done alike for all nodes of a kind, for all links of a joint, or once, its coefficients in memory.
 
-    span, count: the loop and the number of its turns in the whole numbering; `setting` loads what the turn needs at any
-    order, `moving` are the symbols that stand for series, `fixed` those for names, `outer` the series that it reads and does
-    not make, `rates` what it stores of those of states, `lent` are series that other sections need too, `gaps` those of
-    contacts, or what links add to them; k: the order that is written, 0 or that of a loop.
+    span, count: the loop and the number of its turns in the whole numbering; adds: rates are added to those of sections
+    before; setting: statements that load what a turn needs at any order; moving: symbols that stand for series; fixed:
+    symbols that stand for names; outer: series that the section reads and does not make; rates: series of rates, by state;
+    lent: series that other sections read; gaps: those of contacts, or what links add to them; k: the order that is written,
+    0 or that of a loop.
     """
 
     span: Span | None = None
@@ -117,12 +121,7 @@ class SeriesLoop(SeriesWriter):
     sums: int = 0
     zeros, inverse, number = NOTHING, Name("inverse"), Name("number")
 
-    # -- what a recurrence asks for -------------------------------------------------------------------------------
-
-    @property
-    def index(self) -> str:
-        """The variable of the loop, empty if there is none."""
-        return "" if self.span is None else self.span.index
+    # -- what a recurrence uses -----------------------------------------------------------------------------------
 
     def of(self, series: Series) -> Expression:
         if isinstance(series, Constant):
@@ -134,126 +133,126 @@ class SeriesLoop(SeriesWriter):
             return ZERO if first else times(self.of(left), self.of(right))
         total = f"s{self.sums}"
         self.sums += 1
-        ends = (self.track(s).at(START) for s in (left, right))
+        begins = (self.slot(s).at(START) for s in (left, right))
         end = ORDER + 1 if last == 0 else ORDER
-        self.put(let(total, call("convolution", "dense", *ends, ORDER, first, end)))
+        self.put(let(total, call("convolution", "dense", *begins, ORDER, first, end)))
         return Name(total)
 
     def square(self, base: Series, first: int) -> Expression:
         return self.sum(base, base, first, -first)
 
-    def keep(self, what: str, value: Expression) -> Name:
-        if what not in self.kept:
-            self.kept[what] = None
-            self.put(let(what, value), self.note(what, Name(what) + NOTHING))
-        return Name(what)
+    def save(self, name: str, value: Expression) -> Name:
+        if name not in self.saved:
+            self.saved[name] = None
+            self.put(let(name, value), self.assign(name, Name(name) + NOTHING))
+        return Name(name)
 
     # -- where coefficients are -----------------------------------------------------------------------------------
 
-    def reads(self, track: Track, name: str) -> Series:
-        """A series that this section reads."""
-        self.outer.append(Outer(track, name=name))
+    @property
+    def index(self) -> Name | None:
+        """Return the variable of the loop, if there is one."""
+        return None if self.span is None else Name(self.span.index)
+
+    def reads(self, slot: Slot, name: str) -> Series:
+        """Return a series that this section reads from memory."""
+        self.outer.append(Outer(slot, name=name))
         return self.outer[-1]
 
-    def own(self, name: str) -> Track:
-        """Where something of this section stands."""
-        return Track(name, Name(self.index) if self.index else None)
-
-    def track(self, series: Series) -> Track:
-        """Where the coefficients of a series stand."""
-        return series.track if isinstance(series, Outer) else self.own(series.name)
+    def slot(self, series: Series) -> Slot:
+        """Return the memory of a series."""
+        return series.slot if isinstance(series, Outer) else Slot(series.name, self.index)
 
     def at(self, series: Series, k: int | Expression) -> Expression:
-        return self.track(series).load(k if isinstance(k, Expression) else Number(k))
+        return self.slot(series).load(k if isinstance(k, Expression) else Number(k))
 
-    def hold(self, series: Series, value: Expression, inline: bool) -> None:
-        kept = series in self.remembered
-        self.values[series] = value if inline and not kept else self.named(series.name, value)
-        if kept:
-            self.put(self.track(series).store(self.k, lane(self.values[series])))
+    def define(self, series: Series, value: Expression, inline: bool) -> None:
+        stored = series in self.in_memory
+        self.values[series] = value if inline and not stored else self.named(series.name, value)
+        if stored:
+            self.put(self.slot(series).store(self.k, lane(self.values[series])))
 
     @cached_property
-    def remembered(self) -> set[Series]:
-        """Series whose earlier coefficients are needed, or all that is made once for other sections."""
-        used = {used for s in self.graph.series for used in s.convolved}
-        return {*used, *self.graph.watched, *self.graph.positive, *self.lent} - {*self.outer}
+    def in_memory(self) -> set[Series]:
+        """Return the series of which earlier coefficients are needed, here or in other sections."""
+        convolved = {used for s in self.graph.series for used in s.convolved}
+        return {*convolved, *self.graph.watched, *self.graph.positive, *self.lent} - {*self.outer}
 
     def room(self) -> dict[str, int]:
-        """How many groups of memory stand under which name: coefficients, and what has one value for each turn."""
-        kept = {s.name for s in self.remembered}
-        found = {name: (self.order + 1) * self.count for name in sorted(kept - {"t", ""})}
-        return found | {name: self.count for name in (*self.kept, *self.hints)}
+        """Return how many groups of memory each name takes: coefficients, and what has one value for each turn."""
+        names = sorted({s.name for s in self.in_memory} - {"t", ""})
+        rooms = {name: (self.order + 1) * self.count for name in names}
+        return rooms | {name: self.count for name in (*self.saved, *self.hints)}
 
-    def recall(self, what: str) -> Expression:
-        return Load("dense", self.single(what))
+    def single(self, name: str) -> Expression:
+        """Return the group of what has one value for each turn of the section, whatever the order."""
+        return Name(f"at_{name}") if self.index is None else plus(Name(f"at_{name}"), self.index)
 
-    def note(self, what: str, value: Expression) -> Statement:
-        return Store("dense", self.single(what), value)
+    def recall(self, name: str) -> Expression:
+        return Load("dense", self.single(name))
 
-    def single(self, what: str) -> Expression:
-        """Where something stands that has one value for each turn of the section, whatever the order."""
-        return plus(Name(f"at_{what}"), *([Name(self.index)] if self.index else []))
+    def assign(self, name: str, value: Expression) -> Statement:
+        return Store("dense", self.single(name), value)
 
     def signs(self, series: Series) -> list[Statement]:
-        return [span("k", self.order + 1, 1).over([further(self.at(series, ORDER))])]
+        return [span("k", self.order + 1, 1).over([side_by(self.at(series, ORDER))])]
 
-    def weight(self, what: str) -> Name:
+    def weight(self, name: str) -> Name:
         return Name("weight")
 
-    def enlarge(self, k: int, size: Expression) -> list[Statement]:
+    def add_size(self, k: int, size: Expression) -> list[Statement]:
         return [let(f"size_{k}", call("maximum", f"size_{k}", size))]
 
     def counted(self, series: Series) -> list[Statement]:
         return [let("largest", self.low(series)), *self.weighed(series, "", Name("rtol") * "largest")]
 
-    def end_of(self, series: Series, what: str) -> tuple[list[Statement], Expression]:
+    def end_value(self, series: Series, name: str) -> tuple[list[Statement], Expression]:
         return polynomial("value", self.order - 1, partial(self.at, series)), Name("value")
 
     def stored(self, series: Sequence[Series], sizes: Sequence[Expression]) -> tuple[list[Statement], list[Stored]]:
-        tracks = zip(sizes, map(self.track, series), strict=True)
-        return [], [Stored(size, track.at(START), self.order) for size, track in tracks]
+        slots = zip(sizes, map(self.slot, series), strict=True)
+        return [], [Stored(size, slot.at(START), self.order) for size, slot in slots]
 
     # -- statements -----------------------------------------------------------------------------------------------
 
     def coefficients(self, order: Expression) -> list[Statement]:
-        """The statements for coefficients `order`: 0, or k for any later one."""
+        """Return the statements for coefficients `order`: 0, or k for any later one."""
         self.statements, self.k, first = list(self.setting), order, order == START
         if not first:
-            self.put(*(let(name, self.recall(name)) for name in self.kept))
+            self.put(*(let(name, self.recall(name)) for name in self.saved))
         self.put(*(let(s.name, self.at(s, order)) for s in self.outer))
         self.values = {s: Name(s.name) for s in self.outer}
         self.make(self.graph.series, first)
-        self.finish()
-        return self.turns(self.statements)
+        self.use_rates()
+        return self.over_turns(self.statements)
 
-    def finish(self) -> None:
-        """Append the statements that use coefficient 0, or k, of the rates."""
-        for place, rate in self.rates:
-            value, there = self.of(rate), plus(Name("at_rates"), place)
+    def use_rates(self) -> None:
+        """Store coefficient 0, or k, of the rates and of the gaps of contacts."""
+        for state, rate in self.rates:
+            value, group = self.of(rate), plus(Name("at_rates"), state)
             if not self.adds:
-                self.put(Store("dense", there, value + NOTHING if isinstance(rate, Constant) else value))
+                self.put(Store("dense", group, value + NOTHING if isinstance(rate, Constant) else value))
             elif value != ZERO:
-                self.give(there, value)
-        for place, gap in zip(GAPS, self.gaps, strict=False):
-            self.give(of_gap(place).at(self.k), self.of(gap))
+                self.store_rate(group, value)
+        for index, gap in zip(GAPS, self.gaps, strict=False):
+            self.store_rate(Slot("gaps", index).at(self.k), self.of(gap))
             if self.k == START:
-                self.give(plus(Name("at_sizes"), place), magnitude(self, gap))
+                self.store_rate(plus(Name("at_sizes"), index), magnitude(self, gap))
 
-    def give(self, place: Expression, value: Expression) -> None:
+    def store_rate(self, group: Expression, value: Expression) -> None:
         """Store a value, or add it to what other sections have stored."""
         if self.adds:
-            self.put(let("value", add(Load("dense", place), value)), Store("dense", place, Name("value")))
+            self.put(let("value", add(Load("dense", group), value)), Store("dense", group, Name("value")))
         else:
-            self.put(Store("dense", place, lane(value)))
+            self.put(Store("dense", group, lane(value)))
 
     def lengths(self) -> list[Statement]:
-        return self.run([*super().lengths(), *self.watches()])
+        return self.in_loop([*super().lengths(), *self.watches()])
 
-    def run(self, statements: list[Statement]) -> list[Statement]:
-        return self.turns([*self.setting, *statements]) if statements else []
+    def in_loop(self, statements: list[Statement]) -> list[Statement]:
+        return self.over_turns([*self.setting, *statements]) if statements else []
 
-    def turns(self, statements: list[Statement]) -> list[Statement]:
-        """Statements that are run through in the section's loop."""
+    def over_turns(self, statements: list[Statement]) -> list[Statement]:
         return statements if self.span is None else [self.span.over(statements)]
 
 
@@ -264,111 +263,94 @@ class Totals(SeriesLoop):
     totals: list[tuple[str, Series]] = field(default_factory=list)
 
     def coefficients(self, order: Expression) -> list[Statement]:
-        """The statements for coefficients `order`, with the sums before and behind the loop."""
         names = [name for name, _ in self.totals]
-        before = [let(f"{name}{rest}", NOTHING) for name in names for rest in ("", "_rest")]
+        before = [let(f"{name}{suffix}", NOTHING) for name in names for suffix in ("", "_rest")]
         behind = [Store("dense", Name(f"at_{name}") + order, Name(name)) for name in names]
         return [*before, *super().coefficients(order), *behind]
 
-    def finish(self) -> None:
-        """Add the coefficients to the sums; those of a constant beyond the first are zero."""
+    def use_rates(self) -> None:
+        # coefficients of a constant beyond the first are zero
         for name, rate in self.totals:
             value = self.of(rate)
             if value != ZERO:
                 self.put(let(f"{name}_value", value), *compensated(name, f"{name}_value"))
+
+    def room(self) -> dict[str, int]:
+        return super().room() | {name: self.order + 1 for name, _ in self.totals}
 
 
 @dataclass(eq=False)
 class Gathered(SeriesLoop):
     """The sums over the links of each node of some series, by their names."""
 
+    nodes: int = 0
     totals: list[tuple[str, Series]] = field(default_factory=list)
 
     def coefficients(self, order: Expression) -> list[Statement]:
-        """The statements for coefficients `order`, behind those that begin with zero."""
-        zeros = [self.sum_of(name).store(order, NOTHING) for name, _ in self.totals]
+        zeros = [Slot(name, Name("i")).store(order, NOTHING) for name, _ in self.totals]
         return [span("i", "NODES").over(zeros), *super().coefficients(order)]
 
-    def finish(self) -> None:
-        """Add the coefficients to the sums; those of a constant beyond the first are zero."""
+    def use_rates(self) -> None:
+        # coefficients of a constant beyond the first are zero
         for name, rate in self.totals:
-            value, track = self.of(rate), self.sum_of(name)
+            value, slot = self.of(rate), Slot(name, Name("i"))
             if value != ZERO:
-                self.put(let("value", add(track.load(self.k), value)), track.store(self.k, Name("value")))
+                self.put(let("value", add(slot.load(self.k), value)), slot.store(self.k, Name("value")))
 
-    @staticmethod
-    def sum_of(name: str) -> Track:
-        """Where a sum of the target stands."""
-        return Track(name, Name("i"))
+    def room(self) -> dict[str, int]:
+        return super().room() | {name: (self.order + 1) * self.nodes for name, _ in self.totals}
 
 
-def of_state(place: Expression) -> Track:
-    """Where the coefficients of a state stand."""
-    return Track("states", place)
-
-
-def of_gap(place: Expression) -> Track:
-    """Where the coefficients of the gap of a contact stand."""
-    return Track("gaps", place)
-
-
-def gaps_of(mode: str) -> Gaps:
-    """The gaps of the contact of a node with some mode."""
-    rise, fall = (Outer(of_gap(place)) for place in GAPS)
-    up, down = (Load("dense", plus(Name("at_sizes"), place)) for place in GAPS)
-    return Gaps(mode, "stuck", (rise, fall), ("rise", "fall"), (up, down), Name("at_closing"))
+def of_state(index: Expression) -> Slot:
+    """Return the memory of a state."""
+    return Slot("states", index)
 
 
 def polynomial(name: str, degree: int, coefficient: Callable[[Expression], Expression]) -> list[Statement]:
-    """The statements for the value of a polynomial in `ratio`."""
-    further = let(name, Name(name) * "ratio" + coefficient(ORDER))
-    return [
-        let(name, coefficient(Number(degree))),
-        Loop(ORDER.text, Number(degree - 1), Number(-1), (further,), step=-1),
-    ]
+    """Return the statements for the value of a polynomial in `ratio` by Horner's rule."""
+    turn = let(name, Name(name) * "ratio" + coefficient(ORDER))
+    return [let(name, coefficient(Number(degree))), Loop(ORDER.text, Number(degree - 1), Number(-1), (turn,), step=-1)]
 
 
 def with_gaps(node: Node) -> list[sp.Expr]:
-    """The rates of a node, and the two gaps of each event."""
+    """Return the rates of a node, and the two gaps of each event."""
     return [*node.rhs, *(gap for event in node.events for gap in event.gaps)]
 
 
-def with_pushes(joint: Joint) -> list[sp.Expr]:
-    """What a link adds to the rates of a node, and to the gaps of its contact if it has one: forces on a body that sticks."""
-    edge = joint.edge
-    if not joint.target.events:
-        return list(edge.rhs)
-    mode = edge.here[2]
-    push = (1 - mode**2) * edge.rhs[1].xreplace({mode: sp.S.One})
-    return [*edge.rhs, push, -push]
+def symbols_in(expressions: Iterable[sp.Expr]) -> set[sp.Symbol]:
+    return {s for e in expressions for s in e.free_symbols}
 
 
 class LoopedSeries(StepWriter):
-    """Writes loops around the recurrences, with a part for what each of them makes."""
+    """Writes loops around the recurrences, with a section for what each of them makes."""
 
     functions: Sequence[str] = (CONVOLUTION,)
 
     def __init__(self, equations: Equations, order: int) -> None:
         eq = equations
-        named = {s for node in eq.nodes for s in (*node.state, *node.parameters)}
-        named |= {s for edge in eq.edges for s in (edge.weight, *edge.parameters)}
-        words = {*(s.name for s in named), *eq.parameters}
-        super().__init__(equations, order, words)
-        self.places, self.fields = StateLayout(equations), mean_fields(equations)
-        self.names = Names([*words, *self.called.values(), *(s + end for s in words for end in ("_here", "_there"))])
+        symbols = {s for node in eq.nodes for s in (*node.state, *node.parameters)}
+        symbols |= {s for edge in eq.edges for s in (edge.weight, *edge.parameters)}
+        taken = {*(s.name for s in symbols), *eq.parameters}
+        super().__init__(equations, order, taken)
+        self.layout, self.fields = StateLayout(equations), mean_fields(equations)
+        self.names = Names([*taken, *self.called.values(), *(s + end for s in taken for end in ("_here", "_there"))])
         self.varied = [real(name) for name in eq.differing]
+
+        # functions of time alone leave the rates of all sections first: they are one section, the first to be computed
         self.waves = SeriesLoop(SeriesGraph(self.names), order)
-        kinds, (self.sums, joints) = self.places.kinds, link_sums(equations, self.places.joints)
+        kinds, (self.sums, joints) = self.layout.kinds, link_sums(equations, self.layout.joints)
         rates = [[*with_gaps(kind.node), *(e for links in self.sums for e in links.of_node())] for kind in kinds]
         nodes = [self.hoisted(e, [*kind.node.state, *self.varied]) for kind, e in zip(kinds, rates, strict=True)]
-        pushes = [self.of_links(joint.edge, with_pushes(joint)) for joint in joints]
+        pushes = [self.of_links(joint.edge, self.pushes(joint)) for joint in joints]
         fields = [
             [self.of_links(f.edge, e, (*f.sums, *f.shared)) for e in (f.sums.values(), f.shared.values(), f.rates)]
             for f in self.fields
         ]
-        self.waves.graph.settle(self.waves.lent)
+        self.waves.graph.finish(self.waves.lent)
         if self.waves.lent:
             self.waves.outer.append(self.time)
+
+        # the other sections, in the order in which they are computed
         self.parts: list[SeriesLoop] = [self.waves, *map(self.node, kinds, nodes), *map(self.link, joints, pushes)]
         for mean, parts in zip(self.fields, fields, strict=True):
             self.parts += self.field(mean, *parts)
@@ -376,298 +358,312 @@ class LoopedSeries(StepWriter):
         functions = dict(zip(names, self.lent, strict=True))
         for links in self.sums:
             self.parts += self.summed(links, {name: functions[name] for name in links.functions})
+
+        # the last order of all series is needed where a series ends steps
         self.ends = eq.sticks or any(section.graph.kinks for section in self.parts)
         self.orders = order + 1 if self.ends else order
 
-    # -- sections ---------------------------------------------------------------------------------------------
+    # -- rates ------------------------------------------------------------------------------------------------
 
-    def node(self, kind: NodeKindLayout, found: Hoisted) -> SeriesLoop:
-        """The rates of the nodes of a kind."""
-        node, section = (
-            kind.node,
-            SeriesLoop(SeriesGraph(self.names), self.order, span=kind.span, count=self.equations.n),
-        )
-        self.end(section, node.state, node, ("", "i"), node.state)
-        used = {s for e in (*found.rates, *(e for row in node.inertia for e in row)) for s in e.free_symbols}
-        section.setting += self.loaded(self.places.own(used))
-        series, size = self.read(section, found, node.inertia), len(with_gaps(node))
-        self.store(section, node, series[:size])
-        # what the node is as a source of links that are summed stands in memory for them
-        self.node_part, self.lent = section, series[size:]
-        section.lent += [s for s in series[size:] if not isinstance(s, Constant)]
-        section.contacts += [gaps_of(self.called[event.mode.name]) for event in node.events]
-        return section
-
-    def of_links(self, edge: Edge, rates: Iterable[sp.Expr], more: Iterable[sp.Symbol] = ()) -> Hoisted:
-        """Rates by links, and of `more` symbols that move, parted like those of nodes if time enters them."""
-        if not edge.forced:
-            return Hoisted(list(rates))
-        own = (edge.weight, *edge.here, *edge.there, *(s for s, _ in edge.theirs), *self.varied, *more)
-        return self.hoisted(rates, own)
-
-    def link(self, joint: Joint, found: Hoisted) -> SeriesLoop:
-        """What the links of a joint add."""
-        edge, used = joint.edge, {s for e in found.rates for s in e.free_symbols}
-        section = SeriesLoop(SeriesGraph(self.names), self.order, span=joint.span, count=self.places.links, adds=True)
-        section.setting += link_ends(edge, self.called[edge.weight.name], "j_there")
-        self.end(section, edge.here, joint.target, ("_here", "i"), used)
-        self.end(section, edge.there, joint.source, ("_there", "j_there"), used)
-        section.setting += self.loaded(self.places.of_link(edge, used, "j_there"))
-        section.fixed |= theirs(edge)
-        self.store(section, joint.target, self.read(section, found))
-        return section
-
-    def store(self, section: SeriesLoop, node: Node, found: Sequence[Series]) -> None:
-        """Let a section store what was read for a node: its rates at their places, and behind them its gaps."""
-        size = len(node.state)
-        section.rates, section.gaps = (
-            [(self.places.place(c), rate) for c, rate in enumerate(found[:size])],
-            list(found[size:]),
-        )
-
-    def end(
-        self,
-        section: SeriesLoop,
-        symbols: Sequence[sp.Symbol],
-        node: Node,
-        at: tuple[str, str],
-        used: Container[sp.Symbol],
-    ) -> None:
-        """Let a section read the states of a node, or of one end of a link, that are used.
-
-        Those that move are series, those at rest names.  `at` is what stands behind their names, and the number of the node.
-        """
-        suffix, index = at
-        for c, (s, own, moves) in enumerate(zip(symbols, node.state, self.moves(node), strict=True)):
-            name, place = f"{self.called[own.name]}{suffix}", self.places.place(c, index)
-            if s in used and moves:
-                section.moving[s] = section.reads(of_state(place), name)
-            elif s in used:
-                section.fixed[s] = real(name)
-                section.setting.append(let(name, Load("y", place)))
-
-    def field(self, field: MeanField, sums: Hoisted, shared: Hoisted, rates: Hoisted) -> Iterator[SeriesLoop]:
-        """The sums over the nodes, what all nodes make of them, and what is added to the rates.
-
-        Source functions that are functions of the target too are series once.
-        """
-        nodes = self.places.kinds[0].span
-        totals = Totals(SeriesGraph(self.names), self.order, span=nodes, count=self.equations.n)
-        used = {s for e in sums.rates for s in e.free_symbols}
-        self.field_end(totals, field, "_there", used)
-        totals.setting += self.loaded(self.places.of_source(field.edge, used, "i"))
-        totals.fixed |= theirs(field.edge)
-        found = self.read(totals, sums)
-        totals.totals = [(s.name, series) for s, series in zip(field.sums, found, strict=True)]
-        yield totals
-        combined = SeriesLoop(SeriesGraph(self.names), self.order)
-        self.see(combined, self.waves, shared.waves)
-        self.see(combined, combined, {s: State(name=s.name) for s in field.sums})
-        common = dict(zip(field.shared, self.read(combined, replace(shared, waves={})), strict=True))
-        combined.lent += [series for series in common.values() if not isinstance(series, Constant)]
-        yield combined
-        target = SeriesLoop(SeriesGraph(self.names), self.order, span=nodes, count=self.equations.n, adds=True)
-        made = dict(zip(field.sums, found, strict=True))
-        lent = {e: made[s] for s, e in field.alike.items() if made[s] in totals.graph.series}
-        borrowed = {e: real(series.name) for e, series in lent.items()}
-        wanted = [e.xreplace(borrowed) for e in rates.rates]
-        used = {s for e in wanted for s in e.free_symbols}
-        self.field_end(target, field, "_here", used)
-        target.setting += self.loaded(self.places.own(used))
-        lent = {e: series for e, series in lent.items() if borrowed[e] in used}
-        totals.lent += lent.values()
-        self.see(target, totals, {borrowed[e]: series for e, series in lent.items()})
-        self.see(target, combined, common)
-        self.store(target, field.node, self.read(target, replace(rates, rates=wanted)))
-        yield target
-
-    def summed(self, links: LinkSums, functions: Mapping[sp.Symbol, Series]) -> Iterator[SeriesLoop]:
-        """The sums over links of functions of their sources, and what is added to the rates."""
-        edge, nodes, n = links.joint.edge, self.places.kinds[0].span, self.equations.n
-        sums = Gathered(SeriesGraph(self.names), self.order, span=links.joint.span, count=self.places.links)
-        sums.setting += link_ends(edge, self.called[edge.weight.name], "j_there")
-        used = {s for factor, _ in links.sums.values() for s in factor.free_symbols}
-        sums.setting += self.loaded(self.places.of_link(edge, used, "j_there"))
-        for symbol, s in functions.items():
-            known = isinstance(s, Constant)
-            sums.moving[symbol] = s if known else sums.reads(Track(s.name, Name("j_there")), s.name)
-        found = self.read(sums, Hoisted([a * b for a, b in links.sums.values()]))
-        sums.totals = [(s.name, series) for s, series in zip(links.sums, found, strict=True)]
-        yield sums
-        target = SeriesLoop(SeriesGraph(self.names), self.order, span=nodes, count=n, adds=True)
-        rates = links.applied()
-        used = {s for e in rates for s in e.free_symbols}
-        self.end(target, edge.here, links.joint.target, ("_here", "i"), used)
-        target.setting += self.loaded(self.places.own(used))
-        self.see(target, self.node_part, {symbol: s for symbol, s in functions.items() if symbol in used})
-        self.see(target, target, {s: State(name=s.name) for s in links.sums})
-        self.store(target, links.joint.target, self.read(target, Hoisted(rates)))
-        yield target
-
-    def field_end(self, section: SeriesLoop, field: MeanField, suffix: str, used: Container[sp.Symbol]) -> None:
-        """Let a section read a node of a mean field; states of which differences alone matter count from the first node's."""
-        symbols = field.edge.there if suffix == "_there" else field.edge.here
-        self.end(section, symbols, field.node, (suffix, "i"), used)
-        for k in field.shifted:
-            if (state := section.moving.get(symbols[k])) is not None:
-                name = f"{self.called[field.node.state[k].name]}_first"
-                first = section.reads(of_state(self.places.place(k, "0")), name)
-                section.moving[symbols[k]] = section.graph.sum([(ONE, state), (Number(-1.0), first)])
-
-    def see(self, section: SeriesLoop, other: SeriesLoop, series: Mapping[sp.Symbol, Series]) -> None:
-        """Let a section read the series of another one; constants are no different."""
-        for symbol, s in series.items():
-            section.moving[symbol] = s if isinstance(s, Constant) else section.reads(other.own(s.name), s.name)
-
-    def moves(self, node: Node) -> list[bool]:
-        """Which states of a node move: one at rest, such as the mode of a contact, is a constant of the step."""
-        edges = [
-            joint.edge for joint in self.places.joints if joint.target == node
-        ]  # those that are summed by nodes too
-        return moving(node, [*edges, *(field.edge for field in self.fields)])
-
-    def loaded(self, loads: Sequence[Assign]) -> list[Statement]:
-        """Statements that load parameters."""
-        return [let(self.called.get(name, name), s.value) for s in loads for name in s.targets]
-
-    def hoisted(self, given: Iterable[sp.Expr], moving: Sequence[sp.Symbol]) -> Hoisted:
-        """Some rates with names for what depends on time and parameters, series for what depends on time, and the rest,
-        which depends on parameters alone.
-        """
+    def hoisted(self, rates: Iterable[sp.Expr], moving: Sequence[sp.Symbol]) -> Hoisted:
+        """Return rates in which names stand for functions of time (and parameters), and of parameters alone."""
         hoist = Hoist(frozenset(moving), self.names.fresh("wave_"), frozenset({TIME}))
-        rates = [hoist.apply(e) for e in given]
+        reduced = [hoist.apply(e) for e in rates]
         waves: dict[sp.Symbol, Series] = {}
         constants: dict[sp.Symbol, sp.Expr] = {}
         for e, symbol in hoist.table.items():
             if not e.has(TIME):
-                constants[symbol] = e.xreplace(self.swap)
+                constants[symbol] = e.xreplace(self.substitutes)
                 continue
             template = Template.of([e], [TIME], self.names.fresh("shared_"))
-            (waves[symbol],) = self.waves.graph.read(template, {TIME: self.time}, self.swap)
+            (waves[symbol],) = self.waves.graph.read(template, {TIME: self.time}, self.substitutes)
             self.waves.lent.append(waves[symbol])
-        return Hoisted(rates, waves, constants)
+        return Hoisted(reduced, waves, constants)
 
-    def read(self, section: SeriesLoop, given: Hoisted, inertia: Block = ()) -> list[Series]:
-        """The series of a section, and the constants that each of its turns computes."""
-        self.see(section, self.waves, given.waves)
-        graph, size, masses = section.graph, len(given.rates), (e for row in inertia for e in row)
-        template = Template.of([*given.rates, *masses], section.moving, self.names.fresh("shared_"))
-        found = graph.read(template, section.moving, {**self.swap, **given.constants, **section.fixed})
-        entries, right = {divmod(k, size): e for k, e in enumerate(found[size:])}, dict(enumerate(found[:size]))
-        found = list((solved(graph, entries, right) if entries else right).values())
-        graph.settle(found)
+    def of_links(self, edge: Edge, rates: Iterable[sp.Expr], more: Iterable[sp.Symbol] = ()) -> Hoisted:
+        """Return rates by links, hoisted as those of nodes if time enters them; `more` are symbols that move."""
+        if not edge.forced:
+            return Hoisted(list(rates))
+        moving = (edge.weight, *edge.here, *edge.there, *(s for s, _ in edge.theirs), *self.varied, *more)
+        return self.hoisted(rates, moving)
+
+    @staticmethod
+    def pushes(joint: Joint) -> list[sp.Expr]:
+        """Return what a link adds to the rates of a node, and to the gaps of its contact: forces on a body that sticks."""
+        edge = joint.edge
+        if not joint.target.events:
+            return list(edge.rhs)
+        mode = edge.here[2]
+        push = (1 - mode**2) * edge.rhs[1].xreplace({mode: sp.S.One})
+        return [*edge.rhs, push, -push]
+
+    # -- sections ---------------------------------------------------------------------------------------------
+
+    def node(self, kind: NodeKindLayout, hoisted: Hoisted) -> SeriesLoop:
+        """Return the section of the rates of the nodes of a kind."""
+        node = kind.node
+        section = SeriesLoop(SeriesGraph(self.names), self.order, span=kind.span, count=self.equations.n)
+        self.read_states(section, node.state, node, ("", "i"), node.state)
+        used = symbols_in([*hoisted.rates, *(e for row in node.inertia for e in row)])
+        section.setting += self.loaded(self.layout.own(used))
+        series, size = self.read(section, hoisted, node.inertia), len(with_gaps(node))
+        self.store(section, node, series[:size])
+        # the functions of a node as a source of links that are summed are read from memory
+        self.node_part, self.lent = section, series[size:]
+        section.lent += [s for s in series[size:] if not isinstance(s, Constant)]
+        for event in node.events:
+            rise, fall = (Outer(Slot("gaps", index)) for index in GAPS)
+            up, down = (Load("dense", plus(Name("at_sizes"), index)) for index in GAPS)
+            mode, room = self.called[event.mode.name], Name("at_closing")
+            section.contacts.append(Gaps(mode, "stuck", (rise, fall), ("rise", "fall"), (up, down), room))
+        return section
+
+    def link(self, joint: Joint, hoisted: Hoisted) -> SeriesLoop:
+        """Return the section of what the links of a joint add to the rates."""
+        edge, used = joint.edge, symbols_in(hoisted.rates)
+        section = SeriesLoop(SeriesGraph(self.names), self.order, span=joint.span, count=self.layout.links, adds=True)
+        section.setting += link_ends(edge, self.called[edge.weight.name], "j_there")
+        self.read_states(section, edge.here, joint.target, ("_here", "i"), used)
+        self.read_states(section, edge.there, joint.source, ("_there", "j_there"), used)
+        section.setting += self.loaded(self.layout.of_link(edge, used, "j_there"))
+        section.fixed |= theirs(edge)
+        self.store(section, joint.target, self.read(section, hoisted))
+        return section
+
+    def field(self, field: MeanField, sums: Hoisted, shared: Hoisted, rates: Hoisted) -> Iterator[SeriesLoop]:
+        """Yield the sections of a mean field: sums over the nodes, functions of the sums, and what they add to the rates."""
+        # 1. sums over the sources
+        nodes, n = self.layout.kinds[0].span, self.equations.n
+        totals = Totals(SeriesGraph(self.names), self.order, span=nodes, count=n)
+        used = symbols_in(sums.rates)
+        self.read_field_states(totals, field, "_there", used)
+        totals.setting += self.loaded(self.layout.of_source(field.edge, used, "i"))
+        totals.fixed |= theirs(field.edge)
+        series = dict(zip(field.sums, self.read(totals, sums), strict=True))
+        totals.totals = [(symbol.name, s) for symbol, s in series.items()]
+        yield totals
+
+        # 2. what all nodes make of the sums
+        combined = SeriesLoop(SeriesGraph(self.names), self.order)
+        self.see(combined, self.waves, shared.waves)
+        self.see(combined, combined, {s: State(name=s.name) for s in field.sums})
+        common = dict(zip(field.shared, self.read(combined, replace(shared, waves={})), strict=True))
+        combined.lent += [s for s in common.values() if not isinstance(s, Constant)]
+        yield combined
+
+        # 3. the rates of the targets; functions of a node that are those of a source too are series of the first section
+        target = SeriesLoop(SeriesGraph(self.names), self.order, span=nodes, count=n, adds=True)
+        lent = {e: series[s] for s, e in field.alike.items() if series[s] in totals.graph.series}
+        borrowed = {e: real(s.name) for e, s in lent.items()}
+        reduced = [e.xreplace(borrowed) for e in rates.rates]
+        used = symbols_in(reduced)
+        self.read_field_states(target, field, "_here", used)
+        target.setting += self.loaded(self.layout.own(used))
+        lent = {e: s for e, s in lent.items() if borrowed[e] in used}
+        totals.lent += lent.values()
+        self.see(target, totals, {borrowed[e]: s for e, s in lent.items()})
+        self.see(target, combined, common)
+        self.store(target, field.node, self.read(target, replace(rates, rates=reduced)))
+        yield target
+
+    def summed(self, links: LinkSums, functions: Mapping[sp.Symbol, Series]) -> Iterator[SeriesLoop]:
+        """Yield the sections of sums over links: of functions of their sources, and what they add to the rates."""
+        edge, joint = links.joint.edge, links.joint
+        sums = Gathered(
+            SeriesGraph(self.names), self.order, span=joint.span, count=self.layout.links, nodes=self.equations.n
+        )
+        sums.setting += link_ends(edge, self.called[edge.weight.name], "j_there")
+        used = symbols_in(factor for factor, _ in links.sums.values())
+        sums.setting += self.loaded(self.layout.of_link(edge, used, "j_there"))
+        for symbol, s in functions.items():
+            constant = isinstance(s, Constant)
+            sums.moving[symbol] = s if constant else sums.reads(Slot(s.name, Name("j_there")), s.name)
+        series = self.read(sums, Hoisted([a * b for a, b in links.sums.values()]))
+        sums.totals = [(symbol.name, s) for symbol, s in zip(links.sums, series, strict=True)]
+        yield sums
+
+        nodes, rates = self.layout.kinds[0].span, links.applied()
+        target = SeriesLoop(SeriesGraph(self.names), self.order, span=nodes, count=self.equations.n, adds=True)
+        used = symbols_in(rates)
+        self.read_states(target, edge.here, joint.target, ("_here", "i"), used)
+        target.setting += self.loaded(self.layout.own(used))
+        self.see(target, self.node_part, {symbol: s for symbol, s in functions.items() if symbol in used})
+        self.see(target, target, {s: State(name=s.name) for s in links.sums})
+        self.store(target, joint.target, self.read(target, Hoisted(rates)))
+        yield target
+
+    # -- what a section reads and stores ----------------------------------------------------------------------
+
+    def read(self, section: SeriesLoop, hoisted: Hoisted, inertia: Block = ()) -> list[Series]:
+        """Return the series of a section, and add the constants that each of its turns computes to its setting."""
+        self.see(section, self.waves, hoisted.waves)
+        graph, size, masses = section.graph, len(hoisted.rates), (e for row in inertia for e in row)
+        template = Template.of([*hoisted.rates, *masses], section.moving, self.names.fresh("shared_"))
+        series = graph.read(template, section.moving, {**self.substitutes, **hoisted.constants, **section.fixed})
+        if entries := {divmod(k, size): e for k, e in enumerate(series[size:])}:
+            series = list(solved(graph, entries, dict(enumerate(series[:size]))).values())
+        graph.finish(series)
         section.setting += graph.constants
-        return found
+        return series
+
+    def store(self, section: SeriesLoop, node: Node, series: Sequence[Series]) -> None:
+        """Let a section store the rates of a node, and behind them the gaps of its contact."""
+        size = len(node.state)
+        section.rates = [(self.layout.place(c), rate) for c, rate in enumerate(series[:size])]
+        section.gaps = list(series[size:])
+
+    def read_states(
+        self,
+        section: SeriesLoop,
+        symbols: Sequence[sp.Symbol],
+        node: Node,
+        end: tuple[str, str],
+        used: Container[sp.Symbol],
+    ) -> None:
+        """Let a section read the used states of a node, or of one end of a link, under `symbols`.
+
+        `end` is the suffix of their names, and the number of the node.
+        """
+        # states that move are series; one at rest, such as the mode of a contact, is a constant of the step.  Links that are
+        # summed by nodes can move a state too
+        edges = [joint.edge for joint in self.layout.joints if joint.target == node]
+        moves = moving(node, [*edges, *(field.edge for field in self.fields)])
+        suffix, index = end
+        for c, (s, state, moved) in enumerate(zip(symbols, node.state, moves, strict=True)):
+            name, group = f"{self.called[state.name]}{suffix}", self.layout.place(c, index)
+            if s in used and moved:
+                section.moving[s] = section.reads(of_state(group), name)
+            elif s in used:
+                section.fixed[s] = real(name)
+                section.setting.append(let(name, Load("y", group)))
+
+    def read_field_states(self, section: SeriesLoop, field: MeanField, suffix: str, used: Container[sp.Symbol]) -> None:
+        """Let a section read a node of a mean field; states of which differences alone matter count from the first node's."""
+        symbols = field.edge.there if suffix == "_there" else field.edge.here
+        self.read_states(section, symbols, field.node, (suffix, "i"), used)
+        for k in field.shifted:
+            if (state := section.moving.get(symbols[k])) is not None:
+                name = f"{self.called[field.node.state[k].name]}_first"
+                first = section.reads(of_state(self.layout.place(k, "0")), name)
+                section.moving[symbols[k]] = section.graph.sum([(ONE, state), (MINUS, first)])
+
+    def see(self, section: SeriesLoop, other: SeriesLoop, series: Mapping[sp.Symbol, Series]) -> None:
+        """Let a section read series of another one; constants are the same in both."""
+        for symbol, s in series.items():
+            constant = isinstance(s, Constant)
+            section.moving[symbol] = s if constant else section.reads(Slot(s.name, other.index), s.name)
+
+    def loaded(self, loads: Sequence[Assign]) -> list[Statement]:
+        """Return statements that load parameters, under the names of the step."""
+        return [let(self.called.get(name, name), s.value) for s in loads for name in s.targets]
 
     # -- statements -------------------------------------------------------------------------------------------
 
     @property
     def workspace(self) -> int:
-        return self.bases()[1]
+        return sum(self.room().values())
+
+    def room(self) -> dict[str, int]:
+        """Return how many groups the parts of the workspace take, in their order."""
+        eq, terms = self.equations, self.order + 1
+        rooms = {"states": terms * eq.dimension, "rates": eq.dimension}
+        if self.waves.lent:
+            rooms["t"] = terms
+        if eq.sticks:
+            rooms |= {"gaps": terms * 2 * eq.n, "sizes": 2 * eq.n, "closing": terms}
+        for section in self.parts:
+            rooms |= section.room()
+        return rooms
 
     def opening(self) -> list[Statement]:
-        """Name the parts of the workspace, load the graph and what is a parameter of the whole network."""
+        # names of the parts of the workspace
+        statements, group = list[Statement]([whole("TERMS", Number(self.order + 1))]), 0
+        for name, groups in self.room().items():
+            statements.append(whole(f"at_{name}", Name("DENSE_ROWS") * "DIMENSION" + group))
+            group += groups
+        # the graph, and the parameters of the whole network
         eq = self.equations
-        numbers = [(slot, name) for slot, name in enumerate(eq.parameters, start=eq.dimension) if name not in eq.single]
+        shared = [(slot, name) for slot, name in enumerate(eq.parameters, start=eq.dimension) if name not in eq.single]
         return [
-            *self.bases()[0],
+            *statements,
             Assign(NAMES, Name("graph"), whole=True),
             whole("LINKS", Name("target.size")),
-            *(let(self.called[name], Load("p", Number(slot))) for slot, name in numbers),
-            *(let(s.name, lower(e.xreplace(self.swap))) for links in self.sums for s, e in links.factors.items()),
+            *(let(self.called[name], Load("p", Number(slot))) for slot, name in shared),
+            *(
+                let(s.name, lower(e.xreplace(self.substitutes)))
+                for links in self.sums
+                for s, e in links.factors.items()
+            ),
             *self.waves.graph.constants,
         ]
 
     def coefficients(self) -> list[Statement]:
-        begun = self.states(lambda p: [of_state(p).store(START, Load("y", p))])
-        found: list[Statement] = [Comment("order 0"), *begun, *self.times()]
-        found += [s for section in self.parts for s in section.coefficients(START)]
+        # order 0: the states, time if a function of time has a series (t, scale, 0, 0, …), and all series
+        statements: list[Statement] = [Comment("order 0")]
+        statements += self.over_states(lambda p: [of_state(p).store(START, Load("y", p))])
+        if self.waves.lent:
+            t = Name("at_t")
+            statements += [Store("dense", t, Name("t")), Store("dense", t + 1, Name("scale"))]
+            statements.append(span("k", self.order + 1, 2).over([Store("dense", t + ORDER, NOTHING)]))
+        statements += [s for section in self.parts for s in section.coefficients(START)]
+        # order k: x_k = scale/k * rate_(k-1), and all series
         turn: list[Statement] = [let("number", 1.0 * ORDER), let("inverse", 1.0 / ORDER)]
         turn += self.next_states(Name("inverse") * "scale", ORDER)
         turn += [s for section in self.parts for s in section.coefficients(ORDER)]
-        found += [Comment("all further orders"), span("k", self.orders, 1).over(turn)]
-        return found if self.ends else [*found, *self.next_states(1.0 / self.order * Name("scale"), Number(self.order))]
+        statements += [Comment("all further orders"), span("k", self.orders, 1).over(turn)]
+        # the last order of the states alone
+        last = [] if self.ends else self.next_states(1.0 / self.order * Name("scale"), Number(self.order))
+        return [*statements, *last]
 
-    def times(self) -> list[Statement]:
-        """The coefficients of time, if any function of time has a series."""
-        if not self.waves.lent:
-            return []
-        zeros = Store("dense", Name("at_t") + ORDER, NOTHING)
-        known = [Store("dense", Name("at_t"), Name("t")), Store("dense", Name("at_t") + 1, Name("scale"))]
-        return [*known, span("k", self.order + 1, 2).over([zeros])]
-
-    def bases(self) -> tuple[list[Statement], int]:
-        """Where everything stands in the workspace, and how much it takes."""
-        found, size = list[Statement]([whole("TERMS", Number(self.order + 1))]), 0
-        for name, groups in self.room().items():
-            found.append(whole(f"at_{name}", Name("DENSE_ROWS") * "DIMENSION" + size))
-            size += groups
-        return found, size
-
-    def room(self) -> dict[str, int]:
-        """How many groups the parts of the workspace take, in their order."""
-        eq, p = self.equations, self.order
-        sizes = {"states": (p + 1) * eq.dimension, "rates": eq.dimension}
-        if self.waves.lent:
-            sizes["t"] = p + 1
-        if eq.sticks:
-            sizes |= {"gaps": (p + 1) * 2 * eq.n, "sizes": 2 * eq.n, "closing": p + 1}
-        for section in self.parts:
-            sizes |= section.room()
-            if isinstance(section, Gathered):
-                sizes |= {name: (p + 1) * eq.n for name, _ in section.totals}
-            if isinstance(section, Totals):
-                sizes |= {name: p + 1 for name, _ in section.totals}
-        return sizes
-
-    def states(self, body: Callable[[Expression], Iterable[Statement]]) -> list[Statement]:
-        """Loops over all states: what is done with the place of one."""
-        return [span.over(body(place)) for span, place in self.places.rows]
+    def over_states(self, body: Callable[[Expression], Iterable[Statement]]) -> list[Statement]:
+        """Return loops over all states, with statements for the index of one."""
+        return [rows.over(body(index)) for rows, index in self.layout.rows]
 
     def next_states(self, factor: Expression, order: Expression) -> list[Statement]:
-        """Coefficients of the states from those of the rates."""
-        slopes = self.states(
-            lambda p: [of_state(p).store(order, Name("slope_scale") * Load("dense", plus(Name("at_rates"), p)))]
-        )
-        return [let("slope_scale", factor), *slopes]
+        """Return the statements for coefficients of the states from those of the rates."""
+
+        def one(index: Expression) -> list[Statement]:
+            rate = Load("dense", plus(Name("at_rates"), index))
+            return [of_state(index).store(order, Name("slope_scale") * rate)]
+
+        return [let("slope_scale", factor), *self.over_states(one)]
 
     def sizes(self) -> list[Statement]:
-        begun = [let(f"size_{k}", NOTHING) for k in last_orders(self.order)]
-        return [*begun, *self.counted_states(), *([SEEN] if self.watching else [])]
+        begin = [let(f"size_{k}", NOTHING) for k in last_orders(self.order)]
+        return [*begin, *self.sizes_of_states(), *([SEEN] if self.watching else [])]
 
-    def counted_states(self) -> list[Statement]:
-        """Loops that let the last coefficients of all states count."""
-        return [span.over(self.size(place, period)) for span, place, period in self.places.measured]
+    def sizes_of_states(self) -> list[Statement]:
+        """Return loops in which the last coefficients of all states limit the step."""
+        return [rows.over(self.size(index, period)) for rows, index, period in self.layout.measured]
 
-    def size(self, place: Expression, period: float | None) -> list[Statement]:
-        """Let the last coefficients of a state count, in units of its tolerance."""
-        largest: Expression = absolute(Load("y", place))
+    def size(self, index: Expression, period: float | None) -> list[Statement]:
+        """Return the statements for one state, in units of its tolerance."""
+        largest: Expression = absolute(Load("y", index))
         for k in (1, 2):
-            largest = call("maximum", largest, absolute(of_state(place).load(Number(k))))
-        return self.waves.weighed(Outer(of_state(place)), "", Name("rtol") * within(largest, period))
+            largest = call("maximum", largest, absolute(of_state(index).load(Number(k))))
+        return self.waves.weighed(Outer(of_state(index)), "", Name("rtol") * within(largest, period))
 
     def new_state(self) -> list[Statement]:
-        return [let("total", NOTHING), *self.states(self.end_of)]
+        def one(index: Expression) -> list[Statement]:
+            value = polynomial("new", self.order, of_state(index).load)
+            return [*value, Store("y_new", index, Name("new")), let("total", Name("total") + "new")]
 
-    def end_of(self, place: Expression) -> list[Statement]:
-        """The new value of a state."""
-        found = polynomial("new", self.order, of_state(place).load)
-        return [*found, Store("y_new", place, Name("new")), let("total", Name("total") + "new")]
+        return [let("total", NOTHING), *self.over_states(one)]
 
     def rows(self) -> list[Statement]:
-        rows = self.states(
-            lambda p: [
-                Store("dense", plus((ORDER - 1) * Name("DIMENSION"), p), Name("raised") * of_state(p).load(ORDER))
-            ]
-        )
-        turn = [*rows, let("raised", Name("raised") * "ratio")]
+        # row k - 1 of the dense output is coefficient k in units of the step
+        def one(index: Expression) -> list[Statement]:
+            row = plus((ORDER - 1) * Name("DIMENSION"), index)
+            return [Store("dense", row, Name("raised") * of_state(index).load(ORDER))]
+
+        turn = [*self.over_states(one), let("raised", Name("raised") * "ratio")]
         return [let("raised", "ratio"), span("k", self.order + 1, 1).over(turn)]
 
 
 def write_looped(equations: Equations, order: int) -> TaylorStep:
     """Return the looped Taylor step of some order; see `write_step`."""
     if equations.inertial and equations.link_count:
-        found = "links with inertia" if equations.inertial_links else "links of nodes with a mass matrix"
-        raise ValueError(f"taylor: found {found} in a network that is stepped in loops; use dop853 or rodas5p")
+        kind = "links with inertia" if equations.inertial_links else "links of nodes with a mass matrix"
+        raise ValueError(f"taylor: found {kind} in a network that is stepped in loops; use dop853 or rodas5p")
     check_jumps(equations)
     return LoopedSeries(equations, order).step("graph", "weights")

@@ -1,4 +1,8 @@
-"""The rates of M rates = r as series, where nodes or links have inertia: the elimination is planned from the pattern of M."""
+"""The rates of M rates = r as series, where nodes or links have inertia.
+
+`Row` and `Unknown` are the forward and back substitution of one unknown; the pattern of M, known when the step is written,
+decides the order of elimination.
+"""
 
 from __future__ import annotations
 
@@ -6,51 +10,47 @@ from collections.abc import Iterable, Mapping
 
 from synchain.models.mechanics.components import Edge, Node
 
-from ..program.expressions import ONE, ZERO, Expression
+from ..program.expressions import ONE, ZERO
 from ..steps.elimination import Entry, plan
 from ..steps.mass_solve import added_masses
 from .series import Constant, Row, Series, Unknown
 from .series_graph import SeriesGraph, split
 
-Factor = tuple[Expression, Series]
+UNIT = Constant(ONE)
 
 
 def moving(node: Node, edges: Iterable[Edge]) -> list[bool]:
-    """Which states of a node move, by its own rates or by links to it; one at rest, such as the mode of a contact, does not."""
-    return [any(found) for found in zip(_moved(node), *map(_moved, edges), strict=True)]
+    """Return which states of a node move, by its own rates or by links to it; the mode of a contact does not."""
+    return [any(moved) for moved in zip(_moved(node), *map(_moved, edges), strict=True)]
 
 
 def _moved(part: Node | Edge) -> list[bool]:
-    """Which states a node or a link can move: by a right-hand side, or by masses that couple them to others."""
+    """Return which states a node or a link can move: by a right-hand side, or by masses that couple them to others."""
     blocks = [added_masses(part)] if isinstance(part, Node) else part.inertia
     coupled = [[any(e != 0 for e in row) for row in block] for block in blocks if block]
     return [e != 0 or any(block[c] for block in coupled) for c, e in enumerate(part.rhs)]
 
 
 def solved(graph: SeriesGraph, masses: Mapping[Entry, Series], right: Mapping[int, Series]) -> dict[int, Series]:
-    """Return the series of the rates."""
-    entries = {key: found for key, s in masses.items() if (found := _factor(s))[0] != ZERO}
-    coupled = sorted({k for key, e in entries.items() if not (key[0] == key[1] and e == (ONE, _UNIT)) for k in key})
-    place = {slot: number for number, slot in enumerate(coupled)}
-    inner = {(place[r], place[c]): e for (r, c), e in entries.items() if r in place and c in place}
+    """Return the series of the rates by state, from the entries of M and the right-hand sides."""
+    # factor and series of each entry that is not zero; a constant entry is all factor
+    entries = {key: (s.value, UNIT) if isinstance(s, Constant) else split(s) for key, s in masses.items()}
+    entries = {key: e for key, e in entries.items() if e[0] != ZERO}
+    # rows and columns that differ from those of the identity, renumbered; the other rates are their right-hand sides
+    coupled = sorted({k for key, e in entries.items() if not (key[0] == key[1] and e == (ONE, UNIT)) for k in key})
+    number = {slot: k for k, slot in enumerate(coupled)}
+    inner = {(number[r], number[c]): e for (r, c), e in entries.items() if r in number and c in number}
     symmetric = all(inner.get((c, r)) == e for (r, c), e in inner.items())
+    # forward substitution in the order of elimination, back substitution in the reverse order
     order = plan(len(coupled), set(inner)).order
     rows: list[Row] = []
     for r in order:
-        own = {c: inner[r, slot] for c, slot in enumerate(order) if (r, slot) in inner}
-        rows.append(Row(right[coupled[r]], own, tuple(rows), symmetric))
+        row = {k: inner[r, c] for k, c in enumerate(order) if (r, c) in inner}
+        rows.append(Row(right[coupled[r]], row, tuple(rows), symmetric))
     unknowns: dict[int, Unknown] = {}
-    for number in reversed(range(len(rows))):
-        unknowns[number] = Unknown(rows[number], dict(unknowns))
-    for row in rows:
-        row.unknowns = tuple(unknowns[number] for number in range(len(rows)))
+    for k in reversed(range(len(rows))):
+        unknowns[k] = Unknown(rows[k], dict(unknowns))
+    for row_series in rows:
+        row_series.unknowns = tuple(unknowns[k] for k in range(len(rows)))
     graph.series += [*rows, *unknowns.values()]
-    return {**right, **{coupled[r]: unknowns[number] for number, r in enumerate(order)}}
-
-
-def _factor(series: Series) -> Factor:
-    """Constant factor and rest of an entry; a constant entry is all factor."""
-    return (series.value, _UNIT) if isinstance(series, Constant) else split(series)
-
-
-_UNIT = Constant(ONE)
+    return {**right, **{coupled[r]: unknowns[k] for k, r in enumerate(order)}}

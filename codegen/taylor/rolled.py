@@ -1,8 +1,8 @@
-"""A Taylor step of one large node: loops over series of one kind, whose places stand in a table.
+"""A Taylor step of one large node: loops over series of one kind, whose memory a table lists.
 
 A step that is written out has a statement for each coefficient of each series; from a hundred series on it takes some ten
-seconds to compile.  Here series are ranked by what they need of the same order, and those of one rank and kind are one
-loop around one recurrence.  All coefficients are in memory, and the array `where` says at which places, so that the text
+seconds to compile.  Here series are ranked by what they need of the same order, and those of one rank and kind (a `Run`) are
+one loop around one recurrence.  All coefficients are in memory, and the array `where` lists their groups, so that the text
 grows with the number of ranks alone.
 """
 
@@ -25,9 +25,10 @@ from ..program.expressions import ZERO, Expression, Load, Name, Number, call, pl
 from ..program.statements import Assign, Do, Loop, Statement, Store, let, mentioned, whole
 from ..steps.places import NodeKindLayout, span
 from ..steps.step import lane
-from .looped_series import CONVOLUTION, START, Hoisted, LoopedSeries, Outer, SeriesLoop, Track
+from .looped_series import CONVOLUTION, START, Hoisted, LoopedSeries, Outer, SeriesLoop, Slot
+from .passable import check_jumps
 from .series import Constant, Exponential, Kink, Linear, Product, Series, Square
-from .series_graph import SeriesGraph, check_jumps
+from .series_graph import SeriesGraph
 from .simplify import absolute
 from .step_length import unseen
 from .taylor_step import TaylorStep
@@ -38,7 +39,7 @@ LARGE = 200
 CHOICE = 10
 
 PLAIN, APART = "@njit(error_model='numpy')", "@njit(error_model='numpy', separate=True)"
-"""The decorators of a function that may become a part of each loop that calls it, and of one that does not."""
+"""The decorators of a function that LLVM may inline in each loop that calls it, and of one that it may not."""
 
 SUMS = """
 @njit(error_model='numpy', separate=True)
@@ -75,7 +76,7 @@ def sizes(dense, where, states, places, ends, terms, count):
 """.strip()
 
 MEMORY = (Name("dense"), Name("where"), Name("at_states"))
-"""The workspace, the table, and where the places that the table says count from."""
+"""The workspace, the table, and the group from which the entries of the table count."""
 
 ROW = "at_row"
 """The variable of loops; no symbol of a model begins like that."""
@@ -83,131 +84,135 @@ ROW = "at_row"
 COMPUTED = ("name", "inverse", "beyond")
 """Fields of a series that its recurrence sets."""
 
-Place = tuple[str, int]
-"""A group of the workspace: the name of a part, and how far behind its beginning the group stands."""
+Entry = tuple[str, int]
+"""A group of the workspace: the name of a part, and the offset of the group from its beginning."""
 
 
 @dataclass(eq=False)
 class Run:
     """Series of one rank and kind, and `model`, which stands for any of them in their loop.
 
-    columns: by name, the places of the coefficients of the members and of those that they read; kept: names of values that
-    the model computes once in a step.
+    columns: by name, the groups of the members and of the series that they read; saved: names of values that the model
+    computes once in a step.
     """
 
     members: list[Series]
     model: Series
-    columns: dict[str, list[Place]]
-    kept: dict[str, None] = field(default_factory=dict)
+    columns: dict[str, list[Entry]]
+    saved: dict[str, None] = field(default_factory=dict)
 
 
 @dataclass(eq=False)
 class RolledSection(SeriesLoop):
-    """The series of a node, in runs; slots: which state a series is; table: what `where` holds."""
+    """The series of a node, in runs.
 
-    slots: dict[Series, int] = field(default_factory=dict)
-    table: list[int | Place] = field(default_factory=list)
-    entered: dict[tuple[int | Place, ...], int] = field(default_factory=dict)
+    components: which state a series is; table: what `where` holds; entered: where entries begin in it; factors: numbers of
+    the factors of sums.
+    """
+
+    components: dict[Series, int] = field(default_factory=dict)
+    table: list[int | Entry] = field(default_factory=list)
+    entered: dict[tuple[int | Entry, ...], int] = field(default_factory=dict)
     factors: dict[Expression, int] = field(default_factory=dict)
     current: Run | None = None
 
     @cached_property
-    def remembered(self) -> set[Series]:
-        """All series: each loop finds in memory what it reads."""
-        return set(self.graph.series)
+    def in_memory(self) -> set[Series]:
+        return set(self.graph.series)  # each loop finds in memory what it reads
 
     @cached_property
     def runs(self) -> list[Run]:
-        """The series by rank and kind, in an order in which each finds what it needs."""
+        """Return the series by rank and kind, in an order in which each finds what it needs."""
         rank: dict[Series, int] = {}
         groups = defaultdict[tuple[object, ...], list[Series]](list)
         for s in self.graph.series:
-            rank[s] = 1 + max((rank.get(other, 0) for other in _read(s)), default=0)
-            groups[rank[s], *_statics(s)].append(s)
+            rank[s] = 1 + max((rank.get(other, 0) for other in _operands(s)), default=0)
+            groups[rank[s], *_common(s)].append(s)
         return [self.run_of(groups[key]) for key in sorted(groups, key=lambda key: int(str(key[0])))]
 
     def run_of(self, members: list[Series]) -> Run:
-        """The run of some series."""
+        """Return the run of some series: in the model, each operand is a column of the table."""
         model = copy(members[0])
         model.name = self.graph.fresh(type(model).__name__.lower())
         columns = {"out": [(s.name, 0) for s in members]}
         for part in () if isinstance(model, Linear | Product | Square) else fields(model):
             if _moves(getattr(model, part.name)):
                 name = f"{model.name}_{part.name}"
-                columns[part.name] = [self.place_of(getattr(s, part.name)) for s in members]
-                setattr(model, part.name, Outer(Track(name, None), name=f"value_{name}"))
+                columns[part.name] = [self.entry_of(getattr(s, part.name)) for s in members]
+                setattr(model, part.name, Outer(Slot(name, None), name=f"value_{name}"))
         if isinstance(model, Kink):
-            columns["size"] = [self.size_of(getattr(s, "base")) for s in members]  # noqa: B009
+            # the size of the terms that each series begins with; a single term is as large as its value
+            bases = [kink.base for kink in members if isinstance(kink, Kink)]
+            columns["size"] = [(f"size_{s.name}", 0) if isinstance(s, Linear) else self.entry_of(s) for s in bases]
         return Run(members, model, columns)
-
-    def place_of(self, series: Series) -> Place:
-        """Where the coefficients of a series begin."""
-        if series in self.slots:
-            return "states", self.slots[series] * (self.order + 1)
-        return (series.track.name if isinstance(series, Outer) else series.name), 0
-
-    def size_of(self, base: Series) -> Place:
-        """Where the size of the terms stands that a series begins with; a single term is as large as its value."""
-        return (f"size_{base.name}", 0) if isinstance(base, Linear) else self.place_of(base)
-
-    @property
-    def kinked(self) -> set[Series]:
-        """The series in which kinks are looked for."""
-        return {kink.base for kink in self.graph.kinks}
 
     # -- memory ---------------------------------------------------------------------------------------------------
 
-    def track(self, series: Series) -> Track:
-        if self.current is not None and series is self.current.model:
-            return Track(f"{series.name}_out", None)
-        return super().track(series)
+    def entry_of(self, series: Series) -> Entry:
+        """Return the group at which the coefficients of a series begin."""
+        if series in self.components:
+            return "states", self.components[series] * (self.order + 1)
+        return (series.slot.name if isinstance(series, Outer) else series.name), 0
 
-    def single(self, what: str) -> Expression:
-        return plus(Name(f"at_{what}"), Name(ROW))
-
-    def keep(self, what: str, value: Expression) -> Name:
-        if self.current is not None:
-            self.current.kept[what] = None
-        return super().keep(what, value)
-
-    def factor(self, e: Expression) -> Place:
-        """Where a factor of terms stands."""
+    def factor(self, e: Expression) -> Entry:
+        """Return the group of a factor of terms."""
         return "factors", self.factors.setdefault(e, len(self.factors))
+
+    def slot(self, series: Series) -> Slot:
+        if self.current is not None and series is self.current.model:
+            return Slot(f"{series.name}_out", None)
+        return super().slot(series)
+
+    def single(self, name: str) -> Expression:
+        return plus(Name(f"at_{name}"), Name(ROW))
+
+    def save(self, name: str, value: Expression) -> Name:
+        if self.current is not None:
+            self.current.saved[name] = None
+        return super().save(name, value)
 
     def room(self) -> dict[str, int]:
         rooms = {s.name: self.order + 1 for s in self.graph.series}
         for run in self.runs:
             hints = [f"hint_{run.model.base.name}"] if isinstance(run.model, Kink) else []
-            rooms |= dict.fromkeys([*run.kept, *hints], len(run.members))
+            rooms |= dict.fromkeys([*run.saved, *hints], len(run.members))
         rooms |= {f"size_{s.name}": 1 for s in self.graph.series if isinstance(s, Linear)} if self.graph.kinks else {}
         return rooms | {"factors": len(self.factors), "one": 1}
 
     # -- loops ----------------------------------------------------------------------------------------------------
 
-    def rows(self, name: str, columns: dict[str, list[Place]], body: Iterable[Statement]) -> list[Statement]:
-        """A loop that names the places of one row at_<name>_<column> in each turn."""
+    def rows(self, name: str, columns: dict[str, list[Entry]], body: Iterable[Statement]) -> list[Statement]:
+        """Return a loop over the rows of some columns, whose groups are at_<name>_<column> in each turn."""
         table, width = list(zip(*columns.values(), strict=True)), len(columns)
-        first = self.enter([place for row in table for place in row])
-        loads = [_at(f"{name}_{column}", first + k + width * Name(ROW)) for k, column in enumerate(columns)]
-        return [Loop(ROW, START, Number(len(table)), (*loads, *body))] if table else []
+        first = self.enter([entry for row in table for entry in row])
+        groups = [
+            whole(f"at_{name}_{column}", Name("at_states") + Load("where", first + k + width * Name(ROW), None))
+            for k, column in enumerate(columns)
+        ]
+        return [Loop(ROW, START, Number(len(table)), (*groups, *body))] if table else []
 
-    def enter(self, entries: Sequence[int | Place]) -> int:
-        """Where entries begin in the table; equal ones stand there once."""
+    def enter(self, entries: Sequence[int | Entry]) -> int:
+        """Return where entries begin in the table; equal ones are there once."""
         if (key := tuple(entries)) not in self.entered:
             self.entered[key] = len(self.table)
             self.table += entries
         return self.entered[key]
 
     def over_run(self, run: Run, body: Iterable[Statement]) -> list[Statement]:
-        """A loop over the members of a run."""
+        """Return a loop over the members of a run."""
         return self.rows(run.model.name, run.columns, body)
 
     def over(self, series: Sequence[Series], name: str, body: Callable[[Series], list[Statement]]) -> list[Statement]:
-        """A loop that reads some series, one after another."""
-        statements = body(Outer(Track(f"{name}_read", None), name=f"value_{name}")) if series else []
-        return self.rows(name, {"read": [self.place_of(s) for s in series]}, statements) if statements else []
+        """Return a loop that reads some series, one after another."""
+        statements = body(Outer(Slot(f"{name}_read", None), name=f"value_{name}")) if series else []
+        return self.rows(name, {"read": [self.entry_of(s) for s in series]}, statements) if statements else []
 
-    def run(self, statements: list[Statement]) -> list[Statement]:
+    def over_kinks(self, body: Callable[[Kink], Iterable[Statement]]) -> list[Statement]:
+        """Return loops over all kinks."""
+        kinks = [(run, run.model) for run in self.runs if isinstance(run.model, Kink)]
+        return [statement for run, kink in kinks for statement in self.over_run(run, body(kink))]
+
+    def in_loop(self, statements: list[Statement]) -> list[Statement]:
         return statements
 
     # -- coefficients ---------------------------------------------------------------------------------------------
@@ -220,81 +225,68 @@ class RolledSection(SeriesLoop):
                 case Linear():
                     statements += self.sums_of(run)
                 case Product() | Square():
-                    statements += self.products_of(run)
+                    # rows of a product and its two factors, the base of a square twice
+                    rows = [
+                        (out, *([self.entry_of(e) for e in s.convolved] * (2 // len(s.convolved))))
+                        for s, out in zip(run.members, run.columns["out"], strict=True)
+                    ]
+                    first = self.enter([entry for row in rows for entry in row])
+                    products = call("products", *MEMORY, Number(first), Number(len(run.members)), self.k)
+                    statements.append(Do(products))
                 case _:
                     statements += self.recurrence(run)
         self.current = None
+        # the rates: copies of series, or constants
         moving = {k: e for k, (_, e) in enumerate(self.rates) if not isinstance(e, Constant)}
-        columns = {"from": [self.place_of(e) for e in moving.values()], "to": [("rates", k) for k in moving]}
-        statements += self.rows("rate", columns, [Store("dense", Name("at_rate_to"), self.here("rate_from"))])
-        for place, rate in self.rates:
-            if isinstance(rate, Constant):
-                statements.append(Store("dense", plus(Name("at_rates"), place), lane(self.of(rate))))
+        columns = {"from": [self.entry_of(e) for e in moving.values()], "to": [("rates", k) for k in moving]}
+        rate = Slot("rate_from", None).load(self.k)
+        statements += self.rows("rate", columns, [Store("dense", Name("at_rate_to"), rate)])
+        for state, e in self.rates:
+            if isinstance(e, Constant):
+                statements.append(Store("dense", plus(Name("at_rates"), state), lane(self.of(e))))
         if order != START:
             return statements
-        numbers = [Store("dense", plus(Name("at_factors"), Number(k)), lane(e)) for e, k in self.factors.items()]
-        return [*numbers, Store("dense", Name("at_one"), lane(Number(1.0))), *statements]
-
-    def here(self, name: str) -> Expression:
-        """The coefficient of the order that is written, at a place with a name."""
-        return Track(name, None).load(self.k)
+        # the factors of sums are computed first, and the 1 by which their constants are multiplied
+        factors = [Store("dense", plus(Name("at_factors"), Number(k)), lane(e)) for e, k in self.factors.items()]
+        return [*factors, Store("dense", Name("at_one"), lane(Number(1.0))), *statements]
 
     def recurrence(self, run: Run) -> list[Statement]:
-        """The loop that makes the coefficients of a run."""
+        """Return the loop that computes the coefficients of a run."""
         model, first = run.model, self.k == START
         self.statements = []
-        read = dict.fromkeys(s for s in (_read(model) if first else model.linear) if isinstance(s, Outer))
-        self.put(*(let(name, self.recall(name)) for name in (() if first else run.kept)))
-        self.put(*(let(s.name, s.track.load(self.k)) for s in read))
-        self.values = {s: Name(s.name) for s in read}
+        operands = dict.fromkeys(s for s in (_operands(model) if first else model.linear) if isinstance(s, Outer))
+        self.put(*(let(name, self.recall(name)) for name in (() if first else run.saved)))
+        self.put(*(let(s.name, s.slot.load(self.k)) for s in operands))
+        self.values = {s: Name(s.name) for s in operands}
         if first and isinstance(model, Kink):
             value = model.side(self, absolute(Load("dense", Name(f"at_{model.name}_size"))))
         else:
             value = model.begin(self) if first else model.coefficient(self)
-        self.put(self.track(model).store(self.k, lane(value)))
+        self.put(self.slot(model).store(self.k, lane(value)))
         return self.over_run(run, self.statements)
 
     def sums_of(self, run: Run) -> list[Statement]:
-        """The call that makes sums of terms; the constant of a sum is a last term of order 0."""
-        first, terms, ends = self.k == START, list[tuple[Place, Place]](), [0]
+        """Return the call that computes sums of terms; the constant of a sum is a last term of order 0."""
+        first, terms, ends = self.k == START, list[tuple[Entry, Entry]](), [0]
         for s in run.members:
             assert isinstance(s, Linear)
-            terms += [(self.factor(e), self.place_of(inner)) for e, inner in s.terms]
+            terms += [(self.factor(e), self.entry_of(inner)) for e, inner in s.terms]
             terms += [(self.factor(s.constant), ("one", 0))] if first and s.constant != ZERO else []
             ends.append(len(terms))
-        places = [self.enter(run.columns["out"]), self.enter(ends), self.enter([e for pair in terms for e in pair])]
-        calls: list[Statement] = [Do(call("sums", *MEMORY, *map(Number, places), Number(len(run.members)), self.k))]
-        if first and not self.kinked.isdisjoint(run.members):
+        rows = [self.enter(run.columns["out"]), self.enter(ends), self.enter([e for pair in terms for e in pair])]
+        calls: list[Statement] = [Do(call("sums", *MEMORY, *map(Number, rows), Number(len(run.members)), self.k))]
+        if first and not {kink.base for kink in self.graph.kinks}.isdisjoint(run.members):
             sizes = self.enter([(f"size_{s.name}", 0) for s in run.members])
-            calls.append(Do(call("sizes", *MEMORY, Number(sizes), *map(Number, places[1:]), Number(len(run.members)))))
+            calls.append(Do(call("sizes", *MEMORY, Number(sizes), *map(Number, rows[1:]), Number(len(run.members)))))
         return calls
-
-    def products_of(self, run: Run) -> list[Statement]:
-        """The call that makes products and squares."""
-        entries = [
-            place
-            for s, out in zip(run.members, run.columns["out"], strict=True)
-            for place in (out, *([self.place_of(e) for e in s.convolved] * (2 // len(s.convolved))))
-        ]
-        return [Do(call("products", *MEMORY, Number(self.enter(entries)), Number(len(run.members)), self.k))]
 
     # -- end of the step ------------------------------------------------------------------------------------------
 
-    def over_kinks(self, body: Callable[[Kink], Iterable[Statement]]) -> list[Statement]:
-        """Loops over all kinks."""
-        return [
-            s
-            for run in self.runs
-            for kink in [run.model]
-            if isinstance(kink, Kink)
-            for s in self.over_run(run, body(kink))
-        ]
+    def forget_sides(self) -> list[Statement]:
+        return self.over_kinks(lambda kink: [self.assign(f"hint_{kink.base.name}", self.zeros)])
 
-    def unknown(self) -> list[Statement]:
-        return self.over_kinks(lambda kink: [self.note(f"hint_{kink.base.name}", self.zeros)])
-
-    def sides(self) -> list[Statement]:
-        return self.over_kinks(lambda kink: [self.side(kink)])
+    def find_sides(self) -> list[Statement]:
+        return self.over_kinks(lambda kink: [self.find_side(kink)])
 
     def passages(self, exact: bool) -> list[Statement]:
         return self.over_kinks(self.passage)
@@ -316,91 +308,84 @@ class Rolled(LoopedSeries):
     """Writes the step of one node without links."""
 
     functions = (CONVOLUTION.replace(PLAIN, APART), SUMS)
-    section: RolledSection
+    rolled: RolledSection
 
-    def node(self, kind: NodeKindLayout, found: Hoisted) -> SeriesLoop:
+    def node(self, kind: NodeKindLayout, hoisted: Hoisted) -> SeriesLoop:
         node = kind.node
-        self.section = section = RolledSection(SeriesGraph(self.names), self.order)
-        self.end(section, node.state, node, ("", "0"), node.state)
-        section.slots = {section.moving[s]: c for c, s in enumerate(node.state) if s in section.moving}
-        series = self.read(section, found, node.inertia)
+        self.rolled = section = RolledSection(SeriesGraph(self.names), self.order)
+        self.read_states(section, node.state, node, ("", "0"), node.state)
+        section.components = {section.moving[s]: c for c, s in enumerate(node.state) if s in section.moving}
+        series = self.read(section, hoisted, node.inertia)
         section.rates = [(Number(c), rate) for c, rate in enumerate(series)]
         self.node_part, self.lent = section, []
         return section
 
     def opening(self) -> list[Statement]:
-        return [*super().opening(), *self.section.setting]
+        return [*super().opening(), *self.rolled.setting]
 
-    def states(self, body: Callable[[Expression], Iterable[Statement]]) -> list[Statement]:
+    def over_states(self, body: Callable[[Expression], Iterable[Statement]]) -> list[Statement]:
         return [span("i", "DIMENSION").over(body(Name("i")))]
 
-    def counted_states(self) -> list[Statement]:
-        members = defaultdict[float | None, list[Place]](list)
-        for c, period in enumerate(self.places.periods[0]):
+    def sizes_of_states(self) -> list[Statement]:
+        members = defaultdict[float | None, list[Entry]](list)
+        for c, period in enumerate(self.layout.periods[0]):
             members[period].append(("states", c * (self.order + 1)))
         if len(members) == 1:
-            return self.states(lambda place: self.size(place, *members))
+            return self.over_states(lambda index: self.size(index, *members))
         # angles with one period, and all other states, are loops of their own
-        loops, section = list[Statement](), self.section
-        for number, (period, places) in enumerate(members.items()):
+        loops, section = list[Statement](), self.rolled
+        for number, (period, entries) in enumerate(members.items()):
             name = f"state{number}"
-            series = Outer(Track(f"{name}_read", None), name=f"value_{name}", period=period)
-            loops += section.rows(name, {"read": places}, section.counted(series))
+            series = Outer(Slot(f"{name}_read", None), name=f"value_{name}", period=period)
+            loops += section.rows(name, {"read": entries}, section.counted(series))
         return loops
 
     def statements(self) -> list[Statement]:
-        """What the step does, without names of places that it finds in the table."""
+        # parts of the workspace that only the table names need no name in the text
         statements = super().statements()
-        used = mentioned(s for s in statements if not _part(s))
-        return [s for s in statements if not _part(s) or _part(s) in used]
+        used = mentioned(s for s in statements if not _part_named_by(s))
+        return [s for s in statements if not _part_named_by(s) or _part_named_by(s) in used]
 
     def step(self, *more: str) -> TaylorStep:
         written = super().step(*more)
         # LLVM takes a minute for dozens of passages within a function
         called = [text.replace(f"{PLAIN}\ndef passage", f"{APART}\ndef passage") for text in written.called]
-        called += [SIZES] if self.section.graph.kinks else []
+        called += [SIZES] if self.rolled.graph.kinks else []
         begin = dict(zip(self.room(), accumulate(self.room().values(), initial=0), strict=False))
-        table = self.section.table
-        return replace(
-            written, called=tuple(called), table=tuple(e if isinstance(e, int) else begin[e[0]] + e[1] for e in table)
-        )
+        table = tuple(e if isinstance(e, int) else begin[e[0]] + e[1] for e in self.rolled.table)
+        return replace(written, called=tuple(called), table=table)
 
 
-def _part(s: Statement) -> str:
-    """The part of the workspace that a statement gives a name, "" for another statement."""
+def _part_named_by(s: Statement) -> str:
+    """Return the name that a statement gives to a part of the workspace, "" for another statement."""
     return s.targets[0] if isinstance(s, Assign) and s.whole and s.targets[0].startswith("at_") else ""
 
 
-def _at(name: str, entry: Expression) -> Statement:
-    """The place of the workspace that an entry of the table says, named at_<name>."""
-    return whole(f"at_{name}", Name("at_states") + Load("where", entry, None))
-
-
 def _moves(part: object) -> bool:
-    """True for a part of a series that has coefficients of its own."""
+    """Return True for a field of a series that is a series with coefficients."""
     return isinstance(part, Series) and not isinstance(part, Constant)
 
 
-def _read(series: Series) -> list[Series]:
-    """The series that the recurrence of another one reads."""
+def _operands(series: Series) -> list[Series]:
+    """Return the series that the recurrence of another one reads."""
     if isinstance(series, Linear):
         return [inner for _, inner in series.terms]
     return [getattr(series, part.name) for part in fields(series) if _moves(getattr(series, part.name))]
 
 
-def _statics(series: Series) -> tuple[object, ...]:
-    """What members of a run have in common: the kind, and all that is no series with coefficients."""
+def _common(series: Series) -> tuple[object, ...]:
+    """Return what members of a run have in common: the kind, and all fields that are no series with coefficients."""
     if isinstance(series, Linear):
         return (Linear,)
     if isinstance(series, Product | Square):
         return (Product,)
-    parts = [(part.name, getattr(series, part.name)) for part in fields(series) if part.name not in COMPUTED]
-    return (type(series), *(e.value if isinstance(e, Constant) else e for name, e in parts if not _moves(e)))
+    parts = [getattr(series, part.name) for part in fields(series) if part.name not in COMPUTED]
+    return (type(series), *(e.value if isinstance(e, Constant) else e for e in parts if not _moves(e)))
 
 
 @lru_cache(maxsize=64)
 def is_large(equations: Equations) -> bool:
-    """True for one node without links whose step would take long to compile if it were written out."""
+    """Return True for one node without links whose step would take long to compile if it were written out."""
     if equations.n > 1 or equations.link_count or equations.sticks or equations.varied:
         return False
     rates = equations.nodes[0].rhs

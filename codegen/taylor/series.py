@@ -1,13 +1,26 @@
-"""Power series in time and the recurrences of their coefficients.
+"""Power series in time, and the recurrences of their coefficients.
 
-Coefficient k of a series is that of ((t' - t)/scale)**k, t' the time within the step.  Every recurrence below is
-homogeneous in `scale`, so that only the states and time itself know it.
+A Taylor method writes each subexpression u of the rates as a series
 
-A recurrence is written once.  It asks an `Order` for coefficients and convolutions: the part of a step that is written out
-answers with sums of names at a certain k, that of one in loops with loops over orders.
+    u(t') = sum_k u_k ((t' - t)/scale)**k
+
+and computes u_k from coefficients 0 … k of its operands.  `scale` makes the coefficients of one state alike in size; every
+recurrence below is homogeneous in it, so that only the states (`x_(k+1) = scale/(k+1) * rate_k`) and time itself use it.
+
+Three forms cover all functions.  Here a' is the derivative with respect to (t' - t)/scale, so that k a_k are the
+coefficients of (t' - t) a' (`Slope`):
+
+* products, and quotients and roots by the product that they solve: u b = a gives u_k = (a_k - sum_{j=1..k} b_j u_(k-j))/b_0;
+* functions whose derivative is a product, u' = g a': k u_k = sum_{j=1..k} j a_j g_(k-j) (`Integral`);
+* functions whose derivative is a quotient, u' w = a': k u_k w_0 = k a_k - sum_{j=1..k-1} j u_j w_(k-j)
+  (`QuotientIntegral`).
 
 Sources: R. E. Moore, Methods and Applications of Interval Analysis (SIAM, 1979), section 3.4; A. Griewank & A. Walther,
 Evaluating Derivatives (2nd ed., SIAM, 2008), section 13.2.
+
+A recurrence is written once, for an `Order` that supplies coefficients and convolutions: a step that is written out answers
+with sums of names at a certain k, one in loops with loops over orders.  Names of series in kernel text are those of the
+classes.
 """
 
 from __future__ import annotations
@@ -21,9 +34,11 @@ from ..program.statements import Statement
 from .event_location import Stored
 from .simplify import absolute, add, over, times
 
+MINUS = Number(-1.0)
+
 
 class Order(Protocol):
-    """What a recurrence can ask for while coefficient k is made."""
+    """The order k that is being written: what a recurrence can use."""
 
     @property
     def inverse(self) -> Expression:
@@ -34,55 +49,62 @@ class Order(Protocol):
         """k > 0."""
 
     def of(self, series: Series) -> Expression:
-        """Coefficient k of a series."""
+        """Return coefficient k of a series."""
 
     def sum(self, left: Series, right: Series, first: int, last: int) -> Expression:
-        """Sum of left_j * right_(k-j) for j = first … k + last."""
+        """Return the sum of left_j * right_(k-j) for j = first … k + last."""
 
     def square(self, base: Series, first: int) -> Expression:
-        """Sum of base_j * base_(k-j) for j = first … k - first."""
+        """Return the sum of base_j * base_(k-j) for j = first … k - first."""
 
-    def keep(self, what: str, value: Expression) -> Name:
-        """Compute something once, with coefficient 0; returns its name."""
+    def save(self, name: str, value: Expression) -> Name:
+        """Compute a value once in a step, with coefficient 0, and return its name."""
 
     def hint(self, series: Series) -> Expression:
-        """The side of zero on which a series that begins at zero lies just after, 1 or -1; 0 while that is not known."""
+        """Return the side of zero, 1 or -1, on which a series lies just after it begins at zero; 0 if unknown."""
 
 
 @dataclass(eq=False, slots=True)
 class Series:
     """A power series under a name.
 
-    `linear` are the series of which coefficient k enters its own coefficient k once, `convolved` those that it multiplies,
-    `started` those of which it needs the coefficient 0 alone.
+    Coefficient k needs coefficient k of the `linear` series, coefficients 0 … k of the `convolved` series, and coefficient 0
+    alone of the `started` series.  LINEAR, CONVOLVED and STARTED are the fields that hold them.
     """
 
     name: str = field(default="", kw_only=True)
+    LINEAR: ClassVar[tuple[str, ...]] = ()
+    CONVOLVED: ClassVar[tuple[str, ...]] = ()
+    STARTED: ClassVar[tuple[str, ...]] = ()
 
     @property
     def linear(self) -> tuple[Series, ...]:
-        return ()
+        return self._parts(self.LINEAR)
 
     @property
     def convolved(self) -> tuple[Series, ...]:
-        return ()
+        return self._parts(self.CONVOLVED)
 
     @property
     def started(self) -> tuple[Series, ...]:
-        return ()
+        return self._parts(self.STARTED)
+
+    def _parts(self, names: tuple[str, ...]) -> tuple[Series, ...]:
+        parts = (self if name == "self" else getattr(self, name) for name in names)
+        return tuple(part for part in parts if part is not None)  # the factor of an integral is set late
 
     def begin(self, at: Order) -> Expression:
-        """Coefficient 0, unless it is like the others."""
+        """Return coefficient 0, unless it is like the others."""
         return self.coefficient(at)
 
     def coefficient(self, at: Order) -> Expression:
-        """Coefficient k > 0."""
+        """Return coefficient k > 0."""
         raise NotImplementedError
 
 
 @dataclass(eq=False, slots=True)
 class Constant(Series):
-    """A number, or what depends on parameters alone."""
+    """A number, or a function of parameters alone."""
 
     value: Expression
 
@@ -95,9 +117,9 @@ class Constant(Series):
 
 @dataclass(eq=False, slots=True)
 class State(Series):
-    """A state variable: its coefficient k comes from coefficient k - 1 of its rate, outside this file.
+    """A state variable: the writers compute its coefficient k from coefficient k - 1 of its rate.
 
-    period: that of an angle, None for any other state.
+    period: the period of an angle, None for any other state.
     """
 
     period: float | None = field(default=None, kw_only=True)
@@ -106,6 +128,9 @@ class State(Series):
 @dataclass(eq=False, slots=True)
 class Time(Series):
     """Time: t, scale, 0, 0, …"""
+
+
+# -- arithmetic -------------------------------------------------------------------------------------------------------
 
 
 @dataclass(eq=False, slots=True)
@@ -132,10 +157,7 @@ class Product(Series):
 
     left: Series
     right: Series
-
-    @property
-    def convolved(self) -> tuple[Series, ...]:
-        return self.left, self.right
+    CONVOLVED = ("left", "right")
 
     def coefficient(self, at: Order) -> Expression:
         return at.sum(self.left, self.right, 0, 0)
@@ -143,13 +165,10 @@ class Product(Series):
 
 @dataclass(eq=False, slots=True)
 class Square(Series):
-    """base**2, by half the products."""
+    """base**2, with half the products of `Product`."""
 
     base: Series
-
-    @property
-    def convolved(self) -> tuple[Series, ...]:
-        return (self.base,)
+    CONVOLVED = ("base",)
 
     def coefficient(self, at: Order) -> Expression:
         return at.square(self.base, 0)
@@ -157,62 +176,45 @@ class Square(Series):
 
 @dataclass(eq=False, slots=True)
 class SquareRoot(Series):
-    """u = sqrt(a) from u u = a."""
+    """u = sqrt(a) from u u = a: 2 u_0 u_k = a_k - sum_{j=1..k-1} u_j u_(k-j)."""
 
     base: Series
     inverse: Expression = ONE
-
-    @property
-    def linear(self) -> tuple[Series, ...]:
-        return (self.base,)
-
-    @property
-    def convolved(self) -> tuple[Series, ...]:
-        return (self,)
+    LINEAR, CONVOLVED = ("base",), ("self",)
 
     def begin(self, at: Order) -> Expression:
         root = Call("sqrt", (at.of(self.base),))
-        self.inverse = at.keep(f"half_{self.name}", over(Number(0.5), root))
+        self.inverse = at.save(f"half_{self.name}", over(Number(0.5), root))
         return root
 
     def coefficient(self, at: Order) -> Expression:
-        return times(add(at.of(self.base), times(Number(-1.0), at.square(self, 1))), self.inverse)
+        return times(add(at.of(self.base), times(MINUS, at.square(self, 1))), self.inverse)
 
 
 @dataclass(eq=False, slots=True)
 class Ratio(Series):
-    """u = a/b from u b = a."""
+    """u = a/b from u b = a: b_0 u_k = a_k - sum_{j=1..k} b_j u_(k-j)."""
 
     above: Series
     below: Series
     inverse: Expression = ONE
-
-    @property
-    def linear(self) -> tuple[Series, ...]:
-        return (self.above,)
-
-    @property
-    def convolved(self) -> tuple[Series, ...]:
-        return self, self.below
+    LINEAR, CONVOLVED = ("above",), ("self", "below")
 
     def begin(self, at: Order) -> Expression:
-        self.inverse = at.keep(f"i_{self.below.name}", over(ONE, at.of(self.below)))
+        self.inverse = at.save(f"i_{self.below.name}", over(ONE, at.of(self.below)))
         return times(at.of(self.above), self.inverse)
 
     def coefficient(self, at: Order) -> Expression:
-        known = at.sum(self.below, self, 1, 0)
-        return times(add(at.of(self.above), times(Number(-1.0), known)), self.inverse)
+        earlier = at.sum(self.below, self, 1, 0)
+        return times(add(at.of(self.above), times(MINUS, earlier)), self.inverse)
 
 
 @dataclass(eq=False, slots=True)
 class Slope(Series):
-    """k a_k, the coefficients of a' times (t' - t)."""
+    """k a_k, the coefficients of (t' - t) a'."""
 
     of: Series
-
-    @property
-    def linear(self) -> tuple[Series, ...]:
-        return (self.of,)
+    LINEAR = ("of",)
 
     def begin(self, at: Order) -> Expression:
         return ZERO
@@ -221,11 +223,14 @@ class Slope(Series):
         return times(at.number, at.of(self.of))
 
 
+# -- functions by their differential equations ------------------------------------------------------------------------
+
+
 @dataclass(eq=False, slots=True)
 class Integral(Series):
-    """u = f(a) from u' = c g a' with f'(a) = c g, c a number: exp, sin, tan, sinh, tanh, erf and the like.
+    """u = f(a) from u' = c g a' with f'(a) = c g, c a number: exp, sin, tan, sinh, tanh, erf …
 
-    The factor g is set after the series was made, because it may hold u itself.
+    The factor g is set after the series was made, because it may contain u.
     """
 
     function: str
@@ -233,14 +238,7 @@ class Integral(Series):
     slope: Slope
     number: float = 1.0
     factor: Series | None = None
-
-    @property
-    def convolved(self) -> tuple[Series, ...]:
-        return (self.slope,) if self.factor is None else (self.slope, self.factor)
-
-    @property
-    def started(self) -> tuple[Series, ...]:
-        return (self.argument,)
+    CONVOLVED, STARTED = ("slope", "factor"), ("argument",)
 
     def begin(self, at: Order) -> Expression:
         return Call(self.function, (at.of(self.argument),))
@@ -253,19 +251,19 @@ class Integral(Series):
 
 @dataclass(eq=False, slots=True)
 class Exponential(Integral):
-    """u = exp(a) from u' = u a'; where the exponent begins is kept for the length of the step.
+    """u = exp(a) from u' = u a'; the step saves a_0 to look for a rise of u that is still too small to see.
 
-    steepness: of the exponent, as a multiple of a.
+    steepness: the exponent as a multiple of a.
     """
 
     steepness: ClassVar[float] = 1.0
 
     def begin(self, at: Order) -> Expression:
-        return Call(self.function, (at.keep(self.exponent, at.of(self.argument)),))
+        return Call(self.function, (at.save(self.exponent, at.of(self.argument)),))
 
     @property
     def exponent(self) -> str:
-        """What the exponent at the beginning is called."""
+        """The name of the exponent at the beginning of the step."""
         return f"n_{self.name}"
 
 
@@ -286,23 +284,26 @@ class Peak(Exponential):
 
     def begin(self, at: Order) -> Expression:
         start = at.of(self.argument)
-        at.keep(self.exponent, times(Number(-self.steepness), absolute(start)))
+        at.save(self.exponent, times(Number(-self.steepness), absolute(start)))
         return self.value(start)
 
     def value(self, start: Expression) -> Expression:
-        """Its value where a is `start`."""
+        """Return the value of the function where a is `start`."""
         raise NotImplementedError
 
 
 @dataclass(eq=False, slots=True)
 class Crest(Peak):
-    """w = d exp(a) u**2, u the `Sigmoid`, from w' = (2 c u - 1) w a'; the smaller one of two exponentials makes its digits."""
+    """w = d exp(a) u**2, u the `Sigmoid`, from w' = (2 c u - 1) w a'.
+
+    Coefficient 0 is d/((c + d exp(a)) (d + c exp(-a))), which keeps its digits where either exponential is tiny.
+    """
 
     ends: tuple[float, float] = (1.0, 1.0)
 
     def value(self, start: Expression) -> Expression:
         c, d = map(Number, self.ends)
-        rising, falling = Call("exp", (start,)), Call("exp", (times(Number(-1.0), start),))
+        rising, falling = Call("exp", (start,)), Call("exp", (times(MINUS, start),))
         return over(d, times(add(c, times(d, rising)), add(d, times(c, falling))))
 
 
@@ -316,7 +317,7 @@ class Secant(Peak):
 
 @dataclass(eq=False, slots=True)
 class SquaredSecant(Peak):
-    """u = 1/cosh(a)**2 from u' = -2 u tanh(a) a', which has digits where tanh(a) is 1 to the last one."""
+    """u = 1/cosh(a)**2 from u' = -2 u tanh(a) a': it has digits where 1 - tanh(a)**2 has none."""
 
     steepness = 2.0
 
@@ -327,7 +328,7 @@ class SquaredSecant(Peak):
 
 @dataclass(eq=False, slots=True)
 class QuotientIntegral(Series):
-    """u = f(a) from u' w = c a' with f'(a) = c/w, c a number: log, atan, asin, acos and the like."""
+    """u = f(a) from u' w = c a' with f'(a) = c/w, c a number: log, atan, asin, acos …"""
 
     function: str
     argument: Series
@@ -335,84 +336,77 @@ class QuotientIntegral(Series):
     sign: float
     slope: Slope | None = None
     inverse: Expression = ONE
-
-    @property
-    def linear(self) -> tuple[Series, ...]:
-        return (self.argument,)
-
-    @property
-    def convolved(self) -> tuple[Series, ...]:
-        return (self.divisor,) if self.slope is None else (self.slope, self.divisor)
+    LINEAR, CONVOLVED = ("argument",), ("slope", "divisor")
 
     def begin(self, at: Order) -> Expression:
-        self.inverse = at.keep(f"i_{self.divisor.name}", over(ONE, at.of(self.divisor)))
+        self.inverse = at.save(f"i_{self.divisor.name}", over(ONE, at.of(self.divisor)))
         return Call(self.function, (at.of(self.argument),))
 
     def coefficient(self, at: Order) -> Expression:
         if self.slope is None:
             raise RuntimeError(f"{self.name} has no slope yet; this is a mistake in the program")
-        known = times(Number(-1.0), at.inverse, at.sum(self.slope, self.divisor, 1, -1))
-        return times(add(times(Number(self.sign), at.of(self.argument)), known), self.inverse)
+        earlier = times(MINUS, at.inverse, at.sum(self.slope, self.divisor, 1, -1))
+        return times(add(times(Number(self.sign), at.of(self.argument)), earlier), self.inverse)
 
 
 @dataclass(eq=False, slots=True)
 class Power(Series):
-    """u = a**e for a constant e, from a u' = e a' u."""
+    """u = a**e, e constant, from a u' = e a' u: k a_0 u_k = sum_{j=1..k} (e j - (k - j)) a_j u_(k-j).
+
+    Since e j - (k - j) = (e + 1) j - k, the sum is (e + 1) sum j a_j u_(k-j) - k sum a_j u_(k-j).
+    """
 
     base: Series
     slope: Slope
     exponent: Expression
     inverse: Expression = ONE
     beyond: Expression = ONE
-
-    @property
-    def convolved(self) -> tuple[Series, ...]:
-        return self, self.slope, self.base
+    CONVOLVED = ("self", "slope", "base")
 
     def begin(self, at: Order) -> Expression:
         base = at.of(self.base)
-        self.inverse = at.keep(f"i_{self.base.name}", over(ONE, base))
-        self.beyond = at.keep(f"e_{self.name}", add(self.exponent, ONE))
+        self.inverse = at.save(f"i_{self.base.name}", over(ONE, base))
+        self.beyond = at.save(f"e_{self.name}", add(self.exponent, ONE))
         return Call("power", (base, self.exponent))
 
     def coefficient(self, at: Order) -> Expression:
         grown = times(at.inverse, self.beyond, at.sum(self.slope, self, 1, 0))
-        return times(add(grown, times(Number(-1.0), at.sum(self.base, self, 1, 0))), self.inverse)
+        return times(add(grown, times(MINUS, at.sum(self.base, self, 1, 0))), self.inverse)
+
+
+# -- kinks and jumps --------------------------------------------------------------------------------------------------
 
 
 @dataclass(eq=False, slots=True)
 class Kink(Series):
-    """The side of zero on which a series lies just after the start, 1 or -1; 0 while nothing but zeros is known of it.
+    """The side of zero, 1 or -1, on which a series lies just after the start; 0 while only zeros are known of it.
 
-    It is no series itself, it is the same to all orders.  A series that begins at zero, up to rounding, a small part of the
-    terms that it is the sum of, has the side that its coefficients tell, all of which are made anew then.
+    Its value is the same at all orders.  If the series begins at zero, up to rounding of the terms that it is the sum of,
+    the first coefficient that is not zero decides the side, and the step computes all coefficients again.
     """
 
     base: Series
-
-    @property
-    def convolved(self) -> tuple[Series, ...]:
-        return (self.base,)
+    CONVOLVED = ("base",)
 
     def begin(self, at: Order) -> Expression:
         return self.side(at, magnitude(at, self.base))
 
     def side(self, at: Order, terms: Expression) -> Expression:
-        """The side just after the start, by the size of the terms that the series begins with."""
-        size = at.keep(f"size_{self.name}", terms)
+        """Return the side just after the start, from the size of the terms that the series begins with."""
+        size = at.save(f"size_{self.name}", terms)
         start = Call("side_of", (at.of(self.base), self.least(size)))
         hint = 0.0 * Name("scale") if isinstance(self.base, Constant) else at.hint(self.base)
-        return at.keep(self.name, Call("side_or", (start, hint)))
+        return at.save(self.name, Call("side_or", (start, hint)))
 
     def least(self, size: Name) -> Expression:
-        """How far from zero it begins if it does not begin there, by the size of its terms."""
+        """Return the distance from zero within which the series begins at zero, from the size of its terms."""
         return Name("ROUNDING") * size
 
     def coefficient(self, at: Order) -> Expression:
         return Name(self.name)
 
     def passages(self, side: Expression, stored: Stored) -> list[Statement]:
-        """The statements that end a step where the series leaves its side."""
+        """Return the statements that end a step where the series leaves its side."""
         return [stored.passage(side, stored.size, "PASSED", Name("NEAREST") * "passed")]
 
 
@@ -423,26 +417,24 @@ class Choice(Series):
     kink: Kink
     above: Series
     below: Series
-
-    @property
-    def linear(self) -> tuple[Series, ...]:
-        return self.kink, self.above, self.below
+    LINEAR = ("kink", "above", "below")
 
     def coefficient(self, at: Order) -> Expression:
-        return _chosen(at.of(self.kink), at.of(self.above), at.of(self.below))
+        return _one_of_two(at.of(self.kink), at.of(self.above), at.of(self.below))
 
 
 @dataclass(eq=False, slots=True)
 class Brink(Kink):
-    """The side of zero on which a series lies where another one jumps; it begins at zero at zero itself alone."""
+    """The side of zero of a series where another one jumps; only an exact zero counts as zero."""
 
     def least(self, size: Name) -> Expression:
         return ZERO
 
     def passages(self, side: Expression, stored: Stored) -> list[Statement]:
-        """The statements that end a step where the series leaves its side.
+        """Return the statements that end a step where the series leaves its side.
 
-        A passage is as exact as rounding lets it be, of the way until there, not of that of a step without it.
+        A jump changes the rate, so the passage is exact to rounding (2e-15).  The second call measures rounding by the way
+        until the passage and not by the way of the whole step.
         """
         return 2 * [stored.passage(side, 1e4 * stored.size, 2e-15, 0.01 * Name("nearest"))]
 
@@ -455,28 +447,29 @@ class Leaping(Series):
     above: Series
     at: Series
     below: Series
-
-    @property
-    def linear(self) -> tuple[Series, ...]:
-        return self.brink, self.above, self.at, self.below
+    LINEAR = ("brink", "above", "at", "below")
 
     def coefficient(self, at: Order) -> Expression:
-        return _one(at.of(self.brink), at.of(self.above), at.of(self.at), at.of(self.below))
+        side, above, middle, below = (at.of(s) for s in self.linear)
+        if middle == below:
+            return _one_of_two(side, above, below)
+        if middle == above:
+            return _one_of_two(times(MINUS, side), below, above)
+        if middle == ZERO and above == times(MINUS, below):
+            return times(side, above)
+        return expressions.Conditional(Compare("<", side, ZERO), below, _one_of_two(side, above, middle))
 
 
 @dataclass(eq=False, slots=True)
 class Fraction(Series):
-    """A series less the whole number below it just after its start; `turned` is it, or a sum that it is the negative of."""
+    """A series minus its floor just after the start; `turned` is the series, or the sum of which it is the negative."""
 
     base: Series
     turned: Series
-
-    @property
-    def linear(self) -> tuple[Series, ...]:
-        return (self.base,)
+    LINEAR = ("base",)
 
     def begin(self, at: Order) -> Expression:
-        return add(at.of(self.base), times(Number(-1.0), below(at, self.base, self)))
+        return add(at.of(self.base), times(MINUS, floor(at, self.base, self)))
 
     def coefficient(self, at: Order) -> Expression:
         return at.of(self.base)
@@ -484,34 +477,27 @@ class Fraction(Series):
 
 @dataclass(eq=False, slots=True)
 class Whole(Series):
-    """The whole number below a series just after its start; the brinks are those of its distances from this and the next one."""
+    """The floor of a series just after the start; the brinks are its distances from this whole number and from the next."""
 
     base: Series
     lower: Brink
     upper: Brink
-
-    @property
-    def linear(self) -> tuple[Series, ...]:
-        return self.lower, self.upper
-
-    @property
-    def started(self) -> tuple[Series, ...]:
-        return (self.base,)
+    LINEAR, STARTED = ("lower", "upper"), ("base",)
 
     def begin(self, at: Order) -> Expression:
-        return below(at, self.base, self.lower.base)
+        return floor(at, self.base, self.lower.base)
 
     def coefficient(self, at: Order) -> Expression:
         return ZERO
 
 
-def below(at: Order, series: Series, part: Series) -> Expression:
-    """The whole number below a series just after its start; `part` is what lies above."""
-    return add(Call("floor", (at.of(series),)), Call("minimum", (at.hint(part), ZERO)))
+def floor(at: Order, series: Series, fraction: Series) -> Expression:
+    """Return the floor of a series just after the start: one less if it begins at a whole number and falls."""
+    return add(Call("floor", (at.of(series),)), Call("minimum", (at.hint(fraction), ZERO)))
 
 
 def magnitude(at: Order, series: Series) -> Expression:
-    """The sum of the sizes of the terms that a series begins with: rounding is a small part of it."""
+    """Return the sum of the absolute terms that a series begins with; its rounding error is a small part of it."""
     if isinstance(series, Fraction):
         return magnitude(at, series.turned)
     parts = [at.of(series)]
@@ -524,29 +510,25 @@ def magnitude(at: Order, series: Series) -> Expression:
     return add(*(Number(abs(e.value)) if isinstance(e, Number) else absolute(e) for e in parts))
 
 
-def _chosen(side: Expression, above: Expression, below: Expression) -> Expression:
+def _one_of_two(side: Expression, above: Expression, below: Expression) -> Expression:
+    """Return `above` where the side is 1, else `below`; without a comparison where a product does the same."""
     if above == below:
         return above
-    if above == times(Number(-1.0), below):
+    if above == times(MINUS, below):
         return times(side, above)
     return expressions.Conditional(Compare(">", side, ZERO), above, below)
 
 
-def _one(side: Expression, above: Expression, middle: Expression, below: Expression) -> Expression:
-    if middle in (above, below):
-        return _chosen(side, above, below) if middle == below else _chosen(times(Number(-1.0), side), below, above)
-    if middle == ZERO and above == times(Number(-1.0), below):
-        return times(side, above)
-    return expressions.Conditional(Compare("<", side, ZERO), below, _chosen(side, above, middle))
+# -- rates of a mass matrix -------------------------------------------------------------------------------------------
 
 
 @dataclass(eq=False, slots=True)
 class Row(Series):
-    """One row of L y = r - (M - M_0) a, a the solution of M a = r, with the rows of L and U of M_0 = L U.
+    """One row of the forward substitution L y = r - (M - M_0) a, where M a = r are the rates and M_0 = L U.
 
-    M_0 a_k = r_k - sum of M_j a_(k-j) for j = 1 … k: the factors of M_0 serve all orders.  `entries` are factor and series
-    of the row of M by column, rows and columns in the order of elimination.  A symmetric matrix takes half the operations.
-    `unknowns`, the whole solution, is set after all rows were made.
+    Order k of M a = r gives M_0 a_k = r_k - sum_{j=1..k} M_j a_(k-j): the factors of M_0 serve all orders.  `entries` are
+    the factor and the series of the row of M by column, rows and columns in the order of elimination.  A symmetric matrix
+    takes half the operations.  `unknowns`, the whole solution, is set after all rows were made.
     """
 
     right: Series
@@ -564,43 +546,40 @@ class Row(Series):
 
     @property
     def moving(self) -> list[tuple[Expression, Series, Unknown]]:
-        """The entries that change within a step, each with the unknown that it multiplies."""
-        pairs = [(factor, series, self.unknowns[c]) for c, (factor, series) in self.entries.items()]
-        return [found for found in pairs if not isinstance(found[1], Constant)]
+        """Return the entries that change within a step, each with the unknown that it multiplies."""
+        products = [(factor, series, self.unknowns[c]) for c, (factor, series) in self.entries.items()]
+        return [(factor, series, a) for factor, series, a in products if not isinstance(series, Constant)]
 
     @property
     def convolved(self) -> tuple[Series, ...]:
         return tuple(s for _, series, unknown in self.moving for s in (series, unknown))
 
     def begin(self, at: Order) -> Expression:
-        self.factorise(at)
-        return self.coefficient(at)
-
-    def coefficient(self, at: Order) -> Expression:
-        pushed = (times(Number(-1.0), factor, at.sum(series, a, 1, 0)) for factor, series, a in self.moving)
-        known = (times(Number(-1.0), e, at.of(self.before[k])) for k, e in self.lower.items())
-        return add(at.of(self.right), *pushed, *known)
-
-    def factorise(self, at: Order) -> None:
-        """Compute the row of L, that of U, and the inverse of its pivot."""
+        # Gaussian elimination of this row of M_0 by the rows before it: row i of L, then row i of U
         i = len(self.before)
         row = {c: times(factor, at.of(series)) for c, (factor, series) in self.entries.items()}
         for k, other in enumerate(self.before):
             left = row.pop(k, ZERO)
-            left = other.upper.get(i, ZERO) if self.symmetric else left
+            left = other.upper.get(i, ZERO) if self.symmetric else left  # l_ik = u_ki/u_kk
             if left == ZERO:
                 continue
-            self.lower[k] = at.keep(f"l_{self.name}_{k}", times(left, other.inverse))
+            self.lower[k] = at.save(f"l_{self.name}_{k}", times(left, other.inverse))
             for c, e in other.upper.items():
                 if c >= i or not self.symmetric:
-                    row[c] = add(row.get(c, ZERO), times(Number(-1.0), self.lower[k], e))
-        self.inverse = at.keep(f"i_{self.name}", over(ONE, row.pop(i)))
-        self.upper = {c: at.keep(f"u_{self.name}_{c}", e) for c, e in row.items() if e != ZERO}
+                    row[c] = add(row.get(c, ZERO), times(MINUS, self.lower[k], e))
+        self.inverse = at.save(f"i_{self.name}", over(ONE, row.pop(i)))
+        self.upper = {c: at.save(f"u_{self.name}_{c}", e) for c, e in row.items() if e != ZERO}
+        return self.coefficient(at)
+
+    def coefficient(self, at: Order) -> Expression:
+        pushed = (times(MINUS, factor, at.sum(series, a, 1, 0)) for factor, series, a in self.moving)
+        eliminated = (times(MINUS, e, at.of(self.before[k])) for k, e in self.lower.items())
+        return add(at.of(self.right), *pushed, *eliminated)
 
 
 @dataclass(eq=False, slots=True)
 class Unknown(Series):
-    """One unknown a of U a = y; `after` are those of later rows by their columns."""
+    """One unknown a of the back substitution U a = y; `after` are those of later rows by their columns."""
 
     row: Row
     after: dict[int, Unknown]
@@ -610,5 +589,5 @@ class Unknown(Series):
         return self.row, *self.after.values()
 
     def coefficient(self, at: Order) -> Expression:
-        known = (times(Number(-1.0), e, at.of(self.after[c])) for c, e in self.row.upper.items())
-        return times(add(at.of(self.row), *known), self.row.inverse)
+        substituted = (times(MINUS, e, at.of(self.after[c])) for c, e in self.row.upper.items())
+        return times(add(at.of(self.row), *substituted), self.row.inverse)

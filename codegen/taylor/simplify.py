@@ -1,6 +1,6 @@
-"""Sums, products and quotients that are folded where they are made.
+"""Sums, products and quotients that are folded when they are made.
 
-Recurrences are built of them, and are never rearranged: a step of order 24 has thousands.
+Recurrences are built of them and never rearranged afterwards: a step of order 24 has thousands.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ from ..program.expressions import (
 
 
 def add(*terms: Expression) -> Expression:
-    """The sum, without zeros, its numbers together at the end."""
+    """Return the sum, without zeros, its numbers together at the end."""
     number = 0.0
-    rest: list[Expression] = []
+    others: list[Expression] = []
     for term in (part for e in terms for part in terms_of(e)):
         if isinstance(term, Number):
             number += term.value
         else:
-            rest.append(term)
-    if number or not rest:
-        rest.append(Number(number))
-    return plus(*rest)
+            others.append(term)
+    if number or not others:
+        others.append(Number(number))
+    return plus(*others)
 
 
 def times(*factors: Expression) -> Expression:
-    """The product; its numbers become one in front."""
+    """Return the product; its numbers become one in front, its signs one negation."""
     number = 1.0
-    rest: list[Expression] = []
+    others: list[Expression] = []
     for factor in factors:
         if isinstance(factor, Negation):
             number, factor = -number, factor.value
@@ -48,15 +48,15 @@ def times(*factors: Expression) -> Expression:
             if isinstance(part, Number):
                 number *= part.value
             else:
-                rest.append(part)
-    if not rest or number == 0.0:
+                others.append(part)
+    if not others or number == 0.0:
         return Number(number)
-    size = product(rest if abs(number) == 1.0 else [Number(abs(number)), *rest])
+    size = product(others if abs(number) == 1.0 else [Number(abs(number)), *others])
     return negative(size) if number < 0.0 else size
 
 
 def over(above: Expression, below: Expression) -> Expression:
-    """The quotient."""
+    """Return the quotient."""
     if isinstance(above, Number) and isinstance(below, Number):
         return Number(above.value / below.value)
     if above == ZERO or below == ONE:
@@ -65,22 +65,20 @@ def over(above: Expression, below: Expression) -> Expression:
 
 
 def absolute(e: Expression) -> Expression:
-    """The absolute value."""
     return Call("absolute", (e,))
 
 
 def within(size: Expression, period: float | None) -> Expression:
-    """A size, at most the period of an angle."""
+    """Return a size, at most the period of an angle."""
     return size if period is None else Call("minimum", (size, Number(period)))
 
 
 def largest(values: Iterable[Expression]) -> Expression:
-    """The largest of some values."""
     return extreme("maximum", list(values))
 
 
 def extreme(function: str, values: Sequence[Expression]) -> Expression:
-    """Nested calls of a function of two values."""
+    """Return nested calls of a function of two values, a balanced tree: short chains of dependent operations."""
     if len(values) == 1:
         return values[0]
     half = len(values) // 2

@@ -1,7 +1,13 @@
-"""How long a Taylor step may be: the statements that follow those of the sizes of the last coefficients.
+"""How long a Taylor step may be.
 
-The step length is that of A. Jorba & M. Zou, Experimental Mathematics 14, 99 (2005), section 3.2, from the last three
-coefficients, so that no series that has zeros at every second or third place is taken for an exact one.
+A series whose last coefficients have size s_k, in units of the error that it may have, reaches s_k**(-1/k) of `scale`: there
+its term of order k is as large as that error.  This is the step length of A. Jorba & M. Zou, Experimental Mathematics 14, 99
+(2005), section 3.2, from the last three coefficients instead of two, because series with zeros at every second or third
+place would pass for exact ones.
+
+Three more limits follow: no step is longer than FARTHEST times the `scale` of its coefficients; none goes behind the place
+where the terms of a watched series stop falling (`unseen`); none goes on to where an exponential rises that is zero in
+double precision now (`distant`).
 """
 
 from __future__ import annotations
@@ -13,10 +19,10 @@ from ..program.statements import If, Statement, let
 from .simplify import absolute, add, extreme, largest, times
 
 FARTHEST = 16.0
-"""How many times longer than `scale` a step may be."""
+"""The longest step, in units of `scale`; a choice."""
 
 NEXT = 2.0
-"""The same where series are watched, so that what is zero in double precision now is seen when it has begun.
+"""The longest step where series are watched, so that a series that is zero in double precision now is seen when it begins.
 
 Contacts end their slips by events: the first steps behind one would be a third of all steps.
 """
@@ -28,35 +34,34 @@ The series of x' = v, v' = -x**n from x = 0 has its coefficients n + 1 orders ap
 """
 
 HIDDEN, LOST = 1e-9, 1e-110
-"""Least that the low coefficients of a series are taken for: shares of the high ones, and of the absolute tolerance.
+"""Least size of the low coefficients of a series, as shares of the high ones and of the absolute tolerance; choices.
 
 The first is for zeros of the low ones alone, the second for zeros of high order, which no step would reach otherwise.
 """
 
-
 REMOTE, NEARER = 230.0, 100.0
-"""Below minus the first, exponentials are not seen in any coefficient; least that an exponent may rise by from there."""
+"""Exponentials of less than -REMOTE (1e-100) are in no coefficient; least rise of the exponent in a step from there."""
 
 SEEN = let("unseen", 0.0 * Name("scale"))
-"""What `unseen` begins with."""
+"""The initial value of `unseen`."""
 
 
 def last_orders(order: int) -> tuple[int, int, int]:
-    """The orders whose coefficients say how far a series reaches."""
+    """Return the orders whose coefficients decide how far a series reaches."""
     return order, order - 1, order - 2
 
 
 def reach(orders: Sequence[int]) -> Expression:
-    """The logarithm of the share of `scale` that a step may go by its `size_…` of some orders."""
+    """Return the logarithm of the share of `scale` that a step may go, from `size_…` of some orders."""
     return extreme("minimum", [times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))) for k in orders])
 
 
 def unseen(coefficients: Sequence[Expression]) -> list[Statement]:
-    """How much larger the high coefficients of a series are than its low ones, the largest so far."""
+    """Return the statements that raise `unseen` to the ratio of the high coefficients of a series to its low ones."""
     half = len(coefficients) // 2
     low, high = (
-        [absolute(e) for k in places if (e := coefficients[k]) != ZERO]
-        for places in ((*LOW, half - 1), range(half, len(coefficients)))
+        [absolute(e) for k in orders if (e := coefficients[k]) != ZERO]
+        for orders in ((*LOW, half - 1), range(half, len(coefficients)))
     )
     if not (low and high):
         return []
@@ -69,25 +74,26 @@ def unseen(coefficients: Sequence[Expression]) -> list[Statement]:
 
 
 def bounded(coefficients: Sequence[Expression]) -> list[Statement]:
-    """The statements for `way`: it times the share of `scale` that a step goes bounds the change of a series within it.
+    """Return the statements for `way`; way * ratio bounds the change of a series within a step.
 
-    `coefficients` are those of the series but the first.
+    `coefficients` are those of order 1 and more: way = |c_1| + |c_2| ratio + … by Horner's rule.
     """
-    further = [absolute(e) if e != ZERO else e for e in coefficients]
-    while further and further[-1] == ZERO:
-        further.pop()
-    way, found = Name("way"), list[Statement]()
-    for e in reversed(further):
-        found.append(let(way.text, add(e, times(way, Name("ratio"))) if found else e))
-    return found
+    sizes = [absolute(e) if e != ZERO else e for e in coefficients]
+    while sizes and sizes[-1] == ZERO:
+        sizes.pop()
+    statements = list[Statement]()
+    for e in reversed(sizes):
+        statements.append(let("way", add(e, times(Name("way"), Name("ratio"))) if statements else e))
+    return statements
 
 
-def distant(start: Expression, further: Sequence[Expression]) -> list[Statement]:
-    """Shorten a step that might go on to where an exponential is seen that is not, because it is far too small.
+def distant(start: Expression, coefficients: Sequence[Expression]) -> list[Statement]:
+    """Return the statements that end a step before an exponential rises which is far too small to be seen.
 
-    Zero to every digit, with all its coefficients, it says nothing of where it rises; its exponent does.
+    It is zero to every digit, with all its coefficients; its exponent, `start` and `coefficients` from order 1 on, tells
+    where it rises.
     """
-    bound = bounded(further)
+    bound = bounded(coefficients)
     if not bound:
         return []
     remote, far = Compare("<", start, Number(-REMOTE)), Compare(">", Name("way"), Name("room"))
@@ -103,10 +109,7 @@ def distant(start: Expression, further: Sequence[Expression]) -> list[Statement]
 
 
 def finished(order: int, watched: bool, contacts: bool) -> list[Statement]:
-    """The length of the step from the logarithm of its share of `scale`.
-
-    No step goes on behind the place where the terms of a watched series stop falling.
-    """
+    """Return the statements for `length` and `ratio` from `reach`, the logarithm of the step's share of `scale`."""
     falling = call("minimum", *(times(Number(-1.0 / k), call("log", "unseen")) for k in (order - 2, order // 2)))
     farthest = NEXT if watched and not contacts else FARTHEST
     far = call("truncated", Name("scale") * call("exp", "reach"))

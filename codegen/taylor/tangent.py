@@ -1,13 +1,17 @@
 """A Taylor step of an orbit and of the deviations along it.
 
-The tangent of a Taylor step is the Taylor step of orbit and deviation together. Of d' = A d the coefficients are
-d_(k+1) = scale/(k+1) sum_j A_j d_(k-j), and the series of A belongs to the orbit: a step of the orbit leaves it in a short
-shared array, from which every mode takes its own step. The orbit is scalar; a register holds one deviation for each of
-LANES modes.
+The tangent of a Taylor step is the Taylor step of orbit and deviations together: the recurrences also hold for derivatives
+by initial states (R. Barrio, SIAM Journal on Scientific Computing 27, 1929 (2006)).  Of d' = A d the coefficients are
+
+    d_(k+1) = scale/(k+1) sum_j A_j d_(k-j)
+
+where the series of A follows from the orbit alone.  A step of the orbit stores it in a short shared array, from which every
+mode takes a step of its own deviations.  The orbit is scalar; a register holds one deviation for each of LANES modes.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,15 +25,16 @@ from ..program.lowering import lower
 from ..program.passes import Names
 from ..program.printers import LANES
 from ..program.statements import Comment, Function, If, Return, Role, let, store
+from .passable import is_analytic
 from .series import Series, State
-from .series_graph import SeriesGraph, Template, is_analytic
+from .series_graph import SeriesGraph, Template
 from .simplify import absolute, add, largest, times
 from .step_length import last_orders, reach
 from .taylor_step import TaylorStep, check_order
 from .unrolled_series import SQUARE, Lines, UnrolledSeries, polynomial
 
 HEAD = 2
-"""First entries of the shared array: `scale` of the orbit's step, and its length, which the driver writes."""
+"""Number of entries at the beginning of the shared array: `scale` of the orbit's step, and its length."""
 
 COMMON = '''
 @njit(error_model="numpy")
@@ -41,6 +46,7 @@ def common_length(lengths, longest, new, place):
             longest = min(longest, new[place*LANES + lane])
     return longest
 '''.strip()
+"""A mode whose step is at most a 32nd shorter (0.96875 = 31/32) goes along: its error is larger by exp(order/32) at most."""
 
 CARRY = '''
 @njit(error_model="numpy", cache=True)
@@ -54,16 +60,15 @@ def carry(shared, strengths, old, new, registers, tolerance):
     return longest
 '''.strip()
 
-
-LEAST = 2.2250738585072014e-308
-"""The smallest number of full precision."""
+LEAST = sys.float_info.min
+"""The smallest number of full precision, added to the error of a deviation that is zero."""
 
 
 @dataclass(frozen=True, slots=True)
 class TangentStep:
-    """The text of `step` for the orbit and those of the functions that step its modes.
+    """The text of `step` for the orbit, and of the functions that step its modes.
 
-    shared: the length of the array in which the orbit leaves the series of A.
+    shared: the length of the array in which the orbit stores the series of A.
     """
 
     orbit: TaylorStep
@@ -72,101 +77,119 @@ class TangentStep:
 
 
 class OrbitWriter(UnrolledSeries):
-    """Writes the step of an orbit, which leaves the series of some coefficients.
+    """Writes the step of an orbit, which stores the series of some coefficients of A.
 
     Attributes
     ----------
-    wanted : list of Expression
+    coefficients_of_a : list of Expression
         The coefficients, in the symbols of the network.
-    called_so : dict
-        What each of them is called in the step of a mode; those that are one series have one name.
-    left : dict
-        Their coefficients by name and order: a number, or the name of what is left.
-    places : dict
-        Where in the shared array a name is found.
+    names_of_a : dict
+        Their names in the step of a mode; those that are one series have one name.
+    stored_values : dict
+        Their series by name and order: a number, or the name of an entry of the shared array.
+    slots : dict
+        The entries of the shared array by name.
     """
 
-    def __init__(self, equations: Equations, order: int, wanted: Sequence[sp.Expr]) -> None:
-        self.wanted = list(wanted)
-        self.called_so: dict[sp.Expr, str] = {}
-        self.left: dict[tuple[str, int], Expression] = {}
-        self.places: dict[str, int] = {}
+    def __init__(self, equations: Equations, order: int, coefficients_of_a: Sequence[sp.Expr]) -> None:
+        self.coefficients_of_a = list(coefficients_of_a)
+        self.names_of_a: dict[sp.Expr, str] = {}
+        self.stored_values: dict[tuple[str, int], Expression] = {}
+        self.slots: dict[str, int] = {}
         super().__init__(equations, order)
         self.exact = True  # deviations feel the time of an event to first order
 
     def read(self) -> dict[State, Series]:
-        """The rates of the states; what is wanted beside them is noted."""
         rates = super().read()
-        moving, swap = self.of_network()
-        found = self.graph.read(Template.of(self.wanted, moving, self.supply.fresh("shared_")), moving, swap)
-        self.noted = list(dict.fromkeys(found))
-        self.called_so = {e: f"a{self.noted.index(series)}" for e, series in zip(self.wanted, found, strict=True)}
+        moving, constant = self.of_network()
+        template = Template.of(self.coefficients_of_a, moving, self.supply.fresh("shared_"))
+        series = self.graph.read(template, moving, constant)
+        self.noted = list(dict.fromkeys(series))
+        self.names_of_a = {e: f"a{self.noted.index(s)}" for e, s in zip(self.coefficients_of_a, series, strict=True)}
         return rates
 
     def make(self, k: int) -> None:
-        """Write coefficients k of all series, and leave those of what is wanted, but in the last order."""
         super().make(k)
         if k == 0:
             self.lines.put(store("shared", 0, "scale"))
-        for which, series in enumerate(self.noted if k < self.order else ()):
-            name, value = f"a{which}_{k}", self.lines.of(series)
+        # coefficients of A up to the last but one order, behind the HEAD of the shared array
+        for number, series in enumerate(self.noted if k < self.order else ()):
+            name, value = f"a{number}_{k}", self.lines.of(series)
             if not isinstance(value, Number):
-                self.places[name] = HEAD + len(self.places)
-                self.lines.put(store("shared", self.places[name], value))
+                self.slots[name] = HEAD + len(self.slots)
+                self.lines.put(store("shared", self.slots[name], value))
                 value = Name(name)
-            self.left[f"a{which}", k] = value
+            self.stored_values[f"a{number}", k] = value
 
 
 class ModeWriter(Lines):
-    """Writes the step of the modes in one register, from what an orbit leaves."""
+    """Writes the step of the modes in one register, from what the step of an orbit stores."""
 
     def __init__(self, variation: Variation, orbit: OrbitWriter) -> None:
         super().__init__(SeriesGraph(Names([s.name for s in variation.parameters])), orbit.order)
-        self.size, self.called_so, strengths = variation.size, orbit.called_so, variation.parameters
-        self.outer = {name: State(name=name) for name in orbit.called_so.values()}
-        self.values |= {(self.outer[name], k): value for (name, k), value in orbit.left.items()}
-        self.put(let("scale", _shared(0)))
-        self.put(*(let(s.name, _of_modes("strengths", len(strengths), k)) for k, s in enumerate(strengths)))
-        self.put(*(let(f"d{c}_0", _of_modes("old", self.size, c)) for c in range(self.size)))
-        self.put(*(let(name, _shared(place)) for name, place in orbit.places.items()))
+        self.size, self.names_of_a, strengths = variation.size, orbit.names_of_a, variation.parameters
+        self.series_of_a = {name: State(name=name) for name in orbit.names_of_a.values()}
+        self.values |= {(self.series_of_a[name], k): value for (name, k), value in orbit.stored_values.items()}
+        # load what is shared, and strengths and deviations of the modes in this register
+        self.put(let("scale", Load("shared", Number(0), None)))
+        for k, s in enumerate(strengths):
+            self.put(let(s.name, Load("strengths", _register(len(strengths), k), "LANES")))
+        for c in range(self.size):
+            self.put(let(f"d{c}_0", Load("old", _register(self.size, c), "LANES")))
+        self.put(*(let(name, Load("shared", Number(slot), None)) for name, slot in orbit.slots.items()))
         deviations = [State(name=f"d{c}") for c in range(self.size)]
         self.values |= {(d, 0): Name(f"{d.name}_0") for d in deviations}
         self.rates = {d: self.rate(variation, row, deviations) for row, d in enumerate(deviations)}
-        self.graph.settle([*self.rates.values()])
+        self.graph.finish([*self.rates.values()])
 
     def rate(self, variation: Variation, row: int, deviations: Sequence[State]) -> Series:
-        """The rate of a deviation: each entry is what does not move times it, and convolutions for what does."""
+        """Return a row of A d: products for entries of A that are constant, convolutions for those that move."""
         terms: list[tuple[Expression, Series]] = []
         for (r, c), e in variation.matrix:
             if r != row:
                 continue
             fixed: Expression = ZERO
             for coefficient, strength in variation.parts(e):
-                series, factor = self.outer[self.called_so[coefficient]], lower(strength)
-                if self.moves(series):
+                series, factor = self.series_of_a[self.names_of_a[coefficient]], lower(strength)
+                if any(self.at(series, k) != ZERO for k in range(1, self.order)):
                     terms.append((factor, self.graph.product(series, deviations[c])))
                 else:
                     fixed = add(fixed, times(factor, self.of(series)))
-            if not isinstance(fixed, Number | Name):  # what each order multiplies by is made once
+            if not isinstance(fixed, Number | Name):  # the factor of all orders is computed once
                 self.put(let(f"g{r}_{c}", fixed))
                 fixed = Name(f"g{r}_{c}")
             if fixed != ZERO:
                 terms.append((fixed, deviations[c]))
         return self.graph.sum(terms)
 
-    def moves(self, series: Series) -> bool:
-        """True if any later coefficient of a series is not zero."""
-        return any(self.at(series, k) != ZERO for k in range(1, self.order))
-
     def write(self) -> Function:
-        """The function `mode_step`."""
+        """Return the function `mode_step`."""
         for k in range(self.order + 1):
             self.coefficients(k)
-        self.length()
+
+        # the length: the last three coefficients are small beside the deviation at the beginning of the step
+        self.put(Comment("step length"), let("size", largest(absolute(self.at(d, 0)) for d in self.rates)))
+        self.put(let("weight", 1.0 / (Name("tolerance") * "size" + LEAST)))
+        last = {k: [absolute(e) for d in self.rates if (e := self.at(d, k)) != ZERO] for k in last_orders(self.order)}
+        orders = [k for k, sizes in last.items() if sizes]
+        self.put(*(let(f"size_{k}", times(largest(last[k]), Name("weight"))) for k in orders))
+        self.put(let("ratio", Name("longest") / "scale"), let("length", "longest"))
+        if orders:
+            terms = (Name(f"size_{k}") * Power(Name("ratio"), Number(k)) for k in orders)
+            far = Not(Junction("and", tuple(Compare("<=", term, Number(1.0)) for term in terms)))
+            shorter = (
+                Comment("not all of them go so far"),
+                let("lengths", call("truncated", Name("scale") * call("exp", reach(orders)))),
+                let("length", call("common_length", "lengths", "longest", "new", _register(self.size, 0))),
+                let("ratio", Name("length") / "scale"),
+            )
+            self.put(If(call("any_lane", far), shorter))
+
+        # the deviations at the end of the step; NaN if any of them is infinite or NaN
         self.put(Comment("new deviation"), SQUARE)
         for c, d in enumerate(self.rates):
-            self.put(*polynomial(d.name, [self.at(d, k) for k in range(self.order + 1)]))
-            self.put(store("new", _place(self.size, c), f"n_{d.name}"))
+            self.put(*polynomial(d.name, self.all_of(d)))
+            self.put(store("new", _register(self.size, c), f"n_{d.name}"))
         self.put(let("total", plus(*(absolute(Name(f"n_{d.name}")) for d in self.rates))))
         broken = Not(Compare("<", Name("total"), Name("math.inf")))
         self.put(If(call("any_lane", broken), (Return((Name("math.nan"),)),)), Return((Name("length"),)))
@@ -178,25 +201,6 @@ class ModeWriter(Lines):
             Role.CALLED,
         )
 
-    def length(self) -> None:
-        """The length of the step: the last three coefficients are small beside the deviation at its beginning."""
-        self.put(Comment("step length"), let("size", largest(absolute(self.at(d, 0)) for d in self.rates)))
-        self.put(let("weight", 1.0 / (Name("tolerance") * "size" + LEAST)))
-        found = {k: [absolute(e) for d in self.rates if (e := self.at(d, k)) != ZERO] for k in last_orders(self.order)}
-        known = [k for k, last in found.items() if last]
-        self.put(*(let(f"size_{k}", times(largest(found[k]), Name("weight"))) for k in known))
-        self.put(let("ratio", Name("longest") / "scale"), let("length", "longest"))
-        if known:
-            sizes = (Name(f"size_{k}") * Power(Name("ratio"), Number(k)) for k in known)
-            far = Not(Junction("and", tuple(Compare("<=", size, Number(1.0)) for size in sizes)))
-            shorter = (
-                Comment("not all of them go so far"),
-                let("lengths", call("truncated", Name("scale") * call("exp", reach(known)))),
-                let("length", call("common_length", "lengths", "longest", "new", _place(self.size, 0))),
-                let("ratio", Name("length") / "scale"),
-            )
-            self.put(If(call("any_lane", far), shorter))
-
 
 def write_tangent(variation: Variation, order: int) -> TangentStep:
     """Return the Taylor step of some order of an orbit and of deviations along it."""
@@ -206,23 +210,15 @@ def write_tangent(variation: Variation, order: int) -> TangentStep:
         raise ValueError(
             "taylor: found a kink beside deviations along an orbit; expected analytic functions; use rodas5p"
         )
-    wanted = dict.fromkeys(c for _, e in variation.matrix for c, _ in variation.parts(e))
     check_order(order)
-    orbit = OrbitWriter(variation.orbit, order, list(wanted))
+    coefficients = dict.fromkeys(c for _, e in variation.matrix for c, _ in variation.parts(e))
+    orbit = OrbitWriter(variation.orbit, order, list(coefficients))
     step = orbit.step("shared")
     modes = LANES.function(ModeWriter(variation, orbit).write())
-    return TangentStep(step, (COMMON, modes, CARRY), HEAD + len(orbit.places))
+    return TangentStep(step, (COMMON, modes, CARRY), HEAD + len(orbit.slots))
 
 
-def _place(size: int, k: int) -> Expression:
-    """Number k of the registers of one group of modes, which fill `size` registers of an array."""
+def _register(size: int, k: int) -> Expression:
+    """Return the register of an array that holds number k of the `size` registers of one group of modes."""
     group = Name("which") if size == 1 else size * Name("which")
     return group + k if k else group
-
-
-def _of_modes(array: str, size: int, k: int) -> Expression:
-    return Load(array, _place(size, k), "LANES")
-
-
-def _shared(place: int) -> Expression:
-    return Load("shared", Number(place), None)
