@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from .bifurcation.periodic import PeriodicOrbit, periodic_orbit
     from .bifurcation.skeleton import Skeleton, skeleton
     from .engines.scene_kernels import kernel
-    from .opening.open import open_result
+    from .results.open import open_result
     from .results.result import Result
     from .stability.cluster_exponents import ClusterExponents, cluster_exponents
     from .stability.exponents import Exponents, exponents
@@ -117,7 +117,7 @@ _HOME = {
     "kernel": "engines.scene_kernels",
     "lyapunov_spectrum": "stability.lyapunov",
     "msf": "stability.msf",
-    "open_result": "opening.open",
+    "open_result": "results.open",
     "periodic_orbit": "bifurcation.periodic",
     "plane": "stability.msf",
     "run": "sweeps.run",

@@ -45,7 +45,7 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.bifurcation.branches import follow
 from synchain.runtime.bifurcation.periodic import periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton
-from synchain.runtime.opening.open import open_result
+from synchain.runtime.results.open import open_result
 from synchain.runtime.stability.cluster_exponents import cluster_exponents
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum

@@ -17,8 +17,8 @@ from synchain.models.scenes.scene import Scene
 from synchain.models.sweeps.axis import Axis
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.engines.scene_kernels import kernel
-from synchain.runtime.opening.open import open_result
 from synchain.runtime.results import store
+from synchain.runtime.results.open import open_result
 from synchain.runtime.support.progress import Progress
 from synchain.runtime.sweeps.stream import stream
 

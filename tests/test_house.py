@@ -62,14 +62,13 @@ ARROWS = {
     "runtime.sweeps": "stability results engines prediction cells support codegen models",
     "runtime.synchronisation": "sweeps stability results engines prediction cells support codegen models",
     "runtime.bifurcation": "sweeps stability results cells support models",
-    "runtime.opening": "bifurcation synchronisation sweeps stability results prediction cells support codegen models",
     "runtime.plots": "bifurcation synchronisation sweeps stability results prediction support models",
     "runtime.reports": "plots sweeps stability results engines models",
     "runtime.paper": "plots bifurcation synchronisation sweeps stability results prediction support models",
     "runtime.console": "plots bifurcation synchronisation sweeps stability results prediction cells "
     "support codegen models",
     "runtime.front": "models runtime",
-    "runtime.commands": "console reports plots paper opening bifurcation synchronisation sweeps stability results engines "
+    "runtime.commands": "console reports plots paper bifurcation synchronisation sweeps stability results engines "
     "prediction cells support codegen models",
 }
 """The rooms that a room may import, beside itself; names without a package are rooms of the same

@@ -1,7 +1,8 @@
 """Frozen values as JSON and arrays, and back: no code runs when they are read.
 
 Numbers stand in the JSON, arrays in the dataset: an array that the labelled data hold already is
-named, any other becomes a variable of its own.
+named, any other becomes a variable of its own. A file can name only classes that occur in the types
+of the fields of its result.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, TypeAlias
+from functools import cache
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, get_args, get_type_hints
 
 import numpy as np
 
@@ -25,43 +27,62 @@ if TYPE_CHECKING:
 
 Tree: TypeAlias = "dict[str, Any]"
 Variables: TypeAlias = "dict[str, tuple[tuple[str, ...], np.ndarray]]"
+T = TypeVar("T")
 
 
 def encode(value: object, data: xr.Dataset) -> tuple[Tree, Variables]:
     """Return the fields of a frozen value as JSON types, and the arrays that `data` lack."""
-    writer = _SceneCollector(data)
-    tree = writer.tree(value, "")
-    return {"root": tree, "scenes": [json.loads(text) for text in writer.scenes]}, writer.further
+    writer = _Writer(data, _classes_in(type(value)))
+    root = writer.tree(value, "")
+    return {"root": root, "scenes": [json.loads(text) for text in writer.scenes]}, writer.arrays
 
 
-def decode(tree: Mapping[str, Any], data: xr.Dataset, classes: Mapping[str, type]) -> Any:
-    """Return the value of a tree."""
-    return _ValueReader(data, classes, [Scene.from_dict(each) for each in tree["scenes"]]).value(tree["root"])
+def decode(tree: Mapping[str, Any], data: xr.Dataset, kind: type[T]) -> T:
+    """Return the value of a tree; ValueError if it is of another kind."""
+    if (name := tree["root"]["value"]) != kind.__name__:
+        raise ValueError(f"it holds a {name}; expected a result of the kind {kind.__name__}")
+    scenes = [Scene.from_dict(each) for each in tree["scenes"]]
+    value: T = _Reader(data, _classes_in(kind), scenes).value(tree["root"])
+    return value
 
 
-class _SceneCollector:
+@cache
+def _classes_in(kind: type) -> dict[str, type]:
+    """Return a frozen class, and the frozen classes and enums in the types of its fields, by name."""
+    classes: dict[str, type] = {}
+    hints: list[Any] = [kind]
+    while hints:
+        hint = hints.pop()
+        hints += get_args(hint)  # of tuple[Branch, ...], Scene | None …
+        # scenes and graphs have texts of their own
+        if isinstance(hint, type) and hint not in (Scene, Topology, classes.get(hint.__name__)):
+            if issubclass(hint, Enum) or is_dataclass(hint):
+                classes[hint.__name__] = hint
+            if is_dataclass(hint):
+                hints += get_type_hints(hint).values()
+    return classes
+
+
+class _Writer:
     """Collects the scenes and the further arrays of a value."""
 
-    def __init__(self, data: xr.Dataset) -> None:
-        self.data = data
-        self.scenes: dict[str, int] = {}
-        self.further: Variables = {}
+    def __init__(self, data: xr.Dataset, classes: Mapping[str, type]) -> None:
+        self.data, self.classes = data, classes
+        self.scenes: dict[str, int] = {}  # number of each scene by its JSON
+        self.arrays: Variables = {}
 
     def tree(self, value: Any, path: str) -> Any:
-        """The value in JSON types; `path` names it in the dataset."""
+        """Return the value in JSON types; `path` names it in the dataset."""
+        if isinstance(value, np.generic):
+            value = value.item()
         if isinstance(value, Enum):
             return {"enum": [type(value).__name__, value.value]}
-        if isinstance(value, np.generic):
-            return self.tree(value.item(), path)
         if value is None or isinstance(value, bool | int | float | str):
             return value
         if isinstance(value, np.ndarray):
             return self._array(value, path)
         if isinstance(value, tuple | list):
             return [self.tree(item, f"{path}_{k}" if path else str(k)) for k, item in enumerate(value)]
-        return self._tagged(value, path)
-
-    def _tagged(self, value: Any, path: str) -> Tree:
         if isinstance(value, complex):
             return {"complex": [value.real, value.imag]}
         if isinstance(value, Fraction):
@@ -73,35 +94,32 @@ class _SceneCollector:
             return {"table": {name: self.tree(item, f"{path}_{name}") for name, item in value.items()}}
         if isinstance(value, Topology):
             return {"graph": graph_table(value)}
-        if is_dataclass(value) and not isinstance(value, type):
-            parts = {
-                own.name: self.tree(getattr(value, own.name), f"{path}_{own.name}".lstrip("_"))
-                for own in fields(value)
-                if own.init
-            }
+        if self.classes.get(type(value).__name__) is type(value):
+            names = [field.name for field in fields(value) if field.init]
+            parts = {name: self.tree(getattr(value, name), f"{path}_{name}".lstrip("_")) for name in names}
             return {"value": type(value).__name__, "fields": parts}
         raise TypeError(f"{path}: found {type(value).__name__}; expected numbers, arrays, texts or frozen values")
 
     def _array(self, values: np.ndarray, path: str) -> Tree:
-        known = self.data.get(path)
+        labelled = self.data.get(path)
         if (
-            known is None
-            or known.shape != values.shape
-            or not np.array_equal(known.values, values, equal_nan=values.dtype.kind in "fc")
+            labelled is None
+            or labelled.shape != values.shape
+            or not np.array_equal(labelled.values, values, equal_nan=values.dtype.kind in "fc")
         ):
             path = f"field_{path}"
-            self.further[path] = (tuple(f"{path}_{k}" for k in range(values.ndim)), values)
+            self.arrays[path] = (tuple(f"{path}_{k}" for k in range(values.ndim)), values)
         return {"array": path, "dtype": values.dtype.str}
 
 
-class _ValueReader:
-    """Makes values of a tree again."""
+class _Reader:
+    """Makes the values of a tree."""
 
     def __init__(self, data: xr.Dataset, classes: Mapping[str, type], scenes: list[Scene]) -> None:
         self.data, self.classes, self.scenes = data, classes, scenes
 
     def value(self, tree: Any) -> Any:
-        """The value of a part of the tree."""
+        """Return the value of a part of the tree."""
         if isinstance(tree, list):
             return tuple(map(self.value, tree))
         if not isinstance(tree, dict):
@@ -109,14 +127,13 @@ class _ValueReader:
         if "value" in tree:
             return self.classes[tree["value"]](**{name: self.value(part) for name, part in tree["fields"].items()})
         ((tag, part),) = ((tag, part) for tag, part in tree.items() if tag != "dtype")
-        if tag == "array":
-            return np.array(self.data[part].values, dtype=np.dtype(tree["dtype"]))
-        if tag == "enum":
-            return self.classes[part[0]](part[1])
         readers: dict[str, Callable[[], Any]] = {
+            "array": lambda: np.array(self.data[part].values, dtype=np.dtype(tree["dtype"])),
             "complex": lambda: complex(*part),
+            "enum": lambda: self.classes[part[0]](part[1]),
             "fraction": lambda: Fraction(part),
             "graph": lambda: graph_of(part),
+            "scene": lambda: self.scenes[part],
             "table": lambda: FrozenDict({name: self.value(item) for name, item in part.items()}),
         }
-        return readers[tag]() if tag in readers else self.scenes[part]
+        return readers[tag]()

@@ -29,7 +29,8 @@ class Labelled(HasHtml):
     """A frozen value with `data`, `summary`, `as_dict`, `plot` and `save`.
 
     A subclass is a frozen dataclass that defines `data` and `summary`.  Its fields are written and
-    read by `synchain.runtime.results.codec`, so a subclass has no reader or writer of its own.
+    read by `synchain.runtime.results.codec` by their types, so a subclass has no reader or writer of
+    its own.  `open_result` finds it by its public name in `synchain.runtime`.
     """
 
     __slots__ = ()

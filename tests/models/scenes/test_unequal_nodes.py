@@ -21,7 +21,7 @@ from synchain.models.presentation.equations_text import text
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.reduce import reduce_scene
-from synchain.runtime.opening.open import open_result
+from synchain.runtime.results.open import open_result
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.certify import certify
 from synchain.runtime.sweeps.run import run

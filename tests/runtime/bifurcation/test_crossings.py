@@ -15,7 +15,7 @@ from synchain.runtime.bifurcation.branches import Branch, follow
 from synchain.runtime.bifurcation.continuation import Arc
 from synchain.runtime.bifurcation.periodic import PeriodicOrbit, periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton
-from synchain.runtime.opening.open import open_result
+from synchain.runtime.results.open import open_result
 
 # Without f and j the state zero is an orbit, of the multipliers exp(2 pi (a +- i w)) for b = 0, s = 1,
 # and exp(2 pi a), exp(2 pi b) for w = s = 0.

@@ -11,8 +11,8 @@ import pytest
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.reduce import explain, reduce_scene
-from synchain.runtime.opening.open import open_result
 from synchain.runtime.plots.result_plot import draw_result
+from synchain.runtime.results.open import open_result
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.synchronisation.criterion import Criterion

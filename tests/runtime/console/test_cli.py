@@ -26,7 +26,7 @@ from synchain.runtime import commands
 from synchain.runtime.cli import main
 from synchain.runtime.console.outcome import print_json
 from synchain.runtime.engines import job, scene_kernels
-from synchain.runtime.opening.open import open_result
+from synchain.runtime.results.open import open_result
 from synchain.runtime.sweeps import stream
 from synchain.runtime.synchronisation import threshold
 from synchain.runtime.synchronisation.criterion import PAPER

@@ -13,8 +13,8 @@ import pytest
 from synchain.models import Field
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.opening.open import open_result
 from synchain.runtime.results.certificate import NEAR, VERDICTS, Certificate
+from synchain.runtime.results.open import open_result
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps import certify as certification

@@ -25,7 +25,7 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.engines.job import JobSpec, SweepSpec
 from synchain.runtime.engines.scene_kernels import write_kernel
-from synchain.runtime.opening.open import open_result
+from synchain.runtime.results.open import open_result
 from synchain.runtime.results.result import Result
 from synchain.runtime.sweeps.errors import SweepFailed
 from synchain.runtime.sweeps.run import run

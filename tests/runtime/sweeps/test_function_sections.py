@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from synchain.models import Section, chain, mean, nodes, ring
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.opening.open import open_result
+from synchain.runtime.results.open import open_result
 from synchain.runtime.results.result import Result
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.run import run

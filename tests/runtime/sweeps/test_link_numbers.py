@@ -32,7 +32,7 @@ from synchain.models.definitions.loader import load_oscillator
 from synchain.models.inputs.names import LinkName
 from synchain.models.scenes.file import load_scene
 from synchain.runtime import cluster_exponents, exponents, lyapunov_spectrum, msf, plane, thresholds, universal_probe
-from synchain.runtime.opening.open import open_result
+from synchain.runtime.results.open import open_result
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.sweeps.stream import stream
 

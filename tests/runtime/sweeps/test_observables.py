@@ -17,7 +17,7 @@ from synchain.models import Field, chain, complete, end, maximum, mean, minimum,
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.reduce import as_reduction
-from synchain.runtime.opening.open import open_result
+from synchain.runtime.results.open import open_result
 from synchain.runtime.results.result import Result
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.run import run

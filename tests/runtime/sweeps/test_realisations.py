@@ -12,7 +12,7 @@ import sympy as sp
 from synchain.models import chain, end, lorentzian, mean, nodes, normal, rate, ring, uniform
 from synchain.models.scenes.scene import Scene
 from synchain.models.sweeps.distribution import Draw
-from synchain.runtime.opening.open import open_result
+from synchain.runtime.results.open import open_result
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.sweeps.stream import stream
 

@@ -13,8 +13,8 @@ from synchain.models import Field
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.reduce import reduce_scene
-from synchain.runtime.opening.open import open_result
 from synchain.runtime.results.labels import DRIVE_PHASE
+from synchain.runtime.results.open import open_result
 from synchain.runtime.results.result import Result
 from synchain.runtime.sweeps.run import run
 

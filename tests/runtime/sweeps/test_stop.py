@@ -10,7 +10,7 @@ import sympy as sp
 
 from synchain.models import end, mean, nodes, rate, ring
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.opening.open import open_result
+from synchain.runtime.results.open import open_result
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.run import run
 

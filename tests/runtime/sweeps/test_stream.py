@@ -24,9 +24,9 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.commands.run import stopped_by_signals
-from synchain.runtime.opening.open import open_result
 from synchain.runtime.plots.result_plot import draw_result
 from synchain.runtime.results.block_log import HEAD, BlockLog
+from synchain.runtime.results.open import open_result
 from synchain.runtime.support.netcdf import Sheet
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.errors import SweepFailed, SweepInterrupted

@@ -19,8 +19,8 @@ from streams import MAP, PAIR, UP, contents, die_at_the_copy, forking, kill_agai
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cli import main
 from synchain.runtime.commands.run import FORMATS
-from synchain.runtime.opening.open import open_result
 from synchain.runtime.results import store
+from synchain.runtime.results.open import open_result
 from synchain.runtime.results.store import FORMS, chunk, opened, pieces
 from synchain.runtime.support.netcdf import DIGEST
 from synchain.runtime.support.status import Status

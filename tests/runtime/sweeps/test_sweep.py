@@ -17,7 +17,7 @@ from synchain.runtime.cells.plan import plan
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.engines.control import tolerances
 from synchain.runtime.engines.scene_kernels import kernel
-from synchain.runtime.opening.open import open_result
+from synchain.runtime.results.open import open_result
 from synchain.runtime.support.execution import Execution
 from synchain.runtime.support.progress import Reporter
 from synchain.runtime.support.status import Status

@@ -18,8 +18,8 @@ from kept_values import PAIR, every_kind
 
 import synchain.runtime
 from synchain.models.graphs.families import topology
-from synchain.runtime.opening.open import open_result
 from synchain.runtime.results.labelled import Labelled
+from synchain.runtime.results.open import open_result
 from synchain.runtime.results.store import FORMS as KNOWN
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.sweeps.stream import stream
@@ -212,7 +212,7 @@ def test_an_absent_package_is_named_in_one_line_before_anything_runs(tmp_path: P
     code = (
         f"import sys; sys.modules.update(dict.fromkeys({list(packages.values())!r}))\n"
         "from kept_values import PAIR, every_kind\n"
-        "from synchain.runtime.opening.open import open_result\n"
+        "from synchain.runtime.results.open import open_result\n"
         "from synchain.runtime.sweeps.stream import stream\n"
         f"for ending in {list(packages)!r}:\n"
         f"    path, there = {str(tmp_path / 'a')!r} + ending, {str(tmp_path / 'there')!r} + ending\n"
