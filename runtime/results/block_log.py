@@ -51,9 +51,7 @@ FLUSH = 5.0
 
 
 def is_block_log(path: str | os.PathLike[str]) -> bool:
-    """True if a file begins like a log of blocks, or is called one and does not begin like a
-    result.
-    """
+    """Return whether a file begins like a block log, or has its ending and does not begin like a result."""
     try:
         with open_regular(path) as file:
             start = file.read(len(KIND))
@@ -63,22 +61,18 @@ def is_block_log(path: str | os.PathLike[str]) -> bool:
 
 
 class Description(TypedDict):
-    """What a log says of its sweep, in JSON types, so that it can be read without the kernel.
+    """Description of a sweep in JSON types, so that its log can be read without the kernel."""
 
-    The numbers of blocks, of cells in a block, of the states, the samples and the observed values
-    of a cell, and of the numbers that a section point keeps; what its reduction merged, and the exponents of a certified run.
-    """
-
-    attributes: dict[str, Any]
+    attributes: dict[str, Any]  # those of the result
     blocks: int
-    size: int
-    dimension: int
-    samples: int
-    observed: int
-    kept: int
-    merged: list[list[int]] | None
+    size: int  # cells in a block
+    dimension: int  # states of a cell
+    samples: int  # of the trajectory of a cell
+    observed: int  # values of observables of a cell
+    kept: int  # states in a section point
+    merged: list[list[int]] | None  # states and indices of `NodeMerge`
     together: bool
-    certificate: list[list[float]] | None
+    certificate: list[list[float]] | None  # fields of `Certificate`
 
 
 @dataclass(slots=True)
@@ -108,9 +102,7 @@ class BlockLog:
 
     @staticmethod
     def create(path: str | os.PathLike[str], about: Description) -> None:
-        """Create a log without blocks; `about` is what JSON can hold and says how many `blocks`
-        there are.
-        """
+        """Create a log without blocks."""
         text = json.dumps(about).encode()
         if os.path.exists(path):
             BlockLog.expect_idle(path)
@@ -122,7 +114,7 @@ class BlockLog:
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], writing: bool = False) -> BlockLog:
-        """Open a log and find its whole blocks; a record that is torn or damaged counts as none."""
+        """Open a log and find its complete blocks; skip torn and damaged records."""
         file = open_regular(path, writing=writing)
         try:
             if writing:
@@ -132,23 +124,24 @@ class BlockLog:
             log = cls(Path(path), about, places, np.zeros(CODES, np.int64), file, file.tell())
             log._scan()
             if writing:
-                file.truncate(log._end)  # what is torn at the end
+                file.truncate(log._end)  # drop a torn record at the end
         except BaseException:
             file.close()
             raise
         return log
 
     def _scan(self) -> None:
-        """Find the records; the file ends for us behind the last one that has a sound head."""
+        """Find the records; new ones go behind the last one that has a sound head."""
         size = os.fstat(self._file.fileno()).st_size
-        for place, head, sound in _records(self._file, self._end, size):
-            if sound and head[1] < len(self.places):
-                if self.places[head[1]] >= 0:  # written twice, once before some damage: the later one counts
-                    self.counts -= self._statuses(head[1])
-                self.places[head[1]] = place
-                self.counts += np.array(head[6:-1])
-                self.most = max(self.most, head[5])
-            self._end = place + HEAD.size + head[2]
+        for offset, head, sound in _records(self._file, self._end, size):
+            _, block, length, _, _, most, *statuses, _ = head
+            if sound and block < len(self.places):
+                if self.places[block] >= 0:  # written twice, once before some damage: the later one counts
+                    self.counts -= self._statuses(block)
+                self.places[block] = offset
+                self.counts += np.array(statuses)
+                self.most = max(self.most, most)
+            self._end = offset + HEAD.size + length
 
     def _statuses(self, block: int) -> np.ndarray:
         self._file.seek(int(self.places[block]))
@@ -160,14 +153,14 @@ class BlockLog:
         return self.places >= 0
 
     def append(self, block: int, buffers: Buffers) -> None:
-        """Add a finished block; OSError if it cannot be written, after which the log is as it was."""
+        """Add a finished block; after an OSError the log is as before."""
         counts, most = tally(buffers.status), buffers.most_points
         body = _packed(buffers)
         head = HEAD.pack(MARK, block, len(body), zlib.crc32(body), len(buffers.counts), most, *counts.tolist(), 0)
         head = head[:-4] + struct.pack("<I", zlib.crc32(head[:-4]))
         self._file.seek(self._end)
         left = memoryview(head + body)
-        while left:
+        while left:  # an unbuffered write may stop early
             left = left[self._file.write(left) :]
         self.places[block], self._end = self._end, self._end + len(head) + len(body)
         self.counts += counts
@@ -176,27 +169,25 @@ class BlockLog:
             self.flush()
 
     def flush(self) -> None:
-        """Ask the system to put all that was written on the disk itself."""
+        """Ask the system to write everything to the disk itself."""
         os.fsync(self._file.fileno())
         self._flushed = time.monotonic()
 
     def read(self, block: int) -> Buffers:
-        """Return the numbers of a stored block; OSError if they were damaged since the log was
-        opened.
-        """
+        """Return the numbers of a stored block; raise OSError if they were damaged since the log was opened."""
         self._file.seek(int(self.places[block]))
-        head = HEAD.unpack(self._file.read(HEAD.size))
-        body = self._file.read(head[2])
-        if zlib.crc32(body) != head[3]:
+        _, _, length, check, cells, most, *_ = HEAD.unpack(self._file.read(HEAD.size))
+        body = self._file.read(length)
+        if zlib.crc32(body) != check:
             raise OSError(f"{self.path}: block {block} was damaged while it was in use; run again with resume")
         sizes = (int(self.about[name]) for name in ("dimension", "samples", "observed", "kept"))
-        made = _unpacked(body, head[4], head[5], *sizes)
-        if made is None:
+        buffers = _unpacked(body, cells, most, *sizes)
+        if buffers is None:
             raise ValueError(f"{self.path}: block {block} is not as long as its cells need; {AGAIN}")
-        return made
+        return buffers
 
     def close(self) -> None:
-        """Put everything on the disk and close the file."""
+        """Flush and close the file."""
         if not self._file.closed:
             with suppress(OSError):
                 if self._file.writable():
@@ -206,20 +197,18 @@ class BlockLog:
 
 
 def _second(length: int) -> int:
-    """Where the second copy of a first line of so many bytes begins."""
+    """Return the offset of the second copy of a first line of `length` bytes: the next page."""
     return -(-length // PAGE) * PAGE
 
 
 def _about(file: FileIO, path: str | os.PathLike[str]) -> Description:
-    """The description of the sweep, from the first copy that is sound; the file is left at its
-    first record.
-    """
+    """Read the description from its first sound copy, and leave the file at its first record."""
     size = os.fstat(file.fileno()).st_size
     if size == 0:
         raise ValueError(f"{os.fspath(path)} is empty; expected an unfinished run; {AGAIN}")
     starts = set()
-    for place in range(0, size, PAGE):
-        file.seek(place)
+    for offset in range(0, size, PAGE):
+        file.seek(offset)
         start = file.read(len(MAGIC))
         starts |= {start} if start.startswith(KIND) else set()
         head = file.read(LINE.size) if start == MAGIC else b""
@@ -228,7 +217,7 @@ def _about(file: FileIO, path: str | os.PathLike[str]) -> Description:
         if zlib.crc32(text) == check:
             first = len(MAGIC) + LINE.size + length
             file.seek(_second(first) + first)
-            return _understood(text, path)
+            return _description(text, path)
     if not starts:
         raise ValueError(f"{os.fspath(path)} is no unfinished run of synchain; choose another file, or {AGAIN}")
     if MAGIC not in starts:
@@ -238,8 +227,8 @@ def _about(file: FileIO, path: str | os.PathLike[str]) -> Description:
     raise ValueError(f"{os.fspath(path)}: both copies of its first line are damaged; {AGAIN}")
 
 
-def _understood(text: bytes, path: str | os.PathLike[str]) -> Description:
-    """The first line as JSON that has the numbers that a store needs."""
+def _description(text: bytes, path: str | os.PathLike[str]) -> Description:
+    """Return the first line as JSON; raise ValueError if it lacks a number that the log needs."""
     try:
         about = json.loads(text)
     except (ValueError, RecursionError):
@@ -250,50 +239,48 @@ def _understood(text: bytes, path: str | os.PathLike[str]) -> Description:
     raise ValueError(f"{os.fspath(path)}: its first line does not say what its sweep is; {AGAIN}")
 
 
-def _records(file: FileIO, place: int, size: int) -> Iterator[tuple[int, tuple[int, ...], bool]]:
-    """Place, head and soundness of the numbers of each record; what is no record is passed over."""
-    while place + HEAD.size <= size:
-        file.seek(place)
+def _records(file: FileIO, offset: int, size: int) -> Iterator[tuple[int, tuple[int, ...], bool]]:
+    """Yield the offset and the head of each record, and whether its numbers are sound; skip other bytes."""
+    while offset + HEAD.size <= size:
+        file.seek(offset)
         raw = file.read(HEAD.size)
         head = HEAD.unpack(raw)
-        if head[0] == MARK and zlib.crc32(raw[:-4]) == head[-1] and place + HEAD.size + head[2] <= size:
-            yield place, head, zlib.crc32(file.read(head[2])) == head[3]
-            place += HEAD.size + head[2]
+        if head[0] == MARK and zlib.crc32(raw[:-4]) == head[-1] and offset + HEAD.size + head[2] <= size:
+            yield offset, head, zlib.crc32(file.read(head[2])) == head[3]
+            offset += HEAD.size + head[2]
         else:
-            place = _next_mark(file, place + 1, size)
+            offset = _next_mark(file, offset + 1, size)
 
 
-def _next_mark(file: FileIO, place: int, size: int) -> int:
-    """The next place that has a mark, the size of the file if there is none."""
-    while place < size:
-        file.seek(place)
+def _next_mark(file: FileIO, offset: int, size: int) -> int:
+    """Return the offset of the next mark, or the size of the file if there is none."""
+    while offset < size:
+        file.seek(offset)
         piece = file.read(PIECE)
-        found = piece.find(MARK)
-        if found >= 0:
-            return place + found
+        index = piece.find(MARK)
+        if index >= 0:
+            return offset + index
         if len(piece) < len(MARK):
             break
-        place += len(piece) - len(MARK) + 1
+        offset += len(piece) - len(MARK) + 1  # pieces overlap by one byte less than a mark
     return size
 
 
 def _packed(buffers: Buffers) -> bytes:
-    """The numbers of a block; of the section points those that exist."""
+    """Return the numbers of a block as bytes; of the section points only those that exist."""
     floats = (buffers.end, buffers.sums, buffers.points[_exists(buffers)], buffers.samples)
     return buffers.counts.astype("<i8").tobytes() + b"".join(part.astype("<f8").tobytes() for part in floats)
 
 
 def _exists(buffers: Buffers) -> np.ndarray:
-    """True for each section point (cells, room) that exists."""
+    """Return whether each section point exists. Shapes: returns (cells, width of the buffer)."""
     return np.arange(buffers.points.shape[1]) < buffers.point_counts[:, None]
 
 
 def _unpacked(
     body: bytes, cells: int, most: int, dimension: int, samples: int, observed: int, kept: int
 ) -> Buffers | None:
-    """The numbers of a block; None if there are not as many as its cells need, the most section
-    points among them.
-    """
+    """Return the numbers of a block; None if their count does not fit its cells and their section points."""
     if len(body) < cells * COUNTS * 8:
         return None
     counts = np.frombuffer(body, "<i8", cells * COUNTS).reshape(cells, COUNTS).astype(np.int64)
@@ -319,9 +306,7 @@ def _unpacked(
 
 
 def _lock(file: FileIO, path: str | os.PathLike[str]) -> None:
-    """Keep other processes from writing to the same store; the lock ends with the process, however
-    that ends.
-    """
+    """Keep other processes from writing to the same log; the system drops the lock when the process ends."""
     try:
         import fcntl
     except ImportError:  # Windows

@@ -10,15 +10,19 @@ import numpy as np
 NEAR = 1e-11
 """Synchronisation error below which a certified cell ends, relative to the size of the motion."""
 
-ERRORS, CHANCE = 3.5, 1e-6
-"""An exponent is certainly negative if it is below 0 by so many standard errors of a normal variable, or as many of
-Student's as are equally certain; the chance of a burst from NEAR to BURST that a cell may end early with.
+ERRORS = 3.5
+"""Standard errors of a normal variable below 0 at which an exponent is certainly negative (a choice: a chance of 2e-4); averages
+of few blocks take as many of Student's as are equally certain.
 """
 
-BURST, SYNCHRONOUS = 1e-6, 1e-3
-"""Synchronisation error that a certified cell must not reach again; mean error below which a cell counts as synchronous;
-relative to the size of the motion.
-"""
+CHANCE = 1e-6
+"""Largest chance of a burst from NEAR to BURST with which a cell may end early (a choice)."""
+
+BURST = 1e-6
+"""Synchronisation error that a certified cell must not reach again, relative to the size of the motion."""
+
+SYNCHRONOUS = 1e-3
+"""Mean error below which a cell counts as synchronous, relative to the size of the motion."""
 
 VERDICTS = (
     "did not finish",
@@ -30,51 +34,38 @@ VERDICTS = (
     "not synchronous although the state is stable: another attractor, or too short a transient",
     "synchronous on average, but not throughout, although the state is stable: bursts (bubbling), or too short a transient",
 )
+"""Verdicts on a cell; a result stores their indices."""
 
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """The largest transversal exponent (cells,) of the network's synchronous state in each cell,
-    and its standard error.
-
-    diffusion (cells,): variance of the logarithm of a deviation, per unit of time, about its mean
-    growth.  margin (cells,): how far below 0 an exponent must be to be certainly negative.  size (cells,): how far the
-    motion moves, the norm over components.
-    """
+    """Largest transversal exponent of the network's synchronous state in each cell; arrays (cells,)."""
 
     exponent: np.ndarray
-    stderr: np.ndarray
-    diffusion: np.ndarray
-    margin: np.ndarray
-    size: np.ndarray
+    stderr: np.ndarray  # standard error of the exponent
+    diffusion: np.ndarray  # variance of the logarithm of a deviation about its mean growth, per unit of time
+    margin: np.ndarray  # an exponent below -margin is certainly negative
+    size: np.ndarray  # amplitude of the motion, the norm over components
 
     @property
     def near(self) -> np.ndarray:
-        """The synchronisation error (cells,) below which a cell is taken to stay synchronous; 0 if
-        that is not safe.
-
-        A deviation whose logarithm drifts down at the rate -exponent and diffuses ever climbs by g
-        with the chance exp(-2 g |exponent| / diffusion) (Redner, A Guide to First-Passage Processes
-        (Cambridge, 2001), section 3.2).
-        """
+        """Synchronisation error (cells,) below which a cell stays synchronous; 0 if that is not safe."""
+        # A deviation whose logarithm drifts down at the rate -exponent and diffuses ever climbs by g with the chance
+        # exp(-2 g |exponent| / diffusion): Redner, A Guide to First-Passage Processes (Cambridge, 2001), section 3.2.
         climb = math.log(BURST / NEAR)
         rare = -2.0 * climb * self.exponent > -math.log(CHANCE) * self.diffusion
         return np.where((self.exponent + self.margin < 0.0) & rare, NEAR * self.size, 0.0)
 
     def take(self, cells: np.ndarray) -> Certificate:
-        """The part for some cells."""
+        """Return the certificate of some cells."""
         return Certificate(*(getattr(self, part.name)[cells] for part in fields(self)))
 
     def verdicts(self, finished: np.ndarray, error: np.ndarray, largest: np.ndarray) -> np.ndarray:
-        """Index into VERDICTS for each cell, from whether it finished, its mean and its largest
-        synchronisation error.
-
-        Near the loss of stability trajectories within the synchronous state are unstable, and a
-        small distance bursts although the exponent is negative (Ashwin, Buescu & Stewart, Phys.
-        Lett. A 193, 126 (1994)).
-        """
+        """Return an index into VERDICTS for each cell. Shapes (cells,): finished; mean and largest error."""
         allowed = SYNCHRONOUS * self.size
         sign = np.where(self.exponent + self.margin < 0.0, -1, np.where(self.exponent > 2 * self.stderr, 1, 0))
+        # Near the loss of stability trajectories within the synchronous state are unstable, and a small distance
+        # bursts although the exponent is negative: Ashwin, Buescu & Stewart, Phys. Lett. A 193, 126 (1994).
         together = np.where((sign < 0) & (largest >= allowed), 7, np.array([1, 2, 3])[sign + 1])
         apart = np.array([6, 5, 4])[sign + 1]
         return np.where(finished, np.where(error < allowed, together, apart), 0)

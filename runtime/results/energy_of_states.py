@@ -27,34 +27,28 @@ Values = Mapping[str, float] | None
 
 @dataclass(frozen=True, slots=True)
 class _Group:
-    """Nodes or links of one kind: energy and power as functions of (t or weight, states,
-    parameters).
+    """The `count` nodes or links of one kind."""
 
-    states (count,) each: where a state of each of them stands, of a link those of its target, then
-    of its source. parameters (count,) or one name each: what they are called in a scene.
-    """
-
-    formulas: tuple[Formula, Formula]
-    weights: Array | None
-    states: list[Array]
-    parameters: list[str | list[str]]
+    formulas: tuple[Formula, Formula]  # energy and power as functions of (t or weight, states, parameters)
+    weights: Array | None  # (count,): weights of links; None for nodes
+    states: list[Array]  # of each argument (count,): indices of states; of a link the target's, then the source's
+    parameters: list[str | list[str]]  # of each argument: name in the scene, or the names of all members
 
     def total(self, power: bool, states: Array, t: Array, values: Mapping[str, float]) -> Array:
-        """The sum over all of them."""
-        given = [states[..., place] for place in self.states]
+        """Return the sum over all members. Shapes: states (…, dimension), t (…, 1); returns (…)."""
+        arguments = [states[..., indices] for indices in self.states]  # (…, count) each
         numbers = [values[p] if isinstance(p, str) else np.array([values[name] for name in p]) for p in self.parameters]
-        found = self.formulas[power](t if self.weights is None else self.weights, *given, *numbers)
-        return np.asarray(np.broadcast_to(found, given[0].shape).sum(axis=-1))
+        terms = self.formulas[power](t if self.weights is None else self.weights, *arguments, *numbers)
+        return np.asarray(np.broadcast_to(terms, arguments[0].shape).sum(axis=-1))
 
 
 @dataclass(frozen=True, slots=True)
 class EnergyFunction:
-    """The energy of a scene's network as functions of state arrays (…, dimension), in state order;
-    all non-dimensional.
+    """The energy of a scene's network for states (…, dimension) in the order of the equations.
 
-    One formula for the nodes and one for the links of each kind are applied to all of them at once,
-    so that large networks and long trajectories cost array operations alone.  `parameters` replace
-    numbers of the scene by others.
+    All numbers are non-dimensional.  One formula for the nodes and one for the links of each kind are
+    applied to all of them at once, so that large networks and long trajectories cost array operations
+    alone.  `parameters` replace numbers of the scene by others.
     """
 
     scene: Scene
@@ -81,27 +75,27 @@ class EnergyFunction:
         """
         if np.ndim(t) != 1 or len(t) < 3:
             raise ValueError(f"imbalance: found {np.size(t)} samples; expected at least three; raise samples")
-        found = self(states, t, parameters)
+        stored = self(states, t, parameters)
         work = cumulative_simpson(self.power(states, t, parameters), x=t, initial=0.0)
-        return np.asarray(found - found[0] - work)
+        return np.asarray(stored - stored[0] - work)
 
     def _sum(self, power: bool, states: Array, t: Array | float, parameters: Values) -> Array:
         values = dict(self.scene.parameters)
         if parameters is not None:
             check_keys("parameters", check_table("parameters", parameters), values)
             values |= {name: check_number(name, value) for name, value in parameters.items()}
-        given, time, size = numbers("states", states), numbers("t", t)[..., None], len(self.scene.y0)
-        if given.ndim < 1 or given.shape[-1] != size:
-            raise ValueError(f"states: found an array of shape {given.shape}; expected rows of {size} numbers")
-        return np.asarray(sum(group.total(power, given, time, values) for group in self.groups))
+        rows, time, size = numbers("states", states), numbers("t", t)[..., None], len(self.scene.y0)
+        if rows.ndim < 1 or rows.shape[-1] != size:
+            raise ValueError(f"states: found an array of shape {rows.shape}; expected rows of {size} numbers")
+        return np.asarray(sum(group.total(power, rows, time, values) for group in self.groups))
 
 
 def energy_function(scene: Scene) -> EnergyFunction:
-    """Return the compiled energy of a scene's network; ValueError as
-    `synchain.models.scenes.energy.energy`.
+    """Return the compiled energy of a scene's network; raise ValueError as
+    `synchain.models.scenes.energy.energy` does.
     """
     exact = energy(check_scene(scene))
-    equations, places = exact.equations, exact.equations.places
+    equations, places = exact.equations, exact.equations.places  # places[i]: indices of the states of node i
     groups = []
     for kind, (share, node) in enumerate(zip(exact.nodes, equations.nodes, strict=True)):
         members = [i for i, k in enumerate(equations.kind_of) if k == kind]
@@ -109,26 +103,27 @@ def energy_function(scene: Scene) -> EnergyFunction:
         names = _names(equations, node.parameters, members)
         groups.append(_Group(_compiled(share, (TIME, *node.state, *node.parameters)), None, states, names))
     for kind, (share, edge) in enumerate(zip(exact.links, equations.edges, strict=True)):
-        pairs = [pair for pair, number in exact.pairs if number == kind]
+        pairs = [pair for pair, number in exact.pairs if number == kind]  # (target, source, weight)
         if pairs:
-            here, there = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
-            states = [s for end in (here, there) for s in np.array([places[i] for i in end]).T]
-            sources, own = [s for s, _ in edge.theirs], [s for _, s in edge.theirs]
-            names = _names(equations, edge.parameters, here) + _names(equations, own, there)
+            targets, sources = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
+            states = [s for end in (targets, sources) for s in np.array([places[i] for i in end]).T]
+            # A link has parameters of its target, of its source (renamed in the formula), and numbered ones.
+            renamed, original = [s for s, _ in edge.theirs], [s for _, s in edge.theirs]
+            names = _names(equations, edge.parameters, targets) + _names(equations, original, sources)
             for k, s in enumerate(edge.parameters):
                 if s.name in equations.numbered:
                     names[k] = [equations.numbered[s.name].name(s.name, pair) for pair in pairs]
-            formulas = _compiled(share, (edge.weight, *edge.here, *edge.there, *edge.parameters, *sources))
+            formulas = _compiled(share, (edge.weight, *edge.here, *edge.there, *edge.parameters, *renamed))
             groups.append(_Group(formulas, np.array([float(pair[2]) for pair in pairs]), states, names))
     return EnergyFunction(scene, exact, tuple(groups))
 
 
 def _names(equations: Equations, symbols: Sequence[sp.Symbol], nodes: Sequence[int]) -> list[str | list[str]]:
-    """What the parameters of some nodes are called: one name, or one for each node."""
+    """Return the name of each parameter of some nodes, or a name for each node if they differ."""
     return [[f"{s.name}_{i + 1}" for i in nodes] if s.name in equations.varied else s.name for s in symbols]
 
 
 def _compiled(share: Share, arguments: Sequence[sp.Symbol]) -> tuple[Formula, Formula]:
-    """Energy and power as functions of arrays."""
-    made = [sp.lambdify(arguments, e, modules="numpy", cse=True) for e in (share.energy, share.power)]
-    return made[0], made[1]
+    """Return energy and power as functions of arrays."""
+    energy, power = (sp.lambdify(arguments, e, modules="numpy", cse=True) for e in (share.energy, share.power))
+    return energy, power

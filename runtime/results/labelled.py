@@ -1,4 +1,4 @@
-"""What a function of this package returns: labelled data, a plot, a file, a few lines of text."""
+"""The base class of results: labelled data, a plot, a file, a few lines of text."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Labelled(HasHtml):
 
         @property
         def summary(self) -> tuple[tuple[str, str], ...]:
-            """Names and words of what a reader wants to know first; `print` and the command line show them."""
+            """Names and texts of the main facts, which `print` and the command line show."""
 
     def as_dict(self) -> dict[str, object]:
         """Return the value for JSON.
@@ -100,27 +100,27 @@ class Labelled(HasHtml):
             If the file cannot be written.
         """
         data = self.data.copy(deep=False)
-        tree, further = encode(self, data)
-        data = data.assign(further)
+        tree, arrays = encode(self, data)
+        data = data.assign(arrays)
         data.attrs = {**data.attrs, KIND: type(self).__name__, VALUE: json.dumps(tree)}
         write_data(data, path, overwrite)
 
     def __repr__(self) -> str:
         rows = self.summary
-        wide = max((len(name) for name, _ in rows), default=0)
-        return "\n".join([type(self).__name__, *(f"  {name:<{wide}}  {words}" for name, words in rows)])
+        width = max((len(name) for name, _ in rows), default=0)
+        return "\n".join([type(self).__name__, *(f"  {name:<{width}}  {text}" for name, text in rows)])
 
 
 def dataset(
     variables: Mapping[str, tuple[Sequence[str], Any, str]], coordinates: Mapping[str, Any], scene: Scene | None = None
 ) -> xr.Dataset:
-    """Return labelled data."""
-    made = {
-        name: (tuple(dims), np.asarray(values), {"long_name": words})
-        for name, (dims, values, words) in variables.items()
+    """Return labelled data from (dimensions, values, meaning) of each variable."""
+    arrays = {
+        name: (tuple(dims), np.asarray(values), {"long_name": meaning})
+        for name, (dims, values, meaning) in variables.items()
     }
-    about = {} if scene is None else {"title": scene.title or repr(scene), "scene": json.dumps(scene.as_dict())}
-    return xr.Dataset(made, coordinates, about)
+    attributes = {} if scene is None else {"title": scene.title or repr(scene), "scene": json.dumps(scene.as_dict())}
+    return xr.Dataset(arrays, coordinates, attributes)
 
 
 def as_json(table: Mapping[str, object]) -> dict[str, object]:

@@ -30,15 +30,15 @@ STATE = ("component", "node")
 """The dimensions of a state."""
 
 START_STATE = "start_state"
-"""Variable of the states that the cells started from, if those are not the scene's."""
+"""Variable of the initial states of the cells, if they are not the scene's."""
 
 END_TIME, DRIVE_PHASE = "end_time", "drive_phase"
-"""Coordinates of each cell: when it stopped, and how far into a period of the drive that was."""
+"""Coordinates of each cell: the time at which it stopped, and the phase of the drive there, from 0 to 1."""
 
 TIMES = ("time", "section_time", END_TIME, DRIVE_PHASE)
 """Variables that are coordinates of others."""
 
-TOLD = ("scene", "title", "equations", "kernel", "versions")
+TEXTS = ("scene", "title", "equations", "kernel", "versions")
 """Attributes of a result that are text."""
 
 MEANINGS = {
@@ -89,16 +89,16 @@ TOLERANCES = ("rtol_used", "atol_used")
 
 @dataclass(frozen=True, slots=True)
 class States:
-    """Where each state of a network stands in a table of components and nodes."""
+    """Row and column of each state of a network in a table of components and nodes."""
 
     components: tuple[str, ...]
     nodes: int
-    rows: np.ndarray  # (states,): component and node, counted from 0, of each state in the order of the equations
-    columns: np.ndarray
+    rows: np.ndarray  # (states,): index of the component of each state in the order of the equations
+    columns: np.ndarray  # (states,): node of each state, from 0
 
     @classmethod
     def of(cls, scene: Scene) -> States:
-        """Return the places of a scene's states."""
+        """Return the rows and columns of a scene's states."""
         equations = scene.equations
         holders = [equations.holders(name) for name in equations.components]
         rows = np.repeat(np.arange(len(holders)), [len(nodes) for nodes in holders])
@@ -115,14 +115,19 @@ class States:
         return table
 
     def flat(self, table: np.ndarray) -> np.ndarray:
-        """Return states (…, components, nodes) as (…, states); the way back of `table`."""
+        """Return states (…, components, nodes) as (…, states); the inverse of `table`."""
         return np.asarray(table[..., self.rows, self.columns])
 
 
 def variables(
     scene: Scene, spans: np.ndarray, buffers: Buffers, certificate: Certificate | None, most: int
 ) -> Iterator[Variable]:
-    """Yield the variables of some cells. Shapes: spans (cells, len(SpanColumn))."""
+    """Yield the variables of some cells; `most` is the largest number of section points in any cell.
+
+    Shapes: spans (cells, len(SpanColumn)).
+    """
+    stopped = buffers.sums[:, SumColumn.STOPPED_AT]
+    # How each cell was integrated.
     for name in ("status", "steps", "rejected", "periods_skipped"):
         yield name, (), buffers.counts[:, COUNTS[name]].astype(np.int32)
     ran = buffers.status != Status.NOT_RUN
@@ -132,14 +137,15 @@ def variables(
         by_method = buffers.counts[:, Count.BY_METHOD : Count.BY_METHOD + len(method_names(scene))]
         yield "methods", (), ((by_method > 0) @ _masks(scene)).astype(np.int32)
         yield "method_steps", ("integrator",), by_method.astype(np.int32)
+    # Where it stopped: the phase is NaN if the drive has no period, and 0 without a drive.
     states = States.of(scene)
     yield "end", STATE, states.table(buffers.end)
-    yield END_TIME, (), buffers.sums[:, SumColumn.STOPPED_AT]
-    yield DRIVE_PHASE, (), _drive_phase(scene, spans, buffers.sums[:, SumColumn.STOPPED_AT])
+    yield END_TIME, (), stopped
+    period = np.where(spans[:, SpanColumn.PERIOD] > 0.0, spans[:, SpanColumn.PERIOD], np.nan)
+    yield DRIVE_PHASE, (), np.mod(stopped / period, 1.0) if scene.forced else np.zeros(len(spans))
+    # Averages over the window; there are none in a cell that failed before it.
     if "sync_error" in scene.record:
-        unseen = (buffers.status != Status.FINISHED) & (
-            buffers.sums[:, SumColumn.STOPPED_AT] <= spans[:, SpanColumn.START]
-        )
+        unseen = (buffers.status != Status.FINISHED) & (stopped <= spans[:, SpanColumn.START])
         for name in ("sync_error", "sync_error_max"):
             yield name, (), np.where(unseen, np.nan, buffers.sums[:, SUMS[name]])
         yield "sync_error_end", (), buffers.sums[:, SumColumn.LAST]
@@ -147,46 +153,45 @@ def variables(
         values = buffers.sums[:, columns]
         yield name, ("node",) if rows else (), values if rows else values[:, 0]
     if certificate is not None:
-        for name, values in _certified(scene, spans, buffers, certificate).items():
-            yield name, (), values
+        finished = buffers.finished
+        yield "transversal_exponent", (), certificate.exponent
+        yield "transversal_stderr", (), certificate.stderr
+        yield "ended_early", (), (finished & (stopped < spans[:, SpanColumn.END])).astype(np.int32)
+        if "sync_error" in scene.record:
+            mean, peak = buffers.sums[:, SumColumn.MEAN], buffers.sums[:, SumColumn.PEAK]
+            yield "verdict", (), certificate.verdicts(finished, mean, peak).astype(np.int32)
+    # Points of sections, NaN behind a cell's last one, and samples of the window.
     if "section" in scene.record:
         points = np.full((len(spans), max(most, 1), buffers.points.shape[2]), np.nan)
-        room = min(most, buffers.points.shape[1])
-        points[:, :room] = buffers.points[:, :room]
+        width = min(most, buffers.points.shape[1])
+        points[:, :width] = buffers.points[:, :width]
         yield "section_count", (), buffers.point_counts.astype(np.int32)
         yield "section_time", ("point",), points[:, :, PointColumn.TIME]
         yield "section", ("point", *STATE), states.table(points[:, :, PointColumn.STATE :])
     yield from Sections(scene).variables(buffers.points, most)
     if "trajectory" in scene.record:
-        parts = np.linspace(0.0, 1.0, scene.samples) if scene.samples > 1 else np.zeros(1)
+        fractions = np.linspace(0.0, 1.0, scene.samples) if scene.samples > 1 else np.zeros(1)
         start, end = spans[:, SpanColumn.START, None], spans[:, SpanColumn.END, None]
-        yield "time", ("sample",), start + (end - start) * parts
+        yield "time", ("sample",), start + (end - start) * fractions
         yield "trajectory", ("sample", *STATE), states.table(buffers.samples)
 
 
-def _drive_phase(scene: Scene, spans: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """How far (cells,) into a period of the drive each cell stopped, from 0 to 1."""
-    if not scene.forced:
-        return np.zeros(len(time))
-    period = np.where(spans[:, SpanColumn.PERIOD] > 0.0, spans[:, SpanColumn.PERIOD], np.nan)
-    return np.asarray(np.mod(time / period, 1.0))
-
-
 def _masks(scene: Scene) -> np.ndarray:
-    """The bit of each integrator in `methods`."""
+    """Return the bit of each integrator in `methods`."""
     return 2 ** np.arange(len(method_names(scene)))
 
 
 def _attributes(scene: Scene, name: str) -> dict[str, object]:
-    """The attributes of a variable; `methods` is a set of flags (CF conventions 1.11, section 3.5)."""
-    flags: dict[str, object] = {}
-    if name == "methods":
+    """Return the attributes of a variable."""
+    attributes: dict[str, object] = {"long_name": meaning(scene, name)}
+    if name == "methods":  # a set of flags: CF conventions 1.11, section 3.5
         flags = {"flag_masks": _masks(scene).astype(np.int32), "flag_meanings": " ".join(method_names(scene))}
-    return {"long_name": meaning(scene, name), **flags}
+        attributes.update(flags)
+    return attributes
 
 
 def meaning(scene: Scene, name: str) -> str:
-    """Return what a variable of a result holds, in words; those of an observable are its expression."""
+    """Return the meaning of a variable of a result as text; of an observable its expression."""
     if name in scene.observe:
         return str(scene.observe[name])
     if name == "status":
@@ -201,17 +206,6 @@ def dimensions(scene: Scene) -> tuple[str, ...]:
     return (*axes, "realisation") if scene.realisations else axes
 
 
-def _certified(scene: Scene, spans: np.ndarray, buffers: Buffers, certificate: Certificate) -> dict[str, np.ndarray]:
-    """The variables of a certificate."""
-    sums, finished = buffers.sums, buffers.finished
-    values = {"transversal_exponent": certificate.exponent, "transversal_stderr": certificate.stderr}
-    values["ended_early"] = (finished & (sums[:, SumColumn.STOPPED_AT] < spans[:, SpanColumn.END])).astype(np.int32)
-    if "sync_error" in scene.record:
-        verdicts = certificate.verdicts(finished, sums[:, SumColumn.MEAN], sums[:, SumColumn.PEAK])
-        values["verdict"] = verdicts.astype(np.int32)
-    return values
-
-
 def coordinates(scene: Scene) -> dict[str, Any]:
     """Return the coordinates of a result: the axes, the components, the numbers of the nodes, and what sections keep."""
     coords: dict[str, Any] = {"component": list(scene.equations.components), "node": list(scene.topology.labels)}
@@ -222,12 +216,10 @@ def coordinates(scene: Scene) -> dict[str, Any]:
 
 
 def swept(scene: Scene) -> Iterator[Variable]:
-    """Yield the coordinates that tell cells apart, the values of axes and draws, a row for each value.
-
-    A draw of all links has a column for each name that is drawn, along the dimension `…_link`.
-    """
+    """Yield the coordinates that distinguish cells, the values of axes and draws, with a row for each value."""
     for axis in scene.axes:
         yield axis.name, ("cell" if scene.zipped else axis.name,), np.array(axis.values)
+    # A draw of all links is one variable with a column for each link, along the dimension `…_link`.
     groups = _of_links(scene)
     grouped = {f"{base}_{ends}" for base, columns in groups.items() for ends in columns}
     for axis in scene.drawn:
@@ -238,33 +230,33 @@ def swept(scene: Scene) -> Iterator[Variable]:
 
 
 def _of_links(scene: Scene) -> dict[str, dict[str, tuple[float, ...]]]:
-    """What is drawn of all links, by parameter and by the ends of each, "1_2"."""
-    found: dict[str, dict[str, tuple[float, ...]]] = {}
+    """Return the numbers drawn for all links, by parameter and by the ends of each link, "1_2"."""
+    drawn: dict[str, dict[str, tuple[float, ...]]] = {}
     for axis in scene.drawn:
         link = None if axis.name in scene.draws else scene.model.link_parameter(axis.name)
         if link is not None:
-            found.setdefault(link.base, {})[axis.name.removeprefix(f"{link.base}_")] = axis.values
-    return found
+            drawn.setdefault(link.base, {})[axis.name.removeprefix(f"{link.base}_")] = axis.values
+    return drawn
 
 
 def labelled(
-    scene: Scene, found: Iterable[Variable], shape: tuple[int, ...], attributes: Mapping[str, object]
+    scene: Scene, arrays: Iterable[Variable], shape: tuple[int, ...], attributes: Mapping[str, object]
 ) -> xr.Dataset:
     """Return the dataset of variables with one row for each cell."""
     dims, coords = dimensions(scene), coordinates(scene)
     for name, (dim, *more), values in swept(scene):
         coords[name] = ((dim, *more), values[: shape[dims.index(dim)]])
-    made = {
+    labelled_arrays = {
         name: ((*dims, *more), values.reshape((*shape, *values.shape[1:])), _attributes(scene, name))
-        for name, more, values in found
+        for name, more, values in arrays
     }
-    coords |= {name: made.pop(name) for name in TIMES if name in made}
-    return xr.Dataset(made, coords, dict(attributes))
+    coords |= {name: labelled_arrays.pop(name) for name in TIMES if name in labelled_arrays}
+    return xr.Dataset(labelled_arrays, coords, dict(attributes))
 
 
 def scene_of(attributes: Mapping[str, Any]) -> Scene:
     """Return the scene of a result from its attributes."""
-    missing = [name for name in TOLD if not isinstance(attributes.get(name), str)]
+    missing = [name for name in TEXTS if not isinstance(attributes.get(name), str)]
     if "scene" in missing:
         raise ValueError("it is no synchain result: it has no attribute 'scene'")
     if missing:
@@ -280,30 +272,20 @@ def scene_of(attributes: Mapping[str, Any]) -> Scene:
 
 
 def alike(first: Scene, second: Scene) -> bool:
-    """True if two scenes differ at most in their titles and in the text of the files of code that
-    they name.
-    """
+    """Return whether two scenes differ at most in their titles and in the text of files of code that they name."""
     one, other = first.replace(title=""), second.replace(title="")
     return one == other or one.as_dict() == other.as_dict()
 
 
 def changed(attributes: Mapping[str, Any], scene: Scene) -> bool:
-    """True if the code behind the names of a scene's parts has changed since the result was
-    computed.
-    """
+    """Return whether the code behind the names of a scene's parts has changed since the result was computed."""
     return "model" in attributes and attributes["model"] != scene.equations.digest
 
 
 def provenance(
-    scene: Scene,
-    kernel: Kernel,
-    skipped: tuple[str, ...],
-    versions: str,
-    processor: str,
+    scene: Scene, kernel: Kernel, skipped: tuple[str, ...], versions: str, processor: str
 ) -> dict[str, object]:
-    """Return how a result came about, as its attributes; `skipped` says what was left out of the
-    equations.
-    """
+    """Return the origin of a result as its attributes; `skipped` lists what was left out of the equations."""
     return {
         "title": scene.title or repr(scene),
         "scene": json.dumps(scene.as_dict()),

@@ -32,7 +32,7 @@ from .store import filled
 def describe_sweep(
     reduction: ReducedScene, layout: Layout, attributes: Mapping[str, object], certificate: Certificate | None
 ) -> Description:
-    """Return what a block log says of its sweep."""
+    """Return the description of a sweep for its block log."""
     merge = reduction.merge
     exponents = None if certificate is None else [getattr(certificate, part.name) for part in fields(certificate)]
     return {
@@ -50,7 +50,7 @@ def describe_sweep(
 
 
 def layout_of(about: Description, scene: Scene) -> Layout:
-    """Return the blocks of a log."""
+    """Return the division of the cells of a log into blocks."""
     layout = Layout.of(scene, check_integer("size", about["size"], 1))
     if layout.blocks != about["blocks"]:
         raise ValueError(f"found {about['blocks']} blocks; expected {layout.blocks} for the cells of its scene")
@@ -58,13 +58,13 @@ def layout_of(about: Description, scene: Scene) -> Layout:
 
 
 def certificate_of(about: Description) -> Certificate | None:
-    """Return the certificate of a log's cells; None if they are not certified."""
+    """Return the certificate of a log's cells, or None if they are not certified."""
     exponents = about["certificate"]
     return None if exponents is None else Certificate(*(np.array(part, dtype=float) for part in exponents))
 
 
 class _BlockReader:
-    """Reads the blocks of a log as those of the whole network."""
+    """Reads the blocks of a log, expanded from the reduced to the whole network."""
 
     def __init__(self, log: BlockLog, scene: Scene) -> None:
         about = log.about
@@ -73,16 +73,16 @@ class _BlockReader:
         self.planner = Planner(scene)
         if check_integer("dimension", about["dimension"], 1) > len(scene.y0):
             raise ValueError(f"found {about['dimension']} states; expected at most the {len(scene.y0)} of its scene")
-        same = np.arange(about["dimension"])
-        states, places = (same, same) if about["merged"] is None else map(np.array, about["merged"])
-        self.merge = NodeMerge(states, places, bool(about["together"]))
+        identity = np.arange(about["dimension"])
+        states, indices = (identity, identity) if about["merged"] is None else map(np.array, about["merged"])
+        self.merge = NodeMerge(states, indices, bool(about["together"]))
 
     def buffers(self, block: int) -> Buffers:
-        """The results of a block."""
+        """Return the results of a block."""
         return self.merge.expand(self.log.read(block))
 
     def variables(self, cells: np.ndarray, buffers: Buffers) -> Iterator[Variable]:
-        """The variables of these cells, whose results the buffers hold."""
+        """Yield the variables of cells from their buffers. Shapes: cells (k,)."""
         certificate = None if self.certificate is None else self.certificate.take(cells)
         return variables(self.scene, self.planner.spans(cells), buffers, certificate, self.log.most)
 
@@ -92,37 +92,37 @@ def read_partial(path: str | os.PathLike[str]) -> Result:
     with understood(Path(path)):
         about = BlockLog.describe(path)
         scene = scene_of(about["attributes"])
-        layout_of(about, scene)
+        layout_of(about, scene)  # refuse a wrong description before all records are read
         with closing(BlockLog.open(path)) as log:
-            return _so_far(_BlockReader(log, scene))
-
-
-def _so_far(reader: _BlockReader) -> Result:
-    """The blocks that a log holds, as a result."""
-    log, scene = reader.log, reader.scene
-    dimension, samples = len(reader.merge.places), int(log.about["samples"])
-    observed, kept = int(log.about["observed"]), Sections(scene).width(dimension)
-    numbers = scene.cells * numbers_of_a_cell(dimension, log.most, samples, observed, kept)
-    if numbers > IN_MEMORY:
-        raise ValueError(
-            f"found a sweep of {numbers * 8 / 1e9:.0f} GB; expected at most {IN_MEMORY * 8 / 1e9:.0f} GB in "
-            "memory; finish it with resume (--resume), and open parts of the result with xarray"
-        )
-    buffers = Buffers.empty(scene.cells, dimension, log.most, samples, observed, kept)
-    for block in np.flatnonzero(log.done).tolist():
-        buffers.put(reader.layout.rows(block), reader.buffers(block))
-    spans = reader.planner.spans(np.arange(scene.cells))
-    return gather(scene, lambda: log.about["attributes"], spans, buffers, reader.certificate)
+            reader = _BlockReader(log, scene)
+            dimension, samples = len(reader.merge.places), int(about["samples"])
+            observed, point_size = int(about["observed"]), Sections(scene).width(dimension)
+            numbers = scene.cells * numbers_of_a_cell(dimension, log.most, samples, observed, point_size)
+            if numbers > IN_MEMORY:
+                raise ValueError(
+                    f"found a sweep of {numbers * 8 / 1e9:.0f} GB; expected at most {IN_MEMORY * 8 / 1e9:.0f} GB in "
+                    "memory; finish it with resume (--resume), and open parts of the result with xarray"
+                )
+            buffers = Buffers.empty(scene.cells, dimension, log.most, samples, observed, point_size)
+            for block in np.flatnonzero(log.done).tolist():
+                buffers.put(reader.layout.rows(block), reader.buffers(block))
+            spans = reader.planner.spans(np.arange(scene.cells))
+            return gather(scene, lambda: about["attributes"], spans, buffers, reader.certificate)
 
 
 def write_result(log: BlockLog, path: str | os.PathLike[str], scene: Scene) -> dict[str, int]:
-    """Write the file of a scene's log that has all blocks, with one block in memory at a time; the
-    ending of `path` chooses its form.
+    """Write the result of a complete log, one block in memory at a time; return the count of each verdict.
+
+    The ending of `path` chooses the form of the file.
     """
     reader = _BlockReader(log, scene)
     verdicts: dict[str, int] = {}
+    # The first cell alone has all variables: the file is that, but for the lengths of the axes.
+    first = Buffers(*(array[:1] for array in reader.buffers(0).arrays()))
+    arrays = reader.variables(np.arange(1), first)
+    template = labelled(scene, arrays, (1,) * len(scene.shape), log.about["attributes"])
     lengths = dict(zip(dimensions(scene), scene.shape, strict=True))
-    with filled(path, _template(reader), lengths) as file:
+    with filled(path, template, lengths) as file:
         for name, _, values in swept(scene):
             file.put(name, np.arange(len(values)), values)
         for block in range(reader.layout.blocks):
@@ -134,21 +134,13 @@ def write_result(log: BlockLog, path: str | os.PathLike[str], scene: Scene) -> d
     return verdicts
 
 
-def _template(reader: _BlockReader) -> xr.Dataset:
-    """The result of the first cell alone."""
-    scene = reader.scene
-    first = Buffers(*(array[:1] for array in reader.buffers(0).arrays()))
-    found = reader.variables(np.arange(1), first)
-    return labelled(scene, found, (1,) * len(scene.shape), reader.log.about["attributes"])
-
-
 def verdicts_in(data: xr.Dataset) -> dict[str, int]:
-    """Return how many cells of a result have each verdict, as `write_result` does."""
-    return {words: count for name, values in data.items() for words, count in _verdicts(str(name), values)}
+    """Return the number of cells of a result with each verdict, as `write_result` does."""
+    return {verdict: count for name, values in data.items() for verdict, count in _verdicts(str(name), values)}
 
 
 def _verdicts(name: str, values: np.ndarray | xr.DataArray) -> list[tuple[str, int]]:
-    """What a variable of a block adds to the count of verdicts."""
+    """Return the verdicts in a variable of some cells, with their counts."""
     if name == "ended_early":
         return [("ended early", int(np.count_nonzero(values)))]
     if name == "verdict":
@@ -158,5 +150,5 @@ def _verdicts(name: str, values: np.ndarray | xr.DataArray) -> list[tuple[str, i
 
 
 def partial_path(path: str | os.PathLike[str]) -> Path:
-    """Return where the blocks of a run are kept until its result is written: beside the result."""
+    """Return the path of the block log of a run, beside its result."""
     return Path(path).with_suffix(".partial")

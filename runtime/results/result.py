@@ -46,7 +46,10 @@ if TYPE_CHECKING:
 
 
 class _Deferred:
-    """`_make` returns the labelled data of a result that has none yet."""
+    """Holds the function that computes the labelled data of a result on first use.
+
+    A base class, since the slots of a dataclass are its fields alone.
+    """
 
     __slots__ = ("_make",)
     _make: Callable[[], xr.Dataset]
@@ -98,8 +101,8 @@ class Result(_Deferred, Labelled):
             object.__setattr__(self, "_make", lambda: data)
             return data
         if name.startswith("_") or name not in self.data:
-            known = ", ".join(sorted(map(str, self.data.data_vars)))
-            raise AttributeError(f"this result has no {name!r}; it has: {known}")
+            names = ", ".join(sorted(map(str, self.data.data_vars)))
+            raise AttributeError(f"this result has no {name!r}; it has: {names}")
         return self.data[name]
 
     @property
@@ -109,7 +112,7 @@ class Result(_Deferred, Labelled):
 
     @property
     def message(self) -> str:
-        """How many cells ended how, in words."""
+        """Number of cells that ended with each status, as text."""
         codes, counts = np.unique(self.data.status.values, return_counts=True)
         parts = [
             f"{n} cell{'s' * (n > 1)}: {Status(int(c)).message}" for c, n in zip(codes, counts.tolist(), strict=True)
@@ -118,18 +121,18 @@ class Result(_Deferred, Labelled):
 
     @property
     def integrators(self) -> str:
-        """Which integrators how many cells went through, and with how many steps, in words."""
+        """Integrators that the cells used in turn, with their mean numbers of steps, as text."""
         if "methods" not in self.data:
             return str(self.scene.integrator)
-        names, sets = self.data.integrator.values, self.data.methods.values
-        steps = self.data.method_steps.values.reshape(sets.size, -1)
+        names, flags = self.data.integrator.values, self.data.methods.values  # bit k: the k-th integrator was used
+        steps = self.data.method_steps.values.reshape(flags.size, -1)
         parts = []
-        codes, counts = np.unique(sets, return_counts=True)
+        codes, counts = np.unique(flags, return_counts=True)
         for code, count in zip(codes.tolist(), counts.tolist(), strict=True):
-            ran = [k for k in range(len(names)) if code >> k & 1]
-            mean = steps[sets.ravel() == code].mean(axis=0)
-            words = ", then ".join(f"{names[k]} ({mean[k]:.4g} steps)" for k in ran) or "no step"
-            parts.append(words if count == sets.size else f"{words} in {count} cell{'s' * (count > 1)}")
+            used = [k for k in range(len(names)) if code >> k & 1]
+            mean = steps[flags.ravel() == code].mean(axis=0)
+            text = ", then ".join(f"{names[k]} ({mean[k]:.4g} steps)" for k in used) or "no step"
+            parts.append(text if count == flags.size else f"{text} in {count} cell{'s' * (count > 1)}")
         return "; ".join(parts)
 
     @property
@@ -179,17 +182,15 @@ class Result(_Deferred, Labelled):
 
         Raises ValueError for a variable that holds no states.
         """
-        known = tuple(str(each) for each, values in self.data.items() if values.dims[-2:] == STATE)
-        return States.of(self.scene).flat(self.data[check_choice("variable of states", name, known)].values)
+        names = tuple(str(each) for each, values in self.data.items() if values.dims[-2:] == STATE)
+        return States.of(self.scene).flat(self.data[check_choice("variable of states", name, names)].values)
 
     def belongs_to(self, scene: Scene) -> bool:
-        """True if the scene is this result's but for its title."""
+        """Return whether the scene is this result's but for its title."""
         return alike(self.scene, scene)
 
     def stepped(self, equations: Equations) -> bool:
-        """True if these are the equations that were integrated: the scene's, or what was left of
-        them to step.
-        """
+        """Return whether these equations were integrated: the scene's, reduced or not."""
         return bool(self.data.attrs["equations"] == equations.digest)
 
     def restore(self, scene: Scene, buffers: Buffers, equations: Equations) -> None:
@@ -222,18 +223,24 @@ class Result(_Deferred, Labelled):
                 "the result to resume left out other parts of its scene; resume with the reduction of that run"
             )
         if (begun := str(self.data.attrs.get("processor"))) != processor():
-            there, here = told_apart(begun, processor())
+            before, now = told_apart(begun, processor())
             raise ValueError(
-                f"the result to resume was begun on the processor {there}; found {here}, which may round otherwise; "
+                f"the result to resume was begun on the processor {before}; found {now}, which may round otherwise; "
                 "resume on the first kind, or run without resume"
             )
         self._fill(buffers)
         buffers.clear(~buffers.finished)
 
     def _fill(self, buffers: Buffers) -> None:
-        """Copy all cells into the buffers; the way back of `gather`."""
+        """Copy all cells into the buffers; the inverse of `gather`."""
         cells, data = self.scene.cells, self.data
         states = States.of(self.scene)
+
+        def put_points(points: np.ndarray) -> None:
+            """Copy section points (cells, points, columns)."""
+            buffers.widen(points.shape[1])
+            buffers.points[:, : points.shape[1]] = points
+
         for source, target in (("end", buffers.end), ("trajectory", buffers.samples)):
             if source in data:
                 target[:] = states.flat(data[source].values).reshape(target.shape)
@@ -247,27 +254,24 @@ class Result(_Deferred, Labelled):
         if "method_steps" in data:
             by_method = data.method_steps.values.reshape(cells, -1)
             buffers.counts[:, Count.BY_METHOD : Count.BY_METHOD + by_method.shape[1]] = by_method
-        for name, _, place in ObservableArrays(self.scene).columns():
-            buffers.sums[:, place] = data[name].values.reshape(cells, -1)
+        for name, _, columns_of_observable in ObservableArrays(self.scene).columns():
+            buffers.sums[:, columns_of_observable] = data[name].values.reshape(cells, -1)
         if self.scene.sections:
             points = Sections(self.scene).points(cells, {str(name): data[name].values for name in data})
             buffers.counts[:, Count.POINTS] = np.isfinite(points[:, :, PointColumn.TIME]).sum(axis=1)
-            buffers.widen(points.shape[1])
-            buffers.points[:, : points.shape[1]] = points
+            put_points(points)
         if "section" in data:
             points = np.concatenate([data.section_time.values[..., None], states.flat(data.section.values)], axis=-1)
-            points = points.reshape(cells, -1, points.shape[-1])
-            buffers.widen(points.shape[1])
-            buffers.points[:, : points.shape[1]] = points
+            put_points(points.reshape(cells, -1, points.shape[-1]))
 
 
 def read_result(path: Path) -> Result:
-    """Return the result that a file of `Result.save` or `stream` holds."""
+    """Read a file of `Result.save` or `stream`."""
     return result_of(read_data(path), path)
 
 
 def result_of(data: xr.Dataset, path: Path) -> Result:
-    """Return the result of the data of a file; ValueError if they are none."""
+    """Return the result of the data of a file; raise ValueError if they are not those of a result."""
     with understood(path):
         scene = scene_of(data.attrs)
         status = data.get("status")
@@ -295,7 +299,7 @@ def gather(
         if starts is None:
             return data
         table = States.of(scene).table(starts.reshape(*scene.shape, -1))
-        about = {"long_name": "states that the cells started from"}
-        return data.assign({START_STATE: ((*dimensions(scene), *STATE), table, about)})
+        attributes_of_starts = {"long_name": "states that the cells started from"}
+        return data.assign({START_STATE: ((*dimensions(scene), *STATE), table, attributes_of_starts)})
 
     return Result._deferred(make, scene)

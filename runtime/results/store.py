@@ -45,21 +45,20 @@ Copy: TypeAlias = "Callable[[xr.Dataset, Path, Collection[str]], None]"
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """A form of files."""
+    """Functions that write and read one form of files."""
 
-    package: str | None  # what it needs besides the dependencies of this package
-    check: Callable[[Path], None]  # raises OSError if what stands at a path is no file of this form
-    # yields a temporary path that takes the place of the one that is given
-    whole: Callable[[Path], AbstractContextManager[Path]]
-    write: Callable[[xr.Dataset, Path], None]  # writes a dataset to a path, without its digest
-    # yields the sheet of a file at a path, which is like a template but for the lengths of some dimensions
+    package: str | None  # package needed besides the dependencies of this one
+    check: Callable[[Path], None]  # raise OSError if a file of this form cannot replace what a path has
+    whole: Callable[[Path], AbstractContextManager[Path]]  # yield a temporary path, then move it to the path
+    write: Callable[[xr.Dataset, Path], None]  # write a dataset to a path, without its digest
+    # yield the sheet of a new file: like a template but for the lengths of some dimensions
     rows: Callable[[xr.Dataset, Mapping[str, int], Path], AbstractContextManager[Sheet]]
-    seal: Callable[[Path], None]  # writes the digest of a file into it
-    open: Callable[[Path], xr.Dataset]  # returns the data of a file whose digest fits, to be read as they are asked for
+    seal: Callable[[Path], None]  # write the digest of a file into it
+    open: Callable[[Path], xr.Dataset]  # return the lazily read data of a file whose digest fits
 
 
 def form_of(path: str | os.PathLike[str]) -> Form:
-    """Return the form that the ending of a path chooses."""
+    """Return the form that belongs to the ending of a path; raise ModuleNotFoundError without its package."""
     ending = check_path("path", path).suffix.lower()
     if ending not in FORMS:
         raise ValueError(f"path: found {os.fspath(path)!r}; expected a name that ends in {' or '.join(FORMS)}")
@@ -76,7 +75,7 @@ def form_of(path: str | os.PathLike[str]) -> Form:
 
 
 def write_data(data: xr.Dataset, path: str | os.PathLike[str], overwrite: bool = False) -> None:
-    """Write a dataset; its ending chooses the form (see `Labelled.save`)."""
+    """Write a dataset; the ending of the path chooses the form (see `Labelled.save`)."""
     form_of(path).check(Path(path))
     if not check_flag("overwrite", overwrite) and Path(path).exists():
         raise FileExistsError(
@@ -97,14 +96,14 @@ def write_data(data: xr.Dataset, path: str | os.PathLike[str], overwrite: bool =
 
 @contextmanager
 def filled(path: str | os.PathLike[str], template: xr.Dataset, lengths: Mapping[str, int]) -> Iterator[Sheet]:
-    """Yield the variables of a new file, to be filled; it appears at the end of the with block."""
+    """Yield the empty variables of a new file; the file appears at the end of the with block."""
     with _new(path) as (form, temporary), form.rows(_without_complex(template), lengths, temporary) as rows:
         yield rows
 
 
 @contextmanager
 def _new(path: str | os.PathLike[str]) -> Iterator[tuple[Form, Path]]:
-    """The form of a path, and where to write what takes its place, sealed and on the disk itself."""
+    """Yield the form of a path and a temporary path; then seal that file, flush it to the disk and move it."""
     form, target = form_of(path), Path(path)
     form.check(target)
     with form.whole(target) as temporary:
@@ -115,7 +114,7 @@ def _new(path: str | os.PathLike[str]) -> Iterator[tuple[Form, Path]]:
 
 @contextmanager
 def opened(path: Path) -> Iterator[xr.Dataset]:
-    """Yield the open data of a file, which are read as they are asked for."""
+    """Yield the open data of a file, which are read lazily."""
     if not path.exists():
         raise FileNotFoundError(f"{path} does not exist; expected a result: check the path")
     form = form_of(path) if path.suffix.lower() in FORMS else FORMS[".nc"]
@@ -126,13 +125,13 @@ def opened(path: Path) -> Iterator[xr.Dataset]:
 def read_data(path: Path) -> xr.Dataset:
     """Return the dataset of a file in memory, without its digest; raises as `opened`."""
     with opened(path) as file, _readable(path):
-        data = file.load().drop_encoding()  # how it was stored does not say how to store it again
+        data = file.load().drop_encoding()  # the next file chooses its own encoding
     data.attrs = attributes_of(data.attrs, path)
     return _with_complex(data)
 
 
 def attributes_of(attributes: dict[str, object], path: Path) -> dict[str, object]:
-    """The attributes of a file without its digest; a RuntimeWarning says if there is none."""
+    """Return the attributes of a file without its digest; warn if there is none."""
     if "scene" in attributes and DIGEST not in attributes:
         warn(f"{path} has no digest, so damage of its numbers cannot be seen; open it and save it with Result.save")
     return {str(name): value for name, value in attributes.items() if name != DIGEST}
@@ -140,19 +139,19 @@ def attributes_of(attributes: dict[str, object], path: Path) -> dict[str, object
 
 @contextmanager
 def _readable(path: Path) -> Iterator[None]:
-    """Turn any error of a package that reads what is no file of its own into an OSError in one line."""
+    """Turn any error of a package that reads a damaged file into an OSError of one line."""
     try:
         yield
     except Exception as problem:
-        words = " ".join(str(problem).split()) or type(problem).__name__
-        if not isinstance(problem, OSError):  # what stopped a package says nothing of the file
-            words = "it ends before its data do, or they do not fit its head; restore it from a copy"
-        raise OSError(f"cannot read {path}, the file is damaged: {words}") from problem
+        reason = " ".join(str(problem).split()) or type(problem).__name__
+        if not isinstance(problem, OSError):  # the message of a package does not describe the file
+            reason = "it ends before its data do, or they do not fit its head; restore it from a copy"
+        raise OSError(f"cannot read {path}, the file is damaged: {reason}") from problem
 
 
-def _damaged(path: Path, what: str) -> OSError:
+def _damaged(path: Path, part: str) -> OSError:
     return OSError(
-        f"{path} is damaged, its {what} do not fit their digest; restore it from a copy, or run again with overwrite "
+        f"{path} is damaged, its {part} do not fit their digest; restore it from a copy, or run again with overwrite "
         "(--overwrite)"
     )
 
@@ -182,7 +181,7 @@ def _open_netcdf3(path: Path) -> xr.Dataset:
             kind = "an HDF5 or netCDF4 file" if start == b"\x89HDF" else "no netCDF file"
             raise OSError(f"{path} is {kind}; expected a netCDF 3 result, as Result.save and stream write it")
         sealed = is_sealed(file)
-    if sealed is False:  # before its header is believed
+    if sealed is False:  # checked before the header is used
         raise _damaged(path, "bytes")
     with _readable(path):
         data = xr.open_dataset(path, engine="scipy")
@@ -205,14 +204,14 @@ def _copy_to_netcdf4(data: xr.Dataset, path: Path, long: Collection[str]) -> Non
     with TemporaryDirectory(dir=path.parent, prefix=path.stem, suffix=path.suffix) as folder:
         first = Path(folder, "first.nc4")
         _write_netcdf4(_first(data, long), first)
-        with h5netcdf.File(first, "r") as made, h5netcdf.File(path, "w") as file:
-            file.dimensions = {name: data.sizes.get(name, part.size) for name, part in made.dimensions.items()}
-            file.attrs.update(made.attrs)
-            for name, variable in made.variables.items():
-                about = dict(variable.attrs)
-                fill = about.pop("_FillValue", None)
+        with h5netcdf.File(first, "r") as source, h5netcdf.File(path, "w") as file:
+            file.dimensions = {name: data.sizes.get(name, part.size) for name, part in source.dimensions.items()}
+            file.attrs.update(source.attrs)
+            for name, variable in source.variables.items():
+                attributes = dict(variable.attrs)
+                fill = attributes.pop("_FillValue", None)
                 copy = file.create_variable(name, variable.dimensions, variable.dtype, fillvalue=fill)
-                copy.attrs.update(about)
+                copy.attrs.update(attributes)
                 if not set(variable.dimensions) & set(long):
                     copy[...] = variable[...]
             _copy(data, long, file.variables)
@@ -230,7 +229,8 @@ def _open_netcdf4(path: Path) -> xr.Dataset:
     import h5py
 
     open_regular(path).close()
-    # h5netcdf reads this attribute before its File can be closed: one that is damaged leaves a traceback on stderr.
+    # h5netcdf reads this attribute before its File can be closed, and a damaged one leaves a traceback on stderr:
+    # read it here first.
     with _readable(path), h5py.File(path, "r") as file:
         file.attrs.get("_nc3_strict")
     return _intact(path, "h5netcdf")
@@ -269,7 +269,7 @@ def _seal_zarr(path: Path) -> None:
 
 
 def _by_way_of_netcdf3(copy: Copy) -> Callable[..., AbstractContextManager[Sheet]]:
-    """How files are filled whose rows have no fixed places: in netCDF-3 beside them, of which they are copies."""
+    """Return how to fill files whose rows have no fixed offsets: fill a netCDF-3 file beside them, then copy it."""
 
     @contextmanager
     def rows(template: xr.Dataset, lengths: Mapping[str, int], path: Path) -> Iterator[Sheet]:
@@ -287,12 +287,12 @@ def _by_way_of_netcdf3(copy: Copy) -> Callable[..., AbstractContextManager[Sheet
 
 
 def _with(data: xr.Dataset, long: Collection[str]) -> list[str]:
-    """The variables that have a long dimension."""
+    """Return the names of variables that have a long dimension."""
     return [str(name) for name, variable in data.variables.items() if set(variable.dims) & set(long)]
 
 
 def _first(data: xr.Dataset, long: Collection[str]) -> xr.Dataset:
-    """The data at the first place of the long dimensions, in memory."""
+    """Return the data at the first index of the long dimensions, in memory."""
     return data.isel({name: slice(1) for name in long}).load()
 
 
@@ -306,11 +306,11 @@ def _copy(data: xr.Dataset, long: Collection[str], arrays: Mapping[str, Any]) ->
 
 def chunk(shape: tuple[int, ...]) -> tuple[int, ...]:
     """Return the shape of a chunk of at most CHUNK elements that follow each other in C order."""
-    left, found = CHUNK, []
+    left, sizes = CHUNK, []
     for size in reversed(shape):
-        found.append(max(1, min(size, left)))
+        sizes.append(max(1, min(size, left)))
         left //= size or 1
-    return tuple(reversed(found))
+    return tuple(reversed(sizes))
 
 
 def pieces(shape: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
@@ -324,12 +324,12 @@ def pieces(shape: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
 
 
 def _lazy(path: Path, engine: str) -> xr.Dataset:
-    more: dict[str, Any] = {"consolidated": False} if engine == "zarr" else {}
-    return xr.open_dataset(path, engine=engine, cache=False, **more)
+    options: dict[str, Any] = {"consolidated": False} if engine == "zarr" else {}
+    return xr.open_dataset(path, engine=engine, cache=False, **options)
 
 
 def _intact(path: Path, engine: str) -> xr.Dataset:
-    """The data of a file whose contents fit their digest."""
+    """Open a file whose contents fit their digest, or that has none."""
     with _readable(path):
         data = _lazy(path, engine)
         fits = data.attrs.get(DIGEST, "") in ("", _digest(data))
@@ -345,7 +345,7 @@ def _digest_of(path: Path, engine: str) -> str:
 
 
 def _digest(data: xr.Dataset) -> str:
-    """The SHA-256 of names, dimensions, values and attributes, whatever the form of the file."""
+    """Return the SHA-256 of names, dimensions, values and attributes, the same for every form of files."""
     total = hashlib.sha256()
     for name in sorted(map(str, data.variables)):
         variable = data.variables[name]
@@ -364,7 +364,7 @@ def _digest(data: xr.Dataset) -> str:
 
 
 def _without_complex(data: xr.Dataset) -> xr.Dataset:
-    """The data with a further dimension `part` in place of complex numbers, which netCDF does not have."""
+    """Replace complex numbers, which netCDF lacks, by real ones with a further dimension `part`."""
     pairs = {
         name: ((*values.dims, "part"), np.stack([values.values.real, values.values.imag], axis=-1), values.attrs)
         for name, values in data.data_vars.items()
@@ -374,13 +374,13 @@ def _without_complex(data: xr.Dataset) -> xr.Dataset:
 
 
 def _with_complex(data: xr.Dataset) -> xr.Dataset:
-    """The way back of `_without_complex`."""
-    whole = {
+    """Join the pairs of `_without_complex` to complex numbers."""
+    joined = {
         name: (values.dims[:-1], values.values[..., 0] + 1j * values.values[..., 1], values.attrs)
         for name, values in data.data_vars.items()
         if "part" in values.dims
     }
-    return data.assign(whole).drop_vars("part") if whole else data
+    return data.assign(joined).drop_vars("part") if joined else data
 
 
 FORMS: dict[str, Form] = {
