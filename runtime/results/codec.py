@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from fractions import Fraction
-from functools import cache
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, get_args, get_type_hints
 
 import numpy as np
@@ -46,7 +45,6 @@ def decode(tree: Mapping[str, Any], data: xr.Dataset, kind: type[T]) -> T:
     return value
 
 
-@cache
 def _classes_in(kind: type) -> dict[str, type]:
     """Return a frozen class, and the frozen classes and enums in the types of its fields, by name."""
     classes: dict[str, type] = {}
@@ -94,7 +92,7 @@ class _Writer:
             return {"table": {name: self.tree(item, f"{path}_{name}") for name, item in value.items()}}
         if isinstance(value, Topology):
             return {"graph": graph_table(value)}
-        if self.classes.get(type(value).__name__) is type(value):
+        if is_dataclass(value) and self.classes.get(type(value).__name__) is type(value):
             names = [field.name for field in fields(value) if field.init]
             parts = {name: self.tree(getattr(value, name), f"{path}_{name}".lstrip("_")) for name in names}
             return {"value": type(value).__name__, "fields": parts}
