@@ -9,7 +9,7 @@ from synchain.models.dynamics.equations import Equations
 
 from ..program.expressions import Expression, Name, Number, call
 from ..program.printers import C99
-from ..program.statements import Array, Do, Statement, called, used
+from ..program.statements import Array, Do, Statement, called, mentioned
 from .body import is_unrolled, link_places, link_tables, node_places, weights, wrapped
 from .header import Exported
 from .loops import jacobian_statements, mass_statements, rhs_statements
@@ -117,7 +117,7 @@ def _sizes(model: Equations, small: bool) -> list[str]:
 def _function(head: str, body: Sequence[Statement]) -> list[str]:
     """A function; arguments that are not used are named, so that compilers do not warn."""
     arguments = re.findall(r"(\w+)[,)]", head)
-    unused = [f"(void){name};" for name in arguments if name not in used(body)]
+    unused = [f"(void){name};" for name in arguments if name not in mentioned(body)]
     return [head, "{", *(f"    {line}" for line in (*unused, *C99.lines(body))), "}"]
 
 

@@ -36,7 +36,7 @@ from ..simd import lanes
 from ..steps.blocks import NodeBlocks, analyse
 from ..steps.contact_step import push_functions
 from ..steps.looped_step import LoopedStep
-from ..steps.sparse_plan import FILL_LIMIT, SparsePlan, program
+from ..steps.sparse_plan import FILL_LIMIT, SparsePlan, sparse_plan
 from ..steps.step import StepWriter, function_name, node_function, scaling
 from ..steps.unrolled_step import UnrolledStep
 from ..taylor import is_large, write_looped, write_rolled, write_step
@@ -204,7 +204,7 @@ def _planned(equations: Equations, method: Integrator, unroll: int, fill: float)
             f"expected at most {LINK_LIMIT} pairs; use dop853 or taylor"
         )
     equations = equations.without_fields() if method.implicit else equations
-    return equations, program(equations, fill, method.implicit or equations.inertial)
+    return equations, sparse_plan(equations, fill, method.implicit or equations.inertial)
 
 
 def _stages(

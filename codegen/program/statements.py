@@ -205,17 +205,6 @@ def mentioned(statements: Iterable[Statement]) -> set[str]:
     return names
 
 
-def used(statements: Sequence[Statement]) -> set[str]:
-    """Return the variables and arrays in values, and the arrays that are written."""
-    names = {s.array for s in walk(statements) if isinstance(s, Store | Accumulate)}
-    for value in values(statements):
-        for e in value.walk():
-            match e:
-                case Name(text) | Load(text):
-                    names.add(text)
-    return names
-
-
 def operations(statements: Sequence[Statement]) -> int:
     """Count sums, differences, products and quotients; loops and blocks count once."""
     return sum(map(_cost, values(statements))) + sum(isinstance(s, Accumulate) for s in walk(statements))

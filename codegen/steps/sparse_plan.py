@@ -12,7 +12,7 @@ kernel refines every solution to rounding.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import accumulate, pairwise
@@ -76,7 +76,7 @@ def block_pattern(block: Iterable[Iterable[object]]) -> Pattern:
     return tuple((a, b) for a, row in enumerate(block) for b, e in enumerate(row) if e != 0)
 
 
-def program(equations: Equations, fill: float = FILL_LIMIT, solves: bool = True) -> SparsePlan:
+def sparse_plan(equations: Equations, fill: float = FILL_LIMIT, solves: bool = True) -> SparsePlan:
     """Plan the elimination of (s - J) for a network; time and memory grow with its links.
 
     The factors are exact unless they would have more than `fill` entries for each entry of the matrix. A method that
@@ -189,15 +189,13 @@ def _factors(dimension: int, pattern: np.ndarray, fill: float) -> tuple[np.ndarr
     off = pattern[:, pattern[0] != pattern[1]]
     if not off.size:
         return np.arange(dimension), off, True
-    rows, columns = off.tolist()
-    on_diagonal = set(pattern[0, pattern[0] == pattern[1]].tolist())
-    steps = _eliminate_all(dimension, rows, columns, on_diagonal, fill * (dimension + len(rows)) - dimension)
+    steps = order(dimension, list(zip(*pattern.tolist(), strict=True)), fill * (dimension + off.shape[1]) - dimension)
     if steps is not None:
         lower = [(r, k) for k, below in zip(steps.order, steps.below, strict=True) for r in below]
         upper = [(k, c) for k, after in zip(steps.order, steps.after, strict=True) for c in after]
         return np.array(steps.order, np.int64), np.array([*lower, *upper], np.int64).reshape(-1, 2).T, True
     # too much fill: rows without a diagonal entry of J come first, the rest in its order
-    pivots = np.argsort(np.isin(np.arange(dimension), list(on_diagonal)), kind="stable")
+    pivots = np.argsort(np.isin(np.arange(dimension), pattern[0, pattern[0] == pattern[1]]), kind="stable")
     return pivots, _first_level(dimension, off, pivots), False
 
 
@@ -222,29 +220,25 @@ def _first_level(dimension: int, off: np.ndarray, pivots: np.ndarray) -> np.ndar
     return pivots[np.stack(np.divmod(keys, dimension))]
 
 
-def order(size: int, pattern: set[Entry]) -> EliminationPlan:
-    """Order pivots by least degree in the symmetrised pattern, rows without a diagonal entry of J first; O(fill log n)."""
-    off = [(r, c) for r, c in sorted(pattern) if r != c]
-    rows, columns = [r for r, _ in off], [c for _, c in off]
-    steps = _eliminate_all(size, rows, columns, {r for r, c in pattern if r == c}, np.inf)
-    if steps is None:
-        raise RuntimeError("an elimination without a limit of fill was given up; this is a mistake in the program")
-    return steps
+def order(size: int, pattern: Collection[Entry], limit: float = np.inf) -> EliminationPlan | None:
+    """Order pivots by least degree in the symmetrised pattern, rows without a diagonal entry of J first; O(fill log n).
 
-
-def _eliminate_all(
-    size: int, row_of: Sequence[int], column_of: Sequence[int], on_diagonal: set[int], limit: float
-) -> EliminationPlan | None:
-    """Return the exact elimination, None as soon as its off-diagonal entries exceed the limit."""
+    Return None as soon as the factors have more off-diagonal entries than the limit.
+    """
     rows: list[set[int]] = [set() for _ in range(size)]
     columns: list[set[int]] = [set() for _ in range(size)]
-    for r, c in zip(row_of, column_of, strict=True):
-        rows[r].add(c)
-        columns[c].add(r)
+    on_diagonal, count = set[int](), 0
+    for r, c in pattern:
+        if r == c:
+            on_diagonal.add(r)
+        else:
+            rows[r].add(c)
+            columns[c].add(r)
+            count += 1
     near = [rows[k] | columns[k] for k in range(size)]
     heap = [(k in on_diagonal, len(near[k]), k) for k in range(size)]
     heapq.heapify(heap)
-    done, pivots, below, after, count = bytearray(size), [], [], [], len(row_of)
+    done, pivots, below, after = bytearray(size), [], [], []
     while heap:
         _, degree, k = heapq.heappop(heap)
         if done[k] or degree != len(near[k]):

@@ -18,7 +18,7 @@ from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.program.passes import Hoist, Names, StraightLine
 from synchain.codegen.steps.blocks import analyse
 from synchain.codegen.steps.safe_names import RESERVED, tidy
-from synchain.codegen.steps.sparse_plan import program
+from synchain.codegen.steps.sparse_plan import sparse_plan
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Edge, Node
 
@@ -165,7 +165,7 @@ def numbers_of(eq: Equations, method: str, looped: bool) -> list[float]:
     kernel = Interpreted.of(
         emit(eq, method, Recording(("section",), section), width=1, unroll=0 if looped else 8), FLOATS
     )
-    made = program(eq)
+    made = sparse_plan(eq)
     y, graph = [0.3, 0.1, -0.2, 0.5], (made.arrays, made.weights) if looped else ()
     step = take_step(kernel, 0.3, 0.2, y, VALUES, 0.0, 1.0, *graph)
     dense = [0.0 if d is None else d for d in step.dense]

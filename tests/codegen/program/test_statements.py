@@ -58,7 +58,6 @@ from synchain.codegen.program.statements import (
     mentioned,
     operations,
     store,
-    used,
     whole,
 )
 
@@ -86,8 +85,8 @@ def test_operations_are_those_of_values() -> None:
 
 def test_functions_and_names_are_found_at_any_depth() -> None:
     assert called(BODY) == {"sin", "solve", "maximum"}
-    assert used(BODY) == {"y", "NODES", "k", "a", "b", "c", "out", "dense"}
-    assert used([Accumulate("rates", Name("i"), Load("state", Name("j"), None))]) == {"rates", "state", "j"}
+    assert mentioned(BODY) == {"where", "y", "NODES", "K", "i", "k", "a", "b", "c", "out", "dense"}
+    assert mentioned([Accumulate("rates", Name("i"), Load("state", Name("j"), None))]) == {"rates", "i", "state", "j"}
 
 
 def test_what_is_repeated_is_read_off_too() -> None:

@@ -13,7 +13,7 @@ from synchain.codegen.integrators import integrator, names
 from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.steps.places import by_joint
-from synchain.codegen.steps.sparse_plan import program
+from synchain.codegen.steps.sparse_plan import sparse_plan
 
 STEPPED = [name for name in names() if name != "taylor"]
 WAYS = [(name, looped) for name in STEPPED for looped in (False, True) if not (integrator(name).inexact and looped)]
@@ -26,7 +26,7 @@ def test_full_turns_change_no_error_of_a_step(name: str, method: str, looped: bo
     kernel = Interpreted.of(emit(equations, method, Recording(()), width=1, unroll=0 if looped else 8), FLOATS)
     assert kernel.source.driver.looped is looped
     weights = [float(weight) for (_, _, weight), _ in by_joint(equations)]
-    graph = (program(equations).arrays, weights) if looped else ()
+    graph = (sparse_plan(equations).arrays, weights) if looped else ()
     # without atol, so that sizes of states alone decide
     near, far = (take_step(kernel, 0.0, 0.7, list(y), [], 1e-8, 0.0, *graph).error for y in starts(equations))
     assert far == pytest.approx(near, rel=1e-4)

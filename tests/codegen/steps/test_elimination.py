@@ -17,7 +17,7 @@ from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.program.expressions import ONE, Name, Negation, negative
 from synchain.codegen.program.printers import LANES
 from synchain.codegen.steps.elimination import less, plan, times, write_factors, write_solve
-from synchain.codegen.steps.sparse_plan import order, program
+from synchain.codegen.steps.sparse_plan import order, sparse_plan
 from synchain.models.dynamics.equations import Equations
 
 Links = list[tuple[int, int]]
@@ -195,7 +195,7 @@ def test_the_program_solves_the_system(links, weighted):
     weight = {p: Fraction(int(dice.integers(1, 5)), 3) if weighted else Fraction(1) for p in links(n)}
     ends = sorted((*p, w) for (i, j), w in weight.items() for p in ((i, j), (j, i)))
     eq = Equations.of_equal_nodes(harmonic_chain(2).node, spring(), n, tuple(ends))
-    made = program(eq)
+    made = sparse_plan(eq)
     arrays = dict(zip(driver_names(), made.arrays, strict=True))
     matrix = np.zeros((2 * n, 2 * n))
     for (r, c), e in eq.jacobian().items():

@@ -38,7 +38,7 @@ from synchain.codegen.program.expressions import Expression, call
 from synchain.codegen.steps.elimination import plan
 from synchain.codegen.steps.places import by_joint
 from synchain.codegen.steps.safe_names import NAMES
-from synchain.codegen.steps.sparse_plan import program
+from synchain.codegen.steps.sparse_plan import sparse_plan
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
@@ -165,7 +165,7 @@ def dense_errors(m, eq: Equations, h, y, p, jacobian, dense: list, looped: bool)
     slopes = mass * jacobian
     pairs = list(itertools.product(range(size), repeat=2))
     pattern = {(r, c) for r, c in pairs if slopes[r, c] != 0 or mass[r, c] != int(r == c)}
-    order = program(eq).arrays[NAMES.index("order")].tolist() if looped else plan(size, pattern).order
+    order = sparse_plan(eq).arrays[NAMES.index("order")].tolist() if looped else plan(size, pattern).order
     matrix, share = shift * mass - slopes, [mpf(0)] * size
     for at, k in enumerate(order):
         share[k] = shift * mass[k, k] / matrix[k, k]
@@ -268,7 +268,7 @@ def test_a_step_is_what_its_definition_says(case, method, looped, exact_numbers)
     kernel = Interpreted.of(emit(eq, method, Recording(("trajectory",)), width=1, unroll=unroll), EXACT)
     assert kernel.source.driver.looped is looped
     weights = [mpf(w.numerator) / w.denominator for (_, _, w), _ in by_joint(eq)]
-    graph = (program(eq).arrays, np.array(weights, object)) if looped else ()
+    graph = (sparse_plan(eq).arrays, np.array(weights, object)) if looped else ()
     for seed in seeds(case):
         t, y, p, _, jacobian, _ = placed(case, seed)
         h, (new, error, dense) = expected(case, method, seed)

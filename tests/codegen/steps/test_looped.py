@@ -8,7 +8,7 @@ from samples import FLOATS, kernel, plain, run_cells
 
 from synchain.codegen import driver
 from synchain.codegen.steps.safe_names import NAMES
-from synchain.codegen.steps.sparse_plan import SparsePlan, order, program
+from synchain.codegen.steps.sparse_plan import SparsePlan, order, sparse_plan
 from synchain.models import chain, complete, grid, random_cubic, ring, star, tree, wheel
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
@@ -86,7 +86,7 @@ def solved(equations, made: SparsePlan, matrix: np.ndarray, right: np.ndarray) -
 @pytest.mark.parametrize("graph", GRAPHS, ids=lambda g: f"{g.name}{g.n}")
 def test_program_solves_like_numpy(graph):
     equations = Scene(topology=graph, parameters={"sigma": 0.1}).equations
-    made = program(equations)
+    made = sparse_plan(equations)
     assert made.exact
     matrix, right = strong(equations, 6.0), np.random.default_rng(2).normal(size=equations.dimension)
     np.testing.assert_allclose(solved(equations, made, matrix, right), np.linalg.solve(matrix, right), rtol=1e-12)
@@ -97,7 +97,7 @@ def test_an_infinite_pivot_has_no_solution():
     matrix = strong(equations, 8.0)
     matrix[-1, -1] = np.inf
     with np.errstate(invalid="ignore"):
-        found = solved(equations, program(equations), matrix, np.ones(equations.dimension))
+        found = solved(equations, sparse_plan(equations), matrix, np.ones(equations.dimension))
     assert np.isnan(found[-1])
 
 
@@ -105,7 +105,7 @@ def test_an_infinite_pivot_has_no_solution():
 @pytest.mark.parametrize("graph", [grid(30), random_cubic(20)], ids=lambda g: g.name)
 def test_incomplete_elimination_solves_to_rounding(graph, shift):
     equations = Scene(topology=graph).equations
-    made = program(equations, INCOMPLETE)
+    made = sparse_plan(equations, INCOMPLETE)
     assert not made.exact
     matrix, right = strong(equations, shift), np.random.default_rng(2).normal(size=equations.dimension)
     found, expected = solved(equations, made, matrix, right), np.linalg.solve(matrix, right)
@@ -114,7 +114,7 @@ def test_incomplete_elimination_solves_to_rounding(graph, shift):
 
 def test_refinement_that_does_not_converge_says_so():
     equations = Scene(topology=grid(30)).equations
-    made = program(equations, INCOMPLETE)
+    made = sparse_plan(equations, INCOMPLETE)
     right = np.ones(equations.dimension)
     assert np.isnan(solved(equations, made, strong(equations, 0.5), right)).all()
 
@@ -122,7 +122,7 @@ def test_refinement_that_does_not_converge_says_so():
 def test_incomplete_factors_keep_the_first_level_of_fill():
     """Positions first: (v_j, v_i) for every link and (v_i, v_i), which is the diagonal; nothing else."""
     graph = grid(30)
-    made = program(Scene(topology=graph).equations, INCOMPLETE)
+    made = sparse_plan(Scene(topology=graph).equations, INCOMPLETE)
     links = len(graph.links)
     assert made.entries == 2 * 30 + 2 * 30 + 2 * links
     arrays = dict(zip(NAMES, made.arrays, strict=True))
@@ -132,7 +132,7 @@ def test_incomplete_factors_keep_the_first_level_of_fill():
 @pytest.mark.parametrize(("name", "n"), [("grid", 2500), ("random_cubic", 1000)])
 def test_large_fill_is_not_built(name, n):
     graph = topology(name, n)
-    made = program(Scene(topology=graph).equations)
+    made = sparse_plan(Scene(topology=graph).equations)
     assert not made.exact
     assert made.entries == 4 * n + 2 * len(graph.links)
 
@@ -163,7 +163,7 @@ def test_lanes_are_refined_independently():
 @pytest.mark.parametrize("graph", [chain(2000), star(2000), ring(2000), tree(2000)], ids=lambda g: g.name)
 def test_elimination_of_sparse_families_stays_sparse(graph):
     """Trees cause no fill between nodes; a ring adds at most one entry each way for every node."""
-    made = program(Scene(topology=graph).equations)
+    made = sparse_plan(Scene(topology=graph).equations)
     links = len(graph.links)
     # positions first: each link is one entry (v, x) and one (v, v) of fill; a node has (x, v) and (v, x)
     allowed = 2 * graph.n + 2 * graph.n + 2 * links + (4 * graph.n if graph.name == "ring" else 0)

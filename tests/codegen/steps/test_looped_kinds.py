@@ -14,7 +14,7 @@ from synchain.codegen.export.python import to_python
 from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.steps.places import by_joint
-from synchain.codegen.steps.sparse_plan import program
+from synchain.codegen.steps.sparse_plan import sparse_plan
 from synchain.models import ring, star
 from synchain.models.dynamics.equations import Equations
 from synchain.models.scenes.file import load_scene
@@ -68,10 +68,10 @@ def test_loops_do_what_the_written_statements_do(case: str, method: str) -> None
         weights = [float(weight) for (_, _, weight), _ in by_joint(equations)]
         state, t, h = list(y), 0.0, 0.05
         for _ in range(10):
-            graph = (program(equations, fill).arrays, weights) if limit == 0 else ()
+            graph = (sparse_plan(equations, fill).arrays, weights) if limit == 0 else ()
             state, t = take_step(kernel, t, h, state, list(p), 1e-6, 1e-6, *graph).y_new, t + h
         ends.append(state)
-    assert program(equations).weights.tolist() == weights
+    assert sparse_plan(equations).weights.tolist() == weights
     np.testing.assert_allclose(*ends, rtol=1e-11, atol=1e-11)
     assert np.abs(np.array(ends[0]) - y).max() > 0.1
 
@@ -132,5 +132,5 @@ def test_equations_and_elimination_of_a_thousand_nodes_cost_no_algebra(monkeypat
     monkeypatch.setattr(sp.Basic, "subs", counted)
     made = hanging(1000).equations
     assert made.dimension == 2002
-    assert program(made).entries < 20 * 1000
+    assert sparse_plan(made).entries < 20 * 1000
     assert len(calls) < 100

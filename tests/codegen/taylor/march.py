@@ -14,7 +14,7 @@ from numba import njit as numba_njit
 from synchain.codegen import simd
 from synchain.codegen.front_end.syntax_trees import execute
 from synchain.codegen.steps.safe_names import tidy
-from synchain.codegen.steps.sparse_plan import program
+from synchain.codegen.steps.sparse_plan import sparse_plan
 from synchain.codegen.taylor import TaylorStep, write_looped, write_step
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import Node
@@ -82,7 +82,7 @@ class Lanes:
 @functools.lru_cache(maxsize=64)
 def compiled(equations: Equations, order: int, width: int = 1, dense: bool = False, looped: bool = False) -> Lanes:
     """The step of some order, compiled for a width; tests that ask for the same one share it."""
-    plan = program(tidy(equations))
+    plan = sparse_plan(tidy(equations))
     written = write_looped(tidy(equations), order) if looped else step_of(equations, order)
     space = {**SPACE, "WIDTH": width, "DIMENSION": equations.dimension, "NODES": equations.n, "DENSE": dense}
     space["DENSE_ROWS"] = order

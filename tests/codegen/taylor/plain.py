@@ -13,7 +13,7 @@ import numpy as np
 from scipy import special
 
 from synchain.codegen.steps.safe_names import tidy
-from synchain.codegen.steps.sparse_plan import program
+from synchain.codegen.steps.sparse_plan import sparse_plan
 from synchain.codegen.taylor import write_looped, write_rolled, write_step
 from synchain.models.dynamics.equations import Equations
 
@@ -47,7 +47,7 @@ class Text:
     ) -> None:
         equations = tidy(equations)
         write = write_rolled if rolled else write_looped if looped else write_step
-        plan, written = program(equations), write(equations, order)
+        plan, written = sparse_plan(equations), write(equations, order)
         self.size = equations.dimension
         space = {
             **WORDS, "DIMENSION": self.size, "NODES": equations.n, "DENSE_ROWS": order, "DENSE": dense,
