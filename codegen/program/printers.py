@@ -1,7 +1,7 @@
 """Programs as text for readers: minimal parentheses, one printer for each language.
 
 `Printer` holds the grammar of expressions and statements. A language is a subclass: the names of its functions, templates
-of what it writes in one line, and methods for the few things that it writes in another form.
+of one line, and methods for statements of another form.
 """
 
 from __future__ import annotations

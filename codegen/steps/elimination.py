@@ -3,8 +3,7 @@
     pattern ─plan─▶ EliminationPlan;  entries ─write_factors─▶ Factors;  right-hand side ─write_solve─▶ statements
 
 The plan picks pivots on the diagonal by least fill (Markowitz, Management Science 3, 255, 1957). So positions of a
-mechanical network are eliminated before velocities, a chain or any tree causes no fill, and a ring or a star costs
-what it must. No numerical pivoting: the step control chooses the shift, and a bad pivot shows up as a rejected step.
+mechanical network are eliminated before velocities, and a chain or any tree causes no fill. No numerical pivoting: the step control chooses the shift, and a bad pivot shows up as a rejected step.
 An infinite pivot, as of sqrt(x) at 0, would make the step and its error 0; its inverse is NaN, and so the error is.
 """
 
@@ -46,7 +45,7 @@ class EliminationPlan:
 def plan(size: int, pattern: set[Entry]) -> EliminationPlan:
     """Order the pivots 0 … size-1 by least Markowitz cost and list the fill.
 
-    A second order begins with the rows without a diagonal entry of J, whose pivots need no division. It is taken where
+    A second order begins with the rows without a diagonal entry of J: their pivots need no division. It is taken where
     it is not more expensive.
     """
     first = frozenset(k for k in range(size) if (k, k) not in pattern)

@@ -77,7 +77,7 @@ class MeanField:
         return {s: e for s, e in functions.items() if not e.is_Symbol and any(rate.has(e) for rate in self.rates)}
 
     def statements(self, places: StateLayout, base: str, out: str, start: int = 0) -> list[Statement]:
-        """Write both loops at one vector of states, and what all nodes share between them; they add to the vector `out`.
+        """Write both loops at one vector of states, and the shared terms between them; they add to the vector `out`.
 
         Functions of the source and of the target are computed once, and kept in the rows of FIELD from `start` on.
         """
@@ -97,7 +97,7 @@ class MeanField:
             loop += compensated(total.name, lower(e))
         if self.sums:
             statements.append(span("j", "NODES").over(loop))
-        # 2. sums times what all nodes share
+        # 2. sums times the factors that all nodes share
         statements += [let(s.name, lower(e.xreplace(NOW))) for s, e in self.shared.items()]
         # 3. the rates
         kept = {e: real(f"{s}_own") for s, e in self.alike.items()}
@@ -117,7 +117,7 @@ class MeanField:
 class LinkSums:
     """The part of a joint's links that is products of both ends, as sums over the links of each node.
 
-    functions: those of the source, by name. sums: what each link multiplies a function by, and the name of the function
+    functions: those of the source, by name. sums: the factor of each link and the name of the function that it multiplies
     (or one), by the names of the sums. factors: functions of parameters that all links share, by name. rates: the rates of
     a node, in these names and functions of the node.
     """

@@ -97,7 +97,7 @@ class LoopedStep(StepWriter):
 
     @property
     def workspace(self) -> int:
-        """The registers of the workspace, whose parts `opening` names."""
+        """The number of registers of the workspace; `opening` names its parts."""
         eq, implicit, elimination = self.equations, self.method.implicit, self.elimination
         size = (len(self.method.c) + 3) * eq.dimension
         size += eq.n * (sum(len(field.alike) for field in self.fields) + sum(links.kept for links in self.sums))
@@ -127,7 +127,7 @@ class LoopedStep(StepWriter):
             for links in self.sums:
                 self.put(*links.statements(self.places, "y", "out", rows))
                 rows += links.kept
-        # what the step has computed by now and the body uses
+        # the variables of the step so far that the body uses
         needed = mentioned(body)
         constants = [name for name in ("h", "p", *targets(self.statements), "weights") if name in needed]
         about = "Write the right-hand side at the states y behind the place `out` of the workspace."
@@ -224,7 +224,7 @@ class LoopedStep(StepWriter):
         change: Callable[[Expression], Expression] = negative,
         matrix: str = "MATRIX",
     ) -> list[Statement]:
-        """Add the non-zero entries of a block, or what `change` makes of them, to the matrix: by default their negatives."""
+        """Add the non-zero entries of a block, changed by `change`, to the matrix: by default their negatives."""
         return [
             add_to(matrix, self.places.entry(slot, a, b), change(lower(block[a][b].xreplace(swap))))
             for a, b in block_pattern(block)
@@ -317,7 +317,7 @@ class LoopedStep(StepWriter):
 
 
 class LoopMass:
-    """Writes what a mass matrix M adds to a looped step, and all solutions of linear equations.
+    """Writes the terms of a mass matrix M in a looped step, and all solutions of linear equations.
 
     The equations that a step solves are in the head of codegen/steps/mass_solve.py.
     """

@@ -1,4 +1,4 @@
-"""The mass matrix of a network whose nodes or links have inertia: M d(state)/dt = f, solved by a sparse elimination.
+"""The mass matrix of a network with inertia of nodes or links: M d(state)/dt = f, solved by a sparse elimination.
 
 A Rosenbrock step for y' = F = M^-1 f solves
 
@@ -6,7 +6,7 @@ A Rosenbrock step for y' = F = M^-1 f solves
 
 with M at the start of the step: that is the exact Jacobian, multiplied by M (Hairer & Wanner, Solving Ordinary Differential
 Equations II (Springer, 1996), section IV.7). Where M is constant, M F(u) = f(u) and no system in M is solved. Otherwise
-F(u) takes one elimination of M a stage, whose fill follows the links. Explicit methods solve M F = f in each stage.
+F(u) takes one sparse elimination of M a stage. Explicit methods solve M F = f in each stage.
 `Mass` writes this for steps in registers, `LoopMass` (looped_step) for steps in loops.
 """
 
@@ -58,7 +58,7 @@ def momentum_slopes(edge: Edge, here: Sequence[sp.Symbol], there: Sequence[sp.Sy
 
 
 class Mass:
-    """Writes what a mass matrix M adds to a step in registers; nothing if M is the identity.
+    """Writes the terms of a mass matrix M in a step in registers; nothing if M is the identity.
 
     entries: the non-zero entries of M by row and column, empty for the identity. coupled: those that differ from the
     identity. rows: the rows that are solved together, those with such entries and those of the rates they multiply.
@@ -72,16 +72,16 @@ class Mass:
         self.rows = sorted({k for key in self.coupled for k in key})
         self.names = [writer.state[row] for row in self.rows]
 
-    def refuse(self, what: str) -> None:
+    def refuse(self, subject: str) -> None:
         """Raise ValueError where M is not the identity."""
         if self.equations.inertial:
-            found = "links with inertia" if self.equations.inertial_links else "nodes with a mass matrix"
-            raise ValueError(f"{what}: found {found}; expected none; use integrator 'rodas5p' or 'dop853'")
+            parts = "links with inertia" if self.equations.inertial_links else "nodes with a mass matrix"
+            raise ValueError(f"{subject}: found {parts}; expected none; use integrator 'rodas5p' or 'dop853'")
 
     # -- M rates = r ------------------------------------------------------------------------------------------
 
     def elimination(self, matrix: Mapping[Entry, sp.Expr]) -> tuple[EliminationPlan, Factors]:
-        """Eliminate the coupled rows of M, whose entries may be renamed."""
+        """Eliminate the coupled rows of M; `matrix` has its entries, perhaps renamed."""
         index = {row: k for k, row in enumerate(self.rows)}
         inner = {(index[r], index[c]): e for (r, c), e in matrix.items() if r in index and c in index}
         steps = plan(len(index), set(inner))

@@ -56,9 +56,9 @@ class SparsePlan:
 
 @dataclass(frozen=True, slots=True)
 class _Network:
-    """The structure of the matrix: what equations with other symbols or numbers share.
+    """The structure of the matrix; equations that differ in symbols or numbers share it, and the plan.
 
-    size: the most states of a node. kinds, joints: blocks of each kind of node and of each joint, and how many have them.
+    size: the most states of a node. kinds, joints: blocks of each kind of node and of each joint, and their counts.
     links: in the order of the kernel. where (size, n) and more: the array of that name.
     """
 

@@ -99,7 +99,7 @@ class StepWriter(ABC):
         self.state = equations.state
         self.statements: list[Statement] = []
         self.functions: list[Function] = []
-        # symbols with a value for each node: states, parameters of single nodes, and what node functions assign
+        # symbols with a value for each node: states, parameters of single nodes, variables of node functions
         bodies = (body for blocks in kinds for body in (blocks.rhs, blocks.linear))
         self.inner = {s for body in bodies for s, _ in body.statements}
         self.states = list(dict.fromkeys(s for node in equations.nodes for s in node.state))

@@ -4,7 +4,7 @@ The prefix of a name says which vector a state belongs to:
 
     x_1     at the start        u_x_1    in a stage             n_x_1    at the end
     f_x_1   right-hand side     k2_x_1   rate of stage 2        r_x_1    right-hand side of linear equations
-    g_x_1   what a mass matrix makes of a vector (mass_solve)   e_x_1    error
+    g_x_1   vector of mass_solve                                e_x_1    error
 
 Jacobian entries of nodes and links are added before they are lowered, so that zeros and units cost nothing.
 """
@@ -131,7 +131,7 @@ class UnrolledStep(StepWriter):
             for row, r in zip(places, state, strict=True):
                 for column, c in zip(places, state, strict=True):
                     entries[row, column] = results[i][entry(r, c)]
-        # a W-method (inexact) leaves out entries between nodes: its elimination is one of each node
+        # a W-method (inexact) leaves out entries between nodes: it eliminates each node alone
         node = {k: i for i, places in enumerate(eq.places) for k in places}
         for key, e in eq.link_jacobian():
             if node[key[0]] == node[key[1]] or not self.method.inexact:
