@@ -23,6 +23,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import get_context
 from statistics import median
 from unittest import mock
@@ -39,7 +40,8 @@ from synchain.runtime.engines.scene_kernels import kernel
 from synchain.runtime.stability.averages import Averaging, Batches
 from synchain.runtime.stability.exponents import average, coupled_cell, exponents
 from synchain.runtime.stability.interpolation import exact_interpolation
-from synchain.runtime.stability.orbits import Orbits, unit_of_time
+from synchain.runtime.stability.march import BlockInterpolation, March, interpolation_for
+from synchain.runtime.stability.orbits import OrbitProblem, unit_of_time
 from synchain.runtime.support.execution import Execution
 
 from . import peers
@@ -78,7 +80,7 @@ SETTLED, LONGEST = 300, 1e6
 PRECISION = 5e-3
 LOOSE = 5e-2
 BY_ORBIT = 1e12
-"""Looseness of modes that have no say in the steps."""
+"""Tolerance ratio so large that modes never limit the step."""
 BLAS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """Variables of the environment that BLAS libraries take their number of threads from."""
 
@@ -153,20 +155,21 @@ def orbit_rows(contact: str, quick: bool) -> list[Row]:
     """
     periods, reviewed, rounds = (64, 16, 2) if quick else (PERIODS, REVIEWED, 12)
     chosen = [strengths(count) for count in ((1, 100) if quick else (*COUNTS, 0))]
-    ready = [_settled(contact, 1.4, values, periods) for values in chosen]
-    alone = _alone(ready[0], periods)
+    ready = [_ready(contact, 1.4, values, periods) for values in chosen]
+    alone = _alone(*ready[0], periods)
     best, steps = [math.inf] * (1 + len(ready)), [0.0] * (1 + len(ready))
+    runs: list[Callable[[], int]] = [alone, *(partial(_along, *pair, periods) for pair in ready)]
     for _ in range(rounds):
-        for k, run in enumerate([alone, *(lambda o=o: _along(o, periods) for o in ready)]):
+        for k, run in enumerate(runs):
             begin = time.process_time()
             steps[k] = run() / periods
             best[k] = min(best[k], (time.process_time() - begin) / periods)
     what = (ORBIT, LAWS[contact], "synchain")
     rows: list[Row] = [(*what, "", 0, 0, steps[0], 1e6 * best[0], 1.0, nan, nan, periods, nan, nan, nan)]
-    for k, (orbits, values) in enumerate(zip(ready, chosen, strict=True), 1):
+    for k, ((march, _), values) in enumerate(zip(ready, chosen, strict=True), 1):
         plane = np.iscomplexobj(values)
         given = ("0 … 1.2, beta 0 … 0.6", f"{SIDE} x {SIDE}") if plane else (_span(values), len(values))
-        integrated = len(orbits.integrator.order) // orbits.components
+        integrated = len(march.integrator.order) // march.problem.components
         off = difference(contact, values, reviewed)
         cost = (steps[k], 1e6 * best[k], best[k] / best[0], *off, periods, nan, nan, nan)
         rows.append((*what, *given, integrated, *cost))
@@ -178,46 +181,51 @@ def _span(values: Sequence[float] | np.ndarray) -> str:
     return f"{values[0]:g}" if len(values) == 1 else f"{values[0]:g} … {values[-1]:g}"
 
 
-def _settled(contact: str, omega: float, values: np.ndarray, periods: int) -> Orbits:
-    """One orbit with its modes, behind the transient, ready for an average over so many periods."""
+def _settled(contact: str, omega: float, values: np.ndarray) -> tuple[OrbitProblem, np.ndarray]:
+    """Modes along one orbit, and its state (1, components) after the transient."""
     pair = Scene(topology=topology("chain", 2), record=(), contact=contact)
     scene = coupled_cell(Given(exponents, {"omega": omega}), pair, RTOL)
     start = np.array([[numbers[0] for numbers in scene.initial.values()]])
-    orbits = Orbits.make(scene, values, start, workers=1)
-    orbits.settle(SETTLED)
-    orbits.prepare(periods)
-    return orbits
+    problem = OrbitProblem.of_modes(scene, values, start, workers=1)
+    return problem.settled(problem.with_slip_states(start), SETTLED)
 
 
-def _along(orbits: Orbits, periods: int) -> int:
+def _ready(contact: str, omega: float, values: np.ndarray, periods: int) -> tuple[March, np.ndarray]:
+    """A march for an average over some periods, and the state (1, components) at its begin."""
+    problem, state = _settled(contact, omega, values)
+    return March.begin(problem, state, interpolation_for(problem, state, periods)), state
+
+
+def _along(march: March, state: np.ndarray, periods: int) -> int:
     """Average from the settled state with all strengths; returns the steps of the orbit."""
-    carrier = orbits.integrator
-    carrier.state, before = orbits.state.copy(), carrier.steps
+    carrier = march.integrator
+    carrier.state, before = state.copy(), carrier.steps
     averaging = Averaging(0.0, periods, 0.0, 0, Execution(1, show_progress=False))
     with averaging.reporter() as reporter:
-        average(orbits, averaging, reporter)
+        average(march, averaging, reporter)
     return carrier.steps - before
 
 
-def _alone(orbits: Orbits, periods: int) -> Callable[[], int]:
+def _alone(march: March, state: np.ndarray, periods: int) -> Callable[[], int]:
     """A function that runs the same stretch of the orbit without modes and returns its steps."""
+    problem = march.problem
     scene = Scene(
         topology=topology("chain", 1),
         record=(),
-        contact=orbits.scene.contact,
-        integrator=orbits.method.name,
+        contact=problem.scene.contact,
+        integrator=problem.method.name,
         rtol=RTOL,
         transient=0.0,
         window=periods,
-        parameters={"omega": orbits.scene.parameters["omega"]},
+        parameters={"omega": problem.scene.parameters["omega"]},
     )
     cells, compiled = plan(scene), kernel(scene, 1, reduce=False)
     rtol, atol = (float(own.min()) for own in tolerances(scene, scene.equations, cells.numbers))
-    control = control_array(rtol, atol, 0.5 * orbits.unit, scene.max_steps, jumps=False)
+    control = control_array(rtol, atol, 0.5 * problem.unit, scene.max_steps, jumps=False)
 
     def run() -> int:
-        buffers = Buffers.empty(1, orbits.state.shape[1], room=0, samples=0)
-        compiled.drive(0, 1, orbits.state, cells.numbers, cells.spans, control, *buffers.arrays())
+        buffers = Buffers.empty(1, state.shape[1], room=0, samples=0)
+        compiled.drive(0, 1, state, cells.numbers, cells.spans, control, *buffers.arrays())
         return int(buffers.counts[0, 1:3].sum())
 
     run()
@@ -231,13 +239,12 @@ def difference(contact: str, values: np.ndarray, periods: int) -> tuple[float, f
     Along the periodic orbit at omega = 1.15, over so many periods.  The orbit alone chooses the
     steps of both, so that nothing but the interpolation tells them apart.
     """
-    orbits = _settled(contact, 1.15, values, periods)
-    block, interpolation = orbits.block, orbits.interpolation or exact_interpolation(values)
-    sums = []
-    for way in (interpolation, exact_interpolation(values)):
-        orbits.start(way, block, BY_ORBIT)
-        sums.append(orbits.growths(np.full(1, round(periods / block)))[0, 0])
-    gaps = np.abs(sums[0] - sums[1]) / (periods * orbits.unit)
+    problem, state = _settled(contact, 1.15, values)
+    chosen, sums = interpolation_for(problem, state, periods), []
+    for interpolation in (chosen.strengths, exact_interpolation(values)):
+        march = March.begin(problem, state, BlockInterpolation(chosen.block, interpolation), BY_ORBIT)
+        sums.append(march.growths(np.full(1, round(periods / march.block)))[0, 0])
+    gaps = np.abs(sums[0] - sums[1]) / (periods * problem.unit)
     return float(gaps.max()), float(np.median(gaps))
 
 

@@ -337,12 +337,14 @@ def test_what_tells_and_what_works_is_checked_in_all_functions(tmp_path: Any) ->
 
 def test_seed_and_transient_of_a_skeleton_are_used(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[str, float]] = []
-    states, settle = skeletons.starts_of, skeletons.Orbits.settle
+    states, settled = skeletons.starts_of, skeletons.OrbitProblem.settled
     monkeypatch.setattr(
         skeletons, "starts_of", lambda s, seed, box: asked.append(("seed", seed)) or states(s, seed, box)
     )
     monkeypatch.setattr(
-        skeletons.Orbits, "settle", lambda own, length: asked.append(("transient", length)) or settle(own, length)
+        skeletons.OrbitProblem,
+        "settled",
+        lambda problem, starts, length: asked.append(("transient", length)) or settled(problem, starts, length),
     )
     runtime.skeleton(DRIVEN, "omega", [1.3], (1,), 1, transient=7, seed=3, show_progress=False)
     assert asked == [("seed", 3), ("transient", 7.0)]

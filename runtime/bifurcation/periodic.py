@@ -32,7 +32,7 @@ from ..stability.attractor import RETURN, cycle_propagators
 from ..stability.exponents import coupled_cell, single_cell
 from ..stability.limit_cycle import limit_cycle
 from ..stability.motion import Turns, rests
-from ..stability.orbits import Orbits, unit_of_time, within
+from ..stability.orbits import OrbitProblem, unit_of_time, within
 from .phases import Phases, phases_of
 
 __all__ = [
@@ -293,8 +293,8 @@ def closed(gap: np.ndarray, allowed: np.ndarray, state: np.ndarray) -> bool:
 
 def _extent(scene: Scene, state: np.ndarray, periods: int, known: np.ndarray | None = None) -> np.ndarray:
     """How far each component (components,) moves within some drive periods from a state."""
-    orbit = _orbits(scene, state, 0.0, scene.period, known)
-    return np.asarray(np.ptp([orbit.state[0], *within(orbit, periods)], axis=0)[: len(state)])
+    problem, first = _problem(scene, state, 0.0, scene.period, known)
+    return np.asarray(np.ptp([first, *within(problem, first[None], periods)], axis=0)[: len(state)])
 
 
 def _limit_cycle(scene: Scene, periods: int, start: Sequence[float] | np.ndarray | None) -> PeriodicOrbit:
@@ -305,20 +305,21 @@ def _limit_cycle(scene: Scene, periods: int, start: Sequence[float] | np.ndarray
         raise ValueError(
             "periodic orbits: found set-valued friction without a drive; expected a drive, or a smoothed law"
         )
-    state = _initial(scene) if start is None else _state(scene, start)
-    orbit = Orbits.make(scene, np.zeros(1), state[None], 1)
-    orbit.settle(scene.transient)
-    if rests(orbit.rates, orbit.state[0], RETURN, orbit.extent):
-        at = ", ".join(f"{name} = {x:.6g}" for name, x in zip(scene.components, orbit.state[0], strict=False))
+    first = (_initial(scene) if start is None else _state(scene, start))[None]
+    problem = OrbitProblem.of_modes(scene, np.zeros(1), first, 1)
+    problem, (settled,) = problem.settled(problem.with_slip_states(first), scene.transient)
+    if rests(problem.rates, settled, RETURN, problem.extent):
+        at = ", ".join(f"{name} = {x:.6g}" for name, x in zip(scene.components, settled, strict=False))
         raise ArithmeticError(f"no cycle: the motion comes to rest at {at}; `equilibrium` finds such states")
-    free, steps = limit_cycle(orbit, RETURN)
-    if not free:
+    cycle = limit_cycle(problem, settled, RETURN)
+    if cycle is None:
         raise ArithmeticError(
             f"no attracting cycle near the motion after {scene.transient:g} mean return times; start elsewhere, or settle longer"
         )
-    state, extent = orbit.state[0], orbit.extent
-    image, matrix = _strobe(scene, state, 1, 0.0, free, extent)
-    return PeriodicOrbit(scene, 1, state, _sorted(matrix), float(np.abs(image - state).max()), steps, free, extent)
+    state, extent = cycle.state, problem.extent
+    image, matrix = _strobe(scene, state, 1, 0.0, cycle.period, extent)
+    residual = float(np.abs(image - state).max())
+    return PeriodicOrbit(scene, 1, state, _sorted(matrix), residual, cycle.steps, cycle.period, extent)
 
 
 def _nearly_sticks(image: np.ndarray, gap: np.ndarray, extent: np.ndarray) -> bool:
@@ -385,9 +386,11 @@ def _initial(scene: Scene) -> np.ndarray:
 
 def _settled(scene: Scene) -> np.ndarray:
     """State (components,) after the scene's transient from its initial one."""
-    orbits = Orbits.make(scene, np.zeros(1), _initial(scene)[None], 1)
-    orbits.settle(scene.transient if scene.time_unit == "period" else math.ceil(scene.transient / orbits.unit))
-    return np.asarray(orbits.state[0][: orbits.components])
+    first = _initial(scene)[None]
+    problem = OrbitProblem.of_modes(scene, np.zeros(1), first, 1)
+    units = scene.transient if scene.time_unit == "period" else math.ceil(scene.transient / problem.unit)
+    _, (state,) = problem.settled(problem.with_slip_states(first), units)
+    return np.asarray(state[: problem.components])
 
 
 def _state(scene: Scene, start: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -429,25 +432,26 @@ def _strobe(
     scene: Scene, state: np.ndarray, periods: int, alpha: float, free: float = 0.0, extent: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """State some periods later, of the drive or of length `free`, and the propagator of a deviation of strength alpha."""
-    orbits = _orbits(scene, state, alpha, free or scene.period, extent)
-    propagators, logarithms = cycle_propagators(orbits, periods)
+    problem, first = _problem(scene, state, alpha, free or scene.period, extent)
+    propagators, logarithms, image = cycle_propagators(problem, first, periods)
     if (size := float(logarithms[0, 0])) > 700.0:
         raise FloatingPointError(
             f"multipliers: found a deviation that grows by exp({size:.3g}); expected exp(700) at most"
         )
-    matrix = propagators[0, 0] * math.exp(size)
-    return orbits.state[0], matrix
+    return image, propagators[0, 0] * math.exp(size)
 
 
-def _orbits(
+def _problem(
     scene: Scene, state: np.ndarray, alpha: float, period: float | None, extent: np.ndarray | None = None
-) -> Orbits:
-    """A single orbit with a mode of strength alpha, whose unit of time is a period; its absolute tolerance follows its extent."""
+) -> tuple[OrbitProblem, np.ndarray]:
+    """Orbits with a mode of strength alpha in units of a period, and the state with its slip state; tolerances follow the extent."""
     start, moves = np.zeros(len(scene.initial)), np.zeros(len(scene.initial))
     start[: len(state)] = state
     if extent is not None:
         moves[: len(state)] = extent
-    return Orbits.make(scene, np.array([alpha]), start[None], 1, Turns(period or 2.0 * math.pi, moves, "period"))
+    turns = Turns(period or 2.0 * math.pi, moves, "period")
+    problem = OrbitProblem.of_modes(scene, np.array([alpha]), start[None], 1, turns)
+    return problem, problem.with_slip_states(start[None])[0]
 
 
 def _sorted(matrix: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ Source: Auerbach, Cvitanovic, Eckmann, Gunaratne & Procaccia, Phys. Rev. Lett. 5
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from numbers import Integral
 
 import numpy as np
@@ -25,7 +25,7 @@ from synchain.models.scenes.scene import Scene, check_scene
 from ..cells.run_keywords import Given, with_numbers
 from ..results.labelled import Labelled, dataset
 from ..stability.exponents import coupled_cell
-from ..stability.orbits import Orbits, driven_states, within
+from ..stability.orbits import OrbitProblem, driven_states, within
 from ..support.arrays import row
 from ..support.execution import Execution
 from ..support.progress import Hook
@@ -241,9 +241,9 @@ def starts_of(scene: Scene, seed: int, box: np.ndarray | None = None) -> np.ndar
     own = np.array([values[0] for name, values in scene.initial.items() if name != SLIP.name], dtype=float)
     share = np.random.default_rng(seed).uniform(0.0, 1.0, (STARTS, len(own)))
     if box is None:
-        orbit = _orbits(scene, own[None])
+        problem, (state,) = _problem(scene, own[None])
         try:
-            motion = np.concatenate([own[None], *(states[:, : len(own)] for states in driven_states(orbit))])
+            motion = np.concatenate([own[None], *(states[:, : len(own)] for states in driven_states(problem, state))])
         except FloatingPointError:  # its own start escapes, and says nothing of bounded motion but its size
             motion = np.array([own, -own])
         extent = np.ptp(motion, axis=0)
@@ -290,24 +290,24 @@ def _paths(scene: Scene, transient: float, starts: np.ndarray) -> tuple[np.ndarr
 
 def _path(scene: Scene, transient: float, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """States (LENGTH + 1, starts, components) at the beginning of each period, and the extent of each motion."""
-    orbits = _orbits(scene, starts)
-    orbits.settle(transient)
-    integrator = orbits.integrator_of(orbits.strengths)
-    states = [integrator.state]
+    problem, states = _problem(scene, starts)
+    problem, states = problem.settled(states, transient)
+    integrator = problem.integrator(states)
+    strobes = [integrator.state]
     for _ in range(LENGTH):
-        integrator.advance(orbits.unit)
-        states.append(integrator.state)
-    path = np.array(states)[:, :, : orbits.components]
-    last = replace(orbits, state=states[-1])
-    inner = [within(last.part([k]))[:, : orbits.components] for k in range(len(starts))]
+        integrator.advance(problem.unit)
+        strobes.append(integrator.state)
+    path = np.array(strobes)[:, :, : problem.components]
+    inner = [within(problem, last[None])[:, : problem.components] for last in strobes[-1]]
     return path, np.array([np.ptp([*path[:, k], *looks], axis=0) for k, looks in enumerate(inner)])
 
 
-def _orbits(scene: Scene, starts: np.ndarray) -> Orbits:
-    """Orbits from starts (any, components) without the modes of contacts, which follow from them."""
+def _problem(scene: Scene, starts: np.ndarray) -> tuple[OrbitProblem, np.ndarray]:
+    """Orbits from starts (any, components) without slip states, and these states with them."""
     states = np.zeros((len(starts), len(scene.initial)))
     states[:, : starts.shape[1]] = starts
-    return Orbits.make(scene, np.zeros(1), states, 1)
+    problem = OrbitProblem.of_modes(scene, np.zeros(1), states, 1)
+    return problem, problem.with_slip_states(states)
 
 
 def _returning(path: np.ndarray, extent: np.ndarray, periods: int) -> list[np.ndarray]:

@@ -178,7 +178,7 @@ def _check(scene: Scene, arguments: Namespace, rows: Rows, alpha: np.ndarray) ->
 
     from ..prediction.mode_windows import transversal_modes
     from ..prediction.synchronisability import windows
-    from ..stability.orbits import Orbits, pair_of
+    from ..stability.orbits import OrbitProblem, pair_of
 
     axes = (*rows.values(), *(() if len(rows) == 2 else (alpha, arguments.beta or (0.0,))))
     if math.prod(map(len, axes)) > POINTS:
@@ -190,7 +190,7 @@ def _check(scene: Scene, arguments: Namespace, rows: Rows, alpha: np.ndarray) ->
     graph = scene.topology
     one = scene if graph.link_count else pair_of(scene)
     strength = np.zeros(1, dtype=float if arguments.beta is None else complex)
-    Orbits.make(one, strength, np.zeros((1, len(one.components))), None)
+    OrbitProblem.of_modes(one, strength, np.zeros((1, len(one.components))), None)
     if not graph.link_count:
         return []
     gammas = [complex(mode.eigenvalue.value) for mode in transversal_modes(graph)]

@@ -12,26 +12,27 @@ from enum import StrEnum
 import numpy as np
 import sympy as sp
 
-from synchain.models.dynamics.variational import Variation
-
 from .limit_cycle import limit_cycle
 from .motion import rests
-from .orbits import FAR, Orbits, within
+from .orbits import FAR, OrbitProblem, within
 
 LONGEST = 32
-"""Longest cycle that is looked for, in periods of the drive."""
+"""Longest cycle that is looked for, in periods of the drive (a choice)."""
+
+ROUNDS = 3
+"""Most searches for a cycle, each after one more transient."""
 
 RETURN = 1e-9
-"""Largest distance of a closed cycle in each component, relative to what it moves; at least 0.1 rtol."""
+"""Largest distance of a closed cycle in each component, relative to the extent of its motion; at least 0.1 rtol."""
 
 CLOSE = 1e-3
-"""Largest distance of a state that returns, relative to the extent of the motion, and the least part of it that a component moves."""
+"""Largest distance of a return that may still close, and least motion of a component, relative to the extent (a choice)."""
 
-SLACK = 10.0
-"""How many times the tolerance a cycle is compared with."""
+TOLERANCE_RATIO = 10.0
+"""Ratio of the tolerances of two integrations of a cycle, from which the error of its exponents is seen."""
 
 ALIKE = 1e-5
-"""How far exponents of one attractor lie apart, relative to the rates of its linearised equations."""
+"""Largest distance of two starts' exponents on one attractor, relative to the rates of its linearised equations."""
 
 
 class Motion(StrEnum):
@@ -49,21 +50,21 @@ class Motion(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Attractor:
-    """Motion of one start."""
+    """Motion of one start, with what its exponents follow from."""
 
     motion: Motion  # kind of the motion
     cycle: float  # length of one cycle in units of non-dimensional time; 0 if the motion is not a cycle
     # (3, m, p, p): propagators of all m modes over two successive cycles, and over the second one once more with
-    # SLACK times the tolerance. For a fixed point and a constant linear motion, the matrix of the variational
-    # equation as often. None for aperiodic motion
+    # TOLERANCE_RATIO times the tolerance. For a fixed point and a constant linear motion, three times the matrix of
+    # the variational equation. None for aperiodic motion
     propagators: np.ndarray | None = field(default=None, repr=False)
     periods: int = 1  # drive periods of one cycle; 1 without a drive
-    # (3, m): logarithms of the factors that the propagators of a cycle are without
+    # (3, m): logarithms of the factors that the propagators of a cycle lack
     logarithms: np.ndarray | float = field(default=0.0, repr=False)
 
     @property
     def kind(self) -> str:
-        """The motion in words, with the drive periods of its cycle if there are several."""
+        """Name of the motion, with the drive periods of its cycle if there are several."""
         return str(self.motion) if self.periods == 1 else f"{self.motion}, {self.periods} drive periods"
 
     def exponents(self) -> tuple[np.ndarray, np.ndarray]:
@@ -81,107 +82,97 @@ class Attractor:
         return exponents[1], apart.max(axis=0)
 
     def resolution(self) -> np.ndarray:
-        """Return how far apart the exponents (m,) of two starts on this attractor may lie: by their errors, and by where the starts end."""
+        """Return the largest distance (m,) of the exponents of two starts on this attractor: errors, and where the starts end."""
         _, error = self.exponents()
         if self.propagators is None or self.cycle:
             return error + ALIKE / self.cycle
         return error + ALIKE * np.abs(self.propagators[1]).max(axis=(-2, -1))
 
 
-def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
-    """Look for a fixed point or a cycle of 1 … LONGEST drive periods."""
-    orbit = orbits.part([row])
-    if orbit.linear:
-        timed = any(e.has(sp.Symbol("t", real=True)) for _, e in orbit.variation.matrix)
-        return _periodic(orbit, Motion.LINEAR, 1) if timed else _steady(orbit, Motion.LINEAR)
-    closed = max(RETURN, 0.1 * orbit.scene.rtol)
-    if not orbit.forced:
-        return _free(orbit, closed)
-    integrator = orbit.integrator_of(orbit.strengths[:1])
-    for _ in range(3):
+def find_attractor(problem: OrbitProblem, state: np.ndarray, patience: float) -> tuple[Attractor, np.ndarray]:
+    """Look for a fixed point or a cycle of 1 … LONGEST drive periods on which a settled state (components,) is.
+
+    Return it with the state that was reached, from which an average may begin. `patience`: units of time before a new search.
+    """
+    if problem.linear:
+        timed = any(e.has(sp.Symbol("t", real=True)) for _, e in problem.variation.matrix)
+        return (_periodic if timed else _steady)(problem, state, Motion.LINEAR), state
+    closed = max(RETURN, 0.1 * problem.scene.rtol)
+    if not problem.forced:
+        if rests(problem.rates, state, closed, problem.extent):
+            return _steady(problem, state, Motion.FIXED_POINT), state
+        cycle = None if problem.variation.events else limit_cycle(problem, state, closed)
+        if cycle is None:
+            return Attractor(Motion.APERIODIC, 0.0), state
+        return _periodic(problem, cycle.state, Motion.PERIODIC, unit=cycle.period), state
+    integrator = problem.integrator(state[None], problem.strengths[:1])
+    for _ in range(ROUNDS):
+        # the distances of the states at the beginning of periods from the last of them, the latest first
         states = [integrator.state[0]]
         for _ in range(LONGEST):
-            integrator.advance(orbit.unit)
+            integrator.advance(problem.unit)
             states.append(integrator.state[0])
-        orbits.state[row] = orbit.state[0] = states[-1]
-        gaps = np.abs(np.array(states[-2::-1]) - states[-1])
-        moves = np.maximum(np.ptp([*states, *within(orbit)], axis=0), CLOSE * orbit.extent)
-        rounding = orbit.rates.rounding(states[-1], LONGEST * orbit.unit)
-        cycle = next((k + 1 for k, gap in enumerate(gaps) if np.all(gap <= closed * moves + rounding)), 0)
-        if cycle:
-            return _periodic(orbit, Motion.PERIODIC, cycle)
-        if not np.any(np.all(gaps <= CLOSE * np.maximum(moves, orbit.extent), axis=1)):
+        last = states[-1]
+        gaps = np.abs(np.array(states[-2::-1]) - last)
+        moves = np.maximum(np.ptp([*states, *within(problem, last[None])], axis=0), CLOSE * problem.extent)
+        rounding = problem.rates.rounding(last, LONGEST * problem.unit)
+        periods = next((k + 1 for k, gap in enumerate(gaps) if np.all(gap <= closed * moves + rounding)), 0)
+        if periods:
+            return _periodic(problem, last, Motion.PERIODIC, periods), last
+        if not np.any(np.all(gaps <= CLOSE * np.maximum(moves, problem.extent), axis=1)):
             break
-        integrator.advance(max(1, round(patience)) * orbit.unit)
-    return Attractor(Motion.APERIODIC, 0.0)
+        integrator.advance(max(1, round(patience)) * problem.unit)
+    return Attractor(Motion.APERIODIC, 0.0), last
 
 
-def _periodic(orbit: Orbits, motion: Motion, cycle: int, unit: float | None = None) -> Attractor:
-    """Return motion along which the variational equation repeats itself after some drive periods, or other units."""
-    unit = orbit.unit if unit is None else unit
-    block = unit / orbit.unit
-    found = [cycle_propagators(orbit, cycle, block)]
-    settled = orbit.state
-    found += [cycle_propagators(orbit, cycle, block), cycle_propagators(orbit, cycle, block, settled, SLACK)]
-    propagators, logarithms = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return Attractor(motion, cycle * unit, propagators, cycle, logarithms)
+def _periodic(
+    problem: OrbitProblem, state: np.ndarray, motion: Motion, periods: int = 1, unit: float | None = None
+) -> Attractor:
+    """Motion along which the variational equation repeats itself after some drive periods, or other units."""
+    unit = problem.unit if unit is None else unit
+    block = unit / problem.unit
+    # the second cycle tells what the first one was off by, and its looser repetition the error of the steps
+    *first, settled = cycle_propagators(problem, state, periods, block)
+    *second, _ = cycle_propagators(problem, settled, periods, block)
+    *looser, _ = cycle_propagators(problem, settled, periods, block, TOLERANCE_RATIO)
+    propagators, logarithms = (np.concatenate(parts) for parts in zip(first, second, looser, strict=True))
+    return Attractor(motion, periods * unit, propagators, periods, logarithms)
 
 
 def cycle_propagators(
-    orbit: Orbits, cycle: int, block: float = 1.0, state: np.ndarray | None = None, slack: float = 1.0
-) -> tuple[np.ndarray, np.ndarray]:
-    """Integrate the propagators of all modes over one cycle.
+    problem: OrbitProblem, state: np.ndarray, cycle: int, block: float = 1.0, tolerance_ratio: float = 1.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Integrate the propagators of all modes from a state (components,) over a number of blocks, with looser tolerances.
 
-    Shapes: state (1, components); returns propagators (1, m, p, p), logarithms (1, m).
+    Shapes: returns propagators (1, m, p, p), logarithms of the factors they lack (1, m), the state after them (components,).
     """
-    orbit.state = orbit.state if state is None else state
-    orbit.block, orbit.integrator = block, orbit.integrator_of(orbit.strengths, tolerance=slack)
-    total, logarithms = orbit.propagators()
+    integrator = problem.integrator(state[None])
+    integrator.loosen(tolerance_ratio)
+    total, logarithms = problem.propagators(integrator, block)
     for _ in range(cycle - 1):
-        propagators, more = orbit.propagators()
+        propagators, more = problem.propagators(integrator, block)
         total = propagators @ total
+        # a product that leaves the range of numbers is divided by its largest entry
         size = np.abs(total).max(axis=(-2, -1))
         factor = np.where((size > math.exp(FAR)) | ((size < math.exp(-FAR)) & (size > 0.0)), size, 1.0)
         total, logarithms = total / factor[..., None, None], logarithms + more + np.log(factor)
-    orbit.state = orbit.integrator.state
-    return total, logarithms
+    return total, logarithms, integrator.state[0]
 
 
-def _free(orbit: Orbits, closed: float) -> Attractor:
-    """Return the fixed point or the limit cycle of an undriven orbit, else aperiodic motion."""
-    if rests(orbit.rates, orbit.state[0], closed, orbit.extent):
-        return _steady(orbit, Motion.FIXED_POINT)
-    period = 0.0 if orbit.variation.events else limit_cycle(orbit, closed)[0]
-    return _periodic(orbit, Motion.PERIODIC, 1, period) if period else Attractor(Motion.APERIODIC, 0.0)
-
-
-def _steady(orbit: Orbits, motion: Motion) -> Attractor:
-    """Return motion along which the variational equation is constant."""
-    matrix = _matrix(orbit.variation, _symbols(orbit.variation), _values(orbit), orbit.strengths)
-    return Attractor(motion, 0.0, np.stack([matrix] * 3))
-
-
-def _symbols(variation: Variation) -> list[sp.Symbol]:
-    """Symbols of states, parameters and time."""
-    names = [*variation.orbit.state, *variation.orbit.parameters, "t"]
-    return [sp.Symbol(name, real=True) for name in names]
-
-
-def _values(orbit: Orbits) -> list[float]:
-    """Values of `_symbols` at the orbit's state."""
-    return [*orbit.state[0], *(orbit.scene.parameters[name] for name in orbit.variation.orbit.parameters), 0.0]
-
-
-def _matrix(variation: Variation, symbols: list[sp.Symbol], values: list[float], strengths: np.ndarray) -> np.ndarray:
-    """Evaluate the matrices (m, p, p) of the variational equation at a state, for each strength."""
-    p, columns = len(variation.orbit.node.continuous), strengths.reshape(len(strengths), -1).T
+def _steady(problem: OrbitProblem, state: np.ndarray, motion: Motion) -> Attractor:
+    """Motion along which the variational equation is constant: its matrices (m, p, p) at a state, for each strength."""
+    variation, strengths = problem.variation, problem.strengths
+    symbols = [sp.Symbol(name, real=True) for name in (*variation.orbit.state, *variation.orbit.parameters, "t")]
+    values = [*state, *(problem.scene.parameters[name] for name in variation.orbit.parameters), 0.0]
+    p, columns = problem.components, strengths.reshape(len(strengths), -1).T
     alphas = variation.parameters[: len(columns)]
     matrices = np.zeros((len(strengths), p, p), dtype=strengths.dtype)
     for (r, c), e in variation.matrix:
         if r < p and c < p:
+            # an entry is linear in the strengths of the layers
             at = sp.lambdify([*symbols, *alphas], e, "numpy")
             base = at(*values, *np.zeros(len(alphas)))
             matrices[:, r, c] = base
             for unit, column in zip(np.eye(len(alphas)), columns, strict=True):
                 matrices[:, r, c] += (at(*values, *unit) - base) * column
-    return matrices
+    return Attractor(motion, 0.0, np.stack([matrices] * 3))

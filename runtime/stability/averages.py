@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 from scipy.special import ndtr, stdtrit
@@ -16,20 +18,67 @@ from ..support.execution import Execution
 from ..support.progress import Reporter
 
 BATCHES, TOGETHER = 64, 8
-"""Most batches that are kept, and most that are added in one call: an average listens to Ctrl-C between calls."""
+"""Most batches in memory, and most that are added in one call: Ctrl-C is noticed between calls."""
 FEWEST, MOST = 2, 8
-"""Fewest frequencies of an error that is known, and most that are used; each has two degrees of freedom."""
+"""Fewest frequencies that give an error, and most that are used; each has two degrees of freedom."""
 NARROW = 0.1
-"""Frequencies of an error are NARROW n^(2/3) after n periods.
+"""An error is estimated from NARROW n^(2/3) frequencies after n periods.
 
 Lazarus et al. take twice as many for noise that is correlated over a few samples; chaos is over several periods.
 """
 FIRST, PART = 128, 0.5
-"""Periods before the first look at the errors, and the part of the length it asks for before the second look."""
+"""Periods before the first look at the errors, and the part of the length estimated then that precedes the second look."""
 ROUNDING = 100.0 * float(np.finfo(float).eps)
-"""Part of a sum of terms that may be rounding."""
-SLACK, TRIED = 4.0, 8
-"""How many times the tolerance the growth over a block is compared with, and over how many blocks."""
+"""Part of a sum of terms that may be rounding (a choice)."""
+TOLERANCE_RATIO, TRIED = 4.0, 8
+"""The error of the steps is estimated by repeating TRIED blocks at TOLERANCE_RATIO times the tolerance (a choice)."""
+
+
+KEYWORDS = {
+    "average": """
+precision : float
+    Averaging stops if every standard error is below this value.
+periods : float
+    Longest average, in periods of the drive, or in mean return times of undriven motion; a whole number.
+transient : float
+    Transient before the average, in the same units.
+""",
+    "starts": """
+starts : int
+    Number of initial states: that of the scene's first oscillator, and copies displaced at random in the first
+    component by up to 0.4 of the extent of the motion.
+rtol : float
+    Relative tolerance of the integration. The friction law may require a smaller one.
+seed : int
+    Seed of the displacements.
+workers : int, optional
+    Number of threads; all cores by default.
+""",
+    "progress": """
+show_progress : bool, optional
+    Whether to show a bar; by default a bar on terminals and in notebooks, a line a minute elsewhere.
+progress : callable, optional
+    Is called with a `Progress`, which counts periods of the drive.
+""",
+    "parameters": """
+parameters : mapping of str to float, optional
+    Parameters of the scene to set, for names that are keywords already.
+**more : float
+    Parameters of the scene to set.
+""",
+}
+"""Keywords that several public functions take, as their docstrings describe them."""
+
+F = TypeVar("F", bound=Callable[..., object])
+
+
+def document_keywords(function: F) -> F:
+    """Replace `{average}` and the like in a docstring by the text of KEYWORDS."""
+    text = inspect.cleandoc(function.__doc__ or "")
+    for name, described in KEYWORDS.items():
+        text = text.replace(f"{{{name}}}", described.strip())
+    function.__doc__ = text
+    return function
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +89,8 @@ class Averaging:
     # longest average, in periods of the drive, or in mean return times of undriven motion; a whole number
     periods: float
     transient: float  # transient before the average, in the same units; a whole number
-    seed: int  # seed of what is drawn at random before the orbit begins
-    execution: Execution  # who does the work, and who hears how many periods are done
+    seed: int  # seed of the random numbers that are drawn before the orbit begins
+    execution: Execution  # threads, and where progress is reported
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "precision", check_number("precision", self.precision, 0.0))
@@ -50,15 +99,15 @@ class Averaging:
         object.__setattr__(self, "seed", check_integer("seed", self.seed, 0))
 
     def reporter(self, orbits: int = 1) -> Reporter:
-        """Return the reporter of the transients and the longest averages along orbits in turn; its time begins now."""
+        """Return a reporter of transients and longest averages along orbits in turn; its clock starts now."""
         return self.execution.reporter(round(orbits * (self.transient + self.periods)), "period")
 
     def rounds(self, batches: Batches, error: Callable[[], np.ndarray], reporter: Reporter) -> Iterator[int]:
-        """Yield how many blocks remain until the average is long or precise enough; one of them at least must be added.
+        """Yield the number of blocks that remain; the caller adds at least one of them, until the average is precise enough.
 
         Triple sampling: the errors after FIRST periods choose half of the length, those after it the whole. The average
-        ends there if the errors still are below `precision`, and else goes on as long as they ask for. Few looks, and
-        errors that are no smaller than the planned one, leave no chance to end where an error is small by chance.
+        ends there if the errors still are below `precision`, and else continues for the length that they imply. Few looks,
+        and errors that are no smaller than the planned one, leave no chance to end where an error is small by chance.
 
         References
         ----------
@@ -79,20 +128,20 @@ class Averaging:
         batches.planned = None
 
 
-def check_whole(what: str, periods: float) -> float:
+def check_whole(name: str, periods: float) -> float:
     """Return a number of periods; ValueError if it is not whole."""
     if not periods.is_integer():
-        raise ValueError(f"{what}: found {periods:g}; expected a whole number of periods")
+        raise ValueError(f"{name}: found {periods:g}; expected a whole number of periods")
     return periods
 
 
 def error_of_steps(
     usual: Sequence[np.ndarray] | np.ndarray, looser: Sequence[np.ndarray] | np.ndarray, length: float
 ) -> np.ndarray:
-    """Return the error of growth rates that is due to the steps: their change at SLACK times the tolerance.
+    """Return the error of growth rates that is due to the steps: their change at TOLERANCE_RATIO times the tolerance.
 
-    It is the mean change over single blocks, each from the same state and deviations as the other, with its own standard
-    error: chaos makes much of a small difference within a block, at random.
+    The change is averaged over single blocks, each repeated from the same state and deviations, and its standard error is
+    added: chaos magnifies a small difference within a block at random.
     """
     with np.errstate(invalid="ignore"):
         change = np.subtract(usual, looser)
@@ -104,14 +153,14 @@ def error_of_steps(
 class Batches:
     """Means of growth rates over batches of blocks, and their standard errors.
 
-    When BATCHES batches are full, they are joined in pairs, so that memory does not grow.
+    Full BATCHES batches are joined in pairs, so that memory does not grow.
 
     The error of a mean over a time T is sqrt(S/T), where S is the spectral density of the rate at frequency 0. The
     periodogram of the batch means at the lowest few of the frequencies 1/T, 2/T … estimates S, with two degrees of freedom
-    for each. Their number grows as n^(2/3) with n periods, so that the band narrows and correlations of any finite length
-    are seen in the end. Few squares may be small together by chance; Student's quantile makes up for it, so that the mean
-    lies within two errors of the truth as often as a normal variable, in 95 of 100 runs. An error of fewer than FEWEST
-    frequencies is unknown: it has no variance.
+    for each. Their number grows as n^(2/3) with n periods: the band narrows, and correlations of any finite length enter
+    in the end. Few squares may be small together by chance; Student's quantile corrects for it, so that the mean lies
+    within two errors of the truth as often as a normal variable, in 95 of 100 runs. An error from fewer than FEWEST
+    frequencies is infinite: it has no variance.
 
     References
     ----------
@@ -123,7 +172,7 @@ class Batches:
     block: float = 1.0  # number of periods of one block
     blocks: int = 0  # number of blocks so far
     per_batch: int = 1  # number of blocks in a batch
-    # (BATCHES, starts, m): growth over each batch; behind the first `count` nothing that counts
+    # (BATCHES, starts, m): growth over each batch; only the first `count` are used
     sums: np.ndarray = field(default_factory=lambda: np.zeros((BATCHES, 0, 0)))
     count: int = 0  # number of batches, the last of which may be incomplete
     enough: float = field(init=False)  # blocks before the next look at the errors
@@ -145,7 +194,7 @@ class Batches:
 
     @property
     def frequencies(self) -> int:
-        """Number of frequencies that the standard errors are seen at, within what the batches allow."""
+        """Number of frequencies that the standard errors are estimated from, at most half of the batches."""
         return min(_frequencies(self.periods), (self.blocks // self.per_batch - 1) // 2)
 
     @property
@@ -154,16 +203,13 @@ class Batches:
         return self.blocks >= self.enough and self.blocks % self.per_batch == 0
 
     def plan(self, ratio: float, final: bool) -> None:
-        """Put off the next look at the errors until a ratio of the present length is done."""
+        """Postpone the next look at the errors to a multiple of the present length; `final` stores the errors as a lower bound."""
         if final:
             self.planned = self.error_by_start() * math.sqrt(self.blocks)
         self.enough = self.blocks * max(1.0, ratio)
 
     def ahead(self, most: int) -> np.ndarray:
-        """Return the blocks of the next batches: TOGETHER of them, or fewer until the next look at the errors.
-
-        Shapes: returns (batches,).
-        """
+        """Return the blocks (batches,) of the next batches: TOGETHER of them, or fewer until the next look at the errors."""
         blocks, count, per_batch, parts = self.blocks, self.count, self.per_batch, list[int]()
         while most > 0 and len(parts) < TOGETHER and not (parts and blocks >= self.enough):
             count, per_batch = _with_room(count, per_batch)
@@ -180,10 +226,7 @@ class Batches:
             self.extend(growth[None], np.ones(1, dtype=np.int64))
 
     def extend(self, growths: np.ndarray, parts: np.ndarray) -> None:
-        """Add the growth over further batches, as many blocks in each as `ahead` has said.
-
-        Shapes: growths (b, starts, m), parts (b,).
-        """
+        """Add the growth (b, starts, m) over further batches, with the blocks (b,) that `ahead` returned."""
         if self.blocks == 0:
             self.sums = np.empty((BATCHES, *growths.shape[1:]))
         while len(growths):
@@ -206,31 +249,32 @@ class Batches:
 
         Shapes: returns (starts, m).
         """
-        whole, frequencies = self.blocks // self.per_batch, self.frequencies
-        sums = self.sums[:whole]
+        complete, frequencies = self.blocks // self.per_batch, self.frequencies
+        sums = self.sums[:complete]
         if frequencies < FEWEST:
             return np.full(sums.shape[1:], np.inf)
+        # mean of the periodogram over the lowest frequencies
         freedom = 2 * frequencies
-        waves = _waves(frequencies, whole) @ sums.reshape(whole, -1)
-        spread = np.sqrt(np.einsum("ij,ij->j", waves, waves) / (freedom * whole)).reshape(sums.shape[1:])
+        waves = _waves(frequencies, complete) @ sums.reshape(complete, -1)
+        spread = np.sqrt(np.einsum("ij,ij->j", waves, waves) / (freedom * complete)).reshape(sums.shape[1:])
         # a sum of equal terms has no scatter, but rounding
         error = np.maximum(_wide(freedom) * spread, ROUNDING * np.abs(sums).mean(axis=0))
         error /= self.per_batch * self.block * self.unit
         return np.asarray(error if self.planned is None else np.maximum(error, self.planned / math.sqrt(self.blocks)))
 
     def error(self) -> np.ndarray:
-        """Return the standard errors (m,) of the mean over the starts, as `error_by_start`."""
-        each = self.error_by_start()
-        return np.asarray(np.sqrt((each**2).sum(axis=0)) / len(each))
+        """Return the standard errors (m,) of the mean over the starts."""
+        errors = self.error_by_start()
+        return np.asarray(np.sqrt((errors**2).sum(axis=0)) / len(errors))
 
 
 def _with_room(count: int, per_batch: int) -> tuple[int, int]:
-    """How many batches of how many blocks there are when a further one begins: BATCHES are joined in pairs."""
+    """Number of batches and of blocks in each when a further one begins: BATCHES are joined in pairs."""
     return (BATCHES // 2, 2 * per_batch) if count == BATCHES else (count, per_batch)
 
 
 def _frequencies(periods: float) -> int:
-    """Number of frequencies that an error is seen at after some periods."""
+    """Number of frequencies that an error is estimated from after some periods."""
     return min(round(NARROW * periods ** (2.0 / 3.0)), MOST)
 
 
@@ -241,7 +285,7 @@ def _wide(freedom: int) -> float:
 
 
 def errors_for(gaussian: float, periods: float) -> float:
-    """Return how many stated errors of an average over some periods are as certain as so many of a normal variable.
+    """Return the multiple of an average's error that is as certain as `gaussian` standard deviations of a normal variable.
 
     The few squares of a short average have the long tails of Student's distribution.
     """

@@ -8,7 +8,6 @@ Source: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -16,24 +15,20 @@ from enum import StrEnum
 import numpy as np
 import xarray as xr
 
-from synchain.codegen.driver.columns import Control
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.dynamics.variational import Variation, clustered
 from synchain.models.inputs.keywords import warn
 from synchain.models.scenes.scene import Scene
 from synchain.models.symmetries.clusters import Clusters, clusters
 
-from ..cells.initial_modes import with_modes
 from ..cells.run_keywords import ONE_ORBIT, Given
-from ..engines.choice import chosen_for_modes
 from ..results.labelled import Labelled, as_json, dataset
 from ..support.error_text import with_error
 from ..support.execution import Execution
 from ..support.progress import Hook
-from .averages import Averaging, Batches
+from .averages import Averaging, Batches, document_keywords
 from .exponents import single_cell
-from .motion import Turns, rates_of, turns_of
-from .orbits import OF_EXTENT, unit_of_time
+from .orbits import OrbitProblem
 from .variational_integrator import VariationalIntegrator
 
 MERGED = 1e-9
@@ -175,6 +170,7 @@ class ClusterExponents(Labelled):
         )
 
 
+@document_keywords
 def cluster_exponents(
     scene: Scene,
     state: Clusters | Sequence[int],
@@ -198,24 +194,13 @@ def cluster_exponents(
     state : Clusters or sequence of int
         Partition of the nodes, from `synchain.models.symmetries.clusters` or as the cluster of each
         node. Each cluster starts from the state of its first node.
-    precision : float
-        Averaging stops if every standard error is below this value.
-    periods : float
-        Longest average, in periods of the drive, or in mean return times of undriven motion; a whole number.
-    transient : float
-        Transient before the average, in the same units.
+    {average}
     rtol : float
         Relative tolerance of the integration. The friction law may require a smaller one.
     seed : int
         Seed of the initial deviations.
-    show_progress : bool, optional
-        Whether to show a bar; by default a bar on terminals and in notebooks, a line a minute elsewhere.
-    progress : callable, optional
-        Is called with a `Progress`, which counts periods of the drive.
-    parameters : mapping of str to float, optional
-        Parameters of the scene to set, for names that are keywords already.
-    **more : float
-        Parameters of the scene to set.
+    {progress}
+    {parameters}
 
     Returns
     -------
@@ -241,8 +226,8 @@ def cluster_exponents(
     partition = _of_graph(scene, state)
     variation = clustered(without_drive(scene.equations, scene.parameters), partition)
     reporter = averaging.reporter()
-    integrator, turns = _integrator(scene, partition, variation, averaging.seed)
-    unit = turns.time
+    problem, integrator = _integrator(scene, partition, variation, averaging.seed)
+    unit = problem.unit
     batches, dropped = Batches(unit), round(averaging.transient)
     gaps: list[np.ndarray] = []
 
@@ -267,7 +252,7 @@ def cluster_exponents(
         )
     mean, error, time = batches.mean()[0], np.hypot(batches.error_by_start(), steps)[0], batches.time
     return ClusterExponents(
-        partition, mean[1:], error[1:], float(mean[0]), float(error[0]), apart, time, approaching, str(turns)
+        partition, mean[1:], error[1:], float(mean[0]), float(error[0]), apart, time, approaching, str(problem.turns)
     )
 
 
@@ -287,36 +272,23 @@ def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
 
 def _integrator(
     scene: Scene, partition: Clusters, variation: Variation, seed: int
-) -> tuple[VariationalIntegrator, Turns]:
-    """Set up the quotient's orbit with one deviation along it and one in each block, and the unit of time of its motion."""
+) -> tuple[OrbitProblem, VariationalIntegrator]:
+    """The quotient's orbit with one random deviation along it and one in each block."""
     firsts = [members[0] for members in partition.members]
-    state = np.array([[values[i] for values in scene.initial.values() for i in firsts]])
-    numbers = np.array([[scene.parameters[name] for name in variation.orbit.parameters]])
-    state = with_modes(variation.orbit, state, numbers)
-    components = _deviating(variation)
-    parts = list(_parts(partition, components))
-    rows = variation, state, numbers, np.full((1, len(parts)), scene.parameters[scene.strength])
-
-    def integrator_of(slow: float) -> VariationalIntegrator:
-        made = VariationalIntegrator.make(scene, *rows, 1, method=chosen_for_modes(scene, *rows, slow))
-        made.slow = slow
-        return made
-
-    turns = Turns(unit_of_time(scene), np.zeros(0), "period of the drive")
-    if not variation.orbit.forced:
-        observer = integrator_of(math.inf)
-        observer.observes = True
-        turns = turns_of(observer, rates_of(variation.orbit, dict(scene.parameters)))
-    integrator = integrator_of(2.0 * math.pi / turns.time)
-    moving = turns.extent[turns.extent > 0.0]
-    least = OF_EXTENT * integrator.control[Control.RTOL] * float(moving.min(initial=np.inf))
-    integrator.control[Control.ATOL] = min(integrator.control[Control.ATOL], least)
+    start = np.array([[values[i] for values in scene.initial.values() for i in firsts]])
+    parts = list(_parts(partition, _deviating(variation)))
+    strengths = np.full(len(parts), scene.parameters[scene.strength])
+    problem = OrbitProblem.of(scene, variation, strengths, start)
+    state = problem.with_slip_states(start)
+    if not problem.forced:
+        problem = problem.with_turns(problem.observed_turns(state, strengths), start)
+    integrator = problem.integrator(state)
     random = np.random.default_rng(seed)
     deviations = np.zeros((1, variation.size, len(parts)))
     for k, part in enumerate(parts):
         deviations[0, part, k] = random.normal(size=part.stop - part.start)
     integrator.set_deviations(deviations)
-    return integrator, turns
+    return problem, integrator
 
 
 def _deviating(variation: Variation) -> int:

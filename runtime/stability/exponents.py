@@ -34,9 +34,10 @@ from ..support.error_text import interval_text, range_text, with_error
 from ..support.execution import Execution
 from ..support.progress import Hook, Reporter
 from .attractor import Attractor, Motion, find_attractor
-from .averages import Averaging, Batches
+from .averages import Averaging, Batches, document_keywords
+from .march import March, interpolation_for
 from .motion import starts_near
-from .orbits import Orbits, pair_of
+from .orbits import OrbitProblem, pair_of
 from .slow_motion import warn_of_slow_motion
 from .transversal_modes import unused_axes
 
@@ -271,6 +272,7 @@ def _bend(x: np.ndarray, y: np.ndarray, i: int, zero: float) -> float:
     )
 
 
+@document_keywords
 def exponents(
     scene: Scene,
     alpha: Sequence[float] | Sequence[complex] | np.ndarray,
@@ -296,29 +298,10 @@ def exponents(
     alpha : array_like, shape (m,) or (m, layers)
         Strengths alpha + i beta = -sigma gamma, real or complex; of several layers of links one each, with the eigenvalues
         of the layers on a common mode.
-    precision : float
-        Averaging stops if the standard error of every exponent is below this value.
-    periods : float
-        Longest average, in periods of the drive, or in mean return times of undriven motion; a whole number.
-    transient : float
-        Transient before the average, in the same units.
-    starts : int
-        Number of initial states: that of the scene's first oscillator, and copies displaced at random in the first
-        component by up to 0.4 of the extent of the motion.
-    rtol : float
-        Relative tolerance of the integration. The friction law may require a smaller one.
-    seed : int
-        Seed of the displacements.
-    workers : int, optional
-        Number of threads; all cores by default.
-    show_progress : bool, optional
-        Whether to show a bar; by default a bar on terminals and in notebooks, a line a minute elsewhere.
-    progress : callable, optional
-        Is called with a `Progress`, which counts periods of the drive.
-    parameters : mapping of str to float, optional
-        Parameters of the scene to set, for names that are keywords already.
-    **more : float
-        Parameters of the scene to set.
+    {average}
+    {starts}
+    {progress}
+    {parameters}
 
     Returns
     -------
@@ -362,85 +345,90 @@ def transversal(
     Shapes: strengths (m,) or (m, layers).
     """
     reporter = averaging.reporter()
-    orbits = orbits_of(coupled_cell(given, scene, rtol), strengths, starts, averaging)
+    problem, states = orbits_of(coupled_cell(given, scene, rtol), strengths, starts, averaging)
     with reporter:
-        return along(orbits, strengths, averaging, reporter)
+        return along(problem, states, strengths, averaging, reporter)
 
 
-def orbits_of(scene: Scene, strengths: np.ndarray, starts: int, averaging: Averaging) -> Orbits:
-    """Return the synchronous orbits of a scene that sweeps nothing, with modes; parameters as for `transversal`."""
+def orbits_of(
+    scene: Scene, strengths: np.ndarray, starts: int, averaging: Averaging
+) -> tuple[OrbitProblem, np.ndarray]:
+    """Return the problem of transversal modes, and the starts (starts, components); parameters as for `transversal`."""
     starts = check_integer("starts", starts, 1)
     first = np.array([values[0] for values in scene.initial.values()], dtype=float)
-    orbits = Orbits.make(scene, strengths, first[None], averaging.execution.size)
-    if starts > 1 and not orbits.linear:
-        orbits.observe()
-    states = starts_near(first, orbits.extent[: len(first)], starts, averaging.seed)
-    return orbits.begun_at(states)
+    problem = OrbitProblem.of_modes(scene, strengths, first[None], averaging.execution.size)
+    if starts > 1 and not problem.linear:
+        problem = problem.observed(problem.with_slip_states(first[None])[0])
+    # further starts are copies up to REACH extents away
+    return problem, problem.with_slip_states(starts_near(first, problem.extent[: len(first)], starts, averaging.seed))
 
 
-def along(orbits: Orbits, strengths: np.ndarray, averaging: Averaging, reporter: Reporter) -> Exponents:
-    """Compute the exponents of all modes along orbits from their start. Shapes: strengths (m,) or (m, layers)."""
-    starts = len(orbits.state)
-    bounded = [True] * starts if orbits.linear else _settle(orbits, averaging.transient, reporter)
-    attractors = tuple(
-        find_attractor(orbits, row, averaging.transient) if bounded[row] else Attractor(Motion.UNBOUNDED, 0.0)
-        for row in range(starts)
-    )
-    by_start, error, length = _by_start(orbits, attractors, averaging, reporter)
+def along(
+    problem: OrbitProblem, states: np.ndarray, strengths: np.ndarray, averaging: Averaging, reporter: Reporter
+) -> Exponents:
+    """Compute the exponents of all modes along orbits from states (starts, components). Shapes: strengths (m,) or (m, layers)."""
+    starts = len(states)
+    bounded = np.ones(starts, dtype=bool)
+    if not problem.linear:
+        problem, states, bounded = _settled(problem, states, averaging.transient, reporter)
+
+    # exponents of fixed points and cycles are eigenvalues; a search for a cycle moves its state on
+    attractors, reached = [], states.copy()
+    for row in range(starts):
+        attractor = Attractor(Motion.UNBOUNDED, 0.0)
+        if bounded[row]:
+            attractor, reached[row] = find_attractor(problem, states[row], averaging.transient)
+        attractors.append(attractor)
+    by_start = np.full((starts, len(problem.strengths)), np.nan)
+    error = np.full_like(by_start, np.nan)
+    for row, attractor in enumerate(attractors):
+        if attractor.propagators is not None:
+            by_start[row], error[row] = attractor.exponents()
+    time = max(attractor.cycle for attractor in attractors)
+
+    # exponents of other motion are mean growth rates
+    aperiodic = [row for row, attractor in enumerate(attractors) if attractor.motion is Motion.APERIODIC]
+    if aperiodic:
+        begun = reached[aperiodic]
+        march = March.begin(problem, begun, interpolation_for(problem, begun, averaging.periods))
+        by_start[aperiodic], error[aperiodic], time = average(march, averaging, reporter)
+        warn_of_slow_motion(problem.variation.orbit, begun, problem.parameter_values, time)
+
     groups = group_by_attractor(attractors, by_start, error)
-    own = list(groups[0])
+    first = list(groups[0])
     if len(groups) > 1:
         others = ", ".join(dict.fromkeys(attractors[group[0]].kind for group in groups[1:]))
         warn(
-            f"exponents: found {starts - len(own)} of {starts} starts on another motion than the scene's own start "
+            f"exponents: found {starts - len(first)} of {starts} starts on another motion than the scene's own start "
             f"({others}); expected one motion; the exponents are those of the scene's own, by_start has all"
         )
-    mean, spread = by_start[own].mean(axis=0), np.sqrt((error[own] ** 2).sum(axis=0)) / len(own)
-    unit = "" if orbits.linear else str(orbits.turns)
-    return Exponents(strengths, mean, spread, length, starts, by_start, attractors, groups, unit, averaging.precision)
+    mean, spread = by_start[first].mean(axis=0), np.sqrt((error[first] ** 2).sum(axis=0)) / len(first)
+    unit = "" if problem.linear else str(problem.turns)
+    return Exponents(
+        strengths, mean, spread, time, starts, by_start, tuple(attractors), groups, unit, averaging.precision
+    )
 
 
-def _settle(orbits: Orbits, transient: float, reporter: Reporter) -> list[bool]:
-    """Advance all starts over the transient; True for each that stays bounded. FloatingPointError if the scene's own does not."""
-    begun = orbits.state
+def _settled(
+    problem: OrbitProblem, states: np.ndarray, transient: float, reporter: Reporter
+) -> tuple[OrbitProblem, np.ndarray, np.ndarray]:
+    """Run the transient of all starts; True (starts,) for each that stays bounded. FloatingPointError if the first does not."""
+    bounded = np.ones(len(states), dtype=bool)
     try:
-        orbits.settle(transient, reporter.advance)
-        return [True] * len(begun)
+        return *problem.settled(states, transient, reporter.advance), bounded
     except FloatingPointError:
-        if len(begun) == 1:
+        if len(states) == 1:
             raise
-    ends, bounded = begun.copy(), [True] * len(begun)
-    for row in range(len(begun)):
-        alone = orbits.part([row])
+    # one that fails stops all: run each alone
+    problem, ends = problem.observed(states[0]), states.copy()
+    for row in range(len(states)):
         try:
-            alone.settle(transient)
+            ends[row] = problem.settled(states[row : row + 1], transient)[1][0]
         except FloatingPointError:
             if row == 0:
                 raise
             bounded[row] = False
-        else:
-            ends[row] = alone.state[0]
-    orbits.state = ends
-    return bounded
-
-
-def _by_start(
-    orbits: Orbits, attractors: Sequence[Attractor], averaging: Averaging, reporter: Reporter
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Exponents and errors (starts, m) from eigenvalues or averages, NaN of unbounded motion, and the time averaged over."""
-    exponent = np.full((len(attractors), len(orbits.strengths)), np.nan)
-    error = np.full_like(exponent, np.nan)
-    rest = [row for row, attractor in enumerate(attractors) if attractor.motion is Motion.APERIODIC]
-    for row, attractor in enumerate(attractors):
-        if attractor.propagators is not None:
-            exponent[row], error[row] = attractor.exponents()
-    length = max(attractor.cycle for attractor in attractors)
-    if rest:
-        aperiodic = orbits.part(rest)
-        aperiodic.prepare(averaging.periods)
-        exponent[rest], error[rest], length = average(aperiodic, averaging, reporter)
-        warn_of_slow_motion(aperiodic.variation.orbit, aperiodic.state, aperiodic.numbers, length)
-    return exponent, error, length
+    return problem, ends, bounded
 
 
 def coupled_cell(given: Given, scene: Scene, rtol: float) -> Scene:
@@ -455,7 +443,7 @@ def coupled_cell(given: Given, scene: Scene, rtol: float) -> Scene:
 def with_partner(scene: Scene) -> Scene:
     """Return a network that sweeps nothing: a lone oscillator gets a partner; ValueError if the link moves them both.
 
-    One that its coupling cannot join stays alone: it has the mode of strength 0 (`Orbits.make`).
+    One that its coupling cannot join stays alone: it has the mode of strength 0 (`OrbitProblem.of_modes`).
     """
     if check_scene(scene).model.linked:
         return scene.replace(**ONE_CELL)
@@ -474,7 +462,7 @@ def single_cell(given: Given, scene: Scene, rtol: float) -> Scene:
 
 def initial_states(scene: Scene, starts: int, seed: int) -> np.ndarray:
     """Return the first oscillator's initial state and others near it (starts, components), by the extent of its motion."""
-    return orbits_of(scene, np.zeros(1), starts, Averaging(0.0, 1, 0, seed, Execution(1))).state
+    return orbits_of(scene, np.zeros(1), starts, Averaging(0.0, 1, 0, seed, Execution(1)))[1]
 
 
 def group_by_attractor(
@@ -503,18 +491,18 @@ def group_by_attractor(
     return tuple(map(tuple, groups))
 
 
-def average(orbits: Orbits, averaging: Averaging, reporter: Reporter) -> tuple[np.ndarray, np.ndarray, float]:
-    """Average growth rates along orbits with their modes, from the settled states on.
+def average(march: March, averaging: Averaging, reporter: Reporter) -> tuple[np.ndarray, np.ndarray, float]:
+    """Average growth rates along a march from where it is.
 
     Shapes: returns mean, error (starts, m).
     """
-    batches, steps = Batches(orbits.unit, orbits.block), np.zeros(())
+    batches, steps = Batches(march.problem.unit, march.block), np.zeros(())
     for left in averaging.rounds(batches, batches.error, reporter):
         if batches.blocks == 0:
-            growths, steps = orbits.tried(left)
+            growths, steps = march.tried(left)
             parts = np.ones(len(growths), dtype=np.int64)
         else:
             parts = batches.ahead(left)
-            growths = orbits.growths(parts)
+            growths = march.growths(parts)
         batches.extend(growths, parts)
     return batches.mean(), np.hypot(batches.error_by_start(), steps), batches.time

@@ -66,33 +66,35 @@ class Interpolation:
             return Registers(table, np.zeros(1), np.arange(count), lanes * int(table[0, 1]), lanes)
         where, table = np.empty(len(self.strengths), dtype=np.int64), np.zeros((len(self.panels), 7))
         kinds = 2 if np.iscomplexobj(self.strengths) else 1
-        spread, register, node, room = [], 0, 0, 0
+        weights, register, node, room = [], 0, 0, 0
         for k, panel in enumerate(self.panels):
             count, points = -(-len(panel.rows) // lanes), len(panel.points)
             where[panel.rows] = register * lanes + np.arange(len(panel.rows))
             table[k] = register, register + count, node, points, len(panel.extras), room, 0
+            # the weights of `lanes` strengths for one node are neighbours: one register
             padded = np.zeros((count * lanes, points), dtype=panel.weights.dtype)
             padded[: len(panel.rows)] = panel.weights
-            numbers = _numbers(padded).reshape(count, lanes, points * kinds)
-            spread.append(numbers.transpose(0, 2, 1).reshape(-1))
+            weights.append(_real(padded).reshape(count, lanes, points * kinds).transpose(0, 2, 1).reshape(-1))
             register, node, room = register + count, node + points + len(panel.extras), room + count * points * kinds
-        checks = [_numbers(panel.checks).reshape(-1) for panel in self.panels]
+        checks = [_real(panel.checks).reshape(-1) for panel in self.panels]
         table[:, 6] = room * lanes + np.cumsum([0, *map(len, checks[:-1])])
-        return Registers(table, on_a_cache_line(np.concatenate([*spread, *checks])), where, register * lanes, lanes)
+        return Registers(table, on_a_cache_line(np.concatenate([*weights, *checks])), where, register * lanes, lanes)
 
 
 @dataclass(frozen=True, slots=True)
 class Registers:
     """The weights of an interpolation as `synchain.codegen.driver.propagators` takes them."""
 
-    panels: np.ndarray  # (panels, 7): what belongs to each panel: whole numbers
+    # (panels, 7), whole numbers: first and last register, first node, nodes, strengths for comparison, first weight of
+    # the strengths, first weight of those for comparison
+    panels: np.ndarray
     weights: np.ndarray  # (any,): the weights of the strengths, then those of the strengths for comparison
     where: np.ndarray  # (m,): position of each strength in the registers
-    room: int  # numbers in all registers
-    lanes: int  # numbers in one
+    room: int  # lanes of all registers
+    lanes: int  # lanes of one
 
     def of_strengths(self, values: np.ndarray) -> np.ndarray:
-        """Return what belongs to each strength, from values (..., room) in registers."""
+        """Return values (..., m) of the strengths, from values (..., room) in registers."""
         return values[..., : len(self.where)] if len(self.panels) == 1 else values.take(self.where, axis=-1)
 
 
@@ -112,27 +114,28 @@ def strength_interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) ->
 
 
 def lines_of(strengths: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
-    """Return the lines on which strengths (m, layers) lie that differ in a single layer.
+    """Return the fewest lines on which strengths (m, layers) differ in a single layer.
 
-    Shapes: returns fixed (lines, layers - 1), line (m,).
+    Returns this layer, the strengths of the others (lines, layers - 1), and the line (m,) of each strength.
     """
-    found = []
+    lines = []
     for moving in range(strengths.shape[1]):
         fixed, line = np.unique(np.delete(strengths, moving, axis=1), axis=0, return_inverse=True)
-        found.append((moving, fixed, line.reshape(-1)))
-    return min(found, key=lambda lines: len(lines[1]))
+        lines.append((moving, fixed, line.reshape(-1)))
+    return min(lines, key=lambda of_layer: len(of_layer[1]))
 
 
 def _along_lines(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
-    """Yield the panels of every line; those of few strengths have these as their nodes."""
+    """Yield the panels of every line; on a line of few strengths these are the nodes."""
     moving, fixed, line = lines_of(strengths)
     for k, others in enumerate(fixed):
         rows = np.flatnonzero(line == k)
-        own = strengths[rows, moving]
+        values = strengths[rows, moving]
         if len(rows) <= nodes:
-            parts: Iterable[Panel] = (Panel(np.arange(len(own)), own, own[:0], np.eye(len(own)), np.eye(len(own))[:0]),)
+            unit = np.eye(len(values))
+            parts: Iterable[Panel] = (Panel(np.arange(len(values)), values, values[:0], unit, unit[:0]),)
         else:
-            parts = _on_a_line(own, count, nodes)
+            parts = _on_a_line(values, count, nodes)
         for part in parts:
             points, extras = (
                 np.insert(np.tile(others, (len(x), 1)), moving, x, axis=1) for x in (part.points, part.extras)
@@ -146,15 +149,15 @@ def _on_a_line(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]
 
 
 def on_a_cache_line(values: np.ndarray) -> np.ndarray:
-    """Return a copy of a row of numbers that begins on a cache line, so that no register lies across two."""
+    """Return a copy of a row of numbers that begins on a cache line: no register lies across two."""
     block = np.empty(len(values) + 8)
     first = -block.ctypes.data // 8 % 8
     block[first : first + len(values)] = values
     return block[first : first + len(values)]
 
 
-def _numbers(table: np.ndarray) -> np.ndarray:
-    """A matrix of complex numbers as pairs of columns, one of real numbers as it is."""
+def _real(table: np.ndarray) -> np.ndarray:
+    """A matrix of complex numbers as pairs of real columns; a real one unchanged."""
     return np.ascontiguousarray(table).view(float)
 
 
@@ -164,14 +167,15 @@ def _pieces(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
     The strengths for comparison lie between the outer points, and in the middle.
     """
     edges = np.linspace(strengths.min(), strengths.max(), count + 1)
-    which = np.clip(np.searchsorted(edges, strengths, side="right") - 1, 0, count - 1)
+    piece = np.clip(np.searchsorted(edges, strengths, side="right") - 1, 0, count - 1)
+    # points and barycentric weights: Berrut & Trefethen, section 5
     unit = np.cos(np.arange(nodes) * math.pi / (nodes - 1))
     signs = (-1.0) ** np.arange(nodes)
     signs[[0, -1]] *= 0.5
     between = (unit[:-1] + unit[1:])[[0, nodes // 2 - 1, -1]] / 2
-    for k in np.unique(which):
+    for k in np.unique(piece):
         centre, half = (edges[k] + edges[k + 1]) / 2, (edges[k + 1] - edges[k]) / 2
-        rows = np.flatnonzero(which == k)
+        rows = np.flatnonzero(piece == k)
         yield Panel.of(strengths, rows, centre + half * unit, signs, centre + half * between)
 
 

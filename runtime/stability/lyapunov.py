@@ -3,9 +3,12 @@
 Deviations are integrated over short blocks of time and made orthogonal after each. A block is short
 enough if every direction stands out of the error of the integration. Under a smoothed friction law,
 oscillators that stick lose their velocity deviations so fast that no block is short enough;
-exponents lost in this error are not reported as numbers. Their sum is known all the same: the sum
-of all exponents is the mean divergence of the equations, which is integrated along the orbit. If one
-alone is lost, this tells it.
+exponents lost in this error are not reported as numbers. Their sum is known: the sum of all exponents
+is the mean divergence of the equations, which is integrated along the orbit. If one alone is lost, it
+is the difference.
+
+`TangentFrame` holds the orbit (`orbits.OrbitProblem`, an integrator) and the orthogonal deviations;
+`lyapunov_spectrum` runs its transient, lets it choose the length of blocks, and averages the growth.
 
 Under set-valued friction, stick makes the velocity of a deviation zero, so that directions vanish
 within finite time. Their exponent is -inf by definition, and so is the sum. Such a direction comes
@@ -18,31 +21,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import cast
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import sympy as sp
 import xarray as xr
 
-from synchain.codegen.driver.columns import Control
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.dynamics.variational import PHASE, Variation, network_variation, phase_shifted, with_volume
 from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
-from ..cells.initial_modes import with_modes
 from ..cells.run_keywords import ONE_ORBIT, Given
-from ..engines.choice import chosen_for_modes
 from ..results.labelled import Labelled, dataset
 from ..support.error_text import with_error
 from ..support.execution import Execution
 from ..support.progress import Hook
-from .averages import SLACK, TRIED, Averaging, Batches, error_of_steps
+from .averages import TOLERANCE_RATIO, TRIED, Averaging, Batches, document_keywords, error_of_steps
 from .exponents import single_cell
 from .interpolation import Interpolation, Panel
-from .motion import Turns, rates_of, turns_of
-from .orbits import LOOKS, OF_EXTENT, unit_of_time
+from .motion import rates_of
+from .orbits import LOOKS, OrbitProblem
 from .slow_motion import warn_of_slow_motion
 from .variational_integrator import Deviations, VariationalIntegrator
 
@@ -52,34 +51,31 @@ PARTS = (1, 2, 4, 8, 16, 32, 64, 128, 256)
 """Numbers of blocks in a period that are tried, in ascending order."""
 
 ENOUGH = 64
-"""Blocks in a period beyond which more are tried only if the next direction stood out of rounding."""
+"""Blocks in a period beyond which more are tried only if the next direction is longer than ROUNDING (a choice)."""
 
 TRIAL = 4
 """Periods of each trial, and periods that are dropped after the choice."""
 
 CLEAR, LOST = 1e4, 10.0
-"""Lengths of a direction after a block, in tolerances.
-
-From the first on it is clear of the error, below the second it is lost.
-"""
+"""Lengths of a direction after a block, in tolerances: above CLEAR it is clear of the error, below LOST it is lost (a choice)."""
 
 MOST_BLOCKS, FINE, FINEST = 32, 1e-7, 1e-10
-"""Most blocks between two orthogonalisations, the least angle between directions that their trial may end with, and any other."""
+"""Most blocks between two orthogonalisations, and the least angle between directions before one: in trials, in averages."""
 
 UNIT = 1024
-"""Factor between units of deviations: a power of two, and so large that components of usual sizes share one."""
+"""Factor between units of deviations: a power of two, and so large that components of usual sizes share a unit."""
 
 LOOKED = 2
-"""Periods of the drive in which the extent of a motion is seen."""
+"""Periods of the drive in which the extent of a motion is measured."""
 
 LARGEST_RTOL = 1e-5
-"""Beyond, no direction is ever clear of the error."""
+"""Largest rtol: above it no direction is ever clear of the error."""
 
 ROUNDING = 1e-13
-"""Length of a direction that rounding leaves: shorter blocks may find one that is longer."""
+"""Length of a direction that is rounding alone: only shorter blocks can show a longer one."""
 
 GONE = 700.0
-"""Logarithm by which a direction shrinks over a block that is not followed at all; numbers end at 745."""
+"""A direction that shrinks by exp(-GONE) over a block is not integrated: floating-point numbers end at exp(-745)."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -164,7 +160,7 @@ class Lyapunov(Labelled):
         """Kaplan-Yorke dimension; nan if it exceeds the number of computed exponents.
 
         A negative exponent within its standard error counts as 0, as that along a periodic orbit is,
-        whose dimension is 1. `dimension_range` says what the errors leave open.
+        whose dimension is 1. `dimension_range` is the range within the errors.
 
         References
         ----------
@@ -183,7 +179,7 @@ class Lyapunov(Labelled):
         return self._dimension(self.exponent - errors), self._dimension(self.exponent + errors)
 
     def _dimension(self, exponent: np.ndarray) -> float:
-        """The dimension that some exponents give."""
+        """Kaplan-Yorke dimension of exponents in any order."""
         exponent = -np.sort(-exponent)
         sums = np.cumsum(exponent)
         below = np.flatnonzero(sums < 0.0)
@@ -193,6 +189,7 @@ class Lyapunov(Labelled):
         return k + (float(sums[k - 1] / -exponent[k]) if k else 0.0)
 
 
+@document_keywords
 def lyapunov_spectrum(
     scene: Scene,
     *,
@@ -215,24 +212,13 @@ def lyapunov_spectrum(
         Network of at most eight oscillators.
     count : int, optional
         Number of largest exponents; all by default.
-    precision : float
-        Averaging stops if every standard error is below this value.
-    periods : float
-        Longest average, in periods of the drive, or in mean return times of undriven motion; a whole number.
-    transient : float
-        Transient before the average, in the same units.
+    {average}
     rtol : float
         Relative tolerance of the integration, at most 1e-5. The friction law may require a smaller one.
     seed : int
         Seed of the initial directions.
-    show_progress : bool, optional
-        Whether to show a bar; by default a bar on terminals and in notebooks, a line a minute elsewhere.
-    progress : callable, optional
-        Is called with a `Progress`, which counts periods of the drive.
-    parameters : mapping of str to float, optional
-        Parameters of the scene to set, for names that are keywords already.
-    **more : float
-        Parameters of the scene to set.
+    {progress}
+    {parameters}
 
     Returns
     -------
@@ -268,21 +254,21 @@ def lyapunov_spectrum(
                 batches.add(growth[None])
         steps = frame.error_of_steps()
     orbit = frame.integrator
-    warn_of_slow_motion(frame.variation.orbit, orbit.state, orbit.numbers[0], batches.time)
+    warn_of_slow_motion(frame.variation.orbit, orbit.state, orbit.parameter_values[0], batches.time)
     return _report(frame, batches, lost, steps)
 
 
 def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray, steps: np.ndarray) -> Lyapunov:
-    """Means and errors; exponents after a lost direction are lost as well."""
+    """The result of an average; exponents after a lost direction are lost as well."""
     resolved = ~np.logical_or.accumulate(lost)
     mean, error = batches.mean()[0], np.hypot(batches.error_by_start()[0], steps)
     unknown = np.nan if frame.variation.events is None else 0.0
     exponent, spread = np.where(resolved, mean[:-1], -np.inf), np.where(resolved, error[:-1], unknown)
     order = np.argsort(-exponent, kind="stable")
     time, volume = batches.time, (float(mean[-1]), float(error[-1]))
-    if frame.variation.events is not None:
-        known = len(exponent) == frame.variation.size
-        volume = (float(exponent.sum()), float(np.hypot.reduce(spread))) if known else (math.nan, math.nan)
+    if frame.variation.events is not None:  # without volumes, the sum of all exponents takes their place
+        complete = len(exponent) == frame.variation.size
+        volume = (float(exponent.sum()), float(np.hypot.reduce(spread))) if complete else (math.nan, math.nan)
     return Lyapunov(
         exponent[order],
         spread[order],
@@ -291,7 +277,7 @@ def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray, steps: np.n
         time=time,
         block=frame.unit / frame.parts,
         components=frame.variation.size,
-        unit=str(frame.turns),
+        unit=str(frame.problem.turns),
     )
 
 
@@ -306,100 +292,67 @@ def _counted(scene: Scene, count: int | None) -> int:
 
 
 @dataclass(slots=True)
-class VisibleStates:
-    """An integrator whose last states, the logarithms of volumes, are hidden from who looks at the motion."""
-
-    integrator: VariationalIntegrator
-    hidden: int
-
-    @property
-    def state(self) -> np.ndarray:
-        """The other states (1, any)."""
-        return self.integrator.state[:, : self.integrator.state.shape[1] - self.hidden]
-
-    @state.setter
-    def state(self, state: np.ndarray) -> None:
-        self.integrator.state = np.pad(state, ((0, 0), (0, self.hidden)))
-
-    @property
-    def control(self) -> np.ndarray:
-        """What steers the integrator."""
-        return self.integrator.control
-
-    @property
-    def steps(self) -> int:
-        """Steps that were taken."""
-        return self.integrator.steps
-
-    def advance(self, length: float) -> None:
-        """Integrate over a length of time."""
-        self.integrator.advance(length)
-
-
-@dataclass(slots=True)
 class TangentFrame:
     """One orbit with orthogonal deviations, advanced over blocks of 1/parts of a period."""
 
-    scene: Scene  # network and its start
-    variation: Variation  # variational equation of the whole network
+    problem: OrbitProblem  # network with the variational equation of all its states
     integrator: VariationalIntegrator  # integrator of the orbit and its deviations
     basis: np.ndarray  # (size, count): orthonormal deviations
-    turns: Turns  # period of the drive, or mean return time of undriven motion
     parts: int = 1  # blocks in a period
     phase: int = 0  # block within the period
     group: int = 1  # blocks between two orthogonalisations, over which propagators are multiplied
-    carried: tuple[VariationalIntegrator, Deviations] | None = None  # what multiplies them, made at the first call
+    # integrator of the propagator of the network, and the directions that it moves; made at the first call
+    carried: tuple[VariationalIntegrator, Deviations] | None = None
     # the matrix (size, size) of the variational equation as a function of states and parameters
-    rates: Callable[..., np.ndarray] = field(kw_only=True)
+    matrix: Callable[..., np.ndarray] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.matrix = _matrix(self.variation)
 
     @classmethod
     def make(cls, scene: Scene, count: int, seed: int) -> TangentFrame:
         """Set up the frame at the scene's start, with random directions."""
-        turns = Turns(unit_of_time(scene), np.zeros(0), "period of the drive")
         network = network_variation(without_drive(scene.equations, scene.parameters))
         sticks = network.events is not None
+        # the orbit carries the logarithms of volumes as its last states; stick makes volumes zero
         variation = network if sticks else Variation(with_volume(network.orbit), network.size, network.matrix)
         variation = phase_shifted(variation) if variation.orbit.forced else variation
-        values = {**scene.parameters, PHASE.name: 0.0}
-        numbers = np.array([[values[name] for name in variation.orbit.parameters]])
         hidden = 0 if sticks else scene.n
-        state = with_modes(variation.orbit, np.array([[*scene.y0, *(0.0 for _ in range(hidden))]]), numbers)
-
-        def integrator_of(scaled: Variation, slow: float) -> VariationalIntegrator:
-            rows = scaled, state, numbers.copy(), np.zeros((0, count))
-            method = chosen_for_modes(scene, *rows, slow)
-            made = VariationalIntegrator.make(scene, *rows, 1, method=method)
-            made.slow = slow
-            return made
-
+        start = np.array([[*scene.y0, *(0.0 for _ in range(hidden))]])
+        problem = OrbitProblem.of(scene, variation, np.zeros((count, 0)), start)
+        state = problem.with_slip_states(start)
         basis = np.linalg.qr(np.random.default_rng(seed).normal(size=(network.size, count)))[0]
-        if variation.orbit.forced:
-            integrator = integrator_of(variation, 2.0 * math.pi / turns.time)
-            looked = cls(scene, variation, integrator, basis, turns, rates=_rates(variation))
-            turns = turns._replace(extent=looked.extent_of_driven(hidden))
-        else:
-            observed = VisibleStates(integrator_of(variation, math.inf), hidden)
-            observed.integrator.observes = True
-            turns = turns_of(cast("VariationalIntegrator", observed), rates_of(network.orbit, dict(scene.parameters)))
-        variation = variation if sticks else _scaled(variation, turns.extent)
-        integrator = integrator_of(variation, 2.0 * math.pi / turns.time)
-        moving = turns.extent[turns.extent > 0.0]
-        least = OF_EXTENT * integrator.control[Control.RTOL] * float(moving.min(initial=np.inf))
-        integrator.control[Control.ATOL] = min(integrator.control[Control.ATOL], least)
-        return cls(scene, variation, integrator, basis, turns, rates=_rates(variation))
 
-    def extent_of_driven(self, hidden: int) -> np.ndarray:
-        """Return how far each state moves over the next periods of the drive."""
-        self.parts, states = LOOKS, [self.integrator.state[0]]
-        for _ in range(LOOKED * LOOKS):
-            self.advance()
-            states.append(self.integrator.state[0])
-        return np.asarray(np.ptp(states, axis=0)[: len(states[0]) - hidden])
+        # measure the extent of the motion; in its units, deviations of all components are of like size
+        if problem.forced:
+            first = cls(problem, problem.integrator(state), basis, parts=LOOKS)
+            states = [first.integrator.state[0]]
+            for _ in range(LOOKED * LOOKS):
+                first.advance()
+                states.append(first.integrator.state[0])
+            turns = problem.turns._replace(extent=np.ptp(states, axis=0)[: len(states[0]) - hidden])
+        else:
+            rates = rates_of(network.orbit, dict(scene.parameters))
+            turns = problem.observed_turns(state, problem.strengths, rates, hidden)
+        if not sticks:
+            problem = replace(problem, variation=_scaled(variation, turns.extent))
+        problem = problem.with_turns(turns, start)
+        return cls(problem, problem.integrator(state), basis)
+
+    @property
+    def variation(self) -> Variation:
+        """The variational equation of the network."""
+        return self.problem.variation
 
     @property
     def unit(self) -> float:
         """Unit of time: the period of the drive, or the mean return time of undriven motion."""
-        return self.turns.time
+        return self.problem.unit
+
+    @property
+    def volumes(self) -> int:
+        """Number of the last states that are logarithms of volumes."""
+        return 0 if self.variation.events is not None else self.problem.scene.n
 
     @property
     def count(self) -> int:
@@ -417,31 +370,33 @@ class TangentFrame:
         self.phase = (self.phase + 1) % self.parts
         followed = self.followed()
         self.integrator.set_deviations(np.where(np.arange(self.count) < followed, self.basis, 0.0)[None])
-        whole_growth = self.integrator.advance(self.unit / self.parts)[0]
+        factors = self.integrator.advance(self.unit / self.parts)[
+            0
+        ]  # logarithms of those that deviations are divided by
         ends = self.integrator.deviations[0]
         ends[:, followed:] = self.basis[:, followed:]
         self.basis, triangle = np.linalg.qr(ends)
         lengths = np.abs(np.diagonal(triangle))
         volume = np.nan
-        if self.variation.events is None:
-            shares = self.integrator.state[:, -self.scene.n :]
+        if self.volumes:
+            shares = self.integrator.state[:, -self.volumes :]
             volume = float(shares.sum())
             shares[:] = 0.0
         with np.errstate(divide="ignore"):
-            return whole_growth + np.log(lengths), lengths * np.exp(np.minimum(whole_growth, 0.0)), volume
+            return factors + np.log(lengths), lengths * np.exp(np.minimum(factors, 0.0)), volume
 
     def _set_clock(self) -> None:
-        """Let the next block begin at its phase of the drive."""
+        """Set the clock of the equations to the phase of the drive at which the next block begins."""
         names = self.variation.orbit.parameters
         if PHASE.name in names:
-            self.integrator.numbers[:, names.index(PHASE.name)] = self.phase * (self.unit / self.parts)
+            self.integrator.parameter_values[:, names.index(PHASE.name)] = self.phase * (self.unit / self.parts)
 
     def followed(self) -> int:
-        """Number of directions that are integrated over the next block: not those that would be gone long before its end.
+        """Number of directions that are integrated over the next block.
 
-        An integration with a relative error follows them through every decade.
+        Those that vanish long before its end are not: a relative tolerance follows them through every decade.
         """
-        matrix = self.rates(*self.integrator.state[0], *self.integrator.numbers[0])
+        matrix = self.matrix(*self.integrator.state[0], *self.integrator.parameter_values[0])
         length = self.unit / self.parts
         if not GONE < np.abs(matrix).sum(axis=1).max() * length < math.inf:
             return self.count
@@ -457,11 +412,12 @@ class TangentFrame:
         return np.append(np.where(np.isfinite(growth), growth, 0.0), volume), lost
 
     def measure_group(self, blocks: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Advance by several blocks, and yield for each what `measure` returns."""
+        """Advance by several blocks; yield for each what `measure` returns."""
         begun, basis = self.integrator.state, self.basis
         if blocks > 1:
             growths, angles, volumes = self.advance_group(blocks)
             shares = growths - np.maximum(growths.max(axis=1, keepdims=True), 0.0)
+            # directions that stay apart and clear of the error; else the same blocks one by one
             if angles.min() > FINEST and shares.min() > math.log(LOST * self.rtol):
                 yield from zip(np.column_stack([growths, volumes]), np.zeros(growths.shape, dtype=bool), strict=True)
                 return
@@ -469,51 +425,53 @@ class TangentFrame:
         yield from (self.measure() for _ in range(blocks))
 
     def advance_group(self, blocks: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Advance by several blocks in one call: propagators of single blocks move the directions, which are orthogonal at the end.
+        """Advance by several blocks in one call, and make the directions orthogonal at the end.
 
-        Propagators are as exact as the steps, and their products lose no more than rounding.
+        Propagators of single blocks multiply the directions; they are as exact as the steps.
         Shapes: returns growths (blocks, count), angles (blocks, count), volumes (blocks,).
         """
         size, count = self.variation.size, self.count
-        carrier, travellers = self.carried = self.carried or self._carriers()
+        carrier, deviations = self.carried = self.carried or self._carriers()
         self._set_clock()
-        carrier.state, carrier.numbers = self.integrator.state, self.integrator.numbers
+        carrier.state, carrier.parameter_values = self.integrator.state, self.integrator.parameter_values
         carrier.set_deviations(np.eye(size)[None])
-        lanes = travellers.registers.lanes
-        registers = travellers.vectors.reshape(-1, size, lanes)
+        # the directions fill the lanes of the registers (registers, size, lanes), repeated in spare ones
+        lanes = deviations.registers.lanes
+        registers = deviations.vectors.reshape(-1, size, lanes)
         directions = np.resize(self.basis.T, (len(registers) * lanes, size))
         registers[:] = directions.reshape(-1, lanes, size).swapaxes(1, 2)
         states = carrier.state.shape[1]
-        tracks = np.empty((1, blocks, states + registers.size))
-        gains = carrier.follow(self.unit / self.parts, np.ones(blocks, dtype=np.int64), travellers, tracks)[:, 0]
-        ends = np.concatenate([tracks[0, 1:, states:].reshape(-1, *registers.shape), registers[None]])
+        batch_starts = np.empty((1, blocks, states + registers.size))
+        single = np.ones(blocks, dtype=np.int64)
+        log_growth = carrier.follow(self.unit / self.parts, single, deviations, batch_starts)[:, 0]
+        # growth of the orthogonalised directions up to each block, and its change over the block
+        ends = np.concatenate([batch_starts[0, 1:, states:].reshape(-1, *registers.shape), registers[None]])
         moved = ends.swapaxes(2, 3).reshape(blocks, -1, size)[:, :count].swapaxes(1, 2)
         bases, triangles = np.linalg.qr(moved)
         self.basis, angles = bases[-1], np.abs(np.diagonal(triangles, axis1=1, axis2=2))
         with np.errstate(divide="ignore", invalid="ignore"):
-            growths = np.diff(np.cumsum(gains, axis=0) + np.log(angles), axis=0, prepend=0.0)
+            growths = np.diff(np.cumsum(log_growth, axis=0) + np.log(angles), axis=0, prepend=0.0)
         volumes = np.full(blocks, np.nan)
-        if self.variation.events is None:
-            passed = [*tracks[0, :, states - self.scene.n : states], carrier.state[0, -self.scene.n :]]
+        if self.volumes:
+            passed = [*batch_starts[0, :, states - self.volumes : states], carrier.state[0, -self.volumes :]]
             volumes = np.diff(np.sum(passed, axis=1))
-            carrier.state[:, -self.scene.n :] = 0.0
+            carrier.state[:, -self.volumes :] = 0.0
         self.integrator.state = carrier.state
         return growths, angles, volumes
 
     def _carriers(self) -> tuple[VariationalIntegrator, Deviations]:
-        """An integrator of the propagator of the network, and the directions, which all take this one."""
-        size, count, own = self.variation.size, self.count, self.integrator
-        carrier = own
+        """An integrator of the propagator of the network, and the directions, which are all multiplied by it."""
+        size, count, frame = self.variation.size, self.count, self.integrator
+        carrier = frame
         if count < size:
-            rows = self.variation, own.state, own.numbers, np.zeros((0, size))
-            carrier = VariationalIntegrator.make(self.scene, *rows, 1, method=own.kernel.origin.method)
-            carrier.control, carrier.watch, carrier.slow = own.control, own.watch, own.slow
+            carrier = self.problem.integrator(frame.state, np.zeros((size, 0)))
+            carrier.control, carrier.watch = frame.control, frame.watch
         shared = Panel(np.arange(count), np.zeros(1), np.zeros(0), np.ones((count, 1)), np.zeros((0, 1)))
-        registers = Interpolation(np.zeros(count), (shared,)).registers(own.kernel.origin.width)
+        registers = Interpolation(np.zeros(count), (shared,)).registers(frame.kernel.origin.width)
         return carrier, Deviations.make(registers, 1, size, size)
 
     def choose_group(self) -> None:
-        """Choose the most blocks whose product of propagators keeps all directions clear of rounding."""
+        """Choose the most blocks between two orthogonalisations that keep all directions clear of rounding."""
         self.group = 1
         phased = PHASE.name in self.variation.orbit.parameters and self.parts > 1
         if phased or self.followed() < self.count:
@@ -528,11 +486,11 @@ class TangentFrame:
             self.group *= 2
 
     def error_of_steps(self) -> np.ndarray:
-        """Advance by TRIED periods, and return the error of all growth rates (count + 1,) that is due to the steps."""
+        """Advance by TRIED periods; return the error of all growth rates (count + 1,) by the steps."""
         usual, looser = [], []
         for _ in range(TRIED * self.parts):
             basis, phase = self.basis, self.phase
-            with self.integrator.loosened(SLACK):
+            with self.integrator.loosened(TOLERANCE_RATIO):
                 looser.append(self.measure()[0])
             self.basis, self.phase = basis, phase
             usual.append(self.measure()[0])
@@ -540,10 +498,10 @@ class TangentFrame:
 
     def choose_block(self) -> None:
         """Choose the fewest blocks in a period that keep most directions clear of the error."""
-        best = -1
-        fewest = 1
+        best, fewest = -1, 1
         for parts in PARTS:
             self.parts, self.phase = parts, 0
+            # a direction counts if it and all before it are clear of the error in every block
             shares = np.array([self.advance()[1] for _ in range(TRIAL * parts)])
             least = shares.min(axis=0)
             clear = np.logical_and.accumulate(least > CLEAR * self.rtol)
@@ -557,7 +515,7 @@ class TangentFrame:
 
 
 def _scaled(variation: Variation, extent: np.ndarray) -> Variation:
-    """The equation of deviations in units of the extent of each component, in steps of UNIT: those of like size stay."""
+    """The equation of deviations in units of the extent of each component, rounded to powers of UNIT."""
     moving = extent[: variation.size] > 0.0
     if not moving.any():
         return variation
@@ -567,7 +525,7 @@ def _scaled(variation: Variation, extent: np.ndarray) -> Variation:
     return Variation(variation.orbit, variation.size, matrix)
 
 
-def _rates(variation: Variation) -> Callable[..., np.ndarray]:
+def _matrix(variation: Variation) -> Callable[..., np.ndarray]:
     """The matrix of a variational equation at time 0, as a function of states and parameters."""
     names = [sp.Symbol(name, real=True) for name in (*variation.orbit.state, *variation.orbit.parameters)]
     table = sp.zeros(variation.size, variation.size)

@@ -1,6 +1,9 @@
-"""Scales of a motion that know no unit: how far each component moves, how long a turn takes, and how large the terms of rates are.
+"""Scales of a motion: the extent of each component, the time of a turn, and the size of the terms of rates.
 
-All lengths here follow the motion under x -> s x + c for each component, and all times under t -> k t.
+They depend on no unit: lengths follow x -> s x + c for each component, times follow t -> k t.
+
+A path is integrated in steps short beside the extent so far (`path`); tops of its components, or the
+slowest rate of the equilibrium that it comes to, give the unit of time (`turns_of`).
 """
 
 from __future__ import annotations
@@ -21,51 +24,51 @@ from .averages import ROUNDING
 from .variational_integrator import VariationalIntegrator
 
 SHARE = 8
-"""Least number of steps of a path from one end of a component to the other."""
+"""Fewest steps of a path from one end of a component to the other (a choice)."""
 
 FINE = 6
-"""Most steps of the integrator by which a step of a path exceeds twice those of the one before: a spike between two states of a
-path takes more."""
+"""A step of a path is repeated in halves if it takes more than FINE integrator steps beyond twice those of the last one: it
+hides a spike."""
 
 TURNED, JUMP = 0.5, 32
-"""Least cosine of the angle by which the motion turns in a step of a path, and how many times shorter than the last one a step is
-that may turn by more."""
+"""Least cosine of the angle by which the motion turns in a step of a path; a step JUMP times shorter than the last one may
+turn by more: rates jump there."""
 
 FIRST = 1e-6
-"""First step of a path, relative to the shortest time that the start lets guess."""
+"""First step of a path, relative to the shortest time estimated at the start: nothing happens in it."""
 
 SAMPLES, LOOKED, OFTEN = 4096, 64, 8
-"""Most steps of a path in which turns are counted, steps between two counts, and between two looks for an even drift."""
+"""Most steps of a path, steps between two counts of turns, and between two tests for an even drift (a choice)."""
 
 NOISE = 10.0
-"""Change of rates that do not change, relative to what they change by over the extent, in units of the tolerance."""
+"""Rates are constant if they change by less than NOISE rtol of their change over the extent."""
 
 EVEN = 1e-3
-"""Largest change of the speed of an even drift, relative to it."""
+"""Largest relative change of the speed of an even drift (a choice)."""
 
 CLEAR = 1 / 32
-"""Least rise of a turn, relative to the extent of its component."""
+"""Least rise and fall of a turn, relative to the extent of its component (a choice)."""
 
 ENOUGH = 12
-"""Turns whose mean is taken."""
+"""Turns whose mean is taken (a choice)."""
 
 REST = 1e-9
-"""Rates are zero if they are below what they change by over this part of the extent of the motion."""
+"""Rates are zero if they are below their change over this part of the extent of the motion."""
 
 DIGITS = 1e-10
-"""Part of its terms below which a rate is zero, and of its size below which a component stays: steps leave such traces."""
+"""Errors of steps: a rate below this part of its terms is zero, a component that moves less than this part of its size rests."""
 
 ASIDE = 1e-6
-"""How far aside rates are evaluated for their slopes, relative to the extent of the motion."""
+"""Displacement of the difference quotients of rates, relative to the extent of the motion."""
 
 STILL = 1e-6
 """A component whose later motion is below this part of all its motion has come to rest: its approach is its extent."""
 
 FLAT = 1e-6
-"""Part of the fastest rate of an equilibrium below which another one is not resolved."""
+"""Rates of an equilibrium below this part of the fastest are not resolved by difference quotients."""
 
 REACH = 0.4
-"""Largest distance of a further start in the first component, relative to the extent of the motion."""
+"""Largest distance of a further start in the first component, relative to the extent of the motion (a choice)."""
 
 
 class RateFunctions(NamedTuple):
@@ -75,11 +78,11 @@ class RateFunctions(NamedTuple):
     sizes: Callable[[np.ndarray], np.ndarray]
 
     def rounding(self, state: np.ndarray, time: float) -> np.ndarray:
-        """How far each component (p,) may move by rounding alone within a time."""
+        """Return the distance (p,) that each component may move by rounding alone within a time."""
         return np.asarray(ROUNDING * (np.abs(state) + np.nan_to_num(time * self.sizes(state))))
 
     def slopes(self, state: np.ndarray, extent: np.ndarray) -> np.ndarray:
-        """How much each rate changes by (p, p) if one component moves by its extent, to first order."""
+        """Return the change (p, p) of each rate if one component moves by its extent, to first order."""
         here = self.values(state)
         with np.errstate(all="ignore"):
             moved = [self.values(state + move) - here for move in np.diag(ASIDE * extent)]
@@ -87,15 +90,15 @@ class RateFunctions(NamedTuple):
 
 
 class Turns(NamedTuple):
-    """What a path shows: mean time of a turn, extent (p,) of the motion, and what the time is."""
+    """A unit of time, and the extent of a motion."""
 
-    time: float
-    extent: np.ndarray
-    words: str = "unit of time"
+    time: float  # period of the drive, or mean time of a turn
+    extent: np.ndarray  # (p,): of each component
+    label: str = "unit of time"  # meaning of the time
 
     def __str__(self) -> str:
-        """What the unit of time is, and its length."""
-        return f"{self.words}, {self.time:.6g} units of time"
+        """Meaning and length of the unit of time."""
+        return f"{self.label}, {self.time:.6g} units of time"
 
 
 def rates_of(equations: Equations, parameters: dict[str, float]) -> RateFunctions:
@@ -126,12 +129,12 @@ def _size(e: sp.Expr) -> sp.Expr:
 def extent_of(
     states: np.ndarray, settled: np.ndarray, still: float = STILL, rounding: np.ndarray | float = 0.0
 ) -> np.ndarray:
-    """Return how far each component (…) moves in settled states (k, …), or in all states if it has come to rest.
+    """Return the extent of each component (…) in settled states (k, …), or in all states if it has come to rest.
 
     It rests if it moves by less than rounding, or by less than a part `still` of all its motion.
     """
-    later, whole = np.ptp(settled, axis=0), np.ptp(states, axis=0)
-    return np.where(later > np.maximum(still * whole, rounding), later, whole)
+    later, total = np.ptp(settled, axis=0), np.ptp(states, axis=0)
+    return np.where(later > np.maximum(still * total, rounding), later, total)
 
 
 def above(extent: np.ndarray, rounding: np.ndarray) -> np.ndarray:
@@ -147,33 +150,34 @@ def starts_near(state: np.ndarray, extent: np.ndarray, count: int, seed: int) ->
 
 
 def rests(rates: RateFunctions, state: np.ndarray, closed: float, extent: np.ndarray) -> bool:
-    """Return whether the rates at a state are zero: below rounding of their terms, or within what they change by over a part `closed` of the extent."""
+    """Return True if the rates at a state are zero: below rounding of their terms, or their change over a part `closed` of the extent."""
     changes = np.abs(rates.slopes(state, extent)).sum(axis=1)
     here = np.abs(rates.values(state))
     return bool(np.all(here <= np.nan_to_num(closed * changes) + DIGITS * rates.sizes(state)))
 
 
 def path(
-    integrator: VariationalIntegrator, rates: RateFunctions, shortest: float
+    integrator: VariationalIntegrator, rates: RateFunctions, shortest: float, hidden: int = 0
 ) -> Iterator[tuple[np.ndarray, float, np.ndarray, np.ndarray]]:
     """Advance a single orbit by steps in which no component moves by more than a share of its extent, and the motion does not turn round.
 
     Yield, after each step, the state before it, its length, the extent (p,) so far and the rates (p,) after it.  Steps of
-    the shortest length may move by more, as the first ones do, and so may turns at a jump of the rates.  The absolute
-    tolerance follows the extent.
+    the shortest length may move by more, as the first ones do, and so may turns at a jump of the rates.  The `hidden` last
+    states of the integrator are no part of the motion.
     """
-    step, low, high = shortest, integrator.state[0].copy(), integrator.state[0].copy()
+    count = integrator.state.shape[1] - hidden
+    step, low, high = shortest, integrator.state[0, :count].copy(), integrator.state[0, :count].copy()
     speed, last, few = rates.values(low), shortest, math.inf
     while True:
-        before, done = integrator.state, integrator.steps
+        before, done = integrator.state[:, :count], integrator.steps
         integrator.advance(step)
-        after = integrator.state[0]
+        after = integrator.state[0, :count]
         lower, higher = np.minimum(low, after), np.maximum(high, after)
         moved, extent = SHARE * np.abs(after - before[0]), higher - lower
         taken, velocity = integrator.steps - done, rates.values(after)
         turned = step * JUMP > last and _cosine(speed, velocity, extent) < TURNED
         if step > shortest and (taken > 2 * few + FINE or turned or np.any(moved > extent)):
-            integrator.state, step = before, max(shortest, 0.5 * step)
+            integrator.state, step = np.pad(before, ((0, 0), (0, hidden))), max(shortest, 0.5 * step)
             continue
         low, high, speed, last, few = lower, higher, velocity, step, taken
         yield before, step, extent, velocity
@@ -188,10 +192,10 @@ def _cosine(first: np.ndarray, second: np.ndarray, extent: np.ndarray) -> float:
 
 
 def shortest_time(rates: RateFunctions, state: np.ndarray) -> float:
-    """Return a time in which nothing has happened yet at a state that does not rest; 1 if nothing tells one."""
+    """Return a time in which nothing happens at a state that does not rest, by its rates and their slopes; 1 without any."""
     size, speed = np.abs(state), np.abs(rates.values(state))
-    known = (size > 0.0) & (speed > 0.0)
-    times = [*(size[known] / speed[known])]
+    moving = (size > 0.0) & (speed > 0.0)
+    times = [*(size[moving] / speed[moving])]
     scale = np.where(size > 0.0, size, size.max(initial=0.0) or 1.0)
     slopes = rates.slopes(state, scale) / scale[None, :]
     if np.isfinite(slopes).all() and (fastest := np.abs(np.linalg.eigvals(slopes)).max()) > 0.0:
@@ -199,22 +203,24 @@ def shortest_time(rates: RateFunctions, state: np.ndarray) -> float:
     return FIRST * float(min(times, default=1.0 / FIRST))
 
 
-def turns_of(integrator: VariationalIntegrator, rates: RateFunctions) -> Turns:
-    """Return the mean return time of an undriven orbit, or the slowest rate of the equilibrium that it comes to.
+def turns_of(integrator: VariationalIntegrator, rates: RateFunctions, hidden: int = 0) -> Turns:
+    """Measure the mean return time of an undriven orbit, or the slowest rate of the equilibrium that it comes to.
 
     A motion whose rates do not change any more, such as that of locked phases, is at an equilibrium that drifts.  A turn
     of a component lasts from one top to the next, with a fall and a rise by CLEAR of its extent at least between them.
     The component with most turns counts; they are looked for in the later three quarters of a path.
     """
-    start = integrator.state[0].copy()
+    count = integrator.state.shape[1] - hidden
+    start = integrator.state[0, :count].copy()
     times, states, velocities, time = [0.0], [start], [rates.values(start)], 0.0
     extent, closed = np.zeros_like(start), NOISE * float(integrator.control[Control.RTOL])
     if not rests(rates, start, REST, extent):
         try:
-            for k, (_, step, extent, velocity) in enumerate(path(integrator, rates, shortest_time(rates, start)), 1):
+            steps = path(integrator, rates, shortest_time(rates, start), hidden)
+            for k, (_, step, extent, velocity) in enumerate(steps, 1):
                 time += step
                 times.append(time)
-                states.append(integrator.state[0])
+                states.append(integrator.state[0, :count])
                 velocities.append(velocity)
                 if not np.isfinite(time) or k == SAMPLES:
                     break
@@ -235,12 +241,12 @@ def turns_of(integrator: VariationalIntegrator, rates: RateFunctions) -> Turns:
         path_states = path_states - np.outer(times, even)
     late = path_states[early:]
     extent = extent_of(path_states, late[len(late) // 2 :])
-    unit, words = time or 2.0 * np.pi, "time in which nothing returns" if time else "nothing moves"
+    unit, label = time or 2.0 * np.pi, "time in which nothing returns" if time else "nothing moves"
     if turn := _mean_turn(np.array(times[early:]), late, 1):
-        unit, words = turn, "mean return time"
+        unit, label = turn, "mean return time"
     elif even is not None and (slow := _slowest(rates, states[-1], extent)):
-        unit, words = 2.0 * np.pi / slow, "turn of the slowest rate"
-    return Turns(unit, above(extent, rates.rounding(states[-1], unit)), words)
+        unit, label = 2.0 * np.pi / slow, "turn of the slowest rate"
+    return Turns(unit, above(extent, rates.rounding(states[-1], unit)), label)
 
 
 def _drift(
@@ -304,6 +310,6 @@ def _slowest(rates: RateFunctions, state: np.ndarray, extent: np.ndarray) -> flo
     slopes = rates.slopes(state, scale) / scale[None, :]
     if not np.isfinite(slopes).all():
         return 0.0
-    found = np.abs(np.linalg.eigvals(slopes))
-    found = found[found > FLAT * found.max(initial=0.0)]
-    return float(found.min(initial=np.inf)) if len(found) else 0.0
+    sizes = np.abs(np.linalg.eigvals(slopes))
+    sizes = sizes[sizes > FLAT * sizes.max(initial=0.0)]
+    return float(sizes.min(initial=np.inf)) if len(sizes) else 0.0

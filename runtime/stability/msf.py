@@ -1,5 +1,14 @@
 """The master stability function of a scene: exponents, ranges where they are negative, their class.
 
+Each stage takes what the one before returns:
+
+1. `exponents.coupled_cell`: scene and keywords → one cell with a link between equal oscillators.
+2. `exponents.orbits_of`: cell, strengths alpha → `OrbitProblem` of the modes, and the starts.
+3. `exponents.along`: problem, starts → `Exponents`. Each start runs its transient; `find_attractor` looks for a
+   fixed point or a cycle, whose exponents are eigenvalues; other motion is averaged by a `March`.
+4. Here: `Exponents` on a line → `MSF`, with its class and, for the eigenvalues of a network, windows of sigma;
+   on a grid → `Plane`. Over a parameter of the scene, stages 2 and 3 run for each synchronous orbit.
+
 Sources: classes by the zeros of the function on alpha > 0, Huang, Chen, Lai & Pecora, Phys. Rev. E
 80, 036204 (2009); several intervals ("ragged"), Stefański, Perlikowski & Kapitaniak, Phys. Rev. E
 75, 016210 (2007).
@@ -8,7 +17,7 @@ Sources: classes by the zeros of the function on alpha > 0, Huang, Chen, Lai & P
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
@@ -25,7 +34,7 @@ from synchain.models.scenes.scene import Scene, check_scene
 
 from ..cells.run_keywords import ORBITS, Given, with_numbers
 from ..prediction.intervals import Interval
-from ..prediction.mode_windows import defective_rows
+from ..prediction.mode_windows import NetworkMode, defective_rows
 from ..prediction.mode_windows import transversal_modes as network_modes
 from ..prediction.synchronisability import Answer, Verdict, Window, verdict, windows, windows_complex
 from ..results.labelled import Labelled, as_json, dataset, drive_text, scene_text
@@ -33,26 +42,26 @@ from ..support.arrays import row
 from ..support.error_text import range_text, with_error
 from ..support.execution import Execution
 from ..support.progress import Hook
-from .averages import Averaging
+from .averages import Averaging, document_keywords
 from .exponents import Exponents, along, coupled_cell, exponent_rows, orbits_of, transversal, with_partner
 from .transversal_modes import SharedOrbit, shared_orbits, still_strengths, transversal_modes
 
 STRENGTHS = ("alpha", "beta")
-"""What the axes of a plane are called that are strengths of a mode; a parameter may have such a name too."""
+"""Names of the axes of a plane that are strengths of a mode; a parameter may have such a name too."""
 
 NAMES = frozenset(
     {"attractor", "attractors", "contours", "exponent", "mode", "modes", "number", "start", "stderr", "windows"}
 )
-"""What a plane has under these names beside those of all results."""
+"""Names in the data of a plane that no axis may have, beside those of all results."""
 
 MOST_MODES = 6
-"""Modes that a summary lists."""
+"""Most modes that a summary lists (a choice)."""
 
 LOOKED_UP = 2001
-"""Values of sigma at which the modes of a network are looked up in a plane."""
+"""Values of sigma at which the modes of a network are looked up in a plane (a choice)."""
 
 FINE = 1001
-"""Least number of strengths at which the function is computed; ends of ranges are interpolated."""
+"""Least number of strengths of a master stability function; ends of ranges are interpolated between them (a choice)."""
 
 
 class StabilityClass(StrEnum):
@@ -92,6 +101,7 @@ class MSF(Labelled):
     @property
     def data(self) -> xr.Dataset:
         """The function over alpha, and the intervals where it is negative."""
+        windows = () if self._why_no_windows else self.windows
         return dataset(
             {
                 "exponent": (("alpha",), self.exponent, "largest transversal exponent per unit of time"),
@@ -100,7 +110,7 @@ class MSF(Labelled):
                 "interval_error": (("range", "end"), np.reshape(self.uncertainties, (-1, 2)), "errors of the ends"),
                 "window": (
                     ("window_number", "end"),
-                    np.reshape([(w.low, w.high) for w in self._known_windows], (-1, 2)),
+                    np.reshape([(w.low, w.high) for w in windows], (-1, 2)),
                     "sigma at which every mode of the network dies out",
                 ),
             },
@@ -111,9 +121,9 @@ class MSF(Labelled):
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Scene, class, stable ranges of alpha and of sigma, whether the network can synchronise, sizes, motion."""
-        fine, graph = self.fine, self.scene.topology
-        sigma = [self._without_windows] if self._without_windows else [window.text() for window in self.windows]
-        possible = [] if self._without_windows else [("possible", self.verdict.text), *defective_rows(graph)]
+        fine, unknown = self.fine, self._why_no_windows
+        sigma = [unknown] if unknown else [window.text() for window in self.windows]
+        possible = [] if unknown else [("possible", self.verdict.text), *defective_rows(self.scene.topology)]
         rows = [
             ("scene", scene_text(self.scene)),
             ("strength", f"alpha = -sigma gamma{_coupling(self.scene)}, {range_text(fine.alpha)}"),
@@ -129,13 +139,8 @@ class MSF(Labelled):
         return tuple(rows)
 
     @property
-    def _known_windows(self) -> tuple[Window, ...]:
-        """The windows, none where nothing is known of them."""
-        return () if self._without_windows else self.windows
-
-    @property
-    def _without_windows(self) -> str:
-        """Why nothing is known of windows; empty if they are known."""
+    def _why_no_windows(self) -> str:
+        """Why the windows of the network are not known; empty if they are."""
         graph = self.scene.topology
         if not graph.link_count:
             return "not known: no links"
@@ -150,11 +155,11 @@ class MSF(Labelled):
     @property
     def verdict(self) -> Verdict:
         """Whether the network can synchronise for some sigma > 0; GRID_ENDS if a longer line of alpha may change the answer."""
-        found = verdict(self.intervals, self.scene.topology, self.errors)
+        on_grid = verdict(self.intervals, self.scene.topology, self.errors)
         first, last = self.fine.alpha[[0, -1]]
         longer = [(0.0 if a == first else a, math.inf if b == last else b) for a, b in self.intervals]
-        same = verdict(longer, self.scene.topology, self.errors).answer == found.answer
-        return found if same else replace(found, answer=Answer.GRID_ENDS)
+        same = verdict(longer, self.scene.topology, self.errors).answer == on_grid.answer
+        return on_grid if same else replace(on_grid, answer=Answer.GRID_ENDS)
 
     @property
     def exponent(self) -> np.ndarray:
@@ -219,26 +224,25 @@ class MSF(Labelled):
     def windows(self) -> tuple[Window, ...]:
         """Ranges of sigma in which every mode of the scene's network is stable.
 
-        Eigenvalues must be real. No mode is lost at an end that comes from an end of the grid: its error is infinite. So are
-        those of ends at which one is, if an average was too short to estimate them.
+        Eigenvalues must be real. At an end that comes from an end of the grid no mode is lost, and the error is infinite.
+        All errors but those at sigma = 0 are infinite if an average was too short to estimate them.
         """
-        return tuple(self._trimmed(window) for window in windows(self.open_ranges, self.scene.topology, self.errors))
+        first, last = map(float, self.fine.alpha[[0, -1]])
+        windows_of_modes = windows(self.open_ranges, self.scene.topology, self.errors)
 
-    def _trimmed(self, window: Window) -> Window:
-        """Remove the modes of a window whose strength at its ends is an end of the grid, and errors that are unknown."""
-        low, high = (float(self.fine.alpha[k]) for k in (0, -1))
-        modes = [
-            None if mode is None or math.isclose(sigma * mode.size, end, rel_tol=1e-12) else mode
-            for sigma, mode, end in ((window.low, window.low_mode, low), (window.high, window.high_mode, high))
-        ]
-        known = self.errors is not None
-        low_error, high_error = (
-            0.0 if end == 0.0 else error if known and mode is not None else math.inf
-            for mode, end, error in zip(
-                modes, (window.low, window.high), (window.low_error, window.high_error), strict=True
-            )
-        )
-        return replace(window, low_mode=modes[0], high_mode=modes[1], low_error=low_error, high_error=high_error)
+        def lost(sigma: float, mode: NetworkMode | None, grid_end: float) -> NetworkMode | None:
+            """The mode that is lost at an end, None where its strength is the end of the grid."""
+            return None if mode is None or math.isclose(sigma * mode.size, grid_end, rel_tol=1e-12) else mode
+
+        def uncertainty(sigma: float, mode: NetworkMode | None, error: float) -> float:
+            return 0.0 if sigma == 0.0 else error if self.errors is not None and mode is not None else math.inf
+
+        trimmed = []
+        for w in windows_of_modes:
+            low, high = lost(w.low, w.low_mode, first), lost(w.high, w.high_mode, last)
+            errors = (uncertainty(w.low, low, w.low_error), uncertainty(w.high, high, w.high_error))
+            trimmed.append(replace(w, low_mode=low, high_mode=high, low_error=errors[0], high_error=errors[1]))
+        return tuple(trimmed)
 
     @property
     def open_ranges(self) -> tuple[Interval, ...]:
@@ -254,7 +258,7 @@ class MSF(Labelled):
             alpha, exponent, stderr, intervals, uncertainties, class, attractors, time, starts, windows and verdict; windows and
             verdict are None without links and for complex eigenvalues.
         """
-        judged = not self._without_windows
+        judged = not self._why_no_windows
         return as_json(
             {
                 "alpha": self.alpha,
@@ -295,7 +299,7 @@ class Plane(Labelled):
     modes : tuple of str
         Over two parameters, the exact eigenvalues of each transversal mode, those of all layers together.
     mode : ndarray of int, shape (a, b), optional
-        The mode with the largest exponent, by its place in `modes`.
+        Index in `modes` of the mode with the largest exponent.
     strengths : tuple of str
         The axes of these names are strengths of a mode; all others are parameters.
     """
@@ -337,6 +341,9 @@ class Plane(Labelled):
         axes, stable = list(zip(self.names, (self.across, self.up), strict=True)), self.exponent < 0
         strength = "alpha = -sigma gamma" if self.parameters else "alpha + i beta = -sigma gamma"
         modes = f"the largest of {len(self.modes)} transversal modes of {self.scene.n} nodes"
+        imaginary = STRENGTHS[1] if STRENGTHS[1] in self.strengths else None
+        labels = [f"{name} (imaginary part)" if name == imaginary else name for name in self.names]
+        grid = [f"{len(values)} {label} {range_text(values)}" for label, (_, values) in zip(labels, axes, strict=True)]
         contours = [
             ", ".join(
                 f"{name} {with_error(part.min())} … {with_error(part.max())}"
@@ -347,7 +354,7 @@ class Plane(Labelled):
         rows = [
             ("scene", scene_text(self.scene, self.parameters)),
             ("exponents", modes if self.modes else f"{strength}{_coupling(self.scene)}"),
-            ("grid", ", ".join(f"{len(values)} {self._called(name)} {range_text(values)}" for name, values in axes)),
+            ("grid", ", ".join(grid)),
             *[("zero contour", text) for text in contours or ["none"]],
             ("negative", f"at {stable.sum()} of {stable.size} points, {stable.mean():.1%}"),
         ]
@@ -381,7 +388,7 @@ class Plane(Labelled):
         """
         from scipy.interpolate import RegularGridInterpolator
 
-        # rays -sigma gamma of the modes, up to the first that leaves the plane, less a rounding error
+        # sigma up to which no ray -sigma gamma of a mode leaves the plane, less a rounding error
         graph, units = self.scene.topology, [-complex(m.eigenvalue.value) for m in network_modes(self.scene.topology)]
         beta = max(-self.up[0], self.up[-1]) if self.up[0] < 0 else self.up[-1]
         across = [
@@ -391,6 +398,7 @@ class Plane(Labelled):
         top = (1 - 1e-12) * float(min(limits, default=0.0))
         if top <= 0.0:
             return ()
+        # interpolation needs finite numbers; conjugate strengths have the same exponent
         size = np.max(np.abs(self.exponent[np.isfinite(self.exponent)]), initial=1e-300)
         value = np.nan_to_num(self.exponent, nan=size, posinf=size, neginf=-size)
         at = RegularGridInterpolator((self.across, self.up), value, bounds_error=False, fill_value=math.inf)
@@ -400,10 +408,6 @@ class Plane(Labelled):
             return np.asarray(np.minimum(*pairs) < 0)
 
         return windows_complex(stable, graph, np.linspace(0.0, top, LOOKED_UP), 1e-6 * top).windows
-
-    def _called(self, name: str) -> str:
-        """What an axis is."""
-        return f"{name} (imaginary part)" if name == STRENGTHS[1] and name in self.strengths else name
 
     @property
     def motion(self) -> np.ndarray:
@@ -444,6 +448,7 @@ class Plane(Labelled):
         )
 
 
+@document_keywords
 def msf(
     scene: Scene,
     alpha: Sequence[float] | np.ndarray,
@@ -468,10 +473,10 @@ def msf(
         Source of the oscillator and the coupling.
     alpha : array_like, shape (m,)
         Increasing real strengths alpha = -sigma gamma.
-    precision, periods, transient, starts, rtol, seed
-        See `synchain.runtime.exponents`.
-    workers, show_progress, progress, parameters, **more
-        See `synchain.runtime.exponents`.
+    {average}
+    {starts}
+    {progress}
+    {parameters}
 
     Returns
     -------
@@ -489,9 +494,10 @@ def msf(
     fine = np.union1d(line, np.linspace(line[0], line[-1], FINE))
     given = Given(msf, parameters, more, ORBITS)
     averaging = Averaging(precision, periods, transient, seed, Execution(workers, None, show_progress, progress))
-    return MSF(_known(given, scene), line, transversal(given, scene, fine, starts, rtol, averaging))
+    return MSF(_with_parameters(given, scene), line, transversal(given, scene, fine, starts, rtol, averaging))
 
 
+@document_keywords
 def plane(
     scene: Scene,
     alpha: Sequence[float] | np.ndarray | None = None,
@@ -514,7 +520,8 @@ def plane(
     ``plane(scene, alpha, beta)`` is the master stability function over alpha + i beta = -sigma gamma.
     ``plane(scene, alpha, g=values)`` is that over alpha and a parameter, such as the strength of links that act between equal
     states, which moves the synchronous orbit.  ``plane(scene, k=values, g=values)`` is the largest exponent of all
-    transversal modes of the scene's network over two parameters, such as the strengths of two layers of links.
+    transversal modes of the scene's network over two parameters, such as the strengths of two layers of links.  Averages are along
+    each synchronous orbit.
 
     Parameters
     ----------
@@ -525,10 +532,9 @@ def plane(
     beta : array_like, shape (b,), optional
         Increasing imaginary parts. Conjugate strengths have the same exponent, so that only abs(beta)
         is integrated.
-    precision, periods, transient, starts, rtol, seed
-        See `synchain.runtime.exponents`; the average is that along each synchronous orbit.
-    workers, show_progress, progress
-        See `synchain.runtime.exponents`.
+    {average}
+    {starts}
+    {progress}
     parameters, **more
         Parameters of the scene to set, by a number, or axes, by an increasing row of values.
 
@@ -550,16 +556,12 @@ def plane(
     Hasler, Phys. Rev. Lett. 94, 188101 (2005).
     """
     averaging = Averaging(precision, periods, transient, seed, Execution(workers, None, show_progress, progress))
-    whole = Given(plane, parameters, more, ORBITS)
-    whole.checked(with_partner(scene))
-    rows, given = whole.parted()
+    call = Given(plane, parameters, more, ORBITS)
+    call.checked(with_partner(scene))
+    rows, fixed = call.parted()
+
+    # two axes, of strengths or of parameters
     strengths = {name: values for name, values in zip(STRENGTHS, (alpha, beta), strict=True) if values is not None}
-    if beta is not None and "beta" not in whole.values and check_scene(scene).takes("beta"):
-        warn(
-            "plane: found beta, the imaginary part of strengths, and a parameter of that name; "
-            "write parameters={'beta': …} for the parameter",
-            UserWarning,
-        )
     if both := strengths.keys() & rows.keys():
         raise ValueError(
             f"plane: found an axis of strengths and one of a parameter, both named {min(both)!r}; expected two names; "
@@ -572,25 +574,101 @@ def plane(
         )
     expect_free("plane", rows, NAMES)
     axes = {name: row(name, values, 2, rising=True) for name, values in (*strengths.items(), *rows.items())}
-    known = _known(given, scene)
+    shown = _with_parameters(fixed, scene)
+    if rows:
+        return _over_parameters(shown, call, scene, axes, tuple(strengths), starts, rtol, averaging)
+
+    # both axes are strengths: modes along one orbit, each of conjugate ones once
+    if "beta" not in call.values and check_scene(scene).takes("beta"):
+        warn(
+            "plane: found beta, the imaginary part of strengths, and a parameter of that name; "
+            "write parameters={'beta': …} for the parameter",
+            UserWarning,
+        )
+    expect_vanishing("plane", check_scene(scene).equations)
+    across, up = axes.values()
+    heights, index = np.unique(np.abs(up), return_inverse=True)
+    half_plane = transversal(fixed, scene, (across[:, None] + 1j * heights).reshape(-1), starts, rtol, averaging)
+    table, error = (values.reshape(len(across), -1)[:, index] for values in (half_plane.exponent, half_plane.stderr))
+    return Plane(shown, across, up, table, error, _kinds(half_plane)[None, None], half_plane.time)
+
+
+def _over_parameters(
+    shown: Scene,
+    call: Given,
+    scene: Scene,
+    axes: Mapping[str, np.ndarray],
+    strengths: tuple[str, ...],
+    starts: int,
+    rtol: float,
+    averaging: Averaging,
+) -> Plane:
+    """Exponents over two axes, `strengths` of them strengths, along one synchronous orbit after the other."""
+    rows = {name: values for name, values in axes.items() if name not in strengths}
     if len(rows) == 2 and not check_scene(scene).model.linked:
         raise ValueError(
             "plane: found two parameters and a scene without links; expected a network, or alpha and a parameter"
         )
-    if rows:
-        if not strengths:  # exponents depend on all those of the scene
-            whole.expect_one_cell(scene)
-        cell = coupled_cell(
-            replace(given, table={**given.values, **{name: axes[name][0] for name in rows}}), scene, rtol
-        )
-        _check_parameters(cell, {name: axes[name] for name in rows}, bool(strengths))
-        return _over_parameters(known, cell, axes, tuple(strengths), starts, averaging)
-    expect_vanishing("plane", check_scene(scene).equations)
-    across, up = axes.values()
-    heights, place = np.unique(np.abs(up), return_inverse=True)
-    half_plane = transversal(given, scene, (across[:, None] + 1j * heights).reshape(-1), starts, rtol, averaging)
-    table, error = (row.reshape(len(across), -1)[:, place] for row in (half_plane.exponent, half_plane.stderr))
-    return Plane(known, across, up, table, error, _kinds(half_plane)[None, None], half_plane.time)
+    if not strengths:  # exponents depend on all those of the scene
+        call.expect_one_cell(scene)
+    _, fixed = call.parted()
+    at_first = {**fixed.values, **{name: values[0] for name, values in rows.items()}}
+    cell = coupled_cell(replace(fixed, table=at_first), scene, rtol)
+    still = still_strengths(cell)
+    orbit_parameters = mode(cell.equations).orbit.parameters
+    for name, values in rows.items():
+        with_numbers(cell, {name: values[-1]})  # ValueError for a value out of range
+        if strengths and name in still and len(cell.strengths) == 1:
+            raise ValueError(
+                f"plane: found the axes alpha and {name}; expected another parameter: alpha = -{name} gamma"
+            )
+        if name not in still and name not in orbit_parameters:
+            names = ", ".join((*orbit_parameters, *sorted(still)))
+            raise ValueError(f"plane: no exponent depends on {name!r}; expected one of {names}")
+
+    # the points of the grid by their synchronous orbits
+    (first, second), shape = axes, tuple(map(len, axes.values()))
+    modes = () if strengths else tuple(map(str, transversal_modes(cell)))
+    if modes:
+        grid = np.meshgrid(*axes.values(), indexing="ij")
+        orbits = list(shared_orbits(cell, {name: values.ravel() for name, values in zip(axes, grid, strict=True)}))
+    else:  # one orbit for each value of the parameter, with the strengths alpha of a single mode
+        points = np.arange(math.prod(shape)).reshape(shape)
+        index = np.arange(shape[0])[:, None]
+        orbits = [
+            SharedOrbit(points[:, k], {second: float(value)}, axes[first], index)
+            for k, value in enumerate(axes[second])
+        ]
+
+    exponent, stderr, worst = np.empty(shape), np.empty(shape), np.empty(shape, dtype=int)
+    kinds, longest = np.empty((*shape, check_integer("starts", starts, 1)), dtype=object), 0.0
+    with averaging.reporter(len(orbits)) as reporter:
+        for done, orbit in enumerate(orbits, start=1):
+            at = np.unravel_index(orbit.cells, shape)
+            problem, states = orbits_of(with_numbers(cell, orbit.parameters), orbit.strengths, starts, averaging)
+            found = along(problem, states, orbit.strengths, averaging, reporter)
+            # at each point the mode with the largest exponent counts
+            table, points_of_orbit = found.exponent[orbit.place], np.arange(len(orbit.cells))
+            worst[at] = largest = table.argmax(axis=1)
+            exponent[at] = table[points_of_orbit, largest]
+            stderr[at] = found.stderr[orbit.place][points_of_orbit, largest]
+            kinds[at], longest = _kinds(found), max(longest, found.time)
+            reporter.advance(reporter.total * done / len(orbits) - reporter.done)
+    unmoved = still if modes else strengths
+    attractors = kinds[tuple(slice(1) if name in unmoved else slice(None) for name in axes)].astype(str)
+    return Plane(
+        shown,
+        axes[first],
+        axes[second],
+        exponent,
+        stderr,
+        attractors,
+        longest,
+        (first, second),
+        modes,
+        worst if modes else None,
+        strengths,
+    )
 
 
 def _coupling(scene: Scene) -> str:
@@ -598,70 +676,12 @@ def _coupling(scene: Scene) -> str:
     return f" (coupling: {scene.coupling})" if scene.coupling else ""
 
 
-def _check_parameters(cell: Scene, rows: Mapping[str, np.ndarray], beside_alpha: bool) -> None:
-    """Raise ValueError for values out of range, and for parameters that exponents do not depend on."""
-    orbit, still = mode(cell.equations).orbit, still_strengths(cell)
-    for name, values in rows.items():
-        with_numbers(cell, {name: values[-1]})
-        if beside_alpha and name in still and len(cell.strengths) == 1:
-            raise ValueError(
-                f"plane: found the axes alpha and {name}; expected another parameter: alpha = -{name} gamma"
-            )
-        if name not in still and name not in orbit.parameters:
-            known = ", ".join((*orbit.parameters, *sorted(still)))
-            raise ValueError(f"plane: no exponent depends on {name!r}; expected one of {known}")
-
-
-def _over_parameters(
-    known: Scene,
-    cell: Scene,
-    axes: Mapping[str, np.ndarray],
-    strengths: tuple[str, ...],
-    starts: int,
-    averaging: Averaging,
-) -> Plane:
-    """Exponents over two axes, one synchronous orbit after the other."""
-    first, second = axes
-    shape = (len(axes[first]), len(axes[second]))
-    modes = () if strengths else tuple(map(str, transversal_modes(cell)))
-    orbits = list(shared_orbits(cell, _columns(axes)) if modes else _orbits_of_line(axes[first], second, axes[second]))
-    exponent, stderr, worst = np.empty(shape), np.empty(shape), np.empty(shape, dtype=int)
-    kinds, longest = np.empty((*shape, check_integer("starts", starts, 1)), dtype=object), 0.0
-    with averaging.reporter(len(orbits)) as reporter:
-        for done, orbit in enumerate(orbits, start=1):
-            scene, at = with_numbers(cell, orbit.numbers), np.unravel_index(orbit.cells, shape)
-            found = along(orbits_of(scene, orbit.strengths, starts, averaging), orbit.strengths, averaging, reporter)
-            table, rows = found.exponent[orbit.place], np.arange(len(orbit.cells))
-            worst[at] = largest = table.argmax(axis=1)
-            exponent[at], stderr[at] = table[rows, largest], found.stderr[orbit.place][rows, largest]
-            kinds[at], longest = _kinds(found), max(longest, found.time)
-            reporter.advance(reporter.total * done / len(orbits) - reporter.done)
-    still = still_strengths(cell) if modes else strengths
-    attractors = kinds[tuple(slice(1) if name in still else slice(None) for name in axes)].astype(str)
-    of_modes = (modes, worst if modes else None)
-    return Plane(
-        known, axes[first], axes[second], exponent, stderr, attractors, longest, (first, second), *of_modes, strengths
-    )
-
-
-def _columns(axes: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The value of each axis at every point of their grid."""
-    return {name: values.ravel() for name, values in zip(axes, np.meshgrid(*axes.values(), indexing="ij"), strict=True)}
-
-
-def _orbits_of_line(alpha: np.ndarray, name: str, values: np.ndarray) -> Iterator[SharedOrbit]:
-    """One orbit for each value of a parameter, with the strengths alpha of a single mode."""
-    for k, value in enumerate(values):
-        cells = np.arange(len(alpha)) * len(values) + k
-        yield SharedOrbit(cells, {name: float(value)}, alpha, np.arange(len(alpha))[:, None])
-
-
-def _kinds(found: Exponents) -> np.ndarray:
+def _kinds(exponents: Exponents) -> np.ndarray:
     """The kind of motion (starts,) of each start."""
-    return np.array([attractor.kind for attractor in found.attractors])
+    return np.array([attractor.kind for attractor in exponents.attractors])
 
 
-def _known(given: Given, scene: Scene) -> Scene:
+def _with_parameters(given: Given, scene: Scene) -> Scene:
     """The scene with its parameters, which fix its axes; a lone oscillator has none of the links."""
     return with_numbers(scene, {name: value for name, value in given.values.items() if scene.takes(name)}, axes=())
 

@@ -1,4 +1,4 @@
-"""Undriven motion that is too slow for transients and averages, which are counted in units of 2 pi."""
+"""Warn of undriven motion that is too slow for its transient and average."""
 
 from __future__ import annotations
 
@@ -12,18 +12,20 @@ from synchain.models.inputs.keywords import warn
 from ..cells.paces import fastest_rates
 
 TURN = 2.0 * math.pi
-"""Fewest times the inverse of the fastest rate in which motion turns, or settles."""
+"""Least time in which motion turns or settles, in units of the inverse of its fastest rate: one turn."""
 
 
-def warn_of_slow_motion(equations: Equations, states: np.ndarray, numbers: np.ndarray, averaged: float) -> None:
+def warn_of_slow_motion(
+    equations: Equations, states: np.ndarray, parameter_values: np.ndarray, averaged: float
+) -> None:
     """Warn if an average ends before undriven motion turns or settles.
 
-    Its batches agree, because nothing has happened, and their error is small for no reason.
-    Shapes: states (any, states), numbers (parameters,).
+    Its batches agree because nothing has happened, and their error is too small.
+    Shapes: states (any, states), parameter_values (parameters,).
     """
     if equations.forced:
         return
-    fastest = float(fastest_rates(equations, states, numbers).max())
+    fastest = float(fastest_rates(equations, states, parameter_values).max())
     if 0.0 < fastest * averaged < TURN:
         warn(
             f"found an orbit that has neither turned nor settled in the average of {averaged:.3g} units of time, its fastest rate is "

@@ -1,4 +1,4 @@
-"""The transversal modes of a network over the cells of a sweep: which cells share a synchronous orbit, and their strengths."""
+"""The transversal modes of a network over the cells of a sweep, grouped by the synchronous orbit that the cells share."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from synchain.models.spectra.joint import JointEigenvalue, joint_spectrum
 
 @dataclass(frozen=True, slots=True)
 class SharedOrbit:
-    """Cells that differ only in what does not move their synchronous orbit."""
+    """Cells that have the same synchronous orbit."""
 
     cells: np.ndarray  # (c,): the cells
-    numbers: dict[str, float]  # parameters of all of them that the orbit depends on
+    parameters: dict[str, float]  # parameters of all cells that move the orbit
     strengths: np.ndarray  # (m,) or (m, layers): the strengths -sigma gamma of all modes of all cells, each once
-    place: np.ndarray  # (c, modes): where in `strengths` the modes of each cell are
+    place: np.ndarray  # (c, modes): index in `strengths` of each mode of each cell
 
 
 def transversal_modes(scene: Scene) -> tuple[JointEigenvalue, ...]:
@@ -35,7 +35,7 @@ def still_strengths(scene: Scene) -> set[str]:
 
 
 def unused_axes(scene: Scene) -> set[str]:
-    """Return the axes on which nothing depends that is computed for given strengths of modes or of links."""
+    """Return the axes of strengths that do not move the synchronous orbit: exponents at given strengths do not depend on them."""
     axes = {axis.name for axis in check_scene(scene).axes}
     return axes & still_strengths(scene) if axes else set()
 
@@ -48,12 +48,12 @@ def shared_orbits(scene: Scene, columns: Mapping[str, np.ndarray]) -> Iterator[S
     gamma = gamma if len(names) > 1 else gamma[:, 0]
     sigma = [np.broadcast_to(columns.get(name, np.array(scene.parameters[name])), (count,)) for name in names]
     each = np.stack(sigma, axis=-1)[:, None, :] if len(names) > 1 else sigma[0][:, None]
-    own = [name for name in columns if name in scene.parameters and name not in still]
+    moving = [name for name in columns if name in scene.parameters and name not in still]
     groups: dict[tuple[float, ...], list[int]] = defaultdict(list)
     for cell in range(count):
-        groups[tuple(float(columns[name][cell]) for name in own)].append(cell)
+        groups[tuple(float(columns[name][cell]) for name in moving)].append(cell)
     for values, cells in groups.items():
-        asked = -each[cells] * gamma
-        strengths, place = np.unique(asked.reshape(-1, *asked.shape[2:]), axis=0, return_inverse=True)
-        numbers = dict(zip(own, values, strict=True))
-        yield SharedOrbit(np.array(cells), numbers, strengths, place.reshape(asked.shape[:2]))
+        alpha = -each[cells] * gamma  # (c, modes) or (c, modes, layers)
+        strengths, place = np.unique(alpha.reshape(-1, *alpha.shape[2:]), axis=0, return_inverse=True)
+        parameters = dict(zip(moving, values, strict=True))
+        yield SharedOrbit(np.array(cells), parameters, strengths, place.reshape(alpha.shape[:2]))

@@ -30,76 +30,72 @@ from ..engines.choice import chosen_for_modes, warn_of_stiff_modes
 from ..engines.control import control_array, first_step, tolerances
 from ..support.status import Status
 from ..support.threads import worker_count
-from .averages import SLACK, TRIED, error_of_steps
+from .averages import TOLERANCE_RATIO, TRIED, error_of_steps
 from .interpolation import Registers, on_a_cache_line
 
 NO_PANELS = (
-    np.ones(1, dtype=np.int64),
-    np.zeros((0, 1)),
-    np.zeros((0, 7)),
-    np.zeros(0),
-    np.zeros((0, 0)),
-    np.zeros((0, 0, 0)),
-    np.zeros(0),
-    np.zeros((0, 7)),
-    np.zeros(0),
-    np.zeros(0),
-    np.zeros((0, 0, 0)),
+    np.ones(1, dtype=np.int64),  # one block
+    np.zeros((0, 1)),  # places of the deviations of each node
+    np.zeros((0, 7)),  # panels
+    np.zeros(0),  # weights
+    np.zeros((0, 0)),  # deviations of all strengths
+    np.zeros((0, 0, 0)),  # log_growth
+    np.zeros(0),  # interpolation_errors
+    np.zeros((0, 7)),  # panels of stick intervals
+    np.zeros(0),  # weights of stick intervals
+    np.zeros(0),  # places of their nodes
+    np.zeros((0, 0, 0)),  # batch_starts
 )
 """The last arguments of a kernel that carries deviations over one block, and moves no others."""
 
-NO_LEGS, NO_TRACKS = NO_PANELS[-4:-1], NO_PANELS[-1]
-"""What the last ones are for propagators that are integrated from the beginning of a block to its end, and if what a
-batch begins with is not asked for."""
-
+NO_STICK_INTERVALS, NO_BATCH_STARTS = NO_PANELS[-4:-1], NO_PANELS[-1]
+"""Arguments where propagators are integrated over whole blocks, and where the starts of batches are not recorded."""
 
 STEEP, LONG, HIGH, FEWEST_STEPS = 1.1, 3, 256.0, 16
-"""A rise of an orbit without bound: by which factor the steps per time grow in each stretch, in how many at least, and by
-which these and the size in all; stretches of fewer steps tell nothing."""
+"""An orbit grows without bound if its steps per time grow by STEEP in each of LONG stretches, and by HIGH in all, as its size
+does; stretches of fewer than FEWEST_STEPS steps do not count. The kernel does the same within a stretch."""
 
 
 @dataclass(slots=True)
 class Deviations:
     """Deviations of all strengths, which propagators move."""
 
-    registers: Registers  # how they follow from the propagators of the nodes
+    registers: Registers  # how the propagators of all strengths follow from those of the nodes
     columns: int  # components of a deviation, real or complex
     vectors: np.ndarray  # (cells, any): the deviations at unit length, in registers
-    # how the propagators of the nodes follow from those that are integrated, of bodies that stick
-    legs: Registers | None = None
+    # of bodies that stick: how the propagators of the nodes follow from those that are integrated between landings
+    stick_intervals: Registers | None = None
     error: float = 0.0  # largest error of the interpolation so far, relative to the size of a propagator
 
     @classmethod
     def make(
-        cls, registers: Registers, cells: int, columns: int, parts: int, legs: Registers | None = None
+        cls, registers: Registers, cells: int, columns: int, parts: int, stick_intervals: Registers | None = None
     ) -> Deviations:
-        """Return deviations along (1, 1, …)."""
+        """Return deviations along (1, 1, …); `parts`: real numbers of each."""
         lanes = registers.lanes
         start = np.zeros((cells, registers.room // lanes, parts, lanes))
         start[:, :, :columns] = 1.0 / math.sqrt(columns)
-        return cls(registers, columns, on_a_cache_line(start.reshape(-1)).reshape(cells, -1), legs)
+        return cls(registers, columns, on_a_cache_line(start.reshape(-1)).reshape(cells, -1), stick_intervals)
 
     @property
-    def ways(self) -> tuple[np.ndarray, ...]:
-        """What a kernel is told of legs."""
-        return NO_LEGS if self.legs is None else (self.legs.panels, self.legs.weights, self.legs.where.astype(float))
+    def interval_arrays(self) -> tuple[np.ndarray, ...]:
+        """Arguments of a kernel for stick intervals."""
+        own = self.stick_intervals
+        return NO_STICK_INTERVALS if own is None else (own.panels, own.weights, own.where.astype(float))
 
 
 @dataclass(slots=True)
 class GrowthWatch:
-    """Watches orbits over stretches of time that follow each other, as a kernel does within one.
+    """Finds orbits that grow without bound over several stretches of time, as a kernel does within one."""
 
-    steps (cells,): all so far; rises (cells,): stretches since steps per time began to rise; last, origins (2, cells): steps
-    per time and largest size, in the last stretch and before that rise.
-    """
-
-    steps: np.ndarray = field(default_factory=lambda: np.zeros(1))
-    rises: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    steps: np.ndarray = field(default_factory=lambda: np.zeros(1))  # (cells,): all so far
+    rises: np.ndarray = field(default_factory=lambda: np.zeros(1))  # (cells,): stretches since steps per time rise
+    # (2, cells): steps per time and largest size, before that rise and in the last stretch
     origins: np.ndarray = field(default_factory=lambda: np.zeros((2, 1)))
     last: np.ndarray = field(default_factory=lambda: np.array([[np.inf], [0.0]]))
 
     def status(self, codes: np.ndarray, steps: np.ndarray, times: np.ndarray, sizes: np.ndarray, most: float) -> Status:
-        """Return FINISHED, or why the first orbit (cells,) that is given up is; codes: those of the kernel."""
+        """Return FINISHED, or why the first failing orbit fails. Shapes: (cells,); codes: those of the kernel."""
         bad = codes != Status.FINISHED
         if bad.any():
             return Status(int(codes[bad.argmax()]))
@@ -120,7 +116,7 @@ class VariationalIntegrator:
     variation: Variation  # orbit with its variational equation
     kernel: Kernel  # the same, compiled
     state: np.ndarray  # (cells, dimension): states of the orbits
-    numbers: np.ndarray  # (cells, parameters): values of the parameters
+    parameter_values: np.ndarray  # (cells, parameters)
     period: np.ndarray  # (cells,): time after which the clock restarts; 0 if it does not
     control: np.ndarray  # tolerances, limits and the cancel flag for the kernel
     # (number of strengths, padded modes): strengths sorted by size, padded to a multiple of the lanes
@@ -129,12 +125,11 @@ class VariationalIntegrator:
     vectors: np.ndarray  # (cells, size, padded modes): deviations
     workers: int  # number of threads
     steps: int = 0  # steps taken so far
-    warned: bool = False  # whether it was said that the steps are short because the modes are stiff
-    # whether stretches are so short that steps begin as long as those before, and that their length is no cause to
-    # warn
+    warned: bool = False  # whether a warning of steps that are short because modes are stiff was given
+    # whether stretches are so short that steps begin as long as the ones before, and their length is no cause to warn
     observes: bool = False
     slow: float = 1.0  # rate of the motion that steps must follow anyway
-    # ends orbits without bound, and those that take more than `max_steps` steps in all
+    # ends orbits that grow without bound, or take more than `max_steps` steps in all
     watch: GrowthWatch = field(default_factory=GrowthWatch)
 
     @classmethod
@@ -143,42 +138,47 @@ class VariationalIntegrator:
         scene: Scene,
         variation: Variation,
         state: np.ndarray,
-        numbers: np.ndarray,
+        parameter_values: np.ndarray,
         strengths: np.ndarray,
         workers: int | None = None,
-        looseness: float = 1.0,
+        tolerance_ratio: float = 1.0,
         method: Integrator | None = None,
     ) -> VariationalIntegrator:
         """Prepare the kernel and the arrays; tolerances and the step budget are those of the scene.
 
-        Shapes: state (cells, dimension), numbers (cells, parameters), strengths (number of strengths, modes).
+        `tolerance_ratio`: tolerance of the deviations relative to that of the orbits.
+        Shapes: state (cells, dimension), parameter_values (cells, parameters), strengths (number of strengths, modes).
         """
-        method = chosen_for_modes(scene, variation, state, numbers, strengths) if method is None else method
+        method = chosen_for_modes(scene, variation, state, parameter_values, strengths) if method is None else method
         kernel = _kernel(variation, method, native_width())
         width, count = kernel.origin.width, strengths.shape[1]
+        # strengths sorted by size, so that those in one register are alike; the last one fills it up
         order = np.argsort(np.hypot.reduce(strengths, axis=0) if len(strengths) else np.zeros(count), kind="stable")
         padded = -(-count // width) * width
         columns = np.concatenate([order, np.full(padded - count, order[-1])])
         where = np.empty(count, dtype=np.int64)
         where[order] = np.arange(count)
-        rtol, atol = (float(own.min()) for own in tolerances(scene, variation.orbit, numbers))
-        repeat = periods(kernel.equations, numbers)
-        longest = half_swing(kernel.equations, by_place(kernel.equations, numbers))
-        control = np.append(control_array(rtol, atol, longest, scene.max_steps, jumps=False), looseness)
+        rtol, atol = (float(values.min()) for values in tolerances(scene, variation.orbit, parameter_values))
+        repeat = periods(kernel.equations, parameter_values)
+        longest = half_swing(kernel.equations, by_place(kernel.equations, parameter_values))
+        control = np.append(control_array(rtol, atol, longest, scene.max_steps, jumps=False), tolerance_ratio)
         if method.implicit:
-            growth = (at.growth for at in mode_rates(variation, state, numbers, strengths) if math.isfinite(at.growth))
+            growth = (
+                at.growth
+                for at in mode_rates(variation, state, parameter_values, strengths)
+                if math.isfinite(at.growth)
+            )
             control[Control.FIRST_STEP] = first_step(max(growth, default=0.0))
         vectors = np.full((len(state), variation.size, padded), 1.0 / math.sqrt(variation.size))
-        kept = np.ascontiguousarray(strengths[:, columns], dtype=float)
-        kept = kept if len(kept) else np.zeros((1, padded))
+        sorted_strengths = np.ascontiguousarray(strengths[:, columns], dtype=float)
         return cls(
             variation=variation,
             kernel=kernel,
             state=np.ascontiguousarray(state, dtype=float).copy(),
-            numbers=np.ascontiguousarray(numbers, dtype=float),
+            parameter_values=np.ascontiguousarray(parameter_values, dtype=float),
             period=local_clock(kernel.equations, repeat),
             control=control,
-            strengths=kept,
+            strengths=sorted_strengths if len(strengths) else np.zeros((1, padded)),
             order=where,
             vectors=vectors,
             workers=worker_count(workers),
@@ -203,21 +203,21 @@ class VariationalIntegrator:
         return growth[:, self.order]
 
     def follow(
-        self, length: float, batches: np.ndarray, travellers: Deviations, tracks: np.ndarray = NO_TRACKS
+        self, length: float, batches: np.ndarray, deviations: Deviations, batch_starts: np.ndarray = NO_BATCH_STARTS
     ) -> np.ndarray:
         """Integrate over blocks of time that follow each other, and move deviations by their propagators.
 
-        Every block begins with the deviations that were set, p for each node, which stay as they are.
-        Shapes: batches (b,), tracks (cells, b, any); returns (b, cells, strengths).
+        Every block begins with the deviations that were set, p for each node, which are not changed.
+        Shapes: batches (b,), batch_starts (cells, b, any); returns logarithms of the growth (b, cells, strengths).
         """
-        places, room = self.order.reshape(-1, travellers.columns).astype(float), travellers.registers.room
-        gains, misfits = np.empty((len(self.state), len(batches), room)), np.zeros(len(self.state))
-        registers = travellers.registers
-        own = (registers.panels, registers.weights, travellers.vectors, gains, misfits)
-        panels = (batches, places, *own, *travellers.ways, tracks)
-        self._run(length, panels, self.vectors, np.empty((len(self.state), self.strengths.shape[1])))
-        travellers.error = float(np.maximum(travellers.error, misfits.max()))  # NaN too
-        return registers.of_strengths(gains.transpose(1, 0, 2))
+        cells, registers = len(self.state), deviations.registers
+        places = self.order.reshape(-1, deviations.columns).astype(float)
+        log_growth, interpolation_errors = np.empty((cells, len(batches), registers.room)), np.zeros(cells)
+        moved = (registers.panels, registers.weights, deviations.vectors, log_growth, interpolation_errors)
+        panels = (batches, places, *moved, *deviations.interval_arrays, batch_starts)
+        self._run(length, panels, self.vectors, np.empty((cells, self.strengths.shape[1])))
+        deviations.error = float(np.maximum(deviations.error, interpolation_errors.max()))  # NaN too
+        return registers.of_strengths(log_growth.transpose(1, 0, 2))
 
     def loosen(self, ratio: float) -> None:
         """Multiply the tolerances."""
@@ -229,15 +229,12 @@ class VariationalIntegrator:
         Shapes: state (cells, dimension).
         """
         times = len(state) // len(self.state)
-        numbers, period, vectors = (
-            np.concatenate([part] * times) for part in (self.numbers, self.period, self.vectors)
-        )
         other = replace(
             self,
             state=state,
-            numbers=numbers,
-            period=period,
-            vectors=vectors,
+            parameter_values=np.concatenate([self.parameter_values] * times),
+            period=np.concatenate([self.period] * times),
+            vectors=np.concatenate([self.vectors] * times),
             control=self.control.copy(),
             watch=GrowthWatch(),
         )
@@ -246,20 +243,17 @@ class VariationalIntegrator:
 
     @contextmanager
     def loosened(self, ratio: float) -> Iterator[None]:
-        """Multiply the tolerances of what is integrated inside; states, deviations and tolerances are as before after it."""
+        """Multiply the tolerances inside; restore states, deviations and tolerances afterwards."""
         state, vectors, control = self.state, self.vectors.copy(), self.control.copy()
         self.loosen(ratio)
         yield
         self.state, self.vectors[:], self.control[:] = state, vectors, control
 
     def error_of_steps(self, length: float) -> np.ndarray:
-        """Advance by TRIED blocks, and return the error of growth rates (cells, modes) that is due to the steps.
-
-        See `averages.error_of_steps`.
-        """
+        """Advance by TRIED blocks; return the error of growth rates (cells, modes) by the steps, as `averages.error_of_steps`."""
         usual, looser = [], []
         for _ in range(TRIED):
-            with self.loosened(SLACK):
+            with self.loosened(TOLERANCE_RATIO):
                 looser.append(self.advance(length))
             usual.append(self.advance(length))
         return error_of_steps(usual, looser, length)
@@ -272,12 +266,22 @@ class VariationalIntegrator:
         spans = np.zeros((cells, 4))
         spans[:, 1], spans[:, 2] = length, self.period
         end, sums, counts = np.empty((cells, dimension)), np.empty((cells, 4)), np.zeros((cells, 6), dtype=np.int64)
-        given = (self.state, self.numbers, spans, self.control, self.strengths, vectors, growth, end, sums, counts)
-        rest = (*given, *panels)
+        orbits = (
+            self.state,
+            self.parameter_values,
+            spans,
+            self.control,
+            self.strengths,
+            vectors,
+            growth,
+            end,
+            sums,
+            counts,
+        )
         if min(cells, self.workers) == 1:
-            self.kernel.drive(0, cells, *rest)
+            self.kernel.drive(0, cells, *orbits, *panels)
         else:
-            self._share(np.linspace(0, cells, min(cells, self.workers) + 1).astype(int), rest)
+            self._share(np.linspace(0, cells, min(cells, self.workers) + 1).astype(int), (*orbits, *panels))
         times = panels[0].sum() * spans[:, 1]
         status = self.watch.status(
             counts[:, 0], counts[:, 1:3].sum(axis=1), times, np.abs(end).max(axis=1), self.control[Control.MAX_STEPS]
@@ -294,15 +298,15 @@ class VariationalIntegrator:
             self.warned = self.warned or (
                 series
                 and not self.observes
-                and warn_of_stiff_modes(self.variation, end, self.numbers, self.strengths, step, self.slow)
+                and warn_of_stiff_modes(self.variation, end, self.parameter_values, self.strengths, step, self.slow)
             )
         self.state = end
         self.steps += taken
 
-    def _share(self, cuts: np.ndarray, rest: tuple[np.ndarray, ...]) -> None:
+    def _share(self, cuts: np.ndarray, arguments: tuple[np.ndarray, ...]) -> None:
         """Run parts of the cells on threads; Ctrl-C stops them at once."""
         with ThreadPoolExecutor(self.workers) as pool:
-            jobs = [pool.submit(self.kernel.drive, a, b, *rest) for a, b in itertools.pairwise(cuts)]
+            jobs = [pool.submit(self.kernel.drive, a, b, *arguments) for a, b in itertools.pairwise(cuts)]
             try:
                 for job in jobs:
                     job.result()

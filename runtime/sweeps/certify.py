@@ -29,7 +29,7 @@ from ..results.labels import States
 from ..stability.attractor import Motion
 from ..stability.averages import Averaging, errors_for
 from ..stability.exponents import along, coupled_cell
-from ..stability.orbits import Orbits, unit_of_time, within
+from ..stability.orbits import OrbitProblem, unit_of_time, within
 from ..stability.transversal_modes import shared_orbits, transversal_modes
 from ..support.execution import Execution
 from .errors import sweep_errors
@@ -114,15 +114,15 @@ def certify(
     begun = places.table(starts if states is None else states)[:, :, 0]
     table = {name: np.empty(scene.cells) for name in ("exponent", "stderr", "diffusion", "margin", "size")}
     for group in shared_orbits(scene, planner.columns(cells)):
-        single = with_numbers(scene, group.numbers, axes=(), zipped=False, continuation="none", stop=None)
+        single = with_numbers(scene, group.parameters, axes=(), zipped=False, continuation="none", stop=None)
         cell = coupled_cell(Given(certify), single, RTOL)
-        orbits = Orbits.make(cell, group.strengths, begun[group.cells[:1]], averaging.execution.size)
-        orbits = orbits.begun_at(begun[group.cells])
+        problem = OrbitProblem.of_modes(cell, group.strengths, begun[group.cells[:1]], averaging.execution.size)
+        first = problem.with_slip_states(begun[group.cells])
         spread = places.table(starts[group.cells]).transpose(0, 2, 1).reshape(-1, begun.shape[1])
-        for members, extent, whole in _motions(orbits, spread):
+        for members, extent, whole in _motions(problem, first, spread):
             chosen = members[np.linspace(0, len(members) - 1, min(STARTS, len(members))).astype(int)].tolist()
             with averaging.reporter() as reporter:
-                found = along(orbits.part(chosen), group.strengths, averaging, reporter)
+                found = along(problem, first[chosen], group.strengths, averaging, reporter)
             # of several motions that look alike, the least stable counts
             means = [found.by_start[list(rows)].mean(axis=0) for rows in found.groups]
             worst, place = np.nanmax(means, axis=0), group.place[members]
@@ -132,19 +132,21 @@ def certify(
             stderr = found.stderr[place][rows, mode_of]
             table["exponent"][here], table["stderr"][here] = values[rows, mode_of], stderr
             table["diffusion"][here] = stderr**2 * found.time * found.averaged
-            table["margin"][here] = errors_for(ERRORS, found.time / orbits.unit) * stderr
+            table["margin"][here] = errors_for(ERRORS, found.time / problem.unit) * stderr
             rests = found.attractors[0].motion in (Motion.FIXED_POINT, Motion.LINEAR)
             table["size"][here] = np.linalg.norm(whole if rests else extent)
     return Certificate(**table)
 
 
-def _motions(orbits: Orbits, starts: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+def _motions(
+    problem: OrbitProblem, states: np.ndarray, starts: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Yield the rows of orbits that are on one motion, its extent (p,), and that of all motions with the states (any, p) before.
 
     Motions are one if their means and extents over some units of time agree.
     """
-    integrator = orbits.integrator_of(orbits.strengths[:1])
-    step = orbits.unit if orbits.forced else orbits.unit / 8
+    integrator = problem.integrator(states, problem.strengths[:1])
+    step = problem.unit if problem.forced else problem.unit / 8
     path = [integrator.state]
     for _ in range(LOOKED):
         integrator.advance(step)
@@ -157,8 +159,8 @@ def _motions(orbits: Orbits, starts: np.ndarray) -> Iterator[tuple[np.ndarray, n
         allowed = ALIKE * np.maximum(extent[first], extent[left]) + CLOSE * whole
         apart = np.abs(mean[left] - mean[first]) > allowed
         wider = np.abs(extent[left] - extent[first]) > 2.0 * allowed
-        alike = ~np.any(apart | wider, axis=1) | orbits.linear
-        looks = within(orbits.part(left[alike].tolist())) if orbits.forced else np.array(path)[:, left[alike]]
+        alike = ~np.any(apart | wider, axis=1) | problem.linear
+        looks = within(problem, states[left[alike]]) if problem.forced else np.array(path)[:, left[alike]]
         yield left[alike], np.ptp(looks.reshape(-1, len(whole)), axis=0), whole
         left = left[~alike]
 

@@ -12,7 +12,7 @@ from synchain.models.scenes.scene import Scene
 from ..prediction.intervals import Interval
 from ..stability.exponents import initial_states
 from ..stability.msf import MSF, msf
-from ..stability.orbits import Orbits
+from ..stability.orbits import OrbitProblem
 from ..support.error_text import interval_text
 from ..support.execution import Execution
 
@@ -79,7 +79,7 @@ def exponent_windows(
 ) -> ExponentWindows:
     """Compute the windows of a scene's network. Shapes: alpha (m,)."""
     try:
-        Orbits.make(scene, alpha, initial_states(scene, 1, seed), 1)
+        OrbitProblem.of_modes(scene, alpha, initial_states(scene, 1, seed), 1)
     except ValueError as problem:
         return ExponentWindows(absent=str(problem))
     try:

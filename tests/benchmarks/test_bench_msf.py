@@ -16,7 +16,7 @@ from benchmarks import msf
 from benchmarks.peers import PEERS, jitcode_transversal
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.stability import orbits
+from synchain.runtime.stability import march
 
 ABSENT = replace(PEERS[msf.PEER], modules=("a_peer_that_nobody_has",))
 
@@ -54,15 +54,13 @@ def test_costs_are_beside_the_orbit_alone(rows) -> None:
 @pytest.mark.parametrize("contact", msf.LAWS)
 def test_modes_run_along_the_stretch_that_the_orbit_alone_does(contact: str) -> None:
     """Once more from the settled state: as many steps as before, and the same end but for rounding."""
-    settled = msf._settled(contact, 1.15, np.array([0.5]), 8)
-    msf._along(settled, 8)  # the first Taylor step of all finds its scale
-    first = msf._along(settled, 8), settled.integrator.state.copy()
-    assert first[0] == msf._along(settled, 8)
-    np.testing.assert_allclose(first[1], settled.integrator.state, rtol=1e-13)
-    np.testing.assert_allclose(
-        settled.integrator.state, settled.state, atol=1e-5
-    )  # two periods of the drive, four times
-    assert 0 < msf._alone(settled, 8)() < 2 * first[0]
+    moved, state = msf._ready(contact, 1.15, np.array([0.5]), 8)
+    msf._along(moved, state, 8)  # the first Taylor step of all finds its scale
+    first = msf._along(moved, state, 8), moved.integrator.state.copy()
+    assert first[0] == msf._along(moved, state, 8)
+    np.testing.assert_allclose(first[1], moved.integrator.state, rtol=1e-13)
+    np.testing.assert_allclose(moved.integrator.state, state, atol=1e-5)  # two periods of the drive, four times
+    assert 0 < msf._alone(moved, state, 8)() < 2 * first[0]
 
 
 def test_interpolated_exponents_differ_little_and_a_coarse_polynomial_shows(rows, monkeypatch) -> None:
@@ -73,9 +71,9 @@ def test_interpolated_exponents_differ_little_and_a_coarse_polynomial_shows(rows
     )
     values = msf.strengths(100)
     assert 0.0 < msf.difference("atan", values, 8)[0] < 1e-6
-    monkeypatch.setattr(orbits, "NODES", (5,))
-    monkeypatch.setattr(orbits, "PARTS", (1,))
-    monkeypatch.setattr(orbits, "ALLOWED", math.inf)
+    monkeypatch.setattr(march, "NODES", (5,))
+    monkeypatch.setattr(march, "PARTS", (1,))
+    monkeypatch.setattr(march, "ALLOWED", math.inf)
     assert min(msf.difference("atan", values, 8)) > 1e-4
 
 

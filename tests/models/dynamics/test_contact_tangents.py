@@ -17,7 +17,7 @@ from synchain.models.symmetries.clusters import clusters
 from synchain.runtime.bifurcation.periodic import periodic_orbit
 from synchain.runtime.stability.cluster_exponents import cluster_exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum
-from synchain.runtime.stability.orbits import Orbits
+from synchain.runtime.stability.orbits import OrbitProblem
 
 ONE, PAIR = topology("chain", 1), topology("chain", 2)
 JUMP = {"theta_b": 0.1, "epsilon": 1.0, "u": 0.1, "omega": 1.15, "mu_s": 0.3, "mu_k": 0.2}
@@ -83,13 +83,19 @@ def far(x: float, v: float, length: float) -> tuple[mpf, mpf]:
     return reference.x[0], reference.v[0]
 
 
+def propagator(scene: Scene, alpha: float) -> np.ndarray:
+    """Propagator of a mode over two periods of the drive."""
+    start = np.array([[0.1, 0.1, 0.0]])
+    problem = OrbitProblem.of_modes(scene, np.array([alpha]), start, 1)
+    integrator = problem.integrator(problem.with_slip_states(start))
+    return problem.propagators(integrator, 2.0)[0][0, 0]
+
+
 @pytest.mark.long
 def test_the_propagator_of_a_law_with_a_jump_against_fifty_digits() -> None:
     """A release, slip, a landing and another release: differences of the flow, 1e-15 apart, right to 15 digits."""
     scene = jumping().replace(rtol=1e-12)
-    orbits = Orbits.make(scene, np.array([0.0]), np.array([[0.1, 0.1, 0.0]]), 1)
-    orbits.block, orbits.integrator = 2.0, orbits.integrator_of(orbits.strengths)
-    found = orbits.propagators()[0][0, 0]
+    found = propagator(scene, 0.0)
     length = 4.0 * np.pi / JUMP["omega"]
     with mp.workdps(50):
         step = mpf(10) ** -15
@@ -105,9 +111,7 @@ def test_a_pair_out_of_phase_follows_its_mode() -> None:
     from synchain.runtime.sweeps.run import run
 
     scene = jumping(sigma=0.15).replace(transient=0.0, window=2.0, record=(), rtol=1e-12)
-    orbits = Orbits.make(scene, np.array([0.3]), np.array([[0.1, 0.1, 0.0]]), 1)
-    orbits.block, orbits.integrator = 2.0, orbits.integrator_of(orbits.strengths)
-    found = orbits.propagators()[0][0, 0][:, 0]
+    found = propagator(scene, 0.3)[:, 0]
     d = 1e-6
     end = run(scene, reduce=False, show_progress=False, x_1=0.1 + d, x_2=0.1 - d).states("end")
     np.testing.assert_allclose(found, (end[[0, 2]] - end[[1, 3]]) / (2 * d), rtol=1e-4)

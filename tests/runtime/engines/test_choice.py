@@ -16,7 +16,7 @@ from synchain.runtime.cells.plan import CellRows
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.engines.choice import chosen_for_rows
 from synchain.runtime.engines.scene_kernels import kernel_source, ladder_of
-from synchain.runtime.stability.orbits import Orbits
+from synchain.runtime.stability.orbits import OrbitProblem
 from synchain.runtime.support.status import Status
 from synchain.runtime.synchronisation.probe import ring_of_three
 
@@ -121,7 +121,7 @@ def test_the_choice_does_not_depend_on_the_unit_of_time(k):
 
 def of_modes(scene: Scene, alpha: list[float] | list[complex]) -> str:
     state = np.array([[values[0] for values in scene.initial.values()]])
-    return Orbits.make(scene, np.array(alpha), state, 1).method.name
+    return OrbitProblem.of_modes(scene, np.array(alpha), state, 1).method.name
 
 
 @pytest.mark.parametrize(
@@ -346,17 +346,17 @@ def test_a_singularity_is_not_called_stiff():
 def test_modes_that_become_stiff_are_said():
     """Van der Pol from the middle of a jump, where it is not stiff yet, onto the slow branch."""
     scene = Scene(oscillator="van_der_pol", topology=chain(2), parameters={"mu": 200.0}, integrator="taylor")
-    orbits = Orbits.make(scene, np.array([0.0]), np.array([[0.0, 1.0]]), 1)
-    integrator = orbits.integrator_of(orbits.strengths)
+    start = np.array([[0.0, 1.0]])
+    integrator = OrbitProblem.of_modes(scene, np.array([0.0]), start, 1).integrator(start)
     with pytest.warns(RuntimeWarning, match=r"stiff modes: found a rate of .*integrator = 'rodas5p'"):
         integrator.advance(2.0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         integrator.advance(0.1)  # it has been said
-    easy = Orbits.make(scene.replace(parameters={"mu": 1.0}), np.array([0.0]), np.array([[0.0, 1.0]]), 1)
+    easy = OrbitProblem.of_modes(scene.replace(parameters={"mu": 1.0}), np.array([0.0]), start, 1)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        easy.integrator_of(easy.strengths).advance(20.0)
+        easy.integrator(start).advance(20.0)
 
 
 def test_rosenbrock_steps_leave_an_equilibrium_that_repels():

@@ -12,7 +12,8 @@ from synchain.models import Scene, chain
 from synchain.runtime import cluster_exponents, exponents, lyapunov_spectrum, thresholds
 from synchain.runtime.stability.averages import FEWEST, FIRST, MOST, Averaging, Batches
 from synchain.runtime.stability.exponents import average, initial_states
-from synchain.runtime.stability.orbits import Orbits
+from synchain.runtime.stability.march import March, interpolation_for
+from synchain.runtime.stability.orbits import OrbitProblem
 from synchain.runtime.support.execution import Execution
 
 STARTS, WINDOWS = 256, 4
@@ -25,12 +26,13 @@ LORENZ = Scene("lorenz", "x->x", chain(2), rtol=1e-6)
 
 def distances(scene: Scene, alpha: list[float], periods: int) -> np.ndarray:
     """Distances (averages, m) of averages from the mean of them all, in units of their errors."""
-    orbits = Orbits.make(scene, np.array(alpha), initial_states(scene, STARTS, seed=1), workers=1)
-    orbits.settle(100)
-    orbits.prepare(periods)
+    starts = initial_states(scene, STARTS, seed=1)
+    problem = OrbitProblem.of_modes(scene, np.array(alpha), starts, workers=1)
+    problem, states = problem.settled(problem.with_slip_states(starts), 100)
+    march = March.begin(problem, states, interpolation_for(problem, states, periods))
     averaging = Averaging(0.0, periods, 0.0, 0, Execution(1, show_progress=False))
     with averaging.reporter() as reporter:
-        found = [average(orbits, averaging, reporter)[:2] for _ in range(WINDOWS)]
+        found = [average(march, averaging, reporter)[:2] for _ in range(WINDOWS)]
     mean, error = (np.concatenate(part) for part in zip(*found, strict=True))
     return np.abs(mean - mean.mean(axis=0)) / error
 

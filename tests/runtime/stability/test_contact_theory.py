@@ -16,7 +16,7 @@ from synchain.models.inputs.plugins import allow_code
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.results.result import Result
 from synchain.runtime.stability.exponents import exponents
-from synchain.runtime.stability.orbits import Orbits
+from synchain.runtime.stability.orbits import OrbitProblem
 from synchain.runtime.sweeps.run import run
 
 ONE = topology("chain", 1)
@@ -234,9 +234,9 @@ def test_propagator_against_differences_of_the_flow(
     modes = finished(scene).states("trajectory")[:, 2]
     assert set(modes) == kinds
     pair = scene.replace(record=(), samples=0, topology=topology("chain", 2), initial={"x": [x, x], "v": [v, v]})
-    orbits = Orbits.make(pair, np.array([0.0]), np.array([[x, v, 0.0]]), 1)
-    orbits.block, orbits.integrator = 1.0, orbits.integrator_of(orbits.strengths)
-    found = orbits.propagators()[0][0, 0]
+    problem = OrbitProblem.of_modes(pair, np.array([0.0]), np.array([[x, v, 0.0]]), 1)
+    start = problem.with_slip_states(np.array([[x, v, 0.0]]))
+    found = problem.propagators(problem.integrator(start), 1.0)[0][0, 0]
     d = 1e-6
     by_x, by_v = (flow(scene, x + p, v + q) - flow(scene, x - p, v - q) for p, q in ((d, 0.0), (0.0, d)))
     expected = np.stack([by_x, by_v], axis=1) / (2 * d)

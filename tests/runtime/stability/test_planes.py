@@ -14,7 +14,8 @@ from synchain.models import Rates, Scene, Topology, chain, circulant, complete, 
 from synchain.models.definitions.loader import load_oscillator
 from synchain.runtime import exponents, msf, open_result, plane, run
 from synchain.runtime.stability.interpolation import exact_interpolation, strength_interpolation
-from synchain.runtime.stability.orbits import Orbits
+from synchain.runtime.stability.march import BlockInterpolation, March
+from synchain.runtime.stability.orbits import OrbitProblem
 
 TARGET, SOURCE, W = ends(load_oscillator("duffing"))
 K, C, G = sp.symbols("k c g")
@@ -150,23 +151,20 @@ def test_certified_runs_of_two_layers_have_the_same_exponents() -> None:
         run(apart, certified=True, show_progress=False, width=1, **axes)
 
 
-def rossler(strengths: np.ndarray) -> Orbits:
+def rossler(strengths: np.ndarray) -> tuple[OrbitProblem, np.ndarray]:
     i, j, w = ends(load_oscillator("rossler"))
     links = [(Rates({i.x: K * w * (j.x - i.x)}, {K: 0.1}), ring(4)), (Rates({i.y: G * w * j.z / 9}, {G: 0.1}), ring(4))]
     scene = Scene("rossler", links=links, rtol=1e-11, record=())
-    orbits = Orbits.make(scene, strengths, np.array([[1.0, 2.0, 0.5], [3.0, -2.0, 0.4]]), 1)
-    orbits.settle(10)
-    return orbits
+    starts = np.array([[1.0, 2.0, 0.5], [3.0, -2.0, 0.4]])
+    return OrbitProblem.of_modes(scene, strengths, starts, 1).settled(starts, 10)
 
 
 def test_propagators_of_two_strengths_by_scipy_and_by_interpolation() -> None:
     """A chaotic orbit with a link between equal states; on each line a few give all strengths."""
     sides = np.linspace(0.0, 1.5, 60), np.linspace(-0.3, 1.2, 5)
     strengths = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2)
-    orbits = rossler(strengths)
-    orbits.start(exact_interpolation(strengths), 0.4, 0.8)
-    state = orbits.integrator.state.copy()
-    exact, _ = orbits.propagators()
+    problem, state = rossler(strengths)
+    exact, _ = problem.propagators(problem.integrator(state, tolerance_ratio=0.8), 0.4)
     for which in (0, 37, 299):
 
         def rates(_: float, y: np.ndarray, which: int = which) -> np.ndarray:
@@ -178,16 +176,15 @@ def test_propagators_of_two_strengths_by_scipy_and_by_interpolation() -> None:
             return np.concatenate([flow, (jacobian @ columns).ravel()])
 
         whole = np.concatenate([state[0], np.eye(3).ravel()])
-        end = solve_ivp(rates, (0, 0.4 * orbits.unit), whole, method="DOP853", rtol=1e-12, atol=1e-13).y[3:, -1]
+        end = solve_ivp(rates, (0, 0.4 * problem.unit), whole, method="DOP853", rtol=1e-12, atol=1e-13).y[3:, -1]
         np.testing.assert_allclose(exact[0, which], end.reshape(3, 3), atol=1e-8 * np.abs(end).max())
     growths = []
     for interpolation in (exact_interpolation(strengths), strength_interpolation(strengths, 13)):
-        again = rossler(strengths)
-        again.start(interpolation, 0.4, 0.8)
-        growths.append(again.growths(np.array([10])))
+        march = March.begin(problem, state, BlockInterpolation(0.4, interpolation), 0.8)
+        growths.append(march.growths(np.array([10])))
     assert len(interpolation.nodes) == 5 * (13 + 3)
     np.testing.assert_allclose(growths[1], growths[0], atol=1e-7)
-    assert 0.0 < again.travellers.error < 1e-7
+    assert 0.0 < march.deviations.error < 1e-7
 
 
 @pytest.mark.parametrize(("turn", "moving"), [(1.0, 0), (1.0 + 0.5j, 2)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,31 +12,46 @@ import pytest
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability.averages import BATCHES, FIRST, Batches
-from synchain.runtime.stability.interpolation import exact_interpolation, strength_interpolation
-from synchain.runtime.stability.orbits import Orbits
+from synchain.runtime.stability.interpolation import Interpolation, exact_interpolation, strength_interpolation
+from synchain.runtime.stability.march import MODE_TOLERANCE_RATIO, BlockInterpolation, March, interpolation_for
+from synchain.runtime.stability.orbits import OrbitProblem
 
 LINE = np.linspace(0.0, 1.2, 149)
 SQUARE = (np.linspace(0.0, 1.2, 12)[:, None] + 1j * np.linspace(0.0, 0.6, 11)).reshape(-1)
 
 
-def settled(strengths: np.ndarray, starts: int = 1, rtol: float = 1e-11, workers: int = 1, **given: object) -> Orbits:
+def settled(
+    strengths: np.ndarray, starts: int = 1, rtol: float = 1e-11, workers: int = 1, **given: object
+) -> tuple[OrbitProblem, np.ndarray]:
     scene = Scene(topology=topology("chain", 2), rtol=rtol, record=(), **given)  # type: ignore[arg-type]
     first = np.array([values[0] for values in scene.initial.values()])
     state = np.tile(first, (starts, 1))
     state[:, 0] += 0.1 * np.arange(starts)
-    orbits = Orbits.make(scene, strengths, state, workers)
-    orbits.settle(10)
-    return orbits
+    problem = OrbitProblem.of_modes(scene, strengths, state, workers)
+    return problem.settled(problem.with_slip_states(state), 10)
 
 
-def expected(orbits: Orbits, block: float, blocks: int) -> np.ndarray:
+def march_of(
+    problem: OrbitProblem,
+    states: np.ndarray,
+    interpolation: Interpolation,
+    block: float,
+    ratio: float = MODE_TOLERANCE_RATIO,
+    intervals: Interpolation | None = None,
+) -> March:
+    return March.begin(problem, states, BlockInterpolation(block, interpolation, intervals), ratio)
+
+
+def chosen_march(problem: OrbitProblem, states: np.ndarray) -> March:
+    return March.begin(problem, states, interpolation_for(problem, states, 1000))
+
+
+def expected(problem: OrbitProblem, states: np.ndarray, block: float, blocks: int) -> np.ndarray:
     """Growth (starts, m) of deviations that begin along (1, 1, …), by products of NumPy."""
-    whole = orbits.part(list(range(len(orbits.state))))
-    whole.block, whole.integrator = block, whole.integrator_of(orbits.strengths)
-    p, growth = orbits.components, 0.0
-    vectors = np.full((len(orbits.state), len(orbits.strengths), p, 1), 1.0 / np.sqrt(p))
+    integrator, p, growth = problem.integrator(states), problem.components, 0.0
+    vectors = np.full((len(states), len(problem.strengths), p, 1), 1.0 / np.sqrt(p))
     for _ in range(blocks):
-        vectors = whole.propagators()[0] @ vectors
+        vectors = problem.propagators(integrator, block)[0] @ vectors
         length = np.linalg.norm(vectors, axis=2, keepdims=True)
         growth, vectors = growth + np.log(length[:, :, 0, 0]), vectors / length
     return np.asarray(growth)
@@ -60,37 +76,35 @@ TWICE = ("of three states, in the plane",)
 @pytest.mark.parametrize("case", [pytest.param(case, marks=[pytest.mark.long] * (case in TWICE)) for case in CASES])
 def test_growth_is_that_of_products_of_propagators(case: str) -> None:
     strengths, block, given = CASES[case]
-    orbits = settled(strengths, starts=2, **given)  # type: ignore[arg-type]
-    wanted = expected(orbits, block, 3)
+    orbit = settled(strengths, starts=2, **given)  # type: ignore[arg-type]
+    wanted = expected(*orbit, block, 3)
     few = strength_interpolation(strengths, *((26, 1) if np.iscomplexobj(strengths) else (29, 2)))
     assert not few.is_exact
     for interpolation in (few, exact_interpolation(strengths)):
-        orbits.start(interpolation, block, 1.0)
-        found = orbits.growths(np.array([2, 1])).sum(axis=0)
+        march = march_of(*orbit, interpolation, block, 1.0)
+        found = march.growths(np.array([2, 1])).sum(axis=0)
         close = np.abs(found - wanted)
         assert np.median(close) < 1e-7, interpolation.is_exact
         assert close.max() < 1e-4  # where a multiplier passes zero
-        assert orbits.travellers is not None
-        assert orbits.travellers.error < 1e-6
+        assert march.deviations.error < 1e-6
 
 
 def test_growth_beyond_the_range_of_numbers_is_counted() -> None:
     """x'' = -x - alpha v over 3000 turns: a deviation shrinks like exp(-alpha t/2), to 1e-4000 and below."""
     alpha = np.linspace(0.5, 1.5, 9)
-    orbits = settled(alpha, rtol=1e-6, oscillator="harmonic", coupling="damper")
-    orbits.start(exact_interpolation(alpha), 3000.0)
-    found = orbits.growths(np.array([1]))[0, 0]
-    np.testing.assert_allclose(found, -0.5 * alpha * 3000.0 * orbits.unit, rtol=0, atol=2.0)
+    orbit = settled(alpha, rtol=1e-6, oscillator="harmonic", coupling="damper")
+    march = march_of(*orbit, exact_interpolation(alpha), 3000.0)
+    found = march.growths(np.array([1]))[0, 0]
+    np.testing.assert_allclose(found, -0.5 * alpha * 3000.0 * orbit[0].unit, rtol=0, atol=2.0)
 
 
 def test_coarse_nodes_are_seen_by_the_strengths_for_comparison() -> None:
-    orbits = settled(LINE, contact="set-valued", parameters={"omega": 1.4})
+    orbit = settled(LINE, contact="set-valued", parameters={"omega": 1.4})
     found = {}
     for nodes in (8, 13):
-        orbits.start(strength_interpolation(LINE, nodes), 4.0)
-        orbits.growths(np.array([8]))
-        assert orbits.travellers is not None
-        found[nodes] = orbits.travellers.error
+        march = march_of(*orbit, strength_interpolation(LINE, nodes), 4.0)
+        march.growths(np.array([8]))
+        found[nodes] = march.deviations.error
     assert found[8] > 1e-3
     assert 1e-9 < found[13] < 1e-5
 
@@ -110,91 +124,86 @@ def test_growth_from_landing_to_landing_is_that_of_products_of_propagators(case:
     sliding = {"oscillator": "friction", "contact": "set-valued", "parameters": {"omega": omega}}
     if case == "no landings":  # a belt so fast that the body never sticks
         sliding["parameters"] = {"omega": omega, "theta_b": 20.0}
-    orbits = settled(LINE, starts=2, **sliding)
-    wanted = expected(orbits, block, 4 + last)
+    orbit = settled(LINE, starts=2, **sliding)
+    wanted = expected(*orbit, block, 4 + last)
     nodes = strength_interpolation(LINE, 29)
     legs = strength_interpolation(nodes.nodes, 21)
     assert len(legs.nodes) < len(nodes.nodes) < len(LINE)
-    orbits.start(nodes, block, 1.0, legs)
-    close = np.abs(orbits.growths(np.array([1, 3, last])).sum(axis=0) - wanted)
+    march = march_of(*orbit, nodes, block, 1.0, legs)
+    close = np.abs(march.growths(np.array([1, 3, last])).sum(axis=0) - wanted)
     assert np.median(close) < 1e-9
     assert close.max() < 1e-5  # where a multiplier passes zero
-    assert orbits.travellers.error < 1e-9
+    assert march.deviations.error < 1e-9
 
 
 def test_legs_multiply_modes_of_very_different_growth() -> None:
     """Beside one that grows by e^1000 in each block, products of others stay in the range of numbers."""
     strengths = np.array([-4000.0, -1.0, 0.0, 0.5])
-    orbits = settled(strengths, rtol=1e-9, contact="set-valued", parameters={"omega": 1.15})
-    wanted = expected(orbits, 1.0, 16)
-    orbits.start(exact_interpolation(strengths), 8.0, 1.0)
-    found = orbits.growths(np.array([2]))[0]
+    orbit = settled(strengths, rtol=1e-9, contact="set-valued", parameters={"omega": 1.15})
+    wanted = expected(*orbit, 1.0, 16)
+    march = march_of(*orbit, exact_interpolation(strengths), 8.0, 1.0)
+    found = march.growths(np.array([2]))[0]
     assert found[0, 0] > 2000.0
     np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-6)
 
 
 def test_a_leg_on_too_few_nodes_is_seen_by_the_strengths_for_comparison() -> None:
-    orbits = settled(LINE, contact="set-valued", parameters={"omega": 1.4})
+    orbit = settled(LINE, contact="set-valued", parameters={"omega": 1.4})
     nodes = strength_interpolation(LINE, 29)
     found = {}
     for few in (5, 13):
-        orbits.start(nodes, 4.0, 1.0, strength_interpolation(nodes.nodes, few))
-        orbits.growths(np.array([4]))
-        found[few] = orbits.travellers.error
+        march = march_of(*orbit, nodes, 4.0, 1.0, strength_interpolation(nodes.nodes, few))
+        march.growths(np.array([4]))
+        found[few] = march.deviations.error
     assert found[5] > 1e-3
     assert found[13] < 1e-9
 
 
 def test_bodies_that_stick_have_few_nodes_integrated() -> None:
     """The two columns of a dozen and a half propagators, where 24 are multiplied over a block."""
-    orbits = settled(np.linspace(0.0, 1.2, 1000), rtol=1e-6, contact="set-valued", parameters={"omega": 1.4})
-    orbits.prepare(1000)
-    assert len(orbits.interpolation.nodes) == 24
-    assert len(orbits.integrator.order) == 2 * 16
+    orbit = settled(np.linspace(0.0, 1.2, 1000), rtol=1e-6, contact="set-valued", parameters={"omega": 1.4})
+    assert len(interpolation_for(*orbit, 1000).strengths.nodes) == 24
+    assert len(chosen_march(*orbit).integrator.order) == 2 * 16
 
 
 @pytest.mark.parametrize("place", [-1, -13, -26, -39])
 def test_a_number_that_is_none_is_seen_in_the_error(place: int) -> None:
     """The last of the weights are those of the strengths for comparison, 13 for each."""
-    orbits = settled(LINE, oscillator="duffing")
-    orbits.start(strength_interpolation(LINE, 13), 1.0)
-    assert orbits.travellers is not None
-    orbits.travellers.registers.weights[place] = np.nan
-    orbits.growths(np.array([1, 1]))
-    assert np.isnan(orbits.travellers.error)
+    orbit = settled(LINE, oscillator="duffing")
+    march = march_of(*orbit, strength_interpolation(LINE, 13), 1.0)
+    march.deviations.registers.weights[place] = np.nan
+    march.growths(np.array([1, 1]))
+    assert np.isnan(march.deviations.error)
 
 
 def test_growth_does_not_depend_on_the_number_of_workers_or_on_batches() -> None:
     alone, shared = (settled(LINE, 3, 1e-6, w, contact="set-valued", parameters={"omega": 1.4}) for w in (1, 2))
     found = []
-    for orbits in (alone, shared):
-        orbits.prepare(1000)
-        found.append(orbits.growths(np.array([1, 3, 2])))
+    for orbit in (alone, shared):
+        found.append(chosen_march(*orbit).growths(np.array([1, 3, 2])))
     np.testing.assert_array_equal(*found)
     assert found[0].shape == (3, 3, len(LINE))
-    alone.prepare(1000)
-    np.testing.assert_allclose(alone.growths(np.array([6]))[0], found[0].sum(axis=0), rtol=0, atol=1e-11)
+    np.testing.assert_allclose(chosen_march(*alone).growths(np.array([6]))[0], found[0].sum(axis=0), rtol=0, atol=1e-11)
 
 
 def test_strengths_in_other_company_grow_as_much() -> None:
     """Their places in registers and their number change nothing but rounding, as long as the nodes are the same."""
-    orbits = settled(LINE, contact="set-valued", parameters={"omega": 1.4})
-    orbits.start(strength_interpolation(LINE, 21), 4.0)
-    many = orbits.growths(np.array([4]))[0, 0]
+    orbit = settled(LINE, contact="set-valued", parameters={"omega": 1.4})
+    march = march_of(*orbit, strength_interpolation(LINE, 21), 4.0)
+    many = march.growths(np.array([4]))[0, 0]
     for chosen in (np.r_[0:37, 148], np.r_[0, 60:149]):
-        orbits.strengths = LINE[chosen]
-        orbits.start(strength_interpolation(LINE[chosen], 21), 4.0)
-        np.testing.assert_array_equal(orbits.growths(np.array([4]))[0, 0], many[chosen])
+        few = replace(orbit[0], strengths=LINE[chosen])
+        march = march_of(few, orbit[1], strength_interpolation(LINE[chosen], 21), 4.0)
+        np.testing.assert_array_equal(march.growths(np.array([4]))[0, 0], many[chosen])
 
 
 def test_a_deviation_that_has_vanished_stays_so() -> None:
-    orbits = settled(LINE, oscillator="duffing")
-    orbits.start(strength_interpolation(LINE, 13), 1.0)
-    assert orbits.travellers is not None
-    orbits.travellers.vectors[:] = 0.0
+    orbit = settled(LINE, oscillator="duffing")
+    march = march_of(*orbit, strength_interpolation(LINE, 13), 1.0)
+    march.deviations.vectors[:] = 0.0
     for _ in range(2):
-        assert np.all(orbits.growths(np.array([1])) == -np.inf)
-    assert np.all(orbits.travellers.vectors == 0.0)
+        assert np.all(march.growths(np.array([1])) == -np.inf)
+    assert np.all(march.deviations.vectors == 0.0)
 
 
 @pytest.mark.parametrize("ratio", [1.0, 2.5, math.inf])

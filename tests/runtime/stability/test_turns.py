@@ -7,7 +7,7 @@ import pytest
 
 from synchain.models import Field, Rates, Scene, from_edges
 from synchain.runtime import equilibrium, lyapunov_spectrum
-from synchain.runtime.stability.orbits import Orbits
+from synchain.runtime.stability.orbits import OrbitProblem
 
 ROSSLER = Field(
     {"x": "k*(-y - z)", "y": "k*(x + a*y)", "z": "k*(b + z*(x - c))"},
@@ -28,7 +28,7 @@ NEURON = Field(
 def unit(node: Field, start: tuple[float, ...], **parameters: float) -> float:
     initial = dict(zip("xyz", start, strict=True))
     scene = Scene(node, None, initial=initial, parameters=parameters)
-    return Orbits.make(scene, np.zeros(1), np.array([start]), 1).unit
+    return OrbitProblem.of_modes(scene, np.zeros(1), np.array([start]), 1).unit
 
 
 @pytest.mark.parametrize("start", [(1.0, 1.0, 0.1), (3.0, -2.0, 0.5), (0.1, 0.0, 0.0)])

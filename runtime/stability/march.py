@@ -1,0 +1,208 @@
+"""Mean growth of the deviations of many strengths along orbits, block by block.
+
+1. `interpolation_for(problem, states, periods)` tries choices, the cheapest first, on the next blocks, and
+   returns a `BlockInterpolation`: the length of a block, and the few strengths whose propagators over it are
+   integrated for all to be interpolated from.
+2. `March.begin(problem, states, interpolation)` sets an integrator of those few at the states, with one
+   deviation for each of all strengths.
+3. `March.growths(batches)` advances: in, blocks in each batch; out, the logarithm of the growth of every
+   deviation over each batch. `exponents.average` takes batches until the mean growth is precise.
+
+The costs below count multiplications. They were fitted to timings of this package's kernels, and only rank the choices.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .averages import BATCHES, TOLERANCE_RATIO, TRIED, error_of_steps
+from .interpolation import Interpolation, exact_interpolation, lines_of, strength_interpolation
+from .orbits import OrbitProblem
+from .variational_integrator import NO_BATCH_STARTS, Deviations, VariationalIntegrator
+
+NODES, PARTS = (13, 21, 29, 37, 61), (1, 2, 4, 8, 16)
+"""Nodes of a panel of strengths, and panels on each side, that are tried; with three strengths for comparison, nodes fill
+registers of eight."""
+
+BLOCKS, FREE_BLOCKS = (8.0, 4.0, 2.0, 1.0), (1.0, 0.5, 0.25, 0.125)
+"""Lengths of a block that are tried, in periods of a drive and in turns of undriven motion (a choice)."""
+
+STEP, BLOCK, STRENGTH, LANDINGS = 200, 60_000, 42, 5_000
+"""Costs in multiplications: a step of one deviation; a block without any deviation; a strength in a block, as a number of
+nodes; the landings within a unit of time."""
+
+LONGEST_STICK = 4.0
+"""Shortest block, in units of time, that is longer than most intervals between two landings."""
+
+ALLOWED = 1e-12
+"""Interpolation error that is accepted however small rtol is: rounding of a propagator and of its weights."""
+
+HOPELESS, FURTHER = 0.1, 1.45
+"""After an error above HOPELESS, choices with fewer than FURTHER times as many nodes are skipped: errors of polynomials
+fall geometrically with their number of nodes."""
+
+TRIAL = 8
+"""Blocks on which an interpolation is tried (a choice)."""
+
+MODE_TOLERANCE_RATIO = 10.0
+"""Ratio of the tolerance of the modes to that of the orbit if their growth is averaged.
+
+It moves exponents by less than rtol, but more where a multiplier passes through zero: there the
+exponent dips towards -inf and magnifies every error.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class BlockInterpolation:
+    """The propagators of all strengths over a block, interpolated from those of few."""
+
+    block: float  # length of a block in units of time
+    strengths: Interpolation  # from the nodes to all strengths
+    # of bodies that stick: from the strengths that are integrated from landing to landing to the nodes
+    stick_intervals: Interpolation | None = None
+
+    @property
+    def is_exact(self) -> bool:
+        """True if every strength is integrated."""
+        return self.strengths.is_exact and (self.stick_intervals is None or self.stick_intervals.is_exact)
+
+
+@dataclass(slots=True)
+class March:
+    """Orbits that advance by blocks, and the deviations of all strengths along them."""
+
+    problem: OrbitProblem
+    block: float  # length of a block in units of time
+    integrator: VariationalIntegrator  # orbits with the propagators of the nodes
+    deviations: Deviations  # of all strengths, with the largest error of the interpolation so far
+
+    @classmethod
+    def begin(
+        cls,
+        problem: OrbitProblem,
+        states: np.ndarray,
+        interpolation: BlockInterpolation,
+        tolerance_ratio: float = MODE_TOLERANCE_RATIO,
+    ) -> March:
+        """Start deviations of all strengths along the orbits from states (starts, components)."""
+        nodes, intervals = interpolation.strengths, interpolation.stick_intervals
+        if problem.lands and intervals is None:
+            intervals = exact_interpolation(nodes.nodes)
+        integrator = problem.integrator(states, (intervals or nodes).nodes, tolerance_ratio)
+        integrator.set_deviations(problem.unit_deviations(integrator))
+        width = integrator.kernel.origin.width
+        deviations = Deviations.make(
+            nodes.registers(width),
+            len(states),
+            problem.components,
+            problem.variation.size,
+            None if intervals is None else intervals.registers(width),
+        )
+        return cls(problem, interpolation.block, integrator, deviations)
+
+    def growths(self, batches: np.ndarray, batch_starts: np.ndarray = NO_BATCH_STARTS) -> np.ndarray:
+        """Advance by batches (b,) of blocks; return the logarithm of the growth (b, starts, m) over each.
+
+        Orbits and deviations at the beginning of each batch go into `batch_starts` (starts, b, any).
+        """
+        return self.integrator.follow(self.block * self.problem.unit, batches, self.deviations, batch_starts)
+
+    def tried(self, most: int) -> tuple[np.ndarray, np.ndarray]:
+        """Advance by TRIED blocks, or by fewer; return their growth (blocks, starts, m) and its error by the steps (starts, m)."""
+        count, (starts, size), vectors = min(most, TRIED), self.integrator.state.shape, self.deviations.vectors
+        begun = np.empty((starts, count, size + vectors.shape[1]))
+        usual = self.growths(np.ones(count, dtype=np.int64), begun)
+        # each block once more with looser steps, from where it began: all blocks are cells of one call
+        begun = begun.swapaxes(0, 1).reshape(count * starts, -1)
+        beside = self.integrator.beside(np.ascontiguousarray(begun[:, :size]), TOLERANCE_RATIO)
+        deviations = replace(self.deviations, vectors=np.ascontiguousarray(begun[:, size:]))
+        length = self.block * self.problem.unit
+        looser = beside.follow(length, np.ones(1, dtype=np.int64), deviations)[0].reshape(usual.shape)
+        return usual, error_of_steps(usual, looser, length)
+
+
+def interpolation_for(problem: OrbitProblem, states: np.ndarray, periods: float) -> BlockInterpolation:
+    """Choose block and interpolation for an average over some periods by trial on the next blocks.
+
+    Shapes: states (starts, components).
+    """
+    limit = max(0.01 * problem.scene.rtol, ALLOWED)  # later blocks of a chaotic orbit are up to ten times worse
+    failed: list[InterpolationChoice] = []
+    for choice in _choices(problem, states, periods):
+        if any(choice.is_coarser(other) for other in failed):
+            continue
+        interpolation = choice.of(problem.strengths)
+        if interpolation.is_exact:
+            return interpolation
+        march = March.begin(problem, states, interpolation)
+        march.growths(np.full(1, TRIAL))
+        if march.deviations.error < limit:
+            return interpolation
+        more = FURTHER if march.deviations.error > HOPELESS else 1.0
+        failed.append(replace(choice, nodes=int(more * choice.nodes), stick_nodes=int(more * choice.stick_nodes)))
+    return BlockInterpolation(choice.block, exact_interpolation(problem.strengths))
+
+
+@dataclass(frozen=True, slots=True)
+class InterpolationChoice:
+    """A block and numbers of nodes, with their cost."""
+
+    cost: float  # multiplications for a unit of time
+    block: float
+    nodes: int  # of a panel
+    parts: int  # panels on each side
+    stick_nodes: int = (
+        0  # nodes of a panel that are integrated from landing to landing; 0 if all are, over whole blocks
+    )
+
+    def of(self, strengths: np.ndarray) -> BlockInterpolation:
+        """Return the interpolation of strengths (m,) or (m, layers)."""
+        outer = strength_interpolation(strengths, self.nodes, self.parts)
+        inner = strength_interpolation(outer.nodes, self.stick_nodes, self.parts) if self.stick_nodes else None
+        return BlockInterpolation(self.block, outer, inner)
+
+    def is_coarser(self, other: InterpolationChoice) -> bool:
+        """True if another choice has shorter blocks and more nodes, in each panel and in all, or as many.
+
+        Of as many nodes in all, those of few panels interpolate better.
+        """
+        these, others = ((c.nodes, c.stick_nodes, c.nodes * c.parts, c.stick_nodes * c.parts) for c in (self, other))
+        return self.block >= other.block and all(a <= b for a, b in zip(these, others, strict=True))
+
+
+def _choices(problem: OrbitProblem, states: np.ndarray, periods: float) -> list[InterpolationChoice]:
+    """Choices for an average over some periods, the cheapest first."""
+    # the steps that a single mode takes in a unit of time give the cost of a node
+    one = problem.integrator(states, problem.strengths[:1], MODE_TOLERANCE_RATIO)
+    one.advance(problem.unit)
+    node_cost = STEP * problem.components * one.steps / len(states)
+    count, lines = len(problem.strengths), 1
+    if problem.strengths.ndim > 1:
+        lines = len(lines_of(problem.strengths)[1])
+    blocks = [b for b in BLOCKS if b <= max(4.0, periods / BATCHES) and periods % b == 0.0]
+    choices: list[InterpolationChoice] = []
+    if problem.lands and lines == 1:
+        choices += _choices_from_landings([b for b in blocks if b >= LONGEST_STICK], node_cost, count)
+    if not choices:
+        blocks = blocks if problem.forced else list(FREE_BLOCKS)
+        choices += _choices_of_blocks(blocks, lines * node_cost, count * problem.components**2)
+    return sorted(choices, key=lambda choice: choice.cost)
+
+
+def _choices_of_blocks(blocks: Sequence[float], node_cost: float, entries: int) -> Iterator[InterpolationChoice]:
+    """Yield choices without landings; `entries`: numbers in the propagators of all strengths."""
+    for block, nodes, parts in itertools.product(blocks, NODES, PARTS):
+        cost = nodes * parts * node_cost + (entries * (nodes + STRENGTH) + BLOCK) / block
+        yield InterpolationChoice(cost, block, nodes, parts)
+
+
+def _choices_from_landings(blocks: Sequence[float], node_cost: float, count: int) -> Iterator[InterpolationChoice]:
+    """Yield choices for `count` strengths of a body that sticks: one column of two is integrated, one entry of four interpolated."""
+    for block, stick_nodes, nodes, parts in itertools.product(blocks, NODES, NODES, PARTS):
+        if stick_nodes < nodes:
+            cost = stick_nodes * parts * (node_cost / 2 + nodes) + LANDINGS + count * (nodes + STRENGTH / 4) / block
+            yield InterpolationChoice(cost, block, nodes, parts, stick_nodes)
