@@ -1,9 +1,7 @@
-"""The stability of synchronous motion from exponents beside direct simulation, value by value of
-sigma.
+"""The stability of synchronous motion from exponents beside direct simulation, for each value of sigma.
 
-The projection says yes where every transversal exponent is negative by more than two standard
-errors, no where one is positive by more than that.  Where a simulation says otherwise, further
-simulations look for the reason.
+Exponents give yes where all of them are negative by more than two standard errors, no where one is positive
+by more than that.  Where a simulation disagrees, further simulations search for the cause.
 
 Sources: bubbling: Ashwin, Buescu & Stewart, Phys. Lett. A 193, 126 (1994); mergers by round-off:
 Pikovsky, Phys. Rev. Lett. 73, 2931 (1994).
@@ -37,35 +35,29 @@ CAUSES = ("transient too short", "round-off merger", "intermittency", "coexistin
 """Reasons for a disagreement, in the order in which `agreement` explains them."""
 
 LONGER = 4.0
-"""How many times the transient is repeated in the search for a reason."""
+"""Ratio of the transient in the search for a cause to that of the criterion (a choice)."""
 
 MERGED = 1e-14
 """A mean synchronisation error below this part of the motion's extent is round-off, not a distance."""
 
 NEAR_ZERO = 5.0
-"""An exponent within this many standard errors of 0 allows for bursts in either direction."""
+"""Standard errors within which an exponent counts as 0: bursts occur on both sides (a choice)."""
 
 NUDGE = 1e-5
-"""Distance between neighbours in a start next to the synchronous state, as a part of the motion's extent."""
+"""Distance between neighbours in a start next to the synchronous state, relative to the motion's extent (a choice)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """One value of sigma: the largest transversal exponent with its standard error, and what a
-    simulation does.
-
-    `share` is the part of the starts that synchronised, `error` the median of their mean
-    synchronisation errors; `outcome` is one of OUTCOMES, `cause` one of CAUSES where the two
-    disagree, else empty.
-    """
+    """One value of sigma, judged by exponents and by simulation."""
 
     sigma: float
-    exponent: float
+    exponent: float  # largest transversal one
     stderr: float
-    share: float
-    error: float
-    outcome: str
-    cause: str = ""
+    share: float  # part of the starts that synchronised
+    error: float  # median of their mean synchronisation errors
+    outcome: str  # one of OUTCOMES
+    cause: str = ""  # one of CAUSES where the two disagree
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,29 +70,28 @@ class Agreement:
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many values of sigma had each outcome."""
-        found = Counter(cell.outcome for cell in self.cells)
-        return {outcome: found[outcome] for outcome in OUTCOMES}
+        """Number of values of sigma with each outcome."""
+        counts = Counter(cell.outcome for cell in self.cells)
+        return {outcome: counts[outcome] for outcome in OUTCOMES}
 
     @property
     def causes(self) -> dict[str, int]:
-        """How many disagreements had each cause, those that occur."""
-        found = Counter(cell.cause for cell in self.cells if cell.cause)
-        return {cause: found[cause] for cause in CAUSES if found[cause]}
+        """Number of disagreements with each cause that occurs."""
+        counts = Counter(cell.cause for cell in self.cells if cell.cause)
+        return {cause: counts[cause] for cause in CAUSES if counts[cause]}
 
     def as_dict(self) -> dict[str, object]:
-        """JSON-ready: counts, causes, and for each sigma the numbers, outcome and cause."""
+        """Return counts, causes, and for each sigma the numbers, outcome and cause, for JSON."""
         names = ("sigma", "exponent", "stderr", "share", "error", "outcome", "cause")
         rows = [{name: getattr(cell, name) for name in names} for cell in self.cells]
         return {"counts": self.counts, "causes": self.causes, "cells": rows}
 
 
 def strengths(graph: Topology, sigma: Sequence[float] | np.ndarray) -> np.ndarray:
-    """Return the strengths alpha = sigma |gamma_k| (sigma, modes) of a graph's distinct transversal
-    modes.
+    """Return the strengths alpha = sigma |gamma_k| (sigma, modes) of a graph's distinct transversal modes.
 
-    A part of the network that nothing couples to the rest has the strength 0.  Raises ValueError
-    for a graph without links, and for eigenvalues that are complex or positive.
+    A part of the network without links to the others has the strength 0.  Raise ValueError for a graph without links,
+    and for eigenvalues that are complex or positive.
     """
     spectrum = graph.spectrum
     check_probe(graph, spectrum)
@@ -134,49 +125,33 @@ def agreement(
     simulation = DirectSimulation(scene, fitted(scene, grid, checked(criterion), execution), execution)
     alpha = strengths(scene.topology, grid)
     line = line or exponents(scene, np.unique(alpha), workers=workers, show_progress=show_progress, progress=progress)
-    places = _places(line, alpha)
-    share, error = simulation.simulate(grid)
-    projected = [_projected(line.exponent[row], line.stderr[row]) for row in places]
-    outcomes = [_outcome(sign, part >= 0.5) for sign, part in zip(projected, share, strict=True)]
-    largest = [row[int(np.argmax(line.exponent[row]))] for row in places]
-    cells = [
-        Cell(float(s), float(line.exponent[k]), float(line.stderr[k]), float(a), float(e), words)
-        for s, k, a, e, words in zip(grid, largest, share, error, outcomes, strict=True)
-    ]
-    split = [_split(line, row) for row in places]
+    # indices (sigma, modes) of all strengths on the line
+    order = np.argsort(line.alpha)
+    indices = order[np.clip(np.searchsorted(line.alpha[order], alpha), 0, len(order) - 1)]
+    missing = alpha[line.alpha[indices] != alpha]
+    if len(missing):
+        raise ValueError(f"line: found no exponent at alpha = {missing[0]!r}; expected all `strengths` of the graph")
+    shares, medians = simulation.simulate(grid)
+    cells, split = [], []
+    for value, modes, share, error in zip(grid, indices, shares, medians, strict=True):
+        k = modes[int(np.argmax(line.exponent[modes]))]
+        outcome = _outcome(line.exponent[modes], line.stderr[modes], share >= 0.5)
+        cells.append(
+            Cell(float(value), float(line.exponent[k]), float(line.stderr[k]), float(share), float(error), outcome)
+        )
+        # motions of different starts with exponents of different signs
+        largest = line.by_start[:, modes].max(axis=1)
+        split.append(bool(largest.min() < 0.0 < largest.max()))
     return Agreement(scene, simulation.criterion, tuple(_explained(simulation, cells, split)))
 
 
-def _places(line: Exponents, alpha: np.ndarray) -> np.ndarray:
-    """Where each strength stands on the line."""
-    order = np.argsort(line.alpha)
-    at = np.clip(np.searchsorted(line.alpha[order], alpha), 0, len(order) - 1)
-    places = order[at]
-    missing = alpha[line.alpha[places] != alpha]
-    if len(missing):
-        raise ValueError(f"line: found no exponent at alpha = {missing[0]!r}; expected all `strengths` of the graph")
-    return np.asarray(places)
-
-
-def _projected(exponent: np.ndarray, error: np.ndarray) -> int:
-    """1 if all exponents are surely negative, -1 if one is surely not, else 0."""
+def _outcome(exponent: np.ndarray, error: np.ndarray, simulated: bool) -> str:
+    """Compare the signs of all exponents with a simulation; a sign is certain beyond two errors."""
     if np.all(exponent + 2.0 * error < 0.0):
-        return 1
-    return -1 if np.any(exponent - 2.0 * error > 0.0) else 0
-
-
-def _outcome(projected: int, simulated: bool) -> str:
-    if projected == 0:
-        return OUTCOMES[4]
-    if (projected > 0) == simulated:
-        return OUTCOMES[0] if simulated else OUTCOMES[1]
-    return OUTCOMES[3] if simulated else OUTCOMES[2]
-
-
-def _split(line: Exponents, places: np.ndarray) -> bool:
-    """True if the synchronous motions of different starts have exponents of different signs."""
-    largest = line.by_start[:, places].max(axis=1)
-    return bool(largest.min() < 0.0 < largest.max())
+        return OUTCOMES[0] if simulated else OUTCOMES[2]
+    if np.any(exponent - 2.0 * error > 0.0):
+        return OUTCOMES[3] if simulated else OUTCOMES[1]
+    return OUTCOMES[4]
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,9 +163,7 @@ class DirectSimulation:
     execution: Execution
 
     def simulate(self, sigma: np.ndarray, longer: float = 1.0, near: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Share of the starts that synchronised and median error (sigma,); `near` starts next to
-        the synchronous state.
-        """
+        """Return the share of the starts that synchronised and the median error (sigma,); `near` starts next to synchrony."""
         scene = self.scene
         if near:
             first = {name: np.array(values[:1] * scene.n) for name, values in scene.initial.items()}
@@ -204,26 +177,22 @@ class DirectSimulation:
 
 
 def _explained(simulation: DirectSimulation, cells: Sequence[Cell], split: Sequence[bool]) -> list[Cell]:
-    """The cells with causes: disagreements are simulated again, longer, and from next to the
-    synchronous state.
-    """
-    made = list(cells)
-    odd = [i for i, cell in enumerate(cells) if cell.outcome in OUTCOMES[2:4]]
-    if not odd:
-        return made
-    sigma = np.array([cells[i].sigma for i in odd])
+    """The cells with causes: disagreements are simulated again, longer, and from next to the synchronous state."""
+    explained = list(cells)
+    differing = [i for i, cell in enumerate(cells) if cell.outcome in OUTCOMES[2:4]]
+    if not differing:
+        return explained
+    sigma = np.array([cells[i].sigma for i in differing])
     longer = simulation.simulate(sigma, LONGER)[0]
     near = simulation.simulate(sigma, LONGER, near=True)[0]
-    for i, later, close in zip(odd, longer, near, strict=True):
+    for i, later, close in zip(differing, longer, near, strict=True):
         merged = cells[i].error < MERGED * simulation.criterion.size
-        made[i] = replace(cells[i], cause=_cause(cells[i], merged, float(later), float(close), split[i]))
-    return made
+        explained[i] = replace(cells[i], cause=_cause(cells[i], merged, float(later), float(close), split[i]))
+    return explained
 
 
 def _cause(cell: Cell, merged: bool, longer: float, near: float, split: bool) -> str:
-    """Why a simulation disagrees, from the shares of starts that synchronise after a longer
-    transient and from nearby.
-    """
+    """The cause of a disagreement, from the shares of starts that synchronise after a longer transient and from nearby."""
     stable = cell.outcome == OUTCOMES[2]
     mixed = 0.0 < cell.share < 1.0 or 0.0 < longer < 1.0
     if not stable and merged:

@@ -1,7 +1,6 @@
 """Basin stability: the share of random starts from which a network synchronises.
 
-Each start is one throw of a coin, so the share has the exact confidence interval of a binomial
-proportion.
+The starts are independent, so the share has the exact confidence interval of a binomial proportion.
 
 Sources: Menck, Heitzig, Marwan & Kurths, Nature Phys. 9, 89 (2013); Clopper & Pearson, Biometrika
 26, 404 (1934).
@@ -41,14 +40,14 @@ from .trials import Outcome, Trials
 Range = tuple[float, float]
 
 SAMPLE_LIMIT = 10_000_000
-"""Most starts of one call."""
+"""Most starts of one call (a choice)."""
 
 LONGEST = 5000.0
-"""Longest average of the exponent, in its units of time."""
+"""Longest average of the exponent, in its units of time (a choice)."""
 
 
 class Fate(Word):
-    """What became of a start: synchronous, on its way there when its time was over, on another motion, or no end."""
+    """End of a start: synchronous, on the way there when its time was over, on another motion, or without an end."""
 
     SYNCHRONOUS = "synchronous"
     APPROACHING = "still approaching"
@@ -67,25 +66,22 @@ UNDECIDED = (Fate.APPROACHING, Fate.UNFINISHED)
 class Basin(Labelled):
     """Which random starts of a scene's network synchronise.
 
-    start (samples, dimension), in the order of the state; error (samples,): synchronisation error that the tolerance of
-    the criterion is compared with, infinite where a cell did not finish; status (samples,): how it ended; earlier
-    (samples,): the error after half of the transient, NaN where it was not needed; fate (samples,): number of its `Fate`.
-
     A start that is not synchronous is still approaching if its error falls, or if no error could have fallen below the
-    tolerance in this time: `exponent` and `stderr` are the largest transversal exponent of the synchronous state, NaN if
-    it was not needed or is not known.
+    tolerance in this time.
     """
 
     scene: Scene
     criterion: AppliedCriterion
     confidence: float
-    start: np.ndarray = field(repr=False)
-    error: np.ndarray = field(repr=False)
-    status: np.ndarray = field(repr=False)
-    earlier: np.ndarray = field(repr=False)
-    fate: np.ndarray = field(repr=False)
-    exponent: float = math.nan
-    stderr: float = math.nan
+    start: np.ndarray = field(repr=False)  # (samples, dimension)
+    error: np.ndarray = field(repr=False)  # (samples,): synchronisation error, infinite where a cell did not finish
+    status: np.ndarray = field(repr=False)  # (samples,): how the cell ended
+    earlier: np.ndarray = field(
+        repr=False
+    )  # (samples,): error after half of the transient, NaN where it was not needed
+    fate: np.ndarray = field(repr=False)  # (samples,): index of its `Fate`
+    exponent: float = math.nan  # largest transversal exponent of the synchronous state; NaN if not needed or not known
+    stderr: float = math.nan  # its standard error
 
     @property
     def data(self) -> xr.Dataset:
@@ -163,13 +159,13 @@ class Basin(Labelled):
 
     @property
     def statuses(self) -> dict[Status, int]:
-        """How many cells ended how."""
+        """Number of cells that ended with each status."""
         codes, counts = np.unique(self.status, return_counts=True)
         return {Status(int(code)): int(count) for code, count in zip(codes, counts, strict=True)}
 
     @property
     def message(self) -> str:
-        """Shares, interval, the exponent if it was needed, and how many cells ended how, in words."""
+        """Shares, interval, the exponent if it was needed, and the number of cells of each status, as text."""
         return "; ".join(self._findings())
 
     def _findings(self) -> list[str]:
@@ -177,13 +173,13 @@ class Basin(Labelled):
         low, high = self.interval
         first = f"{self.count} of {self.samples} starts synchronised: {self.share:.4g}"
         others = (f"{name}: {share:.4g}" for name, share in self.shares.items() if share and name != Fate.SYNCHRONOUS)
-        sure = f"with confidence {self.confidence:g} {low:.4g} … {high:.4g}"
-        known = [] if math.isnan(self.exponent) else [f"exponent {with_error(self.exponent, self.stderr)}"]
+        confident = f"with confidence {self.confidence:g} {low:.4g} … {high:.4g}"
+        exponent = [] if math.isnan(self.exponent) else [f"exponent {with_error(self.exponent, self.stderr)}"]
         if self.exponent - 2.0 * self.stderr > 0.0:
             left = ": starts that synchronised have not left it yet" if self.count else ""
-            known.append(f"the synchronous state is unstable{left}")
+            exponent.append(f"the synchronous state is unstable{left}")
         ends = (f"{n} cell{'s' * (n > 1)}: {s.message}" for s, n in self.statuses.items())
-        return [first, *others, sure, *known, *ends]
+        return [first, *others, confident, *exponent, *ends]
 
 
 def basin(
@@ -247,53 +243,56 @@ def basin(
     """
     _check(scene, samples, tolerance, confidence)
     execution = Execution(workers, executor, show_progress, progress)
-    asked = Criterion(tolerance, 1, 0.0, transient, window, None, seed)
     scene = Given(basin, parameters, more).scene(scene, record=("sync_error",), stop=scene.stop)
-    known = preset(asked, scene)
-    scene = random_starts(scene, samples, ranges, known.seed or 0)
-    used = resolved(known, scene, lambda atol: _motion(scene, known, atol, execution))
+    partial = preset(Criterion(tolerance, 1, 0.0, transient, window, None, seed), scene)
+    scene = random_starts(scene, samples, ranges, partial.seed or 0)
+    used = resolved(partial, scene, lambda atol: _motion(scene, partial, atol, execution))
+
+    # all starts, judged by how their cells end
     settings = {"window": used.window, "max_steps": used.max_steps, "atol": used.atol or scene.given["atol"]}
-    found, start = _run(scene.replace(transient=used.transient, **settings), np.arange(samples), used, execution)
-    error, fate = errors(found, used, scene.equations), np.full(samples, FATES.index(Fate.UNFINISHED))
+    outcome, start = _run(scene.replace(transient=used.transient, **settings), np.arange(samples), execution)
+    error, fate = errors(outcome, used, scene.equations), np.full(samples, FATES.index(Fate.UNFINISHED))
     for status, end in ENDS.items():
-        fate[found.status == status] = FATES.index(end)
-    finished = found.status == Status.FINISHED
+        fate[outcome.status == status] = FATES.index(end)
+    finished = outcome.status == Status.FINISHED
     fate[finished] = FATES.index(Fate.OTHER)
     fate[finished & (error < used.tolerance)] = FATES.index(Fate.SYNCHRONOUS)
+
+    # of the others, which are still approaching: their errors after half of the transient, and the exponent
     apart, earlier = np.flatnonzero(fate == FATES.index(Fate.OTHER)), np.full(samples, np.nan)
     single = scene.replace(axes=(), zipped=False, stop=None)
     if not len(apart):
-        return Basin(single.replace(stop=scene.stop), used, confidence, start, error, found.status, earlier, fate)
-    half, _ = _run(scene.replace(transient=0.5 * used.transient, **settings), apart, used, execution)
+        return Basin(single.replace(stop=scene.stop), used, confidence, start, error, outcome.status, earlier, fate)
+    half, _ = _run(scene.replace(transient=0.5 * used.transient, **settings), apart, execution)
     earlier[apart] = errors(half, used, scene.equations)
     exponent, stderr = _exponent(single, used, execution)
     late = _approaching(error[apart], earlier[apart], used, _length(single, used), exponent, stderr)
     fate[apart[late]] = FATES.index(Fate.APPROACHING)
     single = single.replace(stop=scene.stop)
-    return Basin(single, used, confidence, start, error, found.status, earlier, fate, exponent, stderr)
+    return Basin(single, used, confidence, start, error, outcome.status, earlier, fate, exponent, stderr)
 
 
-def _run(scene: Scene, cells: np.ndarray, used: AppliedCriterion, execution: Execution) -> tuple[Outcome, np.ndarray]:
-    """Run some cells of a scene; also their starts (cells, dimension)."""
+def _run(scene: Scene, cells: np.ndarray, execution: Execution) -> tuple[Outcome, np.ndarray]:
+    """Run some cells of a scene; return their outcome and starts (cells, dimension)."""
     planner = Planner(scene)
-    with Trials.of(_whole(scene), execution) as trials:
-        found = trials.run(len(cells), lambda which: planner.rows(cells[which]))
-    return found, planner.rows(cells).start
+    with Trials.of(_unreduced(scene), execution) as trials:
+        outcome = trials.run(len(cells), lambda chosen: planner.rows(cells[chosen]))
+    return outcome, planner.rows(cells).start
 
 
-def _whole(scene: Scene) -> ReducedScene:
-    """A scene in which nothing is left out."""
+def _unreduced(scene: Scene) -> ReducedScene:
+    """A scene with all its nodes, which start apart."""
     return replace(reduce_scene(scene, reduce=False), jumps=True)
 
 
-def _motion(scene: Scene, known: Criterion, atol: float | None, execution: Execution) -> SynchronousMotion:
+def _motion(scene: Scene, partial: Criterion, atol: float | None, execution: Execution) -> SynchronousMotion:
     """The motion from the state of the scene's first oscillator."""
     unit = scene.replace(transient=1.0, window=1.0, atol=atol or scene.given["atol"])
     planner, equations = Planner(unit), scene.equations
     spread = spread_of(equations, planner.rows(np.arange(min(scene.cells, 100))).start)
     first = Planner(unit.replace(axes=(), zipped=False)).rows(np.arange(1))
-    with Trials.of(_whole(unit), execution) as trials:
-        times = (known.transient, known.window)
+    with Trials.of(_unreduced(unit), execution) as trials:
+        times = (partial.transient, partial.window)
         return measure_motion(trials, lambda rows: rows, equations, alike(equations, first), times, spread)
 
 
@@ -303,27 +302,27 @@ def _length(scene: Scene, used: AppliedCriterion) -> float:
 
 
 def _exponent(scene: Scene, used: AppliedCriterion, execution: Execution) -> tuple[float, float]:
-    """The largest transversal exponent and its error, which a transient can tell from 0; NaN if there is none."""
+    """The largest transversal exponent, as precise as a transient can resolve, and its error; NaN if there is none."""
     try:
-        found = certify(scene, precision=0.5 / _length(scene, used), periods=LONGEST, workers=execution.workers)
+        certificate = certify(scene, precision=0.5 / _length(scene, used), periods=LONGEST, workers=execution.workers)
     except (ValueError, FloatingPointError):
         return math.nan, math.nan
-    return float(found.exponent[0]), float(found.stderr[0])
+    return float(certificate.exponent[0]), float(certificate.stderr[0])
 
 
 def _approaching(
     error: np.ndarray, earlier: np.ndarray, used: AppliedCriterion, length: float, exponent: float, stderr: float
 ) -> np.ndarray:
-    """Whether starts (samples,) that are not synchronous may only need more time.
+    """True for starts (samples,) that are not synchronous but may only need more time.
 
-    Errors fall at most by exp(2 stderr - exponent) in a unit of time, so that a short transient tells nothing.  After a
-    long one they are on their way if they fall at half the pace of the exponent, or by a factor e; without one, by e.
+    After a long transient they do if their errors fall at half the pace of the exponent, or by a factor e.
     """
     if math.isnan(exponent):
         return np.asarray(error < earlier / math.e)
     fastest = 2.0 * stderr - exponent
     if fastest <= 0.0:
         return np.zeros(len(error), dtype=bool)
+    # errors fall at most by exp(fastest) in a unit of time: too little to decide after a short transient
     if fastest * length < math.log(max(used.size / used.tolerance, 1.0)):
         return np.ones(len(error), dtype=bool)
     return np.asarray(error < earlier * math.exp(max(0.25 * min(exponent, 0.0) * length, -1.0)))
@@ -350,19 +349,17 @@ def _check(scene: Scene, samples: object, tolerance: object, confidence: object)
 
 
 def _box(scene: Scene, ranges: Mapping[str, Range] | None) -> dict[str, Range]:
-    """The ranges in the order of the components, checked; the mode of a contact follows from the
-    other states.
-    """
-    known = tuple(name for name in scene.components if name != SLIP.name)
+    """The ranges in the order of the components, checked; the slip state of a contact follows from the other states."""
+    names = tuple(name for name in scene.components if name != SLIP.name)
     if ranges is None:
-        return dict.fromkeys(known, (-1.0, 1.0))
-    unknown = [name for name in check_table("basin: ranges", ranges) if name not in known]
+        return dict.fromkeys(names, (-1.0, 1.0))
+    unknown = [name for name in check_table("basin: ranges", ranges) if name not in names]
     if unknown:
-        raise ValueError(f"basin: unknown component {unknown[0]!r}; known: {', '.join(known)}")
+        raise ValueError(f"basin: unknown component {unknown[0]!r}; known: {', '.join(names)}")
     if not ranges:
-        raise ValueError(f"basin: no ranges; name at least one component of {', '.join(known)}")
+        raise ValueError(f"basin: no ranges; name at least one component of {', '.join(names)}")
     box = {}
-    for name in known:
+    for name in names:
         if name not in ranges:
             continue
         ends = row(f"basin: the range of {name}", ranges[name], 2)

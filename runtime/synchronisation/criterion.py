@@ -1,4 +1,4 @@
-"""When a coupling counts as synchronous: the starts, how long they run, and the error that is allowed."""
+"""When a coupling counts as synchronous: the starts, their times, and the largest error."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ __all__ = [
 ]
 
 TOLERANCE, REACH = 1e-3, 0.5
-"""Error that is allowed, and reach of the starts, as parts of what the synchronous motion moves."""
+"""Largest error, and reach of the starts, relative to the extent of the synchronous motion (a choice)."""
 
 TIMES = {"transient": 1000.0, "window": 100.0}
 """Transient and window: in periods of the drive, without one in times in which the motion turns by a radian."""
 
 PASSES = 4
-"""Most times that a motion is measured again because the steps did not resolve it."""
+"""Most repeated measurements of a motion that the steps did not resolve."""
 
 EFFORT = 100.0
-"""Most steps of a cell, in steps that the synchronous motion takes in the same time."""
+"""Most steps of a cell, relative to those of the synchronous motion in the same time (a choice)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,22 +57,22 @@ class Criterion:
     majority does not depend on one of them.
 
     Distances between oscillators are those of the scene's own start in all of them.  Where oscillators and links are
-    linear, a mode in which these distances have no part grows from rounding alone: `thresholds` warns of it.
+    linear, a mode that is absent from these distances grows from rounding alone: `thresholds` warns of it.
 
-    What is None follows the motion and the scene; results hold the numbers that were used (`AppliedCriterion`).
+    Fields that are None follow the motion and the scene; results hold the numbers that were used (`AppliedCriterion`).
 
     Parameters
     ----------
     tolerance : float, optional
-        In units of the state.  By default a thousandth of what the synchronous motion moves, for the mean error and for
+        In units of the state.  By default a thousandth of the extent of the synchronous motion, for the mean error and for
         the error of each component at the end of the window.
     starts : int
         Number of initial states.
     reach : float, optional
-        In units of the position, by default half of what the synchronous motion moves in it.
+        In units of the position, by default half of the extent of the synchronous motion in it.
     transient, window : float, optional
         In the scene's unit of time.  By default those of the scene if they are not the default of `Scene`, else 1000 and
-        100 periods of the drive, and without a drive as many times in which the motion turns by a radian.
+        100 periods of the drive; without a drive, 1000 and 100 times in which the motion turns by a radian.
     rtol, seed : float, int, optional
         Those of the scene by default.
 
@@ -109,12 +109,7 @@ class Criterion:
 
 @dataclass(frozen=True, slots=True)
 class AppliedCriterion(Criterion):
-    """A criterion of which every field is the number that was used.
-
-    `extent` is what the synchronous motion moves in each compared component.  `relative`: whether the tolerance follows
-    from it, and each component is judged; else the mean error alone is.  `max_steps`: most steps of a cell, EFFORT times
-    those that the synchronous motion takes.  `atol`: absolute tolerance of the steps, None for that of the scene.
-    """
+    """A criterion whose fields are the numbers that were used."""
 
     tolerance: float
     starts: int
@@ -123,14 +118,16 @@ class AppliedCriterion(Criterion):
     window: float
     rtol: float
     seed: int
-    extent: tuple[float, ...]
-    relative: bool = False
-    max_steps: int = 10_000_000
-    atol: float | None = None
+    extent: tuple[float, ...]  # of the synchronous motion in each compared component
+    relative: bool = (
+        False  # whether the tolerance follows from it and each component is judged, not the mean error alone
+    )
+    max_steps: int = 10_000_000  # most steps of a cell: EFFORT times those of the synchronous motion
+    atol: float | None = None  # absolute tolerance of the steps; None for that of the scene
 
     @property
     def size(self) -> float:
-        """What the synchronous motion moves in all components, as a synchronisation error."""
+        """Extent of the synchronous motion in all components, measured as a synchronisation error is."""
         return math.hypot(*self.extent)
 
     def text(self, scene: Scene) -> str:
@@ -155,9 +152,9 @@ differ by as much as with two seeds of the starts, and steps are 2.3 times fewer
 
 
 IN_CRITERION = {
-    own.name: f"it is one of the criterion; write criterion=Criterion({own.name}=…)" for own in fields(Criterion)
+    each.name: f"it is one of the criterion; write criterion=Criterion({each.name}=…)" for each in fields(Criterion)
 }
-"""What functions with a criterion do not take themselves, and why."""
+"""Keywords that functions with a criterion refuse, and the reason."""
 
 
 def checked(criterion: Criterion | None) -> Criterion:
@@ -168,49 +165,44 @@ def checked(criterion: Criterion | None) -> Criterion:
 
 
 def preset(criterion: Criterion, scene: Scene) -> Criterion:
-    """Return the criterion with what the scene says about times, rtol and seed."""
-    said: dict[str, Any] = {"rtol": scene.rtol, "seed": scene.seed}
+    """Return the criterion with times, rtol and seed of the scene where it has none."""
+    of_scene: dict[str, Any] = {"rtol": scene.rtol, "seed": scene.seed}
     for name, periods in TIMES.items():
-        own = getattr(scene, name)
-        if own != inspect.signature(Scene).parameters[name].default:
-            said[name] = own
+        value = getattr(scene, name)
+        if value != inspect.signature(Scene).parameters[name].default:
+            of_scene[name] = value
         elif scene.time_unit == TimeUnit.PERIOD:
-            said[name] = periods
-    return replace(criterion, **{name: value for name, value in said.items() if getattr(criterion, name) is None})
+            of_scene[name] = periods
+    return replace(criterion, **{name: value for name, value in of_scene.items() if getattr(criterion, name) is None})
 
 
 def applied(criterion: Criterion, motion: SynchronousMotion, scene: Scene) -> AppliedCriterion:
     """Return a criterion (`preset`) with the numbers that follow from the synchronous motion."""
-    found: dict[str, Any] = {own.name: getattr(criterion, own.name) for own in fields(Criterion)}
+    values: dict[str, Any] = {each.name: getattr(criterion, each.name) for each in fields(Criterion)}
     for name, radians in TIMES.items():
-        if found[name] is None:
-            found[name] = radians * motion.radian
-    if found["tolerance"] is None:
-        found["tolerance"] = max(TOLERANCE * motion.size, float(np.finfo(float).tiny))
-    if found["reach"] is None:
-        found["reach"] = REACH * float(motion.extent[0])
+        if values[name] is None:
+            values[name] = radians * motion.radian
+    if values["tolerance"] is None:
+        values["tolerance"] = max(TOLERANCE * motion.size, float(np.finfo(float).tiny))
+    if values["reach"] is None:
+        values["reach"] = REACH * float(motion.extent[0])
     unit = motion.unit if scene.time_unit == TimeUnit.PERIOD else 1.0
-    most = EFFORT * motion.pace * unit * (found["transient"] + found["window"])
+    most = EFFORT * motion.pace * unit * (values["transient"] + values["window"])
+    # a small motion needs a smaller absolute tolerance than the default one
+    scale = float(scale_of_atol(motion.extent[motion.extent > 0.0].min(initial=1.0)))
     return AppliedCriterion(
-        **found,
+        **values,
         extent=tuple(map(float, motion.extent)),
         relative=criterion.tolerance is None,
         max_steps=max(min(scene.max_steps, int(most)), 1),
-        atol=_atol(motion, scene, found["rtol"]),
+        atol=0.1 * values["rtol"] * scale if scene.given["atol"] is None and scale < 1.0 else None,
     )
-
-
-def _atol(motion: SynchronousMotion, scene: Scene, rtol: float) -> float | None:
-    """The absolute tolerance for the smallest extent of a small motion, in place of a default one; else None."""
-    moves = motion.extent[motion.extent > 0.0]
-    scale = float(scale_of_atol(moves.min(initial=1.0)))
-    return 0.1 * rtol * scale if scene.given["atol"] is None and scale < 1.0 else None
 
 
 def resolved(
     criterion: Criterion, scene: Scene, measure: Callable[[float | None], SynchronousMotion]
 ) -> AppliedCriterion:
-    """Return a criterion (`preset`) for the motion that is measured with an absolute tolerance which resolves it."""
+    """Return a criterion (`preset`) with the numbers of the motion, measured again until the absolute tolerance resolves it."""
     used = applied(criterion, measure(None), scene)
     for _ in range(PASSES):
         if used.atol is None:
@@ -222,10 +214,10 @@ def resolved(
 
 
 def errors(outcome: Outcome, criterion: AppliedCriterion, equations: Equations) -> np.ndarray:
-    """Return the errors (cells,) that a tolerance is compared with: the mean ones, if it was given.
+    """Return the errors (cells,) to compare with the tolerance.
 
-    If it follows from the motion, a component that is too small for the mean counts by its own error at the end, as large as
-    its extent is in the extent of all.
+    They are the mean errors; if the tolerance follows from the motion, the error of a small component at the end, in units
+    of its extent, counts too.
     """
     if not criterion.relative:
         return outcome.error
@@ -237,6 +229,6 @@ def errors(outcome: Outcome, criterion: AppliedCriterion, equations: Equations) 
 
 
 def offsets(criterion: AppliedCriterion) -> np.ndarray:
-    """Return how far the starts are moved: not at all, then at random."""
+    """Return the displacements (starts,): 0, then random ones."""
     random = np.random.default_rng(criterion.seed)
     return np.concatenate([[0.0], random.uniform(-criterion.reach, criterion.reach, criterion.starts - 1)])

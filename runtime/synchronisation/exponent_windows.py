@@ -1,4 +1,4 @@
-"""Windows of sigma from transversal exponents, or why there are none."""
+"""Windows of sigma from transversal exponents, or the reason why there are none."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ class ExponentWindows:
     intervals : tuple of (float, float)
         Lower and upper end of each window, in ascending order.
     errors : tuple of (float, float)
-        Errors of the ends: 0 at sigma = 0, inf at an end of the grid, beyond which nothing is known, and if the average is
-        too short for an estimate.
+        Errors of the ends: 0 at sigma = 0; infinite at an end of the grid, beyond which nothing is known, and if the average
+        is too short for an estimate.
     absent : str
-        Why exponents say nothing about the network; empty if they do.
+        Why there are no exponents of the network; empty if there are.
     strengths, values : tuple of float
         Strengths alpha and exponents at them.
     beyond : tuple of float
@@ -54,11 +54,11 @@ class ExponentWindows:
     @classmethod
     def of(cls, function: MSF) -> ExponentWindows:
         """Return the windows of a master stability function for the network of its scene."""
-        found = function.windows
-        ends = [end for w in found for end in ((w.low, w.low_mode), (w.high, w.high_mode))]
+        windows = function.windows
+        ends = [end for w in windows for end in ((w.low, w.low_mode), (w.high, w.high_mode))]
         return cls(
-            tuple((window.low, window.high) for window in found),
-            tuple((window.low_error, window.high_error) for window in found),
+            tuple((window.low, window.high) for window in windows),
+            tuple((window.low_error, window.high_error) for window in windows),
             strengths=tuple(map(float, function.alpha)),
             values=tuple(map(float, function.exponent)),
             beyond=tuple(end for end, lost in ends if lost is None and end),
@@ -69,7 +69,7 @@ class ExponentWindows:
         return np.interp(alpha, self.strengths, self.values)
 
     def text(self, grid_ends: Collection[float] = ()) -> str:
-        """Return the windows with their errors and dots at ends of the grid, or why there are none."""
+        """Return the windows with their errors and dots at ends of the grid, or the reason why there are none."""
         ends = (*self.beyond, *grid_ends)
         return f"not computed: {self.absent}" if self.absent else interval_text(self.intervals, self.errors, ends)
 

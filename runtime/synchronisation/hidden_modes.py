@@ -1,4 +1,4 @@
-"""Modes of a network that its start has no part in."""
+"""Modes of a linear network that are absent from its start."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.scenes.scene import Scene
 
 ROUNDING = 1e-12
-"""Part of the distances between oscillators below which a mode has none."""
+"""Largest part of the distances between oscillators that is rounding (a choice)."""
 
 
 def hidden_modes(scene: Scene) -> tuple[str, ...]:
-    """Return a sentence if a linear network starts without a part in some of its transversal modes.
+    """Return a sentence if some transversal modes are absent from the start of a linear network.
 
-    The modes of linear oscillators with linear links move independently: one without a part in the start is excited by
-    rounding alone, so that its growth is noticed late. The default start of three in a chain, 0.30, 0.28, 0.26, has no
-    part in the mode (1, -2, 1). Other networks hand motion from mode to mode; between all pairs of equal links every start has a part; one-way links are not
-    looked at.
+    The modes of linear oscillators with linear links move independently: one that is absent from the start is excited by
+    rounding alone, and its growth is noticed late. The mode (1, -2, 1) is absent from the default start of three in a
+    chain, 0.30, 0.28, 0.26. Nonlinear networks pass motion from mode to mode; all-to-all networks have a single
+    transversal eigenvalue; one-way links are not examined.
     """
     graph = scene.topology
     if graph.all_to_all is not None or not graph.symmetric or not _linear(scene.equations):

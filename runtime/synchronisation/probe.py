@@ -49,20 +49,17 @@ MODE_BETA = sp.Symbol("mode_beta", real=True)
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Probe(Labelled):
-    """Verdicts of the probe over complex strengths alpha + i beta.
-
-    alpha, beta, error and share have one shape: error is the median over the starts of the mean
-    synchronisation error (infinite where a cell did not finish), share the part of the starts that
-    synchronised.  status (…, starts) says how each cell ended.
-    """
+    """Verdicts of the probe over complex strengths alpha + i beta; alpha, beta, error and share have one shape."""
 
     scene: Scene
     criterion: AppliedCriterion
     alpha: np.ndarray = field(repr=False)
     beta: np.ndarray = field(repr=False)
-    error: np.ndarray = field(repr=False)
-    share: np.ndarray = field(repr=False)
-    status: np.ndarray = field(repr=False)
+    error: np.ndarray = field(
+        repr=False
+    )  # median over the starts of the mean synchronisation error; infinite without an end
+    share: np.ndarray = field(repr=False)  # part of the starts that synchronised
+    status: np.ndarray = field(repr=False)  # (…, starts): how each cell ended
 
     @property
     def data(self) -> xr.Dataset:
@@ -80,7 +77,7 @@ class Probe(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """Scene, strengths and how many synchronise."""
+        """Scene, strengths, number of those that synchronise, and criterion."""
         return (
             ("scene", scene_text(self.scene)),
             ("strengths", f"{self.alpha.size}: alpha {range_text(self.alpha)}, beta {range_text(self.beta)}"),
@@ -90,9 +87,7 @@ class Probe(Labelled):
 
     @property
     def synchronous(self) -> np.ndarray:
-        """True if at least half of the starts synchronised, as in
-        `synchain.runtime.synchronisation.threshold`.
-        """
+        """True if at least half of the starts synchronised."""
         return self.share >= 0.5
 
 
@@ -114,8 +109,8 @@ def universal_probe(
     Parameters
     ----------
     scene : Scene
-        Oscillator, coupling and parameters; its network and sigma are not used, and the three start
-        as its first two oscillators go on (`first_starts`).
+        Oscillator, coupling and parameters; its network and sigma are not used. The three start on the line through the
+        starts of its first two oscillators.
     alpha, beta : array_like
         Real and imaginary part of the strengths, broadcast against each other; negative numbers are
         allowed.
@@ -142,18 +137,19 @@ def universal_probe(
     scene = Given(universal_probe, parameters, more, IN_CRITERION).scene(scene, unused_axes(scene))
     if scene.varied:
         scene.equations.expect_alike("the three-oscillator probe")
-    known = preset(criterion, scene)
+    partial = preset(criterion, scene)
+    # the ring in units of time, and its kernel; both parts of the strength are parameters of it
     ring = scene.replace(
         record=("sync_error",),
         topology=topology("ring", 3),
         initial=first_starts(scene, 3),
         transient=1.0,
         window=1.0,
-        rtol=known.rtol,
+        rtol=partial.rtol,
     )
     equations, planner = ring_of_three(ring.equations), Planner(ring)
-    plain = _rows(planner, equations.parameters, real.reshape(-1), imaginary.reshape(-1), np.zeros(known.starts))
-    strongest = known.starts * np.atleast_1d(np.hypot(real, imaginary).argmax())
+    plain = _rows(planner, equations.parameters, real.reshape(-1), imaginary.reshape(-1), np.zeros(partial.starts))
+    strongest = partial.starts * np.atleast_1d(np.hypot(real, imaginary).argmax())
     method = chosen_for_rows(ring, equations, plain.take(strongest))
     source = RowsSpec(equations, method, control_of(planner, True)).source()
 
@@ -164,41 +160,45 @@ def universal_probe(
     def measure(atol: float | None) -> SynchronousMotion:
         one = alike(equations, _rows(planner, equations.parameters, np.zeros(1), np.zeros(1), np.zeros(1)))
         with trials(ring if atol is None else ring.replace(atol=atol)) as few:
-            times, apart = (known.transient, known.window), spread_of(equations, plain.start[:1])
+            times, apart = (partial.transient, partial.window), spread_of(equations, plain.start[:1])
             return measure_motion(few, lambda rows: rows, equations, one, times, apart)
 
-    used = resolved(known, ring, measure)
+    # the criterion follows the motion; then all strengths and starts are cells of one round
+    used = resolved(partial, ring, measure)
     atol = ring.given["atol"] if used.atol is None else used.atol
     ring = ring.replace(transient=used.transient, window=used.window, max_steps=used.max_steps, atol=atol)
     planner = Planner(ring)
     rows = _rows(planner, equations.parameters, real.reshape(-1), imaginary.reshape(-1), offsets(used))
     with trials(ring) as many:
-        found = many.run(len(rows), rows.take)
+        outcome = many.run(len(rows), rows.take)
     shape = (*real.shape, used.starts)
-    error, status = errors(found, used, equations).reshape(shape), found.status.reshape(shape)
+    error, status = errors(outcome, used, equations).reshape(shape), outcome.status.reshape(shape)
     share = np.asarray((error < used.tolerance).mean(axis=-1))
     return Probe(scene, used, real, imaginary, np.asarray(np.median(error, axis=-1)), share, status)
 
 
 def ring_of_three(equations: Equations) -> Equations:
-    """Return three nodes in a ring, with links of the weight alpha/3 + beta/sqrt(3) one way and
-    alpha/3 - beta/sqrt(3) back.
+    """Return three nodes in a ring, with links of the weight alpha/3 + beta/sqrt(3) one way and alpha/3 - beta/sqrt(3) back.
 
-    The parameters `mode_alpha` and `mode_beta` take the place of sigma; the weight of a link, 1 or
-    -1, is its direction.
+    The parameters `mode_alpha` and `mode_beta` replace sigma; the weight of a link, 1 or -1, is its direction.
     """
     equations.expect_alike("the three-oscillator probe")
     edge = equations.edge
     if edge is None:
         raise ValueError("these equations have no coupling; the probe needs links")
     sigma = strength(edge, equations.node.parameters)
-    _check_coupling(edge, sigma)
+    # a link must be its strength times its weight times a function that is zero between equal states
+    if not edge.diffusive:
+        raise ValueError("a link acts between equal states, so complete synchronisation is no solution of this network")
+    unit = {edge.weight: sp.S.One, sigma: sp.S.One}
+    for e in edge.rhs:
+        if sp.simplify(e - sigma * edge.weight * e.xreplace(unit)) != 0:
+            raise ValueError(f"the coupling {e} is not proportional to {sigma} and the weight; a mode has no strength")
     taken = {s.name for s in (*equations.node.state, *equations.node.parameters, *edge.parameters)}
     for symbol in (MODE_ALPHA, MODE_BETA):
         if symbol.name in taken:
             raise ValueError(f"the name {symbol.name!r} is needed for the probe; rename it in the model")
     factor = MODE_ALPHA / 3 + edge.weight * MODE_BETA / sp.sqrt(3)
-    unit = {edge.weight: sp.S.One, sigma: sp.S.One}
     others = tuple(s for s in edge.parameters if s != sigma)
     rates = tuple(factor * e.xreplace(unit) for e in edge.rhs)
     turned = Edge(edge.here, edge.there, edge.weight, rates, (*others, MODE_ALPHA, MODE_BETA))
@@ -207,22 +207,8 @@ def ring_of_three(equations: Equations) -> Equations:
     return Equations.of_equal_nodes(equations.node, turned, 3, (*there, *back))
 
 
-def _check_coupling(edge: Edge, sigma: sp.Symbol) -> None:
-    """Prove that a link is its strength times its weight times a function that is zero between equal
-    states.
-    """
-    if not edge.diffusive:
-        raise ValueError("a link acts between equal states, so complete synchronisation is no solution of this network")
-    for e in edge.rhs:
-        unit = e.xreplace({edge.weight: sp.S.One, sigma: sp.S.One})
-        if sp.simplify(e - sigma * edge.weight * unit) != 0:
-            raise ValueError(f"the coupling {e} is not proportional to {sigma} and the weight; a mode has no strength")
-
-
 def _broadcast(alpha: ArrayLike, beta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    """Both parts of the strengths in one shape; ValueError if they have none, are empty or not
-    finite.
-    """
+    """Both parts of the strengths in one shape; ValueError if they are empty, not finite, or do not fit together."""
     parts = numbers("alpha", alpha), numbers("beta", beta)
     for part in parts:
         if part.size == 0:
@@ -238,15 +224,13 @@ def _broadcast(alpha: ArrayLike, beta: ArrayLike) -> tuple[np.ndarray, np.ndarra
 
 
 def _rows(planner: Planner, names: tuple[str, ...], alpha: np.ndarray, beta: np.ndarray, moves: np.ndarray) -> CellRows:
-    """Rows of every strength and start, the starts fastest; a start moves all oscillators alike in
-    the position.
-    """
+    """Rows of every strength and start, the starts fastest; `moves` (starts,) displace all oscillators alike in the position."""
     one, scene, starts = planner.rows(np.arange(1)), planner.scene, len(moves)
     count = len(alpha) * starts
     values = {**scene.parameters, MODE_ALPHA.name: 0.0, MODE_BETA.name: 0.0}
-    numbers = np.tile([values[name] for name in names], (count, 1))
-    numbers[:, names.index(MODE_ALPHA.name)] = np.repeat(alpha, starts)
-    numbers[:, names.index(MODE_BETA.name)] = np.repeat(beta, starts)
+    parameter_values = np.tile([values[name] for name in names], (count, 1))
+    parameter_values[:, names.index(MODE_ALPHA.name)] = np.repeat(alpha, starts)
+    parameter_values[:, names.index(MODE_BETA.name)] = np.repeat(beta, starts)
     start = np.tile(one.start, (count, 1))
     start[:, : scene.n] += np.tile(moves, len(alpha))[:, None]
-    return CellRows(start, numbers, np.tile(one.spans, (count, 1)))
+    return CellRows(start, parameter_values, np.tile(one.spans, (count, 1)))

@@ -1,8 +1,8 @@
-"""The synchronous motion of a network: how far it moves, how fast it turns, and how many steps it takes.
+"""The synchronous motion of a network: its extent, the time of a turn, and the steps it takes.
 
-Tolerances and times follow it, so that results depend neither on the units of states nor on that of time.  It is measured
-by the kernel that runs the cells, at states far apart: contacts, jumps and unequal nodes have no orbit with deviations, of
-which `stability.motion` looks at every step.
+Tolerances and times of a criterion follow the motion, so that results depend on no unit of states or time.  The kernel
+that runs the cells measures it, at times far apart: contacts, jumps and unequal nodes have no orbit with deviations,
+which `stability.motion` follows step by step.
 """
 
 from __future__ import annotations
@@ -22,34 +22,31 @@ from ..cells.paces import fastest_rates
 from ..cells.plan import CellRows
 from ..stability.motion import above, extent_of
 from ..support.status import Status
-from .trials import Outcome, Rows, Trials
+from .trials import Outcome, Trials
 
 SAMPLES = 64
-"""States at which a stretch of the motion is looked at."""
+"""States that are sampled in a stretch of the motion (a choice)."""
 
 REST = 1e-5
-"""A component rests if it moves by less than this part of what it moved from the start on."""
+"""A component rests if it moves by less than this part of its motion from the start on (a choice)."""
 
 SEEN = 1e-7
-"""Part of the size of a state below which a movement is that of rounding."""
+"""Movements below this part of the size of a state are errors of the steps (a choice)."""
 
 TURNS, ROUNDS, LONGER = 2.0, 20, 2.0
-"""Turns of an undriven motion that tell its pace; most stretches of time that are tried, each so many times the last."""
+"""Turns of an undriven motion that give its pace; most stretches of time that are tried, each LONGER times the last."""
 
 
 @dataclass(frozen=True, slots=True)
 class SynchronousMotion:
-    """What is measured of a synchronous motion.
+    """Scales of a synchronous motion, in non-dimensional time."""
 
-    extent (components,): what each compared component moves, less its drift; of one that comes to rest, what it moved from
-    the start on.  radian: time in which the motion turns by a radian.  pace: steps in a unit of time.  unit: the scene's
-    unit of time, in non-dimensional time.
-    """
-
-    extent: np.ndarray
-    radian: float
-    pace: float
-    unit: float
+    extent: (
+        np.ndarray
+    )  # (compared components,): less the drift; of a component that comes to rest, that of its approach
+    radian: float  # time in which the motion turns by a radian
+    pace: float  # steps in a unit of time
+    unit: float  # the scene's unit of time
 
     @property
     def size(self) -> float:
@@ -58,9 +55,9 @@ class SynchronousMotion:
 
 
 def columns_of(equations: Equations) -> np.ndarray:
-    """Return where in the state the compared components stand (components, nodes)."""
-    place = {name: k for k, name in enumerate(equations.state)}
-    return np.array([[place[f"{name}_{i + 1}"] for i in range(equations.n)] for name in equations.compared])
+    """Return the indices (components, nodes) of the compared components in the state."""
+    index = {name: k for k, name in enumerate(equations.state)}
+    return np.array([[index[f"{name}_{i + 1}"] for i in range(equations.n)] for name in equations.compared])
 
 
 def alike(equations: Equations, row: CellRows) -> CellRows:
@@ -71,7 +68,7 @@ def alike(equations: Equations, row: CellRows) -> CellRows:
 
 
 def first_starts(scene: Scene, count: int) -> dict[str, list[float]] | None:
-    """Return starts of so many oscillators that go on as the first two of a scene do; None for the default start."""
+    """Return starts of `count` oscillators that continue the line through the first two of a scene; None for the default start."""
     if scene.given["initial"] is None:
         return None
     first = {name: (*values, values[0])[:2] for name, values in scene.initial.items() if name != SLIP.name}
@@ -79,7 +76,7 @@ def first_starts(scene: Scene, count: int) -> dict[str, list[float]] | None:
 
 
 def spread_of(equations: Equations, start: np.ndarray) -> np.ndarray:
-    """Return how far apart the oscillators of some starts (cells, dimension) are, by components."""
+    """Return the largest distances (components,) between the oscillators of some starts (cells, dimension)."""
     return np.asarray(np.ptp(start[:, columns_of(equations)], axis=(0, 2)))
 
 
@@ -97,8 +94,7 @@ def measure_motion(
         spans = np.tile(row.spans, (len(ends), 1))
         spans[:, SpanColumn.START], spans[:, SpanColumn.END] = 0.0, ends
         cells = replace(row.take(np.zeros(len(ends), dtype=int)), spans=spans)
-        lay_out: Rows = lambda which: rows(cells.take(which))  # noqa: E731
-        return trials.run(len(ends), lay_out)
+        return trials.run(len(ends), lambda chosen: rows(cells.take(chosen)))
 
     columns, unit = columns_of(equations), float(row.spans[0, SpanColumn.START])
     period = float(row.spans[0, SpanColumn.PERIOD])
@@ -107,16 +103,18 @@ def measure_motion(
         fastest = float(fastest_rates(equations, state[None], row.numbers[0])[0])
         return 1.0 / fastest if 0.0 < fastest < math.inf else math.inf
 
+    # times: those that are given, else multiples of a radian
     radian = period / (2.0 * math.pi) if period else _radian(sample, columns, row.start[0], inverse)
     transient, window = (
         radian * radians if time is None else time * unit for time, radians in zip(times, (1000.0, 100.0), strict=True)
     )
+    # states from the start on, and after the transient at times with golden-ratio spacing, which match no period
     early = window * np.arange(1, SAMPLES + 1) / SAMPLES
-    turned = max(window, 4.0 * math.pi * radian)  # in less than a turn, what is seen depends on the phase
+    turned = max(window, 4.0 * math.pi * radian)  # in less than a turn, the extent depends on the phase
     late = transient + turned * (np.arange(1, SAMPLES + 1) * (math.sqrt(5.0) - 1.0) / 2.0 % 1.0)
-    found = sample(np.concatenate([early, late]))
-    paces = np.where(found.status == Status.FINISHED, found.steps / np.concatenate([early, late]), 0.0)
-    states = np.concatenate([row.start, found.end])[:, columns]
+    outcome = sample(np.concatenate([early, late]))
+    paces = np.where(outcome.status == Status.FINISHED, outcome.steps / np.concatenate([early, late]), 0.0)
+    states = np.concatenate([row.start, outcome.end])[:, columns]
     extent = _extent(np.concatenate([[0.0], early, late]), states, SAMPLES)
     return SynchronousMotion(np.where(extent > 0.0, extent, apart), radian, max(float(paces.max()), 1.0 / radian), unit)
 
@@ -127,24 +125,22 @@ def _radian(
     start: np.ndarray,
     inverse: Callable[[np.ndarray], float],
 ) -> float:
-    """The time in which an undriven motion turns by a radian; if it does not, the inverse of its fastest rate.
-
-    1 if there is no rate.
-    """
+    """The time in which an undriven motion turns by a radian, else the inverse of its fastest rate, else 1."""
     least = inverse(start)
     length = least if math.isfinite(least) else 1.0
     for _ in range(ROUNDS):
-        found = sample(length * np.arange(1, SAMPLES + 1) / SAMPLES)
-        states = found.end[:, columns[:, 0]]
+        outcome = sample(length * np.arange(1, SAMPLES + 1) / SAMPLES)
+        states = outcome.end[:, columns[:, 0]]
         if not np.isfinite(states).all():
             break
         moved = _without_drift(np.arange(SAMPLES), states, 0)
-        whole, last = np.ptp(moved, axis=0), np.ptp(moved[SAMPLES // 2 :], axis=0)
+        extent, last = np.ptp(moved, axis=0), np.ptp(moved[SAMPLES // 2 :], axis=0)
         moves = last > REST * np.ptp(states, axis=0)
         if not moves.any():
-            least = min(least, inverse(found.end[-1]))
+            least = min(least, inverse(outcome.end[-1]))
             break
-        turns = (np.abs(np.diff(moved, axis=0)).sum(axis=0)[moves] / (2.0 * whole[moves])).max()
+        # a turn moves a component by twice its extent
+        turns = (np.abs(np.diff(moved, axis=0)).sum(axis=0)[moves] / (2.0 * extent[moves])).max()
         if turns >= TURNS:
             return float(length / (2.0 * math.pi * turns))
         length *= LONGER
@@ -152,14 +148,14 @@ def _radian(
 
 
 def _without_drift(time: np.ndarray, states: np.ndarray, first: int) -> np.ndarray:
-    """States (times, …) less the straight line through those from the `first` on."""
+    """States (times, …) less the least-squares line through those from the `first` on."""
     late = time[first:] - time[first:].mean()
     slope = np.tensordot(late, states[first:], axes=1) / (late @ late)
     return np.asarray(states - np.multiply.outer(time - time[first:].mean(), slope) - states[first:].mean(axis=0))
 
 
 def _extent(time: np.ndarray, states: np.ndarray, late: int) -> np.ndarray:
-    """What components move in the `late` last of some states (times, components, nodes), 0 where all of them rest."""
+    """Extents of components in the `late` last of some states (times, components, nodes), 0 where all nodes rest."""
     good = np.isfinite(states).all(axis=(1, 2))
     late = int(good[-late:].sum())
     if late < 3:

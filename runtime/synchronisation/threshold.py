@@ -1,11 +1,12 @@
-"""Where a network synchronises: probe, projection through the spectrum, and the check by direct
-simulation.
+"""Ranges of sigma in which a network synchronises, found in three ways.
 
-The two-oscillator probe tells for which alpha = sigma |gamma| the mode of a network dies out: in
-its own network the one non-zero eigenvalue is -2.  Any other network synchronises where every
-non-zero |sigma gamma_k| lies in the probe's ranges (Pecora & Carroll, Phys. Rev. Lett. 80, 2109
-(1998); Fink et al., Phys. Rev. E 61, 5080 (2000)).  Transversal exponents give the same ranges
-without a transient or a tolerance, and with error bars.
+1. `exponent_windows`: transversal exponents of all modes, with error bars, without transient or tolerance.
+2. `probe`, `project`: two oscillators are simulated over alpha = sigma |gamma|; their one non-zero eigenvalue
+   is -2.  Any network synchronises where every non-zero |sigma gamma_k| lies in the probe's ranges (Pecora &
+   Carroll, Phys. Rev. Lett. 80, 2109 (1998); Fink et al., Phys. Rev. E 61, 5080 (2000)).
+3. `simulate`: the network itself over sigma.
+
+2 and 3 take a grid, judge its points by an `AppliedCriterion`, and refine the ends of ranges.
 """
 
 from __future__ import annotations
@@ -45,14 +46,14 @@ from .synchronous_motion import SynchronousMotion, alike, first_starts, measure_
 from .trials import Trials
 
 RESOLUTION, CLOSER, RELATIVE = 5e-4, 5.0, 1e-3
-"""Width in sigma to which ends of ranges are refined by default: it is less where a step of the grid is less than so many
-times as wide, and more where sigma is so large that this part of it is more."""
+"""Default width in sigma to which ends of ranges are refined: RESOLUTION, or RELATIVE sigma if that is more, and at most a
+step of the grid over CLOSER."""
 
 LONGEST = 1e9
 """Longest step of a grid, in widths to which ends are refined: ten rounds refine it."""
 
 PROBES = 257
-"""About how many values of alpha are probed at least."""
+"""Least number of probed values of alpha, approximately (a choice)."""
 
 Measure = Callable[[np.ndarray], np.ndarray]
 """Mean synchronisation errors (m, starts) at points (m,)."""
@@ -60,24 +61,21 @@ Measure = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """Verdicts of one sweep over sigma (or alpha) and what they rest on.
+    """Verdicts of one sweep over sigma, or over alpha."""
 
-    x (m,), error (m,): median over the starts of the mean synchronisation error; share (m,): part
-    of the starts that synchronised; intervals: where at least half do, ends refined.
-    """
-
-    x: np.ndarray = field(repr=False)
-    error: np.ndarray = field(repr=False)
-    share: np.ndarray = field(repr=False)
-    intervals: tuple[Interval, ...]
+    x: np.ndarray = field(repr=False)  # (m,): sigma or alpha
+    error: np.ndarray = field(repr=False)  # (m,): median over the starts of the mean synchronisation error
+    share: np.ndarray = field(repr=False)  # (m,): part of the starts that synchronised
+    intervals: tuple[Interval, ...]  # where at least half of them do, ends refined
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Thresholds(Labelled):
     """Synchronous ranges of one network: from the exponents of its modes, measured directly, and predicted from the probe.
 
-    The exponents decide.  Simulation and probe know a transient: near an end errors fall so slowly that they measure it;
-    `warnings` names these ends.  `criterion` holds the numbers that were used.  `direct` is in sigma, `probe` in alpha = sigma abs(gamma), `predicted` and `exponents` in sigma.
+    The exponents decide.  Simulation and probe have a transient: near an end of a range errors fall so slowly that the end
+    depends on it; `warnings` names these ends.  `criterion` holds the numbers that were used.  `direct`, `predicted` and
+    `exponents` are in sigma, `probe` in alpha = sigma abs(gamma).
     """
 
     scene: Scene
@@ -91,12 +89,12 @@ class Thresholds(Labelled):
     @property
     def data(self) -> xr.Dataset:
         """Errors and shares over sigma and over alpha, the ranges, and the errors of their ends."""
-        found = self.exponents
+        windows = self.exponents
         ranges = {
             "interval": (self.direct.intervals, "synchronous sigma, simulated"),
             "predicted": (self.predicted, "synchronous sigma, from the probe"),
             "probe_interval": (self.probe.intervals, "synchronous alpha of the probe"),
-            "window": (found.intervals, f"sigma with negative exponents{found.absent and f', {found.text()}'}"),
+            "window": (windows.intervals, f"sigma with negative exponents{windows.absent and f', {windows.text()}'}"),
         }
         return dataset(
             {
@@ -108,7 +106,7 @@ class Thresholds(Labelled):
                     name: ((f"{name}_number", "end"), np.reshape(ends, (-1, 2)), meaning)
                     for name, (ends, meaning) in ranges.items()
                 },
-                "window_error": (("window_number", "end"), np.reshape(found.errors, (-1, 2)), "errors of the ends"),
+                "window_error": (("window_number", "end"), np.reshape(windows.errors, (-1, 2)), "errors of the ends"),
             },
             {"sigma": self.direct.x, "alpha": self.probe.x, "end": ["low", "high"]},
             self.scene,
@@ -121,16 +119,13 @@ class Thresholds(Labelled):
         steepest = max(abs(value) for value in self.scene.topology.spectrum.values)
         grid, alpha = ((float(x[0]), float(x[-1])) for x in (self.direct.x, self.probe.x))
         reach = (*grid, *(end / steepest for end in alpha))
+        conjecture = [] if self.conjecture is None else [interval_text([(0.0, self.conjecture)])]
         rows = [
             ("scene", scene_text(self.scene)),
             (f"{name}, negative exponents", self.exponents.text(reach)),
             (f"{name}, simulated", interval_text(self.direct.intervals, grid_ends=grid)),
             (f"{name}, predicted by the probe", interval_text(self.predicted, grid_ends=reach)),
-            *(
-                []
-                if self.conjecture is None
-                else [(f"{name}, Wu-Chua conjecture", interval_text([(0.0, self.conjecture)]))]
-            ),
+            *((f"{name}, Wu-Chua conjecture", text) for text in conjecture),
             (f"alpha = {name} |gamma|, probe", interval_text(self.probe.intervals, grid_ends=alpha)),
             (f"grid of {name}", range_text(self.direct.x)),
             ("simulated and probe", f"{used.text(self.scene)}, at least half of {used.starts} starts"),
@@ -192,27 +187,27 @@ def thresholds(
     scene : Scene
         The network; its records, observables and sections are not used.
     sigma : sequence of float, optional
-        An increasing grid on which ranges are looked for (default: `default_grid`); narrower ranges
-        are not seen.  The probe's grid in alpha covers every sigma abs(gamma), with the spacing of this one.
+        Increasing grid on which ranges are searched (default: `default_grid`); ranges between two of its values are
+        missed.  The probe's grid in alpha covers every sigma abs(gamma), with the spacing of this one.
     resolution : float, optional
         Ends of ranges are refined to this width in sigma, those of the probe to twice as much in
         alpha.  By default it is 5e-4 or, if that is more, a thousandth of sigma, and at most a fifth of the step
         of the grid.
     criterion : Criterion, optional
-        When a value of sigma counts as synchronous; it holds rtol, seed and transient of all cells, and follows scene
-        and motion in what it leaves open.
+        When a value of sigma counts as synchronous, with rtol, seed and transient of all cells; fields that are None
+        follow the scene and its motion.
     precision, periods : float
         Standard error and longest average of the exponents, as for `exponents`.
     workers, executor, show_progress, progress
-        As for `run`; each round has a bar of its own.  Exponents are computed in this process.
+        As for `run`, with one bar for each round.  Exponents are computed in this process.
     parameters, **more
         Override the parameters of the scene, as for `exponents`.
 
     Returns
     -------
     Thresholds
-        A network in several parts is allowed; its warnings say so, and name the modes of a linear network that the
-        start has no part in (`hidden_modes`).
+        Its warnings name a network in several parts, and the modes of a linear network that are absent from the start
+        (`hidden_modes`).
 
     Raises
     ------
@@ -239,48 +234,45 @@ def thresholds(
     pair = probe(scene, alpha, used, resolution, execution)
     direct = simulate(scene, grid, used, resolution, execution)
     predicted = tuple(project(pair.intervals, spectrum, float(grid[-1]), float(grid[0])))
-    found = Thresholds(scene, pair, predicted, direct, used, stable, (*scene.warnings, *hidden_modes(scene)))
-    return replace(found, warnings=(*found.warnings, *_limited(found)))
+    result = Thresholds(scene, pair, predicted, direct, used, stable, (*scene.warnings, *hidden_modes(scene)))
+    return replace(result, warnings=(*result.warnings, *_limited(result)))
 
 
-def _limited(found: Thresholds) -> Iterator[str]:
+def _limited(result: Thresholds) -> Iterator[str]:
     """Sentences about ends at which the exponent is negative, but errors take longer than the transient to fall."""
-    used, scene = found.criterion, found.scene
+    used, scene = result.criterion, result.scene
     length = used.transient * ((scene.period or 1.0) if scene.time_unit == TimeUnit.PERIOD else 1.0)
     sizes = np.array([abs(value) for value in scene.spectrum.values if abs(value) > 0.0])
-    grid, fall = {float(found.direct.x[0]), float(found.direct.x[-1])}, math.log(used.size / used.tolerance)
-    if not found.exponents.strengths or not fall > 0.0:
+    grid, fall = {float(result.direct.x[0]), float(result.direct.x[-1])}, math.log(used.size / used.tolerance)
+    if not result.exponents.strengths or not fall > 0.0:
         return
-    for words, ranges in (("simulated", found.direct.intervals), ("predicted by the probe", found.predicted)):
+    for method, ranges in (("simulated", result.direct.intervals), ("predicted by the probe", result.predicted)):
         ends = np.array(sorted({end for pair in ranges for end in pair} - grid))
         if not len(ends):
             continue
-        exponent = found.exponents.at(np.outer(ends, sizes)).max(axis=1)
+        # an error falls from the extent of the motion to the tolerance in fall / |exponent|
+        exponent = result.exponents.at(np.outer(ends, sizes)).max(axis=1)
         late = (exponent < 0.0) & (-exponent * length < fall)
         if late.any():
             shown = ", ".join(
                 f"{with_error(end)} (exponent {at:.2g})" for end, at in zip(ends[late], exponent[late], strict=True)
             )
             yield (
-                f"the ends of what is {words} at {scene.strength} = {shown} come of the transient: errors fall by the factor "
+                f"the ends of what is {method} at {scene.strength} = {shown} come of the transient: errors fall by the factor "
                 f"{math.exp(fall):.3g} in ln({math.exp(fall):.3g})/|exponent|, and {length:.4g} units of time are given; "
                 "trust the exponents there, or raise Criterion(transient=…)"
             )
 
 
 def default_grid(spectrum: Spectrum, step: float = 0.0025) -> np.ndarray:
-    """Return values of sigma from 0 to the one with 1.2 as largest |sigma gamma|, in at least 60
-    steps of at most `step`.
-    """
+    """Return sigma from 0 to where the largest |sigma gamma| is 1.2, in at least 60 steps of at most `step`."""
     highest = 1.2 / max(abs(value) for value in spectrum.values)
     return np.linspace(0.0, highest, max(math.ceil(highest / step), 60) + 1)
 
 
 def _probe_grid(sigma: np.ndarray, spectrum: Spectrum) -> np.ndarray:
-    """Values of alpha that cover sigma |gamma| for every mode: sigma times the largest |gamma|, then where others reach further.
-
-    Each step is divided so often that there are about PROBES values.
-    """
+    """Values of alpha that cover sigma |gamma| for every mode, about PROBES or more."""
+    # sigma times the largest |gamma|, extended where others reach further
     sizes = sorted({abs(value) for value in spectrum.values if abs(value) > 0.0}, reverse=True)
     grid = sigma * sizes[0]
     for size in (*sizes[1:], *([0.0] if spectrum.multiplicities[0] > 1 else [])):
@@ -291,7 +283,7 @@ def _probe_grid(sigma: np.ndarray, spectrum: Spectrum) -> np.ndarray:
 
 
 def _widths(x: np.ndarray, resolution: float | None) -> np.ndarray:
-    """To what width ends of ranges are refined in each step of a grid (m - 1,)."""
+    """Width (m - 1,) to which ends of ranges are refined in each step of a grid."""
     if resolution is not None:
         return np.full(len(x) - 1, resolution)
     nearer = np.minimum(np.abs(x[1:]), np.abs(x[:-1]))
@@ -310,7 +302,7 @@ def _check_steps(x: np.ndarray, resolution: float | None) -> None:
 
 
 def check_probe(graph: Topology, spectrum: Spectrum) -> None:
-    """Raise ValueError if the two-oscillator probe says nothing about a network."""
+    """Raise ValueError if the two-oscillator probe does not apply to a network."""
     if graph.n < 2 or not graph.link_count:
         raise ValueError(f"{graph.name}({graph.n}) has no links; thresholds need at least two coupled oscillators")
     if any(isinstance(value, complex) for value in spectrum.values):
@@ -346,10 +338,7 @@ def simulate(
     resolution: float | None = None,
     execution: Execution | None = None,
 ) -> Sweep:
-    """Sweep sigma by direct simulation of a scene's network.
-
-    One kernel and one pool of workers run the grid and all rounds that refine the ends of ranges.
-    """
+    """Sweep sigma by direct simulation: one kernel and one pool run the grid and all rounds that refine ends of ranges."""
     x, execution = row("sigma", sigma, rising=True), execution or Execution()
     used = fitted(scene, x, criterion, execution)
     reduction = reduce_scene(cells_of(scene, x, used))
@@ -357,8 +346,8 @@ def simulate(
 
         def measure(points: np.ndarray) -> np.ndarray:
             planner = Planner(cells_of(scene, points, used))
-            found = trials.run(planner.scene.cells, lambda cells: reduction.rows(planner.rows(cells)))
-            return errors(found, used, scene.equations).reshape(len(points), used.starts)
+            outcome = trials.run(planner.scene.cells, lambda cells: reduction.rows(planner.rows(cells)))
+            return errors(outcome, used, scene.equations).reshape(len(points), used.starts)
 
         return judge(measure, x, resolution, used)
 
@@ -367,30 +356,29 @@ def fitted(scene: Scene, sigma: np.ndarray, criterion: Criterion, execution: Exe
     """Return a criterion with the numbers that follow from the motion of a scene's equal oscillators."""
     if isinstance(criterion, AppliedCriterion):
         return criterion
-    known, apart = preset(criterion, scene), spread_of(scene.equations, np.array([scene.y0]))
+    partial, apart = preset(criterion, scene), spread_of(scene.equations, np.array([scene.y0]))
 
     def measure(atol: float | None) -> SynchronousMotion:
-        rtol = known.rtol or scene.rtol
-        unit = AppliedCriterion(1.0, known.starts, 0.0, 1.0, 1.0, rtol, 0, (), max_steps=scene.max_steps, atol=atol)
+        rtol = partial.rtol or scene.rtol
+        unit = AppliedCriterion(1.0, partial.starts, 0.0, 1.0, 1.0, rtol, 0, (), max_steps=scene.max_steps, atol=atol)
         reduction = reduce_scene(cells_of(scene, sigma, unit))
         first = alike(scene.equations, Planner(cells_of(scene, np.zeros(1), unit)).rows(np.arange(1)))
         with Trials.of(reduction, execution) as trials:
-            times = (known.transient, known.window)
+            times = (partial.transient, partial.window)
             return measure_motion(trials, reduction.rows, scene.equations, first, times, apart)
 
-    return resolved(known, scene, measure)
+    return resolved(partial, scene, measure)
 
 
 def judge(measure: Measure, x: np.ndarray, resolution: float | None, criterion: AppliedCriterion) -> Sweep:
     """Return the verdicts on an increasing grid and the synchronous ranges, with ends refined to `resolution` in sigma."""
 
-    def share(errors: np.ndarray) -> np.ndarray:
-        return np.asarray((errors < criterion.tolerance).mean(axis=1))
+    def share(mean_errors: np.ndarray) -> np.ndarray:
+        return np.asarray((mean_errors < criterion.tolerance).mean(axis=1))
 
-    found = measure(x)
-    on_grid = share(found)
-    ranges = refine(lambda points: share(measure(points)) >= 0.5, x, on_grid >= 0.5, _widths(x, resolution))
-    return Sweep(x, np.asarray(np.median(found, axis=1)), on_grid, tuple(ranges))
+    on_grid = measure(x)
+    ranges = refine(lambda points: share(measure(points)) >= 0.5, x, share(on_grid) >= 0.5, _widths(x, resolution))
+    return Sweep(x, np.asarray(np.median(on_grid, axis=1)), share(on_grid), tuple(ranges))
 
 
 def cells_of(scene: Scene, sigma: np.ndarray, criterion: AppliedCriterion) -> Scene:
@@ -414,12 +402,10 @@ def cells_of(scene: Scene, sigma: np.ndarray, criterion: AppliedCriterion) -> Sc
 def project(
     ranges: Sequence[Interval], spectrum: Spectrum, highest: float = math.inf, lowest: float = 0.0
 ) -> list[Interval]:
-    """The sigma from `lowest` to `highest` for which every transversal sigma |gamma_k| lies in one of
-    the ranges of alpha.
+    """Return the sigma from `lowest` to `highest` for which every transversal sigma |gamma_k| lies in a range of alpha.
 
-    One zero eigenvalue belongs to the synchronous motion itself.  Every further one is a part of
-    the network that nothing couples to the rest: it asks that alpha = 0 be in a range (identical
-    oscillators that the drive alone locks).
+    One zero eigenvalue belongs to the synchronous motion itself.  Every further one is a part of the network without
+    links to the others: it synchronises only if alpha = 0 is in a range (a drive alone locks the oscillators).
     """
     allowed: list[Interval] = [(lowest, highest)]
     for value, multiplicity in zip(spectrum.values, spectrum.multiplicities, strict=True):
@@ -431,18 +417,16 @@ def project(
 
 
 def critical_ratio(spectrum: Spectrum) -> float:
-    """Largest over smallest non-zero |gamma|; a bounded range of alpha must be at least this wide
-    (as a ratio).
-    """
+    """Return the largest over the smallest non-zero |gamma|: a bounded range of alpha must have at least this ratio."""
     sizes = [abs(value) for value in spectrum.values if abs(value) > 0.0]
     return max(sizes) / min(sizes)
 
 
-def wu_chua(sigma: float, known: Spectrum, wanted: Spectrum) -> float:
-    """Carry the end of a range that starts at zero coupling from one network to another.
+def wu_chua(sigma: float, first: Spectrum, second: Spectrum) -> float:
+    """Return the upper end of a range from zero coupling on for a second network, from its value for a first one.
 
-    sigma_m gamma_1(m) = sigma_n gamma_1(n), with gamma_1 the eigenvalue of largest modulus where
-    the end is the upper one. Source: Wu & Chua, IEEE Trans. Circuits Syst. I 43, 161 (1996).
+    sigma_m gamma_1(m) = sigma_n gamma_1(n), with gamma_1 the eigenvalue of largest modulus. Source: Wu & Chua, IEEE
+    Trans. Circuits Syst. I 43, 161 (1996).
     """
-    largest = [max(abs(value) for value in s.values) for s in (known, wanted)]
+    largest = [max(abs(value) for value in spectrum.values) for spectrum in (first, second)]
     return sigma * largest[0] / largest[1]

@@ -1,6 +1,4 @@
-"""Trials: cells of which the mean synchronisation error and the end are asked for, run in rounds by one kernel on one
-pool of workers.
-"""
+"""Cells that run in rounds by one kernel on one pool of workers, for their mean synchronisation errors and ends."""
 
 from __future__ import annotations
 
@@ -33,31 +31,18 @@ Rows = Callable[[np.ndarray], CellRows]
 
 
 class Outcome(NamedTuple):
-    """What became of cells: mean synchronisation errors (cells,), infinite if a cell did not finish; how they ended (cells,);
-    states at the end (cells, dimension); steps (cells,).
-    """
+    """Results of a round."""
 
-    error: np.ndarray
-    status: np.ndarray
-    end: np.ndarray
-    steps: np.ndarray
+    error: np.ndarray  # (cells,): mean synchronisation errors, infinite if a cell did not finish
+    status: np.ndarray  # (cells,): how they ended
+    end: np.ndarray  # (cells, dimension): states at the end, NaN if a cell did not finish
+    steps: np.ndarray  # (cells,)
 
 
 class Trials:
-    """One compiled kernel and one pool of workers for any number of rounds; a context manager that
-    closes the pool.
+    """A compiled kernel of a problem and a pool of workers for any number of rounds; a context manager that closes the pool.
 
-    Parameters
-    ----------
-    scene : Scene
-        Says how long a cell runs.
-    problem : RowsSpec
-    source : SweepKernel
-        The kernel of the problem.
-    execution : Execution
-        Runs all rounds; each has a bar of its own.
-    expand : callable, optional
-        Turns the results of a reduced network into those of the whole one.
+    The scene gives the length of a cell; `expand` turns the buffers of a reduced network into those of the unreduced one.
     """
 
     def __init__(
@@ -76,7 +61,7 @@ class Trials:
 
     @classmethod
     def of(cls, reduction: ReducedScene, execution: Execution) -> Trials:
-        """Return trials of what is left of a scene; its cells stand for those of all rounds."""
+        """Return trials of a reduced scene, whose cells represent those of all rounds."""
         strongest = reduction.rows(reduction.planner.extremes())
         source = write_kernel(reduction, method=chosen_for_rows(reduction.scene, reduction.equations, strongest))
         control = control_of(reduction.planner, reduction.jumps)
@@ -97,11 +82,9 @@ class Trials:
         size = block_size(self.scene, self.width, self.execution.size, count)
 
         def finish(task: Task, buffers: Buffers) -> None:
-            whole = buffers if self.expand is None else self.expand(buffers)
-            error[task.cells], end[task.cells] = (
-                mean_errors(whole),
-                np.where(whole.finished[:, None], whole.end, np.nan),
-            )
+            network = buffers if self.expand is None else self.expand(buffers)
+            error[task.cells] = mean_errors(network)
+            end[task.cells] = np.where(network.finished[:, None], network.end, np.nan)
             status[task.cells] = buffers.status
             steps[task.cells] = buffers.counts[:, [Count.ACCEPTED, Count.REJECTED]].sum(axis=1)
             reporter.add(tally(buffers.status))

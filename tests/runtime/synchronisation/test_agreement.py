@@ -17,7 +17,6 @@ from synchain.runtime.synchronisation.agreement import (
     Cell,
     _cause,
     _outcome,
-    _projected,
     agreement,
     strengths,
 )
@@ -106,13 +105,13 @@ def test_causes(
 
 
 def test_a_verdict_needs_two_standard_errors() -> None:
-    def verdict(*exponent: float) -> int:
-        return _projected(np.array(exponent), np.full(len(exponent), 0.01))
+    def verdicts(*exponent: float) -> list[str]:
+        return [_outcome(np.array(exponent), np.full(len(exponent), 0.01), simulated) for simulated in (True, False)]
 
-    assert [verdict(-0.03, -0.5), verdict(-0.03, 0.03), verdict(-0.015, -0.5), verdict(-0.5, 0.015)] == [1, -1, 0, 0]
-    assert [_outcome(sign, simulated) for sign in (1, -1, 0) for simulated in (True, False)] == [
-        "both yes", "exponent yes, simulation no", "exponent no, simulation yes", "both no", "undecided", "undecided",
-    ]  # fmt: skip
+    assert verdicts(-0.03, -0.5) == ["both yes", "exponent yes, simulation no"]
+    assert verdicts(-0.03, 0.03) == ["exponent no, simulation yes", "both no"]
+    assert verdicts(-0.015, -0.5) == ["undecided", "undecided"]
+    assert verdicts(-0.5, 0.015) == ["undecided", "undecided"]
 
 
 def test_strengths_are_those_of_all_modes() -> None:
