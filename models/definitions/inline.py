@@ -41,7 +41,10 @@ from .loader import load_friction_law
 Expression: TypeAlias = "sp.Expr | float | str"
 """An expression of SymPy, a number, or text that is parsed and not run."""
 
-Given: TypeAlias = "Mapping[Any, Any]"
+LONGEST_SOURCE = 4096
+"""Most characters of a citation, a choice."""
+
+Keyed: TypeAlias = "Mapping[Any, Any]"
 """A mapping whose keys are symbols, functions of time, or names."""
 
 
@@ -51,11 +54,11 @@ def Lagrangian(
     Q: Mapping[Any, Expression] | None = None,
     R: Expression = 0,
     *,
-    coordinates: Given | Iterable[Any] | None = None,
-    friction: FrictionLaw | Expression | Given | None = None,
+    coordinates: Keyed | Iterable[Any] | None = None,
+    friction: FrictionLaw | Expression | Keyed | None = None,
     contact: str | None = None,
-    parameters: Given | None = None,
-    initial: Given | None = None,
+    parameters: Keyed | None = None,
+    initial: Keyed | None = None,
     scaling: Mapping[str, Mapping[str, Any]] | None = None,
     source: str = "",
     name: str = "oscillator",
@@ -88,7 +91,7 @@ def Lagrangian(
     initial : mapping, optional
         The state around which oscillators start, 0 for the states left out.
     scaling : mapping, optional
-        Given if the Lagrangian is in physical quantities, from which the non-dimensional equations are derived.
+        Keyed if the Lagrangian is in physical quantities, from which the non-dimensional equations are derived.
         ``units`` has the SI unit of each constant, such as ``{"m": "kg", "k": "N/m"}``, and of each coordinate with a
         unit; ``scales`` the units of mass, length and time made of the constants, ``{"kg": "m", "m": …, "s":
         "sqrt(m/k)"}``; ``physical`` the name in the expressions of each parameter that has another name there.
@@ -144,27 +147,28 @@ def Lagrangian(
         if value is not None and not rubs:
             raise ValueError(f"{what}: found {keyword} {str(value)!r}, but no force has friction(…); leave it out")
     treatment = ContactModel.ATAN if contact is None else ContactModel.parse("contact", contact)
-    own = _own_parameters(
-        names, (*energies, *acting), law if isinstance(friction, sp.Expr | int | float) else None, defaults
-    )
+    # A law that was written as an expression takes its parameters along.
+    written = law if isinstance(friction, sp.Expr | int | float) else None
+    node_parameters = names.used_parameters((*energies, *acting), written)
+    if scales is not None:
+        scales = replace(scales, physical=FrozenDict({name: scales.physical[name] for name in node_parameters}))
     model = LagrangianModel(
         tuple(Coordinate(c, speed, units.get(c, "1")) for c, speed in table.items()),
         kinetic,
         potential,
         acting,
         dissipation,
-        None if scales is None else replace(scales, physical=FrozenDict({p: scales.physical[p] for p in own})),
+        scales,
     )
-    return Oscillator(
-        name, own, model, names.initial(initial), law, treatment, source=check_text("source", source, 4096)
-    )
+    start, citation = names.initial(initial), check_text("source", source, LONGEST_SOURCE)
+    return Oscillator(name, node_parameters, model, start, law, treatment, source=citation)
 
 
 def Field(
     rates: Mapping[Any, Expression],
     *,
-    parameters: Given | None = None,
-    initial: Given | None = None,
+    parameters: Keyed | None = None,
+    initial: Keyed | None = None,
     source: str = "",
     name: str = "field",
 ) -> Oscillator:
@@ -204,24 +208,29 @@ def Field(
     y
     """
     what = f"oscillator {_called(name)!r}"
-    given = dict(check_table(f"{what}: rates", rates))
-    if not given:
+    entries = dict(check_table(f"{what}: rates", rates))
+    if not entries:
         raise ValueError(f"{what}: found no rates; expected one for each state")
-    moving = _functions(what, [*given, *given.values()])
-    table = _distinct(what, "state", {_name(what, "state", key): "" for key in given}, len(given))
+    moving = _functions(what, [*entries, *entries.values()])
+    table = _distinct(what, "state", {_name(what, "state", key): "" for key in entries}, len(entries))
     defaults = _parameters(what, parameters)
     names = _ModelNames.of(what, table, moving, defaults)
-    found = tuple(names.expression(f"rate of {s}", e) for s, e in zip(table, given.values(), strict=True))
-    if any(rate.has(FRICTION) for rate in found):
+    field_rates = tuple(names.expression(f"rate of {s}", e) for s, e in zip(table, entries.values(), strict=True))
+    if any(rate.has(FRICTION) for rate in field_rates):
         raise ValueError(f"{what}: found friction(…) in a rate; expected it in the forces of a Lagrangian")
-    own = _own_parameters(names, found, None, defaults)
-    model = FieldModel(tuple(table), found)
-    return Oscillator(name, own, model, names.initial(initial), source=check_text("source", source, 4096))
+    model = FieldModel(tuple(table), field_rates)
+    return Oscillator(
+        name,
+        names.used_parameters(field_rates),
+        model,
+        names.initial(initial),
+        source=check_text("source", source, LONGEST_SOURCE),
+    )
 
 
 def friction_law(
     force: Expression,
-    parameters: Given | None = None,
+    parameters: Keyed | None = None,
     *,
     static: Expression | None = None,
     order: Iterable[tuple[str, str]] = (),
@@ -277,9 +286,10 @@ def friction_law(
     for name_of in (entry for pair in pairs for entry in pair):
         if name_of not in defaults:
             raise ValueError(f"{what}: order names {name_of!r}; expected parameters: {', '.join(defaults) or 'none'}")
-    own = _own_parameters(names, used, None, defaults)
-    feeds = check_flag("self_exciting", self_exciting)
-    return FrictionLaw(name, own, coefficient, holding, pairs, feeds, source=check_text("source", source, 4096))
+    own, feeds = names.used_parameters(used), check_flag("self_exciting", self_exciting)
+    return FrictionLaw(
+        name, own, coefficient, holding, pairs, feeds, source=check_text("source", source, LONGEST_SOURCE)
+    )
 
 
 def link_energy(
@@ -287,7 +297,7 @@ def link_energy(
     *,
     R: Expression = 0,
     T: Expression = 0,
-    parameters: Given | None = None,
+    parameters: Keyed | None = None,
     between: Mapping[str, Iterable[str]] | None = None,
     source: str = "",
     name: str = "coupling",
@@ -341,10 +351,10 @@ def link_energy(
         raise ValueError(f"{what}: found friction(…); expected it in the forces of a Lagrangian")
     if not any(e.has(WEIGHT) for e in energies):
         raise ValueError(f"{what}: no energy has the weight W of a link; expected it as a factor, k*W*(q_i - q_j)**2/2")
-    own = _own_parameters(replace(names, what=what), energies, None, defaults)
+    own = replace(names, what=what).used_parameters(energies)
     potential, dissipation, kinetic = energies
     return LagrangianCoupling(
-        name, own, potential, dissipation, kinetic, kinds, source=check_text("source", source, 4096)
+        name, own, potential, dissipation, kinetic, kinds, source=check_text("source", source, LONGEST_SOURCE)
     )
 
 
@@ -383,6 +393,7 @@ class _ModelNames:
     # functions of time and their derivatives -> the symbols that take their places; a plain symbol of the same name is
     # refused, since SymPy's derivatives would not have seen it
     moving: Mapping[sp.Expr, sp.Symbol] = field(default_factory=dict)
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
     # parameter -> its name in the expressions; parameters left out have one name
     physical: Mapping[str, str] = field(default_factory=dict)
 
@@ -392,7 +403,7 @@ class _ModelNames:
         what: str,
         table: Mapping[str, str],
         functions: Iterable[AppliedUndef],
-        parameters: Iterable[str],
+        parameters: Mapping[str, Parameter],
         scaling: Scaling | None = None,
     ) -> _ModelNames:
         """The names of a model: coordinates with the names of their velocities ("" for none), and quantities."""
@@ -421,7 +432,7 @@ class _ModelNames:
             if table[state]:
                 moving[function.diff(function.args[0])] = sp.Symbol(table[state], real=True)
         symbols = {name: sp.Symbol(name, real=True) for name in states}
-        return cls(what, {**symbols, **quantities, TIME.name: TIME}, states, moving, physical)
+        return cls(what, {**symbols, **quantities, TIME.name: TIME}, states, moving, parameters, physical)
 
     @classmethod
     def of_law(cls, what: str, parameters: Mapping[str, Parameter]) -> _ModelNames:
@@ -429,7 +440,7 @@ class _ModelNames:
         if SLIDING.name in parameters:
             raise ValueError(f"{what}: the name 'w' stands for the sliding velocity; rename that parameter")
         symbols = {name: sp.Symbol(name, real=True) for name in parameters}
-        return cls(what, {SLIDING.name: SLIDING, **symbols})
+        return cls(what, {SLIDING.name: SLIDING, **symbols}, parameters=parameters)
 
     @classmethod
     def of_link(cls, what: str, states: Iterable[str], parameters: Mapping[str, Parameter]) -> _ModelNames:
@@ -438,7 +449,8 @@ class _ModelNames:
         clash = next((name for name in (*states, *weights) if name in parameters), None)
         if clash is not None:
             raise ValueError(f"{what}: the name {clash!r} stands for two things; rename the parameter")
-        return cls(what, {**{name: sp.Symbol(name, real=True) for name in (*states, *parameters)}, **weights})
+        symbols = {name: sp.Symbol(name, real=True) for name in (*states, *parameters)}
+        return cls(what, {**symbols, **weights}, parameters=parameters)
 
     def expression(self, about: str, value: object) -> sp.Expr:
         """The expression of a user in the form that a model keeps."""
@@ -453,8 +465,9 @@ class _ModelNames:
                 )
         unknown = [e for e in value.atoms(AppliedUndef, sp.Derivative) if e.func != FRICTION and e not in self.moving]
         if unknown:
-            found = min(map(str, unknown))
-            raise ValueError(f"{about}: found {found}; expected {', '.join(map(str, self.moving)) or 'plain symbols'}")
+            raise ValueError(
+                f"{about}: found {min(map(str, unknown))}; expected {', '.join(map(str, self.moving)) or 'plain symbols'}"
+            )
         return exact(about, value.xreplace(self.moving), self.symbols)
 
     def state(self, about: str, key: object, known: Collection[str]) -> str:
@@ -466,40 +479,55 @@ class _ModelNames:
             raise ValueError(f"{self.what}: {about} has the key {short_repr(key)}; expected {expected}")
         return name
 
-    def initial(self, given: Given | None) -> FrozenDict[float] | None:
+    def initial(self, value: Keyed | None) -> FrozenDict[float] | None:
         """The state around which oscillators start."""
-        if given is None:
+        if value is None:
             return None
-        table = check_table(f"{self.what}: initial", given)
+        table = check_table(f"{self.what}: initial", value)
         return FrozenDict(
-            {self.state("initial", key, self.states): _value(f"initial {key}", value) for key, value in table.items()}
+            {self.state("initial", key, self.states): _value(f"initial {key}", number) for key, number in table.items()}
         )
+
+    def used_parameters(self, expressions: Iterable[sp.Expr], law: FrictionLaw | None = None) -> FrozenDict[Parameter]:
+        """The parameters without those of a law written among them; ValueError if one is unused, or used in both."""
+        symbols = {s.name for e in expressions for s in e.free_symbols}
+        of_law = frozenset(() if law is None else law.parameters)
+        for name in self.parameters:
+            inside = self.physical.get(name, name)
+            if name in of_law and inside in symbols:
+                raise ValueError(
+                    f"{self.what}: {name!r} is in the friction law and outside of it; expected it in one of them"
+                )
+            if name not in of_law and inside not in symbols:
+                shown = repr(name) if inside == name else f"{name!r} ({inside} in the expressions)"
+                raise ValueError(f"{self.what}: no expression has the parameter {shown}; use it or leave it out")
+        return FrozenDict({name: parameter for name, parameter in self.parameters.items() if name not in of_law})
 
 
 def _functions(what: str, values: Iterable[object]) -> list[AppliedUndef]:
     """The functions of time in some expressions, sorted by name."""
-    found = {f for value in values if isinstance(value, sp.Expr) for f in value.atoms(AppliedUndef)}
-    moving = sorted((f for f in found if f.func != FRICTION), key=str)
+    functions = {f for value in values if isinstance(value, sp.Expr) for f in value.atoms(AppliedUndef)}
+    moving = sorted((f for f in functions if f.func != FRICTION), key=str)
     for function in moving:
         if len(function.args) != 1 or getattr(function.args[0], "name", "") != TIME.name:
             raise ValueError(f"{what}: found the function {function}; expected functions of t alone, e.g. x(t)")
     return moving
 
 
-def _coordinates(what: str, given: object, moving: Iterable[AppliedUndef]) -> Mapping[str, str]:
+def _coordinates(what: str, value: object, moving: Iterable[AppliedUndef]) -> Mapping[str, str]:
     """Each coordinate with the name of its velocity."""
-    if given is None:
-        given = list(dict.fromkeys(function.func.__name__ for function in moving))
-        if not given:
+    if value is None:
+        value = list(dict.fromkeys(function.func.__name__ for function in moving))
+        if not value:
             raise ValueError(f"{what}: found no function of time; expected coordinates = {{x: v}} for plain symbols")
-    if isinstance(given, Mapping):
-        table = {_name(what, "coordinate", key): _name(what, "velocity", value) for key, value in given.items()}
-        return _distinct(what, "coordinate", table, len(given))
-    if isinstance(given, str | bytes) or not isinstance(given, Iterable):
+    if isinstance(value, Mapping):
+        table = {_name(what, "coordinate", key): _name(what, "velocity", speed) for key, speed in value.items()}
+        return _distinct(what, "coordinate", table, len(value))
+    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
         raise TypeError(
-            f"{what}: coordinates: found {typed_repr(given)}; expected a list, or a mapping such as {{x: v}}"
+            f"{what}: coordinates: found {typed_repr(value)}; expected a list, or a mapping such as {{x: v}}"
         )
-    names = [_name(what, "coordinate", key) for key in given]
+    names = [_name(what, "coordinate", key) for key in value]
     if not names:
         raise ValueError(f"{what}: found no coordinates; expected at least one")
     speeds = ["v"] if len(names) == 1 else [f"v_{name}" for name in names]
@@ -541,20 +569,20 @@ def _scaling(
 ) -> tuple[Scaling, dict[str, str]]:
     """The scaling of a table, and the units of all quantities that are no parameters."""
     what = f"{what}: scaling"
-    given = check_table(what, table)
-    check_keys(what, given, ("units", "scales", "physical"))
+    entries = check_table(what, table)
+    check_keys(what, entries, ("units", "scales", "physical"))
     units: dict[str, str] = {}
-    for key, unit in check_table(f"{what}: units", given.get("units", {})).items():
+    for key, unit in check_table(f"{what}: units", entries.get("units", {})).items():
         name = _name(what, "quantity", key)
         units[name] = check_text(f"{what}: unit of {name}", unit)
         _try(f"{what}: {name}", lambda unit=unit: dimension(unit))
     constants = {name: unit for name, unit in units.items() if name not in coordinates}
     # Parameters have another name in the expressions, or the same.
-    renamed = check_table(f"{what}: physical", given.get("physical", {}))
+    renamed = check_table(f"{what}: physical", entries.get("physical", {}))
     check_keys(f"{what}: physical", renamed, parameters)
     physical = {name: _name(what, "quantity", renamed.get(name, name)) for name in parameters}
     # The units of mass, length and time are made of the constants.
-    scales = check_table(f"{what}: scales", given.get("scales", {}))
+    scales = check_table(f"{what}: scales", entries.get("scales", {}))
     if set(scales) != {"kg", "m", "s"}:
         keys = ", ".join(map(repr, scales)) or "nothing"
         raise ValueError(f"{what}: found scales of {keys}; expected those of 'kg', 'm' and 's'")
@@ -563,10 +591,10 @@ def _scaling(
     return Scaling(FrozenDict(constants), FrozenDict(physical), FrozenDict(made)), units
 
 
-def _parameters(what: str, given: Given | None) -> dict[str, Parameter]:
+def _parameters(what: str, parameters: Keyed | None) -> dict[str, Parameter]:
     """Name -> Parameter, with the range that a symbol was assumed to have."""
     table: dict[str, Parameter] = {}
-    for key, value in check_table(f"{what}: parameters", {} if given is None else given).items():
+    for key, value in check_table(f"{what}: parameters", {} if parameters is None else parameters).items():
         name = _name(what, "parameter", key)
         if name in table:
             raise ValueError(f"{what}: two parameters are called {name!r}; expected each name once")
@@ -579,7 +607,7 @@ def _parameter(value: object) -> Parameter:
         return value
     if not isinstance(value, Mapping):
         return Parameter(_value("default", value))
-    return Parameter.of_table("parameter", value, [own.name for own in fields(Parameter)])
+    return Parameter.of_table("parameter", value, [entry.name for entry in fields(Parameter)])
 
 
 def _value(what: str, value: object) -> float:
@@ -603,41 +631,22 @@ def _assumed(key: object, parameter: Parameter) -> Parameter:
         return replace(parameter, minimum=max(0.0, parameter.minimum or 0.0))
     if facts.items() <= _POSITIVE.items():
         return replace(parameter, positive=True)
-    told = ", ".join(sorted(name for name, holds in facts.items() if holds and name not in _POSITIVE))
-    raise ValueError(f"its symbol is assumed to be {told or 'nonzero'}; expected real, nonnegative or positive")
+    assumed = ", ".join(sorted(name for name, holds in facts.items() if holds and name not in _POSITIVE))
+    raise ValueError(f"its symbol is assumed to be {assumed or 'nonzero'}; expected real, nonnegative or positive")
 
 
-def _own_parameters(
-    names: _ModelNames, expressions: Iterable[sp.Expr], law: FrictionLaw | None, defaults: Mapping[str, Parameter]
-) -> FrozenDict[Parameter]:
-    """The parameters without those of a law that was written among them; ValueError if one is unused or in both."""
-    used = {s.name for e in expressions for s in e.free_symbols}
-    of_law = frozenset(() if law is None else law.parameters)
-    for name in defaults:
-        inside = names.physical.get(name, name)
-        if name in of_law and inside in used:
-            raise ValueError(
-                f"{names.what}: {name!r} is in the friction law and outside of it; expected it in one of them"
-            )
-        if name not in of_law and inside not in used:
-            called = repr(name) if inside == name else f"{name!r} ({inside} in the expressions)"
-            raise ValueError(f"{names.what}: no expression has the parameter {called}; use it or leave it out")
-    return FrozenDict({name: parameter for name, parameter in defaults.items() if name not in of_law})
-
-
-def _law(what: str, given: object, defaults: Mapping[str, Parameter]) -> FrictionLaw | None:
+def _law(what: str, value: object, defaults: Mapping[str, Parameter]) -> FrictionLaw | None:
     """The friction law of a name, a value, or an expression of the sliding velocity and some of the parameters."""
-    if given is None or isinstance(given, FrictionLaw):
-        return given
-    if isinstance(given, str):
-        return load_friction_law(given)
+    if value is None or isinstance(value, FrictionLaw):
+        return value
+    if isinstance(value, str):
+        return load_friction_law(value)
     expected = "a name, a law that friction_law('mu*sign(w)', {'mu': 0.3}) makes, or an expression of SymPy of w"
-    value = check_instance(f"{what}: friction", given, (sp.Expr, int, float), expected)
+    force = check_instance(f"{what}: friction", value, (sp.Expr, int, float), expected)
     about = f"{what}: friction"
-    coefficient = _ModelNames.of_law(about, defaults).expression("law", value)
+    coefficient = _ModelNames.of_law(about, defaults).expression("law", force)
     used = {s.name for s in coefficient.free_symbols}
-    own = {name: parameter for name, parameter in defaults.items() if name in used}
-    return friction_law(coefficient, own)
+    return friction_law(coefficient, {name: parameter for name, parameter in defaults.items() if name in used})
 
 
 def _try(what: str, action: Any) -> Any:

@@ -20,9 +20,9 @@ def settle(n: int, shape: object, generators: object) -> dict[str, object]:
     orders = (n,) if shape is None else integers_option("shape", shape, 2)
     if prod(orders) != n:
         raise ValueError(f"shape = {orders} has {prod(orders)} elements; expected n = {n}")
-    found: dict[str, object] = {} if shape is None else {"shape": orders}
+    options: dict[str, object] = {} if shape is None else {"shape": orders}
     if generators is None:
-        return found
+        return options
     chosen: dict[_Element, None] = {}
     for element in _elements(generators, orders):
         reduced = tuple(g % order for g, order in zip(element, orders, strict=True))
@@ -30,22 +30,24 @@ def settle(n: int, shape: object, generators: object) -> dict[str, object]:
             raise ValueError(f"generators: found {element}, which joins nodes to themselves; leave it out")
         inverse = _inverse(reduced, orders)
         chosen[min(reduced, inverse)] = None
-    return found | {"generators": tuple(g for element in sorted(chosen) for g in element)}
+    return options | {"generators": tuple(g for element in sorted(chosen) for g in element)}
 
 
-def _elements(given: object, orders: _Element) -> list[_Element]:
+def _elements(generators: object, orders: _Element) -> list[_Element]:
     """The elements of a list of them, or of their numbers one after another, one number for each cyclic group."""
-    if isinstance(given, list | tuple) and any(isinstance(part, list | tuple) for part in given):
-        wrong = next((part for part in given if not isinstance(part, list | tuple) or len(part) != len(orders)), None)
+    if isinstance(generators, list | tuple) and any(isinstance(part, list | tuple) for part in generators):
+        wrong = next(
+            (part for part in generators if not isinstance(part, list | tuple) or len(part) != len(orders)), None
+        )
         if wrong is not None:
             raise ValueError(
                 f"generators: found {wrong}; expected {len(orders)} numbers, one for each order in {orders}"
             )
-        given = [number for part in given for number in part]
-    numbers, rank = integers_option("generators", given, 0), len(orders)
-    if len(numbers) % rank:
-        raise ValueError(f"generators = {numbers}; expected {rank} numbers for each, one for each order in {orders}")
-    return [numbers[k : k + rank] for k in range(0, len(numbers), rank)]
+        generators = [number for part in generators for number in part]
+    flat, rank = integers_option("generators", generators, 0), len(orders)
+    if len(flat) % rank:
+        raise ValueError(f"generators = {flat}; expected {rank} numbers for each, one for each order in {orders}")
+    return [flat[k : k + rank] for k in range(0, len(flat), rank)]
 
 
 def _inverse(element: _Element, orders: _Element) -> _Element:
@@ -86,16 +88,16 @@ def spectrum(n: int, *, shape: tuple[int, ...] | None = None, generators: tuple[
     from ..algebra.cosine_sums import AngleSum, expressions
 
     orders, chosen = _group(n, shape, generators)
-    whole = lcm(*orders)
+    unit = lcm(*orders)
     weights = [(g, Fraction(1, 2) if g == _inverse(g, orders) else Fraction(1)) for g in chosen]
-    numbers = []
+    sums = []
     for character in product(*map(range, orders)):
         total = AngleSum.rational(0)
         for g, weight in weights:
-            turn = sum(k * a * (whole // m) for k, a, m in zip(character, g, orders, strict=True))
-            total += AngleSum.cosine(-2 * weight, weight, turn % whole, whole)
-        numbers.append((total, 1))
-    return expressions(numbers)
+            turn = sum(k * a * (unit // m) for k, a, m in zip(character, g, orders, strict=True))
+            total += AngleSum.cosine(-2 * weight, weight, turn % unit, unit)
+        sums.append((total, 1))
+    return expressions(sums)
 
 
 TOPOLOGY = Family(

@@ -28,9 +28,9 @@ def settle(n: int, rotations: object, reflections: object) -> dict[str, object]:
     }
 
 
-def _numbers(what: str, given: object) -> tuple[int, ...]:
+def _numbers(what: str, value: object) -> tuple[int, ...]:
     """Whole numbers from 0 on; none of an empty list or text."""
-    return () if isinstance(given, str | list | tuple) and not given else integers_option(what, given, 0)
+    return () if isinstance(value, str | list | tuple) and not value else integers_option(what, value, 0)
 
 
 def edges(
@@ -60,7 +60,7 @@ def spectrum(n: int, *, rotations: tuple[int, ...] = (1,), reflections: tuple[in
 
     if len(reflections) > 2:
         return None
-    m, numbers = n // 2, []
+    m, sums = n // 2, []
     gap = abs(reflections[-1] - reflections[0]) if len(reflections) == 2 else 0
     half = Fraction(len(reflections), 2)
     for k in range(m):
@@ -68,8 +68,8 @@ def spectrum(n: int, *, rotations: tuple[int, ...] = (1,), reflections: tuple[in
         for a in rotations:
             weight = Fraction(1, 2) if 2 * a == m else Fraction(1)
             value += AngleSum.cosine(-2 * weight, weight, k * a % m, m)
-        numbers += [(value + AngleSum.cosine(0, sign * half, k * gap, 2 * m), 1) for sign in (1, -1)]
-    return expressions(numbers)
+        sums += [(value + AngleSum.cosine(0, sign * half, k * gap, 2 * m), 1) for sign in (1, -1)]
+    return expressions(sums)
 
 
 TOPOLOGY = Family(

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
 def settle(n: int, offsets: object) -> dict[str, object]:
     """Distances of 1 … n/2, each once; n - s is s."""
-    given = integers_option("offsets", offsets, 1)
-    for s in given:
+    distances = integers_option("offsets", offsets, 1)
+    for s in distances:
         if s % n == 0:
-            raise ValueError(f"offsets = {given}: {s} joins nodes of a ring of {n} to themselves; leave it out")
-    return {"offsets": tuple(sorted({min(s % n, -s % n) for s in given}))}
+            raise ValueError(f"offsets = {distances}: {s} joins nodes of a ring of {n} to themselves; leave it out")
+    return {"offsets": tuple(sorted({min(s % n, -s % n) for s in distances}))}
 
 
 def edges(n: int, *, offsets: tuple[int, ...] = (1, 2)) -> Iterator[tuple[int, int, int]]:
@@ -35,11 +35,11 @@ def spectrum(n: int, *, offsets: tuple[int, ...] = (1, 2)) -> Eigenvalues:
     from ..algebra.cosine_sums import AngleSum, expressions
 
     weights = [(s, Fraction(1, 2) if 2 * s == n else Fraction(1)) for s in offsets]
-    numbers = []
+    sums = []
     for k in range(n // 2 + 1):
         parts = [AngleSum.cosine(-2 * weight, weight, k * s, n) for s, weight in weights]
-        numbers.append((sum(parts, AngleSum.rational(0)), 1 if k in (0, n - k) else 2))
-    return expressions(numbers)
+        sums.append((sum(parts, AngleSum.rational(0)), 1 if k in (0, n - k) else 2))
+    return expressions(sums)
 
 
 def formula(offsets: str | Iterable[object] = (1, 2)) -> ClosedForm:

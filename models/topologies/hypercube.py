@@ -17,23 +17,23 @@ if TYPE_CHECKING:
 
 def _radices(n: int) -> list[int]:
     """The prime factors of n, ascending: the base of each digit of a node's place."""
-    found, p = [], 2
+    factors, p = [], 2
     while p * p <= n:
         if n % p:
             p += 1
         else:
-            found.append(p)
+            factors.append(p)
             n //= p
-    return found + ([n] if n > 1 else [])
+    return factors + ([n] if n > 1 else [])
 
 
 def edges(n: int) -> Iterator[tuple[int, int, int]]:
     """Each node and those that are larger in one digit."""
     bases = _radices(n)
     for i in range(n):
-        place, value = i, 1
+        index, value = i, 1
         for base in bases:
-            place, digit = divmod(place, base)
+            index, digit = divmod(index, base)
             yield from ((i, i + step * value, 1) for step in range(1, base - digit))
             value *= base
 

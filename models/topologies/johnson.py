@@ -24,11 +24,11 @@ def settle(n: int, k: object) -> dict[str, object]:
 def edges(n: int, *, k: int = 2) -> Iterator[tuple[int, int, int]]:
     """Each subset and those with one of its elements replaced by a larger one."""
     m = ground_set(n, k)
-    place = numbered(m, k)
-    for subset, i in place.items():
+    index = numbered(m, k)
+    for subset, i in index.items():
         for old in subset:
-            kept = [e for e in subset if e != old]
-            yield from ((i, place[tuple(sorted((*kept, e)))], 1) for e in range(old + 1, m) if e not in subset)
+            others = [e for e in subset if e != old]
+            yield from ((i, index[tuple(sorted((*others, e)))], 1) for e in range(old + 1, m) if e not in subset)
 
 
 def spectrum(n: int, *, k: int = 2) -> Eigenvalues:

@@ -28,11 +28,11 @@ def settle(n: int, k: object) -> dict[str, object]:
 def edges(n: int, *, k: int = 2) -> Iterator[tuple[int, int, int]]:
     """Each subset and the later ones that have none of its elements."""
     m = ground_set(n, k)
-    place = numbered(m, k)
-    for subset, i in place.items():
+    index = numbered(m, k)
+    for subset, i in index.items():
         # In the order of the dictionary the later ones of all disjoint subsets begin with a larger element.
-        rest = [e for e in range(subset[0] + 1, m) if e not in subset]
-        yield from ((i, place[other], 1) for other in combinations(rest, k))
+        larger = [e for e in range(subset[0] + 1, m) if e not in subset]
+        yield from ((i, index[other], 1) for other in combinations(larger, k))
 
 
 def spectrum(n: int, *, k: int = 2) -> Eigenvalues:

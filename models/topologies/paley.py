@@ -42,11 +42,11 @@ def _squares(p: int, e: int) -> set[tuple[int, ...]]:
 
     monic = (nmod_poly([*reversed(low), 1], p) for low in product(range(p), repeat=e))
     modulus = next(f for f in monic if [(g.degree(), m) for g, m in f.factor()[1]] == [(e, 1)])
-    found = set()
+    squares = set()
     for digits in product(range(p), repeat=e):
         square = nmod_poly(list(digits), p) ** 2 % modulus
-        found.add(tuple(int(square[k]) for k in range(e)))
-    return found - {(0,) * e}
+        squares.add(tuple(int(square[k]) for k in range(e)))
+    return squares - {(0,) * e}
 
 
 def edges(n: int) -> Iterator[tuple[int, int, int]]:

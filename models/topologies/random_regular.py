@@ -39,9 +39,9 @@ def edges(n: int, *, degree: int = 4, seed: int = 0) -> Iterator[tuple[int, int,
 def _drawn(n: int, degree: int, stream: random.Random) -> _Edges:
     """The edges of the first attempt that succeeds."""
     for _ in range(_ATTEMPTS):
-        found = _paired(n, degree, stream)
-        if found is not None:
-            return found
+        joined = _paired(n, degree, stream)
+        if joined is not None:
+            return joined
     raise ValueError(
         f"random_regular: found no graph of {n} nodes of degree {degree} in {_ATTEMPTS} attempts; choose another seed"
     )
@@ -50,7 +50,7 @@ def _drawn(n: int, degree: int, stream: random.Random) -> _Edges:
 def _paired(n: int, degree: int, stream: random.Random) -> _Edges | None:
     """The edges of one attempt; None if the ends that are left form no pair."""
     ends = [i for i in range(n) for _ in range(degree)]
-    found: _Edges = set()
+    joined: _Edges = set()
     while ends:
         for k in range(len(ends) - 1, 0, -1):
             j = int(stream.random() * (k + 1))
@@ -58,20 +58,20 @@ def _paired(n: int, degree: int, stream: random.Random) -> _Edges | None:
         left: list[int] = []
         for a, b in zip(ends[::2], ends[1::2], strict=True):
             pair = (min(a, b), max(a, b))
-            if a == b or pair in found:
+            if a == b or pair in joined:
                 left += pair
             else:
-                found.add(pair)
-        if left and not _possible(left, found):
+                joined.add(pair)
+        if left and not _possible(left, joined):
             return None
         ends = left
-    return found
+    return joined
 
 
-def _possible(ends: list[int], found: _Edges) -> bool:
+def _possible(ends: list[int], joined: _Edges) -> bool:
     """True if two of the free ends can still be joined."""
     nodes = sorted(set(ends))
-    return any((a, b) not in found for k, a in enumerate(nodes) for b in nodes[k + 1 :])
+    return any((a, b) not in joined for k, a in enumerate(nodes) for b in nodes[k + 1 :])
 
 
 TOPOLOGY = Family(

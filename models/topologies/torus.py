@@ -36,8 +36,8 @@ def edges(n: int, *, shape: tuple[int, ...] | None = None) -> Iterator[tuple[int
     for i in range(n):
         step = 1
         for size in reversed(shape or sides(n)):
-            place = i // step % size
-            j = i + step if place + 1 < size else i - step * (size - 1)
+            position = i // step % size
+            j = i + step if position + 1 < size else i - step * (size - 1)
             yield min(i, j), max(i, j), 1
             step *= size
 

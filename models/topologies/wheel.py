@@ -28,15 +28,15 @@ def spectrum(n: int) -> Eigenvalues:
     from ..algebra.lazy import LazyEigenvalues
 
     rim = (n - 1) // 2
-    own = n > 5
+    apart = n > 5
 
     def make(k: int) -> tuple[sp.Expr, int]:
         if k == 0 or k > rim:
             return Integer(-n if k else 0), 1
-        times = (1 if 2 * k == n - 1 else 2) + (k == rim and not own)
+        times = (1 if 2 * k == n - 1 else 2) + (k == rim and not apart)
         return expression(AngleSum.cosine(-3, 1, k, n - 1)), times
 
-    return LazyEigenvalues(rim + 1 + own, n, make)
+    return LazyEigenvalues(rim + 1 + apart, n, make)
 
 
 def formula() -> ClosedForm:
