@@ -337,7 +337,7 @@ def family(name: str) -> Family:
         if (function := getattr(made, key)) is not None:
             guarded[key] = plugins.blamed(function)(function)
     if made.spectrum is not None:
-        guarded["spectrum"] = _guarded_spectrum(made.spectrum, getattr(canonical, "place", name))
+        guarded["spectrum"] = _guarded_spectrum(made.spectrum, getattr(canonical, "path", name))
     return replace(made, **guarded)
 
 

@@ -1,1 +1,1 @@
-"""Text, numbers, expressions and options of users: read, checked, refused. Knows no networks."""
+"""Text, numbers, expressions and options of users: read, checked, refused. No networks."""

@@ -16,6 +16,8 @@ from typing import NoReturn
 from .reader import Algebra, NoMeaning, parse, stray_character, unpaired
 
 LENGTH, DEPTH, EXPONENT, MAGNITUDE = 200, 24, 100.0, 1e100
+"""Most characters and nested operations, largest exponent and value: choices, far above what a parameter needs."""
+
 FUNCTIONS: dict[str, Callable[[float], float]] = {
     "cos": math.cos,
     "exp": math.exp,
@@ -93,12 +95,12 @@ class _Floats(Algebra[float]):
         return self._checked(FUNCTIONS[function], argument)
 
     def _checked(self, operation: Callable[..., float | complex], *operands: float) -> float:
-        """The result of an operation, if it is real and not too large."""
+        """Compute an operation; ValueError unless the result is real and at most MAGNITUDE."""
         try:
             value = operation(*operands)
         except (OverflowError, ZeroDivisionError) as error:
             raise ValueError(f"number {self.text!r}: {error}; expected a finite value") from None
         if isinstance(value, complex) or not abs(value) <= MAGNITUDE:
-            found = "a complex value" if isinstance(value, complex) else f"an intermediate value of {value:g}"
-            raise ValueError(f"number {self.text!r} has {found}; expected real values up to {MAGNITUDE:g}")
+            kind = "a complex value" if isinstance(value, complex) else f"an intermediate value of {value:g}"
+            raise ValueError(f"number {self.text!r} has {kind}; expected real values up to {MAGNITUDE:g}")
         return value

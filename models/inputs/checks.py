@@ -1,7 +1,7 @@
 """Checks of arguments, options and entries of files.
 
-Every check takes `what`, the subject of its error, and `value`, what the user gave; it returns the
-value in its final type.  Errors have one grammar: "thing: found X; expected Y; do Z".
+Every check takes `what`, the subject of its error, and the user's `value`, and returns the value in its
+final type.  Errors have one grammar: "thing: found X; expected Y; do Z".
 """
 
 from __future__ import annotations
@@ -35,24 +35,24 @@ def short_repr(value: object) -> str:
     short.maxstring = short.maxother = 60
     short.maxlevel = 2
     try:
-        words = " ".join(short.repr(value).split())
+        text = " ".join(short.repr(value).split())
     except Exception:
-        words = f"<{type(value).__name__}>"
-    return words if len(words) <= 120 else words[:117] + "..."
+        text = f"<{type(value).__name__}>"
+    return text if len(text) <= 120 else text[:117] + "..."
 
 
 T = TypeVar("T")
 
 
-def suggestion(found: object, known: Iterable[str], other: Mapping[str, str] | None = None) -> str:
-    """Return the question whether a known name was meant."""
-    if not isinstance(found, str):
+def suggestion(name: object, names: Iterable[str], other: Mapping[str, str] | None = None) -> str:
+    """Return "; did you mean …?" for a name close to a valid one, or to another word for one; "" for any other."""
+    if not isinstance(name, str):
         return ""
-    meant = {name: name for name in known}
-    meant = {name: here for name, here in (other or {}).items() if here in meant} | meant
-    longer = sorted(name for name in meant if found and name.startswith(found))
-    close = longer[:1] or difflib.get_close_matches(found, sorted(meant), 1)
-    return f"; did you mean {meant[close[0]]!r}?" if close else ""
+    targets = {candidate: candidate for candidate in names}
+    targets = {candidate: target for candidate, target in (other or {}).items() if target in targets} | targets
+    longer = sorted(candidate for candidate in targets if name and candidate.startswith(name))
+    close = longer[:1] or difflib.get_close_matches(name, sorted(targets), 1)
+    return f"; did you mean {targets[close[0]]!r}?" if close else ""
 
 
 _NUMBERED = re.compile(r"(.+?)((?:_\d+)+)")
@@ -60,37 +60,37 @@ _NUMBERED = re.compile(r"(.+?)((?:_\d+)+)")
 
 
 def listed(names: Iterable[str]) -> str:
-    """Return names with commas between them; of more than two in a row that differ by numbers alone the first and the last."""
-    words: list[str] = []
+    """Join names by commas; of three or more in a row that differ in their numbers alone, only the first and the last."""
+    parts: list[str] = []
     for base, same in groupby(names, lambda name: match[1] if (match := _NUMBERED.fullmatch(name)) else name):
         row = list(same)
-        words += row if len(row) < 3 or row[0] == base else [f"{row[0]} … {row[-1]}"]
-    return ", ".join(words)
+        parts += row if len(row) < 3 or row[0] == base else [f"{row[0]} … {row[-1]}"]
+    return ", ".join(parts)
 
 
 def first_of(values: Iterable[T], n: int) -> tuple[tuple[T, ...], str]:
-    """Return up to n + 1 of some values, and in words how many there are; endless ones are not counted."""
+    """Return up to n + 1 of some values, and their number as text: "more than n" for an iterator, which is not counted."""
     first = tuple(islice(values, n + 1))
     endless = len(first) > n and not isinstance(values, Sized)
     return first, f"more than {n}" if endless else str(len(values) if isinstance(values, Sized) else len(first))
 
 
 def is_row(value: object) -> TypeGuard[Iterable[Any]]:
-    """True for a sequence of values in place of one."""
+    """Return True for a sequence of values, False for a single value."""
     return isinstance(value, Iterable) and not isinstance(value, str | bytes) and getattr(value, "ndim", 1) > 0
 
 
-def check_keys(what: str, given: Mapping[object, object], known: Iterable[str]) -> None:
-    """Check that all keys of a mapping are text, and known."""
-    known = tuple(known)
-    for key in given:
+def check_keys(what: str, table: Mapping[object, object], names: Iterable[str]) -> None:
+    """Raise an error unless all keys of a mapping are texts out of `names`."""
+    names = tuple(names)
+    for key in table:
         if not isinstance(key, str):
             raise TypeError(f"{what}: key {short_repr(key)} is a {type(key).__name__}; expected text")
-        if key not in known:
+        if key not in names:
             if reason := unsupported(key):
                 raise ValueError(f"{what}: unknown key {short_repr(key)}: {reason}")
-            close = suggestion(key, known)
-            raise ValueError(f"{what}: unknown key {short_repr(key)}; known: {', '.join(known) or 'none'}{close}")
+            close = suggestion(key, names)
+            raise ValueError(f"{what}: unknown key {short_repr(key)}; known: {', '.join(names) or 'none'}{close}")
 
 
 def check_table(what: str, value: object) -> Mapping[object, object]:
@@ -114,25 +114,25 @@ def check_printable(what: str, value: str) -> str:
 
     A terminal obeys control characters, and a name may come from any file.
     """
-    found = _CONTROL.search(value)
-    if found:
+    control = _CONTROL.search(value)
+    if control:
         raise ValueError(
-            f"{what}: found the control character {found[0]!a}; expected letters, digits and signs on one line; "
+            f"{what}: found the control character {control[0]!a}; expected letters, digits and signs on one line; "
             "remove it"
         )
     return value
 
 
-def check_choice(what: str, value: object, known: tuple[str, ...]) -> str:
-    """Return a value that is one of the known names."""
+def check_choice(what: str, value: object, names: tuple[str, ...]) -> str:
+    """Return a value that is one of some names."""
     name = check_text(what, value)
-    if name not in known:
-        raise ValueError(f"unknown {what} {short_repr(name)}; known: {', '.join(known)}{suggestion(name, known)}")
+    if name not in names:
+        raise ValueError(f"unknown {what} {short_repr(name)}; known: {', '.join(names)}{suggestion(name, names)}")
     return name
 
 
 def check_number(what: str, value: object, low: float | None = None, high: float | None = None) -> float:
-    """Return a finite float."""
+    """Return a finite float, of a number or of a constant expression such as "2*pi"."""
     if getattr(value, "ndim", None) == 0:
         value = value.item()  # type: ignore[attr-defined]
     if isinstance(value, str):
@@ -155,12 +155,12 @@ def check_number(what: str, value: object, low: float | None = None, high: float
 
 
 def _is_exact(value: object) -> bool:
-    """True for a real number of SymPy, which is not loaded for it."""
+    """True for a real number of SymPy, found without importing SymPy."""
     return bool(getattr(value, "is_number", False) and getattr(value, "is_real", False))
 
 
 def _span(low: float | None, high: float | None) -> str:
-    """The words for a closed range with optional ends."""
+    """Describe a closed range with optional ends."""
     if high is None:
         return "a number" if low is None else f"a number of at least {low:g}"
     return f"a number of at most {high:g}" if low is None else f"a number from {low:g} to {high:g}"
@@ -169,8 +169,8 @@ def _span(low: float | None, high: float | None) -> str:
 def typed_repr(value: object) -> str:
     """Return the short `repr` of any value and its type, for an error message."""
     name = type(value).__name__
-    words = short_repr(value)
-    return words if name in words or value is None else f"{words} ({name})"
+    text = short_repr(value)
+    return text if name in text or value is None else f"{text} ({name})"
 
 
 def check_instance(what: str, value: object, kind: type[T] | tuple[type[T], ...], expected: str) -> T:
@@ -205,7 +205,7 @@ def check_integer(what: str, value: object, low: int, high: int | None = None) -
 
 
 def check_positive(what: str, value: object) -> float:
-    """Return a finite number above 0; raises TypeError and ValueError as `number`."""
+    """Return a finite number above 0; TypeError and ValueError as `check_number`."""
     result = check_number(what, value)
     if result <= 0.0:
         raise ValueError(f"{what}: found {result:g}; expected a number above 0")

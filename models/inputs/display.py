@@ -1,4 +1,4 @@
-"""Values that show themselves in a notebook: the door from a value to the room that draws."""
+"""Base classes of values with HTML, LaTeX or a drawing in notebooks; the rooms above write these."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
 
 class HasHtml:
-    """A value with HTML for notebooks, which `synchain.runtime.reports` writes.
+    """A value with HTML for notebooks, written by `synchain.runtime.reports`.
 
-    Its public methods refuse arguments that do not fit as public functions do.
+    Its public methods refuse wrong arguments as public functions do (`check_methods`).
     """
 
     __slots__ = ()

@@ -1,4 +1,4 @@
-"""Expressions of symbols as text: what the numbers, operations and functions in it make, whatever its names mean."""
+"""Read a text as an expression of SymPy; subclasses of `Expressions` decide which names and functions there are."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .checks import short_repr, suggestion
 from .reader import Algebra, NoMeaning, ParsedText
 
 EXPONENT, MAGNITUDE = 16, 1e100
-"""Largest exponent of a power that is a number, largest constant."""
+"""Largest exponent that is a number, largest constant; choices that keep expressions short and doubles finite."""
 
 FUNCTIONS: Mapping[str, Any] = {
     "abs": sp.Abs, "acos": sp.acos, "acosh": sp.acosh, "asin": sp.asin, "asinh": sp.asinh, "atan": sp.atan,
@@ -21,7 +21,7 @@ FUNCTIONS: Mapping[str, Any] = {
     "exp": sp.exp, "floor": sp.floor, "log": sp.log, "max": sp.Max, "min": sp.Min, "sign": sp.sign, "sin": sp.sin, "sinh": sp.sinh,
     "sqrt": sp.sqrt, "tan": sp.tan, "tanh": sp.tanh,
 }  # fmt: skip
-"""The functions that a model may call, by their names in text; generated code knows the same ones."""
+"""The functions that a model may call, by their names in text; generated code has the same ones."""
 
 
 def _expm1(x: sp.Expr) -> sp.Expr:
@@ -86,54 +86,54 @@ _COUNTS: Mapping[Any, int | None] = {sp.atan2: 2, _modulo: 2, sp.Max: None, sp.M
 
 
 class _Refusal(Exception):
-    """An error in words of its own."""
+    """An error with a complete message."""
 
 
 @dataclass(frozen=True, slots=True)
 class Expressions(Algebra[sp.Basic]):
-    """Expressions as SymPy makes them; operands are checked, so that no constant grows.
+    """Expressions of SymPy; each operand is checked before it is used, so that no constant grows without bound.
 
-    A subclass says what names and functions there are.
+    A subclass defines the names and functions.
     """
 
     what: str  # the subject of errors
     deepest = 100
     whole: ClassVar[float] = MAGNITUDE  # largest whole number, above and below a line
-    numbers: ClassVar[str] = "finite numbers"  # what constants must be, in words
-    functions: ClassVar[Mapping[str, Callable[..., sp.Expr]]]  # the functions by their names, as messages list them
+    numbers: ClassVar[str] = "finite numbers"  # the condition on constants, for messages
+    functions: ClassVar[Mapping[str, Callable[..., sp.Expr]]]  # by name, in the order of messages
 
     def read(self, expression: ParsedText) -> sp.Expr:
         """Return the value of an expression."""
         try:
-            found = self.value(expression.evaluate(self))
+            value = self.value(expression.evaluate(self))
         except _Refusal as refusal:
             raise ValueError(str(refusal)) from None
         except NoMeaning as error:
             raise ValueError(f"{self.what}: {error.reason}") from None
-        except Exception as error:  # of SymPy, which compares in vain
+        except Exception as error:  # of SymPy, e.g. for a comparison that it cannot decide
             text, reason = short_repr(expression.text), " ".join(str(error).split())[:200]
             raise ValueError(f"{self.what}: {text} has no value: {reason or type(error).__name__}") from None
-        steep = [e for e in found.atoms(sp.Pow) if e.exp.is_number and not abs(e.exp) <= EXPONENT]
+        steep = [e for e in value.atoms(sp.Pow) if e.exp.is_number and not abs(e.exp) <= EXPONENT]
         if steep:
             raise ValueError(
                 f"{self.what}: found the power {short_repr(steep[0])}; expected exponents up to {EXPONENT}"
             )
-        return found
+        return value
 
     def pieces(self) -> str:
-        """What expressions consist of beside numbers, in words."""
+        """List the pieces of expressions beside numbers, for messages."""
         raise NotImplementedError
 
     def function(self, name: str) -> Callable[..., sp.Expr] | None:
-        """The function of a name, None of an unknown one."""
+        """Return the function of a name, None for an unknown one."""
         return self.functions.get(name)
 
     def _known(self, name: str) -> Callable[..., sp.Expr]:
-        found = self.function(name)
-        if found is None:
+        function = self.function(name)
+        if function is None:
             close = suggestion(name, self.functions)
             raise NoMeaning(f"unknown function {short_repr(name)}; known: {', '.join(self.functions)}{close}")
-        return found
+        return function
 
     def refuse(self, node: ast.expr, reason: str) -> NoReturn:
         piece = short_repr(ast.unparse(node))
@@ -181,8 +181,8 @@ class Expressions(Algebra[sp.Basic]):
         return lower**upper
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[sp.Basic]]:
-        found = self._known(function)
-        wanted = _COUNTS.get(found, 1)
+        called = self._known(function)
+        wanted = _COUNTS.get(called, 1)
         if options or (count < 2 if wanted is None else count != wanted):
             raise NoMeaning(f"{function} has {count + len(options)} arguments; expected {wanted or 'at least 2'}")
         return (self,) * count
@@ -191,7 +191,7 @@ class Expressions(Algebra[sp.Basic]):
         return self._known(function)(*map(self.value, arguments))
 
     def value(self, e: sp.Basic) -> sp.Expr:
-        """The expression, if it is no condition and its constants are finite and not too large."""
+        """Return an expression; NoMeaning for a condition, and for a constant that is infinite or too large."""
         if not isinstance(e, sp.Expr):
             raise NoMeaning(f"found the condition {short_repr(e)}, which is no value; expected a value")
         large = next((number for number in _constants(e) if not self.fits(number)), None)
@@ -200,7 +200,7 @@ class Expressions(Algebra[sp.Basic]):
         return e
 
     def fits(self, number: sp.Expr) -> bool:
-        """True for a constant that is finite and not too large."""
+        """Return True for a constant that is finite and not too large."""
         if number.is_Rational:
             return bool(max(abs(number.p), number.q) <= self.whole)
         size = sp.N(number)

@@ -1,4 +1,4 @@
-"""Names of states and parameters of single nodes, "x_2", and links, "k_1_2", and those that results have for things of their own."""
+"""Names of states and parameters of single nodes, "x_2", and links, "k_1_2", and the names that results reserve."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TAKEN = frozenset(
      "trajectory",
      "transversal_exponent", "transversal_stderr", "verdict"}
 )  # fmt: skip
-"""What data of results have under these names already."""
+"""Variables and coordinates of results."""
 
 ATTRIBUTES = frozenset(
     {"as_dict", "belongs_to", "data", "integrators", "kind", "link", "message", "name", "names", "plot", "restore", "save", "scene", "state",

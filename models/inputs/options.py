@@ -19,9 +19,9 @@ _LIST = re.compile(r"[\s\d]+([,x][\s\d]+)+", re.ASCII)
 _INTEGER = re.compile(r"[+-]?\d{1,18}", re.ASCII)
 
 
-def as_options(given: Mapping[str, Any]) -> Options:
+def as_options(options: Mapping[str, Any]) -> Options:
     """Return options as a topology stores them: sorted by name, lists as tuples."""
-    return tuple((key, tuple(v) if isinstance(v, list) else v) for key, v in sorted(given.items()))
+    return tuple((key, tuple(v) if isinstance(v, list) else v) for key, v in sorted(options.items()))
 
 
 def integer_option(what: str, value: object, low: int, high: int | None = None) -> int:
@@ -85,10 +85,10 @@ def integers_option(what: str, value: object, low: int) -> tuple[int, ...]:
         entries = value
     else:
         raise TypeError(f"{what} = {short_repr(value)}; expected a list of whole numbers, e.g. [1, 3]")
-    numbers = tuple(integer_option(what, entry, low) for entry in entries)
-    if not numbers:
+    result = tuple(integer_option(what, entry, low) for entry in entries)
+    if not result:
         raise ValueError(f"{what} is empty; expected at least one whole number")
-    return numbers
+    return result
 
 
 def probability_option(what: str, value: object) -> str:

@@ -14,7 +14,6 @@ from __future__ import annotations
 import hashlib
 import inspect
 import pkgutil
-import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -23,12 +22,10 @@ from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .checks import check_path, check_text, short_repr, suggestion
-
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
+from .entry_points import announced
 
 PACKAGE = "synchain.models"
 """The package whose folders hold the plug-ins that are shipped."""
@@ -58,17 +55,17 @@ class OwnFile(str):
     value of one text of one file.
     """
 
-    __slots__ = ("digest", "place")
-    place: str
+    __slots__ = ("digest", "path")
+    path: str
     digest: str
 
-    def __new__(cls, name: str, place: str, digest: str) -> OwnFile:
+    def __new__(cls, name: str, path: str, digest: str) -> OwnFile:
         file = super().__new__(cls, name)
-        file.place, file.digest = place, digest
+        file.path, file.digest = path, digest
         return file
 
     def _key(self) -> tuple[str, str, str]:
-        return str(self), self.place, self.digest
+        return str(self), self.path, self.digest
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, OwnFile) and self._key() == other._key()
@@ -91,7 +88,7 @@ _allowed: set[Path] = set()
 
 def names(kind: PluginKind) -> tuple[str, ...]:
     """Return the sorted names of all plug-ins of a kind."""
-    return tuple(sorted({*_shipped(kind), *_entry_points(kind)}))
+    return tuple(sorted({*_shipped(kind), *announced(_group(kind))}))
 
 
 def allow_code(*paths: str | Path) -> None:
@@ -110,14 +107,14 @@ def allow_code(*paths: str | Path) -> None:
         If one is no file that ends in .py.
     """
     for path in paths:
-        place = check_path("plug-in", path)
-        if place.suffix != ".py" or not place.is_file():
+        file = check_path("plug-in", path)
+        if file.suffix != ".py" or not file.is_file():
             raise ValueError(f"plug-in {str(path)!r} is no file that ends in .py; check the path")
-        _allowed.add(place.resolve())
+        _allowed.add(file.resolve())
 
 
 def allowed_code() -> tuple[str, ...]:
-    """The files outside the package that may be run as plug-ins, sorted."""
+    """Return the files outside the package that may be run as plug-ins, sorted."""
     return tuple(sorted(map(str, _allowed)))
 
 
@@ -141,15 +138,15 @@ def load(kind: PluginKind, name: str) -> Any:
     """Return the value that a plug-in file assigns, with the plug-in's name and the summary from its docstring."""
     name = named(kind, name)
     if isinstance(name, OwnFile):
-        return _value(kind, name, _module(kind, name), name.place)
+        return _value(kind, name, _module(kind, name), name.path)
     if name in _shipped(kind):
         module = import_module(f"{PACKAGE}.{kind.folder}.{name}")
         return _value(kind, name, module, str(module.__file__))
-    if name in _entry_points(kind):
+    if name in announced(_group(kind)):
         return _value(kind, name, *_installed(kind, name))
-    known = names(kind)
-    hint = suggestion(name, known, {**kind.near, **kind.also})
-    raise ValueError(f"unknown {kind.name} {short_repr(name)}; known: {', '.join(known)}{kind.otherwise}{hint}")
+    valid = names(kind)
+    hint = suggestion(name, valid, {**kind.near, **kind.also})
+    raise ValueError(f"unknown {kind.name} {short_repr(name)}; known: {', '.join(valid)}{kind.otherwise}{hint}")
 
 
 def is_shipped(kind: PluginKind, name: str) -> bool:
@@ -199,22 +196,13 @@ def _shipped(kind: PluginKind) -> tuple[str, ...]:
     return tuple(m.name for m in pkgutil.iter_modules(package.__path__) if not m.name.startswith("_"))
 
 
-def _entry_points(kind: PluginKind) -> Mapping[str, EntryPoint]:
-    """The entry points of installed packages by name; none is loaded."""
-    return _announced(f"synchain.{kind.folder}", tuple(sys.path))
-
-
-@lru_cache(maxsize=8)
-def _announced(group: str, paths: tuple[str, ...]) -> Mapping[str, EntryPoint]:
-    """The entry points of a group, looked up again only if `sys.path` has changed."""
-    from importlib.metadata import entry_points
-
-    return {entry.name: entry for entry in entry_points(group=group)}
+def _group(kind: PluginKind) -> str:
+    return f"synchain.{kind.folder}"
 
 
 def _installed(kind: PluginKind, name: str) -> tuple[ModuleType, str]:
     """The module of an entry point, and how messages call it."""
-    entry = _entry_points(kind)[name]
+    entry = announced(_group(kind))[name]
     where = f"{kind.name} {name!r} of the entry point {entry.value!r}"
     try:
         module = entry.load()
@@ -225,41 +213,41 @@ def _installed(kind: PluginKind, name: str) -> tuple[ModuleType, str]:
     return module, where
 
 
-def _text(kind: PluginKind, name: str, place: Path) -> bytes:
+def _text(kind: PluginKind, name: str, path: Path) -> bytes:
     """The text of a file that `allow_code` has allowed; ValueError if it is not allowed or cannot be read."""
-    if not place.is_file():
-        raise ValueError(f"{kind.name} {name!r}: no such file: {place}; expected a .py file; check the path")
-    if place not in _allowed:
+    if not path.is_file():
+        raise ValueError(f"{kind.name} {name!r}: no such file: {path}; expected a .py file; check the path")
+    if path not in _allowed:
         raise ValueError(
             f"{kind.name} {name!r} is a file of code, which is not run unasked; read it, then allow it: "
             f"synchain.models.inputs.plugins.allow_code({name!r}), or --allow-code where a command has it"
         )
     try:
-        return place.read_bytes()
+        return path.read_bytes()
     except OSError as error:
         raise ValueError(
-            f"{kind.name} {name!r}: cannot be read ({error.strerror}); check the rights of {place}"
+            f"{kind.name} {name!r}: cannot be read ({error.strerror}); check the rights of {path}"
         ) from None
 
 
 def _module(kind: PluginKind, own: OwnFile, text: bytes | None = None) -> ModuleType:
     """The module of a file of code, run once for each text."""
-    key = (kind.name, own.place, own.digest)
+    key = (kind.name, own.path, own.digest)
     if key in _modules:
         return _modules[key]
     if text is None:
-        text = _text(kind, own, Path(own.place))
+        text = _text(kind, own, Path(own.path))
         if hashlib.sha256(text).hexdigest() != own.digest:
             raise ValueError(
-                f"{kind.name} {str(own)!r}: found another text in {own.place} than when its scene was made; "
+                f"{kind.name} {str(own)!r}: found another text in {own.path} than when its scene was made; "
                 "expected the same text; make the scene anew, or restore the file"
             )
-    module = ModuleType(f"synchain_{kind.name}_{Path(own.place).stem}")
-    module.__file__ = own.place
+    module = ModuleType(f"synchain_{kind.name}_{Path(own.path).stem}")
+    module.__file__ = own.path
     try:
-        exec(compile(text, own.place, "exec", dont_inherit=True), module.__dict__)
+        exec(compile(text, own.path, "exec", dont_inherit=True), module.__dict__)
     except Exception as error:
-        raise _located(error, own.place) from error
+        raise _located(error, own.path) from error
     _modules[key] = module
     return module
 
@@ -267,9 +255,9 @@ def _module(kind: PluginKind, own: OwnFile, text: bytes | None = None) -> Module
 def _located(error: Exception, file: str, what: str = "") -> ValueError:
     """A ValueError with the innermost line of `file` in an error's traceback, of any file if `file` is empty."""
     frames = traceback.extract_tb(error.__traceback__)
-    places = [(frame.filename, frame.lineno) for frame in frames if file in ("", frame.filename)]
+    lines = [(frame.filename, frame.lineno) for frame in frames if file in ("", frame.filename)]
     if isinstance(error, SyntaxError) and error.filename and file in ("", error.filename):
-        places.append((error.filename, error.lineno))
-    place = f"{places[-1][0]}, line {places[-1][1]}" if places else file
-    where = f"{what}: {place}" if what else place
+        lines.append((error.filename, error.lineno))
+    where = f"{lines[-1][0]}, line {lines[-1][1]}" if lines else file
+    where = f"{what}: {where}" if what else where
     return ValueError(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}; correct the file")

@@ -15,9 +15,9 @@ from typing import Any
 from .checks import check_path, check_printable
 
 FILE_LIMIT = 32 * 2**20
-"""Largest matrix file that is read, in bytes."""
+"""Largest matrix file in bytes, a choice."""
 ROWS = 2000
-"""Most rows of a matrix: larger graphs are made of their links."""
+"""Most rows of a matrix, a choice; larger graphs are read as lists of links."""
 
 _TEXT = re.compile(r"[+-]?(?:\d+/0*[1-9]\d*|(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)", re.ASCII)
 _BY_ZERO = re.compile(r"[+-]?\d+/0+", re.ASCII)
@@ -26,7 +26,7 @@ _EXPECTED = "expected a rational number such as 1/2, -3 or 0.25"
 
 
 def rational(entry: Any, where: str) -> Fraction:
-    """Return one exact number."""
+    """Return the exact value of a number or a text; a float stands for its shortest decimal."""
     if isinstance(entry, bool):
         raise TypeError(f"{where} is {entry}, a bool; {_EXPECTED}")
     if isinstance(entry, str):
@@ -48,14 +48,14 @@ def rational(entry: Any, where: str) -> Fraction:
 
 @lru_cache(maxsize=4096)
 def _number(text: str) -> Fraction | None:
-    """The number of a text; None if the text is none."""
+    """The number of a text, None if it cannot be read."""
     return Fraction(text) if len(text) <= _LONGEST and _TEXT.fullmatch(text) else None
 
 
 def _from_text(text: str, where: str) -> Fraction:
-    found = _number(text)
-    if found is not None:
-        return found
+    number = _number(text)
+    if number is not None:
+        return number
     shown = text if len(text) <= 40 else f"{text[:40]}… ({len(text)} characters)"
     if _BY_ZERO.fullmatch(text):
         raise ValueError(f"{where} is {shown}, a division by zero; {_EXPECTED}")
@@ -70,19 +70,19 @@ def rational_rows(rows: Any, name: str) -> list[list[Fraction]]:
 
 
 def _entry(entry: object, name: str, i: int, j: int) -> Fraction:
-    found = _number(entry) if type(entry) is str else None
-    return rational(entry, f"{name}: entry ({i + 1}, {j + 1})") if found is None else found
+    number = _number(entry) if type(entry) is str else None
+    return rational(entry, f"{name}: entry ({i + 1}, {j + 1})") if number is None else number
 
 
 def total(numbers: Iterable[Fraction]) -> Fraction:
-    """Return the sum of many fractions: their numerators over one denominator, reduced once."""
-    found = list(filter(None, numbers))
-    below = lcm(*(x.denominator for x in found))
-    return Fraction(sum(x.numerator * (below // x.denominator) for x in found), below)
+    """Add fractions over one common denominator and reduce once, which is faster for many of them."""
+    terms = list(filter(None, numbers))
+    below = lcm(*(x.denominator for x in terms))
+    return Fraction(sum(x.numerator * (below // x.denominator) for x in terms), below)
 
 
 def square(rows: Any, name: str) -> list[list[Any]]:
-    """Return the rows of a square table, its entries as they are."""
+    """Return the rows of a square table with unchanged entries."""
     # SymPy lists a matrix entry by entry
     symbolic = hasattr(rows, "tolist") and not hasattr(rows, "dtype")
     listed = rows.tolist() if symbolic else rows
@@ -116,21 +116,21 @@ def _too_large(name: str) -> ValueError:
 
 def file_text(path: str | Path, what: str, expected: str = "a text file") -> tuple[str, str]:
     """Return the text of a small file, and the name of the file."""
-    place = check_path(what, path)
-    check_printable(what, place.name)
-    if not place.exists():
-        raise FileNotFoundError(f"{what} {str(place)!r} does not exist; expected {expected}: check the path")
-    if not place.is_file():
-        raise ValueError(f"{what} {str(place)!r} is a folder or device; expected {expected}")
-    size = place.stat().st_size
+    file = check_path(what, path)
+    check_printable(what, file.name)
+    if not file.exists():
+        raise FileNotFoundError(f"{what} {str(file)!r} does not exist; expected {expected}: check the path")
+    if not file.is_file():
+        raise ValueError(f"{what} {str(file)!r} is a folder or device; expected {expected}")
+    size = file.stat().st_size
     if size > FILE_LIMIT:
         raise ValueError(
-            f"{what} {str(place)!r} has {size} bytes; expected at most {FILE_LIMIT}: larger graphs are made from lists"
+            f"{what} {str(file)!r} has {size} bytes; expected at most {FILE_LIMIT}: larger graphs are made from lists"
         )
     try:
-        return place.read_text(encoding="utf-8-sig"), place.name
+        return file.read_text(encoding="utf-8-sig"), file.name
     except UnicodeDecodeError:
-        raise ValueError(f"{what} {str(place)!r} is not UTF-8; expected {expected} in that encoding") from None
+        raise ValueError(f"{what} {str(file)!r} is not UTF-8; expected {expected} in that encoding") from None
 
 
 def parse_rows(text: str, name: str) -> list[list[str]]:

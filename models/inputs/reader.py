@@ -1,7 +1,7 @@
-"""The one reader of expressions of users: a whitelist over `ast`, nothing in a text is ever run.
+"""Read expressions of users by a whitelist over `ast`; no text is ever run.
 
-`parse` turns a text into an `ParsedText`; `ParsedText.evaluate` walks its tree and leaves the
-meaning of every number, name and operation to an `Algebra`: floats, exact numbers, sums of cosines,
+`parse` turns a text into a `ParsedText`; `ParsedText.evaluate` walks its syntax tree and asks an
+`Algebra` for the value of every number, name and operation: floats, exact numbers, sums of cosines,
 symbolic weights and graphs are algebras.
 """
 
@@ -43,10 +43,9 @@ class NoMeaning(Exception):
 class Algebra(Generic[V]):
     """The meaning of expressions: the values of numbers, names, operations and calls, and refusals.
 
-    Values are of any type V.  A subclass defines what its expressions may contain; every method
-    that it leaves out raises NotImplementedError, which the reader turns into `refuse` with the
-    piece of the expression.  A method that may take long or grow large checks the sizes of its
-    operands first.
+    Values are of any type V.  Every method that a subclass leaves out raises NoMeaning, which the
+    reader turns into `refuse` with the piece of the expression.  A method that may take long or grow
+    large checks the sizes of its operands first.
 
     Attributes
     ----------
@@ -109,11 +108,11 @@ class Algebra(Generic[V]):
         return self.power(base, self.number(exponent))
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[Any] | None]:
-        """The algebras that read the arguments of a call; a wrong call is refused here."""
+        """Return an algebra for each argument of a call, None for one that is passed on as text; NoMeaning for a wrong call."""
         raise NoMeaning
 
     def call(self, function: str, arguments: Sequence[Any], options: Mapping[str, str]) -> V:
-        """The value of a call; `options` are the arguments with a name, as they are written."""
+        """The value of a call; `options` are the keyword arguments as text."""
         raise NoMeaning
 
     def compare(self, sign: str, a: V, b: V) -> V:
@@ -241,26 +240,26 @@ class ParsedText:
         return algebra.call(function, arguments, dict(zip(names, values, strict=True)))
 
     def _written(self, node: ast.expr) -> str:
-        """A piece as a command line has it: (3, 4) as 3,4; 1 / 10 as 1/10; digits unchanged."""
+        """The text of a piece in the form of a command line: (3, 4) as 3,4; 1 / 10 as 1/10; digits unchanged."""
         if isinstance(node, ast.Tuple):
             return ",".join(self._written(element) for element in node.elts)
         return (ast.get_source_segment(self.text, node) or "").replace(" ", "")
 
 
 def _called(node: ast.expr) -> str | None:
-    """The name of what is called: f, nodes.mean or nodes[3]; None for anything else."""
+    """The name of a called function: f, nodes.mean or nodes[3]; None for any other expression."""
     match node:
         case ast.Name(id=name):
             return name
-        case ast.Attribute(value=ast.Name(id=name), attr=own):
-            return f"{name}.{own}"
+        case ast.Attribute(value=ast.Name(id=name), attr=attribute):
+            return f"{name}.{attribute}"
         case ast.Subscript(value=ast.Name(id=name), slice=ast.Constant(value=int() as i)) if not isinstance(i, bool):
             return f"{name}[{i}]"
     return None
 
 
 def parse(text: str) -> ParsedText | None:
-    """Return a text as an expression."""
+    """Return the syntax tree of a text, None if it is no expression of Python."""
     stripped = text.strip()
     try:
         with warnings.catch_warnings():
@@ -271,7 +270,7 @@ def parse(text: str) -> ParsedText | None:
 
 
 def unpaired(text: str) -> str:
-    """Return words on the first bracket of a text that has no partner, such as " with a ( that is not closed"; else ""."""
+    """Describe the first bracket without a partner, " with a ( that is not closed"; return "" if there is none."""
     waiting: list[str] = []
     for sign in text:
         if sign in _PARTNERS.values():

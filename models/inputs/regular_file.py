@@ -14,21 +14,20 @@ def open_regular(
 ) -> FileIO:
     """Open a regular file without buffering.
 
-    The kind of the file is asked of what was opened, so that nothing put in its place meanwhile is
-    read.
+    The kind is tested on the open descriptor, so that a file exchanged in between is not read.
     """
     flags |= os.O_RDWR if writing else os.O_RDONLY
     flags |= getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
-    place = Path(path)
-    if folder is None and place.is_dir():  # Windows cannot open one
-        raise IsADirectoryError(f"{place} is a folder; expected a file: name the file in it")
+    file = Path(path)
+    if folder is None and file.is_dir():  # Windows cannot open one
+        raise IsADirectoryError(f"{file} is a folder; expected a file: name the file in it")
     try:
         descriptor = os.open(path, flags, dir_fd=folder)
     except OSError as problem:
         if problem.errno == errno.ENXIO:  # a socket
-            raise OSError(f"{place} is a pipe or device; expected a file; choose another path") from None
+            raise OSError(f"{file} is a pipe or device; expected a file; choose another path") from None
         raise
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        raise OSError(f"{place} is a pipe or device; expected a file; choose another path")
+        raise OSError(f"{file} is a pipe or device; expected a file; choose another path")
     return FileIO(descriptor, "r+b" if writing else "rb")

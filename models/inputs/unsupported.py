@@ -1,4 +1,4 @@
-"""What networks of the literature have and this program has not, by the words that ask for it, and who has it."""
+"""Features of networks in the literature that this program lacks, with programs that have them, by keyword."""
 
 from __future__ import annotations
 
@@ -29,5 +29,5 @@ _WORDS: Mapping[str, str] = {
 
 
 def unsupported(name: object) -> str:
-    """Return the sentence for a word that asks for what is not supported; "" for other words."""
+    """Return the sentence on an unsupported feature by its keyword; "" for other words."""
     return _WORDS.get(name, "") if isinstance(name, str) else ""

@@ -1,4 +1,4 @@
-"""Words of scene files that have a fixed meaning."""
+"""Words of scene files with a fixed meaning, as enumerations."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .checks import check_choice
 
 
 class Word(StrEnum):
-    """One of a few words: it equals its text and is written as its text."""
+    """A member of an enumeration that equals its text and prints as its text."""
 
     def __repr__(self) -> str:
         return str.__repr__(self)

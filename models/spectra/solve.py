@@ -63,7 +63,7 @@ def spectrum(graph: Matrix, proof: Proof | None = None) -> Spectrum:
         return _unverified(graph, pairs, check_modulo(graph, pairs) if proof is Proof.MODULAR else None)
     except ProofError as error:
         if isinstance(graph.name, OwnFile):
-            raise ValueError(f"{graph.name.place}: {error}") from None
+            raise ValueError(f"{graph.name.path}: {error}") from None
         raise
 
 
