@@ -46,20 +46,27 @@ class HasDrawing(HasHtml):
 
     __slots__ = ()
 
-    def draw(self, ax: Axes | None = None) -> Axes:
-        """Draw the graph; nothing is shown on a screen, ``ax.figure.savefig("graph.png")`` writes it.
-
-        Widths show weights, arrows one-way links, colours kinds of nodes.
+    def draw(self, ax: Axes | None = None, values: object = None, **style: Any) -> Axes:
+        """Draw the graph: widths show weights, arrows one-way links, colours kinds of nodes or values.
 
         Parameters
         ----------
         ax : matplotlib axes, optional
-            By default those of a new figure.
+            By default pyplot's current ones, or those of a new figure.
+        values : array_like (n,), optional
+            Colour of each node: whole numbers are classes, such as clusters; others are numbers of a colour map.
+        **style
+            Keywords of `matplotlib.axes.Axes.scatter` for the nodes, such as `cmap`, `vmin`, `s`.
 
         Returns
         -------
         matplotlib axes
+
+        Examples
+        --------
+        >>> import synchain as sc
+        >>> axes = sc.ring(6).draw(values=[0, 1, 2, 0, 1, 2])
         """
         from synchain.runtime.plots.graph_picture import draw_graph
 
-        return draw_graph(self, ax)
+        return draw_graph(self, ax, values, **style)

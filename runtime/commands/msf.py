@@ -112,9 +112,10 @@ def execute(arguments: Namespace) -> int:
 
 def _write(found: MSF | Plane, folder: Path) -> list[Path]:
     """Write numbers and plot, over complex strengths with the rays of modes; return both paths."""
+    from ..plots.canvas import SIZE
     from ..plots.csv_table import as_csv
     from ..plots.plane import draw_rays
-    from ..plots.style import context
+    from ..plots.style import context, new_figure
     from ..stability.msf import Plane
     from ..support.files import whole_file, write_text
 
@@ -122,10 +123,11 @@ def _write(found: MSF | Plane, folder: Path) -> list[Path]:
     numbers = found.data[["exponent", "stderr"]].to_dataframe().reset_index()
     write_text(paths[0], as_csv(tuple(numbers.columns), numbers.itertuples(index=False, name=None)))
     with context(), whole_file(paths[1]) as temporary:
-        axes, scene = found.plot(), found.scene
+        figure, scene = new_figure(SIZE), found.scene
+        axes = found.plot(figure.add_subplot())
         if isinstance(found, Plane) and found.has_windows:
             draw_rays(axes, found, scene.parameters[scene.strength] or None)
-        axes.figure.figure.savefig(temporary, dpi=200)
+        figure.savefig(temporary, dpi=200)
     return paths
 
 

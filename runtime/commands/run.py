@@ -274,17 +274,17 @@ def _drawn(target: Path) -> Path:
 
 def _draw(target: Path) -> Path:
     """Write the figure of a result, which is read from its file as far as it is drawn."""
-    import matplotlib
-
-    matplotlib.use("Agg")
+    from ..plots.canvas import SIZE
     from ..plots.result_plot import draw_result
+    from ..plots.style import context, new_figure
     from ..results.labels import scene_of
     from ..results.result import Result
     from ..results.store import opened
 
     path = target.with_suffix(".png")
-    with opened(target) as data:
-        axes = draw_result(Result(data, scene_of(data.attrs)))
+    with opened(target) as data, context():
+        figure = new_figure(SIZE)
+        draw_result(Result(data, scene_of(data.attrs)), figure.add_subplot())
         with whole_file(path) as temporary:
-            axes.figure.figure.savefig(temporary, dpi=150)
+            figure.savefig(temporary, dpi=150)
     return path

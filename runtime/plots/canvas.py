@@ -1,22 +1,29 @@
-"""The axes that plots are drawn into, in the style of the figures."""
+"""The axes that plots are drawn into."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Mapping
+from typing import Any
 
 from matplotlib.axes import Axes
-
-from .style import context, new_figure
+from matplotlib.cbook import normalize_kwargs
+from matplotlib.lines import Line2D
 
 SIZE = (4.8, 3.4)
-"""Width and height of a new figure in inches."""
+"""Width and height in inches of figures that belong to no window."""
 
 
-@contextmanager
-def canvas(ax: Axes | None) -> Iterator[Axes]:
-    """Yield the axes, or those of a new figure, within the style of the figures."""
-    if ax is not None and not isinstance(ax, Axes):
+def axes_of(ax: Axes | None) -> Axes:
+    """Return the given axes, or pyplot's current ones: those of a new figure if there are none, as in xarray."""
+    if ax is None:
+        import matplotlib.pyplot as plt
+
+        return plt.gca()
+    if not isinstance(ax, Axes):
         raise TypeError(f"ax: found {type(ax).__name__}; expected matplotlib axes, e.g. plt.subplots()[1]")
-    with context():
-        yield new_figure(SIZE).add_subplot() if ax is None else ax
+    return ax
+
+
+def line_style(style: Mapping[str, Any], **defaults: Any) -> dict[str, Any]:
+    """Return the style of a line: that of the user, who may write `lw` for `linewidth`, before the defaults."""
+    return {**defaults, **normalize_kwargs(dict(style), Line2D)}

@@ -1,4 +1,4 @@
-"""Plots of every kind of result: functions that take and return axes, and show nothing."""
+"""Plots of every kind of result: functions that draw into axes and return them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from ..synchronisation.basin import Basin, Fate
 from ..synchronisation.probe import Probe
 from ..synchronisation.threshold import Thresholds
 from .branch_marks import MARK, MARKERS, STABLE, UNSTABLE
-from .canvas import canvas
+from .canvas import axes_of, line_style
 from .exponent import draw_exponent, finite
 from .plane import draw_plane
 from .result_plot import draw_result
@@ -40,39 +40,38 @@ DOTS: dict[str, Any] = {"linestyle": "none", "marker": "."}
 """Style of points without a line."""
 
 
-def drawn(value: object, ax: Axes | None, **options: Any) -> Axes:
-    """Draw a value into axes, by default those of a new figure, and return them."""
-    with canvas(ax) as axes:
-        return _draw(value, axes, **options)
+def drawn(value: object, ax: Axes | None, **style: Any) -> Axes:
+    """Draw a value into axes, by default pyplot's current ones, and return them; `style` goes to Matplotlib's artists."""
+    return _draw(value, axes_of(ax), **style)
 
 
 @singledispatch
-def _draw(value: object, axes: Axes) -> Axes:
+def _draw(value: object, axes: Axes, **style: Any) -> Axes:
     raise TypeError(f"found {type(value).__name__}; expected a value with a plot")
 
 
 @_draw.register
-def _(value: Result, axes: Axes, kind: str | None = None) -> Axes:
-    return draw_result(value, axes, kind)
+def _(value: Result, axes: Axes, **options: Any) -> Axes:
+    return draw_result(value, axes, **options)
 
 
 @_draw.register
-def _(value: Streamed, axes: Axes) -> Axes:
-    return draw_result(value.result, axes)
+def _(value: Streamed, axes: Axes, **options: Any) -> Axes:
+    return draw_result(value.result, axes, **options)
 
 
 @_draw.register
-def _(value: MSF, axes: Axes) -> Axes:
-    return draw_exponent(axes, value)
+def _(value: MSF, axes: Axes, sigma: float | None = None, **style: Any) -> Axes:
+    return draw_exponent(axes, value, sigma, **style)
 
 
 @_draw.register
-def _(value: Plane, axes: Axes) -> Axes:
-    return draw_plane(axes, value)
+def _(value: Plane, axes: Axes, **style: Any) -> Axes:
+    return draw_plane(axes, value, **style)
 
 
 @_draw.register
-def _(value: Exponents, axes: Axes) -> Axes:
+def _(value: Exponents, axes: Axes, **style: Any) -> Axes:
     """Draw exponents over a strength as a line, over two strengths of a mode as dots, else in order."""
     label, strengths = r"exponent $\Lambda$ per unit of $\tau$", value.alpha.reshape(len(value.alpha), -1)
     columns = np.concatenate([strengths.real, strengths.imag], axis=1).T if np.iscomplexobj(strengths) else strengths.T
@@ -81,24 +80,25 @@ def _(value: Exponents, axes: Axes) -> Axes:
         names = (r"$\alpha$", r"$\beta$") if value.alpha.ndim == 1 else (r"$\alpha_1$", r"$\alpha_2$")
         colour = finite(value.exponent)
         top = float(np.nanmax(np.abs(colour), initial=0.0)) or 1.0
-        style: dict[str, Any] = {"cmap": "RdBu_r", "s": 14.0, "edgecolors": BLACK, "linewidths": 0.3}
-        dots = axes.scatter(columns[0], columns[1], c=colour, vmin=-top, vmax=top, **style)
+        defaults = {"cmap": "RdBu_r", "s": 14.0, "edgecolors": BLACK, "linewidths": 0.3, "vmin": -top, "vmax": top}
+        dots = axes.scatter(columns[0], columns[1], c=colour, **{**defaults, **style})
         axes.set(xlabel=names[0], ylabel=names[1])
         axes.figure.colorbar(dots, ax=axes, label=label)
         return axes
     axes.axhline(0.0, color=BLACK, linewidth=0.6)
     x = value.alpha if value.on_a_line else np.arange(len(value.alpha))
-    axes.errorbar(x, finite(value.exponent), 2 * finite(value.stderr), color=BLUE)
+    axes.errorbar(x, finite(value.exponent), 2 * finite(value.stderr), **line_style(style, color=BLUE))
     axes.set(xlabel=r"strength of a mode $\alpha$" if value.on_a_line else "number of the mode", ylabel=label)
     return axes
 
 
 @_draw.register
-def _(value: Thresholds, axes: Axes) -> Axes:
+def _(value: Thresholds, axes: Axes, **style: Any) -> Axes:
     """Draw the share of synchronous starts over sigma, with predicted intervals above."""
     # grey where at least half of the starts synchronise
     bands(axes, value.direct.intervals)
-    axes.plot(value.direct.x, value.direct.share, color=BLUE, drawstyle="steps-mid", label="simulated")
+    simulated = line_style(style, color=BLUE, drawstyle="steps-mid", label="simulated")
+    axes.plot(value.direct.x, value.direct.share, **simulated)
     # intervals above the curve: predicted by the probe, and of negative exponents with two standard errors
     for k, (low, high) in enumerate(value.predicted):
         axes.plot([low, high], [1.06, 1.06], color=ORANGE, marker="|", label="" if k else "predicted by the probe")
@@ -113,7 +113,7 @@ def _(value: Thresholds, axes: Axes) -> Axes:
 
 
 @_draw.register
-def _(value: Basin, axes: Axes) -> Axes:
+def _(value: Basin, axes: Axes, **style: Any) -> Axes:
     """Draw the first two initial components of the first node, coloured by the fate of the start."""
     initial, names = value.data.initial.values[:, :2, 0], [str(name) for name in value.data.component.values[:2]]
     across, up = (initial[:, 0], initial[:, -1])
@@ -121,17 +121,17 @@ def _(value: Basin, axes: Axes) -> Axes:
     for k, (fate, colour) in enumerate(zip(Fate, colours, strict=True)):
         chosen = value.fate == k
         if chosen.any():
-            axes.plot(across[chosen], up[chosen], **DOTS, markersize=2.5, color=colour, label=fate)
+            axes.plot(across[chosen], up[chosen], **line_style(style, **DOTS, markersize=2.5, color=colour, label=fate))
     axes.set(xlabel=symbol(f"{names[0]}_1"), ylabel=symbol(f"{names[-1]}_1"))
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     return axes
 
 
 @_draw.register
-def _(value: Lyapunov, axes: Axes) -> Axes:
+def _(value: Lyapunov, axes: Axes, **style: Any) -> Axes:
     number = np.arange(1, len(value.exponent) + 1)
     axes.axhline(0.0, color=BLACK, linewidth=0.6)
-    axes.errorbar(number, finite(value.exponent), 2 * value.stderr, color=BLUE, **DOTS)
+    axes.errorbar(number, finite(value.exponent), 2 * value.stderr, **line_style(style, color=BLUE, **DOTS))
     axes.set(xlabel="number", ylabel="Lyapunov exponent per unit of time")
     lost = int((~value.resolved).sum())
     note(axes, f"{lost} of {len(number)} decay too fast to be followed" if lost else "")
@@ -140,12 +140,13 @@ def _(value: Lyapunov, axes: Axes) -> Axes:
 
 
 @_draw.register
-def _(value: ClusterExponents, axes: Axes) -> Axes:
+def _(value: ClusterExponents, axes: Axes, **style: Any) -> Axes:
     """Draw the exponent of each block with two standard errors, coloured by its verdict."""
     colours = {BlockVerdict.STABLE: BLUE, BlockVerdict.UNDECIDED: GREY, BlockVerdict.UNSTABLE: ORANGE}
     axes.axhline(0.0, color=BLACK, linewidth=0.6)
     for k, verdict in enumerate(value.verdicts):
-        axes.errorbar([k + 1], finite(value.exponent[[k]]), 2 * value.stderr[[k]], color=colours[verdict], fmt="o")
+        look = line_style(style, color=colours[verdict], linestyle="none", marker="o")
+        axes.errorbar([k + 1], finite(value.exponent[[k]]), 2 * value.stderr[[k]], **look)
     names = [f"block {k + 1}\nclusters {', '.join(str(c + 1) for c in row)}" for k, row in enumerate(value.intertwined)]
     axes.set_xticks(range(1, len(names) + 1), names)
     axes.set_ylabel("exponent per unit of time")
@@ -154,19 +155,21 @@ def _(value: ClusterExponents, axes: Axes) -> Axes:
 
 
 @_draw.register
-def _(value: Equilibrium, axes: Axes) -> Axes:
+def _(value: Equilibrium, axes: Axes, **style: Any) -> Axes:
     """Draw the eigenvalues in the complex plane, orange where perturbations grow."""
     grows = value.eigenvalues.real > 0.0 if value.growing else np.zeros(len(value.eigenvalues), dtype=bool)
     axes.axvline(0.0, color=BLACK, linewidth=0.6)
     for chosen, colour in ((~grows, BLUE), (grows, ORANGE)):
-        axes.plot(value.eigenvalues.real[chosen], value.eigenvalues.imag[chosen], **DOTS, color=colour)
+        axes.plot(
+            value.eigenvalues.real[chosen], value.eigenvalues.imag[chosen], **line_style(style, **DOTS, color=colour)
+        )
     axes.set(xlabel="real part of eigenvalues", ylabel="imaginary part")
     note(axes, value.verdict)
     return axes
 
 
 @_draw.register
-def _(value: PeriodicOrbit, axes: Axes) -> Axes:
+def _(value: PeriodicOrbit, axes: Axes, **style: Any) -> Axes:
     """Draw the closed curve of the first two components, with a dot at the start of each period."""
     # integrate one node without links over the period of the orbit
     start = {name: [x] for name, x in zip(value.components, value.state.tolist(), strict=True)}
@@ -181,7 +184,7 @@ def _(value: PeriodicOrbit, axes: Axes) -> Axes:
     )
     path = run(one, show_progress=False, workers=1).trajectory.sel(node=1)
     names = value.components[0], value.components[min(1, len(value.components) - 1)]
-    axes.plot(*(path.sel(component=name) for name in names), color=BLUE)
+    axes.plot(*(path.sel(component=name) for name in names), **line_style(style, color=BLUE))
     points = value.points
     axes.plot(points[:, 0], points[:, min(1, points.shape[1] - 1)], **DOTS, markersize=6.0, color=ORANGE)
     axes.set(xlabel=symbol(names[0]), ylabel=symbol(names[1]))
@@ -189,16 +192,16 @@ def _(value: PeriodicOrbit, axes: Axes) -> Axes:
 
 
 @_draw.register
-def _(value: Branch, axes: Axes) -> Axes:
-    return _branches((value,), axes)
+def _(value: Branch, axes: Axes, **style: Any) -> Axes:
+    return _branches((value,), axes, style)
 
 
 @_draw.register
-def _(value: Skeleton, axes: Axes) -> Axes:
-    return _branches(value.branches, axes)
+def _(value: Skeleton, axes: Axes, **style: Any) -> Axes:
+    return _branches(value.branches, axes, style)
 
 
-def _branches(branches: tuple[Branch, ...], axes: Axes) -> Axes:
+def _branches(branches: tuple[Branch, ...], axes: Axes, style: dict[str, Any]) -> Axes:
     """Draw the first component at the start of a period: solid where stable, dashed where unstable."""
     # one colour for each number of drive periods; `legend` holds one entry for each style that is drawn
     colours = (PURPLE, BLUE, ORANGE, GREEN)
@@ -209,7 +212,7 @@ def _branches(branches: tuple[Branch, ...], axes: Axes) -> Axes:
     for branch in branches:
         colour = colours[counts.index(branch.orbits[0].periods) % len(colours)]
         for stable, values, states in stretches(branch):
-            axes.plot(values, states[:, 0], color=colour, **(STABLE if stable else UNSTABLE))
+            axes.plot(values, states[:, 0], **line_style(style, color=colour, **(STABLE if stable else UNSTABLE)))
             legend["stable" if stable else "unstable"] = {"color": BLACK, **(STABLE if stable else UNSTABLE)}
         for turn in branch.bifurcations:
             axes.plot([turn.value], [turn.orbit.state[0]], color=colour, marker=MARKERS[turn.kind], **MARK)
@@ -217,8 +220,8 @@ def _branches(branches: tuple[Branch, ...], axes: Axes) -> Axes:
     if branches:
         name = symbol(branches[0].orbits[0].components[0])
         axes.set(xlabel=symbol(branches[0].name), ylabel=f"{name} at the beginning of a period")
-        handles = [Line2D([], [], label=label, **style) for label, style in legend.items()]
-        axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize=6)
+        handles = [Line2D([], [], label=label, **look) for label, look in legend.items()]
+        axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, fontsize="x-small")
     return axes
 
 
@@ -244,12 +247,18 @@ def stretches(branch: Branch) -> list[tuple[bool, np.ndarray, np.ndarray]]:
 
 
 @_draw.register
-def _(value: Probe, axes: Axes) -> Axes:
+def _(value: Probe, axes: Axes, **style: Any) -> Axes:
     """Draw strengths in the complex plane: dots where synchronous, crosses where not."""
     good = value.synchronous
-    axes.plot(value.alpha[good], value.beta[good], **DOTS, markersize=7.0, color=BLUE, label="synchronous")
+    axes.plot(
+        value.alpha[good],
+        value.beta[good],
+        **line_style(style, **DOTS, markersize=7.0, color=BLUE, label="synchronous"),
+    )
     crosses: dict[str, Any] = {"linestyle": "none", "marker": "x", "markersize": 5.0}
-    axes.plot(value.alpha[~good], value.beta[~good], **crosses, color=ORANGE, label="not")
+    axes.plot(
+        value.alpha[~good], value.beta[~good], **line_style(style, **crosses, color=ORANGE, label="not synchronous")
+    )
     axes.set(xlabel=r"$\alpha$", ylabel=r"$\beta$")
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     return axes

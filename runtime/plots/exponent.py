@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 
+from synchain.models.presentation.writer import Latex
+
 from ..stability.msf import MSF
-from .style import BLUE, bands
+from .canvas import line_style
+from .style import BLUE, ORANGE, bands
 
 MARKED = 60
 """Most strengths that are marked; more would cover the line."""
 
 
-def draw_exponent(axes: Axes, function: MSF) -> Axes:
+def draw_exponent(axes: Axes, function: MSF, sigma: float | None = None, **style: Any) -> Axes:
     """Draw exponents over all strengths at which they were computed; dots mark the requested ones if they are few.
 
-    A band shows two standard errors on either side, grey bands the ranges with a negative exponent.
+    A band shows two standard errors on either side, grey bands the ranges with a negative exponent. Orange strokes
+    are the modes of the network at the strength `sigma` of links, by default that of the scene.
     """
     fine = function.fine
     value, error = finite(fine.exponent), finite(fine.stderr)
     bands(axes, function.intervals)
     axes.axhline(0.0, color="0.35", linewidth=0.6, zorder=1)
     axes.fill_between(fine.alpha, value - 2 * error, value + 2 * error, color=BLUE, alpha=0.3, linewidth=0.0, zorder=2)
-    axes.plot(fine.alpha, value, color=BLUE, linewidth=0.9, zorder=3)
+    axes.plot(fine.alpha, value, **line_style(style, color=BLUE, linewidth=0.9, zorder=3))
     if len(function.alpha) <= MARKED:
         axes.plot(
             function.alpha,
@@ -33,12 +39,28 @@ def draw_exponent(axes: Axes, function: MSF) -> Axes:
             markersize=2.5,
             zorder=3,
         )
+    _mark_modes(axes, function, sigma)
     axes.set(
         xlim=(function.alpha[0], function.alpha[-1]),
         xlabel=r"strength of a mode $\alpha=\sigma\,|\gamma|$",
         ylabel=r"exponent $\Lambda$ per unit of $\tau$",
     )
     return axes
+
+
+def _mark_modes(axes: Axes, function: MSF, sigma: float | None) -> None:
+    """Mark the strengths sigma |gamma| of the modes of the network, if they are real and inside the plotted range."""
+    scene = function.scene
+    strength = scene.parameters[scene.strength] if sigma is None else sigma
+    gamma = np.array([value for value in scene.topology.spectrum.values if value != 0]) if strength else np.array([])
+    if not gamma.size or np.iscomplexobj(gamma):
+        return
+    modes = np.unique(-strength * gamma.real)
+    modes = modes[(modes >= function.alpha[0]) & (modes <= function.alpha[-1])]
+    heights = np.interp(modes, function.fine.alpha, finite(function.fine.exponent))
+    label = rf"modes at ${Latex().letter(scene.strength)} = {strength:.4g}$"
+    axes.plot(modes, heights, color=ORANGE, linestyle="none", marker="|", markersize=9.0, zorder=4, label=label)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0))
 
 
 def finite(values: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from .graph_layout import positions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from numpy.typing import ArrayLike
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 """Colours of the kinds of nodes (Okabe & Ito)."""
@@ -127,52 +128,66 @@ def _hits_node(positions: np.ndarray, i: int, j: int) -> bool:
     return bool(np.any((along > 1e-6) & (along < 1.0 - 1e-6) & (distance < 0.01)))
 
 
-def draw_graph(value: HasDrawing, ax: Axes | None = None) -> Axes:
-    """Draw a graph, or that of a scene, into axes (default: those of a new figure); return them."""
+def draw_graph(value: HasDrawing, ax: Axes | None = None, values: ArrayLike | None = None, **style: Any) -> Axes:
+    """Draw a graph, or that of a scene, into axes (default: pyplot's); return them.
+
+    `values` (n,) colour the nodes: whole numbers as classes, others by a colour map.
+    """
     from matplotlib.collections import LineCollection
     from matplotlib.patches import FancyArrowPatch
 
-    from .canvas import canvas
+    from .canvas import axes_of
 
-    picture = Picture.of(value)
-    with canvas(ax) as axes:
-        # straight lines as one collection, which draws fast
-        place, straight = picture.positions, [line for line in picture.lines if not (line.arrow or line.bent)]
-        axes.add_collection(
-            LineCollection(
-                [place[[line.source, line.target]] for line in straight],
-                linewidths=[line.width for line in straight],
-                colors=[NEGATIVE if line.negative else "0.45" for line in straight],
+    picture, axes = Picture.of(value), axes_of(ax)
+    # straight lines as one collection, which draws fast
+    place, straight = picture.positions, [line for line in picture.lines if not (line.arrow or line.bent)]
+    axes.add_collection(
+        LineCollection(
+            [place[[line.source, line.target]] for line in straight],
+            linewidths=[line.width for line in straight],
+            colors=[NEGATIVE if line.negative else "0.45" for line in straight],
+            zorder=1,
+        )
+    )
+    # arcs and arrows one by one
+    for line in picture.lines:
+        if line.arrow or line.bent:
+            patch = FancyArrowPatch(
+                place[line.source],
+                place[line.target],
+                arrowstyle="-|>" if line.arrow else "-",
+                connectionstyle=f"arc3,rad={BEND if line.bent else 0.0}",
+                mutation_scale=8.0,
+                shrinkA=0.0,
+                shrinkB=6.0 if line.arrow else 0.0,
+                linewidth=line.width,
+                color=NEGATIVE if line.negative else "0.45",
                 zorder=1,
             )
-        )
-        # arcs and arrows one by one
-        for line in picture.lines:
-            if line.arrow or line.bent:
-                patch = FancyArrowPatch(
-                    place[line.source],
-                    place[line.target],
-                    arrowstyle="-|>" if line.arrow else "-",
-                    connectionstyle=f"arc3,rad={BEND if line.bent else 0.0}",
-                    mutation_scale=8.0,
-                    shrinkA=0.0,
-                    shrinkB=6.0 if line.arrow else 0.0,
-                    linewidth=line.width,
-                    color=NEGATIVE if line.negative else "0.45",
-                    zorder=1,
-                )
-                axes.add_patch(patch)
-        _nodes(axes, picture)
+            axes.add_patch(patch)
+    _nodes(axes, picture, values, style)
     return axes
 
 
-def _nodes(axes: Axes, picture: Picture) -> None:
+def _nodes(axes: Axes, picture: Picture, values: ArrayLike | None, style: dict[str, Any]) -> None:
     """Draw the nodes with their colours and labels, with a legend if there are several kinds."""
     place, kind = picture.positions, np.array(picture.kind)
     size = (2.0 * POINTS * picture.radius) ** 2  # matplotlib takes the square of the diameter in points
-    for k, name in enumerate(picture.names):
-        x, y = place[kind == k].T
-        axes.scatter(x, y, s=size, color=COLOURS[k % len(COLOURS)], zorder=2, label=name, linewidths=0.0)
+    dots: dict[str, Any] = {"s": size, "zorder": 2, "linewidths": 0.0, **style}
+    if values is None:
+        for k, name in enumerate(picture.names):
+            axes.scatter(*place[kind == k].T, **{"color": COLOURS[k % len(COLOURS)], "label": name, **dots})
+    else:
+        colour = np.asarray(values)
+        if colour.shape != kind.shape or colour.dtype.kind not in "biuf":
+            raise ValueError(
+                f"values: found an array {colour.shape} of {colour.dtype}; expected {len(kind)} real numbers, one a node"
+            )
+        if colour.dtype.kind == "f":
+            axes.figure.colorbar(axes.scatter(*place.T, **{"c": colour, **dots}), ax=axes)
+        else:  # whole numbers are classes, such as clusters
+            classes = np.unique(colour, return_inverse=True)[1]
+            axes.scatter(*place.T, **{"color": [COLOURS[k % len(COLOURS)] for k in classes], **dots})
     if picture.radius >= NUMBERED:
         for i, (x, y) in enumerate(place.tolist()):
             axes.text(
@@ -185,7 +200,7 @@ def _nodes(axes: Axes, picture: Picture) -> None:
                 fontsize=min(POINTS * picture.radius, 7.0),
                 zorder=3,
             )
-    if len(picture.names) > 1:
+    if len(picture.names) > 1 and values is None:
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
     low, high = place.min(axis=0) - 0.2, place.max(axis=0) + 0.2
     axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))

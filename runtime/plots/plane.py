@@ -29,12 +29,13 @@ DOT: dict[str, Any] = {
 }
 
 
-def draw_plane(axes: Axes, plane: Plane) -> Axes:
+def draw_plane(axes: Axes, plane: Plane, **style: Any) -> Axes:
     """Draw exponents in colours, blue if negative, with a line at zero."""
     value = finite(plane.exponent)
     cmap, norm = _colours(value)
     labels = [AXES[name] if name in plane.strengths else symbol(name) for name in plane.names]
-    painted = axes.pcolormesh(plane.across, plane.up, value.T, norm=norm, cmap=cmap, shading="nearest", rasterized=True)
+    look = {"norm": norm, "cmap": cmap, "shading": "nearest", "rasterized": True, **style}
+    painted = axes.pcolormesh(plane.across, plane.up, value.T, **look)
     for k, line in enumerate(plane.contours):
         axes.plot(line[:, 0], line[:, 1], color=BLACK, linewidth=1.1, label="" if k else r"$\Lambda=0$")
     axes.set(
@@ -45,7 +46,6 @@ def draw_plane(axes: Axes, plane: Plane) -> Axes:
     )
     bar = axes.figure.colorbar(painted, ax=axes, aspect=30, pad=0.02)
     bar.set_label(r"exponent $\Lambda$ per unit of $\tau$")
-    bar.ax.tick_params(labelsize=7)
     return axes
 
 

@@ -1,9 +1,11 @@
-"""Default plot of a result: error curve, bifurcation diagram, map or phase portrait."""
+"""Plots of a result: error curve, bifurcation diagram, map, time series, phase portrait, space-time map, network."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -11,12 +13,14 @@ from matplotlib.axes import Axes
 from synchain.models.inputs.checks import suggestion
 from synchain.models.inputs.names import NodeName
 
+from ..prediction.synchronisability import Window
 from ..results.result import Result
 from ..support.status import Status
-from .canvas import SIZE
-from .style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, context, failures, new_figure, note, symbol
+from .canvas import axes_of, line_style
+from .graph_picture import draw_graph
+from .style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, bands, failures, note, symbol
 
-KINDS = ("error", "section", "map", "phase", "end")
+KINDS = ("error", "section", "map", "time", "phase", "space", "network", "end")
 """Kinds of plot; the names of observables are kinds too."""
 CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
 """Colours of oscillators, in turn."""
@@ -26,16 +30,24 @@ FINEST = 1000
 """Largest number of drawn values per axis of a map; longer axes are thinned."""
 ROUNDING = 1e-9
 """Draw synchronisation errors below this value as zero."""
+DECADES = 1e3
+"""Draw errors whose largest is this many times the smallest on a logarithmic scale."""
 MARKED = 60
 """Largest number of cells drawn with a dot each: more dots would hide the line."""
+SHARP = 0.5
+"""Largest angle in radians between chords of a phase portrait that is drawn as a line: 12 samples a turn."""
+PAINT: dict[str, Any] = {"shading": "nearest", "cmap": "cividis", "rasterized": True}
+"""Style of colours over two axes."""
 
 
-def draw_result(result: Result, ax: Axes | None = None, kind: str | None = None) -> Axes:
-    """Draw a result.
+def draw_result(
+    result: Result, ax: Axes | None = None, kind: str | None = None, windows: Iterable[Window] = (), **style: Any
+) -> Axes:
+    """Draw a result, windows of the coupling strength shaded behind it; `style` goes to Matplotlib's artists.
 
-    Axes in excess of those of the plot are kept at their first value, the leading ones first. A
-    phase portrait shows the first cell. Cells that did not finish are omitted and counted above the
-    axes.
+    Axes in excess of those of the plot are kept at their first value, the leading ones first: plots
+    over time and of the network show the first cell. Cells that did not finish are omitted and
+    counted above the axes.
     """
     if kind is not None and kind not in (choices := (*KINDS, *result.scene.observe)):
         raise ValueError(f"unknown kind of plot {kind!r}; known: {', '.join(choices)}{suggestion(kind, choices)}")
@@ -43,39 +55,46 @@ def draw_result(result: Result, ax: Axes | None = None, kind: str | None = None)
     chosen = kind or possible[0]
     if chosen not in possible:
         raise ValueError(f"this result has no numbers for the plot {chosen!r}; it has them for: {', '.join(possible)}")
-    with context():
-        axes = new_figure(SIZE).add_subplot() if ax is None else ax
-        observed = chosen not in kinds
-        cut, remark = _cut(result, 2 if chosen == "map" or (observed and REALISATION in result.data.status.dims) else 1)
-        if observed:
-            _observed(axes, cut, result, chosen)
-        else:
-            draw = {"error": _error, "section": _section, "map": _map, "phase": _phase, "end": _end}[chosen]
-            draw(axes, cut, result)
-        failed = int((result.data.status != Status.FINISHED).sum())
-        note(axes, "; ".join(filter(None, [remark, failures(failed, result.data.status.size)])))
+    axes = axes_of(ax)
+    if chosen not in kinds:
+        cut, remark = _cut(result, 2 if REALISATION in result.data.status.dims else 1)
+        _observed(axes, cut, result, chosen, style)
+    else:
+        draw, kept_axes = _DRAWING[chosen]
+        cut, remark = _cut(result, kept_axes)
+        draw(axes, cut, result, style)
+    if shaded := [(window.low, window.high) for window in windows]:
+        if (along := _along(cut, result)[1] if cut.status.ndim else "") != result.scene.strength:
+            raise ValueError(
+                f"windows: found a plot over {along or 'no parameter'}; expected one over {result.scene.strength}"
+            )
+        limits = axes.get_xlim()
+        bands(axes, shaded)
+        axes.set_xlim(limits)
+    failed = int((result.data.status != Status.FINISHED).sum())
+    note(axes, "; ".join(filter(None, [remark, failures(failed, result.data.status.size)])))
     return axes
 
 
 def _possible(result: Result) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the possible plots, the most specific first, and those of them that draw no observable."""
+    """Return the possible plots, the default first, and those of them that draw no observable."""
     count, data = result.data.status.ndim, result.data
     kinds = []
     if count >= 2:
         kinds.append("map")
     if "sync_error" in data and count >= 1:
         kinds.append("error")
-    if "trajectory" in data and count == 0:
-        kinds.append("phase")
-    if "section" in data:
-        kinds.append("section")
-    if "trajectory" in data and count > 0:
-        kinds.append("phase")
-    kinds.append("end")
+    # of one run its motion, over parameters its section first
+    section = ["section"] if "section" in data else []
+    motion = ["time", "phase", "space"] if "trajectory" in data else []
+    if motion:  # the default: curves that can be told apart, else colours
+        motion.sort(key=("phase" if result.scene.n <= len(CYCLE) else "space").__ne__)
+    kinds += section + motion if count else motion + section
+    kinds += ["end", "network"]
     observed = [name for name in result.scene.observe if count and name in data and name not in kinds]
     # observables come before the default plots unless the user asked for a record
     if "sync_error" in data or "section" in data:
-        return (*kinds[:-1], *observed, "end"), tuple(kinds)
+        return (*kinds[:-2], *observed, *kinds[-2:]), tuple(kinds)
     return (*observed, *kinds), tuple(kinds)
 
 
@@ -108,33 +127,39 @@ def _line_style(x: np.ndarray, name: str) -> dict[str, Any]:
     return {"linestyle": "none" if unordered else "-", "marker": "." if unordered or len(x) <= MARKED else None}
 
 
-def _error(axes: Axes, data: xr.Dataset, result: Result) -> None:
+def _error(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -> None:
     """Draw the synchronisation error over the axis."""
     x, name = _along(data, result)
-    order = np.argsort(x, kind="stable")
-    axes.plot(x[order], data.sync_error.values[order], color=BLUE, **_line_style(x, name))
+    order, error = np.argsort(x, kind="stable"), data.sync_error.values
+    axes.plot(x[order], error[order], **line_style(style, color=BLUE, **_line_style(x, name)))
     axes.set(xlabel=symbol(name), ylabel="average synchronisation error")
-    if np.nanmax(data.sync_error.values, initial=0.0) < ROUNDING:  # do not enlarge rounding errors to the full height
+    if np.nanmax(error, initial=0.0) < ROUNDING:  # do not enlarge rounding errors to the full height
         axes.set_ylim(-0.05 * ROUNDING, ROUNDING)
+    elif np.nanmax(error) > DECADES * max(np.nanmin(error), ROUNDING):
+        # decades of errors, and a linear scale below those that are rounding
+        axes.set_yscale("symlog", linthresh=max(ROUNDING, float(np.nanmin(error))), linscale=0.3)
+        axes.set_ylim(bottom=0.0)
 
 
-def _observed(axes: Axes, data: xr.Dataset, result: Result, name: str) -> None:
+def _observed(axes: Axes, data: xr.Dataset, result: Result, name: str, style: dict[str, Any]) -> None:
     """Draw an observable over the axis: a line for each node, or for each realisation and their mean."""
     x, along = _along(data, result)
     order = np.argsort(x, kind="stable")
     values = data[name].values[order].reshape(len(x), -1)
-    style = _line_style(x, along)
+    marks = _line_style(x, along)
     if REALISATION in data.status.dims[1:]:
         axes.plot(x[order], values, color=SKY, linewidth=0.5)
-        axes.plot(x[order], values.mean(axis=1), color=BLUE, **style, label="mean of the realisations")
+        axes.plot(
+            x[order], values.mean(axis=1), **line_style(style, color=BLUE, label="mean of the realisations", **marks)
+        )
         axes.legend()
     else:
         for i, line in enumerate(values.T):
-            axes.plot(x[order], line, color=CYCLE[i % len(CYCLE)], **style)
+            axes.plot(x[order], line, **line_style(style, color=CYCLE[i % len(CYCLE)], **marks))
     axes.set(xlabel=symbol(along), ylabel=name.replace("_", " "))
 
 
-def _section(axes: Axes, data: xr.Dataset, result: Result) -> None:
+def _section(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -> None:
     """Draw the first state other than the section's: over the axis if there is one, else as a return map."""
     states, section = result.scene.equations.state, result.scene.section
     state = next((name for name in states if name != section.variable), states[0])
@@ -143,24 +168,28 @@ def _section(axes: Axes, data: xr.Dataset, result: Result) -> None:
     y = data.section.sel(component=node_name.base).isel(node=node_name.index).values
     # the section for an axis label: its state as a formula, its direction, and its level if that is not 0
     where = f"{symbol(section.variable)}{str(section).removeprefix(section.variable)}"
-    dots: dict[str, Any] = {
-        "linestyle": "none",
-        "marker": ".",
-        "markeredgewidth": 0.0,
-        "color": BLACK,
-        "rasterized": True,
-    }
-    if data.status.ndim == 0:
-        axes.plot(y[:-1], y[1:], markersize=3.0, **dots)
+    x = None if data.status.ndim == 0 else _along(data, result)
+    dots = line_style(
+        style,
+        linestyle="none",
+        marker=".",
+        markeredgewidth=0.0,
+        color=BLACK,
+        rasterized=True,
+        # small and half transparent where many values of a parameter have many points
+        markersize=3.0 if x is None else float(np.clip(700.0 / len(x[0]), 1.0, 3.0)),
+        alpha=1.0 if x is None or len(x[0]) <= MARKED else 0.5,
+    )
+    if x is None:
+        axes.plot(y[:-1], y[1:], **dots)
         axes.set(xlabel=f"{symbol(state)} at {where}", ylabel=f"{symbol(state)} the next time")
         _widen(axes)
         return
-    x, name = _along(data, result)
-    axes.plot(np.repeat(x, y.shape[1]), y.reshape(-1), markersize=float(np.clip(700.0 / len(x), 1.0, 3.0)), **dots)
-    axes.set(xlabel=symbol(name), ylabel=f"{symbol(state)} at {where}")
+    axes.plot(np.repeat(x[0], y.shape[1]), y.reshape(-1), **dots)
+    axes.set(xlabel=symbol(x[1]), ylabel=f"{symbol(state)} at {where}")
 
 
-def _map(axes: Axes, data: xr.Dataset, result: Result) -> None:
+def _map(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -> None:
     """Draw colours over the last two axes: the error, else the number of section points, else the final state."""
     if "sync_error" in data:
         values, label = data.sync_error, "average synchronisation error"
@@ -170,28 +199,56 @@ def _map(axes: Axes, data: xr.Dataset, result: Result) -> None:
         values, label = data.end.isel(component=0, node=0), f"{symbol(result.scene.equations.state[0])} at the end"
     down, along = (str(name) for name in values.dims)
     values = values.sortby([down, along])
-    painted = axes.pcolormesh(values[along], values[down], values, shading="nearest", cmap="cividis", rasterized=True)
+    painted = axes.pcolormesh(values[along], values[down], values, **{**PAINT, **style})
     axes.set(xlabel=symbol(along), ylabel=symbol(down), facecolor="0.8")
     axes.figure.colorbar(painted, ax=axes, label=label)
 
 
-def _phase(axes: Axes, data: xr.Dataset, result: Result) -> None:
-    """Draw velocity over position in the first cell; for many oscillators draw colours over time."""
-    data = data.isel({name: 0 for name in data.status.dims})
+def _time(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -> None:
+    """Draw the first state of each node over time."""
+    states = _node_states(data.trajectory, result, 0)
+    _curves(axes, (np.broadcast_to(data.time.values, states.T.shape), states.values.T), style)
+    axes.set(xlabel="time", ylabel=_symbols(states))
+    _legend(axes, result)
+
+
+def _phase(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -> None:
+    """Draw the second state of each node over its first: a line, or dots where samples are too few for one."""
     first, second = (_node_states(data.trajectory, result, k) for k in (0, 1))
-    n = result.scene.n
-    if n > len(CYCLE):  # more curves than colours
-        time = data.time.values
-        painted = axes.pcolormesh(
-            time, np.arange(1, n + 1), first.values.T, shading="nearest", cmap="cividis", rasterized=True
-        )
-        axes.set(xlabel="time", ylabel="oscillator")
-        axes.figure.colorbar(painted, ax=axes, label=_symbols(first))
-        return
-    for i, (x, y) in enumerate(zip(first.values.T, second.values.T, strict=True)):
-        axes.plot(x, y, color=CYCLE[i], linewidth=0.7, label="oscillator " * (i == 0) + str(i + 1))
+    x, y = first.values.T, second.values.T
+    # angles between successive chords, each state in units of its range
+    with np.errstate(invalid="ignore", divide="ignore"):
+        chords = np.diff(x, axis=1) / np.ptp(x) + 1j * np.diff(y, axis=1) / np.ptp(y)
+        turns = np.abs(np.angle(chords[:, 1:] / chords[:, :-1]))
+    coarse = float(np.nanmedian(turns)) > SHARP if np.isfinite(turns).any() else False
+    _curves(axes, (x, y), {"linestyle": "none", "marker": ".", "markersize": 2.0, **style} if coarse else style)
     axes.set(xlabel=_symbols(first), ylabel=_symbols(second))
     _legend(axes, result)
+
+
+def _curves(axes: Axes, lines: tuple[np.ndarray, np.ndarray], style: dict[str, Any]) -> None:
+    """Draw a curve for each node: x and y are (n, samples)."""
+    count = len(lines[0])
+    colours = CYCLE if count <= len(CYCLE) else mpl.colormaps["viridis"](np.linspace(0.0, 1.0, count))
+    for i, (x, y) in enumerate(zip(*lines, strict=True)):
+        label = "oscillator " * (i == 0) + str(i + 1)
+        axes.plot(x, y, **line_style(style, color=colours[i], linewidth=0.8, label=label))
+
+
+def _space(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -> None:
+    """Draw the first state as colours over time and node."""
+    states = _node_states(data.trajectory, result, 0)
+    nodes = np.arange(1, result.scene.n + 1)
+    painted = axes.pcolormesh(data.time.values, nodes, states.values.T, **{**PAINT, **style})
+    axes.set(xlabel="time", ylabel="oscillator")
+    axes.figure.colorbar(painted, ax=axes, label=_symbols(states))
+
+
+def _network(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -> None:
+    """Draw the graph with its nodes coloured by their first state at the end."""
+    states = _node_states(data.end, result, 0)
+    draw_graph(result.scene.topology, axes, states.values.astype(float), **style)
+    axes.figure.axes[-1].set_ylabel(f"{_symbols(states)} at the end")
 
 
 def _node_states(values: xr.DataArray, result: Result, k: int) -> xr.DataArray:
@@ -208,14 +265,15 @@ def _symbols(states: xr.DataArray) -> str:
     return ", ".join(dict.fromkeys(symbol(str(name)) for name in states.component.values))
 
 
-def _end(axes: Axes, data: xr.Dataset, result: Result) -> None:
+def _end(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -> None:
     """Draw the final states of every oscillator, over the axis if there is one."""
     first, second = (_node_states(data.end, result, k) for k in (0, 1))
     along = _along(data, result) if data.status.ndim else None
     x, y = (first, second) if along is None else (np.broadcast_to(along[0][:, None], first.shape), first)
     for i, color in enumerate(CYCLE[: result.scene.n]):  # one line of each colour, as there may be many oscillators
         across, up = (np.asarray(values)[..., i :: len(CYCLE)].ravel() for values in (x, y))
-        axes.plot(across, up, linestyle="none", marker=".", color=color, label="oscillator " * (i == 0) + str(i + 1))
+        label = "oscillator " * (i == 0) + str(i + 1)
+        axes.plot(across, up, **line_style(style, linestyle="none", marker=".", color=color, label=label))
     labels = (
         (f"{_symbols(first)} at the end", f"{_symbols(second)} at the end")
         if along is None
@@ -245,3 +303,15 @@ def _widen(axes: Axes) -> None:
         least = 0.01 * max(abs(low), abs(high), 1e-3)
         if high - low < least:
             set_limits(0.5 * (low + high - least), 0.5 * (low + high + least))
+
+
+_DRAWING = {  # function of each kind, and the number of axes of parameters that it draws over
+    "error": (_error, 1),
+    "section": (_section, 1),
+    "map": (_map, 2),
+    "time": (_time, 0),
+    "phase": (_phase, 0),
+    "space": (_space, 0),
+    "network": (_network, 0),
+    "end": (_end, 1),
+}

@@ -56,21 +56,24 @@ class Labelled(HasHtml):
         """
         return as_json({str(name): variable.values for name, variable in self.data.variables.items()})
 
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the value.
+    def plot(self, ax: Axes | None = None, **style: Any) -> Axes:
+        """Draw the value into the current figure of pyplot, or into given axes.
 
         Parameters
         ----------
         ax : Axes, optional
-            Matplotlib axes; by default those of a new figure.
+            Matplotlib axes; by default pyplot's current ones, or those of a new figure.
+        **style
+            Keywords of the Matplotlib artist that draws the main curve or the colours, such as
+            `color`, `linewidth`, `cmap`.
 
         Returns
         -------
         Axes
-            Nothing is shown on a screen.  ``ax.figure.savefig("figure.png")`` writes the figure, which
-            belongs to no window.
+            ``plt.show()`` shows the figure, a notebook shows it after the cell, and
+            ``plt.savefig("figure.png")`` writes it.
         """
-        return self._drawn(ax)
+        return self._drawn(ax, **style)
 
     def _drawn(self, ax: Axes | None, **options: Any) -> Axes:
         from synchain.runtime.plots.drawing import drawn

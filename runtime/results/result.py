@@ -39,10 +39,13 @@ from .store import read_data, write_data
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Iterable
 
     from matplotlib.axes import Axes
 
     from synchain.models.dynamics.equations import Equations
+
+    from ..prediction.synchronisability import Window
 
 
 class _Deferred:
@@ -148,30 +151,53 @@ class Result(_Deferred, Labelled):
             ("variables", ", ".join(map(str, self.data.data_vars))),
         )
 
-    def plot(self, ax: Axes | None = None, kind: str | None = None) -> Axes:
-        """Draw the result.
+    def plot(
+        self, ax: Axes | None = None, kind: str | None = None, *, windows: Iterable[Window] = (), **style: Any
+    ) -> Axes:
+        """Draw the result into the current figure of pyplot, or into given axes.
 
         Parameters
         ----------
         ax : Axes, optional
-            Matplotlib axes; by default those of a new figure.
-        kind : {"error", "section", "map", "phase", "end"} or str, optional
-            Synchronisation error over one axis, section points over one axis or each over the one
-            before, colours over two axes, trajectories, final states, or the observable of that
-            name over one axis. By default the most specific kind that the axes and records allow.
+            Matplotlib axes; by default pyplot's current ones, or those of a new figure.
+        kind : {"error", "section", "map", "time", "phase", "space", "network", "end"} or str, optional
+            By default the most specific kind that axes and records allow.
+
+            * error: synchronisation error over an axis of parameters
+            * section: bifurcation diagram, points of the section over an axis; without an axis each
+              point over the one before
+            * map: colours over two axes of parameters
+            * time: first state of each oscillator over time
+            * phase: phase portrait, second state over first
+            * space: space-time map, first state as colours over time and oscillator
+            * network: the graph, oscillators coloured by their first state at the end
+            * end: final states
+            * the name of an observable: its value over an axis
+        windows : sequence of Window, optional
+            Intervals of the coupling strength that are shaded behind the curve, such as
+            ``msf(…).windows``: where a prediction says that the network synchronises.
+        **style
+            Keywords of the Matplotlib artist, such as `color`, `linewidth`, `cmap`.
 
         Returns
         -------
         Axes
-            Nothing is shown on a screen.  ``ax.figure.savefig("figure.png")`` writes the figure, which
-            belongs to no window.
+            ``plt.show()`` shows the figure, a notebook shows it after the cell, and
+            ``plt.savefig("figure.png")`` writes it.
 
         Raises
         ------
         ValueError
-            If the kind is unknown, or if the result has no numbers for it.
+            If the kind is unknown, if the result has no numbers for it, or if windows are given
+            for a plot that is not over the coupling strength.
+
+        Examples
+        --------
+        >>> import synchain as sc
+        >>> scene = sc.Scene("van_der_pol", "x->v", sc.ring(4), record=["trajectory"], transient=0, window=20)
+        >>> axes = sc.run(scene, sigma=0.5).plot(kind="time")
         """
-        return self._drawn(ax, kind=kind)
+        return self._drawn(ax, kind=kind, windows=windows, **style)
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         """Write the data as they are: a result is its dataset (see `Labelled.save` for the forms)."""
