@@ -78,7 +78,6 @@ package, a package stands for all of its rooms.
 DOORS = {
     ("models/inputs/display.py", "runtime.plots"),
     ("models/inputs/display.py", "runtime.reports"),
-    ("runtime/results/labelled.py", "runtime.plots"),
 }
 """Files that call a room above them, inside a method: values draw and show themselves by what stands at the top."""
 

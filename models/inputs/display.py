@@ -9,6 +9,8 @@ from .keywords import check_methods
 if TYPE_CHECKING:
     from typing import TypeAlias
 
+    Animation: TypeAlias = Any
+    ArrayLike: TypeAlias = Any
     Axes: TypeAlias = Any
 
 
@@ -41,12 +43,79 @@ class HasLatex(HasHtml):
         return latex(self)
 
 
+class HasPlot(HasHtml):
+    """A value with a picture of its numbers."""
+
+    __slots__ = ()
+
+    def plot(self, ax: Axes | None = None, **style: Any) -> Axes:
+        """Draw the value into the current figure of pyplot, or into given axes.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            By default pyplot's current ones, or those of a new figure.
+        **style
+            Keywords of the Matplotlib artist that draws the main curve or the colours, such as
+            `color`, `linewidth`, `cmap`.
+
+        Returns
+        -------
+        matplotlib axes
+            ``plt.show()`` shows the figure, a notebook shows it after the cell, and
+            ``plt.savefig("figure.png")`` writes it.
+        """
+        from synchain.runtime.plots.drawing import drawn
+
+        return drawn(self, ax, **style)
+
+
+class HasAnimation(HasPlot):
+    """A value with a motion."""
+
+    __slots__ = ()
+
+    def animate(self, seconds: float = 10.0, fps: int = 25) -> Animation:
+        """Return an animation of the first cell: a notebook plays it, ``save("motion.gif")`` writes it.
+
+        Oscillators with friction are masses on a moving belt, up to twelve of them; others are the
+        nodes of their graph, coloured by their first state. The phase portrait is beside them.
+
+        Parameters
+        ----------
+        seconds : float, optional
+            Length of the animation, which shows the whole recorded window.
+        fps : int, optional
+            Frames a second.
+
+        Returns
+        -------
+        matplotlib.animation.FuncAnimation
+            ``save`` writes GIF files with Pillow, MP4 files with ffmpeg if that is installed.
+
+        Raises
+        ------
+        ValueError
+            If no trajectory was recorded, or for more than 200 oscillators.
+
+        Examples
+        --------
+        >>> import synchain as sc
+        >>> scene = sc.Scene("friction", "spring", sc.chain(3), record=["trajectory"], contact="set-valued", window=4)
+        >>> motion = sc.run(scene, sigma=0.1).animate(seconds=2)
+        >>> motion.save("motion.gif")  # doctest: +SKIP
+        """
+        from synchain.runtime.plots.animation import animate
+
+        return animate(self, seconds, fps)  # type: ignore[arg-type]  # a Result, the only value with a motion
+
+
 class HasDrawing(HasHtml):
     """A graph, or a value with a graph."""
 
     __slots__ = ()
 
-    def draw(self, ax: Axes | None = None, values: object = None, **style: Any) -> Axes:
+    def draw(self, ax: Axes | None = None, values: ArrayLike | None = None, **style: Any) -> Axes:
         """Draw the graph: widths show weights, arrows one-way links, colours kinds of nodes or values.
 
         Parameters

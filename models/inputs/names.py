@@ -18,7 +18,7 @@ TAKEN = frozenset(
 """Variables and coordinates of results."""
 
 ATTRIBUTES = frozenset(
-    {"as_dict", "belongs_to", "data", "integrators", "kind", "link", "message", "name", "names", "plot", "restore", "save", "scene", "state",
+    {"animate", "as_dict", "belongs_to", "data", "integrators", "kind", "link", "message", "name", "names", "plot", "restore", "save", "scene", "state",
      "states", "stepped", "success", "summary"}
 )  # fmt: skip
 """Attributes of results and of their data, which would hide variables of these names."""

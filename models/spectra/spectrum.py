@@ -13,7 +13,7 @@ from ..algebra.balls import precision
 from ..algebra.lazy import LazyEigenvalues
 from ..algebra.roots import Root, coefficient_text
 from ..inputs.checks import check_instance
-from ..inputs.display import HasLatex
+from ..inputs.display import HasLatex, HasPlot
 from .eigenvalue import Eigenvalue, decimal
 
 SHOWN = 24
@@ -21,7 +21,7 @@ SHOWN = 24
 
 
 @dataclass(frozen=True, slots=True)
-class Spectrum(HasLatex):
+class Spectrum(HasLatex, HasPlot):
     """The distinct eigenvalues downwards by real part (of G from 0), conjugates side by side.
 
     Parameters

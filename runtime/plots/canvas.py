@@ -7,6 +7,7 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.cbook import normalize_kwargs
+from matplotlib.collections import PathCollection
 from matplotlib.lines import Line2D
 
 SIZE = (4.8, 3.4)
@@ -18,10 +19,24 @@ def axes_of(ax: Axes | None) -> Axes:
     if ax is None:
         import matplotlib.pyplot as plt
 
-        return plt.gca()
+        axes: Axes = plt.gca()
+        return axes
     if not isinstance(ax, Axes):
         raise TypeError(f"ax: found {type(ax).__name__}; expected matplotlib axes, e.g. plt.subplots()[1]")
     return ax
+
+
+KEYWORDS = {"s", "c", "cmap", "norm", "vmin", "vmax", "shading"}
+"""Keywords of `scatter` and `pcolormesh` beside the properties of what they draw."""
+
+
+def check_style(style: Mapping[str, Any], method: str, known: str) -> None:
+    """Raise TypeError for a keyword that no artist of Matplotlib takes."""
+    for name in normalize_kwargs(dict(style), Line2D):
+        if name not in KEYWORDS and not any(hasattr(artist, f"set_{name}") for artist in (Line2D, PathCollection)):
+            raise TypeError(
+                f"unknown keyword {name!r} of {method}; known: {known}, and keywords of Matplotlib such as color, linewidth, cmap"
+            )
 
 
 def line_style(style: Mapping[str, Any], **defaults: Any) -> dict[str, Any]:

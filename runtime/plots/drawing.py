@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from functools import singledispatch
 from typing import Any
 
@@ -11,6 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from synchain.models.graphs.topology import Topology
+from synchain.models.inputs.display import HasPlot
+from synchain.models.spectra.spectrum import Spectrum
 
 from ..bifurcation.branches import Branch
 from ..bifurcation.equilibrium import Equilibrium
@@ -27,7 +30,7 @@ from ..synchronisation.basin import Basin, Fate
 from ..synchronisation.probe import Probe
 from ..synchronisation.threshold import Thresholds
 from .branch_marks import MARK, MARKERS, STABLE, UNSTABLE
-from .canvas import axes_of, line_style
+from .canvas import axes_of, check_style, line_style
 from .exponent import draw_exponent, finite
 from .plane import draw_plane
 from .result_plot import draw_result
@@ -40,24 +43,18 @@ DOTS: dict[str, Any] = {"linestyle": "none", "marker": "."}
 """Style of points without a line."""
 
 
-def drawn(value: object, ax: Axes | None, **style: Any) -> Axes:
+def drawn(value: HasPlot, ax: Axes | None, **style: Any) -> Axes:
     """Draw a value into axes, by default pyplot's current ones, and return them; `style` goes to Matplotlib's artists."""
+    own = [name for name in inspect.signature(type(value).plot).parameters if name not in ("self", "style")]
+    check_style({name: x for name, x in style.items() if name not in own}, "plot", ", ".join(own))
+    if isinstance(value, Result | Streamed):  # refuses kinds before it opens a figure
+        return draw_result(value if isinstance(value, Result) else value.result, ax, **style)
     return _draw(value, axes_of(ax), **style)
 
 
 @singledispatch
 def _draw(value: object, axes: Axes, **style: Any) -> Axes:
     raise TypeError(f"found {type(value).__name__}; expected a value with a plot")
-
-
-@_draw.register
-def _(value: Result, axes: Axes, **options: Any) -> Axes:
-    return draw_result(value, axes, **options)
-
-
-@_draw.register
-def _(value: Streamed, axes: Axes, **options: Any) -> Axes:
-    return draw_result(value.result, axes, **options)
 
 
 @_draw.register
@@ -124,6 +121,25 @@ def _(value: Basin, axes: Axes, **style: Any) -> Axes:
             axes.plot(across[chosen], up[chosen], **line_style(style, **DOTS, markersize=2.5, color=colour, label=fate))
     axes.set(xlabel=symbol(f"{names[0]}_1"), ylabel=symbol(f"{names[-1]}_1"))
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+    return axes
+
+
+@_draw.register
+def _(value: Spectrum, axes: Axes, **style: Any) -> Axes:
+    """Draw multiplicities over real eigenvalues, complex ones as points of their plane."""
+    values, counts = np.array(list(value.values)), np.array(list(value.multiplicities))
+    if np.iscomplexobj(values):
+        dots = {"s": 24.0 * counts, "color": BLUE, "alpha": 0.7, **style}
+        axes.scatter(values.real, values.imag, **dots)
+        axes.axhline(0.0, color=BLACK, linewidth=0.4)
+        axes.axvline(0.0, color=BLACK, linewidth=0.4)
+        axes.set(xlabel=r"real part of $\gamma$", ylabel=r"imaginary part of $\gamma$")
+        note(axes, "areas show multiplicities" if counts.max() > 1 else "")
+        return axes
+    axes.vlines(values, 0.0, counts, colors=style.get("color", BLUE), linewidth=0.8)
+    axes.plot(values, counts, **line_style(style, color=BLUE, marker="o", markersize=4.0, linestyle="none"))
+    axes.set(xlabel=r"eigenvalue $\gamma$", ylabel="multiplicity", ylim=(0.0, 1.15 * counts.max()))
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     return axes
 
 

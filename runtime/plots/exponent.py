@@ -20,7 +20,7 @@ MARKED = 60
 def draw_exponent(axes: Axes, function: MSF, sigma: float | None = None, **style: Any) -> Axes:
     """Draw exponents over all strengths at which they were computed; dots mark the requested ones if they are few.
 
-    A band shows two standard errors on either side, grey bands the ranges with a negative exponent. Orange strokes
+    A band shows two standard errors on either side, grey bands the ranges with a negative exponent. Orange dots
     are the modes of the network at the strength `sigma` of links, by default that of the scene.
     """
     fine = function.fine
@@ -53,13 +53,13 @@ def _mark_modes(axes: Axes, function: MSF, sigma: float | None) -> None:
     scene = function.scene
     strength = scene.parameters[scene.strength] if sigma is None else sigma
     gamma = np.array([value for value in scene.topology.spectrum.values if value != 0]) if strength else np.array([])
-    if not gamma.size or np.iscomplexobj(gamma):
+    if not gamma.size or np.iscomplexobj(gamma):  # nothing to mark on a line
         return
     modes = np.unique(-strength * gamma.real)
     modes = modes[(modes >= function.alpha[0]) & (modes <= function.alpha[-1])]
     heights = np.interp(modes, function.fine.alpha, finite(function.fine.exponent))
     label = rf"modes at ${Latex().letter(scene.strength)} = {strength:.4g}$"
-    axes.plot(modes, heights, color=ORANGE, linestyle="none", marker="|", markersize=9.0, zorder=4, label=label)
+    axes.plot(modes, heights, color=ORANGE, linestyle="none", marker="o", markersize=5.0, zorder=4, label=label)
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0))
 
 

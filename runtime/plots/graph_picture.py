@@ -136,8 +136,9 @@ def draw_graph(value: HasDrawing, ax: Axes | None = None, values: ArrayLike | No
     from matplotlib.collections import LineCollection
     from matplotlib.patches import FancyArrowPatch
 
-    from .canvas import axes_of
+    from .canvas import axes_of, check_style
 
+    check_style(style, "draw", "ax, values")
     picture, axes = Picture.of(value), axes_of(ax)
     # straight lines as one collection, which draws fast
     place, straight = picture.positions, [line for line in picture.lines if not (line.arrow or line.bent)]
@@ -194,7 +195,7 @@ def _nodes(axes: Axes, picture: Picture, values: ArrayLike | None, style: dict[s
                 x,
                 y,
                 picture.short_label(i),
-                color="white",
+                color="white" if values is None else "0.1",
                 ha="center",
                 va="center_baseline",
                 fontsize=min(POINTS * picture.radius, 7.0),

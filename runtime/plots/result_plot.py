@@ -135,9 +135,9 @@ def _error(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) 
     axes.set(xlabel=symbol(name), ylabel="average synchronisation error")
     if np.nanmax(error, initial=0.0) < ROUNDING:  # do not enlarge rounding errors to the full height
         axes.set_ylim(-0.05 * ROUNDING, ROUNDING)
-    elif np.nanmax(error) > DECADES * max(np.nanmin(error), ROUNDING):
-        # decades of errors, and a linear scale below those that are rounding
-        axes.set_yscale("symlog", linthresh=max(ROUNDING, float(np.nanmin(error))), linscale=0.3)
+    elif np.nanmax(error) > DECADES * (least := float(np.nanmin(error[error > ROUNDING]))):
+        # decades of errors, and a linear scale from zero to the smallest that is no rounding error
+        axes.set_yscale("symlog", linthresh=least, linscale=0.3)
         axes.set_ylim(bottom=0.0)
 
 
@@ -206,15 +206,15 @@ def _map(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) ->
 
 def _time(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -> None:
     """Draw the first state of each node over time."""
-    states = _node_states(data.trajectory, result, 0)
+    states = node_states(data.trajectory, result, 0)
     _curves(axes, (np.broadcast_to(data.time.values, states.T.shape), states.values.T), style)
-    axes.set(xlabel="time", ylabel=_symbols(states))
+    axes.set(xlabel="time", ylabel=symbols(states))
     _legend(axes, result)
 
 
 def _phase(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -> None:
     """Draw the second state of each node over its first: a line, or dots where samples are too few for one."""
-    first, second = (_node_states(data.trajectory, result, k) for k in (0, 1))
+    first, second = (node_states(data.trajectory, result, k) for k in (0, 1))
     x, y = first.values.T, second.values.T
     # angles between successive chords, each state in units of its range
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -222,7 +222,7 @@ def _phase(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) 
         turns = np.abs(np.angle(chords[:, 1:] / chords[:, :-1]))
     coarse = float(np.nanmedian(turns)) > SHARP if np.isfinite(turns).any() else False
     _curves(axes, (x, y), {"linestyle": "none", "marker": ".", "markersize": 2.0, **style} if coarse else style)
-    axes.set(xlabel=_symbols(first), ylabel=_symbols(second))
+    axes.set(xlabel=symbols(first), ylabel=symbols(second))
     _legend(axes, result)
 
 
@@ -237,21 +237,21 @@ def _curves(axes: Axes, lines: tuple[np.ndarray, np.ndarray], style: dict[str, A
 
 def _space(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -> None:
     """Draw the first state as colours over time and node."""
-    states = _node_states(data.trajectory, result, 0)
+    states = node_states(data.trajectory, result, 0)
     nodes = np.arange(1, result.scene.n + 1)
     painted = axes.pcolormesh(data.time.values, nodes, states.values.T, **{**PAINT, **style})
     axes.set(xlabel="time", ylabel="oscillator")
-    axes.figure.colorbar(painted, ax=axes, label=_symbols(states))
+    axes.figure.colorbar(painted, ax=axes, label=symbols(states))
 
 
 def _network(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -> None:
     """Draw the graph with its nodes coloured by their first state at the end."""
-    states = _node_states(data.end, result, 0)
+    states = node_states(data.end, result, 0)
     draw_graph(result.scene.topology, axes, states.values.astype(float), **style)
-    axes.figure.axes[-1].set_ylabel(f"{_symbols(states)} at the end")
+    axes.figure.axes[-1].set_ylabel(f"{symbols(states)} at the end")
 
 
-def _node_states(values: xr.DataArray, result: Result, k: int) -> xr.DataArray:
+def node_states(values: xr.DataArray, result: Result, k: int) -> xr.DataArray:
     """Return the first (`k` = 0) or second state of each node, the first one if a node has no second; nodes last."""
     equations = result.scene.equations
     state_names = [{s.name for s in node.state} for node in equations.nodes]
@@ -260,14 +260,14 @@ def _node_states(values: xr.DataArray, result: Result, k: int) -> xr.DataArray:
     return values.sel(component=xr.DataArray(chosen, dims="node"), node=values.node).transpose(..., "node")
 
 
-def _symbols(states: xr.DataArray) -> str:
+def symbols(states: xr.DataArray) -> str:
     """Return the symbols of states without numbers of nodes, separated by commas."""
     return ", ".join(dict.fromkeys(symbol(str(name)) for name in states.component.values))
 
 
 def _end(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) -> None:
     """Draw the final states of every oscillator, over the axis if there is one."""
-    first, second = (_node_states(data.end, result, k) for k in (0, 1))
+    first, second = (node_states(data.end, result, k) for k in (0, 1))
     along = _along(data, result) if data.status.ndim else None
     x, y = (first, second) if along is None else (np.broadcast_to(along[0][:, None], first.shape), first)
     for i, color in enumerate(CYCLE[: result.scene.n]):  # one line of each colour, as there may be many oscillators
@@ -275,9 +275,9 @@ def _end(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) ->
         label = "oscillator " * (i == 0) + str(i + 1)
         axes.plot(across, up, **line_style(style, linestyle="none", marker=".", color=color, label=label))
     labels = (
-        (f"{_symbols(first)} at the end", f"{_symbols(second)} at the end")
+        (f"{symbols(first)} at the end", f"{symbols(second)} at the end")
         if along is None
-        else (symbol(along[1]), f"{_symbols(first)} at the end")
+        else (symbol(along[1]), f"{symbols(first)} at the end")
     )
     axes.set(xlabel=labels[0], ylabel=labels[1])
     _widen(axes)

@@ -11,21 +11,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from synchain.models.inputs.display import HasHtml
+from synchain.models.inputs.display import HasPlot
 
 from .codec import encode
 from .store import write_data
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from synchain.models.scenes.scene import Scene
 
 KIND, VALUE = "kind", "value"
 """Attributes of a file: the class of the value, and its fields as JSON."""
 
 
-class Labelled(HasHtml):
+class Labelled(HasPlot):
     """A frozen value with `data`, `summary`, `as_dict`, `plot` and `save`.
 
     A subclass is a frozen dataclass that defines `data` and `summary`.  Its fields are written and
@@ -55,30 +53,6 @@ class Labelled(HasHtml):
             [real part, imaginary part].
         """
         return as_json({str(name): variable.values for name, variable in self.data.variables.items()})
-
-    def plot(self, ax: Axes | None = None, **style: Any) -> Axes:
-        """Draw the value into the current figure of pyplot, or into given axes.
-
-        Parameters
-        ----------
-        ax : Axes, optional
-            Matplotlib axes; by default pyplot's current ones, or those of a new figure.
-        **style
-            Keywords of the Matplotlib artist that draws the main curve or the colours, such as
-            `color`, `linewidth`, `cmap`.
-
-        Returns
-        -------
-        Axes
-            ``plt.show()`` shows the figure, a notebook shows it after the cell, and
-            ``plt.savefig("figure.png")`` writes it.
-        """
-        return self._drawn(ax, **style)
-
-    def _drawn(self, ax: Axes | None, **options: Any) -> Axes:
-        from synchain.runtime.plots.drawing import drawn
-
-        return drawn(self, ax, **options)
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         """Write a file that opens in xarray and in `open_result`; it appears whole or not at all.

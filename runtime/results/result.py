@@ -13,6 +13,7 @@ import xarray as xr
 from synchain.codegen.driver.columns import Count, PointColumn
 from synchain.codegen.machine_code.processor import processor, told_apart
 from synchain.models.inputs.checks import check_choice, check_instance
+from synchain.models.inputs.display import HasAnimation, HasPlot
 from synchain.models.scenes.scene import Scene, check_scene
 
 from ..cells.buffers import Buffers
@@ -45,8 +46,6 @@ if TYPE_CHECKING:
 
     from synchain.models.dynamics.equations import Equations
 
-    from ..prediction.synchronisability import Window
-
 
 class _Deferred:
     """Holds the function that computes the labelled data of a result on first use.
@@ -59,7 +58,7 @@ class _Deferred:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Result(_Deferred, Labelled):
+class Result(_Deferred, HasAnimation, Labelled):
     """Labelled arrays of a run; a variable `name` of the data is also an attribute:
     `result.sync_error`.
 
@@ -152,7 +151,7 @@ class Result(_Deferred, Labelled):
         )
 
     def plot(
-        self, ax: Axes | None = None, kind: str | None = None, *, windows: Iterable[Window] = (), **style: Any
+        self, ax: Axes | None = None, kind: str | None = None, *, windows: Iterable[Any] = (), **style: Any
     ) -> Axes:
         """Draw the result into the current figure of pyplot, or into given axes.
 
@@ -197,7 +196,7 @@ class Result(_Deferred, Labelled):
         >>> scene = sc.Scene("van_der_pol", "x->v", sc.ring(4), record=["trajectory"], transient=0, window=20)
         >>> axes = sc.run(scene, sigma=0.5).plot(kind="time")
         """
-        return self._drawn(ax, kind=kind, windows=windows, **style)
+        return HasPlot.plot(self, ax, kind=kind, windows=windows, **style)
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         """Write the data as they are: a result is its dataset (see `Labelled.save` for the forms)."""

@@ -20,7 +20,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -28,6 +28,7 @@ import xarray as xr
 from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.dynamics.variational import mode
 from synchain.models.inputs.checks import check_integer
+from synchain.models.inputs.display import HasPlot
 from synchain.models.inputs.keywords import warn
 from synchain.models.inputs.names import expect_free
 from synchain.models.scenes.scene import Scene, check_scene
@@ -45,6 +46,9 @@ from ..support.progress import Hook
 from .averages import Averaging, document_keywords
 from .exponents import Exponents, along, coupled_cell, exponent_rows, orbits_of, transversal, with_partner
 from .transversal_modes import SharedOrbit, shared_orbits, still_strengths, transversal_modes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 STRENGTHS = ("alpha", "beta")
 """Names of the axes of a plane that are strengths of a mode; a parameter may have such a name too."""
@@ -248,6 +252,34 @@ class MSF(Labelled):
     def open_ranges(self) -> tuple[Interval, ...]:
         """The intervals as used for a network: the function counts as unstable beyond the grid."""
         return self.intervals
+
+    def plot(self, ax: Axes | None = None, sigma: float | None = None, **style: Any) -> Axes:
+        """Draw exponents over the strength of a mode, with the modes of the network marked on the curve.
+
+        Grey bands are the ranges of negative exponents, the blue band is two standard errors wide
+        on either side.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            By default pyplot's current ones, or those of a new figure.
+        sigma : float, optional
+            Coupling strength for which the modes are marked, at sigma |gamma|; by default that of the scene.
+        **style
+            Keywords of the curve, such as `color` and `linewidth`.
+
+        Returns
+        -------
+        matplotlib axes
+
+        Examples
+        --------
+        >>> import synchain as sc
+        >>> function = sc.msf(sc.Scene("duffing", "spring", sc.chain(4)), [0, 0.1, 0.2], periods=50)
+        >>> axes = function.plot(sigma=0.05)
+        """
+        axes: Axes = HasPlot.plot(self, ax, sigma=sigma, **style)
+        return axes
 
     def as_dict(self) -> dict[str, object]:
         """Return the function for JSON.
