@@ -1,4 +1,4 @@
-"""From what a user gave to a complete scene: defaults filled in, every value checked against the model."""
+"""Complete the keywords of a scene: fill in defaults and check every value against the model."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..inputs.entry_points import announced
 from ..inputs.frozen import FrozenDict
 from ..inputs.words import Word
 from ..mechanics.components import WEIGHT_NUMBER
-from ..mechanics.contact import ContactModel, FrictionLaw
+from ..mechanics.contact import ContactModel
 from ..mechanics.oscillator import FieldModel
 from ..mechanics.physics import check_masses, check_power
 from ..networks.layers import as_contact, as_coupling, as_groups, as_law, as_layers, as_oscillator
@@ -65,38 +65,42 @@ def _shipped_integrators() -> tuple[str, ...]:
     return tuple(m.name for m in pkgutil.iter_modules([str(METHODS)]) if not m.name.startswith("_"))
 
 
-def complete(given: Mapping[str, Any]) -> dict[str, Any]:
+def complete(keywords: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values of a scene's keywords, and its model."""
-    values = dict(given)
-    values["title"] = check_text("title", given["title"])
-    values["seed"] = check_integer("seed", given["seed"], *LIMITS["seed"])
-    values["draws"] = draws(given["draws"], given["realisations"])
-    values["rng"] = check_integer("rng", given["rng"], *LIMITS["rng"])
-    values |= _model(given, values["draws"], values["rng"])
+    values = dict(keywords)
+    values["title"] = check_text("title", keywords["title"])
+    values["seed"] = check_integer("seed", keywords["seed"], *LIMITS["seed"])
+    # The model, on the union of the graphs that are drawn.
+    values["draws"] = draws(keywords["draws"], keywords["realisations"])
+    values["rng"] = check_integer("rng", keywords["rng"], *LIMITS["rng"])
+    values |= _model(keywords, values["draws"], values["rng"])
     model: Model = values["model"]
-    values["axes"] = axes = read_axes(given["axes"], given["zipped"])
-    check_cells(axes, given["zipped"], given["realisations"])
-    drawn = drawn_axes(model, values["draws"], given["realisations"], values["rng"])
-    values["parameters"] = numbers = parameters(model, given["parameters"], (*axes, *drawn))
-    own = varied(numbers, model.parameters)
-    if any(model.link_names(name) for name in own):
-        model.equations(own)  # refuses links that can have no numbers of their own
+    # Axes, draws and parameters, which differ from node to node, or link to link, where one of them is swept or drawn.
+    values["axes"] = axes = read_axes(keywords["axes"], keywords["zipped"])
+    check_cells(axes, keywords["zipped"], keywords["realisations"])
+    drawn = drawn_axes(model, values["draws"], keywords["realisations"], values["rng"])
+    values["parameters"] = numbers = parameters(model, keywords["parameters"], (*axes, *drawn))
+    differing = varied(numbers, model.parameters)
+    if any(model.link_names(name) for name in differing):
+        model.equations(differing)  # refuses links that cannot differ
     if GRAPH in values["draws"]:
-        _check_graphs(model, own)
-    values["initial"] = _start(model, given["initial"], values["seed"])
-    values["record"] = _records(model, given["record"])
-    values["section"] = _section(model, given["section"])
-    values["observe"] = observables(model, numbers, given["observe"])
-    values["sections"] = sections(model, numbers, given["sections"])
-    values["stop"] = stop(model, numbers, given["stop"])
+        _check_graphs(model, differing)
+    # Start, records and times.
+    values["initial"] = _start(model, keywords["initial"], values["seed"])
+    values["record"] = _records(model, keywords["record"])
+    values["section"] = _section(model, keywords["section"])
+    values["observe"] = observables(model, numbers, keywords["observe"])
+    values["sections"] = sections(model, numbers, keywords["sections"])
+    values["stop"] = stop(model, numbers, keywords["stop"])
     _check_sections(values)
-    values |= _times(model, numbers, given)
+    values["time_unit"] = _time_unit(model, numbers, keywords["time_unit"])
     for name in ("transient", "window"):
-        values[name] = check_number(name, given[name], *LIMITS[name])
+        values[name] = check_number(name, keywords[name], *LIMITS[name])
     recorded = (*values["record"], *values["observe"], *values["sections"])
     if recorded and values["window"] == 0.0:
         raise ValueError(f"window: found 0, in which {str(recorded[0])!r} has nothing to record; give a window > 0")
-    values |= _numerics(given, values["record"])
+    values |= _numerics(keywords, values["record"])
+    # Checks of several keywords together.
     values["continuation"] = check_sweep(model, values)
     check_draws(model, values, drawn)
     _check_friction(model, numbers, (*axes, *drawn), values["zipped"])
@@ -104,9 +108,9 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     return values
 
 
-def _check_graphs(model: Model, own: tuple[str, ...]) -> None:
-    """Refuse graphs by realisation if a link of weight 0, which stands for none, acts."""
-    for edge in model.equations(own).edges:
+def _check_graphs(model: Model, differing: tuple[str, ...]) -> None:
+    """Refuse graphs by realisation if a link of weight 0, which represents no link, acts."""
+    for edge in model.equations(differing).edges:
         acting = next((e for e in edge.expressions if e.xreplace({WEIGHT_NUMBER: sp.S.Zero}) != 0), None)
         if acting is not None:
             raise ValueError(
@@ -114,24 +118,24 @@ def _check_graphs(model: Model, own: tuple[str, ...]) -> None:
             )
 
 
-def _model(given: Mapping[str, Any], drawn: Mapping[str, Draws], rng: int) -> dict[str, Any]:
-    """The parts of the model, and the model, on the union of the graphs that are drawn if there are any."""
-    oscillator = as_oscillator(given["oscillator"])
-    if given["links"] is not None and given["coupling"] not in (None, "spring"):
+def _model(keywords: Mapping[str, Any], drawn: Mapping[str, Draws], rng: int) -> dict[str, Any]:
+    """Return the model, on the union of the graphs that are drawn if there are any, and its parts."""
+    oscillator = as_oscillator(keywords["oscillator"])
+    if keywords["links"] is not None and keywords["coupling"] not in (None, "spring"):
         raise ValueError("links: found a coupling beside it; expected each layer with its own coupling; leave one out")
-    coupling = as_coupling(given["coupling"]) if given["links"] is None else None
-    layers = as_layers(given["links"], coupling, given["topology"])
+    coupling = as_coupling(keywords["coupling"]) if keywords["links"] is None else None
+    layers = as_layers(keywords["links"], coupling, keywords["topology"])
     if GRAPH in drawn:
-        nodes = drawn_nodes(drawn, rng)  # known before any link is drawn
-        if len(layers) > 1 or (given["topology"] is not None and layers[0][1].n != nodes):
+        nodes = drawn_nodes(drawn, rng)  # before any link is drawn
+        if len(layers) > 1 or (keywords["topology"] is not None and layers[0][1].n != nodes):
             found = f"{len(layers)} layers of links" if len(layers) > 1 else f"graphs of {nodes} nodes"
             raise ValueError(
                 f"draw topology: found {found}; expected graphs of {layers[0][1].n} nodes for a single layer"
             )
-        layers = ((coupling, drawn_graph(drawn, given["realisations"], rng)),)
-    friction = as_law(given["friction"], oscillator)
-    groups = as_groups(given["nodes"], layers[0][1].n)
-    contact = as_contact(given["contact"], (oscillator, *(group.oscillator for group in groups)))
+        layers = ((coupling, drawn_graph(drawn, keywords["realisations"], rng)),)
+    friction = as_law(keywords["friction"], oscillator)
+    groups = as_groups(keywords["nodes"], layers[0][1].n)
+    contact = as_contact(keywords["contact"], (oscillator, *(group.oscillator for group in groups)))
     model = Model.of(NodeKind(oscillator, friction), groups, contact, layers)
     single = len(layers) == 1
     return {
@@ -153,34 +157,36 @@ def _check_physics(model: Model, numbers: Mapping[str, float], axes: Sequence[Ax
     for ends in (min, max):
         swept = {axis.name: ends(axis.values) for axis in axes}
         values = {name: swept.get(name, value) for name, value in numbers.items()}
-        for kind, own in at_nodes(model, values):
-            check_masses(kind.oscillator, own)
+        for kind, at_node in at_nodes(model, values):
+            check_masses(kind.oscillator, at_node)
             if kind.friction is not None:
-                check_power(kind.friction, own)
+                check_power(kind.friction, at_node)
 
 
-def _start(model: Model, given: object, seed: int) -> FrozenDict[tuple[float, ...]]:
-    """The initial states, component by component, those of each kind of node around its own centre."""
+def _start(model: Model, initial: object, seed: int) -> FrozenDict[tuple[float, ...]]:
+    """Return the initial states by component; the default of each kind of node lies around its centre."""
     for name in model.components:
         base, _, number = name.rpartition("_")
         if base in model.components and number.isdecimal() and 1 <= int(number) <= model.n:
             raise ValueError(f"the state variable {name!r} has the name of {base!r} at node {number}; rename it")
-    apart = model.unlinked
-    own = [
+    network = model.unlinked
+    by_kind = [
         default_start(tuple(s.name for s in node.state), model.n, kind.oscillator.initial)
-        for node, kind in zip(apart.nodes, model.kinds, strict=True)
+        for node, kind in zip(network.nodes, model.kinds, strict=True)
     ]
-    defaults = {name: tuple(own[model.kind_of[i]][name][i] for i in apart.holders(name)) for name in model.components}
-    return chosen_start(given, defaults, seed)
+    defaults = {
+        name: tuple(by_kind[model.kind_of[i]][name][i] for i in network.holders(name)) for name in model.components
+    }
+    return chosen_start(initial, defaults, seed)
 
 
-def _records(model: Model, given: object) -> tuple[Record, ...]:
-    """What is recorded, in the order of the words."""
+def _records(model: Model, record: object) -> tuple[Record, ...]:
+    """Return the records in the order of `Record`; by default the synchronisation error if there are states to compare."""
     n, common = model.n, bool(model.unlinked.common)
-    found = ((Record.SYNC_ERROR,) if n > 1 and common else ()) if given is None else given
-    if not isinstance(found, (list, tuple)):
-        raise TypeError(f"record: found {short_repr(found)}; expected a list out of {', '.join(Record)}")
-    names = [Record.parse("record", name) for name in found]
+    listed = ((Record.SYNC_ERROR,) if n > 1 and common else ()) if record is None else record
+    if not isinstance(listed, (list, tuple)):
+        raise TypeError(f"record: found {short_repr(listed)}; expected a list out of {', '.join(Record)}")
+    names = [Record.parse("record", name) for name in listed]
     if len(set(names)) < len(names):
         raise ValueError(f"record: found {short_repr(names)}; expected each record once; remove the repetition")
     if n == 1 and Record.SYNC_ERROR in names:
@@ -192,52 +198,52 @@ def _records(model: Model, given: object) -> tuple[Record, ...]:
     return tuple(name for name in Record if name in names)
 
 
-def _section(model: Model, given: object) -> Section:
-    """The section: unless it is given, a velocity of the first node falls through 0, or the state of a vector field."""
-    own = tuple(s.name for s in model.unlinked.node_at(0).state)
-    crossed = own[0] if isinstance(model.kinds[model.kind_of[0]].oscillator.model, FieldModel) else own[-1]
-    default = f"{'v' if 'v' in own else crossed}_1 falling"
-    section = Section.parse(default if given is None else given)
+def _section(model: Model, section_text: object) -> Section:
+    """Return the section; by default a velocity of the first node, or the first state of a vector field, falls through 0."""
+    states = tuple(s.name for s in model.unlinked.node_at(0).state)
+    crossed = states[0] if isinstance(model.kinds[model.kind_of[0]].oscillator.model, FieldModel) else states[-1]
+    default = f"{'v' if 'v' in states else crossed}_1 falling"
+    section = Section.parse(default if section_text is None else section_text)
     model.check_state(section.variable, "section variable")
     return section
 
 
 def _check_sections(values: Mapping[str, Any]) -> None:
-    """Refuse two names for one variable, and two ways to say a section."""
+    """Refuse one name for two variables, and a section beside sections or a stop."""
     other = "sections" if values["sections"] else "stop" if values["stop"] else None
     if Record.SECTION in values["record"] and other:
         raise ValueError(f"record: found 'section' beside {other}; expected one of them; make it one of the sections")
-    made = {f"{name}{more}" for name in values["sections"] for more in ENDINGS}
-    twice = sorted(made & {*values["observe"]})
+    variables = {f"{name}{ending}" for name in values["sections"] for ending in ENDINGS}
+    twice = sorted(variables & {*values["observe"]})
     if twice:
         raise ValueError(f"observe: found the name {twice[0]!r}, which a section has; rename one of them")
 
 
-def _times(model: Model, numbers: Mapping[str, float], given: Mapping[str, object]) -> dict[str, object]:
-    """The unit of time: the period of the drive if there is one."""
+def _time_unit(model: Model, numbers: Mapping[str, float], unit_text: object) -> TimeUnit:
+    """Return the unit of time; by default the period of the drive if there is one at all values of the parameters."""
     motion = drive(model, numbers)
     default = TimeUnit.TIME if motion.frequency is None or motion.by_values else TimeUnit.PERIOD
-    unit = default if given["time_unit"] is None else TimeUnit.parse("time_unit", given["time_unit"])
+    unit = default if unit_text is None else TimeUnit.parse("time_unit", unit_text)
     if unit == TimeUnit.PERIOD and motion.frequency is None:
         names = " and ".join(dict.fromkeys(repr(kind.oscillator.name) for kind in model.kinds))
-        whole = names if len(model.kinds) == 1 else f"the network of {names}"
+        subject = names if len(model.kinds) == 1 else f"the network of {names}"
         raise ValueError(
-            f"time_unit: found 'period', but {whole} {motion.problem}; expected 'time'; change it or leave it out"
+            f"time_unit: found 'period', but {subject} {motion.problem}; expected 'time'; change it or leave it out"
         )
-    return {"time_unit": unit}
+    return unit
 
 
-def _numerics(given: Mapping[str, object], records: Sequence[Record]) -> dict[str, object]:
-    """The integrator, its tolerances and limits."""
-    rtol = check_number("rtol", given["rtol"], *LIMITS["rtol"])
-    atol = rtol / 10 if given["atol"] is None else check_number("atol", given["atol"], *LIMITS["atol"])
-    integrator = check_choice("integrator", given["integrator"], ("auto", *integrators()))
+def _numerics(keywords: Mapping[str, object], records: Sequence[Record]) -> dict[str, object]:
+    """Return the integrator, its tolerances and limits."""
+    rtol = check_number("rtol", keywords["rtol"], *LIMITS["rtol"])
+    atol = rtol / 10 if keywords["atol"] is None else check_number("atol", keywords["atol"], *LIMITS["atol"])
+    integrator = check_choice("integrator", keywords["integrator"], ("auto", *integrators()))
     if atol < 1e-300:
         raise ValueError(
             f"atol: found {atol!r}; expected a number above 0, since states pass through 0; take e.g. 1e-10"
         )
-    max_steps = check_integer("max_steps", given["max_steps"], *LIMITS["max_steps"])
-    samples = check_integer("samples", given["samples"], *LIMITS["samples"])
+    max_steps = check_integer("max_steps", keywords["max_steps"], *LIMITS["max_steps"])
+    samples = check_integer("samples", keywords["samples"], *LIMITS["samples"])
     if Record.TRAJECTORY in records and samples < 2:
         raise ValueError(
             f"samples: found {samples} for the trajectory; expected at least 2, "
@@ -247,23 +253,18 @@ def _numerics(given: Mapping[str, object], records: Sequence[Record]) -> dict[st
 
 
 def _check_friction(model: Model, numbers: Mapping[str, float], axes: Sequence[Axis], zipped: bool) -> None:
-    """Refuse set-valued friction whose static coefficient is below that of slip, which can neither hold nor slip."""
+    """Refuse set-valued friction whose static coefficient is below that of slip in a cell: it can neither hold nor slip."""
     if model.contact != ContactModel.SET_VALUED:
         return
-    for kind, own in at_nodes(model, {name: name for name in numbers}):
-        if kind.friction is not None:
-            for low, high in kind.friction.order:
-                _check_order(kind.friction, (own[low], own[high]), numbers, axes, zipped)
-
-
-def _check_order(
-    friction: FrictionLaw, pair: tuple[str, str], numbers: Mapping[str, float], axes: Sequence[Axis], zipped: bool
-) -> None:
-    """Compare two parameters in all cells, the smaller one first."""
-    low, high = pair
     swept = {axis.name: axis.values for axis in axes}
-    lows, highs = (swept.get(name, (numbers[name],)) for name in pair)
-    together = zipped and low in swept and high in swept
-    for a, b in zip(lows, highs, strict=True) if together else ((max(lows), min(highs)),):
-        if b < a:
-            raise ValueError(f"friction {friction}: found {high} = {b!r} below {low} = {a!r}; expected {low} <= {high}")
+    for kind, names in at_nodes(model, {name: name for name in numbers}):
+        for pair in kind.friction.order if kind.friction else ():
+            low, high = (names[name] for name in pair)
+            lows, highs = (swept.get(name, (numbers[name],)) for name in (low, high))
+            # On a grid the largest of one meets the smallest of the other; zipped axes meet value by value.
+            together = zipped and low in swept and high in swept
+            for a, b in zip(lows, highs, strict=True) if together else ((max(lows), min(highs)),):
+                if b < a:
+                    raise ValueError(
+                        f"friction {kind.friction}: found {high} = {b!r} below {low} = {a!r}; expected {low} <= {high}"
+                    )

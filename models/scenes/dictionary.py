@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -21,37 +23,52 @@ from ..sweeps.parameters import collected
 
 
 def arguments(values: object, keywords: Iterable[str], folder: Path | None = None) -> dict[str, Any]:
-    """Return the keywords of a scene from names and values as in a scene file."""
-    found = check_table("scene", values)
-    check_keys("scene", found, ["sweep" if name == "axes" else name for name in keywords])
-    given: dict[str, Any] = {str(key): value for key, value in found.items()}
-    if "topology" in given:
-        given["topology"] = graph_of(check_table("topology", given["topology"]), folder)
-    if "sweep" in given:
-        sweep = dict(check_table("sweep", given.pop("sweep")))
-        if "zipped" in sweep and "zipped" in given:
+    """Return the keywords of a scene from names and values as in a scene file, whose paths start in `folder`."""
+    table = check_table("scene", values)
+    check_keys("scene", table, ["sweep" if name == "axes" else name for name in keywords])
+    read: dict[str, Any] = {str(key): value for key, value in table.items()}
+    if "sweep" in read:
+        sweep = dict(check_table("sweep", read.pop("sweep")))
+        if "zipped" in sweep and "zipped" in read:
             raise ValueError("zipped is given twice, in [sweep] and above; expected it once; remove one")
-        given["zipped"] = sweep.pop("zipped", given.get("zipped", False))
-        given["axes"] = sweep
-    for name in ("parameters", "initial", "observe", "sections", "draws"):
-        if name in given:
-            check_table(name, given[name])
-    graphs = given.get("draws", {}).get(GRAPH)
-    if isinstance(graphs, list):
-        tables = (check_table(f"draw {GRAPH} {k}", graph) for k, graph in enumerate(graphs, start=1))
-        given["draws"] = {**given["draws"], GRAPH: [graph_of(table, folder) for table in tables]}
-    for name in ("oscillator", "friction", "coupling"):
-        if name in given:
-            given[name] = _placed(given[name], folder)
-    if isinstance(given.get("links"), list):
-        given["links"] = [_layer(f"links {k}", entry, folder) for k, entry in enumerate(given["links"], start=1)]
-    if isinstance(given.get("nodes"), list):
-        given["nodes"] = [_placed(group, folder) for group in given["nodes"]]
-    return given
+        read["zipped"] = sweep.pop("zipped", read.get("zipped", False))
+        read["axes"] = sweep
+
+    def each(value: object, reader: Callable[[int, Any], object]) -> object:
+        """Read the entries of a list, counted from 1; `Scene` refuses anything else."""
+        return [*map(reader, count(1), value)] if isinstance(value, list) else value
+
+    def graph(what: str, value: object) -> Topology:
+        return graph_of(check_table(what, value), folder)
+
+    def layer(k: int, value: object) -> tuple[object, Topology]:
+        what = f"links {k}"
+        entry = check_table(what, value)
+        check_keys(what, entry, ("coupling", "topology"))
+        for key in ("coupling", "topology"):
+            if key not in entry:
+                raise ValueError(f"{what}: {key!r} is missing; expected a coupling and its graph")
+        return _placed(entry["coupling"], folder), graph(f"{what}: topology", entry["topology"])
+
+    def draws(value: object) -> object:
+        drawn = dict(check_table("draws", value))
+        if GRAPH in drawn:
+            drawn[GRAPH] = each(drawn[GRAPH], lambda k, entry: graph(f"draw {GRAPH} {k}", entry))
+        return drawn
+
+    readers: dict[str, Callable[[Any], object]] = {
+        "topology": partial(graph, "topology"),
+        "links": lambda value: each(value, layer),
+        "nodes": lambda value: each(value, lambda _, group: _placed(group, folder)),
+        "draws": draws,
+        **{name: partial(_placed, folder=folder) for name in ("oscillator", "friction", "coupling")},
+        **{name: partial(check_table, name) for name in ("parameters", "initial", "observe", "sections")},
+    }
+    return {name: readers[name](value) if name in readers else value for name, value in read.items()}
 
 
 def _placed(name: object, folder: Path | None) -> object:
-    """The name of a part, or a table with such names; a path to a file of code starts in the folder of the scene file."""
+    """Return a name, or a table of names, in which paths to files of code start in `folder`."""
     if isinstance(name, Mapping):
         return {key: _placed(e, folder) if key in ("oscillator", "friction") else e for key, e in name.items()}
     if not isinstance(name, str) or folder is None or not split(name)[0].endswith(".py"):
@@ -59,79 +76,62 @@ def _placed(name: object, folder: Path | None) -> object:
     return str(folder / name)
 
 
-def _layer(what: str, given: object, folder: Path | None) -> tuple[object, Topology]:
-    """A layer of links, {coupling = …, topology = …}."""
-    table = check_table(what, given)
-    check_keys(what, table, ("coupling", "topology"))
-    for key in ("coupling", "topology"):
-        if key not in table:
-            raise ValueError(f"{what}: {key!r} is missing; expected a coupling and its graph")
-    return _placed(table["coupling"], folder), graph_of(check_table(f"{what}: topology", table["topology"]), folder)
-
-
-def graph_of(given: Mapping[object, Any], folder: Path | None = None) -> Topology:
+def graph_of(table: Mapping[object, Any], folder: Path | None = None) -> Topology:
     """Return the graph of a table in a scene file; relative paths in it start at `folder`."""
-    name = _placed(given.get("name"), folder)
-    known = isinstance(name, str) and "matrix" not in given and (name in names() or name.endswith(".py"))
-    options = family(str(name)).options if known else {}
-    check_keys("topology", given, ("name", "n", *options, "matrix", "edges", "labels", "directed", "file"))
-    if "file" in given:
-        return _of_file(given, folder)
-    if "edges" in given:
-        return _of_edges(given)
-    if "matrix" in given:
-        return _of_matrix(given)
+    name = _placed(table.get("name"), folder)
+    is_family = isinstance(name, str) and "matrix" not in table and (name in names() or name.endswith(".py"))
+    options = family(str(name)).options if is_family else {}
+    check_keys("topology", table, ("name", "n", *options, "matrix", "edges", "labels", "directed", "file"))
+    if "file" in table:
+        return _of_file(table, folder)
+    if "edges" in table:
+        return _of_edges(table)
+    if "matrix" in table:
+        name = check_text("topology name", table.get("name", "matrix"))
+        graph = checked_name("topology", from_matrix(table["matrix"], name))
+        if "n" in table and check_integer("topology n", table["n"], 1, MOST_NODES) != graph.n:
+            rows = f"{graph.n} row{'s' * (graph.n != 1)}"
+            raise ValueError(f"topology: n = {table['n']} but the matrix has {rows}; remove n")
+        return graph
     for key in ("name", "n"):
-        if key not in given:
-            found = short_repr(dict(given))
+        if key not in table:
+            found = short_repr(dict(table))
             raise ValueError(
                 f"topology: {key!r} is missing in {found}; expected name and n, or edges, or matrix, or file"
             )
-    n = check_integer("topology n", given["n"], 0, MOST_NODES)
-    if not known and is_composed(part("topology name", name)):
-        return _composed(str(name), n)
-    chosen = {key: given[key] for key in options if key in given}
-    return topology(part("topology name", name), n, **chosen)
-
-
-def _composed(name: str, n: int) -> Topology:
-    """The graph of a text such as "weighted(complete(100), 1/100)"."""
-    graph = read_graph(name, MOST_NODES)
+    n = check_integer("topology n", table["n"], 0, MOST_NODES)
+    text = part("topology name", name)
+    if is_family or not is_composed(text):
+        return topology(text, n, **{key: table[key] for key in options if key in table})
+    # An operation such as "weighted(complete(100), 1/100)".
+    graph = read_graph(text, MOST_NODES)
     if graph.n != n:
-        raise ValueError(f"topology: n = {n} but {short_repr(name)} has {graph.n} nodes; expected n = {graph.n}")
+        raise ValueError(f"topology: n = {n} but {short_repr(text)} has {graph.n} nodes; expected n = {graph.n}")
     return graph
 
 
-def _of_file(given: Mapping[object, Any], folder: Path | None) -> Topology:
-    if len(given) > 1:
-        raise ValueError(f"topology: found {short_repr(dict(given))}; expected 'file' alone; remove the other keys")
-    path = Path(folder or ".", check_text("topology file", given["file"], 4096))
+def _of_file(table: Mapping[object, Any], folder: Path | None) -> Topology:
+    if len(table) > 1:
+        raise ValueError(f"topology: found {short_repr(dict(table))}; expected 'file' alone; remove the other keys")
+    path = Path(folder or ".", check_text("topology file", table["file"], 4096))
     try:
         return read_matrix(path)
     except OSError as error:
         raise ValueError(f"topology: {' '.join(str(error).split())}") from None
 
 
-def _of_edges(given: Mapping[object, Any]) -> Topology:
-    """The graph of a list of edges, of nodes 1 … n, of the nodes of `labels`, or of whatever nodes the edges name."""
-    name = check_text("topology name", given.get("name", "edges"))
-    if "n" in given and "labels" in given:
+def _of_edges(table: Mapping[object, Any]) -> Topology:
+    """Return the graph of a list of edges between nodes 1 … n, between `labels`, or between the nodes that they name."""
+    name = check_text("topology name", table.get("name", "edges"))
+    if "n" in table and "labels" in table:
         raise ValueError("topology: found n beside labels; expected one of them; leave n out")
-    labels = given.get("labels")
-    if "n" in given:
-        labels = range(1, check_integer("topology n", given["n"], 1, MOST_NODES) + 1)
+    labels = table.get("labels")
+    if "n" in table:
+        labels = range(1, check_integer("topology n", table["n"], 1, MOST_NODES) + 1)
     elif labels is not None and not isinstance(labels, list):
         raise TypeError(f"topology labels: found {short_repr(labels)}; expected a list of texts or whole numbers")
-    graph = edge_graph(given["edges"], labels, given.get("directed", False), name)
-    return checked_name("topology", Topology(name, graph.n, graph.links) if "n" in given else graph)
-
-
-def _of_matrix(given: Mapping[object, Any]) -> Topology:
-    name = check_text("topology name", given.get("name", "matrix"))
-    graph = checked_name("topology", from_matrix(given["matrix"], name))
-    if "n" in given and check_integer("topology n", given["n"], 1, MOST_NODES) != graph.n:
-        raise ValueError(f"topology: n = {given['n']} but the matrix has {graph.n} row{'s' * (graph.n != 1)}; remove n")
-    return graph
+    graph = edge_graph(table["edges"], labels, table.get("directed", False), name)
+    return checked_name("topology", Topology(name, graph.n, graph.links) if "n" in table else graph)
 
 
 def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
@@ -146,10 +146,10 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
     if layers is not None:
         del written["coupling"], written["topology"]
         written["links"] = [
-            {"coupling": as_text_or_table(own), "topology": graph_table(graph)} for own, graph in layers
+            {"coupling": as_text_or_table(coupling), "topology": graph_table(graph)} for coupling, graph in layers
         ]
     written["nodes"] = [group.as_dict() for group in values["nodes"]]
-    if values["atol"] == values["rtol"] / 10:  # it follows rtol, in functions with a tolerance of their own too
+    if values["atol"] == values["rtol"] / 10:  # the default, which follows another rtol too
         del written["atol"]
     written["parameters"] = collected(values["parameters"], varied)
     written["initial"] = {name: list(states) for name, states in values["initial"].items()}
@@ -167,16 +167,16 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
 
 
 def _draw(drawn: Draws) -> object:
-    """A distribution or a random graph as text, or numbers or graphs by realisation."""
+    """Return a distribution or a random graph as text, or numbers or graphs by realisation."""
     if isinstance(drawn, Draw | RandomGraph):
         return str(drawn)
     return [*map(graph_table, drawn.graphs)] if isinstance(drawn, Graphs) else [*map(list, drawn)]
 
 
 def graph_table(graph: Topology) -> dict[str, object]:
-    """Return a graph in JSON types: its family and options, or its edges; `graph_of` reads it.
+    """Return a graph in JSON types, which `graph_of` reads: its family and options, or its edges.
 
-    Of a weighted complete graph, whose links may be too many to be listed, it is the text of the operation.
+    A weighted complete graph, whose links may be too many to be listed, becomes the text of the operation.
     """
     try:
         composed = graph.all_to_all is not None and is_composed(graph.name)

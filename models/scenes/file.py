@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 KEY_PARTS = 8
-"""Most parts of a dotted key in a scene file."""
+"""Most parts of a dotted key in a scene file: more than any needs, few enough for the parser."""
 
 _STRINGS = (
     r'"""(?:\\.|[^\\])*?(?:"""|\Z)',
@@ -26,7 +26,7 @@ _STRINGS = (
 )
 
 _TOKEN = re.compile(rf"(?P<word>{'|'.join(_STRINGS)}|[\w+-]+|[ \t]+)|(?P<dot>\.)|(?P<end>#[^\n]*|.)", re.DOTALL)
-"""What stands in a TOML text: strings, bare words and blanks, which go on with a key, dots, and whatever ends one."""
+"""Tokens of TOML: strings, bare words and blanks, which continue a key, dots, and any other text, which ends a key."""
 
 
 def scene_names() -> tuple[str, ...]:
@@ -51,16 +51,16 @@ def load_scene(name_or_path: str | os.PathLike[str]) -> Scene:
     if name.endswith(".toml"):
         path = Path(name)
         return _scene(path.name, _read(path), path.parent)
-    known = scene_names()
-    if name not in known and os.path.exists(name):
+    names = scene_names()
+    if name not in names and os.path.exists(name):
         raise ValueError(
             f"scene {short_repr(name)}: found a file of another kind; expected a scene, whose name ends in .toml; "
             "the scene of a result is open_result(...).scene, which save('scene.toml') writes"
         )
-    if name not in known:
+    if name not in names:
         raise ValueError(
-            f"unknown scene {short_repr(name)}; known: {', '.join(known)}, or a path to a .toml file"
-            + suggestion(name, known)
+            f"unknown scene {short_repr(name)}; known: {', '.join(names)}, or a path to a .toml file"
+            + suggestion(name, names)
         )
     source = resources.files(f"{__package__}.library").joinpath(f"{name}.toml")
     return _scene(f"{name}.toml", source.read_bytes(), None)
@@ -90,18 +90,27 @@ def _read(path: Path) -> bytes:
 
 
 def _scene(name: str, content: bytes, folder: Path | None) -> Scene:
-    """The scene of a file's content, whose paths start in `folder`."""
+    """Return the scene of a file's content, whose paths start in `folder`."""
     from .scene import Scene  # the list of scenes needs no SymPy
 
     try:
-        words = content.decode("utf-8-sig")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise ValueError(
             f"{name}: byte {error.start} is not UTF-8; expected UTF-8 text; save the file in that encoding"
         ) from None
-    _check_keys(name, words)
+    # The time and memory of the parser rise with the square of the parts of a dotted key.
+    dots = 0
+    for token in _TOKEN.finditer(text):
+        dots = 0 if token.lastgroup == "end" else dots + (token.lastgroup == "dot")
+        if dots >= KEY_PARTS:
+            line = text.count("\n", 0, token.start()) + 1
+            raise ValueError(
+                f"{name}: line {line} has a key of more than {KEY_PARTS} parts with dots between them; expected at most "
+                "3, as in sweep.sigma.from; correct the file there"
+            )
     try:
-        values = tomllib.loads(words)
+        values = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         reason = str(error) if isinstance(error, tomllib.TOMLDecodeError) else "too deep or too long a value"
         raise ValueError(f"{name}: not TOML: {' '.join(reason.split())[:300]}; correct the file there") from None
@@ -109,19 +118,3 @@ def _scene(name: str, content: bytes, folder: Path | None) -> Scene:
         return Scene.from_dict(values, folder)
     except (ValueError, TypeError) as error:
         raise type(error)(f"{name}: {error}") from None
-
-
-def _check_keys(name: str, words: str) -> None:
-    """Refuse a dotted key of more than KEY_PARTS parts: the parser's time and memory rise with their square."""
-    dots = 0
-    for found in _TOKEN.finditer(words):
-        if found.lastgroup == "dot":
-            dots += 1
-        elif found.lastgroup == "end":
-            dots = 0
-        if dots >= KEY_PARTS:
-            line = words.count("\n", 0, found.start()) + 1
-            raise ValueError(
-                f"{name}: line {line} has a key of more than {KEY_PARTS} parts with dots between them; expected at most "
-                "3, as in sweep.sigma.from; correct the file there"
-            )

@@ -1,4 +1,4 @@
-"""What to simulate and what to record: the frozen description that everything else starts from."""
+"""`Scene`: the model, its numbers, and what is recorded of it; every computation starts from one."""
 
 from __future__ import annotations
 
@@ -196,11 +196,11 @@ class Scene(HasDrawing, HasLatex):
         draws: Mapping[str, object] | None = None,
         rng: int = 0,
     ) -> None:
-        given = {name: value for name, value in locals().items() if name != "self"}
-        values = complete(given)
+        keywords = {name: value for name, value in locals().items() if name != "self"}
+        values = complete(keywords)
         for name, value in values.items():
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "given", _kept(given, values))
+        object.__setattr__(self, "given", _frozen_keywords(keywords, values))
         if called_from_outside():
             _warn(self)
 
@@ -246,15 +246,15 @@ class Scene(HasDrawing, HasLatex):
     @property
     def strengths(self) -> tuple[str, ...]:
         """The strength of each layer that has links; ValueError if no parameter of one, or more than one, is a factor."""
-        equations, found = self.equations, []
+        equations, names_of_layers = self.equations, []
         numbered = tuple(s for edge in equations.edges for s in edge.parameters if s.name in equations.numbered)
         for layer in equations.layers:
             of_ends = (((*equations.nodes[a].parameters, *numbered), edge) for (a, _), edge in layer.edge_of)
             names = {strength(edge, others).name for others, edge in of_ends}
             if len(names) > 1:
                 raise ValueError(f"strength of the links: found {', '.join(sorted(names))}; expected one for all links")
-            found.append(names.pop())
-        return tuple(found)
+            names_of_layers.append(names.pop())
+        return tuple(names_of_layers)
 
     @property
     def forced(self) -> bool:
@@ -331,6 +331,7 @@ class Scene(HasDrawing, HasLatex):
         ValueError, TypeError
             For unknown names, and for whatever `Scene` refuses.
         """
+        # Names of parameters, names of keywords, and names that are neither.
         single = {name: changes.pop(name) for name in tuple(changes) if name not in self.given and self.takes(name)}
         strange = next((name for name in changes if name not in self.given), None)
         if strange is not None:
@@ -342,27 +343,24 @@ class Scene(HasDrawing, HasLatex):
             )
         if changes.get("topology") is not None:
             changes["topology"] = as_topology(changes["topology"])
-        given = {**self.given, "initial": self._kept_start(changes), **changes}
-        if given["links"] is not None:  # coupling and graph of a single layer give way
-            given |= {"coupling": None, "topology": None} | changes
-        if given["parameters"] is not None or single:
-            numbers = {} if given["parameters"] is None else check_table("parameters", given["parameters"])
-            given["parameters"] = {**without(self.model, numbers, single), **single}
-        if self.varied and "parameters" not in changes and _nodes(given) != self.n:
+        start: Mapping[str, object] | None = self.given["initial"]
+        if start and not {"contact", "friction", "oscillator", "nodes"}.isdisjoint(changes):
+            # The friction may be another; modes of contacts follow from x and v.
+            start = {name: at for name, at in start.items() if name != SLIP.name}
+        keywords = {**self.given, "initial": start, **changes}
+        if keywords["links"] is not None:  # they replace the coupling and the graph of a single layer
+            keywords |= {"coupling": None, "topology": None} | changes
+        if keywords["parameters"] is not None or single:
+            numbers = {} if keywords["parameters"] is None else check_table("parameters", keywords["parameters"])
+            keywords["parameters"] = {**without(self.model, numbers, single), **single}
+        if self.varied and "parameters" not in changes and _node_count(keywords) != self.n:
             raise ValueError(
                 f"{self.varied[0]} has values for {self.n} nodes, or for their links; give `parameters` for another number"
             )
-        scene = Scene(**given)
+        scene = Scene(**keywords)
         if called_from_outside():
             _warn(scene, self)
         return scene
-
-    def _kept_start(self, changes: Mapping[str, object]) -> Mapping[str, object] | None:
-        """The initial states that were given, without modes of contacts if the friction may be another."""
-        start: Mapping[str, object] | None = self.given["initial"]
-        if start and not {"contact", "friction", "oscillator", "nodes"}.isdisjoint(changes):
-            return {name: at for name, at in start.items() if name != SLIP.name}  # modes follow from x and v
-        return start
 
     def _values(self) -> dict[str, Any]:
         """The completed value of each keyword."""
@@ -412,19 +410,15 @@ class Scene(HasDrawing, HasLatex):
         oscillators = " and ".join(dict.fromkeys(kind.oscillator.name for kind in self.model.kinds))
         laws = " and ".join(dict.fromkeys(kind.friction.name for kind in self.model.kinds if kind.friction))
         names = [oscillators, laws, *(str(coupling) for coupling, _ in self.model.linked)]
-        words = [repr(self.title)] if self.title else []
-        words += [
-            "/".join(name for name in names if name),
-            f"{self.topology.name}({self.n})",
-            *map(repr, self.axes),
-        ]
-        return f"Scene({', '.join(words)})"
+        title = [repr(self.title)] if self.title else []
+        parts = "/".join(name for name in names if name)
+        return f"Scene({', '.join([*title, parts, f'{self.topology.name}({self.n})', *map(repr, self.axes)])})"
 
 
 def _warn(scene: Scene, before: Scene | None = None) -> None:
     """Warn of functions of single inputs, of a synchronisation error that cannot vanish, and of friction that is not resolved.
 
-    Of a scene that was another one `before`, warn of what is new.
+    A scene that replaces another one, `before`, repeats no warning of that.
     """
     sentences = list[str]()
     if before is None or (scene.model, scene.varied) != (before.model, before.varied):
@@ -434,14 +428,14 @@ def _warn(scene: Scene, before: Scene | None = None) -> None:
     unresolved = unresolved_smoothing(scene.model, scene.parameters, scene.axes)
     if unresolved and not (before and unresolved_smoothing(before.model, before.parameters, before.axes)):
         sentences.append(unresolved)
-    for words in filter(None, sentences):
-        warn(words)
+    for sentence in filter(None, sentences):
+        warn(sentence)
 
 
-def _nodes(given: Mapping[str, Any]) -> int | None:
-    """The number of nodes of given links or of a given graph."""
+def _node_count(keywords: Mapping[str, Any]) -> int | None:
+    """Return the number of nodes of the links or of the graph; None if neither is a keyword, or readable."""
     try:
-        graph = given["topology"] if given["links"] is None else given["links"][0][1]
+        graph = keywords["topology"] if keywords["links"] is None else keywords["links"][0][1]
     except (TypeError, LookupError):
         return None
     return getattr(graph, "n", None)
@@ -452,54 +446,53 @@ def _spectrum(graph: Topology) -> Spectrum:
     return graph.spectrum
 
 
-KEYWORDS = tuple(own.name for own in fields(Scene) if own.compare)
+KEYWORDS = tuple(row.name for row in fields(Scene) if row.compare)
 """The keywords of a scene, which are the keys of a scene file."""
 
 _FOLLOWING = {"friction": "default", "contact": None, "record": None, "section": None, "time_unit": None, "atol": None}
-"""Keywords whose default depends on other keywords, with the value that stands for it."""
+"""Keywords whose default depends on other keywords, with the value that means this default."""
 
 
-def _kept(given: Mapping[str, Any], values: Mapping[str, Any]) -> FrozenDict[Any]:
-    """What was given, in values that do not change: defaults that follow other keywords stay open."""
-    kept = {name: values[name] for name in KEYWORDS}
+def _frozen_keywords(keywords: Mapping[str, Any], values: Mapping[str, Any]) -> FrozenDict[Any]:
+    """Return the keywords as immutable values; those with a default that follows other keywords stay open."""
+    frozen = {name: values[name] for name in KEYWORDS}
     for name, following in _FOLLOWING.items():
-        if isinstance(given[name], str | None) and given[name] == following:
-            kept[name] = following
-    for name in ("parameters", "initial"):
-        if given[name] is None:
-            kept[name] = None
-    if GRAPH in values["draws"] and given["topology"] is not None:
-        kept["topology"] = as_topology(given["topology"])
-    if given["initial"] is not None:
-        kept["initial"] = FrozenDict({n: _kept_states(at, values["initial"][n]) for n, at in given["initial"].items()})
-    if given["parameters"] is not None:
-        kept["parameters"] = FrozenDict(_kept_parameters(given["parameters"], values["model"], values["parameters"]))
-    return FrozenDict(kept)
+        if isinstance(keywords[name], str | None) and keywords[name] == following:
+            frozen[name] = following
+    if GRAPH in values["draws"] and keywords["topology"] is not None:
+        frozen["topology"] = as_topology(keywords["topology"])
+    # A number or a range fits every number of nodes; a tuple has a number for each.
+    frozen["initial"] = frozen["parameters"] = None
+    if keywords["initial"] is not None:
+        start = {}
+        for name, at in keywords["initial"].items():
+            states = values["initial"][name]
+            is_list = is_row(at.tolist() if hasattr(at, "tolist") else at)
+            start[name] = FrozenDict(at) if isinstance(at, Mapping) else states if is_list else states[0]
+        frozen["initial"] = FrozenDict(start)
+    if keywords["parameters"] is not None:
+        frozen["parameters"] = FrozenDict(
+            _frozen_parameters(keywords["parameters"], values["model"], values["parameters"])
+        )
+    return FrozenDict(frozen)
 
 
-def _kept_states(given: object, states: tuple[float, ...]) -> object:
-    """The states of a component as they were given: a number, a range, or a tuple with one number for each node."""
-    if isinstance(given, Mapping):
-        return FrozenDict(given)
-    return states if is_row(given.tolist() if hasattr(given, "tolist") else given) else states[0]
-
-
-def _kept_parameters(given: Mapping[str, object], model: Model, numbers: Mapping[str, float]) -> dict[str, object]:
-    """The parameters that were given: a number, or a tuple with one for each node."""
-    kept: dict[str, object] = {}
-    for name in given:
+def _frozen_parameters(table: Mapping[str, object], model: Model, numbers: Mapping[str, float]) -> dict[str, object]:
+    """Return the parameters of a table: a number, or a tuple with one for each node or link."""
+    frozen: dict[str, object] = {}
+    for name in table:
         if name in numbers:
-            kept[name] = numbers[name]
+            frozen[name] = numbers[name]
         elif name in model.parameters:
-            links = dict.fromkeys(map(str, model.link_names(name).values()))
-            kept[name] = tuple(numbers[own] for own in links or (str(NodeName(name, i)) for i in model.holders(name)))
-        else:
+            names = [*dict.fromkeys(map(str, model.link_names(name).values()))]
+            names = names or [str(NodeName(name, i)) for i in model.holders(name)]
+            frozen[name] = tuple(numbers[single] for single in names)
+        else:  # the parameter of one node, all of which have one number
             parts = model.single(name)
-            kept[name] = numbers[parts.base] if parts else given[name]
-    return kept
+            frozen[name] = numbers[parts.base] if parts else table[name]
+    return frozen
 
 
 def check_scene(value: object) -> Scene:
     """Return the value if it is a Scene, else raise TypeError."""
-
     return check_instance("scene", value, Scene, "a Scene, e.g. load_scene('figure_4a')")

@@ -43,9 +43,9 @@ OPTIONS = {int: ["integer", "string"], str: ["number", "string"]}
 def schema() -> Table:
     """Return the JSON Schema of scene files, in JSON types.
 
-    The schema knows the keys of every table, their types and ranges, and the names of all parts.  It
-    leaves to `Scene` what hangs on several keys, such as whether an oscillator has a parameter, and the
-    grammar of texts.  It keeps to words that draft 4 and draft 7 share, since editors know either.
+    The schema lists the keys of every table, their types and ranges, and the names of all parts.
+    `Scene` checks all that depends on several keys, such as whether an oscillator has a parameter, and the
+    grammar of texts.  The words are those that draft 4 and draft 7 share, since editors read either.
 
     References
     ----------
@@ -68,7 +68,7 @@ def schema() -> Table:
 
 
 def _rows() -> dict[str, Table]:
-    """What is said of the keywords whose type alone does not tell the form of the value in a file."""
+    """Return the rows of the keywords whose form in a file does not follow from their type."""
     oscillator, friction = _written_out()
     group = {"oscillator": oscillator, "friction": friction, "at": {"type": "array", "items": WHOLE, "minItems": 1}}
     uniform = {"low": NUMBER, "high": NUMBER, "seed": _of_type("seed", int)}
@@ -82,8 +82,8 @@ def _rows() -> dict[str, Table]:
         _table({"rates": expressions, "parameters": {"type": "object"}}, "rates"),
         _table({"potential": NUMBER, "parameters": {"type": "object"}}, "potential"),
     ]
-    words = {"type": "string", "pattern": "->| on "}
-    coupling = {"anyOf": [*_part(COUPLING, "none")["anyOf"], words, *tables]}
+    components = {"type": "string", "pattern": "->| on "}
+    coupling = {"anyOf": [*_part(COUPLING, "none")["anyOf"], components, *tables]}
     graph = {"anyOf": _graphs()}
     section = {
         "function": TEXT,
@@ -100,7 +100,7 @@ def _rows() -> dict[str, Table]:
         "topology": graph,
         "parameters": {
             "type": "object",
-            "properties": {name: {"description": words, **values} for name, words in _parameters().items()},
+            "properties": {name: {"description": text, **values} for name, text in _parameters().items()},
             "additionalProperties": values,
         },
         "initial": {"type": "object", "additionalProperties": _either(numbers, _table(uniform, "low", "high"))},
@@ -123,7 +123,7 @@ def _rows() -> dict[str, Table]:
 
 
 def _of_type(name: str, kind: Any) -> Table:
-    """The row of a keyword by its type: a word, several words, text, a number in its range, true or false."""
+    """Return the row of a keyword by its type: a word, several words, text, a number in its range, true or false."""
     if isinstance(kind, type) and issubclass(kind, Word):
         return {"enum": [str(word) for word in kind]}
     if get_origin(kind) is tuple:
@@ -138,29 +138,29 @@ def _of_type(name: str, kind: Any) -> Table:
 
 
 def _table(properties: Mapping[str, Table], *required: str) -> Table:
-    """A table with these keys and no others."""
+    """Return the row of a table with these keys and no others."""
     row = {"type": "object", "properties": dict(properties), "additionalProperties": False}
     return {**row, "required": list(required)} if required else row
 
 
 def _either(*others: Table) -> Table:
-    """A number or something else."""
+    """Return the row of a number or something else."""
     return {"anyOf": [NUMBER, *others]}
 
 
 def _part(kind: PluginKind, *words: str) -> Table:
-    """The name of a part, a file outside the package, or one of some words."""
+    """Return the row of the name of a part, of a file outside the package, or of some words."""
     return {"anyOf": [{"enum": [*plugins.names(kind), *words]}, FILE]}
 
 
 def _written_out() -> tuple[Table, Table]:
-    """An oscillator and a friction law: a name, or a table of expressions."""
+    """Return the rows of an oscillator and of a friction law: a name, or a table of expressions."""
     anything: Table = {"type": "object"}
     contact = {"enum": [str(word) for word in ContactModel]}
     law = _part(FRICTION_LAW, "none", "default")
     keys = {"name": TEXT, "force": NUMBER, "static": NUMBER, "order": {"type": "array"}}
-    own = _table({**keys, "self_exciting": {"type": "boolean"}, "parameters": anything}, "force")
-    friction = {"anyOf": [*law["anyOf"], own]}
+    table = _table({**keys, "self_exciting": {"type": "boolean"}, "parameters": anything}, "force")
+    friction = {"anyOf": [*law["anyOf"], table]}
     common = {"name": TEXT, "parameters": anything, "initial": anything}
     field = _table({**common, "rates": EXPRESSIONS}, "rates")
     energies = {"coordinates": anything, "kinetic": NUMBER, "potential": NUMBER, "dissipation": NUMBER}
@@ -170,7 +170,7 @@ def _written_out() -> tuple[Table, Table]:
 
 
 def _graphs() -> list[Table]:
-    """The tables of a topology: one for each family, a file of code, a matrix, a list of edges, a file of a matrix."""
+    """Return the tables of a topology: one for each family, a file of code, a matrix, a list of edges, a file of a matrix."""
     rows = {"type": "array", "minItems": 1, "items": {"type": "array", "items": NUMBER}}
     outside = {"type": "object", "properties": {"name": FILE, "n": WHOLE}, "required": ["name", "n"]}
     matrix = {"matrix": rows, "name": TEXT, "n": WHOLE}
@@ -195,33 +195,33 @@ def _graphs() -> list[Table]:
 
 
 def _family(graphs: Family) -> Table:
-    """The table of one family, its options by the types of their defaults."""
+    """Return the table of one family, its options by the types of their defaults."""
     options: dict[str, Table] = {
         name: {"type": OPTIONS.get(type(default), ["array", "integer", "string"])}
         for name, default in graphs.options.items()
     }
-    own: dict[str, Table] = {"name": {"enum": [graphs.name]}, "n": {**WHOLE, "minimum": graphs.minimum}, **options}
-    return {"description": graphs.summary, **_table(own, "name", "n")}
+    keys: dict[str, Table] = {"name": {"enum": [graphs.name]}, "n": {**WHOLE, "minimum": graphs.minimum}, **options}
+    return {"description": graphs.summary, **_table(keys, "name", "n")}
 
 
 def _parameters() -> dict[str, str]:
-    """What the parameters of all parts mean, each in the words of the parts that have it."""
+    """Return the meaning of each parameter in all parts that have it."""
     parts: dict[str, Mapping[str, Parameter]] = {
         **{name: load_oscillator(name).parameters for name in plugins.names(OSCILLATOR)},
         **{f"friction {name}": load_friction_law(name).parameters for name in plugins.names(FRICTION_LAW)},
         **{f"coupling {name}": read_coupling(name).parameters for name in plugins.names(COUPLING)},
         "contact atan": {"kappa": KAPPA},
     }
-    words: dict[str, list[str]] = {}
+    meanings: dict[str, list[str]] = {}
     for part, parameters in parts.items():
         for name, parameter in parameters.items():
-            words.setdefault(name, []).append(f"{part}: {parameter.meaning}")
-    return {name: "; ".join(words[name]) for name in sorted(words)}
+            meanings.setdefault(name, []).append(f"{part}: {parameter.meaning}")
+    return {name: "; ".join(meanings[name]) for name in sorted(meanings)}
 
 
 def _meanings(kind: type) -> dict[str, str]:
-    """What the parameters of a class mean, by its NumPy-style docstring."""
+    """Return the meanings of the parameters of a class from its NumPy-style docstring."""
     text = inspect.getdoc(kind) or ""
     section = text.partition("Parameters\n----------\n")[2].partition("\n\n")[0]
     rows = re.findall(r"^(\w[\w, ]*) : .*\n((?: {4}.*\n?)+)", section, re.MULTILINE)
-    return {name: " ".join(words.split()) for names, words in rows for name in names.split(", ")}
+    return {name: " ".join(text.split()) for names, text in rows for name in names.split(", ")}

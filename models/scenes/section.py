@@ -52,19 +52,19 @@ class Section:
         object.__setattr__(self, "direction", Direction.parse("section direction", self.direction))
         object.__setattr__(self, "level", check_number("section level", self.level))
         if self.keep is not None:
-            kept = (self.keep,) if isinstance(self.keep, str | sp.Expr) else self.keep
-            if not isinstance(kept, Iterable):
-                raise TypeError(f"section keep: found {short_repr(kept)}; expected expressions, such as ('v', 'x_1')")
-            object.__setattr__(self, "keep", tuple(_text("section keep", e) for e in kept))
+            exprs = (self.keep,) if isinstance(self.keep, str | sp.Expr) else self.keep
+            if not isinstance(exprs, Iterable):
+                raise TypeError(f"section keep: found {short_repr(exprs)}; expected expressions, such as ('v', 'x_1')")
+            object.__setattr__(self, "keep", tuple(_text("section keep", e) for e in exprs))
 
     @classmethod
-    def parse(cls, words: object) -> Section:
+    def parse(cls, text: object) -> Section:
         """Return the section written as "v_1 falling" or "x_2 rising 0.1"; a Section passes unchanged."""
-        if isinstance(words, Section):
-            return words
-        parts = check_text("section", words).split(maxsplit=2)
+        if isinstance(text, Section):
+            return text
+        parts = check_text("section", text).split(maxsplit=2)
         if len(parts) < 2:
-            raise ValueError(f"section {words!r}: expected 'state direction [level]', e.g. 'v_1 falling'")
+            raise ValueError(f"section {text!r}: expected 'state direction [level]', e.g. 'v_1 falling'")
         return cls(
             parts[0],
             Direction.parse("section direction", parts[1]),
@@ -72,11 +72,11 @@ class Section:
         )
 
     @classmethod
-    def of_table(cls, what: str, given: object) -> Section:
+    def of_table(cls, what: str, value: object) -> Section:
         """Return the section of a table {function, direction, level, keep}; a Section passes unchanged."""
-        if isinstance(given, Section):
-            return given
-        table = check_table(what, given)
+        if isinstance(value, Section):
+            return value
+        table = check_table(what, value)
         check_keys(what, table, ("function", "direction", "level", "keep"))
         if "function" not in table:
             raise ValueError(f"{what}: found {short_repr(dict(table))}; expected function = 'x_1 - x_2'")
@@ -94,5 +94,5 @@ class Section:
 
 
 def _text(what: str, value: object) -> str:
-    """An expression as the text that it is kept as."""
+    """Return the text of an expression, with its terms in lexicographic order."""
     return sp.sstr(as_value(what, value), order="lex")

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from ..inputs.checks import check_path, short_repr, typed_repr
 
 BYTES = 1_000_000
-"""Most bytes of a scene file."""
+"""Most bytes of a scene file: a choice."""
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -22,20 +22,20 @@ def toml(table: Mapping[str, object]) -> str:
 
 def write(table: Mapping[str, object], path: str | os.PathLike[str]) -> None:
     """Write a table to a scene file."""
-    place = check_path("scene file", path)
-    if place.suffix != ".toml":
-        raise ValueError(f"scene file: found {short_repr(str(place))}; expected a name that ends in .toml")
+    file = check_path("scene file", path)
+    if file.suffix != ".toml":
+        raise ValueError(f"scene file: found {short_repr(str(file))}; expected a name that ends in .toml")
     content = toml(table).encode()
     if len(content) > BYTES:
         raise ValueError(f"scene file: found {len(content)} bytes; expected at most {BYTES}; use fewer values")
-    place.write_bytes(content)
+    file.write_bytes(content)
 
 
 def _lines(table: Mapping[str, object], path: tuple[str, ...]) -> Iterator[str]:
-    """The lines of a table: its values, then the tables in it, each below its title."""
+    """Yield the lines of a table: its values, then the tables in it, each below its title."""
     tables = {key: value for key, value in table.items() if isinstance(value, Mapping)}
     if path[-1:] == ("parameters",):
-        tables = {}  # in one line each: their order among numbers is that of the parameters
+        tables = {}  # each on one line, which keeps the order of all parameters
     if path and (len(tables) < len(table) or not table):
         yield f"\n[{'.'.join(map(_key, path))}]"
     for key, value in table.items():
@@ -50,7 +50,7 @@ def _key(key: str) -> str:
 
 
 def _value(value: object) -> str:
-    """A value on one line."""
+    """Return a value on one line."""
     if isinstance(value, Mapping):
         return f"{{{', '.join(f'{_key(key)} = {_value(entry)}' for key, entry in value.items())}}}"
     if isinstance(value, list | tuple):

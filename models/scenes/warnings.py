@@ -22,13 +22,13 @@ from ..sweeps.axis import Axis
 from ..sweeps.parameters import at_nodes
 
 STIFF = 100.0
-"""Frequency of a mode and number of its swings above which springs are called stiff."""
+"""Frequency of a mode, and number of its swings, above which springs count as stiff: a choice."""
 
 STEEP = 100.0
 """Least kappa times speed of a belt at which a smoothed law is near its jump: 1 - (2/pi) atan(100) is 0.6 %."""
 
 COUNTED = 200
-"""Up to so many nodes zeros of a graph with negative weights are counted by its characteristic polynomial."""
+"""Most nodes of a graph with negative weights whose zero eigenvalues the characteristic polynomial counts: a choice of time."""
 
 
 def zero_multiplicity(graph: Topology) -> int:
@@ -46,21 +46,37 @@ def zero_multiplicity(graph: Topology) -> int:
 
 
 def warnings(model: Model, varied: tuple[str, ...], values: Mapping[str, Any], duration: float) -> tuple[str, ...]:
-    """Return the sentences for one scene, none if all is well."""
-    graph = model.topology
-    of_nodes = tuple(name for name in varied if model.holders(name))
-    alike = not varied and len(model.kinds) == 1
+    """Return the sentences about one scene."""
     in_parts, asynchronous = asynchrony(model, varied)
-    sentences = (
-        in_parts,
-        *(_negative_weights(own) for _, own in model.linked),
-        _different_nodes(graph, of_nodes),
+    sentences = [in_parts]
+    for _, graph in model.linked:
+        if _has_negative(graph):
+            sentences.append(
+                f"topology {graph.name}({graph.n}) has negative weights, which drive oscillators apart; if its matrix is a "
+                "Laplacian D - A, negate it: the connectivity matrix is A - D"
+            )
+    of_nodes = tuple(name for name in varied if model.holders(name))
+    if of_nodes and model.topology.link_count:
+        sentences.append(
+            f"the nodes differ in {', '.join(of_nodes)}: equal states are no solution of this network, so there is no "
+            "complete synchronisation; the synchronisation error stays above 0"
+        )
+    sentences += (
         asynchronous,
         unresolved_smoothing(model, values["parameters"], values["axes"]),
-        *(function_of_inputs(coupling, own) for coupling, own in model.linked),
+        *(function_of_inputs(coupling, graph) for coupling, graph in model.linked),
         _stiff_springs(model, values, duration),
-        _equal_starts(values) if alike and not asynchronous else "",
     )
+    # The synchronisation error of oscillators that are alike and start from one state.
+    initial = values["initial"]
+    moved = {name.base for axis in values["axes"] if (name := NodeName.parse(axis.name))} & set(initial)
+    together = not moved and all(len(set(states)) <= 1 for states in initial.values())
+    alike = not varied and len(model.kinds) == 1 and not asynchronous
+    if alike and together and "sync_error" in values["record"]:
+        sentences.append(
+            "all oscillators start from the same state, so the synchronisation error stays 0 whatever the "
+            "coupling; give them different initial states"
+        )
     return tuple(filter(None, sentences))
 
 
@@ -72,7 +88,7 @@ def asynchrony(model: Model, varied: tuple[str, ...]) -> tuple[str, str]:
 def unresolved_smoothing(model: Model, parameters: Mapping[str, float], axes: tuple[Axis, ...]) -> str:
     """Return a sentence if a smoothed friction law is still near its middle at the speed of a belt; "" if none is.
 
-    A belt at rest, or whose speed depends on places or time, is not judged.  Of an axis its ends count.
+    Belts at rest, or with a speed that depends on states or time, are skipped.  The ends of an axis represent it.
     """
     if model.contact != ContactModel.ATAN:
         return ""
@@ -95,20 +111,20 @@ def unresolved_smoothing(model: Model, parameters: Mapping[str, float], axes: tu
 
 @lru_cache(maxsize=64)
 def _belts(node: Node) -> tuple[tuple[tuple[str, ...], Callable[..., float]], ...]:
-    """Kappa times the sliding velocity of a node at rest, for each of its laws: names of parameters, and function of them."""
-    kappa, found = sp.Symbol("kappa", real=True), []
+    """Return kappa times the sliding velocity of a node at rest, for each law: names of parameters, and function of them."""
+    kappa, belts = sp.Symbol("kappa", real=True), []
     smoothed = {a.args[0] for e in node.rhs for a in e.atoms(sp.atan) if a.has(kappa)}
     for argument in sorted(smoothed, key=str):
         at_rest = argument.xreplace(dict.fromkeys(node.state[len(node.state) // 2 :], sp.S.Zero))
         if not at_rest.free_symbols & {TIME, *node.state}:
             names = tuple(sorted(s.name for s in at_rest.free_symbols))
-            found.append((names, sp.lambdify([sp.Symbol(name, real=True) for name in names], at_rest, "math")))
-    return tuple(found)
+            belts.append((names, sp.lambdify([sp.Symbol(name, real=True) for name in names], at_rest, "math")))
+    return tuple(belts)
 
 
 @lru_cache(maxsize=16)
 def _in_parts(graph: Topology) -> str:
-    """A sentence if some nodes cannot reach one another."""
+    """Return a sentence if some nodes cannot reach one another."""
     multiplicity = zero_multiplicity(graph)
     if multiplicity <= 1:
         return ""
@@ -121,34 +137,14 @@ def _in_parts(graph: Topology) -> str:
     )
 
 
-def _negative_weights(graph: Topology) -> str:
-    """A sentence if a weight is negative."""
-    if not _has_negative(graph):
-        return ""
-    return (
-        f"topology {graph.name}({graph.n}) has negative weights, which drive oscillators apart; if its matrix is a "
-        "Laplacian D - A, negate it: the connectivity matrix is A - D"
-    )
-
-
 def _has_negative(graph: Topology) -> bool:
-    """True if a weight is negative."""
+    """Return whether a weight is negative."""
     weight = graph.all_to_all
     return any(w < 0 for _, _, w in graph.links) if weight is None else bool(graph.link_count and weight < 0)
 
 
-def _different_nodes(graph: Topology, varied: tuple[str, ...]) -> str:
-    """A sentence if joined nodes differ in parameters."""
-    if not varied or not graph.link_count:
-        return ""
-    return (
-        f"the nodes differ in {', '.join(varied)}: equal states are no solution of this network, so there is no "
-        "complete synchronisation; the synchronisation error stays above 0"
-    )
-
-
 def _without_synchrony(model: Model, varied: tuple[str, ...]) -> str:
-    """A sentence if equal motion of all nodes is no solution, because couplings act between equal states."""
+    """Return a sentence if equal motion of all nodes is no solution, because couplings act between equal states."""
     if all(isinstance(coupling, MatrixCoupling) for coupling, _ in model.linked):
         return ""
     equations = model.equations(tuple(name for name in varied if not model.holders(name)))
@@ -161,13 +157,13 @@ def _without_synchrony(model: Model, varied: tuple[str, ...]) -> str:
             f"coupling {' and '.join(names)} does not vanish between oscillators in equal states: {problem}; expected a "
             "function of differences, or one sum of weights at all nodes"
         )
-    except ValueError:  # of a node with a mass matrix it is not known
+    except ValueError:  # there is no test for nodes with a mass matrix
         pass
     return ""
 
 
 def function_of_inputs(coupling: Coupling, graph: Topology) -> str:
-    """A sentence if a link is S(W x_j) where a node has several: S of their sum, a firing rate, is another model."""
+    """Return a sentence if a link is S(W x_j) where a node has several: S of their sum, a firing rate, is another model."""
     if not isinstance(coupling, Rates) or graph.link_count <= graph.n:
         return ""
     for rate in coupling.rates.values():
@@ -184,47 +180,30 @@ def function_of_inputs(coupling: Coupling, graph: Topology) -> str:
 
 
 def _stiff_springs(model: Model, values: Mapping[str, Any], duration: float) -> str:
-    """A sentence if a mode of the springs swings so often that its phase error adds up to more than is asked for.
-
-    The frequency of the fastest mode is at most sqrt(1 + 2 sigma d), d the largest weight at a node (Gershgorin).
-    """
+    """Return a sentence if a mode of the springs swings so often that its phase error adds up to more than rtol."""
     if [str(coupling) for coupling, _ in model.linked] != ["spring"]:
         return ""
-    swept = (value for axis in values["axes"] if axis.name == "sigma" for value in axis.values)
-    own = [value for name, value in values["parameters"].items() if name == "sigma" or _of_sigma(name)]
-    fastest = math.sqrt(1.0 + 2.0 * max([*own, *swept]) * _largest_degree(model.topology))
+    # The strengths of all links, and of single ones, in all cells.
+    strengths = [value for axis in values["axes"] if axis.name == "sigma" for value in axis.values]
+    for name, value in values["parameters"].items():
+        link = LinkName.parse(name)
+        if name == "sigma" or (link and link.base == "sigma"):
+            strengths.append(value)
+    # The largest sum d of the sizes of the weights that a node feels.
+    graph = model.topology
+    if graph.all_to_all is not None:
+        degree = abs(float(graph.all_to_all)) * (graph.n - 1)
+    else:
+        weights = [0.0] * graph.n
+        for target, _, weight in graph.links:
+            weights[target] += abs(float(weight))
+        degree = max(weights)
+    # By Gershgorin's theorem the frequency of the fastest mode is at most sqrt(1 + 2 sigma d).
+    fastest = math.sqrt(1.0 + 2.0 * max(strengths) * degree)
     swings = fastest * duration / (2.0 * math.pi)
     if fastest < STIFF or swings < STIFF:
         return ""
     return (
         f"stiff springs: a mode of frequency {fastest:.3g} swings {swings:.3g} times, and the errors of its phase add up "
         "to more than rtol; tighten rtol until the result no longer changes"
-    )
-
-
-def _of_sigma(name: str) -> bool:
-    """True for the strength of one link."""
-    link = LinkName.parse(name)
-    return link is not None and link.base == "sigma"
-
-
-def _largest_degree(graph: Topology) -> float:
-    """The largest sum of the sizes of the weights that a node feels."""
-    if graph.all_to_all is not None:
-        return abs(float(graph.all_to_all)) * (graph.n - 1)
-    weights = [0.0] * graph.n
-    for target, _, weight in graph.links:
-        weights[target] += abs(float(weight))
-    return max(weights)
-
-
-def _equal_starts(values: Mapping[str, Any]) -> str:
-    """A sentence if the synchronisation error is recorded of oscillators that start from one state."""
-    initial = values["initial"]
-    moved = {name.base for axis in values["axes"] if (name := NodeName.parse(axis.name))} & set(initial)
-    if "sync_error" not in values["record"] or moved or any(len(set(x)) > 1 for x in initial.values()):
-        return ""
-    return (
-        "all oscillators start from the same state, so the synchronisation error stays 0 whatever the "
-        "coupling; give them different initial states"
     )

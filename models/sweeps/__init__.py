@@ -1,1 +1,1 @@
-"""The numbers of cells: parameters, initial states, axes, and what is drawn along an axis of realisations. Knows no scene."""
+"""The numbers of cells: parameters, initial states, axes, and draws along an axis of realisations; no scene."""

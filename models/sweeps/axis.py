@@ -10,7 +10,7 @@ from itertools import islice
 from ..inputs.checks import check_integer, check_keys, check_number, check_text, short_repr
 
 LIMIT = 10_000_000
-"""Most values on one axis."""
+"""Most values on one axis: a choice that bounds the memory of a scene."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +46,9 @@ class Axis:
         check_keys(f"axis {name}", values, ("from", "to", "count"))
         missing = [key for key in ("from", "to", "count") if key not in values]
         if missing:
-            found = short_repr(dict(values))
-            raise ValueError(f"axis {name}: {missing[0]!r} is missing in {found}; expected {{from, to, count}}")
+            raise ValueError(
+                f"axis {name}: {missing[0]!r} is missing in {short_repr(dict(values))}; expected {{from, to, count}}"
+            )
         return cls.between(name, values["from"], values["to"], values["count"])
 
     def __len__(self) -> int:
@@ -60,12 +61,13 @@ class Axis:
 
 
 def known_length(values: object) -> int:
-    """Return how many values the entry of an axis in a table will have; 1 if only the axis can tell, or refuses it."""
+    """Return the number of values of an axis in a table without making them; 1 if the axis must be made first."""
     size = values.get("count") if isinstance(values, Mapping) else len(values) if isinstance(values, Sized) else 1
     return size if isinstance(size, int) and 0 < size <= LIMIT else 1
 
 
 def _spaced(first: Fraction, last: Fraction, count: int) -> Iterator[float]:
+    """Yield equally spaced values by whole numbers over one denominator, each rounded once."""
     base = first.denominator * last.denominator
     a, b = first.numerator * last.denominator, last.numerator * first.denominator
     steps = max(count - 1, 1)

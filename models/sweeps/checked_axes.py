@@ -28,7 +28,7 @@ class Continuation(Word):
 
 
 CELL_LIMIT = 10**9
-"""Most cells of a sweep; results of as many go to a file, block by block (`synchain.runtime.stream`)."""
+"""Most cells of a sweep, a choice; large results go to a file, block by block (`synchain.runtime.stream`)."""
 
 SAMPLE_LIMIT = 10**9
 """Most numbers in the trajectories of all cells, 8 GB."""
@@ -36,24 +36,51 @@ SAMPLE_LIMIT = 10**9
 
 def check_sweep(model: Model, values: Mapping[str, Any]) -> Continuation:
     """Check the axes of a scene and return its continuation."""
-    zipped, axes = values["zipped"], values["axes"]
+    zipped, axes, parameters = values["zipped"], values["axes"], values["parameters"]
     if not isinstance(zipped, bool):
         raise TypeError(f"zipped: found {short_repr(zipped)}; expected true or false")
+    # Names: each a parameter or a state, and used once.
     names = [axis.name for axis in axes]
     for i, axis in enumerate(axes):
-        _axis(model, values["parameters"], axis)
+        _check_axis(model, parameters, axis)
         expect_free(f"axis {axis.name}", [axis.name])
         if axis.name in names[:i]:
             raise ValueError(f"axis {axis.name!r} occurs twice; expected each axis once; merge their values")
+    # Numbers of cells and samples.
     if zipped and len({len(axis) for axis in axes}) > 1:
         lengths = ", ".join(f"{axis.name}: {len(axis)}" for axis in axes)
         raise ValueError(f"zipped axes have different lengths ({lengths}); expected one length for all")
     cells = _cells([len(axis) for axis in axes], zipped)
-    if values["time_unit"] == "period":
-        _period(model, values["parameters"], axes, zipped)
     if "trajectory" in values["record"]:
-        _samples(model, values["samples"], cells)
-    return _continuation(model, axes, zipped, values["continuation"])
+        numbers = cells * values["samples"] * model.unlinked.dimension
+        if numbers > SAMPLE_LIMIT:
+            raise ValueError(
+                f"trajectory: found {numbers} numbers in {cells} cells of {values['samples']} samples; expected at most "
+                f"{SAMPLE_LIMIT}, the results must fit into memory; take fewer samples or cells"
+            )
+    # The drive must have a period in every cell if times count its periods.
+    if values["time_unit"] == "period" and axes:
+        rest = rest_in_sweep(drive(model, parameters).frequency, parameters, axes, zipped)
+        if rest is not None:
+            raise ValueError(
+                f"axis {rest[0]}: found {rest[1]:g}, at which the drive has no period; "
+                'expected other values or time_unit = "time"'
+            )
+    # A continued cell starts where its neighbour along the last axis ended.
+    continuation = Continuation.parse("continuation", values["continuation"])
+    if continuation == Continuation.NONE or not axes:  # a run may sweep a scene without axes
+        return continuation
+    for axis in axes if zipped else axes[-1:]:
+        if model.parameter(axis.name) is None:
+            raise ValueError(
+                f"continuation along the initial state {axis.name!r}: a continued cell starts where its "
+                "neighbour ended; expected a parameter as the last axis; reorder the axes"
+            )
+    if any(b <= a for a, b in pairwise(axes[-1].values)):
+        raise ValueError(
+            f"continuation along axis {axes[-1].name!r}: its values do not rise; expected rising values; sort them"
+        )
+    return continuation
 
 
 def check_draws(model: Model, values: Mapping[str, Any], drawn: Sequence[Axis]) -> None:
@@ -62,7 +89,7 @@ def check_draws(model: Model, values: Mapping[str, Any], drawn: Sequence[Axis]) 
     for axis in drawn:
         if axis.name in swept:
             raise ValueError(f"draw {axis.name!r}: it is an axis as well; expected one of them")
-        _axis(model, values["parameters"], axis)
+        _check_axis(model, values["parameters"], axis)
     for name in values["draws"]:
         expect_free(f"draw {name}", [name, f"{name}_link"], swept)
     if drawn and values["continuation"] != Continuation.NONE:
@@ -92,44 +119,22 @@ def _cells(lengths: Sequence[int], zipped: object) -> int:
     return cells
 
 
-def _period(model: Model, parameters: Mapping[str, float], axes: Sequence[Axis], zipped: bool) -> None:
-    """Refuse a drive that stands still in a cell whose times count its periods."""
-    if not axes:
-        return
-    found = rest_in_sweep(drive(model, parameters).frequency, parameters, axes, zipped)
-    if found is not None:
-        raise ValueError(
-            f"axis {found[0]}: found {found[1]:g}, at which the drive has no period; "
-            'expected other values or time_unit = "time"'
-        )
-
-
-def _samples(model: Model, samples: int, cells: int) -> None:
-    """Refuse trajectories that fit into no memory."""
-    numbers = cells * samples * model.unlinked.dimension
-    if numbers > SAMPLE_LIMIT:
-        raise ValueError(
-            f"trajectory: found {numbers} numbers in {cells} cells of {samples} samples; expected at most "
-            f"{SAMPLE_LIMIT}, the results must fit into memory; take fewer samples or cells"
-        )
-
-
-def read_axes(given: object, zipped: object) -> tuple[Axis, ...]:
+def read_axes(value: object, zipped: object) -> tuple[Axis, ...]:
     """Return the axes of a list of Axis objects or of a table of names and values, whose cells are counted first."""
-    if isinstance(given, Mapping):
-        _cells([known_length(values) for values in given.values()], zipped)
-        return tuple(Axis.from_table(name, values) for name, values in given.items())
-    if isinstance(given, (str, bytes)) or not isinstance(given, Iterable):
-        raise TypeError(f"axes: found {short_repr(given)}; expected Axis objects, e.g. [Axis('sigma', [0.1, 0.2])]")
+    if isinstance(value, Mapping):
+        _cells([known_length(values) for values in value.values()], zipped)
+        return tuple(Axis.from_table(name, values) for name, values in value.items())
+    if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
+        raise TypeError(f"axes: found {short_repr(value)}; expected Axis objects, e.g. [Axis('sigma', [0.1, 0.2])]")
     axes = []
-    for axis in given:
+    for axis in value:
         if not isinstance(axis, Axis):
             raise TypeError(f"axes: found {short_repr(axis)}; expected an Axis, e.g. Axis('sigma', [0.1, 0.2])")
         axes.append(axis)
     return tuple(axes)
 
 
-def _axis(model: Model, parameters: Mapping[str, float], axis: Axis) -> None:
+def _check_axis(model: Model, parameters: Mapping[str, float], axis: Axis) -> None:
     """Refuse an axis that is neither a parameter in its range nor an initial state."""
     parameter = model.parameter(axis.name)
     if parameter is not None:
@@ -153,36 +158,18 @@ def _axis(model: Model, parameters: Mapping[str, float], axis: Axis) -> None:
     model.check_state(axis.name, "axis")
 
 
-def _continuation(model: Model, axes: Sequence[Axis], zipped: bool, given: object) -> Continuation:
-    """The continuation; ValueError if the axes do not allow it."""
-    continuation = Continuation.parse("continuation", given)
-    if continuation == Continuation.NONE or not axes:  # a run may sweep what the scene does not
-        return continuation
-    for axis in axes if zipped else axes[-1:]:
-        if model.parameter(axis.name) is None:
-            raise ValueError(
-                f"continuation along the initial state {axis.name!r}: a continued cell starts where its "
-                "neighbour ended; expected a parameter as the last axis; reorder the axes"
-            )
-    if any(b <= a for a, b in pairwise(axes[-1].values)):
-        raise ValueError(
-            f"continuation along axis {axes[-1].name!r}: its values do not rise; expected rising values; sort them"
-        )
-    return continuation
-
-
 def rest_in_sweep(
     frequency: sp.Expr, parameters: Mapping[str, float], axes: Sequence[Axis], zipped: bool
 ) -> tuple[str, float] | None:
-    """The name of an axis and a value of it at which a frequency is 0, None if there is none.
+    """Return the name of an axis and its first value at which a frequency is 0; None if there is none.
 
-    Grids in which several axes move the frequency are not searched.
+    Grids in which several axes change the frequency are not searched.
     """
     names = names_in(frequency)
     moving = {axis.name: axis.values for axis in axes if axis.name in names}
     if not moving or (len(moving) > 1 and not zipped):
         return None
     columns = [moving.get(name, itertools.repeat(parameters.get(name, math.nan))) for name in names]
-    at = next((k for k, found in enumerate(map(as_function(frequency), *columns)) if found == 0.0), None)
+    at = next((k for k, value in enumerate(map(as_function(frequency), *columns)) if value == 0.0), None)
     first = next(iter(moving))
     return None if at is None else (first, moving[first][at])

@@ -1,4 +1,4 @@
-"""What numbers are drawn from: normal, uniform and Lorentzian distributions, as values and as text."""
+"""Normal, uniform and Lorentzian distributions, as values and as text."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from ..inputs.reader import Algebra, NoMeaning, parse, unpaired
 from ..inputs.words import Word
 
 KNOWN = "normal(mean, deviation), uniform(low, high), lorentzian(centre, half width)"
-"""What may be drawn from, in messages."""
+"""The distributions, in messages."""
 
 
 class Distribution(Word):
-    """What numbers are drawn from."""
+    """The kinds of distributions."""
 
     NORMAL = "normal"
     UNIFORM = "uniform"
@@ -104,5 +104,5 @@ def read_draw(what: str, text: str) -> Draw:
     try:
         return expression.evaluate(_Distributions(what))
     except ValueError as error:
-        words = str(error)
-        raise ValueError(words if words.startswith(what) else f"{what}: {words}") from None
+        message = str(error)
+        raise ValueError(message if message.startswith(what) else f"{what}: {message}") from None

@@ -1,4 +1,4 @@
-"""Realisations: parameters and initial states that are drawn from distributions, or listed, along an axis of their own."""
+"""Realisations: parameters, initial states and graphs, drawn or listed along a further axis of the sweep."""
 
 from __future__ import annotations
 
@@ -57,23 +57,23 @@ class RandomGraph:
 
 
 Draws = Draw | tuple[tuple[float, ...], ...] | Graphs | RandomGraph
-"""A distribution, or numbers by realisation, one, or one for each node or link; or graphs by realisation, or a random one."""
+"""A distribution; a row of numbers by realisation, one, or one for each node or link; graphs by realisation; a random graph."""
 
 GRAPH = "topology"
 """The name of the graph among what is drawn."""
 
 
-def draws(given: object, realisations: object) -> FrozenDict[Draws]:
-    """Return what is drawn, by the names of parameters and initial states."""
+def draws(value: object, realisations: object) -> FrozenDict[Draws]:
+    """Return the draws by the names of parameters and initial states."""
     count = check_integer("realisations", realisations, 0, LIMIT)
-    table = {} if given is None else check_table("draws", given)
+    table = {} if value is None else check_table("draws", value)
     if bool(table) != bool(count):
         found = f"{count} realisations and {len(table)} names to draw"
         raise ValueError(f"draws: found {found}; expected both, e.g. realisations=50, draws={{'x': normal(0, 1)}}")
     return FrozenDict(
         {
-            check_text("draw", name): (_graphs if name == GRAPH else _drawn)(f"draw {name}", value, count)
-            for name, value in table.items()
+            check_text("draw", name): (_graphs if name == GRAPH else _drawn)(f"draw {name}", entry, count)
+            for name, entry in table.items()
         }
     )
 
@@ -96,12 +96,12 @@ def _graphs_of(drawn: Mapping[str, Draws]) -> Graphs | RandomGraph:
 
 
 def _realised(graphs: Graphs | RandomGraph, count: int, rng: int) -> Graphs:
-    """The graphs of all realisations, drawn now unless they are listed."""
+    """Return the graphs of all realisations; draw them unless they are listed."""
     return graphs.graphs(count, rng) if isinstance(graphs, RandomGraph) else graphs
 
 
 def _graphs(what: str, value: object, count: int) -> Graphs | RandomGraph:
-    """Graphs by realisation, or a random one."""
+    """Return graphs by realisation, or a random one."""
     if isinstance(value, str):
         return RandomGraph(check_text(what, value))
     if isinstance(value, RandomGraph):
@@ -112,20 +112,20 @@ def _graphs(what: str, value: object, count: int) -> Graphs | RandomGraph:
             f"{what}: found {short_repr(value)}; expected a list of {count} graphs, or a random one as text, such as "
             "'erdos_renyi(20, p=0.3)'"
         )
-    found, number = first_of(listed, count)
-    if len(found) != count:
+    graphs, number = first_of(listed, count)
+    if len(graphs) != count:
         raise ValueError(f"{what}: found {number} graphs; expected {count}, one for each realisation")
-    return Graphs(_bounded((checked_name(what, as_topology(what, graph)) for graph in found), count))
+    return Graphs(_bounded((checked_name(what, as_topology(what, graph)) for graph in graphs), count))
 
 
 @lru_cache(maxsize=8)
 def _random_graphs(text: str, count: int, rng: int) -> Graphs:
-    """The graphs of a text whose seeds are a stream of their own, which depends on `rng` alone."""
+    """Return the graphs of a text; their stream of seeds depends on `rng` alone."""
     return Graphs(_bounded(islice(_random_graph(text, rng), count), count))
 
 
 def _random_graph(text: str, rng: int) -> Iterator[Topology]:
-    """Yield graphs of a text without end; their links are drawn when they are asked for."""
+    """Yield graphs of a text without end; each draws its links when they are used first."""
     stream = random.Random(f"{rng} {GRAPH}")
     seeds, begin = iter(lambda: stream.getrandbits(52), None), stream.getstate()
     while True:
@@ -142,25 +142,23 @@ def _random_graph(text: str, rng: int) -> Iterator[Topology]:
 
 
 def _bounded(graphs: Iterable[Topology], count: int) -> tuple[Topology, ...]:
-    """The graphs, of which the run has a weight for each link of their union in each of `count` realisations.
-
-    Raises ValueError for more than LIMIT of these, as soon as they are so many.
-    """
-    found, union = [], set[tuple[int, int]]()
+    """Return the graphs; ValueError as soon as the links of their union have more than LIMIT weights in `count` realisations."""
+    bounded, union = [], set[tuple[int, int]]()
     for graph in graphs:
-        found.append(graph)
+        bounded.append(graph)
         if graph.link_count * count <= LIMIT:
             union.update(link[:2] for link in graph.links)
         links = max(len(union), graph.link_count)
         if links * count > LIMIT:
             raise ValueError(
-                f"draw {GRAPH}: found {links} links in the union of the first {len(found)} graphs, each with a weight in each of "
+                f"draw {GRAPH}: found {links} links in the union of the first {len(bounded)} graphs, each with a weight in each of "
                 f"{count} realisations; expected at most {LIMIT} weights; take fewer realisations, or run the graphs one by one"
             )
-    return tuple(found)
+    return tuple(bounded)
 
 
 def _drawn(what: str, value: object, count: int) -> Draws:
+    """Return a distribution, or rows of numbers by realisation."""
     if isinstance(value, Draw):
         return value
     if isinstance(value, str):
@@ -183,7 +181,7 @@ def _drawn(what: str, value: object, count: int) -> Draws:
 
 
 def _plain(value: object) -> object:
-    """An array as lists."""
+    """Return an array as lists."""
     return value.tolist() if hasattr(value, "tolist") else value
 
 
@@ -195,48 +193,47 @@ def _is_row(value: object) -> TypeGuard[Sequence[object]]:
 def drawn_axes(model: Model, drawn: FrozenDict[Draws], count: int, rng: int) -> tuple[Axis, ...]:
     """Return the drawn values of each parameter and initial state, one for each realisation.
 
-    A distribution of a parameter or state of the nodes is drawn for each node by itself, that of a parameter of links, or
-    of their weights "W", for each edge by itself: links there and back have one number.  Each name has a stream of its own,
-    which depends on `rng` and the name alone: neither workers nor other draws change it.
+    A distribution of a parameter or state of nodes is drawn for each node separately, that of a parameter of links, or of
+    their weights "W", for each edge separately: links there and back have one number.  The random stream of a name depends
+    on `rng` and the name alone: neither workers nor other draws change it.
     """
     axes: dict[str, Axis] = {}
     for name, how in drawn.items():
-        for own, values in _columns(model, name, how, count, rng):
-            if own in axes:
-                raise ValueError(f"draw {name}: {own} is drawn twice; expected it once")
-            axes[own] = Axis(own, values)
+        for single, values in _columns(model, name, how, count, rng):
+            if single in axes:
+                raise ValueError(f"draw {name}: {single} is drawn twice; expected it once")
+            axes[single] = Axis(single, values)
     return tuple(axes.values())
 
 
 def _columns(model: Model, name: str, how: Draws, count: int, rng: int) -> Iterable[tuple[str, Sequence[float]]]:
-    """The names and the values of one draw."""
+    """Return the names of single parameters and states of one draw, with a value for each realisation."""
     if isinstance(how, Graphs | RandomGraph):
         return _weights(model, _realised(how, count, rng).graphs)
     holders = model.unlinked.holders(name)
     links = {} if holders else model.link_names(name)
     if links:
         return _link_columns(f"draw {name}{model.on_graph(name)}", name, links, how, count, rng)
-    known = name in model.parameters or name in model.components or NodeName.parse(name) is not None
     if name == WEIGHTS:
         raise ValueError(
             f"draw {name}: found {len(model.linked)} layers of links; expected one whose weights are drawn"
         )
-    if not known:
+    if name not in (*model.parameters, *model.components) and NodeName.parse(name) is None:
         raise ValueError(model.unknown(name, "draw", (*model.parameters, *model.components)))
     alone = not holders or (model.n == 1 and name in model.parameters)
     names = [name] if alone else [str(NodeName(name, i)) for i in holders]
     if isinstance(how, Draw):
-        return [(own, _numbers(how, f"{rng} {own}", count)) for own in names]
+        return [(single, _numbers(how, f"{rng} {single}", count)) for single in names]
     width = len(how[0])
     if width == 1 and len(names) > 1 and name in model.parameters:
         names = [name]
     if width not in (1, len(names)):
         raise ValueError(f"draw {name}: found rows of {width} numbers; expected 1 or {len(names)}, one for each node")
-    return [(own, [row[min(k, width - 1)] for row in how]) for k, own in enumerate(names)]
+    return [(single, [row[min(k, width - 1)] for row in how]) for k, single in enumerate(names)]
 
 
 def _weights(model: Model, graphs: tuple[Topology, ...]) -> Iterable[tuple[str, Sequence[float]]]:
-    """The names and the values of the weights of graphs; 0 where a graph has no link."""
+    """Return the names and the values of the weights of graphs; 0 where a graph has no link."""
     links = model.link_names(WEIGHTS)
     try:
         rows = [{at[:2]: float(at[2]) for at in graph.links} for graph in graphs]
@@ -244,8 +241,8 @@ def _weights(model: Model, graphs: tuple[Topology, ...]) -> Iterable[tuple[str, 
         raise ValueError(
             f"draw {GRAPH}: found a weight beyond the range of numbers; expected at most 1.8e308"
         ) from None
-    found = [by_name("draw topology", links, {at: row.get(at, 0.0) for at in links}) for row in rows]
-    return [(str(own), [row[own] for row in found]) for own in found[0]]
+    named = [by_name("draw topology", links, {at: row.get(at, 0.0) for at in links}) for row in rows]
+    return [(str(link), [row[link] for row in named]) for link in named[0]]
 
 
 def _link_columns(
@@ -256,19 +253,20 @@ def _link_columns(
     count: int,
     rng: int,
 ) -> Iterable[tuple[str, Sequence[float]]]:
-    """The names and the values of one draw of a parameter of links, or of their weights."""
+    """Return the names and the values of one draw of a parameter of links, or of their weights."""
     if isinstance(how, Draw):
-        edges = {at: links[at[::-1]] if at[0] > at[1] and at[::-1] in links else own for at, own in links.items()}
+        # Links in both directions share the number of the edge, which has the name of the link with the smaller target.
+        edges = {at: links[at[::-1]] if at[0] > at[1] and at[::-1] in links else link for at, link in links.items()}
         drawn = {edge: _numbers(how, f"{rng} {edge}", count) for edge in dict.fromkeys(edges.values())}
-        return [(str(own), drawn[edges[own.target, own.source]]) for own in dict.fromkeys(links.values())]
+        return [(str(link), drawn[edges[link.target, link.source]]) for link in dict.fromkeys(links.values())]
     if len(how[0]) == 1 and name != WEIGHTS:
         return [(name, [row[0] for row in how])]
     full = [row if len(row) > 1 else row * len(links) for row in how]
     rows = [by_name(what, links, in_order(what, links, row, str(len(row)))) for row in full]
-    return [(str(own), [row[own] for row in rows]) for own in rows[0]]
+    return [(str(link), [row[link] for row in rows]) for link in rows[0]]
 
 
 def _numbers(how: Draw, stream: str, count: int) -> list[float]:
-    """The numbers of one stream: a Mersenne twister that is seeded by the SHA-512 of its name."""
+    """Return the numbers of one stream: a Mersenne twister that Python seeds by the SHA-512 of its name."""
     source = random.Random(stream)
     return [how.value((source.getrandbits(52) + 0.5) / 2.0**52) for _ in range(count)]

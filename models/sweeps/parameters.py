@@ -22,13 +22,13 @@ Place: TypeAlias = NodeName | LinkName
 """The name of a parameter at one node or one link."""
 
 
-def parameters(model: Model, given: object, axes: Sequence[Axis]) -> FrozenDict[float]:
+def parameters(model: Model, table: object, axes: Sequence[Axis]) -> FrozenDict[float]:
     """Return every parameter with its value; those that differ from node to node, or are swept at one, as a_1 … a_n.
 
     Those that differ from link to link, or are swept at one, are k_1_2 where node 1 feels node 2.
     """
-    read = _Given(model)
-    for name, value in check_table("parameters", {} if given is None else given).items():
+    read = _Table(model)
+    for name, value in check_table("parameters", {} if table is None else table).items():
         if not isinstance(name, str):
             raise TypeError(f"parameters: key {short_repr(name)} is a {type(name).__name__}; expected text")
         read.add(name, value)
@@ -36,9 +36,9 @@ def parameters(model: Model, given: object, axes: Sequence[Axis]) -> FrozenDict[
     swept = {parts.base for parts in single if parts is not None}
     values: dict[str, float] = {}
     for name, value in read.shared.items():
-        own = read.own(name, value, name in swept)
-        if own and (name in swept or len(set(own.values())) > 1):
-            named = {str(place): number for place, number in own.items()}
+        by_place = read.by_place(name, value, name in swept)
+        if by_place and (name in swept or len(set(by_place.values())) > 1):
+            named = {str(place): number for place, number in by_place.items()}
             if taken := named.keys() & model.parameters.keys():
                 raise ValueError(
                     f"parameter {name!r}: found a number for each node or link, but {min(taken)!r} stands for two parameters; "
@@ -46,24 +46,25 @@ def parameters(model: Model, given: object, axes: Sequence[Axis]) -> FrozenDict[
                 )
             values |= named
         else:
-            values[name] = next(iter(own.values()), value)
+            values[name] = next(iter(by_place.values()), value)
     if WEIGHTS in swept - set(values):
         names, ((_, graph),) = model.link_names(WEIGHTS), model.linked
         values |= {str(names[i, j]): float(weight) for i, j, weight in graph.links}
     return FrozenDict(values)
 
 
-class _Given:
-    """What was given of the parameters of a model, in their ranges: numbers for all, lists, and those of one place."""
+class _Table:
+    """Parameters of a model from a table, in their ranges: numbers for all, lists, and numbers of one node or link."""
 
     def __init__(self, model: Model) -> None:
-        known = model.parameters
-        self.model, self.shared = model, {name: float(known[name].default) for name in known}
-        self.lists = {name: _at_nodes(model, name, model.defaults(name)) for name in known if len(model.kinds) > 1}
+        self.model = model
+        self.shared = {name: float(parameter.default) for name, parameter in model.parameters.items()}
+        mixed = model.parameters if len(model.kinds) > 1 else ()  # each kind of node has its default
+        self.lists = {name: _at_nodes(model, name, model.defaults(name)) for name in mixed}
         self.single: dict[str, dict[Place, float]] = {}
 
     def add(self, name: str, value: Any) -> None:
-        """Take one of the parameters; ValueError or TypeError as `parameters`."""
+        """Add one of the parameters; ValueError or TypeError as `parameters`."""
         model, known = self.model, self.model.parameters
         place = model.single(name)
         if WEIGHTS not in known and (name if place is None else place.base) == WEIGHTS:
@@ -83,8 +84,8 @@ class _Given:
             self.shared[name] = in_range(name, value, known[name])
             self.lists.pop(name, None)
 
-    def own(self, name: str, shared: float, swept: bool) -> dict[Place, float]:
-        """The values of a parameter at each node or link if some have numbers of their own or it is swept; else none."""
+    def by_place(self, name: str, shared: float, swept: bool) -> dict[Place, float]:
+        """Return the values of a parameter at each node or link if some have separate numbers or it is swept; else none."""
         if not (swept or name in self.lists or name in self.single):
             return {}
         nodes: Iterable[Place] = [NodeName(name, i) for i in self.model.holders(name)]
@@ -93,7 +94,7 @@ class _Given:
 
 
 def _at_nodes(model: Model, name: str, values: Iterable[float]) -> dict[Place, float]:
-    """The values of a parameter by the nodes that have it."""
+    """Return the values of a parameter by the nodes that have it."""
     return {NodeName(name, i): value for i, value in zip(model.holders(name), values, strict=True)}
 
 
@@ -102,10 +103,9 @@ def _listed(value: object) -> bool:
 
 
 def _for_each_link(model: Model, name: str, value: Any) -> dict[Place, float]:
-    """The values of a parameter of links.
+    """Return the values of a parameter of links from a list, a matrix, or the weights of a graph.
 
-    They are a list in the order of the graph's links, or of its edges (i < j) where links run both ways, a matrix, or a
-    graph whose weights they are.  ValueError or TypeError for anything else.
+    A list has the order of the graph's links, or of its edges (i < j) where links run both ways.
     """
     parameter, links = model.parameters[name], model.link_names(name)
     what = f"parameter {name!r}{model.on_graph(name)}"
@@ -123,7 +123,7 @@ def _for_each_link(model: Model, name: str, value: Any) -> dict[Place, float]:
             raise ValueError(
                 f"{what}: found {found} where node {i + 1} feels node {j + 1}; expected one for each link, no others{more}"
             )
-    checked = {at: in_range(str(own), table[at], parameter) for at, own in links.items()}
+    checked = {at: in_range(str(link), table[at], parameter) for at, link in links.items()}
     return by_name(what, links, checked)
 
 
@@ -131,20 +131,20 @@ def by_name(
     what: str, links: Mapping[tuple[int, int], LinkName], table: Mapping[tuple[int, int], float]
 ) -> dict[Place, float]:
     """Return the numbers of links by the names of the links."""
-    numbers: dict[Place, float] = {}
-    for at, own in links.items():
-        if numbers.setdefault(own, table[at]) != table[at]:
+    named: dict[Place, float] = {}
+    for at, link in links.items():
+        if named.setdefault(link, table[at]) != table[at]:
             raise ValueError(
-                f"{what}: found {numbers[own]!r} and {table[at]!r} at nodes {own.target + 1} and {own.source + 1}; "
+                f"{what}: found {named[link]!r} and {table[at]!r} at nodes {link.target + 1} and {link.source + 1}; "
                 "expected one number for both directions of a link that acts on both of its ends"
             )
-    return numbers
+    return named
 
 
 def in_order(
     what: str, links: Mapping[tuple[int, int], LinkName], listed: Sequence[T], count: str
 ) -> dict[tuple[int, int], T]:
-    """Return numbers by target and source."""
+    """Return the numbers of a list, one for each edge or each link, by target and source."""
     edges = [at for at in links if at[0] < at[1]] if all(at[::-1] in links for at in links) else []
     if len(listed) == len(edges) != 0:
         table = dict(zip(edges, listed, strict=True))
@@ -158,7 +158,7 @@ def in_order(
 
 
 def _matrix(what: str, n: int, listed: Sequence[Any]) -> dict[tuple[int, int], Any]:
-    """The entries of a matrix, row i what node i feels."""
+    """Return the entries of a matrix by target (row) and source (column)."""
     rows = [list(islice(row, n + 1)) if _listed(row) else [] for row in listed]
     if len(rows) != n or any(len(row) != n for row in rows):
         raise ValueError(f"{what}: found rows of numbers; expected a matrix of {n} rows of {n} numbers")
@@ -188,43 +188,45 @@ def varied(values: Mapping[str, float], known: Iterable[str]) -> tuple[str, ...]
 
 def at_nodes(model: Model, values: Mapping[str, T]) -> Iterator[tuple[NodeKind, dict[str, T]]]:
     """Yield the kind and the parameters of every node that differs from those before."""
-    known = model.parameters
-    own = {name: dict.fromkeys(model.holders(name)) for name in known if name not in values}
+    names = model.parameters
+    holders = {name: dict.fromkeys(model.holders(name)) for name in names if name not in values}
     seen = set()
-    for i in range(model.n if len(model.kinds) > 1 or own else 1):
-        mine = {
-            name: values[str(NodeName(name, i)) if name in own else name] for name in known if i in own.get(name, (i,))
+    for i in range(model.n if len(model.kinds) > 1 or holders else 1):
+        at_node = {
+            name: values[str(NodeName(name, i)) if name in holders else name]
+            for name in names
+            if i in holders.get(name, (i,))
         }
-        key = (model.kind_of[i], *mine.items())
+        key = (model.kind_of[i], *at_node.items())
         if key not in seen:
             seen.add(key)
-            yield model.kinds[model.kind_of[i]], mine
+            yield model.kinds[model.kind_of[i]], at_node
 
 
 def drive(model: Model, values: Mapping[str, float]) -> Drive:
     """Return at which frequencies time enters the equations of a model whose parameters have these values."""
     timed = any(coupling.forced for coupling, _ in model.linked)
-    own = varied(values, model.parameters)
-    found = drive_of((*model.unlinked.nodes, *(model.equations(own).edges if timed else ())), own)
-    if found.frequency is None or not found.by_values:
-        return found
-    value = as_function(found.frequency)(*(values[name] for name in names_in(found.frequency)))
-    return replace(found, frequency=None) if math.isnan(value) else found
+    differing = varied(values, model.parameters)
+    edges = model.equations(differing).edges if timed else ()
+    motion = drive_of((*model.unlinked.nodes, *edges), differing)
+    if motion.frequency is None or not motion.by_values:
+        return motion
+    value = as_function(motion.frequency)(*(values[name] for name in names_in(motion.frequency)))
+    return replace(motion, frequency=None) if math.isnan(value) else motion
 
 
 def without(model: Model, values: Mapping[object, object], names: Iterable[str]) -> dict[object, object]:
     """Return the values of parameters without those that single nodes have of some `names`."""
-    gone = set(names)
-
-    def kept(name: object) -> bool:
+    remaining, replaced = dict(values), set(names)
+    for name in values:
         parts = model.single(name) if isinstance(name, str) else None
-        return parts is None or parts.base not in gone
-
-    return {name: value for name, value in values.items() if kept(name)}
+        if parts is not None and parts.base in replaced:
+            del remaining[name]
+    return remaining
 
 
 def collected(values: Mapping[str, float], varied: Iterable[str]) -> dict[str, float | list[float]]:
-    """Return the parameters as a scene file has them: those of `varied` as lists, weights not at all."""
+    """Return the parameters in the form of a scene file: those of `varied` as lists, without weights."""
     lists: dict[str, list[float]] = {name: [] for name in varied}
     table: dict[str, float | list[float]] = {}
     for name, value in values.items():
