@@ -1,4 +1,4 @@
-"""From a scene to what a kernel takes and fills: reduction, rows of cells, buffers.
+"""From a scene to the arrays that a kernel reads and fills: reduction, rows of cells, buffers.
 
 * cell: one simulation of a sweep
 * row: the numbers of a cell that a kernel takes

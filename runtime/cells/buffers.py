@@ -11,44 +11,41 @@ from synchain.codegen.driver.columns import COUNTS, TOLERANCES, Count, PointColu
 from ..support.status import Status
 
 IN_MEMORY = 10**9
-"""Numbers of the largest result that is kept in memory, 8 GB."""
+"""Numbers of the largest result in memory, 8 GB: a choice."""
 
 
-def numbers_of_a_cell(dimension: int, room: int, samples: int, observed: int = 0, kept: int | None = None) -> int:
-    """Return how many numbers the buffers hold for each cell; the arguments are those of `Buffers.empty`."""
-    kept = dimension if kept is None else kept
-    return dimension * (1 + samples) + (PointColumn.STATE + kept) * room + len(SumColumn) + observed + COUNTS
+def numbers_of_a_cell(dimension: int, room: int, samples: int, observed: int = 0, point_size: int | None = None) -> int:
+    """Return the size of the buffers of one cell; the arguments are those of `Buffers.empty`."""
+    point_size = dimension if point_size is None else point_size
+    return dimension * (1 + samples) + (PointColumn.STATE + point_size) * room + len(SumColumn) + observed + COUNTS
 
 
 @dataclass(slots=True)
 class Buffers:
-    """The arrays that a kernel fills, one row for each cell; the docstring of `drive` in a kernel
-    describes them.
-    """
+    """The arrays that a kernel fills, one row for each cell."""
 
     end: np.ndarray  # (cells, dimension): states at which the cells stopped
-    # (cells, len(SumColumn)): synchronisation errors, the time at which each cell stopped, and what was observed
+    # (cells, len(SumColumn) + observed): synchronisation errors, the time at which each cell stopped, observables
     sums: np.ndarray
     counts: np.ndarray  # (cells, COUNTS): status, steps, numbers of section points, and tolerances
-    # (cells, room, 1 + kept): time and state of the section points, or time, number of the section and what it keeps;
+    # (cells, room, 1 + point_size): time and state of the section points, or time, number of the section and its kept values;
     # NaN if a cell has fewer
     points: np.ndarray
     samples: np.ndarray  # (cells, samples, dimension): states at equally spaced times of the window
-    # (cells, any): what the lanes of cells held that paused or whose steps underflow; empty if no cell goes on from
-    # there
+    # (cells, any): the lanes of cells that paused or whose steps underflow; empty if no cell continues from there
     lanes: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
 
     @classmethod
     def empty(
-        cls, cells: int, dimension: int, room: int, samples: int, observed: int = 0, kept: int | None = None
+        cls, cells: int, dimension: int, room: int, samples: int, observed: int = 0, point_size: int | None = None
     ) -> Buffers:
-        """Return buffers of cells that have not run: numbers NaN, counts zero."""
-        kept = dimension if kept is None else kept
+        """Return buffers of cells that have not run, NaN and counts of 0; a section point has `point_size` numbers (dimension)."""
+        point_size = dimension if point_size is None else point_size
         return cls(
             end=np.full((cells, dimension), np.nan),
             sums=np.full((cells, len(SumColumn) + observed), np.nan),
             counts=np.zeros((cells, COUNTS), np.int64),
-            points=np.full((cells, room, PointColumn.STATE + kept), np.nan),
+            points=np.full((cells, room, PointColumn.STATE + point_size), np.nan),
             samples=np.full((cells, samples, dimension), np.nan),
         )
 
@@ -85,9 +82,7 @@ class Buffers:
 
     @property
     def ended(self) -> bool:
-        """True if every cell came to its end, good or bad; False if one did not run or was
-        interrupted.
-        """
+        """True if every cell came to its end, good or bad; False if one did not run or was interrupted."""
         return not bool(np.isin(self.status, (Status.NOT_RUN, Status.INTERRUPTED)).any())
 
     @property
@@ -101,7 +96,7 @@ class Buffers:
         return int(self.point_counts.max(initial=0))
 
     def widen(self, room: int) -> None:
-        """Make room for so many section points of each cell, if there is less."""
+        """Make room for `room` section points of each cell, if there is less."""
         old = self.points.shape[1]
         if room > old:
             points = np.full((len(self.points), room, self.points.shape[2]), np.nan)
@@ -109,9 +104,7 @@ class Buffers:
             self.points = points
 
     def put(self, cells: np.ndarray, part: Buffers) -> None:
-        """Copy the rows of `part` into the rows `cells`, whose room for section points grows if it
-        has to.
-        """
+        """Copy the rows of `part` into the rows `cells`, with more room for section points if necessary."""
         self.widen(part.points.shape[1])
         self.points[cells, : part.points.shape[1]] = part.points
         self.end[cells], self.sums[cells] = part.end, part.sums
@@ -120,7 +113,7 @@ class Buffers:
             self.lanes[cells] = part.lanes
 
     def clear(self, cells: np.ndarray) -> None:
-        """Set cells (numbers or a mask) back to the state in which they have not run."""
+        """Reset cells (numbers or a mask) to the state before they run."""
         for array in (self.end, self.sums, self.points, self.samples):
             array[cells] = np.nan
         self.counts[cells] = 0

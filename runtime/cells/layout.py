@@ -10,23 +10,21 @@ import numpy as np
 from synchain.models.scenes.scene import Scene
 
 REFILLS = 16
-"""Most cells of a block for each lane: enough that the lanes which idle at its end do not count."""
+"""Most cells of a block for each lane: a choice, so that few lanes idle at the end of a block."""
 
 SHARE = 8
-"""A block is at most this part of what one worker has to do, so that all are busy to the end."""
+"""A block is at most this part of the work of one worker, so that all are busy to the end: a choice."""
 
 LONGEST = 1e7
-"""A block of more oscillators times periods is cut smaller, to what the lanes need: about a minute
-of work.
-"""
+"""Most oscillators times periods of a block with more than one cell a lane: about a minute of work."""
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
     """Blocks of `size` cells, in C order over the axes.
 
-    In a continued sweep (`columns` values of the last axis, `falling` if it runs downwards) a block
-    is one column of up to `size` rows, and each block needs the one before it in its row.
+    In a continued sweep (`columns` values of the last axis, `falling` if it runs downwards) a block is one column of up to
+    `size` rows, and each block depends on the one before it in its row.
     """
 
     cells: int
@@ -51,25 +49,22 @@ class Layout:
         """Return the numbers of the cells of a block."""
         if not self.columns:
             return np.arange(block * self.size, min((block + 1) * self.size, self.cells))
-        group, place = divmod(block, self.columns)
-        column = self.columns - 1 - place if self.falling else place
+        group, step = divmod(block, self.columns)
+        column = self.columns - 1 - step if self.falling else step
         last = min((group + 1) * self.size, self.cells // self.columns)
         return np.arange(group * self.size, last) * self.columns + column
 
     def after(self, block: int) -> int | None:
-        """The block that needs this one, if there is one."""
+        """Return the block that depends on this one, or None."""
         return block + 1 if self.columns and (block + 1) % self.columns else None
 
     def before(self, block: int) -> int | None:
-        """The block that this one needs, if there is one."""
+        """Return the block on which this one depends, or None."""
         return block - 1 if self.columns and block % self.columns else None
 
 
 def block_size(scene: Scene, width: int, workers: int, cells: int | None = None) -> int:
-    """Return the cells of a block, a multiple of the number of lanes.
-
-    A block is large enough to keep the lanes busy and small enough to be lost.
-    """
+    """Return the cells of a block, a multiple of the number of lanes: enough to keep them busy, few enough to be lost."""
     if cells is None:
         cells = scene.cells // (scene.shape[-1] if scene.continued else 1)
     lengths = scene.transient + scene.window

@@ -1,4 +1,4 @@
-"""What a scene observes and where it cuts: the values of its kernel, and the numbers of its result."""
+"""Observables and sections of a scene: the values that its kernel computes, and the arrays of its result."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from synchain.models.scenes.scene import Scene, Section
 
 
 def watched(scene: Scene) -> Recording:
-    """Return what the kernel of a scene watches: observables, sections and a stop, the energy in them as sums."""
+    """Return the observables, sections and stop of a scene's kernel, the energy in them as sums over nodes and links."""
     sections = Sections(scene)
     recording = Recording((), None, ObservableArrays(scene).values, sections.values, sections.stop)
     if has_own_energy(scene.model) or not any(e.has(ENERGY) for e in (*recording.observed, *recording.events)):
@@ -43,23 +43,23 @@ class ObservableArrays:
 
     @cached_property
     def values(self) -> tuple[sp.Expr, ...]:
-        """The values that the kernel tallies; observables of one value share it."""
+        """The values that the kernel tallies; observables of the same value share it."""
         return tuple(dict.fromkeys(observable.value for observable in self.scene.observe.values()))
 
     @cached_property
     def _rows(self) -> dict[sp.Expr, int]:
-        """How many numbers each value is."""
+        """The number of components of each value: n with one for each node, else 1."""
         equations = self.scene.equations
         return {value: equations.n if with_rows(equations, value) else 1 for value in self.values}
 
     @property
     def numbers(self) -> int:
-        """How many numbers a cell has of all observables."""
+        """Numbers of all observables of a cell."""
         return sum(self._rows[observable.value] for observable in self.scene.observe.values())
 
     @property
     def tallies(self) -> int:
-        """How many numbers the kernel keeps of a cell."""
+        """Numbers that the kernel tallies for a cell: the length of time, and all tallies of each value."""
         return 1 + len(Tally) * sum(self._rows.values()) if self.values else 0
 
     def columns(self) -> Iterator[tuple[str, bool, slice]]:
@@ -74,16 +74,17 @@ class ObservableArrays:
         """Return the `sums` of buffers out of those of a kernel; NaN in cells that ended before their window."""
         if not self.values:
             return sums
+        # The kernel's columns: the length of the window so far, then the tallies of each value.
         length = sums[:, len(SumColumn), None]
         length = np.where(length > 0.0, length, np.nan)
         tallies = sums[:, len(SumColumn) + 1 :].reshape(len(sums), -1, len(Tally))
-        begins, first = {}, 0
+        rows_of, first = {}, 0
         for value, rows in self._rows.items():
-            begins[value] = slice(first, first + rows)
+            rows_of[value] = slice(first, first + rows)
             first += rows
         parts = [sums[:, : len(SumColumn)]]
         for observable in self.scene.observe.values():
-            parts.append(_over_window(observable.window, tallies[:, begins[observable.value]], length))
+            parts.append(_over_window(observable.window, tallies[:, rows_of[observable.value]], length))
         return np.concatenate(parts, axis=1)
 
 
@@ -95,14 +96,12 @@ class Sections:
 
     @cached_property
     def values(self) -> tuple[tuple[sp.Expr, ...], ...]:
-        """Each section function, followed by what its points keep."""
-        return tuple(
-            (
-                as_value(name, section.variable) - sp.Rational(repr(section.level)),
-                *(as_value(name, e) for e in _kept(section)),
-            )
-            for name, section in self.scene.sections.items()
-        )
+        """Each section function less its level, followed by the expressions that its points keep."""
+        values = []
+        for name, section in self.scene.sections.items():
+            level = sp.Rational(repr(section.level))
+            values.append((as_value(name, section.variable) - level, *(as_value(name, e) for e in _kept(section))))
+        return tuple(values)
 
     @property
     def stop(self) -> sp.Expr | None:
@@ -110,7 +109,7 @@ class Sections:
         return None if self.scene.stop is None else as_value("stop", self.scene.stop)
 
     def width(self, dimension: int) -> int:
-        """Return how many numbers a section point has beside its time; `dimension` if sections are on states."""
+        """Return the size of a section point without its time; `dimension` if sections are on states."""
         if not self.values:
             return dimension
         return 1 + max(len(parts) - 1 for parts in self.values)
@@ -119,20 +118,20 @@ class Sections:
         """Yield names, dimensions and values of the variables out of points (cells, room, 1 + width)."""
         room = max(most, 1)
         for k, (name, section) in enumerate(self.scene.sections.items()):
-            own = points[:, :, 1] == k
-            order = np.argsort(~own, axis=1, kind="stable")[:, :room]
-            found = np.full((len(points), room, 1 + len(_kept(section))), np.nan)
-            sorted_points = np.take_along_axis(points, order[:, :, None], axis=1)
-            mine = np.take_along_axis(own, order, axis=1)
-            numbers = np.delete(sorted_points, 1, axis=2)[:, :, : found.shape[2]]
-            found[:, : order.shape[1]] = np.where(mine[:, :, None], numbers, np.nan)
-            yield f"{name}_count", (), own.sum(axis=1).astype(np.int32)
-            yield f"{name}_time", ("point",), found[:, :, 0]
+            # The points of this section first, in their order, without the column of its number.
+            belongs = points[:, :, 1] == k
+            order = np.argsort(~belongs, axis=1, kind="stable")[:, :room]
+            rows = np.full((len(points), room, 1 + len(_kept(section))), np.nan)
+            sorted_points = np.delete(np.take_along_axis(points, order[:, :, None], axis=1), 1, axis=2)
+            valid = np.take_along_axis(belongs, order, axis=1)[:, :, None]
+            rows[:, : order.shape[1]] = np.where(valid, sorted_points[:, :, : rows.shape[2]], np.nan)
+            yield f"{name}_count", (), belongs.sum(axis=1).astype(np.int32)
+            yield f"{name}_time", ("point",), rows[:, :, 0]
             if _kept(section):
-                yield name, ("point", f"{name}_kept"), found[:, :, 1:]
+                yield name, ("point", f"{name}_kept"), rows[:, :, 1:]
 
     def points(self, cells: int, data: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Return the points (cells, room, 1 + width) out of variables by their names; the way back of `variables`."""
+        """Return the points (cells, room, 1 + width) from variables by their names, the inverse of `variables`."""
         parts = []
         for k, (name, section) in enumerate(self.scene.sections.items()):
             times = np.reshape(data[f"{name}_time"], (cells, -1))
@@ -141,18 +140,18 @@ class Sections:
             if size := len(_kept(section)):
                 part[:, :, 2 : 2 + size] = np.reshape(data[name], (*times.shape, size))
             parts.append(part)
-        whole = np.concatenate(parts, axis=1)
-        order = np.argsort(np.isnan(whole[:, :, 0]), axis=1, kind="stable")
-        return np.take_along_axis(whole, order[:, :, None], axis=1)
+        points = np.concatenate(parts, axis=1)
+        order = np.argsort(np.isnan(points[:, :, 0]), axis=1, kind="stable")
+        return np.take_along_axis(points, order[:, :, None], axis=1)
 
     def meanings(self) -> dict[str, str]:
-        """What the variables of the sections hold, in words."""
-        words: dict[str, str] = {}
+        """Return descriptions of the variables of the sections."""
+        texts: dict[str, str] = {}
         for name, section in self.scene.sections.items():
-            words[f"{name}_count"] = f"number of points in the window where {section}"
-            words[f"{name}_time"] = f"times of the points where {section}"
-            words[name] = f"what is kept of the points where {section}, NaN where there are fewer"
-        return words
+            texts[f"{name}_count"] = f"number of points in the window where {section}"
+            texts[f"{name}_time"] = f"times of the points where {section}"
+            texts[name] = f"what is kept of the points where {section}, NaN where there are fewer"
+        return texts
 
 
 def _kept(section: Section) -> tuple[str, ...]:
@@ -160,7 +159,7 @@ def _kept(section: Section) -> tuple[str, ...]:
 
 
 def _over_window(window: Window, tallies: np.ndarray, length: np.ndarray) -> np.ndarray:
-    """What a window keeps (cells, rows) of tallies (cells, rows, len(Tally)); NaN where a value was undefined."""
+    """Return a reduction (cells, rows) of tallies (cells, rows, len(Tally)) over a window; NaN where a value was undefined."""
     gap = tallies[:, :, Tally.SUM] / length
     defined = np.where(np.isfinite(gap), 0.0, np.nan)
     match window:
@@ -168,5 +167,5 @@ def _over_window(window: Window, tallies: np.ndarray, length: np.ndarray) -> np.
             return np.asarray(tallies[:, :, Tally.FIRST] + gap)
         case Window.VARIANCE:
             return np.asarray(np.maximum(tallies[:, :, Tally.SQUARES] / length - gap * gap, 0.0))
-    kept = {Window.MAXIMUM: Tally.LARGEST, Window.MINIMUM: Tally.LEAST, Window.END: Tally.LATEST}[window]
-    return np.asarray(tallies[:, :, kept] + defined)
+    column = {Window.MAXIMUM: Tally.LARGEST, Window.MINIMUM: Tally.LEAST, Window.END: Tally.LATEST}[window]
+    return np.asarray(tallies[:, :, column] + defined)

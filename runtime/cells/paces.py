@@ -1,4 +1,4 @@
-"""How fast motions decay, grow, turn and go on: from exact slopes of the first nodes of a network, in all cells at once."""
+"""Rates of decay, growth, turning and change of motions in all cells at once, from exact slopes of a network's first nodes."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from synchain.models.mechanics.components import TIME, Block, Edge, Node
 from .stiffness_rates import eigenvalue_rates, turns
 
 NODES, LINKS = 50, 5000
-"""Nodes of a large network whose slopes are computed, and links of one layer."""
+"""Most nodes of a network whose slopes are computed, and most links of one layer: a choice of time."""
 
 SHIFT = 1e-6
-"""A motion is followed for this part of its shortest time, to see how its rates change."""
+"""Part of the shortest time of a motion over which the change of its rates is measured: a choice far above rounding."""
 
 NOISE = 10.0
-"""Rates, and their changes, below those of this many tolerances of the state are errors of steps."""
+"""Rates, and changes of rates, below those of this many tolerances of the state count as errors of steps: a choice."""
 
 BLOCK = 4096
-"""Cells that are computed at once."""
+"""Cells that are computed at once: a choice of memory."""
 
 STEP, ENDLESS = 1e-200, 1e60
-"""Length of steps along the imaginary axis, and slopes that are infinite: that of sqrt(x) at 0 comes out as 1e100."""
+"""Length of steps along the imaginary axis, and least size of infinite slopes: that of sqrt(x) at 0 is computed as 1e100."""
 
 Column = int | np.ndarray
 
@@ -40,10 +40,9 @@ Column = int | np.ndarray
 class Paces(NamedTuple):
     """Rates per unit of time in each cell (cells,).
 
-    `fastest` is that of decay or growth, `turning` that of rotation, `growth` that of growth alone, and `parted` that of
-    decay far faster than the slowest motion of a node, all eigenvalues;
-    `going` is how fast the rates of the motion itself change, 0 at rest.  `size` bounds the eigenvalues.  `fastest` is
-    inf where a rate is finite and its slope is not.
+    Of the eigenvalues: `fastest` is the rate of decay or growth, `turning` of rotation, `growth` of growth alone, `parted` of
+    decay far faster than the slowest motion of a node, and `size` bounds them all.  `going` is the relative change of the
+    rates along the motion, 0 at rest.  `fastest` is inf where a rate is finite and its slope is not.
     """
 
     fastest: np.ndarray
@@ -58,33 +57,33 @@ class Paces(NamedTuple):
 class TemplateRates:
     """The nodes of one kind, or the links of one template, as functions of arrays."""
 
-    # rates, and the entries of their derivatives by the node's own states, row by row
+    # rates, and the entries of their derivatives by the states of the node, or of the link's target, row by row
     rates: Callable[..., list[float | np.ndarray]]
     slopes: Callable[..., list[float | np.ndarray]]
-    # (count, p): places of the states of each node or of each link's target; those of its source, None for nodes
-    own: np.ndarray
+    # (count, p): indices of the states of each node or of each link's target; of its source, None for nodes
+    states: np.ndarray
     source: np.ndarray | None
-    targets: np.ndarray  # (count,)
+    targets: np.ndarray  # (count,): the nodes
     columns: tuple[Column, ...]  # (count,): columns of the parameters among the numbers of a cell
     weights: np.ndarray | None = None  # (count,): weights of links
-    share: float = 1.0  # links that each of these stands for
-    # a state and the value of it at which a smoothed jump has its middle
+    share: float = 1.0  # links that each of these represents
+    # index of an argument, a state, and the value of it in the middle of a smoothed jump
     turned: tuple[tuple[int, Callable[..., list[float | np.ndarray]]], ...] = ()
 
     def arguments(self, state: np.ndarray, numbers: np.ndarray, time: np.ndarray) -> list[np.ndarray]:
-        """States, weights, parameters and the time, each (cells, count) or (cells, 1)."""
-        places = (self.own,) if self.source is None else (self.own, self.source)
-        found = [state[:, column] for own in places for column in own.T]
-        found += [] if self.weights is None else [self.weights]
-        found += [numbers[:, [c] if isinstance(c, int) else c] for c in self.columns]
-        return [*found, time[:, None]]
+        """Return states, weights, parameters and the time, each (cells, count) or (cells, 1)."""
+        ends = (self.states,) if self.source is None else (self.states, self.source)
+        arguments = [state[:, column] for indices in ends for column in indices.T]
+        arguments += [] if self.weights is None else [self.weights]
+        arguments += [numbers[:, [c] if isinstance(c, int) else c] for c in self.columns]
+        return [*arguments, time[:, None]]
 
     def values(self, function: Callable[..., list[float | np.ndarray]], arguments: list[np.ndarray]) -> np.ndarray:
-        """What a function gives, (cells, count, entries)."""
-        shape = len(arguments[0]), len(self.own)
+        """Return the values of a function, (cells, count, entries)."""
+        shape = len(arguments[0]), len(self.states)
         with np.errstate(all="ignore"):
-            found = [np.broadcast_to(np.asarray(e, dtype=float), shape) for e in function(*arguments)]
-            return self.share * np.stack(found, axis=-1)
+            entries = [np.broadcast_to(np.asarray(e, dtype=float), shape) for e in function(*arguments)]
+            return self.share * np.stack(entries, axis=-1)
 
 
 class Templates:
@@ -117,6 +116,7 @@ class Templates:
             size = _sizes(blocks)
             size = np.where(np.isnan(size), np.inf, size)
             size = np.where((size == np.inf) & ~np.isfinite(rates).all(axis=1), 0.0, size)  # there are no rates
+            # Follow the motion for a short time, and compare its rates, relative to the states or to their noise.
             step = SHIFT * np.minimum(1.0 / np.maximum(size, 1e-300), shortest)
             ahead = self._rates(state + step[:, None] * rates, numbers, time + step)
             scale = np.maximum(np.abs(state), np.finfo(float).tiny) if noise is None else noise
@@ -138,49 +138,47 @@ class Templates:
         """Yield the blocks (cells, count, p, p) of nodes and links in the middle of each smoothed jump, and close by."""
         for part in self.parts:
             for k, middle in part.turned:
-                own = part.arguments(state, numbers, np.zeros(len(state)))
-                (place,) = np.moveaxis(part.values(middle, own), -1, 0) / part.share
+                arguments = part.arguments(state, numbers, np.zeros(len(state)))
+                (value,) = np.moveaxis(part.values(middle, arguments), -1, 0) / part.share
                 for shift in (-1e-9, 0.0, 1e-9):
-                    own[k] = place + shift * (1.0 + np.abs(place))
-                    yield (1.0 if part.source is None else 2.0) * part.values(part.slopes, own).reshape(
-                        *place.shape, part.own.shape[1], -1
-                    )
+                    arguments[k] = value + shift * (1.0 + np.abs(value))
+                    slopes = part.values(part.slopes, arguments).reshape(*value.shape, part.states.shape[1], -1)
+                    yield (1.0 if part.source is None else 2.0) * slopes
 
     def _rates(self, state: np.ndarray, numbers: np.ndarray, time: np.ndarray) -> np.ndarray:
-        """The rates (cells, dimension), zero beyond the first nodes."""
+        """Return the rates (cells, dimension), zero beyond the first nodes."""
         rates = np.zeros((len(state), self.dimension))
         for part in self.parts:
-            found = part.values(part.rates, part.arguments(state, numbers, time))
-            np.add.at(rates.T, part.own, np.moveaxis(found, 0, -1))
+            of_part = part.values(part.rates, part.arguments(state, numbers, time))
+            np.add.at(rates.T, part.states, np.moveaxis(of_part, 0, -1))
         for part, inverse in self._inverse_masses(state, numbers, time):
-            rates[:, part.own] = np.einsum("cnij,cnj->cni", inverse, rates[:, part.own])
+            rates[:, part.states] = np.einsum("cnij,cnj->cni", inverse, rates[:, part.states])
         return rates
 
     def blocks(self, state: np.ndarray, numbers: np.ndarray, time: np.ndarray) -> np.ndarray:
-        """Return the nodes' own blocks (cells, nodes, p, p) of the Jacobian, with twice what links add: a bound for springs."""
+        """Return the diagonal blocks (cells, nodes, p, p) of the Jacobian, with twice the terms of links: a bound for springs."""
         blocks = np.zeros((len(state), self.nodes, self.size, self.size))
         for part in self.parts:
-            size = part.own.shape[1]
-            found = part.values(part.slopes, part.arguments(state, numbers, time))
+            size = part.states.shape[1]
+            slopes = part.values(part.slopes, part.arguments(state, numbers, time))
             with np.errstate(all="ignore"):
-                found = (1.0 if part.source is None else 2.0) * found.reshape(len(state), -1, size, size)
-                np.add.at(np.moveaxis(blocks, 1, 0)[:, :, :size, :size], part.targets, np.moveaxis(found, 1, 0))
+                slopes = (1.0 if part.source is None else 2.0) * slopes.reshape(len(state), -1, size, size)
+                np.add.at(np.moveaxis(blocks, 1, 0)[:, :, :size, :size], part.targets, np.moveaxis(slopes, 1, 0))
         rates = self._rates(state, numbers, time) if self.masses else np.empty(0)
         for part, inverse in self._inverse_masses(state, numbers, time):
-            size = part.own.shape[1]
+            size = part.states.shape[1]
             with np.errstate(all="ignore"):  # F = M^-1 r: M dF/dy = dr/dy - d(M F)/dy at fixed F
-                fixed = [*part.arguments(state, numbers, time), *np.moveaxis(rates[:, part.own], -1, 0)]
+                fixed = [*part.arguments(state, numbers, time), *np.moveaxis(rates[:, part.states], -1, 0)]
                 turned = part.values(part.slopes, fixed).reshape(len(state), -1, size, size)
-                own = blocks[:, part.targets, :size, :size] - turned
-                blocks[:, part.targets, :size, :size] = inverse @ own
+                blocks[:, part.targets, :size, :size] = inverse @ (blocks[:, part.targets, :size, :size] - turned)
         return blocks
 
     def _inverse_masses(
         self, state: np.ndarray, numbers: np.ndarray, time: np.ndarray
     ) -> Iterator[tuple[TemplateRates, np.ndarray]]:
-        """The inverse mass matrices (cells, count, p, p) of nodes that have one; NaN where it is singular."""
+        """Yield the inverse mass matrices (cells, count, p, p) of nodes that have one; NaN where it is singular."""
         for part in self.masses:
-            size = part.own.shape[1]
+            size = part.states.shape[1]
             masses = part.values(part.rates, part.arguments(state, numbers, time)).reshape(len(state), -1, size, size)
             singular = ~np.isfinite(masses).all(axis=(2, 3)) | (np.linalg.det(np.nan_to_num(masses)) == 0.0)
             masses[singular] = np.eye(size)
@@ -190,7 +188,7 @@ class Templates:
 
 
 def _sizes(blocks: np.ndarray) -> np.ndarray:
-    """Bounds (cells,) of the eigenvalues of blocks (cells, count, p, p): Frobenius norms."""
+    """Return bounds (cells,) of the eigenvalues of blocks (cells, count, p, p): Frobenius norms."""
     return np.asarray(np.sqrt((blocks**2).sum(axis=(2, 3))).max(axis=1))
 
 
@@ -202,7 +200,7 @@ def fastest_rates(equations: Equations, states: np.ndarray, numbers: np.ndarray)
 
 
 def _node_parts(equations: Equations, slots: dict[str, int]) -> Iterator[TemplateRates]:
-    """The first nodes, kind by kind."""
+    """Yield the first nodes, kind by kind."""
     for kind, node in enumerate(equations.nodes):
         nodes = [i for i, k in enumerate(equations.kind_of[:NODES]) if k == kind]
         if nodes and is_large(equations) and is_analytic(equations):
@@ -214,7 +212,7 @@ def _node_parts(equations: Equations, slots: dict[str, int]) -> Iterator[Templat
 
 
 def _mass_parts(equations: Equations, slots: dict[str, int]) -> Iterator[TemplateRates]:
-    """The mass matrices of the first nodes that have one."""
+    """Yield the mass matrices of the first nodes that have one."""
     for kind, node in enumerate(equations.nodes):
         nodes = [i for i, k in enumerate(equations.kind_of[:NODES]) if k == kind]
         if nodes and node.inertia:
@@ -239,26 +237,22 @@ def _node_part(
 
 
 def _link_parts(equations: Equations, slots: dict[str, int]) -> Iterator[TemplateRates]:
-    """The links that the first nodes feel, template by template."""
+    """Yield the links that the first nodes feel, template by template."""
     for layer in equations.layers:
-        links, share = _links(layer)
+        pairs, share = layer.links, 1.0
+        if isinstance(pairs, AllPairs):
+            # Of all pairs a few evenly spread sources of each node, each of which represents several.
+            count = min(pairs.n, NODES)
+            each = min(pairs.n - 1, LINKS // count)
+            gaps = [1 + k * (pairs.n - 1) // each for k in range(each)]
+            links = [(i, (i + gap) % pairs.n, pairs.weight) for i in range(count) for gap in gaps]
+            share = (pairs.n - 1) / max(each, 1)
+        else:
+            links = [link for link in pairs if link[0] < NODES][:LINKS]
         for ends, edge in layer.edge_of:
-            own = [link for link in links if equations.ends(link) == ends]
-            if own:
-                yield _link_part(equations, slots, layer, edge, own, share)
-
-
-def _links(layer: Layer) -> tuple[list[Link], float]:
-    """Links to the first nodes, LINKS at most, and how many each stands for."""
-    pairs = layer.links
-    if isinstance(pairs, AllPairs):
-        count = min(pairs.n, NODES)
-        each = min(pairs.n - 1, LINKS // count)
-        gaps = [1 + k * (pairs.n - 1) // each for k in range(each)]
-        return [(i, (i + gap) % pairs.n, pairs.weight) for i in range(count) for gap in gaps], (pairs.n - 1) / max(
-            each, 1
-        )
-    return [link for link in pairs if link[0] < NODES][:LINKS], 1.0
+            alike = [link for link in links if equations.ends(link) == ends]
+            if alike:
+                yield _link_part(equations, slots, layer, edge, alike, share)
 
 
 def _link_part(
@@ -287,12 +281,12 @@ def _link_part(
 
 
 def _flat(block: Block) -> tuple[sp.Expr, ...]:
-    """The entries of a block, row by row."""
+    """Return the entries of a block, row by row."""
     return tuple(e for row in block for e in row)
 
 
 def _of_nodes(equations: Equations, slots: dict[str, int], name: str, nodes: list[int]) -> Column:
-    """The column of a parameter, or that of each of some nodes."""
+    """Return the column of a parameter, or its columns at some nodes."""
     if name not in equations.varied:
         return slots[name]
     return np.array([slots[str(NodeName(name, i))] for i in nodes])
@@ -301,14 +295,14 @@ def _of_nodes(equations: Equations, slots: dict[str, int], name: str, nodes: lis
 def _turned(
     symbols: tuple[sp.Symbol, ...], rates: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...]
 ) -> tuple[tuple[int, Callable[..., list[float | np.ndarray]]], ...]:
-    """Where among the arguments the state of each smoothed jump stands, and its value in the middle."""
-    return tuple((symbols.index(state), _function(symbols, (place,))) for state, place in turns(rates, states))
+    """Return for each smoothed jump the index of a state among the arguments, and its value in the middle of the jump."""
+    return tuple((symbols.index(state), _function(symbols, (middle,))) for state, middle in turns(rates, states))
 
 
 def _complex_steps(
     rates: Callable[..., list[float | np.ndarray]], size: int
 ) -> Callable[..., list[float | np.ndarray]]:
-    """The slopes of analytic rates, row by row, by steps along the imaginary axis: those of large nodes take SymPy seconds.
+    """Return the slopes of analytic rates, row by row, by steps along the imaginary axis: SymPy takes seconds for large nodes.
 
     Source: W. Squire, G. Trapp, SIAM Review 40, 110 (1998).
     """
@@ -316,8 +310,8 @@ def _complex_steps(
     def slopes(*arguments: np.ndarray) -> list[float | np.ndarray]:
         shape = np.broadcast_shapes(*(np.shape(e) for e in arguments))
         steps = 1j * STEP * np.eye(size)[:, :, None, None]
-        found = rates(*(e + step for e, step in zip(arguments[:size], steps, strict=True)), *arguments[size:])
-        imaginary = [np.imag(np.broadcast_to(np.asarray(e), (size, *shape))) / STEP for e in found]
+        shifted = rates(*(e + step for e, step in zip(arguments[:size], steps, strict=True)), *arguments[size:])
+        imaginary = [np.imag(np.broadcast_to(np.asarray(e), (size, *shape))) / STEP for e in shifted]
         return [np.where(np.abs(e) < ENDLESS, e, np.copysign(np.inf, e)) for row in imaginary for e in row]
 
     return slopes
@@ -325,7 +319,7 @@ def _complex_steps(
 
 @lru_cache(maxsize=256)
 def _function(symbols: tuple[sp.Symbol, ...], entries: tuple[sp.Expr, ...]) -> Callable[..., list[float | np.ndarray]]:
-    """Expressions as a function of arrays, common parts of which are computed once."""
+    """Return expressions as a function of arrays that computes common parts once."""
     function: Callable[..., list[float | np.ndarray]] = sp.lambdify(
         symbols, list(entries), ["scipy", "numpy"], cse=True
     )

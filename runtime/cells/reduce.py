@@ -1,9 +1,7 @@
-"""Exact reduction of a scene: terms that are zero in every cell, and oscillators that move as one,
-are left out.
+"""Exact reduction of a scene: leave out terms that are zero in every cell, and merge oscillators that move as one.
 
-`synchain.models.dynamics.reduction` proves each reduction; it is undone before the result, which is
-that of the whole network.  docs/skips.md lists all reductions, also those of the emitted text and
-of the kernel's driver.
+`synchain.models.dynamics.reduction` proves each reduction.  Results are expanded to the whole network.  docs/skips.md lists
+all reductions, also those of the emitted text and of the kernel's driver.
 """
 
 from __future__ import annotations
@@ -41,12 +39,24 @@ PERIODIC = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NodeMerge:
-    """Which oscillators are stepped as one, and the way back to the whole network."""
+    """The columns by which states of a whole network and of one with merged oscillators follow from each other."""
 
     states: np.ndarray  # columns of the whole network's state that start the reduced one
     places: np.ndarray  # column of the reduced state in which each state of the whole network is found
     # True if all oscillators are stepped as one and their synchronisation error, which is 0, is a record
     together: bool
+
+    @classmethod
+    def of(cls, network: Equations, reduced: Equations, classes: tuple[int, ...], together: bool) -> NodeMerge:
+        """Return the columns from the class of each oscillator of a network."""
+        if reduced.n == network.n:
+            same = np.arange(network.dimension)
+            return cls(same, same, together)
+        states, places = np.empty(reduced.dimension, dtype=int), np.empty(network.dimension, dtype=int)
+        for node, k in reversed([*enumerate(classes)]):  # the first node of a class is its representative
+            states[list(reduced.places[k])] = network.places[node]
+            places[list(network.places[node])] = reduced.places[k]
+        return cls(states, places, together)
 
     @property
     def merges(self) -> bool:
@@ -55,20 +65,18 @@ class NodeMerge:
 
     def expand(self, buffers: Buffers) -> Buffers:
         """Return the results of the whole network; the same arrays if nothing was merged."""
-        whole = self._take(buffers, self.places)
-        if self.together:
-            whole = replace(whole, sums=whole.sums.copy())
-            whole.sums[whole.status != Status.NOT_RUN, : SumColumn.STOPPED_AT] = (
-                0.0  # one oscillator has no distance to itself
-            )
-        return whole
+        expanded = self._take(buffers, self.places)
+        if self.together:  # one oscillator has no distance to itself
+            expanded = replace(expanded, sums=expanded.sums.copy())
+            expanded.sums[expanded.status != Status.NOT_RUN, : SumColumn.STOPPED_AT] = 0.0
+        return expanded
 
     def contract(self, buffers: Buffers) -> Buffers:
         """Return the part of the whole network's results that the reduced network has."""
         return self._take(buffers, self.states)
 
     def _take(self, buffers: Buffers, columns: np.ndarray) -> Buffers:
-        """The buffers of a network whose states are these columns of another one's."""
+        """Return the buffers of a network whose states are these columns of another one's."""
         if not self.merges:
             return buffers
         points = np.concatenate([[PointColumn.TIME], columns + PointColumn.STATE])
@@ -82,7 +90,7 @@ class NodeMerge:
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class ReducedScene:
-    """What is left of a scene to integrate, and the way back."""
+    """The part of a scene that is integrated, and how results of the whole scene follow from it."""
 
     scene: Scene
     planner: Planner = field(repr=False)  # lays out its cells
@@ -90,8 +98,8 @@ class ReducedScene:
     recording: Recording = field(repr=False)  # records, observables, sections and stop of the kernel
     merge: NodeMerge = field(repr=False)  # which oscillators are stepped as one
     numbers: np.ndarray = field(repr=False)  # columns of the whole network's parameters that are left
-    skipped: tuple[str, ...]  # sentences: what was left out, and what was not and why
-    kept: tuple[str, ...]
+    skipped: tuple[str, ...]  # sentences about the parts that were left out
+    kept: tuple[str, ...]  # sentences about parts that were not, and why
     jumps: bool  # whether a cell that repeats itself leaves out whole cycles
 
     @property
@@ -106,7 +114,7 @@ class ReducedScene:
 
     @property
     def observed(self) -> ObservableArrays:
-        """What the scene observes."""
+        """The observables of the scene."""
         return ObservableArrays(self.scene)
 
     @property
@@ -122,22 +130,22 @@ class ReducedScene:
     def check_memory(self) -> None:
         """Raise ValueError if the results of all cells do not fit into memory."""
         cells = self.scene.cells
-        numbers = cells * numbers_of_a_cell(len(self.merge.places), 0, self.samples, self.observed.numbers)
-        if numbers > IN_MEMORY:
+        size = cells * numbers_of_a_cell(len(self.merge.places), 0, self.samples, self.observed.numbers)
+        if size > IN_MEMORY:
             raise ValueError(
-                f"sweep: found {cells} cells, {numbers * 8 / 1e9:.0f} GB in memory; expected at most "
+                f"sweep: found {cells} cells, {size * 8 / 1e9:.0f} GB in memory; expected at most "
                 f"{IN_MEMORY * 8 / 1e9:.0f} GB; write it to a file with stream, whose memory does not grow with the sweep, "
                 "or take fewer cells"
             )
 
-    def rows(self, whole: CellRows) -> CellRows:
+    def rows(self, rows: CellRows) -> CellRows:
         """Return the rows of the reduced network out of those of the whole one."""
-        start, numbers = whole.start, whole.numbers
+        start, parameters = rows.start, rows.numbers
         if self.merge.merges:
             start = np.take(start, self.merge.states, axis=1)
-        if len(self.numbers) < numbers.shape[1]:
-            numbers = np.take(numbers, self.numbers, axis=1)
-        return replace(whole, start=start, numbers=numbers)
+        if len(self.numbers) < parameters.shape[1]:
+            parameters = np.take(parameters, self.numbers, axis=1)
+        return replace(rows, start=start, numbers=parameters)
 
     def expand(self, buffers: Buffers) -> Buffers:
         """Return the results of the whole network; the same arrays if nothing was merged."""
@@ -145,7 +153,7 @@ class ReducedScene:
 
 
 def as_reduction(scene: Scene, reduce: bool | ReducedScene, starts: np.ndarray | None = None) -> ReducedScene:
-    """Return the reduction of a scene that the argument `reduce` of `run` asks for."""
+    """Return the reduction of a scene for the argument `reduce` of `run`."""
     check_scene(scene)
     if not isinstance(reduce, ReducedScene):
         return reduce_scene(scene, check_flag("reduce", reduce), starts=starts)
@@ -159,13 +167,13 @@ def as_reduction(scene: Scene, reduce: bool | ReducedScene, starts: np.ndarray |
 def reduce_scene(
     scene: Scene, reduce: bool = True, fold_all: bool = False, starts: np.ndarray | None = None
 ) -> ReducedScene:
-    """Return what is left of a scene to integrate. Shapes: starts (cells, dimension)."""
-    whole, found = scene.equations, watched(scene)
+    """Return the part of a scene that must be integrated. Shapes: starts (cells, dimension)."""
+    network, recording = scene.equations, watched(scene)
     skipped: list[str] = []
     kept: list[str] = []
-    equations, classes = whole, tuple(range(scene.n))
+    equations, classes = network, tuple(range(scene.n))
     if reduce:
-        equations = _fold(scene, _observed_parameters(scene, found), fold_all, skipped, kept)
+        equations = _fold(scene, _observed_parameters(scene, recording), fold_all, skipped, kept)
         if starts is None:
             equations, classes = _merge(scene, equations, skipped, kept)
         else:
@@ -174,99 +182,90 @@ def reduce_scene(
     else:
         kept.append("everything is integrated as it stands, as asked for")
     together = max(classes) == 0 and scene.n > 1 and "sync_error" in scene.record
-    seen: dict[int, int] = {}
-    for node, k in enumerate(classes):
-        seen.setdefault(k, node)
-    first = [seen[k] for k in range(equations.n)]
-    merge, section = _node_merge(whole, equations, classes, together), None
+    merge, section = NodeMerge.of(network, equations, classes, together), None
     if "section" in scene.record:
         # the section variable of the class of its node
-        variable = equations.state[int(merge.places[whole.state.index(scene.section.variable)])]
+        variable = equations.state[int(merge.places[network.state.index(scene.section.variable)])]
         section = sp.Symbol(variable, real=True) - sp.Rational(repr(scene.section.level))
     records = tuple(r for r in scene.record if not (together and r == "sync_error"))
+    # The synchronisation error, a sum of distances from the first oscillator, counts the oscillators of each other class.
+    sizes, multiplicity = Counter(classes), None
+    if "sync_error" in scene.record and any(size > 1 for k, size in sizes.items() if k != 0):
+        multiplicity = tuple(sizes[k] for k in range(len(sizes)))
+    # Columns of the network's parameters that are left; a reduced node has those of the first oscillator of its class.
+    first = {k: node for node, k in reversed([*enumerate(classes)])}
+    column, columns = {name: k for k, name in enumerate(network.parameters)}, []
+    for name in equations.parameters:
+        parts = NodeName.parse(name)
+        if parts and parts.base in equations.varied:
+            name = str(NodeName(parts.base, first[parts.index]))
+        columns.append(column[name])
     return ReducedScene(
         scene,
         Planner(scene, starts),
         equations,
-        replace(found, records=records, section=section, multiplicity=_multiplicity(scene, classes)),
+        replace(recording, records=records, section=section, multiplicity=multiplicity),
         merge,
-        _columns(whole, equations, first),
+        np.array(columns, dtype=int),
         tuple(skipped),
         tuple(kept),
         reduce,
     )
 
 
-def _node_merge(whole: Equations, reduced: Equations, classes: tuple[int, ...], together: bool) -> NodeMerge:
-    """The columns of both states, from the class of each oscillator of the whole network."""
-    if reduced.n == whole.n:
-        same = np.arange(whole.dimension)
-        return NodeMerge(same, same, together)
-    first: dict[int, int] = {}
-    states, places = np.empty(reduced.dimension, dtype=int), np.empty(whole.dimension, dtype=int)
-    for node, k in enumerate(classes):
-        if first.setdefault(k, node) == node:
-            states[list(reduced.places[k])] = whole.places[node]
-        places[list(whole.places[node])] = reduced.places[k]
-    return NodeMerge(states, places, together)
-
-
-def _columns(whole: Equations, reduced: Equations, first: list[int]) -> np.ndarray:
-    """The columns of the whole network's parameters that a reduced one has; its node k stands for first[k]."""
-    column = {name: k for k, name in enumerate(whole.parameters)}
-    return np.array([column[_column(name, reduced, first)] for name in reduced.parameters], dtype=int)
-
-
-def _column(name: str, equations: Equations, first: list[int]) -> str:
-    """The name in the whole network of a parameter of a reduced one; node k stands for first[k]."""
-    parts = NodeName.parse(name)
-    return str(NodeName(parts.base, first[parts.index])) if parts and parts.base in equations.varied else name
-
-
 def _fixed(scene: Scene) -> dict[str, float]:
-    """The parameters with one value in every cell."""
+    """Return the parameters with one value in every cell."""
     swept = {axis.name: axis.values for axis in (*scene.axes, *scene.drawn)}
     values = {name: swept.get(name, (scene.parameters[name],)) for name in scene.equations.parameters}
-    return {name: found[0] for name, found in values.items() if min(found) == max(found)}
+    return {name: row[0] for name, row in values.items() if min(row) == max(row)}
+
+
+def _observed_parameters(scene: Scene, recording: Recording) -> set[str]:
+    """Return the parameters that occur in observables and in sections on functions."""
+    names = {s.name for value in (*recording.observed, *recording.events) for s in value.free_symbols}
+    names = names.union(*(rows.names for rows in recording.sums))
+    of_nodes = {str(NodeName(name, i)) for name in scene.equations.varied if name in names for i in range(scene.n)}
+    return (names | of_nodes) & set(scene.parameters)
 
 
 def _fold(scene: Scene, observed: set[str], fold_all: bool, skipped: list[str], kept: list[str]) -> Equations:
-    """Fold parameters one after the other, and say what each of them took along; not those that are `observed`."""
-    equations, fixed = scene.equations, _fixed(scene)
-    for name, value in fixed.items():
+    """Replace parameters that are 0 in every cell, or fixed with `fold_all`, by numbers; keep those that are `observed`."""
+    equations = scene.equations
+    for name, value in _fixed(scene).items():
         if (value != 0.0 and not fold_all) or name not in equations.parameters:
             continue
         try:
-            made = _without(equations, name, Fraction(repr(value)))
+            folded = _without(equations, name, Fraction(repr(value)))
         except ValueError as problem:
             kept.append(str(problem))
             continue
-        seen = sorted(observed & (set(equations.parameters) - set(made.parameters)))
+        seen = sorted(observed & (set(equations.parameters) - set(folded.parameters)))
         if seen:
             kept.append(f"parameter: {name} = {value:g} in every cell, but {', '.join(seen)} is observed")
             continue
-        skipped.append(_consequence(equations, made, name, value))
-        equations = made
+        # Other parameters may disappear with it, or all terms with time, or all links.
+        gone = [p for p in equations.parameters if p not in folded.parameters and p != name]
+        too = f" together with {', '.join(gone)}" if gone else ""
+        if equations.forced and not folded.forced:
+            skipped.append(f"forcing: {name} = {value:g} in every cell, left out{too}; no time terms")
+        elif equations.link_count and not folded.link_count:
+            skipped.append(f"coupling: {name} = {value:g} in every cell, left out{too}; no links")
+        else:
+            also = too and f"; left out{too}"
+            skipped.append(f"parameter: {name} = {value:g} in every cell, now a number of the equations{also}")
+        equations = folded
     return equations
 
 
 @lru_cache(maxsize=64)
 def _without(equations: Equations, name: str, value: Fraction) -> Equations:
-    """The equations at one value of a parameter; runs of one model ask for it again and again."""
+    """Return the equations at one value of a parameter; runs of one model share them."""
     return substitute_constants(equations, {name: value})
 
 
-def _observed_parameters(scene: Scene, found: Recording) -> set[str]:
-    """The parameters that occur in observables and in sections on functions."""
-    names = {s.name for value in (*found.observed, *found.events) for s in value.free_symbols}
-    names = names.union(*(rows.names for rows in found.sums))
-    of_nodes = {str(NodeName(name, i)) for name in scene.equations.varied if name in names for i in range(scene.n)}
-    return (names | of_nodes) & set(scene.parameters)
-
-
 def _present(scene: Scene, equations: Equations) -> list[str]:
-    """What has to be integrated, in words."""
-    found = ["forcing: time occurs in the equations"] if equations.forced else []
+    """Return sentences about the forcing and the links that are integrated."""
+    sentences = ["forcing: time occurs in the equations"] if equations.forced else []
     if equations.link_count:
         fixed = _fixed(scene)
         names = [*dict.fromkeys(symbol.name for edge in equations.edges for symbol in edge.parameters)]
@@ -274,126 +273,90 @@ def _present(scene: Scene, equations: Equations) -> list[str]:
         strengths = [
             f"{name} = {fixed[name]:g}" if name in fixed else f"{name} {differ.get(name, 'is swept')}" for name in names
         ]
-        found.append(f"coupling: {', '.join([f'{equations.link_count} links', *strengths])}")
-    return found
-
-
-def _consequence(before: Equations, after: Equations, name: str, value: float) -> str:
-    """What a folded parameter has taken along, in words."""
-    gone = [p for p in before.parameters if p not in after.parameters and p != name]
-    too = f" together with {', '.join(gone)}" if gone else ""
-    if before.forced and not after.forced:
-        return f"forcing: {name} = {value:g} in every cell, left out{too}; no time terms"
-    if before.link_count and not after.link_count:
-        return f"coupling: {name} = {value:g} in every cell, left out{too}; no links"
-    return f"parameter: {name} = {value:g} in every cell, now a number of the equations{too and f'; left out{too}'}"
+        sentences.append(f"coupling: {', '.join([f'{equations.link_count} links', *strengths])}")
+    return sentences
 
 
 def _merge(
     scene: Scene, equations: Equations, skipped: list[str], kept: list[str]
 ) -> tuple[Equations, tuple[int, ...]]:
-    """Make one node of oscillators that move as one in every cell; returns the class of each
-    oscillator.
-    """
-    n, alone = scene.n, tuple(range(scene.n))
+    """Merge oscillators that move as one in every cell; return the equations and the class of each oscillator."""
+    n, unmerged = scene.n, (equations, tuple(range(scene.n)))
     if equations.mixed:
         kept.append("quotient: nodes of several kinds are stepped one by one")
-        return equations, alone
+        return unmerged
     if scene.observe or scene.sections or scene.stop:
         kept.append(f"quotient: the {n} oscillators are observed one by one")
-        return equations, alone
-    colours = [] if _all_apart(scene) else _colours(scene)
+        return unmerged
+    # A component whose starts all differ, in every cell, decides at once, also in a large network.
+    moved = {parts.base for axis in (*scene.axes, *scene.drawn) if (parts := NodeName.parse(axis.name))}
+    all_apart = any(len(set(states)) == n for name, states in scene.initial.items() if name not in moved)
+    colours = [] if all_apart else _colours(scene)
     different = len(set(colours)) or n
-    words = f"quotient: {n} oscillators with {different} different starts"
     if different == n:
         if n > 1:
             kept.append(f"quotient: the {n} oscillators start from different states")
-        return equations, alone
+        return unmerged
     try:
-        made, classes = quotient(equations, colours)
+        reduced, classes = quotient(equations, colours)
     except NoQuotient as problem:
         kept.append(str(problem))
-        return equations, alone
-    if made.n == n:
-        kept.append(f"{words} are stepped one by one: the links do not treat equal starts alike")
-        return equations, alone
-    if made.n == 1:
-        words = f"quotient: {n} oscillators that all start equal"
-    skipped.append(f"{words} are stepped as {made.n}; the links treat equal starts alike, so they stay equal")
-    return made, classes
-
-
-def _all_apart(scene: Scene) -> bool:
-    """True if the starts of a component differ at all nodes in every cell, which a large network shows soon."""
-    moved = {parts.base for axis in (*scene.axes, *scene.drawn) if (parts := NodeName.parse(axis.name))}
-    return any(len(set(x)) == scene.n for name, x in scene.initial.items() if name not in moved)
+        return unmerged
+    starts = f"quotient: {n} oscillators with {different} different starts"
+    if reduced.n == n:
+        kept.append(f"{starts} are stepped one by one: the links do not treat equal starts alike")
+        return unmerged
+    if reduced.n == 1:
+        starts = f"quotient: {n} oscillators that all start equal"
+    skipped.append(f"{starts} are stepped as {reduced.n}; the links treat equal starts alike, so they stay equal")
+    return reduced, classes
 
 
 def _colours(scene: Scene) -> list[Hashable]:
-    """For each oscillator its start and its own parameters in all cells; equal if these are equal
-    in every cell.
-    """
+    """Return the start and the parameters of each oscillator in all cells; colours are equal if these are in every cell."""
     drawn = {axis.name for axis in scene.drawn}
     swept = {axis.name: axis.values for axis in (*scene.axes, *scene.drawn)}
     colours: list[Hashable] = []
     for i in range(scene.n):
-        own: list[Hashable] = []
+        colour: list[Hashable] = []
         starts = {f"{component}_{i + 1}": values[i] for component, values in scene.initial.items()}
-        numbers = {f"{name}_{i + 1}": scene.parameters[f"{name}_{i + 1}"] for name in scene.equations.varied}
-        for name, value in (starts | numbers).items():
-            found = swept.get(name, (value,))
-            if min(found) == max(found):
-                own.append(found[0])
-            else:
-                together = scene.zipped or name in drawn
-                own.append(found if together else name)  # on a grid two axes differ in some cell
-        colours.append(tuple(own))
+        parameters = {f"{name}_{i + 1}": scene.parameters[f"{name}_{i + 1}"] for name in scene.equations.varied}
+        for name, value in (starts | parameters).items():
+            row = swept.get(name, (value,))
+            if min(row) == max(row):
+                colour.append(row[0])
+            else:  # on a grid two axes differ in some cell
+                colour.append(row if scene.zipped or name in drawn else name)
+        colours.append(tuple(colour))
     return colours
 
 
-def _multiplicity(scene: Scene, classes: tuple[int, ...]) -> tuple[int, ...] | None:
-    """Oscillators in each class if the synchronisation error must count them, else None.
-
-    It is the sum of the distances from the first oscillator, whose own class does not contribute.
-    """
-    sizes = Counter(classes)
-    if "sync_error" not in scene.record or all(size == 1 for k, size in sizes.items() if k != 0):
-        return None
-    return tuple(sizes[k] for k in range(len(sizes)))
-
-
 def explain(reduction: ReducedScene) -> str:
-    """Return in words what is left out of a scene and why, what is not, and what a cell may leave
-    out at run time.
-    """
-    parts = (
-        ("left out", (*reduction.skipped, *_unwritten(reduction))),
-        ("not left out", reduction.kept),
-        (
-            "in a cell, while it runs",
-            (DIVERGED, PERIODIC) if reduction.jumps and reduction.scene.drive.frequency is not None else (DIVERGED,),
-        ),
-    )
-    return "\n".join(
-        "\n".join([title, *(f"  {sentence}" for sentence in sentences or ("nothing",))]) for title, sentences in parts
-    )
-
-
-def _unwritten(reduction: ReducedScene) -> list[str]:
-    """What the text of the kernel does not have, because the scene never had it."""
-    scene, found = reduction.scene, []
+    """Return a text: the parts of a scene that are left out and why, those that are not, and what a cell skips as it runs."""
+    scene, records = reduction.scene, reduction.recording.records
+    # Terms and records that the scene never had.
+    absent = []
     if not scene.forced:
-        found.append("forcing: time does not occur in the equations; no time terms")
+        absent.append("forcing: time does not occur in the equations; no time terms")
     if not scene.equations.link_count:
-        found.append("coupling: no links")
+        absent.append("coupling: no links")
     if "sync_error" not in scene.record:
-        found.append("synchronisation error: not recorded")
-    elif "sync_error" not in reduction.recording.records:
-        found.append("synchronisation error: 0 between oscillators that are stepped as one")
+        absent.append("synchronisation error: not recorded")
+    elif "sync_error" not in records:
+        absent.append("synchronisation error: 0 between oscillators that are stepped as one")
     if "section" not in scene.record:
-        found.append("section: not recorded; no search for crossings")
+        absent.append("section: not recorded; no search for crossings")
     if "trajectory" not in scene.record:
-        found.append("trajectory: not recorded; no samples")
-    if not reduction.recording.records:
-        found.append("dense output: no record needs states inside a step")
-    return found
+        absent.append("trajectory: not recorded; no samples")
+    if not records:
+        absent.append("dense output: no record needs states inside a step")
+    periodic = reduction.jumps and scene.drive.frequency is not None
+    parts = {
+        "left out": (*reduction.skipped, *absent),
+        "not left out": reduction.kept,
+        "in a cell, while it runs": (DIVERGED, PERIODIC) if periodic else (DIVERGED,),
+    }
+    lines = []
+    for title, sentences in parts.items():
+        lines += [title, *(f"  {sentence}" for sentence in sentences or ("nothing",))]
+    return "\n".join(lines)

@@ -1,5 +1,5 @@
-"""Parameters of a scene that a public function takes beside keywords of its own: as keywords,
-run(scene, workers=2, omega=1.2), or as a mapping, run(scene, parameters={"omega": 1.2}).
+"""Parameters of a scene among the keywords of a public function: run(scene, workers=2, omega=1.2), or as a mapping,
+run(scene, parameters={"omega": 1.2}).
 """
 
 from __future__ import annotations
@@ -16,14 +16,13 @@ from synchain.models.scenes.scene import KEYWORDS, Scene, check_scene
 from synchain.models.sweeps.parameters import without
 
 ORBITS = {"executor": "its orbits advance on threads of this process, as many as `workers` says"}
-"""What functions that advance several orbits at once do not take, and why."""
+"""Keywords that functions which advance several orbits at once refuse, and why."""
 
 ONE_ORBIT = {name: "it advances one orbit, step after step, on one thread" for name in ("workers", "executor")}
-"""What functions that advance a single orbit do not take, and why."""
-
+"""Keywords that functions which advance a single orbit refuse, and why."""
 
 SHOWN = 12
-"""Most initial states that an error lists."""
+"""Most initial states that an error lists: a choice."""
 
 ONE_CELL: Mapping[str, Any] = {
     "axes": (),
@@ -34,17 +33,17 @@ ONE_CELL: Mapping[str, Any] = {
     "sections": None,
     "stop": None,
 }
-"""Settings of a scene that sweeps and records nothing, for functions that say themselves what they run."""
+"""Settings of a scene that sweeps and records nothing, for functions that choose themselves what they run."""
 
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """Parameters of a scene as the caller of a public function gave them."""
+    """Parameters of a scene from the call of a public function."""
 
-    function: Callable[..., object]  # the function; errors name it and know its keywords
-    table: Mapping[str, object] | None = None  # what was given as `parameters`
-    keywords: Mapping[str, object] = field(default_factory=dict)  # what was given as further keywords
-    # keywords of other functions that this one does not take, and why
+    function: Callable[..., object]  # its name and its keywords appear in errors
+    table: Mapping[str, object] | None = None  # the argument `parameters`
+    keywords: Mapping[str, object] = field(default_factory=dict)  # further keywords
+    # keywords of other functions that this one refuses, and why
     refused: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -74,10 +73,10 @@ class Given:
         return with_numbers(scene, numbers, **{**ONE_CELL, **settings})
 
     def expect_one_cell(self, scene: Scene, free: Collection[str] = (), *, stops: bool = False) -> None:
-        """Raise ValueError for a scene with draws, or with axes that no parameter fixes: one cell would stand for all.
+        """Raise ValueError for a scene with draws, or with axes that no parameter fixes: one cell would represent all.
 
-        Axes of what is `free`, on which the function does not depend, are no choice between answers.  A stop ends the
-        motion; it is refused too, unless the function `stops` there.
+        Axes of parameters that are `free`, on which the function does not depend, pass.  A stop ends the motion; it is refused
+        too, unless the function `stops` there.
         """
         swept = [axis.name for axis in check_scene(scene).axes if axis.name not in {*self.values, *free}]
         for what, names, remedy in (("axes", swept, "axes=()"), ("draws", scene.draws, "realisations=0, draws=None")):
@@ -93,15 +92,15 @@ class Given:
             )
 
     def sweep(self, scene: Scene, **settings: object) -> Scene:
-        """Return a scene with parameters and initial states fixed, by a number, or swept, by a
-        sequence, which makes an axis after those of the scene, and with those settings that are
-        not None.
+        """Return a scene with parameters and initial states fixed, by a number, or swept, by a sequence.
+
+        A sequence makes an axis after those of the scene.  Settings that are None are those of the scene.
         """
         fixed: dict[str, object] = {}
         swept: dict[str, object] = {axis.name: axis.values for axis in check_scene(scene).axes}
         start: dict[str, list[float]] = {}
-        given = self.checked(scene, states=True)
-        for name, value in given.items():
+        values = self.checked(scene, states=True)
+        for name, value in values.items():
             if is_row(value):
                 swept[name] = value
                 continue
@@ -112,9 +111,9 @@ class Given:
                 fixed[name] = value
             swept.pop(name, None)
         settings = {name: value for name, value in settings.items() if value is not None}
-        if given:
+        if values:
             settings["axes"] = swept
-        if start:  # a scene remembers as given only what is
+        if start:  # other components keep their defaults, which may follow other keywords
             settings["initial"] = {**(scene.given["initial"] or {}), **start}
         return with_numbers(scene, fixed, **settings)
 
@@ -125,7 +124,7 @@ class Given:
         return rows, replace(self, table=numbers, keywords={})
 
     def checked(self, scene: Scene, states: bool = False) -> dict[str, object]:
-        """Return the values; ValueError for an unknown name; with `states`, initial states are known too."""
+        """Return the values; ValueError for a name that is no parameter, nor, with `states`, an initial state."""
         values = self.values
         for name in values:
             if not (scene.takes(name) or (states and _state(scene, name))):
@@ -133,9 +132,9 @@ class Given:
         return values
 
     def _refusal(self, scene: Scene, name: str, states: bool) -> str:
-        """Why a name is refused."""
-        of, own = self.function.__name__, _own(self.function)
-        if name in own:
+        """Return why a name is refused."""
+        of, keywords = self.function.__name__, _keywords_of(self.function)
+        if name in keywords:
             return f"{of}: found its keyword {name!r} in `parameters`; expected parameters of the scene"
         if name in self.refused:
             return f"{of} takes no {name!r}: {self.refused[name]}"
@@ -145,31 +144,27 @@ class Given:
         if reason:
             return f"{of}: unknown parameter {name!r}; {reason}"
         initial = scene.equations.state if states else ()
-        words = suggestion(name, (*scene.parameters, *initial, *own)) or suggestion(name, KEYWORDS)
+        hint = suggestion(name, (*scene.parameters, *initial, *keywords)) or suggestion(name, KEYWORDS)
         shown = initial if len(initial) <= SHOWN else (f"{initial[0]} … {initial[-1]}",)
-        known = dict.fromkeys((*scene.parameters, *shown, *own))
-        return f"unknown parameter or keyword {name!r} of {of}; known: {listed(known)}{words}"
+        valid_names = dict.fromkeys((*scene.parameters, *shown, *keywords))
+        return f"unknown parameter or keyword {name!r} of {of}; known: {listed(valid_names)}{hint}"
 
 
 def with_numbers(scene: Scene, values: Mapping[str, object], **settings: object) -> Scene:
-    """Return a scene with some parameters changed, whatever they are called, and some settings."""
+    """Return a scene with some parameters changed, also those with names of keywords, and some settings."""
     if values:
-        known: Mapping[object, object] = scene.given["parameters"] or {}
-        numbers = without(scene.model, known, values)
-        numbers.update(values.items())
-        settings["parameters"] = numbers
+        parameters: Mapping[object, object] = scene.given["parameters"] or {}
+        settings["parameters"] = {**without(scene.model, parameters, values), **values}
     return scene.replace(**settings) if settings else scene
 
 
 def _state(scene: Scene, name: str) -> NodeName | None:
-    """The parts of the name of an initial state, None for another name; equations are derived only
-    for a name that looks like one.
-    """
+    """Return the parts of the name of an initial state, or None; derive equations only for a name that looks like one."""
     state = NodeName.parse(name)
     return state if state and state.base in scene.components and name in scene.equations.state else None
 
 
-def _own(function: Callable[..., object]) -> list[str]:
-    """The names of a function's keywords, without the scene and the collection of parameters."""
+def _keywords_of(function: Callable[..., object]) -> list[str]:
+    """Return the names of a function's keywords, without the scene and the collection of parameters."""
     arguments = inspect.signature(function).parameters.values()
     return [a.name for a in arguments if a.kind is not a.VAR_KEYWORD and a.name != "scene"]

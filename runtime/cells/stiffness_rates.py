@@ -1,4 +1,4 @@
-"""How fast motions decay, grow and turn at a state: eigenvalues of the nodes' own blocks of the Jacobian."""
+"""Rates of decay, growth and turning at a state: eigenvalues of the diagonal blocks of the Jacobian, one for each node."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import TIME
 
 NODES = 50
-"""Orbits that are looked at."""
+"""Most orbits whose rates are computed: a choice of time."""
 
 SPREAD = 30.0
-"""How many times faster than the slowest motion of a node a decay is that is parted from it."""
+"""Ratio to the slowest motion of a node from which on a decay counts as separate: a choice."""
 
 TURNING = (sp.atan, sp.tanh, sp.erf, sp.Abs)
 """Functions that are steep, or turn sharply, where their argument is zero: the layer of a smoothed jump."""
@@ -34,33 +34,28 @@ class FastestRates(NamedTuple):
 def mode_rates(
     variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray
 ) -> Iterator[FastestRates]:
-    """Yield those of deviations without a strength, with the largest and with the most negative, of the first orbits."""
+    """Yield the rates of deviations along the first orbits: without a strength, with the largest, and with the most negative."""
     strengths, extreme = strengths[: len(variation.parameters)], []
     if strengths.size:
         extreme = [np.argmax(np.hypot.reduce(strengths, axis=0)), np.argmin(strengths[0])]
-    known = [np.zeros(len(strengths)), *(strengths[:, which] for which in dict.fromkeys(extreme))]
+    chosen = [np.zeros(len(strengths)), *(strengths[:, column] for column in dict.fromkeys(extreme))]
     table = [[sp.S.Zero] * variation.size for _ in range(variation.size)]
     for (row, column), e in variation.matrix:
         table[row][column] = e
     entries, orbit = tuple(map(tuple, table)), variation.orbit
     names = (*orbit.state, *orbit.parameters, *(s.name for s in variation.parameters), TIME.name)
     for cell in zip(state[:NODES], numbers[:NODES], strict=True):
-        for strong in known:
-            values = dict(zip(names, np.concatenate([*cell, strong, [0.0]]), strict=True))
-            yield _of_blocks(_value(entries, values)[None])
-
-
-def _of_blocks(blocks: np.ndarray) -> FastestRates:
-    """Those of some blocks (count, p, p)."""
-    return FastestRates(*(float(found[0]) for found in eigenvalue_rates(blocks[None])[:3]))
+        for strength in chosen:
+            values = dict(zip(names, np.concatenate([*cell, strength, [0.0]]), strict=True))
+            block = _value(entries, values)
+            yield FastestRates(*(float(rate[0]) for rate in eigenvalue_rates(block[None, None])[:3]))
 
 
 def eigenvalue_rates(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the fastest decay or growth, turning, growth and parted decay (cells,) of blocks (cells, count, p, p).
 
-    A decay is parted if it is SPREAD times as fast as the slowest motion of its block.
-
-    A block with an entry that is infinite is infinitely fast; one with an entry that is not a number does not count.
+    A decay is parted if it is SPREAD times as fast as the slowest motion of its block.  A block with an infinite entry is
+    infinitely fast; one with a NaN does not count.
     """
     endless = (np.isinf(blocks).any(axis=(2, 3)) & ~np.isnan(blocks).any(axis=(2, 3))).any(axis=1)
     blocks = np.where(np.isfinite(blocks).all(axis=(2, 3), keepdims=True), blocks, 0.0)
@@ -89,6 +84,7 @@ def turns(rates: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...]) -> tuple[tu
 
     A root of a size, which a power of unknown exponent may be, is steep at a point, and has no layer.
     """
+    # Leave out such powers, and collect the arguments of turning functions.
     roots = {
         p: sp.S.Zero
         for e in rates
@@ -96,15 +92,16 @@ def turns(rates: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...]) -> tuple[tu
         if isinstance(p.base, sp.Abs) and not (p.exp - 1).is_nonnegative
     }
     gaps = {part.args[0] for e in rates for part in e.xreplace(roots).atoms(*TURNING)}
-    found = []
+    # The first state of which an argument is a linear function gives its zero.
+    middles = []
     for gap in sorted(gaps, key=sp.default_sort_key):
         slopes = ((s, gap.diff(s)) for s in states)
-        found += [(s, s - gap / slope) for s, slope in slopes if slope != 0 and not slope.has(s)][:1]
-    return tuple(found)
+        middles += [(s, s - gap / slope) for s, slope in slopes if slope != 0 and not slope.has(s)][:1]
+    return tuple(middles)
 
 
 def _value(entries: tuple[tuple[sp.Expr, ...], ...], values: Mapping[str, float]) -> np.ndarray:
-    """The numbers of a block; NaN where it has none."""
+    """Return the numbers of a block; NaN if it cannot be evaluated."""
     symbols, function = _compiled(entries)
     shape = len(entries), len(entries[0])
     try:

@@ -1,9 +1,9 @@
-"""Which integrators the cells of a scene go through: the first by where they start, others by what their steps show."""
+"""Choose the integrator of each cell: the first by the rates at its start, later ones by the lengths of its steps."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -29,24 +29,23 @@ from ..support.status import Status
 from .control import first_step, scale_of_atol, tolerances
 
 STIFF = 30.0
-"""How many times faster than it turns and goes on a motion decays from where Rosenbrock steps are the faster ones, by
-measurement (docs/performance.md)."""
+"""Ratio of decay to turning and to change of a motion from which on Rosenbrock steps are faster, as measured
+(docs/performance.md)."""
 
 LAYER = 0.1
-"""Part of its stiffness with which the layer of a smoothed jump counts: motion is not always inside."""
+"""Factor of the stiffness inside the layer of a smoothed jump: a choice, as motion is inside for a part of the time."""
 
 FIRST_LOOK = 64.0
-"""Steps after which a cell first looks whether its integrator suits it."""
+"""Steps after which a cell first pauses if many more are to come: a choice."""
 
 STALLED = 0.01
-"""Part of the shortest time of a motion below which series are short for a reason of their own, such as a hidden pole."""
-
+"""Part of the shortest time of a motion below which steps are limited by the series, by a hidden pole, say: a choice."""
 
 SLIDE = 64.0
-"""Part of max_steps after which a slide along a jump ends, if the time that is left would take as many times max_steps."""
+"""A slide along a jump ends after 1/SLIDE of max_steps if its remaining time would take SLIDE times max_steps: a choice."""
 
 AUTOMATIC = ("taylor", "dop853", AUTO)
-"""What `auto` stands for, in the order in which cells try them."""
+"""The integrators of `auto`, in the order in which cells try them."""
 
 
 def method_names(scene: Scene) -> tuple[str, ...]:
@@ -59,14 +58,14 @@ class Ladder:
     """The integrators of some equations in the order in which cells try them.
 
     Series come first where they exist, then explicit stages, then a Rosenbrock method. A cell begins with the last one
-    if it is stiff where it starts, else with the first one. While it runs it pauses at 64, 256, 1024 ... steps if many
-    are to come, and is handed on from there: to Rosenbrock steps if its steps are as short as its fastest decay while its
+    if it is stiff at its start, else with the first one. While it runs it pauses at 64, 256, 1024 ... steps if many
+    are to come, and may change there: to Rosenbrock steps if its steps are as short as its fastest decay while its
     motion is slow, to explicit stages if its series are far shorter than any time of its motion. A series without a next
-    term ends in steps that underflow, and is handed on as well. Each decision depends on the cell alone.
+    term ends in steps that underflow, and changes as well. Each decision depends on the cell alone.
     """
 
     scene: Scene  # its integrator and its tolerances
-    equations: Equations  # what is integrated
+    equations: Equations  # those that are integrated
 
     @cached_property
     def methods(self) -> tuple[Integrator, ...]:
@@ -80,7 +79,7 @@ class Ladder:
 
     @property
     def columns(self) -> np.ndarray:
-        """Where among `method_names` each method stands."""
+        """The index among `method_names` of each method."""
         return np.array([method_names(self.scene).index(method.name) for method in self.methods])
 
     @property
@@ -99,18 +98,18 @@ class Ladder:
             return np.zeros(len(rows), int)
         if self.scene.cells > 1:
             return self._first(rows)
-        # a run asks for its only cell twice: which kernel to load, and how to begin
-        asked = b"".join(part.tobytes() for part in (rows.start, rows.numbers, rows.spans))
-        found = self._known.get(asked)
-        if found is None:
-            found = self._known[asked] = self._first(rows)
-        return found.copy()
+        # The run of a single cell chooses twice for the same row: for the kernel to load, and for the cell.
+        key = b"".join(array.tobytes() for array in (rows.start, rows.numbers, rows.spans))
+        if key not in self._chosen:
+            self._chosen[key] = self._first(rows)
+        return self._chosen[key].copy()
 
     @cached_property
-    def _known(self) -> dict[bytes, np.ndarray]:
+    def _chosen(self) -> dict[bytes, np.ndarray]:
         return {}
 
     def _first(self, rows: CellRows) -> np.ndarray:
+        # Stiff cells decay far faster than they turn, grow or are driven, for long enough to matter.
         paces = at_start(self.templates, rows)
         endless = ~np.isfinite(paces.size)
         slow = np.maximum(np.maximum(paces.turning, paces.growth), math.pi / rows.spans[:, SpanColumn.LONGEST])
@@ -124,7 +123,7 @@ class Ladder:
         return self.methods[np.bincount(self.first(rows)).argmax()]
 
     def steps(self, rows: CellRows, first: np.ndarray) -> np.ndarray:
-        """Return spans (cells, len(Span)) with the first step and the first look of cells that begin with some methods."""
+        """Return spans (cells, len(SpanColumn)) with the first step and the first pause of cells that begin with some methods."""
         spans = rows.spans.copy()
         implicit = np.flatnonzero(np.array([method.implicit for method in self.methods])[first])
         if len(implicit):
@@ -133,15 +132,15 @@ class Ladder:
         return spans
 
     def further(self, rows: CellRows, buffers: Buffers, method: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-        """Return which method (cells,) cells go on with that have paused or whose steps underflow; -1 for none.
+        """Return the next method (cells,) of cells that paused or whose steps underflow, -1 for none.
 
-        Shapes: method (cells,), lengths (cells,).
+        Shapes: method (cells,), lengths (cells,), the mean steps since the last pause.
         """
         paused = buffers.status == Status.PAUSED
         series = np.array([m.series for m in self.methods])[method]
         implicit = np.array([m.implicit for m in self.methods])[method]
         untried = buffers.counts[:, Count.BY_METHOD + self.columns[self._explicit]] == 0
-        found = np.where(paused, method, np.where(untried, self._explicit, -1))
+        following = np.where(paused, method, np.where(untried, self._explicit, -1))
         looked = np.flatnonzero(paused & ~implicit & np.isfinite(buffers.end).all(axis=1))
         if len(looked):
             at = self.at(rows.take(looked), buffers.end[looked], buffers.sums[looked, SumColumn.STOPPED_AT])
@@ -150,8 +149,9 @@ class Ladder:
             stiff = finite & (at.fastest > STIFF * slow) & (at.fastest * length > 1.0) & self.solvable
             free = length < STALLED * rows.spans[looked, SpanColumn.LONGEST]
             stalled = series[looked] & finite & free & (np.maximum(at.size, at.going) * length < STALLED)
-            found[looked] = np.where(stiff, len(self.methods) - 1, np.where(stalled, self._explicit, found[looked]))
-        return found
+            unchanged = np.where(stalled, self._explicit, following[looked])
+            following[looked] = np.where(stiff, len(self.methods) - 1, unchanged)
+        return following
 
     @cached_property
     def jumps(self) -> bool:
@@ -159,10 +159,10 @@ class Ladder:
         return next(iter(unpassed(self.equations)), None) is not None
 
     def sliding(self, rows: CellRows, buffers: Buffers, lengths: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """Return which of some paused cells (cells,) slide along a jump, so that max_steps will not do.
+        """Return whether paused cells (cells,) slide along a jump for longer than max_steps reach.
 
-        Explicit steps across a jump are as short as its error asks for, and alike: `lengths` (cells,) is their mean length
-        since the last pause, `before` that before it. A slide may end soon, so that it has 1/SLIDE of max_steps.
+        The error across a jump makes explicit steps short and alike: `lengths` (cells,) is their mean length since the last
+        pause, `before` that before it.  A slide may end soon, and so has 1/SLIDE of max_steps.
         """
         left = rows.spans[:, SpanColumn.END] - buffers.sums[:, SumColumn.STOPPED_AT]
         steady = (lengths < 2.0 * before) & (before < 2.0 * lengths)
@@ -170,10 +170,10 @@ class Ladder:
         return self.jumps & steady & hopeless & (SLIDE * buffers.steps > self.scene.max_steps)
 
     def tolerances(self, rows: CellRows) -> tuple[np.ndarray, np.ndarray]:
-        """Return (rtol, atol), each (cells,), with which cells are integrated.
+        """Return (rtol, atol), each (cells,), of the integration.
 
-        A default atol shrinks for small motions (`scale_of_atol`). Their size is that of the start, or how far the rates there
-        carry the cell in its shortest time.
+        A default atol shrinks for small motions (`scale_of_atol`). Their size is that of the start, or the distance that the
+        rates there cover in the shortest time of the cell.
         """
         rtol, atol = tolerances(self.scene, self.equations, rows.numbers)
         if self.scene.given["atol"] is None:
@@ -185,7 +185,7 @@ class Ladder:
         return rtol, atol
 
     def at(self, rows: CellRows, state: np.ndarray, time: np.ndarray) -> Paces:
-        """Return how fast cells move at some states and times, where states are known to the tolerances."""
+        """Return the rates of cells at some states and times, with states exact to the tolerances."""
         rtol, atol = self.tolerances(rows)
         noise = rtol[:, None] * np.minimum(np.abs(state), self.longest) + atol[:, None]
         return self.templates.paces(state, rows.numbers, time, rows.spans[:, SpanColumn.LONGEST], noise)
@@ -197,21 +197,21 @@ class Ladder:
 
     @property
     def _explicit(self) -> int:
-        """Place of the explicit method of stages."""
+        """Index of the explicit method with stages."""
         return next(k for k, m in enumerate(self.methods) if not m.series)
 
     def _enters_layers(self, rows: CellRows, slow: np.ndarray) -> np.ndarray:
-        """True for cells (cells,) of which a smoothed jump is stiff inside, although the start lies outside."""
-        found = np.zeros(len(rows), dtype=bool)
+        """Return whether a smoothed jump is stiff inside, for cells (cells,) that start outside."""
+        enters = np.zeros(len(rows), dtype=bool)
         for blocks in self.templates.layers(rows.start, rows.numbers):
             fastest, turning, *_ = eigenvalue_rates(blocks)
             within = LAYER * fastest * rows.spans[:, SpanColumn.END] > WORTH
-            found |= within & (LAYER * fastest > STIFF * np.maximum(slow, LAYER * turning)) & np.isfinite(fastest)
-        return found
+            enters |= within & (LAYER * fastest > STIFF * np.maximum(slow, LAYER * turning)) & np.isfinite(fastest)
+        return enters
 
 
 def at_start(templates: Templates, rows: CellRows) -> Paces:
-    """Return how fast cells move where they start."""
+    """Return the rates of cells at their start."""
     shortest = np.minimum(rows.spans[:, SpanColumn.LONGEST], np.maximum(rows.spans[:, SpanColumn.END], 1e-300))
     return templates.paces(rows.start, rows.numbers, np.zeros(len(rows)), shortest, None)
 
@@ -224,10 +224,10 @@ def first_steps(templates: Templates, rows: CellRows) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def _has_series(equations: Equations) -> bool:
-    """True if Taylor steps pass all that the equations hold, and take no longer to compile than most runs take.
+    """Return whether Taylor steps can pass all kinks and jumps of the equations, and compile fast enough.
 
-    Power series where all functions are analytic between kinks, and between jumps along which no motion slides, unless
-    motion may pass another place without a series.  The recurrences of a dense mass matrix take long to compile.
+    No motion may slide along a jump, or pass another point without a series.  The recurrences of a dense mass matrix take
+    longer to compile than most runs take.
     """
     return not equations.inertial and jump(equations) is None and not may_cross_singularity(equations)
 
@@ -246,9 +246,9 @@ def chosen_for_modes(
     strengths: np.ndarray,
     slow: float = 1.0,
 ) -> Integrator:
-    """Return the integrator of orbits with deviations along them, Taylor or Rosenbrock steps: modes have no others.
+    """Return the integrator of orbits with deviations along them: a Taylor or a Rosenbrock method.
 
-    Power series where all functions are analytic, and neither the orbit nor the strongest mode is stiff at the start.
+    Taylor steps if all functions are analytic, and neither the orbit nor the strongest mode is stiff at the start.
     Shapes: state (cells, dimension), numbers (cells, parameters), strengths (number of strengths, modes).
     """
     if scene.integrator == "taylor":
@@ -266,11 +266,12 @@ def _taylor(scene: Scene, equations: Equations, large: bool = False) -> Integrat
 def mode_stiffness(
     variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray, slow: float = 1.0
 ) -> float:
-    """Return how much faster deviations decay or grow at some states than they or the motion turn: the largest of the first orbits.
+    """Return the largest ratio, of the first orbits, of decay or growth of deviations to their turning or to `slow`.
 
-    Of the strengths none and the largest are looked at; parameters as for `chosen_for_modes`.
+    Parameters as for `chosen_for_modes`; strength zero and the extreme ones are compared.
     """
-    return _stiffest(((at.fastest, at.turning) for at in mode_rates(variation, state, numbers, strengths)), slow)
+    rates = mode_rates(variation, state, numbers, strengths)
+    return max((at.fastest / max(slow, at.turning) for at in rates), default=0.0)
 
 
 def warn_of_stiff_modes(
@@ -281,9 +282,9 @@ def warn_of_stiff_modes(
     step: float,
     slow: float = 1.0,
 ) -> bool:
-    """Warn if Taylor steps with deviations were short, `step` in the mean, because they are stiff where they ended.
+    """Warn if Taylor steps with deviations were short, `step` in the mean, because the modes are stiff; return whether they were.
 
-    The other parameters are those of `chosen_for_modes`.  Return whether they were.
+    The other parameters are those of `chosen_for_modes`.
     """
     if step * STIFF * slow >= 1.0:
         return False
@@ -297,21 +298,15 @@ def warn_of_stiff_modes(
     return False
 
 
-def _stiffest(rates: Iterable[tuple[float, float]], slow: float = 1.0) -> float:
-    return max((fastest / max(slow, turning) for fastest, turning in rates), default=0.0)
-
-
 FEW = 100
-"""Steps of a cell that are not many, however short."""
+"""Steps of a cell below which there is no warning of short steps: a choice."""
 
 BLOWN = 1e6
-"""Growth of a state from which on what grows as fast as anything is a solution without bound."""
+"""Growth of a state from which on a motion that still grows at its fastest rate counts as unbounded: a choice."""
 
 
 def warn_of_steps(ladder: Ladder, buffers: Buffers, rows_of: Callable[[np.ndarray], CellRows]) -> None:
-    """Warn if no cell came to its end, if some made no step, if explicit steps were short because a cell is stiff, if a
-    motion has no bound, or if an angle turned so far that its rounding exceeds its tolerance.
-    """
+    """Warn of cells that reached no end or made no step, of stiffness, unbounded motion, and angles beyond their digits."""
     status, steps, times = buffers.status, buffers.steps, buffers.sums[:, SumColumn.STOPPED_AT]
     idle = np.isin(status, (Status.STEP_UNDERFLOW, Status.STEP_BUDGET)) & (times <= 0.0)
     if len(status) and not np.isin(status, (Status.FINISHED, Status.STOPPED, Status.INTERRUPTED, Status.NOT_RUN)).any():
@@ -320,12 +315,13 @@ def warn_of_steps(ladder: Ladder, buffers: Buffers, rows_of: Callable[[np.ndarra
         k = int(idle.argmax())
         warn(f"{idle.sum()} of {len(idle)} cells made no step, cell {k} first: {Status(int(status[k])).message}")
     explicit = not (ladder.methods[-1].implicit or ladder.equations.sticks)
-    whole = ~np.isin(status, (Status.STEP_UNDERFLOW, Status.DIVERGED)) & (times > 0.0)
-    whole &= np.isfinite(buffers.end).all(axis=1)
+    regular = ~np.isin(status, (Status.STEP_UNDERFLOW, Status.DIVERGED)) & (times > 0.0)
+    regular &= np.isfinite(buffers.end).all(axis=1)
     sizes = np.abs(buffers.end)
-    _warn_of_far_angles(ladder, np.where(whole[:, None], sizes, 0.0))
+    _warn_of_far_angles(ladder, np.where(regular[:, None], sizes, 0.0))
+    # Rates at the ends of large states and, of explicit methods, of cells with many steps.
     sizes = np.minimum(sizes, ladder.longest)
-    cells = np.flatnonzero(whole & ((sizes.max(axis=1) > BLOWN) | (explicit & (steps >= FEW))))
+    cells = np.flatnonzero(regular & ((sizes.max(axis=1) > BLOWN) | (explicit & (steps >= FEW))))
     if not len(cells):
         return
     rows, end, steps, times, sizes = rows_of(cells), buffers.end[cells], steps[cells], times[cells], sizes[cells]

@@ -1,9 +1,7 @@
-"""Jobs: a compiled kernel with all that it needs to run cells, and the specification that rebuilds
-it elsewhere.
+"""Jobs: a compiled kernel with all data to run cells, and the specification that rebuilds it in another process.
 
-A job runs in threads of this process.  A worker that does not share its memory, another process or
-another machine, gets the specification once, packed, and compiles the kernel from its own
-installation (`worker.py`).
+A job runs in threads of this process.  A worker that does not share its memory, in another process or on another machine,
+receives the specification once, packed, and compiles the kernel from its installation (`sweeps/worker.py`).
 """
 
 from __future__ import annotations
@@ -37,9 +35,7 @@ from .ladder_engine import LadderEngine, run_rows
 from .scene_kernels import write_kernel
 
 Start = tuple[np.ndarray, np.ndarray]
-"""States (cells, dimension) to start from in place of the scene's, and for which cells (cells,)
-they are good.
-"""
+"""States (cells, dimension) to start from in place of the scene's, and whether they are valid (cells,)."""
 
 
 class Job(Protocol):
@@ -55,7 +51,7 @@ class Job(Protocol):
 
 
 class Problem(Protocol):
-    """What a job integrates."""
+    """The equations and records of a job."""
 
     def source(self, width: int) -> SweepKernel:
         """Return the text of its kernel."""
@@ -66,7 +62,7 @@ class Problem(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class JobSpec:
-    """What all blocks of a job have in common: enough to rebuild it in another process."""
+    """The common part of all blocks of a job, from which another process rebuilds it."""
 
     problem: Problem
     width: int  # lanes of the kernel and SHA-256 of its text
@@ -99,9 +95,9 @@ class JobSpec:
                 "a sweep needs the same installation everywhere"
             )
         if head["processor"] != processor():
-            kept, here = told_apart(head["processor"], processor())
+            main, here = told_apart(head["processor"], processor())
             raise InstallationError(
-                f"this worker has the processor {here}; expected that of the main program, {kept}, because another kind may "
+                f"this worker has the processor {here}; expected that of the main program, {main}, because another kind may "
                 "round otherwise; run on one kind, or set NUMBA_CPU_NAME and NUMBA_CPU_FEATURES to one that all can run"
             )
         allow_code(*head["code"])

@@ -39,9 +39,7 @@ def kernel(scene: Scene, width: int | None = None, reduce: bool | ReducedScene =
 
 
 def kernel_source(scene: Scene, width: int | None = None, reduce: bool | ReducedScene = True) -> SweepKernel:
-    """Return the text of a scene's kernel without compiling it; parameters and errors as for
-    `kernel`.
-    """
+    """Return the text of a scene's kernel without compiling it; parameters and errors as for `kernel`."""
     return write_kernel(as_reduction(scene, reduce), width)
 
 
@@ -49,22 +47,19 @@ _ladders: WeakKeyDictionary[ReducedScene, Ladder] = WeakKeyDictionary()
 
 
 def ladder_of(reduction: ReducedScene) -> Ladder:
-    """Return the integrators that the cells of what is left of a scene go through; the same object each time."""
-    found = _ladders.get(reduction)
-    if found is None:
-        found = _ladders[reduction] = Ladder(reduction.scene, reduction.equations)
-    return found
+    """Return the integrators of the cells of a reduced scene; the same object each time."""
+    if reduction not in _ladders:
+        _ladders[reduction] = Ladder(reduction.scene, reduction.equations)
+    return _ladders[reduction]
 
 
 def chosen_integrator(reduction: ReducedScene) -> Integrator:
-    """Return the integrator that most of the first cells of what is left of a scene begin with."""
+    """Return the integrator with which most of a sample of cells begin."""
     return ladder_of(reduction).main(reduction.rows(reduction.planner.sample()))
 
 
 def write_kernel(reduction: ReducedScene, width: int | None = None, method: Integrator | None = None) -> SweepKernel:
-    """Return the text of the kernel that integrates what is left of a scene; `width` as for
-    `kernel`.  By default the integrator is the one that most cells begin with.
-    """
+    """Return the text of the kernel of a reduced scene; by default of the integrator with which most cells begin."""
     scene = reduction.scene
     width = 1 if width is None and scene.cells == 1 else width
     if width is not None and check_integer("width", width, 1) not in WIDTHS:
@@ -74,15 +69,13 @@ def write_kernel(reduction: ReducedScene, width: int | None = None, method: Inte
 
 
 _emitted = lru_cache(maxsize=32)(emit)
-"""`emit`; runs that differ only in numbers share a kernel."""
+"""`emit`; runs that differ only in numbers share the text."""
 
 
 def warn_of_chords(source: SweepKernel) -> None:
-    """Warn if states between steps are recorded by an integrator that has only straight lines
-    there.
-    """
-    words = {"sample": "trajectory", "cut": "sections", "tally": "observables"}
-    between = [words[r.entry] for r in reversed(source.recorders) if r.entry in words]
+    """Warn of records of states between steps by an integrator that joins its steps by straight lines."""
+    records = {"sample": "trajectory", "cut": "sections", "tally": "observables"}
+    between = [records[r.entry] for r in reversed(source.recorders) if r.entry in records]
     if between and source.method.dense_order < 2:
         warn(
             f"{source.integrator} draws straight lines between its steps, so errors of {' and '.join(between)} are not bounded "
