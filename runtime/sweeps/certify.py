@@ -1,10 +1,9 @@
-"""Certification: the transversal exponents along the motion that every cell of a sweep ends on say whether its
-synchronous state is stable.
+"""Certification: stability of the synchronous state of every cell by the transversal exponents along its final motion.
 
 Two oscillators can become equal bit for bit by rounding and then stay together although the state
 is unstable (Pikovsky, Phys. Rev. Lett. 73, 2931 (1994)), and a cell that starts outside the basin
-or waits too short a time is not synchronous although the state is stable.  The exponents tell these
-cases apart, and let a cell that is certain to stay synchronous end early.
+or waits too short a time is not synchronous although the state is stable.  The exponents distinguish these
+cases, and a cell that is certain to stay synchronous ends early.
 """
 
 from __future__ import annotations
@@ -36,23 +35,23 @@ from .errors import sweep_errors
 from .memory import Memory
 from .pool import Task
 from .prepare import PreparedRun
-from .scheduler import BlockScheduler
+from .scheduler import BlockScheduler, Sink
 
 MOST = 10**7
-"""Cells of the largest certified sweep: exponents and verdicts of all of them are held in memory."""
+"""Cells of the largest certified sweep, a choice: exponents and verdicts of all of them are in memory."""
 
 TRANSIENT, RTOL = 300, 1e-6
-"""Units of time before the average along an orbit, and its tolerance."""
+"""Units of time before the average along an orbit, and its tolerance: choices of time."""
 
 LOOKED, STARTS = 64, 4
-"""Looks at a motion by which cells are told apart, and cells of each motion along which exponents are averaged."""
+"""Samples of a motion that distinguish it from others, and cells of each motion along which exponents are averaged: choices."""
 
 ALIKE, CLOSE = 0.25, 1e-3
-"""Motions whose means differ by less, relative to their extents and to those of all motions of a group, count as one."""
+"""Motions with a smaller difference of means, relative to their extents and to those of all motions of a group, are one."""
 
 
-@dataclass(slots=True)
-class _Ends:
+@dataclass
+class _Ends(Sink):
     """Store where the cells of a sweep end: states of the reduced network (`left`) and of the whole one."""
 
     layout: Layout
@@ -60,10 +59,6 @@ class _Ends:
     left: np.ndarray
     whole: np.ndarray
     finished: np.ndarray
-
-    def missing(self, block: int) -> np.ndarray:
-        """Return the numbers of all cells of a block."""
-        return self.layout.rows(block)
 
     def ends(self, block: int) -> Start:
         """Return the final states of a block, and which of its cells finished."""
@@ -77,7 +72,7 @@ class _Ends:
 
 
 def certified(prepared: PreparedRun) -> PreparedRun:
-    """Return a run with the exponents of every cell along the motion that it ends on: all cells run once for their ends."""
+    """Return a run with the exponents of every cell along its final motion; all cells run once for their ends."""
     scene, layout = prepared.scene, prepared.layout()
     check_certifiable(scene)
     shape = (scene.cells, prepared.reduction.dimension), (scene.cells, len(scene.y0))
@@ -87,7 +82,7 @@ def certified(prepared: PreparedRun) -> PreparedRun:
     reporter = quiet.reporter(scene.cells)
     workers = quiet.workers if quiet.executor is None else None
     with sweep_errors(scene.cells, lambda: (0, Memory.of(prepared, None).result())):
-        BlockScheduler(layout, np.zeros(layout.blocks, dtype=bool), ends, prepared, reporter).run()
+        BlockScheduler(np.zeros(layout.blocks, dtype=bool), ends, prepared, reporter).run()
         states = np.where(finished[:, None], ends.whole, Planner(scene).rows(np.arange(scene.cells)).start)
         return replace(prepared, certificate=certify(scene, states, workers=workers))
 
@@ -100,50 +95,50 @@ def certify(
     periods: float = 2000,
     workers: int | None = None,
 ) -> Certificate:
-    """Return the exponents of the synchronous motion that every cell is on.
+    """Return the exponents along the synchronous motion of every cell, which starts from `states` (cells, states).
 
     Cells that differ only in their starts and in the strength of links that vanish between equal states share the
-    exponents of each motion that they are on.
-    Shapes: states (cells, states).
+    exponents of each of their motions.
     """
     check_certifiable(scene)
     averaging = Averaging(precision, periods, TRANSIENT, 0, Execution(workers, None, False))
     planner, cells = Planner(scene), np.arange(scene.cells)
     starts = planner.rows(cells).start
-    places = States.of(scene)
-    begun = places.table(starts if states is None else states)[:, :, 0]
+    layout = States.of(scene)
+    begun = layout.table(starts if states is None else states)[:, :, 0]  # (cells, p): the first node
     table = {name: np.empty(scene.cells) for name in ("exponent", "stderr", "diffusion", "margin", "size")}
     for group in shared_orbits(scene, planner.columns(cells)):
+        # One orbit for each cell of a group, at the parameters that the group shares.
         single = with_numbers(scene, group.parameters, axes=(), zipped=False, continuation="none", stop=None)
         cell = coupled_cell(Given(certify), single, RTOL)
         problem = OrbitProblem.of_modes(cell, group.strengths, begun[group.cells[:1]], averaging.execution.size)
         first = problem.with_slip_states(begun[group.cells])
-        spread = places.table(starts[group.cells]).transpose(0, 2, 1).reshape(-1, begun.shape[1])
+        spread = layout.table(starts[group.cells]).transpose(0, 2, 1).reshape(-1, begun.shape[1])
         for members, extent, whole in _motions(problem, first, spread):
             chosen = members[np.linspace(0, len(members) - 1, min(STARTS, len(members))).astype(int)].tolist()
             with averaging.reporter() as reporter:
-                found = along(problem, first[chosen], group.strengths, averaging, reporter)
-            # of several motions that look alike, the least stable counts
-            means = [found.by_start[list(rows)].mean(axis=0) for rows in found.groups]
-            worst, place = np.nanmax(means, axis=0), group.place[members]
-            values = worst[place]
+                average = along(problem, first[chosen], group.strengths, averaging, reporter)
+            # Of several attractors that resemble one another take the least stable, and of its modes the largest exponent.
+            means = [average.by_start[list(rows)].mean(axis=0) for rows in average.groups]
+            strength_of = group.place[members]
+            values = np.nanmax(means, axis=0)[strength_of]
             rows, mode_of = np.arange(len(members)), values.argmax(axis=1)
-            here = group.cells[members]
-            stderr = found.stderr[place][rows, mode_of]
-            table["exponent"][here], table["stderr"][here] = values[rows, mode_of], stderr
-            table["diffusion"][here] = stderr**2 * found.time * found.averaged
-            table["margin"][here] = errors_for(ERRORS, found.time / problem.unit) * stderr
-            rests = found.attractors[0].motion in (Motion.FIXED_POINT, Motion.LINEAR)
-            table["size"][here] = np.linalg.norm(whole if rests else extent)
+            at = group.cells[members]
+            stderr = average.stderr[strength_of][rows, mode_of]
+            table["exponent"][at], table["stderr"][at] = values[rows, mode_of], stderr
+            table["diffusion"][at] = stderr**2 * average.time * average.averaged
+            table["margin"][at] = errors_for(ERRORS, average.time / problem.unit) * stderr
+            rests = average.attractors[0].motion in (Motion.FIXED_POINT, Motion.LINEAR)
+            table["size"][at] = np.linalg.norm(whole if rests else extent)
     return Certificate(**table)
 
 
 def _motions(
     problem: OrbitProblem, states: np.ndarray, starts: np.ndarray
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield the rows of orbits that are on one motion, its extent (p,), and that of all motions with the states (any, p) before.
+    """Yield the rows of orbits on one motion, its extent (p,), and that of all motions and `starts` (any, p) together.
 
-    Motions are one if their means and extents over some units of time agree.
+    Motions with equal means and extents over some units of time are one.
     """
     integrator = problem.integrator(states, problem.strengths[:1])
     step = problem.unit if problem.forced else problem.unit / 8
@@ -153,16 +148,19 @@ def _motions(
         path.append(integrator.state)
     mean, extent = np.mean(path, axis=0), np.ptp(path, axis=0)
     whole = np.ptp(np.concatenate([*path, starts]), axis=0)
-    left = np.arange(len(mean))
-    while len(left):
-        first = left[0]
-        allowed = ALIKE * np.maximum(extent[first], extent[left]) + CLOSE * whole
-        apart = np.abs(mean[left] - mean[first]) > allowed
-        wider = np.abs(extent[left] - extent[first]) > 2.0 * allowed
+    # Group the rows with the first one that remains.
+    remaining = np.arange(len(mean))
+    while len(remaining):
+        first = remaining[0]
+        allowed = ALIKE * np.maximum(extent[first], extent[remaining]) + CLOSE * whole
+        apart = np.abs(mean[remaining] - mean[first]) > allowed
+        wider = np.abs(extent[remaining] - extent[first]) > 2.0 * allowed
         alike = ~np.any(apart | wider, axis=1) | problem.linear
-        looks = within(problem, states[left[alike]]) if problem.forced else np.array(path)[:, left[alike]]
-        yield left[alike], np.ptp(looks.reshape(-1, len(whole)), axis=0), whole
-        left = left[~alike]
+        rows = remaining[alike]
+        # A forced motion was sampled at one phase of the drive only; sample it within a period.
+        samples = within(problem, states[rows]) if problem.forced else np.array(path)[:, rows]
+        yield rows, np.ptp(samples.reshape(-1, len(whole)), axis=0), whole
+        remaining = remaining[~alike]
 
 
 def check_certifiable(scene: Scene) -> None:

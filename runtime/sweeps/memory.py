@@ -9,9 +9,9 @@ import numpy as np
 from ..cells.buffers import Buffers
 from ..cells.layout import Layout
 from ..cells.observable_arrays import Sections
-from ..engines.choice import warn_of_steps
 from ..engines.job import Start
 from ..engines.scene_kernels import ladder_of
+from ..engines.step_warnings import warn_of_steps
 from ..results.labels import START_STATE
 from ..results.result import Result, gather
 from ..support.progress import Reporter
@@ -77,7 +77,7 @@ class Memory:
 
     def run(self, reporter: Reporter) -> None:
         """Run the blocks that have not finished."""
-        scheduler = BlockScheduler(self.layout, self.done(), self, self.prepared, reporter)
+        scheduler = BlockScheduler(self.done(), self, self.prepared, reporter)
         reduction = self.prepared.reduction
         try:
             with sweep_errors(reduction.scene.cells, lambda: (int(self.buffers.finished.sum()), self.result())):

@@ -20,8 +20,11 @@ from .prepare import PreparedRun
 class Sink(Protocol):
     """Store blocks that have ended: in memory, on disk, or their ends alone."""
 
+    layout: Layout
+
     def missing(self, block: int) -> np.ndarray:
-        """Return the numbers of the cells of a block that are still to run."""
+        """Return the numbers of the cells of a block that are still to run; all of them, unless single cells are stored."""
+        return self.layout.rows(block)
 
     def ends(self, block: int) -> Start:
         """Return the final states of a stored block, and which of its cells finished."""
@@ -34,7 +37,6 @@ class Sink(Protocol):
 class BlockScheduler:
     """Schedule the blocks that are not `done` (blocks,), store them in `sink` and report progress."""
 
-    layout: Layout
     done: np.ndarray
     sink: Sink
     prepared: PreparedRun
@@ -51,7 +53,7 @@ class BlockScheduler:
         """Yield the unfinished blocks that depend on no unfinished one."""
         done = self.done.copy()  # `finish` returns the block that depends on one that finishes meanwhile
         for block in np.flatnonzero(~done).tolist():
-            needed = self.layout.before(block)
+            needed = self.sink.layout.before(block)
             if needed is None or done[needed]:
                 yield self._task(block, None if needed is None else self.sink.ends(needed))
 
@@ -62,7 +64,7 @@ class BlockScheduler:
             return None
         self.done[task.block] = True
         self.reporter.add(tally(buffers.status))
-        following = self.layout.after(task.block)
+        following = self.sink.layout.after(task.block)
         if following is None or self.done[following]:
             return None
         return self._task(following, (buffers.end, buffers.finished))

@@ -11,7 +11,6 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import xarray as xr
 
 from synchain.codegen.machine_code.installation import InstallationError
@@ -39,7 +38,7 @@ from .certify import certified as with_certificate
 from .errors import SweepFailed, reason_of, sweep_errors, worker_lost
 from .pool import Task
 from .prepare import PreparedRun, prepare
-from .scheduler import BlockScheduler
+from .scheduler import BlockScheduler, Sink
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -255,16 +254,12 @@ def _finished(path: Path, scene: Scene, reporter: Reporter) -> Streamed:
     return Streamed(path, scene, reporter.now, verdicts)
 
 
-@dataclass(slots=True)
-class _Disk:
+@dataclass
+class _Disk(Sink):
     """Store the blocks of a sweep in a block log."""
 
     layout: Layout
     log: BlockLog
-
-    def missing(self, block: int) -> np.ndarray:
-        """Return the numbers of all cells of a block: a log has whole blocks only."""
-        return self.layout.rows(block)
 
     def ends(self, block: int) -> Start:
         """Return the final states of a block, and which of its cells finished."""
@@ -284,7 +279,7 @@ def _run_blocks(
     scene = prepared.scene
     _check_kernel(prepared, log)
     layout = layout_of(log.about, scene)
-    scheduler = BlockScheduler(layout, log.done, _Disk(layout, log), prepared, reporter)
+    scheduler = BlockScheduler(log.done, _Disk(layout, log), prepared, reporter)
 
     def reason(problem: Exception) -> str | None:
         """Return why workers, their installations or the disk failed; None for any other error."""
