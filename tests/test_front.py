@@ -224,6 +224,22 @@ def test_examples_of_docstrings_run(name: str) -> None:
     assert found.failed == 0
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "models.scenes.scene",
+        "models.scenes.file",
+        "models.sweeps.axis",
+        "models.sweeps.distribution",
+        "runtime.sweeps.run",
+    ],
+)
+def test_examples_of_scenes_and_runs(name: str) -> None:
+    found = doctest.testmod(importlib.import_module(f"synchain.{name}"))
+    assert found.attempted > 1
+    assert found.failed == 0
+
+
 @pytest.mark.parametrize("page", ["README.md", "docs/inline.md"])
 def test_the_models_of_the_docs_can_be_made(page: str) -> None:
     """All but what runs them, which other tests do."""

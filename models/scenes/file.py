@@ -40,6 +40,12 @@ def load_scene(name_or_path: str | os.PathLike[str]) -> Scene:
 
     Raises ValueError or TypeError, with the file's name in front, on a missing or unreadable file and on
     whatever `Scene` refuses.  Nothing in the file is run.
+
+    Examples
+    --------
+    >>> from synchain import load_scene
+    >>> load_scene("figure_4a").n
+    2
     """
     if not isinstance(name_or_path, (str, os.PathLike)):
         raise TypeError(

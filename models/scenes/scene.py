@@ -126,7 +126,21 @@ class Scene(HasDrawing, HasLatex):
     Raises
     ------
     ValueError, TypeError
-        For anything that the model does not know or cannot be given.
+        For unknown names, values out of range, and combinations that no model has.
+
+    See Also
+    --------
+    load_scene : The scene of a file.
+    synchain.run : Simulate every cell.
+
+    Examples
+    --------
+    >>> from synchain import Scene, chain
+    >>> scene = Scene("van_der_pol", "spring", chain(3), parameters={"mu": 1.5}, axes={"sigma": [0.1, 0.2]})
+    >>> scene.n, scene.cells, scene.components
+    (3, 2, ('x', 'v'))
+    >>> scene.replace(sigma=0.1, axes=()).parameters["sigma"]
+    0.1
     """
 
     title: str

@@ -19,6 +19,14 @@ class Axis:
 
     `values` may be any iterable of finite numbers, a NumPy array included; it is kept as a tuple of floats.
     Raises TypeError or ValueError on an empty axis, anything but finite numbers, or more than LIMIT values.
+
+    Examples
+    --------
+    >>> from synchain import Axis
+    >>> Axis("sigma", [0.1, 0.2])
+    Axis('sigma', [0.1, 0.2])
+    >>> Axis.between("omega", 0, 1, 5).values
+    (0.0, 0.25, 0.5, 0.75, 1.0)
     """
 
     name: str

@@ -32,6 +32,12 @@ class Draw:
 
     Raises ValueError or TypeError on anything but finite numbers, a deviation or a half width that is not positive, and
     ends that do not rise.
+
+    Examples
+    --------
+    >>> from synchain import normal, uniform
+    >>> print(normal(0, 1), uniform(-1, 1))
+    normal(0.0, 1.0) uniform(-1.0, 1.0)
     """
 
     distribution: Distribution

@@ -110,6 +110,18 @@ def run(
         On Ctrl-C; its `result` has the cells that had finished.
     SweepFailed
         If the workers are lost; its `result` has the cells that had finished.
+
+    See Also
+    --------
+    stream : The same, with the result in a file.
+
+    Examples
+    --------
+    >>> from synchain import Field, Scene, run
+    >>> decay = Scene(Field({"x": "-a*x"}, parameters={"a": 1}), initial={"x": 2}, transient=0, window=1)
+    >>> result = run(decay, a=[1, 2], show_progress=False)
+    >>> print(result.end.values.ravel().round(6))
+    [0.735759 0.270671]
     """
     # 1. Scene: one state to start from is the start of the scene, which axes of initial states then replace.
     start_times: float | np.ndarray | None = None
