@@ -1,1 +1,1 @@
-"""What is simulated: a model with its numbers and what is recorded of it, and the files that hold it."""
+"""Scenes: a model with its numbers and its records, and the files that hold them."""

@@ -32,7 +32,7 @@ from .section import Section
 
 
 class TimeUnit(Word):
-    """What `transient` and `window` count."""
+    """The unit of `transient` and `window`."""
 
     PERIOD = "period"
     TIME = "time"
@@ -79,8 +79,8 @@ def complete(keywords: Mapping[str, Any]) -> dict[str, Any]:
     values["axes"] = axes = read_axes(keywords["axes"], keywords["zipped"])
     check_cells(axes, keywords["zipped"], keywords["realisations"])
     drawn = drawn_axes(model, values["draws"], keywords["realisations"], values["rng"])
-    values["parameters"] = numbers = parameters(model, keywords["parameters"], (*axes, *drawn))
-    differing = varied(numbers, model.parameters)
+    values["parameters"] = parameter_values = parameters(model, keywords["parameters"], (*axes, *drawn))
+    differing = varied(parameter_values, model.parameters)
     if any(model.link_names(name) for name in differing):
         model.equations(differing)  # refuses links that cannot differ
     if GRAPH in values["draws"]:
@@ -89,11 +89,11 @@ def complete(keywords: Mapping[str, Any]) -> dict[str, Any]:
     values["initial"] = _start(model, keywords["initial"], values["seed"])
     values["record"] = _records(model, keywords["record"])
     values["section"] = _section(model, keywords["section"])
-    values["observe"] = observables(model, numbers, keywords["observe"])
-    values["sections"] = sections(model, numbers, keywords["sections"])
-    values["stop"] = stop(model, numbers, keywords["stop"])
+    values["observe"] = observables(model, parameter_values, keywords["observe"])
+    values["sections"] = sections(model, parameter_values, keywords["sections"])
+    values["stop"] = stop(model, parameter_values, keywords["stop"])
     _check_sections(values)
-    values["time_unit"] = _time_unit(model, numbers, keywords["time_unit"])
+    values["time_unit"] = _time_unit(model, parameter_values, keywords["time_unit"])
     for name in ("transient", "window"):
         values[name] = check_number(name, keywords[name], *LIMITS[name])
     recorded = (*values["record"], *values["observe"], *values["sections"])
@@ -103,8 +103,8 @@ def complete(keywords: Mapping[str, Any]) -> dict[str, Any]:
     # Checks of several keywords together.
     values["continuation"] = check_sweep(model, values)
     check_draws(model, values, drawn)
-    _check_friction(model, numbers, (*axes, *drawn), values["zipped"])
-    _check_physics(model, numbers, (*axes, *drawn))
+    _check_friction(model, parameter_values, (*axes, *drawn), values["zipped"])
+    _check_physics(model, parameter_values, (*axes, *drawn))
     return values
 
 
@@ -128,9 +128,9 @@ def _model(keywords: Mapping[str, Any], drawn: Mapping[str, Draws], rng: int) ->
     if GRAPH in drawn:
         nodes = drawn_nodes(drawn, rng)  # before any link is drawn
         if len(layers) > 1 or (keywords["topology"] is not None and layers[0][1].n != nodes):
-            found = f"{len(layers)} layers of links" if len(layers) > 1 else f"graphs of {nodes} nodes"
+            drawn_text = f"{len(layers)} layers of links" if len(layers) > 1 else f"graphs of {nodes} nodes"
             raise ValueError(
-                f"draw topology: found {found}; expected graphs of {layers[0][1].n} nodes for a single layer"
+                f"draw topology: found {drawn_text}; expected graphs of {layers[0][1].n} nodes for a single layer"
             )
         layers = ((coupling, drawn_graph(drawn, keywords["realisations"], rng)),)
     friction = as_law(keywords["friction"], oscillator)
@@ -150,13 +150,13 @@ def _model(keywords: Mapping[str, Any], drawn: Mapping[str, Draws], rng: int) ->
     }
 
 
-def _check_physics(model: Model, numbers: Mapping[str, float], axes: Sequence[Axis]) -> None:
+def _check_physics(model: Model, parameter_values: Mapping[str, float], axes: Sequence[Axis]) -> None:
     """Refuse wrong physics at the scene's parameters and at the ends of its axes."""
     if all(isinstance(kind.oscillator.model, FieldModel) and kind.friction is None for kind in model.kinds):
         return
     for ends in (min, max):
         swept = {axis.name: ends(axis.values) for axis in axes}
-        values = {name: swept.get(name, value) for name, value in numbers.items()}
+        values = {name: swept.get(name, value) for name, value in parameter_values.items()}
         for kind, at_node in at_nodes(model, values):
             check_masses(kind.oscillator, at_node)
             if kind.friction is not None:
@@ -219,9 +219,9 @@ def _check_sections(values: Mapping[str, Any]) -> None:
         raise ValueError(f"observe: found the name {twice[0]!r}, which a section has; rename one of them")
 
 
-def _time_unit(model: Model, numbers: Mapping[str, float], unit_text: object) -> TimeUnit:
+def _time_unit(model: Model, parameter_values: Mapping[str, float], unit_text: object) -> TimeUnit:
     """Return the unit of time; by default the period of the drive if there is one at all values of the parameters."""
-    motion = drive(model, numbers)
+    motion = drive(model, parameter_values)
     default = TimeUnit.TIME if motion.frequency is None or motion.by_values else TimeUnit.PERIOD
     unit = default if unit_text is None else TimeUnit.parse("time_unit", unit_text)
     if unit == TimeUnit.PERIOD and motion.frequency is None:
@@ -252,15 +252,15 @@ def _numerics(keywords: Mapping[str, object], records: Sequence[Record]) -> dict
     return {"integrator": integrator, "rtol": rtol, "atol": atol, "max_steps": max_steps, "samples": samples}
 
 
-def _check_friction(model: Model, numbers: Mapping[str, float], axes: Sequence[Axis], zipped: bool) -> None:
+def _check_friction(model: Model, parameter_values: Mapping[str, float], axes: Sequence[Axis], zipped: bool) -> None:
     """Refuse set-valued friction whose static coefficient is below that of slip in a cell: it can neither hold nor slip."""
     if model.contact != ContactModel.SET_VALUED:
         return
     swept = {axis.name: axis.values for axis in axes}
-    for kind, names in at_nodes(model, {name: name for name in numbers}):
+    for kind, names in at_nodes(model, {name: name for name in parameter_values}):
         for pair in kind.friction.order if kind.friction else ():
             low, high = (names[name] for name in pair)
-            lows, highs = (swept.get(name, (numbers[name],)) for name in (low, high))
+            lows, highs = (swept.get(name, (parameter_values[name],)) for name in (low, high))
             # On a grid the largest of one meets the smallest of the other; zipped axes meet value by value.
             together = zipped and low in swept and high in swept
             for a, b in zip(lows, highs, strict=True) if together else ((max(lows), min(highs)),):

@@ -95,9 +95,8 @@ def graph_of(table: Mapping[object, Any], folder: Path | None = None) -> Topolog
         return graph
     for key in ("name", "n"):
         if key not in table:
-            found = short_repr(dict(table))
             raise ValueError(
-                f"topology: {key!r} is missing in {found}; expected name and n, or edges, or matrix, or file"
+                f"topology: {key!r} is missing in {short_repr(dict(table))}; expected name and n, or edges, or matrix, or file"
             )
     n = check_integer("topology n", table["n"], 0, MOST_NODES)
     text = part("topology name", name)

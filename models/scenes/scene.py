@@ -312,7 +312,7 @@ class Scene(HasDrawing, HasLatex):
 
     @property
     def drawn(self) -> tuple[Axis, ...]:
-        """What is drawn, with one value for each realisation; all of these run together along the last dimension."""
+        """Drawn parameters and states, with a value for each realisation; all share the last dimension of the sweep."""
         return drawn_axes(self.model, self.draws, self.realisations, self.rng)
 
     @property
@@ -365,8 +365,8 @@ class Scene(HasDrawing, HasLatex):
         if keywords["links"] is not None:  # they replace the coupling and the graph of a single layer
             keywords |= {"coupling": None, "topology": None} | changes
         if keywords["parameters"] is not None or single:
-            numbers = {} if keywords["parameters"] is None else check_table("parameters", keywords["parameters"])
-            keywords["parameters"] = {**without(self.model, numbers, single), **single}
+            table = {} if keywords["parameters"] is None else check_table("parameters", keywords["parameters"])
+            keywords["parameters"] = {**without(self.model, table, single), **single}
         if self.varied and "parameters" not in changes and _node_count(keywords) != self.n:
             raise ValueError(
                 f"{self.varied[0]} has values for {self.n} nodes, or for their links; give `parameters` for another number"
@@ -491,19 +491,19 @@ def _frozen_keywords(keywords: Mapping[str, Any], values: Mapping[str, Any]) -> 
     return FrozenDict(frozen)
 
 
-def _frozen_parameters(table: Mapping[str, object], model: Model, numbers: Mapping[str, float]) -> dict[str, object]:
+def _frozen_parameters(table: Mapping[str, object], model: Model, values: Mapping[str, float]) -> dict[str, object]:
     """Return the parameters of a table: a number, or a tuple with one for each node or link."""
     frozen: dict[str, object] = {}
     for name in table:
-        if name in numbers:
-            frozen[name] = numbers[name]
+        if name in values:
+            frozen[name] = values[name]
         elif name in model.parameters:
             names = [*dict.fromkeys(map(str, model.link_names(name).values()))]
             names = names or [str(NodeName(name, i)) for i in model.holders(name)]
-            frozen[name] = tuple(numbers[single] for single in names)
+            frozen[name] = tuple(values[single] for single in names)
         else:  # the parameter of one node, all of which have one number
             parts = model.single(name)
-            frozen[name] = numbers[parts.base] if parts else table[name]
+            frozen[name] = values[parts.base] if parts else table[name]
     return frozen
 
 

@@ -30,8 +30,8 @@ class Graphs:
     def __post_init__(self) -> None:
         sizes = sorted({graph.n for graph in self.graphs})
         if len(sizes) != 1:
-            found = ", ".join(map(str, sizes)) or "no"
-            raise ValueError(f"draw {GRAPH}: found graphs of {found} nodes; expected one number of nodes")
+            counts = ", ".join(map(str, sizes)) or "no"
+            raise ValueError(f"draw {GRAPH}: found graphs of {counts} nodes; expected one number of nodes")
 
     @property
     def union(self) -> Topology:
@@ -60,7 +60,7 @@ Draws = Draw | tuple[tuple[float, ...], ...] | Graphs | RandomGraph
 """A distribution; a row of numbers by realisation, one, or one for each node or link; graphs by realisation; a random graph."""
 
 GRAPH = "topology"
-"""The name of the graph among what is drawn."""
+"""The name of the graph among the draws."""
 
 
 def draws(value: object, realisations: object) -> FrozenDict[Draws]:

@@ -57,9 +57,8 @@ def _component(what: str, value: object, name: str, n: int, seed: int) -> tuple[
         check_keys(what, value, ("low", "high", "seed"))
         for key in ("low", "high"):
             if key not in value:
-                found = short_repr(dict(value))
                 raise ValueError(
-                    f"{what}: {key!r} is missing in {found}; expected {{low, high}} or {{low, high, seed}}"
+                    f"{what}: {key!r} is missing in {short_repr(dict(value))}; expected {{low, high}} or {{low, high, seed}}"
                 )
         low, high = check_number(f"{what}: low", value["low"]), check_number(f"{what}: high", value["high"])
         if low > high:

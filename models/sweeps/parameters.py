@@ -65,23 +65,23 @@ class _Table:
 
     def add(self, name: str, value: Any) -> None:
         """Add one of the parameters; ValueError or TypeError as `parameters`."""
-        model, known = self.model, self.model.parameters
+        model, valid = self.model, self.model.parameters
         place = model.single(name)
-        if WEIGHTS not in known and (name if place is None else place.base) == WEIGHTS:
+        if WEIGHTS not in valid and (name if place is None else place.base) == WEIGHTS:
             raise ValueError(
                 f"parameter {name!r}: the graph has the weights of links; expected an axis such as {WEIGHTS}_1_2 = [0.5, 1], "
                 f"or draws of {WEIGHTS}"
             )
         if place is not None:
-            self.single.setdefault(place.base, {})[place] = in_range(name, value, known[place.base])
-        elif name not in known:
-            raise ValueError(model.unknown(name, "parameter", known))
+            self.single.setdefault(place.base, {})[place] = in_range(name, value, valid[place.base])
+        elif name not in valid:
+            raise ValueError(model.unknown(name, "parameter", valid))
         elif not model.holders(name) and (is_graph(value) or _listed(value)):
             self.lists[name] = _for_each_link(model, name, value)
         elif _listed(value):
             self.lists[name] = _at_nodes(model, name, _for_each_node(model, name, value))
         else:
-            self.shared[name] = in_range(name, value, known[name])
+            self.shared[name] = in_range(name, value, valid[name])
             self.lists.pop(name, None)
 
     def by_place(self, name: str, shared: float, swept: bool) -> dict[Place, float]:
@@ -118,10 +118,10 @@ def _for_each_link(model: Model, name: str, value: Any) -> dict[Place, float]:
         table = _matrix(what, model.n, listed) if any(map(_listed, listed)) else in_order(what, links, listed, count)
     for i, j in sorted(table.keys() ^ links.keys()):
         if (i, j) in links or check_number(what, table[i, j]) != 0:
-            found = "no number" if (i, j) in links else "a number without a link"
+            excess = "no number" if (i, j) in links else "a number without a link"
             more = "; a matrix may have the number 0" if (i, j) in links else ""
             raise ValueError(
-                f"{what}: found {found} where node {i + 1} feels node {j + 1}; expected one for each link, no others{more}"
+                f"{what}: found {excess} where node {i + 1} feels node {j + 1}; expected one for each link, no others{more}"
             )
     checked = {at: in_range(str(link), table[at], parameter) for at, link in links.items()}
     return by_name(what, links, checked)
@@ -179,9 +179,9 @@ def _for_each_node(model: Model, name: str, value: Any) -> list[float]:
     return [in_range(str(NodeName(name, i)), entry, parameter) for i, entry in zip(holders, listed, strict=True)]
 
 
-def varied(values: Mapping[str, float], known: Iterable[str]) -> tuple[str, ...]:
+def varied(values: Mapping[str, float], valid_names: Iterable[str]) -> tuple[str, ...]:
     """Return the names of the parameters that have a value for each node or each link; "W" for weights that are swept."""
-    names = dict.fromkeys(known)
+    names = dict.fromkeys(valid_names)
     weights = WEIGHTS not in names and any((link := LinkName.parse(name)) and link.base == WEIGHTS for name in values)
     return (*(name for name in names if name not in values), *((WEIGHTS,) if weights else ()))
 

@@ -15,23 +15,23 @@ from synchain.models.mechanics.components import TIME
 from .shortest_interval import shortest_stays
 
 
-def periods(equations: Equations, numbers: np.ndarray) -> np.ndarray:
+def periods(equations: Equations, parameters: np.ndarray) -> np.ndarray:
     """Return the period (cells,) of the equations at parameters (cells, parameters); 0 without a drive or a period."""
-    if len(numbers) == 0:
+    if len(parameters) == 0:
         return np.zeros(0)
-    return _periods(_drive(equations), dict(zip(equations.parameters, numbers.T, strict=True)), len(numbers))
+    return _periods(_drive(equations), dict(zip(equations.parameters, parameters.T, strict=True)), len(parameters))
 
 
-def longest_steps(equations: Equations, numbers: np.ndarray, end: np.ndarray) -> np.ndarray:
+def longest_steps(equations: Equations, parameters: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Return the longest step (cells,) at parameters (cells, parameters) of runs up to the times `end` (cells,).
 
     A longer step could miss a swing or a pulse of the drive.  The limit is half the period of the fastest sine or cosine of
     time, or the shortest time between two zeros, jumps, kinks (`Drive.gaps`) or rises (`Drive.rises`) of another function
     of time; inf without a drive.  A drive without a period is sampled up to `end`.
     """
-    if not equations.forced or not len(numbers):
-        return np.full(len(numbers), math.inf)
-    values = by_place(equations, numbers)
+    if not equations.forced or not len(parameters):
+        return np.full(len(parameters), math.inf)
+    values = by_place(equations, parameters)
     places = len(next(iter(values.values()), end)) // len(end)
     return np.asarray(_half_swings(equations, values, np.tile(end, places)).reshape(places, -1).min(axis=0))
 
@@ -42,18 +42,18 @@ def half_swing(equations: Equations, values: Mapping[str, np.ndarray], end: floa
     return float(_half_swings(equations, values, np.full(rows, end)).min(initial=math.inf))
 
 
-def by_place(equations: Equations, numbers: np.ndarray) -> dict[str, np.ndarray]:
+def by_place(equations: Equations, parameters: np.ndarray) -> dict[str, np.ndarray]:
     """Return the drive's parameters of cells (cells, parameters) by their names in templates: a row for each cell and place.
 
     Places are the nodes and, beside them, the links; NaN for parameters that a place lacks.
     """
     drive = _drive(equations)
     names = {name for expr in (*drive.paces, *drive.gaps, *drive.rises) for name in names_in(expr)}
-    columns = dict(zip(equations.parameters, numbers.T, strict=True))
+    columns = dict(zip(equations.parameters, parameters.T, strict=True))
     at_nodes = {name: [f"{name}_{i + 1}" for i in range(equations.n)] for name in equations.varied}
     at_links = {name: list(layer.names(name)) for name, layer in equations.numbered.items()}
     differing = {name: single for name, single in (at_nodes | at_links).items() if name in names}
-    places, absent = max(map(len, differing.values()), default=1), np.full(len(numbers), np.nan)
+    places, absent = max(map(len, differing.values()), default=1), np.full(len(parameters), np.nan)
     values = {name: np.tile(columns[name], places) for name in names & {*columns}}
     for name, single in differing.items():
         padded = single + [""] * (places - len(single))

@@ -15,11 +15,11 @@ CLOCK = 8.0
 """Period of the clock of an oscillator without a drive: a power of two, so that no digit is lost."""
 
 
-def with_modes(equations: Equations, start: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+def with_modes(equations: Equations, start: np.ndarray, parameters: np.ndarray) -> np.ndarray:
     """Return initial states with the slip states that velocities and loads imply at the time 0.
 
     An oscillator at exactly the ground's velocity sticks if static friction can hold it.
-    Shapes: start (cells, 3 n), numbers (cells, parameters).
+    Shapes: start (cells, 3 n), parameters (cells, count).
     """
     n = equations.n
     if not equations.sticks:
@@ -27,7 +27,7 @@ def with_modes(equations: Equations, start: np.ndarray, numbers: np.ndarray) -> 
     (event,) = equations.node.events
     states = np.array(start, dtype=float)
     # Parameters (cells, 1), and (cells, n) where nodes differ.
-    values = {sp.Symbol(p, real=True): c[:, None] for p, c in zip(equations.parameters, numbers.T, strict=True)}
+    values = {sp.Symbol(p, real=True): c[:, None] for p, c in zip(equations.parameters, parameters.T, strict=True)}
     values[TIME] = np.zeros((len(states), 1))
     of_nodes = {}
     for name in equations.varied:

@@ -64,18 +64,18 @@ class TemplateRates:
     states: np.ndarray
     source: np.ndarray | None
     targets: np.ndarray  # (count,): the nodes
-    columns: tuple[Column, ...]  # (count,): columns of the parameters among the numbers of a cell
+    columns: tuple[Column, ...]  # (count,): columns among the parameters of a cell
     weights: np.ndarray | None = None  # (count,): weights of links
     share: float = 1.0  # links that each of these represents
     # index of an argument, a state, and the value of it in the middle of a smoothed jump
     turned: tuple[tuple[int, Callable[..., list[float | np.ndarray]]], ...] = ()
 
-    def arguments(self, state: np.ndarray, numbers: np.ndarray, time: np.ndarray) -> list[np.ndarray]:
+    def arguments(self, state: np.ndarray, parameters: np.ndarray, time: np.ndarray) -> list[np.ndarray]:
         """Return states, weights, parameters and the time, each (cells, count) or (cells, 1)."""
         ends = (self.states,) if self.source is None else (self.states, self.source)
         arguments = [state[:, column] for indices in ends for column in indices.T]
         arguments += [] if self.weights is None else [self.weights]
-        arguments += [numbers[:, [c] if isinstance(c, int) else c] for c in self.columns]
+        arguments += [parameters[:, [c] if isinstance(c, int) else c] for c in self.columns]
         return [*arguments, time[:, None]]
 
     def values(self, function: Callable[..., list[float | np.ndarray]], arguments: list[np.ndarray]) -> np.ndarray:
@@ -98,27 +98,32 @@ class Templates:
         self.masses = tuple(_mass_parts(equations, slots))
 
     def paces(
-        self, state: np.ndarray, numbers: np.ndarray, time: np.ndarray, shortest: np.ndarray, noise: np.ndarray | None
+        self,
+        state: np.ndarray,
+        parameters: np.ndarray,
+        time: np.ndarray,
+        shortest: np.ndarray,
+        noise: np.ndarray | None,
     ) -> Paces:
         """Return how fast the cells of some rows move.
 
-        Shapes: state (cells, dimension), numbers (cells, parameters), time (cells,), shortest (cells,), noise (cells,
+        Shapes: state (cells, dimension), parameters (cells, count), time (cells,), shortest (cells,), noise (cells,
         dimension).
         """
         if len(state) > BLOCK:
             each = [
-                self.paces(state[k], numbers[k], time[k], shortest[k], None if noise is None else noise[k])
+                self.paces(state[k], parameters[k], time[k], shortest[k], None if noise is None else noise[k])
                 for k in (slice(i, i + BLOCK) for i in range(0, len(state), BLOCK))
             ]
             return Paces(*map(np.concatenate, zip(*each, strict=True)))
-        rates, blocks = self._rates(state, numbers, time), self.blocks(state, numbers, time)
+        rates, blocks = self._rates(state, parameters, time), self.blocks(state, parameters, time)
         with np.errstate(all="ignore"):
             size = _sizes(blocks)
             size = np.where(np.isnan(size), np.inf, size)
             size = np.where((size == np.inf) & ~np.isfinite(rates).all(axis=1), 0.0, size)  # there are no rates
             # Follow the motion for a short time, and compare its rates, relative to the states or to their noise.
             step = SHIFT * np.minimum(1.0 / np.maximum(size, 1e-300), shortest)
-            ahead = self._rates(state + step[:, None] * rates, numbers, time + step)
+            ahead = self._rates(state + step[:, None] * rates, parameters, time + step)
             scale = np.maximum(np.abs(state), np.finfo(float).tiny) if noise is None else noise
             speed = np.nan_to_num(np.abs(rates) / scale, nan=0.0).max(axis=1)
             turn = np.nan_to_num(np.abs(ahead - rates) / scale, nan=0.0).max(axis=1) / step
@@ -127,59 +132,61 @@ class Templates:
             going = np.where(speed > 0.0, turn / speed, 0.0)
         return Paces(*eigenvalue_rates(blocks), going, size)
 
-    def reach(self, state: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    def reach(self, state: np.ndarray, parameters: np.ndarray) -> np.ndarray:
         """Return how far (cells,) the rates at the start carry cells in the shortest time of their motion."""
         time = np.zeros(len(state))
         with np.errstate(all="ignore"):
-            speed = np.abs(self._rates(state, numbers, time)).max(axis=1)
-            return np.nan_to_num(speed / _sizes(self.blocks(state, numbers, time)), nan=0.0, posinf=0.0)
+            speed = np.abs(self._rates(state, parameters, time)).max(axis=1)
+            return np.nan_to_num(speed / _sizes(self.blocks(state, parameters, time)), nan=0.0, posinf=0.0)
 
-    def layers(self, state: np.ndarray, numbers: np.ndarray) -> Iterator[np.ndarray]:
+    def layers(self, state: np.ndarray, parameters: np.ndarray) -> Iterator[np.ndarray]:
         """Yield the blocks (cells, count, p, p) of nodes and links in the middle of each smoothed jump, and close by."""
         for part in self.parts:
             for k, middle in part.turned:
-                arguments = part.arguments(state, numbers, np.zeros(len(state)))
+                arguments = part.arguments(state, parameters, np.zeros(len(state)))
                 (value,) = np.moveaxis(part.values(middle, arguments), -1, 0) / part.share
                 for shift in (-1e-9, 0.0, 1e-9):
                     arguments[k] = value + shift * (1.0 + np.abs(value))
                     slopes = part.values(part.slopes, arguments).reshape(*value.shape, part.states.shape[1], -1)
                     yield (1.0 if part.source is None else 2.0) * slopes
 
-    def _rates(self, state: np.ndarray, numbers: np.ndarray, time: np.ndarray) -> np.ndarray:
+    def _rates(self, state: np.ndarray, parameters: np.ndarray, time: np.ndarray) -> np.ndarray:
         """Return the rates (cells, dimension), zero beyond the first nodes."""
         rates = np.zeros((len(state), self.dimension))
         for part in self.parts:
-            of_part = part.values(part.rates, part.arguments(state, numbers, time))
+            of_part = part.values(part.rates, part.arguments(state, parameters, time))
             np.add.at(rates.T, part.states, np.moveaxis(of_part, 0, -1))
-        for part, inverse in self._inverse_masses(state, numbers, time):
+        for part, inverse in self._inverse_masses(state, parameters, time):
             rates[:, part.states] = np.einsum("cnij,cnj->cni", inverse, rates[:, part.states])
         return rates
 
-    def blocks(self, state: np.ndarray, numbers: np.ndarray, time: np.ndarray) -> np.ndarray:
+    def blocks(self, state: np.ndarray, parameters: np.ndarray, time: np.ndarray) -> np.ndarray:
         """Return the diagonal blocks (cells, nodes, p, p) of the Jacobian, with twice the terms of links: a bound for springs."""
         blocks = np.zeros((len(state), self.nodes, self.size, self.size))
         for part in self.parts:
             size = part.states.shape[1]
-            slopes = part.values(part.slopes, part.arguments(state, numbers, time))
+            slopes = part.values(part.slopes, part.arguments(state, parameters, time))
             with np.errstate(all="ignore"):
                 slopes = (1.0 if part.source is None else 2.0) * slopes.reshape(len(state), -1, size, size)
                 np.add.at(np.moveaxis(blocks, 1, 0)[:, :, :size, :size], part.targets, np.moveaxis(slopes, 1, 0))
-        rates = self._rates(state, numbers, time) if self.masses else np.empty(0)
-        for part, inverse in self._inverse_masses(state, numbers, time):
+        rates = self._rates(state, parameters, time) if self.masses else np.empty(0)
+        for part, inverse in self._inverse_masses(state, parameters, time):
             size = part.states.shape[1]
             with np.errstate(all="ignore"):  # F = M^-1 r: M dF/dy = dr/dy - d(M F)/dy at fixed F
-                fixed = [*part.arguments(state, numbers, time), *np.moveaxis(rates[:, part.states], -1, 0)]
+                fixed = [*part.arguments(state, parameters, time), *np.moveaxis(rates[:, part.states], -1, 0)]
                 turned = part.values(part.slopes, fixed).reshape(len(state), -1, size, size)
                 blocks[:, part.targets, :size, :size] = inverse @ (blocks[:, part.targets, :size, :size] - turned)
         return blocks
 
     def _inverse_masses(
-        self, state: np.ndarray, numbers: np.ndarray, time: np.ndarray
+        self, state: np.ndarray, parameters: np.ndarray, time: np.ndarray
     ) -> Iterator[tuple[TemplateRates, np.ndarray]]:
         """Yield the inverse mass matrices (cells, count, p, p) of nodes that have one; NaN where it is singular."""
         for part in self.masses:
             size = part.states.shape[1]
-            masses = part.values(part.rates, part.arguments(state, numbers, time)).reshape(len(state), -1, size, size)
+            masses = part.values(part.rates, part.arguments(state, parameters, time)).reshape(
+                len(state), -1, size, size
+            )
             singular = ~np.isfinite(masses).all(axis=(2, 3)) | (np.linalg.det(np.nan_to_num(masses)) == 0.0)
             masses[singular] = np.eye(size)
             inverse = np.linalg.inv(masses)
@@ -192,10 +199,10 @@ def _sizes(blocks: np.ndarray) -> np.ndarray:
     return np.asarray(np.sqrt((blocks**2).sum(axis=(2, 3))).max(axis=1))
 
 
-def fastest_rates(equations: Equations, states: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-    """Return the fastest decay, growth or turning (states,) at states (states, dimension) with one row of numbers."""
+def fastest_rates(equations: Equations, states: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+    """Return the fastest decay, growth or turning (states,) at states (states, dimension) with one row of parameters."""
     count = len(states)
-    paces = Templates(equations).paces(states, np.tile(numbers, (count, 1)), np.zeros(count), np.ones(count), None)
+    paces = Templates(equations).paces(states, np.tile(parameters, (count, 1)), np.zeros(count), np.ones(count), None)
     return np.maximum(paces.fastest, paces.turning)
 
 

@@ -32,7 +32,7 @@ class FastestRates(NamedTuple):
 
 
 def mode_rates(
-    variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray
+    variation: Variation, state: np.ndarray, parameters: np.ndarray, strengths: np.ndarray
 ) -> Iterator[FastestRates]:
     """Yield the rates of deviations along the first orbits: without a strength, with the largest, and with the most negative."""
     strengths, extreme = strengths[: len(variation.parameters)], []
@@ -44,7 +44,7 @@ def mode_rates(
         table[row][column] = e
     entries, orbit = tuple(map(tuple, table)), variation.orbit
     names = (*orbit.state, *orbit.parameters, *(s.name for s in variation.parameters), TIME.name)
-    for cell in zip(state[:NODES], numbers[:NODES], strict=True):
+    for cell in zip(state[:NODES], parameters[:NODES], strict=True):
         for strength in chosen:
             values = dict(zip(names, np.concatenate([*cell, strength, [0.0]]), strict=True))
             block = _value(entries, values)

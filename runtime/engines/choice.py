@@ -241,19 +241,19 @@ def chosen_for_modes(
     scene: Scene,
     variation: Variation,
     state: np.ndarray,
-    numbers: np.ndarray,
+    parameters: np.ndarray,
     strengths: np.ndarray,
     slow: float = 1.0,
 ) -> Integrator:
     """Return the integrator of orbits with deviations along them: a Taylor or a Rosenbrock method.
 
     Taylor steps if all functions are analytic, and neither the orbit nor the strongest mode is stiff at the start.
-    Shapes: state (cells, dimension), numbers (cells, parameters), strengths (number of strengths, modes).
+    Shapes: state (cells, dimension), parameters (cells, count), strengths (number of strengths, modes).
     """
     if scene.integrator == "taylor":
         return _taylor(scene, variation.orbit)
     smooth = scene.integrator == "auto" and is_analytic(variation.orbit)
-    if smooth and mode_stiffness(variation, state, numbers, strengths, slow) < STIFF:
+    if smooth and mode_stiffness(variation, state, parameters, strengths, slow) < STIFF:
         return _taylor(scene, variation.orbit)
     return integrator(AUTO)
 
@@ -263,20 +263,20 @@ def _taylor(scene: Scene, equations: Equations, large: bool = False) -> Integrat
 
 
 def mode_stiffness(
-    variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray, slow: float = 1.0
+    variation: Variation, state: np.ndarray, parameters: np.ndarray, strengths: np.ndarray, slow: float = 1.0
 ) -> float:
     """Return the largest ratio, of the first orbits, of decay or growth of deviations to their turning or to `slow`.
 
     Parameters as for `chosen_for_modes`; strength zero and the extreme ones are compared.
     """
-    rates = mode_rates(variation, state, numbers, strengths)
+    rates = mode_rates(variation, state, parameters, strengths)
     return max((at.fastest / max(slow, at.turning) for at in rates), default=0.0)
 
 
 def warn_of_stiff_modes(
     variation: Variation,
     state: np.ndarray,
-    numbers: np.ndarray,
+    parameters: np.ndarray,
     strengths: np.ndarray,
     step: float,
     slow: float = 1.0,
@@ -287,7 +287,7 @@ def warn_of_stiff_modes(
     """
     if step * STIFF * slow >= 1.0:
         return False
-    for fastest, turning, _ in mode_rates(variation, state, numbers, strengths):
+    for fastest, turning, _ in mode_rates(variation, state, parameters, strengths):
         if fastest * step > 1.0 and fastest > STIFF * max(slow, turning):
             warn(
                 f"stiff modes: found a rate of {fastest:.3g} beside slow motion, and Taylor steps of {step:.2g}; "

@@ -50,18 +50,18 @@ def first_step(growth: float) -> float:
     return min(FIRST_STEP, GROWN / max(growth, GROWN))
 
 
-def tolerances(scene: Scene, equations: Equations, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (rtol, atol), each (cells,), of the integration; `numbers` (cells, parameters) are those of the equations.
+def tolerances(scene: Scene, equations: Equations, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return (rtol, atol), each (cells,), of the integration; `parameters` (cells, count) are those of the equations.
 
     A smoothed jump of friction is 1/kappa wide in velocity; with steps that do not resolve this width oscillators slip
     through it.  With contact "atan" rtol is therefore at most 1/kappa and atol at most 0.1/kappa (not below 1e-13), for
     the largest kappa of the nodes.
     """
-    rtol, atol = np.full(len(numbers), scene.rtol), np.full(len(numbers), scene.atol)
+    rtol, atol = np.full(len(parameters), scene.rtol), np.full(len(parameters), scene.atol)
     names = _names_of(scene, "kappa")
     columns = [k for k, name in enumerate(equations.parameters) if name in names]
-    if scene.contact == "atan" and columns and len(numbers):
-        width = 1.0 / np.maximum(numbers[:, columns].max(axis=1), 1e-300)
+    if scene.contact == "atan" and columns and len(parameters):
+        width = 1.0 / np.maximum(parameters[:, columns].max(axis=1), 1e-300)
         rtol, atol = np.minimum(rtol, np.maximum(width, 1e-13)), np.minimum(atol, np.maximum(0.1 * width, 1e-13))
     return rtol, atol
 

@@ -20,7 +20,7 @@ from ..results.result import Result
 from ..support.arrays import row
 
 Start: TypeAlias = Result | xr.DataArray | Mapping[str, object] | Sequence[float] | np.ndarray
-"""What a run may start from."""
+"""Types of the argument `start`."""
 
 START_TIME = "start_time"
 """The name in results of the time of the earlier run at which they started."""
