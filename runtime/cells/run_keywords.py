@@ -154,7 +154,9 @@ def with_numbers(scene: Scene, values: Mapping[str, object], **settings: object)
     """Return a scene with some parameters changed, also those with names of keywords, and some settings."""
     if values:
         parameters: Mapping[object, object] = scene.given["parameters"] or {}
-        settings["parameters"] = {**without(scene.model, parameters, values), **values}
+        changed = without(scene.model, parameters, values)
+        changed.update(values.items())
+        settings["parameters"] = changed
     return scene.replace(**settings) if settings else scene
 
 
