@@ -180,7 +180,7 @@ def reduce_scene(
             kept.append("quotient: each cell starts from other states")
         kept += _present(scene, equations)
     else:
-        kept.append("everything is integrated: reduce is off")
+        kept.append("everything is integrated as it stands, as asked for")
     together = max(classes) == 0 and scene.n > 1 and "sync_error" in scene.record
     merge, section = NodeMerge.of(network, equations, classes, together), None
     if "section" in scene.record:
