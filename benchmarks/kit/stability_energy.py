@@ -13,7 +13,7 @@ from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.machine_code.compile import load
 from synchain.models.dynamics.equations import Equations
-from synchain.models.mechanics.components import TIME, Edge, Node
+from synchain.models.mechanics.components import Edge, Node
 from synchain.models.mechanics.lagrangian import total_derivative
 from synchain.models.networks.energy_terms import EnergyTerms
 from synchain.models.scenes.scene import Scene
@@ -82,7 +82,7 @@ def _with_work(equations: Equations, exact: EnergyTerms) -> Equations:
     power = share.power
     if node.events:  # the force of friction in stick is whatever holds the body
         x, v = node.state[:2]
-        power = total_derivative(share.energy, (x,), (v,), (node.rhs[1],), TIME)
+        power = total_derivative(share.energy, (x,), (v,), (node.rhs[1],))
     single = Node((*node.state, work), (*node.rhs, power), node.parameters, node.events)
     if edge is not None:
         rates = (*edge.rhs, _link_power(node, edge))

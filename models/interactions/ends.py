@@ -1,4 +1,4 @@
-"""The two ends of a link: target i and source j, the symbols of their states and parameters, and what a link adds."""
+"""The two ends of a link, target i and source j: symbols of their states and parameters, and the terms of a link."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sympy as sp
 
 from ..inputs.checks import check_instance, suggestion
 from ..mechanics.components import TIME, Node
-from ..mechanics.oscillator import FieldModel, Oscillator
+from ..mechanics.oscillator import Oscillator
 
 WEIGHT = sp.Symbol("weight", real=True)
 """The weight of a link in the expressions of a coupling."""
@@ -25,12 +25,12 @@ class End:
     _parameters: tuple[str, ...]
 
     def __getattr__(self, name: str) -> sp.Symbol:
-        if name.startswith("_"):  # what pickle and copy look for
+        if name.startswith("_"):  # pickle and copy look for these
             raise AttributeError(name)
-        known = (*self._states, *self._parameters)
-        if name not in known:
+        names = (*self._states, *self._parameters)
+        if name not in names:
             raise AttributeError(
-                f"end {self._letter} of a link: unknown {name!r}; known: {', '.join(known)}{suggestion(name, known)}"
+                f"end {self._letter} of a link: unknown {name!r}; known: {', '.join(names)}{suggestion(name, names)}"
             )
         return sp.Symbol(f"{name}_{self._letter}", real=True)
 
@@ -68,21 +68,16 @@ def ends(node: Oscillator, source: Oscillator | None = None) -> tuple[End, End, 
     >>> W * (j.x - i.x)
     weight*(-x_i + x_j)
     """
-    made = []
-    for letter, own in (("i", node), ("j", node if source is None else source)):
-        model = check_instance("ends", own, Oscillator, "an Oscillator").model
-        states = (
-            model.state
-            if isinstance(model, FieldModel)
-            else (*(c.name for c in model.coordinates), *(c.velocity for c in model.coordinates))
-        )
-        made.append(End(letter, tuple(states), tuple(own.parameters)))
-    return made[0], made[1], WEIGHT
+    oscillators = (
+        check_instance("ends", each, Oscillator, "an Oscillator") for each in (node, node if source is None else source)
+    )
+    i, j = (End(letter, each.states, tuple(each.parameters)) for letter, each in zip("ij", oscillators, strict=True))
+    return i, j, WEIGHT
 
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """What one link adds: energies in the symbols of both ends, or rates of the states of its target.
+    """The terms of one link: energies in the symbols of both ends, or rates of the states of its target.
 
     `oriented` is True if an energy changes in the exchange of the ends (`synchain.models.interactions.link`).
     """
@@ -138,15 +133,32 @@ class Pair:
 
     @property
     def described(self) -> str:
-        """The two nodes in words."""
-        return " and ".join(str(own or node.state) for own, node in zip(self.oscillators, self.nodes, strict=True))
+        """The two nodes, for messages."""
+        return " and ".join(str(each or node.state) for each, node in zip(self.oscillators, self.nodes, strict=True))
 
     @property
     def theirs(self) -> dict[sp.Symbol, sp.Symbol]:
         """Symbols for the parameters of the source, and those of its node."""
         return {sp.Symbol(f"{s.name}_j", real=True): s for s in self.nodes[1].parameters}
 
-    def known(self) -> dict[sp.Symbol, sp.Symbol]:
-        """What the symbols of `ends` are in the equations of a link: a parameter of the target has its own name."""
-        own = {sp.Symbol(f"{s.name}_i", real=True): s for s in self.nodes[0].parameters}
-        return {**{s: s for s in (*self.here, *self.there, *self.theirs, WEIGHT, TIME)}, **own}
+    def symbols(self) -> dict[sp.Symbol, sp.Symbol]:
+        """Return the symbol in an edge for each symbol of `ends`: a parameter m_i of the target is called m there."""
+        of_target = {sp.Symbol(f"{s.name}_i", real=True): s for s in self.nodes[0].parameters}
+        return {**{s: s for s in (*self.here, *self.there, *self.theirs, WEIGHT, TIME)}, **of_target}
+
+
+def directed(energy: sp.Expr, exchanged: sp.Expr) -> tuple[sp.Expr, bool]:
+    """Return the energy of a link from the energy and that of exchanged ends, and True if the two differ.
+
+    An energy that differs is W^2 V_even + W V_odd (`synchain.models.interactions.link`).
+    """
+    if sp.expand(energy - exchanged) == 0:
+        return energy, False
+    here, there = (e.xreplace({WEIGHT: sp.S.One}) for e in (energy, exchanged))
+    return sp.expand(WEIGHT**2 * (here + there) / 2 + WEIGHT * (here - there) / 2), True
+
+
+def has_velocities(node: Node) -> bool:
+    """Return True for a node of coordinates followed by their velocities."""
+    half = len(node.state) // 2
+    return bool(node.events) or node.rhs[:half] == node.state[half:]

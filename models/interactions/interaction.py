@@ -25,13 +25,13 @@ from ..inputs.frozen import FrozenDict
 from ..mechanics.components import TIME, Node
 from ..mechanics.expression import FRICTION_NAME, LENGTH, exact, read, written
 from ..mechanics.parameter import Parameter
-from .ends import WEIGHT, Pair, Terms
+from .ends import WEIGHT, Pair, Terms, directed, has_velocities
 
 _WEIGHT = "W"
-"""What the weight of a link is called in a text."""
+"""Name of the weight of a link in a text."""
 
 _TAKEN = frozenset({"pi", FRICTION_NAME, *FUNCTIONS})
-"""Names that mean something else in a text."""
+"""Names with another meaning in a text."""
 
 
 @dataclass(frozen=True, slots=True, init=False)
@@ -39,12 +39,12 @@ class Rates:
     """A link that adds to the rates of states of its target; nothing acts back on the source.
 
     The rate that a link of weight W from j to i adds may be any function of the states and parameters of both ends, of
-    W, of the link's own parameters and of time.  It need not vanish between equal states.
+    W, of the parameters of the link and of time.  It need not vanish between equal states.
 
     Parameters
     ----------
     rates : mapping of Symbol or str to Expr or str
-        What a link adds to the rate of each state of its target, such as {i.theta: K*W*sin(j.theta - i.theta)}, in the
+        Terms that a link adds to the rates of states of its target, such as {i.theta: K*W*sin(j.theta - i.theta)}, in the
         symbols of `ends`, or as text, {"theta": "K*W*sin(theta_j - theta_i)"}.  Decimals are exact: 0.1 is 1/10.
     parameters : mapping of Symbol or str to number or Parameter
         Parameters of the link with their defaults.
@@ -80,20 +80,20 @@ class Rates:
         twice = next((name for name in targets if targets.count(name) > 1), None)
         if twice is not None:
             raise ValueError(f"rates of a link: the rate of {twice!r} is given twice; expected it once")
-        given = [_told(f"rates of a link: rate of {name}", e) for name, e in zip(targets, table.values(), strict=True)]
-        found = _Content.of("rates of a link", given, parameters)
-        for name, rate in zip(targets, found.expressions, strict=True):
+        values = [
+            _parsed(f"rates of a link: rate of {name}", e) for name, e in zip(targets, table.values(), strict=True)
+        ]
+        checked, defaults = _checked("rates of a link", values, parameters)
+        for name, rate in zip(targets, checked, strict=True):
             if rate == 0:
                 raise ValueError(f"rates of a link: the rate of {name!r} is 0; expected a function; leave it out")
-        ordered = sorted(zip(targets, found.expressions, strict=True))
-        object.__setattr__(self, "rates", FrozenDict(ordered))
-        object.__setattr__(self, "parameters", found.parameters)
+        # In alphabetical order, so that equal contents make equal couplings.
+        object.__setattr__(self, "rates", FrozenDict(sorted(zip(targets, checked, strict=True))))
+        object.__setattr__(self, "parameters", defaults)
 
     def __reduce__(self) -> tuple[type[Rates], tuple[object, ...]]:
-        return Rates, (self._keyed(), dict(self.parameters))
-
-    def _keyed(self) -> dict[sp.Symbol, sp.Expr]:
-        return {sp.Symbol(f"{name}_i", real=True): rate for name, rate in self.rates.items()}
+        keyed = {sp.Symbol(f"{name}_i", real=True): rate for name, rate in self.rates.items()}
+        return Rates, (keyed, dict(self.parameters))
 
     @property
     def forced(self) -> bool:
@@ -101,7 +101,7 @@ class Rates:
         return any(e.has(TIME) for e in self.rates.values())
 
     def canonical(self, state: tuple[str, ...], coordinates: tuple[str, ...]) -> Rates:
-        """The coupling itself, whose spelling is one."""
+        """Return the coupling, which has one spelling."""
         return self
 
     def check_ends(self, single: Node, other: Node | None = None) -> None:
@@ -110,20 +110,20 @@ class Rates:
 
     def terms(self, pair: Pair) -> Terms:
         """Return what a link adds to the rates of its target."""
-        known = pair.names[0]
+        states = pair.names[0]
         for name in self.rates:
-            if name not in known:
+            if name not in states:
                 raise ValueError(
-                    f"coupling '{self}': unknown state {name!r} of {pair.nodes[0].state}; known: {', '.join(known)}"
-                    f"{suggestion(name, known)}"
+                    f"coupling '{self}': unknown state {name!r} of {pair.nodes[0].state}; known: {', '.join(states)}"
+                    f"{suggestion(name, states)}"
                 )
-        added = {name: _placed(self, e, pair) for name, e in self.rates.items()}
-        return Terms(rates=tuple(added.get(name, sp.S.Zero) for name in known))
+        rates = {name: _in_symbols_of(pair, self, e) for name, e in self.rates.items()}
+        return Terms(rates=tuple(rates.get(name, sp.S.Zero) for name in states))
 
     def as_dict(self) -> dict[str, object]:
         """Return the coupling as a table of a scene file."""
-        written = {name: _written(e) for name, e in self.rates.items()}
-        return {"rates": written, "parameters": _numbers(self.parameters)}
+        rates = {name: _written(e) for name, e in self.rates.items()}
+        return {"rates": rates, "parameters": _tables(self.parameters)}
 
     def __str__(self) -> str:
         return f"rates of {', '.join(self.rates)}"
@@ -134,7 +134,7 @@ class Potential:
     """A link with a potential of any coordinates and parameters of its two ends: forces on both.
 
     A link of weight W between i and j stores the energy V(i, j).  If V changes in the exchange of its ends, a link has a
-    direction, as `synchain.models.interactions.link` says, and weights other than 1 are refused.
+    direction (`synchain.models.interactions.link`), and weights other than 1 are refused.
 
     Parameters
     ----------
@@ -155,14 +155,12 @@ class Potential:
     parameters: FrozenDict[Parameter]
 
     def __init__(self, energy: object, parameters: Mapping[sp.Symbol | str, object] | None = None) -> None:
-        found = _Content.of("potential of a link", [_told("potential of a link", energy)], parameters)
-        letters = {s.name[-2:] for s in found.expressions[0].free_symbols - found.own}
-        if not {"_i", "_j"} <= letters:
-            raise ValueError(
-                f"potential of a link: found {short_repr(found.expressions[0])}, of one end; expected a function of both"
-            )
-        object.__setattr__(self, "energy", found.expressions[0])
-        object.__setattr__(self, "parameters", found.parameters)
+        what = "potential of a link"
+        (e,), defaults = _checked(what, [_parsed(what, energy)], parameters)
+        object.__setattr__(self, "energy", e)
+        object.__setattr__(self, "parameters", defaults)
+        if not {"_i", "_j"} <= {s.name[-2:] for s in self._of_ends()}:
+            raise ValueError(f"{what}: found {short_repr(e)}, of one end; expected a function of both")
 
     def __reduce__(self) -> tuple[type[Potential], tuple[object, ...]]:
         return Potential, (self.energy, dict(self.parameters))
@@ -173,20 +171,21 @@ class Potential:
         return self.energy.has(TIME)
 
     def canonical(self, state: tuple[str, ...], coordinates: tuple[str, ...]) -> Potential:
-        """The coupling itself, whose spelling is one."""
+        """Return the coupling, which has one spelling."""
         return self
 
     def check_ends(self, single: Node, other: Node | None = None) -> None:
         """Raise ValueError for nodes without velocities, unknown names and an energy of velocities."""
         for node in (single, other or single):
-            half = len(node.state) // 2
-            if not node.events and node.rhs[:half] != node.state[half:]:
+            if not has_velocities(node):
                 raise ValueError(
                     f"coupling '{self}' needs coordinates with velocities; found a node of {node.state}; expected Rates, "
                     "which say what a link adds to each state"
                 )
         pair = Pair((single, other or single), (None, None))
-        speeds = sorted(s.name for s in _placed(self, self.energy, pair).free_symbols & set(pair.velocities))
+        # An energy of velocities is a kinetic energy or a dissipation, which is no potential.
+        used = _in_symbols_of(pair, self, self.energy).free_symbols
+        speeds = sorted(s.name for s in used & set(pair.velocities))
         if speeds:
             raise ValueError(
                 f"coupling '{self}': found the velocity {speeds[0]!r} in the energy; expected coordinates and parameters"
@@ -195,73 +194,69 @@ class Potential:
     def terms(self, pair: Pair) -> Terms:
         """Return the energy of a link."""
         if pair.nodes[0] != pair.nodes[1]:
-            return Terms(potential=_placed(self, self.energy, pair))
-        turned = {s: sp.Symbol(s.name[:-1] + ("j" if s.name.endswith("_i") else "i"), real=True) for s in self._ends()}
-        back = self.energy.xreplace(turned)
-        here, there = (_placed(self, e, pair) for e in (self.energy, back))
-        if sp.expand(here - there) == 0:
-            return Terms(potential=here)
-        here, there = (e.xreplace({WEIGHT: sp.S.One}) for e in (here, there))
-        directed = sp.expand(WEIGHT**2 * (here + there) / 2 + WEIGHT * (here - there) / 2)
-        return Terms(potential=directed, oriented=True)
+            return Terms(potential=_in_symbols_of(pair, self, self.energy))
+        # Between equal nodes: the energy with its ends exchanged decides whether the link has a direction.
+        exchange = {
+            s: sp.Symbol(s.name[:-1] + ("j" if s.name.endswith("_i") else "i"), real=True) for s in self._of_ends()
+        }
+        energy, oriented = directed(
+            *(_in_symbols_of(pair, self, e) for e in (self.energy, self.energy.xreplace(exchange)))
+        )
+        return Terms(potential=energy, oriented=oriented)
 
-    def _ends(self) -> set[sp.Symbol]:
-        own = {TIME, WEIGHT, *(sp.Symbol(name, real=True) for name in self.parameters)}
-        return self.energy.free_symbols - own
+    def _of_ends(self) -> set[sp.Symbol]:
+        return self.energy.free_symbols - _of_link(self.parameters)
 
     def as_dict(self) -> dict[str, object]:
         """Return the coupling as a table of a scene file."""
-        return {"potential": _written(self.energy), "parameters": _numbers(self.parameters)}
+        return {"potential": _written(self.energy), "parameters": _tables(self.parameters)}
 
     def __str__(self) -> str:
-        names = dict.fromkeys(sorted(s.name[:-2] for s in self._ends()))
+        names = dict.fromkeys(sorted(s.name[:-2] for s in self._of_ends()))
         return f"potential of {', '.join(names)}"
 
 
-@dataclass(frozen=True, slots=True)
-class _Content:
-    """The checked expressions and parameters of a coupling, and the symbols that belong to no end."""
+def _of_link(names: Iterable[str]) -> set[sp.Symbol]:
+    """Return the symbols that belong to no end of a link: time, weight and its parameters."""
+    return {TIME, WEIGHT, *(sp.Symbol(name, real=True) for name in names)}
 
-    expressions: tuple[sp.Expr, ...]
-    parameters: FrozenDict[Parameter]
-    own: frozenset[sp.Symbol]
 
-    @classmethod
-    def of(cls, what: str, given: Iterable[object], parameters: Mapping[sp.Symbol | str, object] | None) -> _Content:
-        table = _parameters(what, parameters)
-        symbols = {sp.Symbol(name, real=True) for name in table}
-        own = frozenset({TIME, WEIGHT, *symbols})
-        found = tuple(_exact(what, e) for e in given)
-        used = {s for e in found for s in e.free_symbols}
-        for s in sorted(used - own, key=lambda s: s.name):
-            if not s.name.endswith(("_i", "_j")) or len(s.name) < 3:
-                names = (*table, *(s.name for s in used if s.name.endswith(("_i", "_j"))))
-                meant = suggestion(s.name, names) or f", or write {s.name}_i for what the node has"
-                raise ValueError(
-                    f"{what}: undeclared symbol {s.name!r}; expected symbols of both ends, the weight, t and the parameters "
-                    f"{', '.join(table) or '(none)'}; give it a default{meant}"
-                )
-        for s in sorted(symbols - used, key=lambda s: s.name):
-            raise ValueError(f"{what}: nothing uses the parameter {s.name!r}; use it or leave it out")
-        if WEIGHT not in used:
+def _checked(
+    what: str, values: Iterable[object], parameters: Mapping[sp.Symbol | str, object] | None
+) -> tuple[tuple[sp.Expr, ...], FrozenDict[Parameter]]:
+    """Return the expressions and parameters of a coupling, with every symbol declared and every parameter used."""
+    table = _parameters(what, parameters)
+    of_link = _of_link(table)
+    expressions = tuple(_exact(what, e) for e in values)
+    used = {s for e in expressions for s in e.free_symbols}
+    for s in sorted(used - of_link, key=lambda s: s.name):
+        if not s.name.endswith(("_i", "_j")) or len(s.name) < 3:
+            names = (*table, *(s.name for s in used if s.name.endswith(("_i", "_j"))))
+            meant = suggestion(s.name, names) or f", or write {s.name}_i for what the node has"
             raise ValueError(
-                f"{what}: nothing uses the weight of a link; expected it as a factor, e.g. W*sin(j.x - i.x)"
+                f"{what}: undeclared symbol {s.name!r}; expected symbols of both ends, the weight, t and the parameters "
+                f"{', '.join(table) or '(none)'}; give it a default{meant}"
             )
-        strange = next(
-            (f for e in found for f in sorted(e.atoms(AppliedUndef, sp.Derivative, sp.Integral), key=str)), None
-        )
-        if strange is not None:
-            raise ValueError(f"{what}: found {strange}; expected known functions of symbols; write it out")
-        return cls(found, table, own)
+    for name in table:  # in the order of the alphabet
+        if sp.Symbol(name, real=True) not in used:
+            raise ValueError(f"{what}: nothing uses the parameter {name!r}; use it or leave it out")
+    if WEIGHT not in used:
+        raise ValueError(f"{what}: nothing uses the weight of a link; expected it as a factor, e.g. W*sin(j.x - i.x)")
+    unknown = next(
+        (f for e in expressions for f in sorted(e.atoms(AppliedUndef, sp.Derivative, sp.Integral), key=str)), None
+    )
+    if unknown is not None:
+        raise ValueError(f"{what}: found {unknown}; expected known functions of symbols; write it out")
+    return expressions, table
 
 
-def _told(what: str, value: object) -> object:
-    """The expression that a text tells; any other value as it is."""
+def _parsed(what: str, value: object) -> object:
+    """Return the expression of a text; any other value unchanged."""
     return read(what, check_text(what, value, LENGTH), _AnyName()) if isinstance(value, str) else value
 
 
 def _exact(what: str, value: object) -> sp.Expr:
-    """The expression with real symbols and rational numbers."""
+    """Return an expression with real symbols and rational numbers."""
     symbols = value.free_symbols if isinstance(value, sp.Expr) else ()
     taken = sorted(s.name for s in symbols if s.name in _TAKEN)
     if taken:
@@ -270,7 +265,7 @@ def _exact(what: str, value: object) -> sp.Expr:
 
 
 def _target(key: object) -> str:
-    """The state of the target that a key of the rates means."""
+    """Return the name of the state of the target that a key of the rates names."""
     if isinstance(key, str):
         return check_text("rates of a link", key)
     if not isinstance(key, sp.Symbol):
@@ -280,86 +275,84 @@ def _target(key: object) -> str:
     return key.name[:-2]
 
 
-def _parameters(what: str, given: Mapping[sp.Symbol | str, object] | None) -> FrozenDict[Parameter]:
-    """The parameters by name, in the order of the alphabet: equal contents make equal couplings."""
-    found: dict[str, Parameter] = {}
-    for key, value in check_table(f"{what}: parameters", {} if given is None else given).items():
+def _parameters(what: str, defaults: Mapping[sp.Symbol | str, object] | None) -> FrozenDict[Parameter]:
+    """Return the parameters by name, in the order of the alphabet: equal contents make equal couplings."""
+    parameters: dict[str, Parameter] = {}
+    for key, value in check_table(f"{what}: parameters", {} if defaults is None else defaults).items():
         name = key.name if isinstance(key, sp.Symbol) else key
         if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
-            word = isinstance(name, str) and keyword.iskeyword(name)
-            why, close = (", a word of Python", f"{name}_") if word else ("", "K")
+            # A name that Python reserves gets the advice to append an underscore.
+            reserved = isinstance(name, str) and keyword.iskeyword(name)
+            why, close = (", a word of Python", f"{name}_") if reserved else ("", "K")
             raise ValueError(f"{what}: found the parameter {short_repr(key)}{why}; expected a name such as {close!r}")
         if name in (TIME.name, WEIGHT.name, _WEIGHT):
             meaning = "the time" if name == TIME.name else "the weight of a link"
             raise ValueError(f"{what}: the parameter {name!r} has the name of {meaning}; rename it")
-        if name in found:
+        if name in parameters:
             raise ValueError(f"{what}: the parameter {name!r} is given twice; expected it once")
-        found[name] = value if isinstance(value, Parameter) else _parameter(f"{what}: parameter {name}", value)
-    return FrozenDict(sorted(found.items(), key=lambda item: item[0]))
+        parameters[name] = value if isinstance(value, Parameter) else _parameter(f"{what}: parameter {name}", value)
+    return FrozenDict(sorted(parameters.items(), key=lambda item: item[0]))
 
 
 def _parameter(what: str, value: object) -> Parameter:
-    """The parameter of a default, or of a table with its default, unit, meaning and range."""
+    """Return the parameter of a default, or of a table with its default, unit, meaning and range."""
     if not isinstance(value, Mapping):
         return _plain(check_number(what, value))
     names = [f.name for f in fields(Parameter) if f.name != "scale"]
     return Parameter.of_table(what, value, names, meaning=_plain(0.0).meaning)
 
 
-def _placed(coupling: Rates | Potential, e: sp.Expr, pair: Pair) -> sp.Expr:
-    """An expression in the symbols of an edge; ValueError for a name that a node does not have."""
-    known = pair.known()
-    own = {sp.Symbol(name, real=True) for name in coupling.parameters}
-    for s in sorted(e.free_symbols - own, key=lambda s: s.name):
-        if s not in known:
+def _in_symbols_of(pair: Pair, coupling: Rates | Potential, e: sp.Expr) -> sp.Expr:
+    """Return an expression of `ends` in the symbols of an edge; raise ValueError for a name that a node does not have."""
+    symbols = pair.symbols()
+    for s in sorted(e.free_symbols - _of_link(coupling.parameters), key=lambda s: s.name):
+        if s not in symbols:
             end, node = ("target", pair.nodes[0]) if s.name.endswith("_i") else ("source", pair.nodes[1])
-            names = [own.name for own in (*node.state, *node.parameters)]
+            names = [each.name for each in (*node.state, *node.parameters)]
             raise ValueError(
                 f"coupling '{coupling}': unknown {s.name[:-2]!r} at the {end} of a link; known: {', '.join(names)}"
                 f"{suggestion(s.name[:-2], names)}"
             )
-    return e.xreplace({s: own for s, own in known.items() if s != own})
+    return e.xreplace({s: symbol for s, symbol in symbols.items() if s != symbol})
 
 
 # -- tables of scene files ---------------------------------------------------------------------------------------
 
 
 def _written(e: sp.Expr) -> str:
-    """An expression as the text that `read` reads."""
+    """Return the text of an expression."""
     return written(e.xreplace({WEIGHT: sp.Symbol(_WEIGHT, real=True)}))
 
 
-def _numbers(parameters: Mapping[str, Parameter]) -> dict[str, object]:
-    """Parameters as a table has them: a number, or a table of its own for one that has a unit, a meaning or a range."""
-    return {name: own.default if own == _plain(own.default) else _table(own) for name, own in parameters.items()}
+def _tables(parameters: Mapping[str, Parameter]) -> dict[str, object]:
+    """Return each parameter as its default, or as a table if it has a unit, a meaning or a range."""
+    tables: dict[str, object] = {}
+    for name, parameter in parameters.items():
+        values = {f.name: getattr(parameter, f.name) for f in fields(Parameter) if f.name != "scale"}
+        table = {key: value for key, value in values.items() if value is not None and value is not False}
+        tables[name] = parameter.default if parameter == _plain(parameter.default) else table
+    return tables
 
 
 def _plain(default: float) -> Parameter:
     return Parameter(default, "1", "parameter of a link")
 
 
-def _table(parameter: Parameter) -> dict[str, object]:
-    """A parameter without what is as it is by default."""
-    written = {f.name: getattr(parameter, f.name) for f in fields(Parameter) if f.name != "scale"}
-    return {name: value for name, value in written.items() if value is not None and value is not False}
-
-
-def from_table(what: str, given: Mapping[object, object]) -> Rates | Potential:
+def from_table(what: str, table: Mapping[object, object]) -> Rates | Potential:
     """Return the coupling of a table of a scene file, {rates = {x = "…"}, parameters = {…}} or {potential = "…", …}."""
-    kinds = sorted(str(key) for key in given if key in ("rates", "potential"))
-    strange = next((key for key in given if key not in ("rates", "potential", "parameters")), None)
-    if strange is not None or len(kinds) != 1:
-        found = ", ".join(map(short_repr, given)) or "nothing"
+    kinds = sorted(str(key) for key in table if key in ("rates", "potential"))
+    if len(kinds) != 1 or any(key not in (*kinds, "parameters") for key in table):
+        found = ", ".join(map(short_repr, table)) or "nothing"
         raise ValueError(f"{what}: found {found}; expected either 'rates' or 'potential', with 'parameters'")
-    parameters = check_table(f"{what}: parameters", given.get("parameters", {}))
+    parameters = check_table(f"{what}: parameters", table.get("parameters", {}))
     named = {str(name): value for name, value in parameters.items()}
     if kinds == ["potential"]:
-        return Potential(given["potential"], named)
-    return Rates(check_table(f"{what}: rates", given["rates"]), named)
+        return Potential(table["potential"], named)
+    return Rates(check_table(f"{what}: rates", table["rates"]), named)
 
 
 class _AnyName(Mapping[str, sp.Symbol]):
-    """A symbol for every name but those of a constant and of friction: the nodes of a link are not known yet."""
+    """A symbol for every name except those of constants and functions, before the nodes of a link are chosen."""
 
     def __contains__(self, name: object) -> bool:
         return name not in _TAKEN

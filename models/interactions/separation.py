@@ -1,9 +1,8 @@
 """Links whose rates are finite sums of products: a function of the target times a function of the source.
 
-Between all pairs of nodes such a link needs the sums of its source functions alone, a mean field: one loop over the nodes
-adds them up, another one applies them (Y. Kuramoto, Chemical Oscillations, Waves, and Turbulence, Springer, 1984, section
-5.4, for the sine).  On any other graph a node needs the sums over its own links: links are products, and functions are
-computed once for each node.
+Between all pairs of nodes such a link is a mean field: one loop over the nodes sums the functions of the source, a second
+one applies the sums (Kuramoto, Chemical Oscillations, Waves, and Turbulence, Springer, 1984, section 5.4, for the sine).
+On any other graph the functions are computed once for each node, and a link costs their products.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ import sympy as sp
 from ..mechanics.components import Edge
 
 MOST_PRODUCTS = 32
-"""Most products in the rate of one state, and highest power of a sum that is multiplied out."""
+"""Most products in the rate of one state, and highest power of a sum that is multiplied out (a choice)."""
 
 _THEOREMS: dict[type[sp.Expr], Callable[[sp.Expr, sp.Expr], tuple[tuple[sp.Expr, sp.Expr], ...]]] = {
     sp.sin: lambda a, b: ((sp.sin(a), sp.cos(b)), (sp.cos(a), sp.sin(b))),
@@ -34,76 +33,76 @@ _SLOPES = {sp.sin: (sp.cos, 1), sp.cos: (sp.sin, -1)}
 Symbols = frozenset[sp.Symbol]
 
 Products = dict[tuple[sp.Expr, sp.Expr], sp.Expr]
-"""What all nodes share, by the functions of target and source that it multiplies."""
+"""Coefficients that all nodes share, by the functions (of target, of source) that they multiply."""
 
 
 @dataclass(frozen=True, slots=True)
 class Separated:
     """A link as sums of products."""
 
-    # for each state of the target the terms of its rate: what all nodes share, a function of the target, and one of
-    # the source
+    # For each state of the target the terms of its rate: coefficient, function of the target, function of the source.
     products: tuple[tuple[tuple[sp.Expr, sp.Expr, sp.Expr], ...], ...]
-    own: tuple[sp.Expr, ...]  # what the link would add between a node and itself: a sum over all nodes has it too much
-    # states of which the link feels differences alone. All values of such a state may be counted from that of one
-    # node, so that sums of powers and of exponentials keep their digits however far all nodes have moved together
+    own: tuple[sp.Expr, ...]  # rates of a link from a node to itself, which a sum over all nodes contains in excess
+    # States that enter as differences alone. Their values may be counted from that of one node, so that sums of powers
+    # and exponentials keep their digits however far all nodes have moved together.
     shifted: tuple[int, ...]
 
     @property
     def sources(self) -> tuple[sp.Expr, ...]:
-        """The functions of the source, each once."""
+        """The distinct functions of the source."""
         return tuple(dict.fromkeys(source for row in self.products for _, _, source in row))
 
 
 @dataclass(frozen=True, slots=True)
 class Summed:
-    """A link as products that are summed over the links of a node, and a rest that is not."""
+    """A link as products that are summed over the links of a node, and a remainder."""
 
-    # for each state of the target the terms of its rate: what all links share, what each link has for itself, a
-    # function of the target, and one of the source
+    # For each state of the target the terms of its rate: coefficient of all links, factor of each link, function of the
+    # target, function of the source.
     products: tuple[tuple[tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr], ...], ...]
-    rest: tuple[sp.Expr, ...]  # what is added to these, a function of both ends
+    rest: tuple[sp.Expr, ...]  # the terms of each rate that are no such products
 
     @property
     def sources(self) -> tuple[sp.Expr, ...]:
-        """The functions of the source, each once."""
+        """The distinct functions of the source."""
         return tuple(dict.fromkeys(source for row in self.products for *_, source in row if source != 1))
 
 
 @lru_cache(maxsize=64)
 def summed(edge: Edge, varied: tuple[str, ...] = (), numbered: tuple[str, ...] = ()) -> Summed | None:
-    """Return a link with those of its terms as products that have no digits to lose; None if there are none.
+    """Return a link with terms of sines and cosines as products; None if it has none.
 
-    Sines and cosines are bounded, so that their addition theorems cost a rounding error of the rate at most.  Powers and
-    exponentials of differences stay as they are: far from the origin their products are larger than their sum.
+    Sines and cosines are bounded: their addition theorems cost at most a rounding error of the rate.  Powers and
+    exponentials of differences stay in the remainder: far from the origin their products cancel.
     """
     if edge.inertia or edge.oriented or edge.forced:
         return None
     source = frozenset((*edge.there, *(s for s, _ in edge.theirs)))
     target = frozenset((*edge.here, *(s for s in edge.parameters if s.name in varied)))
-    own = (edge.weight, *(s for s in edge.parameters if s.name in numbered))
-    rows, rest = [], []
+    of_link = (edge.weight, *(s for s in edge.parameters if s.name in numbered))
+    rows, remainders = [], []
     for e in edge.rhs:
-        row, left = [], []
+        row, remainder = [], []
         for term in sp.Add.make_args(e):
-            found = _products(term, target, source, bounded=True)
-            functions = [f for pair in found or () for f in pair]
+            products = _products(term, target, source, bounded=True)
+            functions = [f for pair in products or () for f in pair]
             curved = any(not f.is_polynomial(*target, *source) for f in functions)
-            alike = not any(f.has(*own) for f in functions)  # the same function for all links
-            if curved and alike and found and _vanishes(term - sum(c * a * b for (a, b), c in found.items())):
-                row += [(*c.as_independent(*own, as_Add=False), a, b) for (a, b), c in found.items()]
+            alike = not any(f.has(*of_link) for f in functions)  # the same function for all links
+            if curved and alike and products and _vanishes(term - sum(c * a * b for (a, b), c in products.items())):
+                row += [(*c.as_independent(*of_link, as_Add=False), a, b) for (a, b), c in products.items()]
             else:
-                left.append(term)
+                remainder.append(term)
         rows.append(tuple(row))
-        rest.append(sp.Add(*left))
-    return Summed(tuple(rows), tuple(rest)) if any(rows) else None
+        remainders.append(sp.Add(*remainder))
+    return Summed(tuple(rows), tuple(remainders)) if any(rows) else None
 
 
 @lru_cache(maxsize=64)
 def separated(edge: Edge, varied: tuple[str, ...] = ()) -> Separated | None:
-    """Return a link as sums of products, None if none is found; the expanded difference is proved to be zero."""
+    """Return a link as sums of products; None unless the expanded difference is proved to be zero."""
     if edge.inertia or edge.oriented:
         return None
+    # Symbols of the source, and of the target with parameters that differ from node to node.
     theirs = dict(edge.theirs)
     source = frozenset((*edge.there, *theirs))
     target = frozenset((*edge.here, *(s for s in edge.parameters if s.name in varied)))
@@ -113,21 +112,23 @@ def separated(edge: Edge, varied: tuple[str, ...] = ()) -> Separated | None:
         if row is None or len(row) > MOST_PRODUCTS or not _vanishes(e - sum(c * a * b for (a, b), c in row.items())):
             return None
         rows.append(tuple((c, a, b) for (a, b), c in row.items()))
+    # The sum over all nodes contains the node itself, h(s, s).
     itself = {**dict(zip(edge.there, edge.here, strict=True)), **theirs}
     own = tuple(e.xreplace(itself) for e in edge.rhs)
     return Separated(tuple(rows), own, _shifted(edge, {b for row in rows for _, _, b in row}))
 
 
 def _products(e: sp.Expr, target: Symbols, source: Symbols, bounded: bool = False) -> Products | None:
-    """An expression as a sum of products, None if it is not seen to be one; `bounded` ones alone where their sum is."""
+    """Return an expression as a sum of products, None if the rules find none; `bounded`: sines and cosines alone."""
+    # Constants and functions of one end are products already.
     here, there = bool(e.free_symbols & target), bool(e.free_symbols & source)
     if not here and not there:
         return {(sp.S.One, sp.S.One): e} if e != 0 else {}
     if e.is_Mul:
-        found: Products | None = {(sp.S.One, sp.S.One): sp.S.One}
+        product: Products | None = {(sp.S.One, sp.S.One): sp.S.One}
         for part in e.args:
-            found = _times(found, _products(part, target, source, bounded))
-        return found
+            product = _times(product, _products(part, target, source, bounded))
+        return product
     if not there:
         return {(e, sp.S.One): sp.S.One}
     if e.is_Add and not bounded:
@@ -135,23 +136,22 @@ def _products(e: sp.Expr, target: Symbols, source: Symbols, bounded: bool = Fals
     if not here:
         return {(sp.S.One, e): sp.S.One}
     states = target | source
+    # A sum whose terms are no polynomials of states is separated term by term.
     if e.is_Add and not any(part.free_symbols & states and part.is_polynomial(*states) for part in e.args):
         return _sum([_products(part, target, source, bounded) for part in e.args])
     if bounded and e.func not in _SLOPES:
         return None
     if e.is_Pow and e.exp.is_Integer and 1 < e.exp <= MOST_PRODUCTS:
-        base, found = _products(e.base, target, source), {(sp.S.One, sp.S.One): sp.S.One}
+        base = _products(e.base, target, source)
+        power: Products | None = {(sp.S.One, sp.S.One): sp.S.One}
         for _ in range(int(e.exp)):
-            found = _times(found, base)
-        return found
+            power = _times(power, base)
+        return power
     return _by_theorem(e, target, source)
 
 
 def _by_theorem(e: sp.Expr, target: Symbols, source: Symbols) -> Products | None:
-    """A function with an addition theorem whose argument is a function of the target plus one of the source.
-
-    What all nodes share in the argument of a sine or cosine becomes factors: a lag costs nothing at the nodes.
-    """
+    """Return f(own + theirs + lag) by its addition theorem, with arguments of the target, the source and neither."""
     theorem = _THEOREMS.get(e.func)
     if theorem is None:
         return None
@@ -163,13 +163,14 @@ def _by_theorem(e: sp.Expr, target: Symbols, source: Symbols) -> Products | None
         return None
     if e.func not in _SLOPES:
         return _sum([_one(sp.S.One, a, b) for a, b in theorem(own + lag, theirs)])
+    # cos(lag) and sin(lag) are coefficients, so that a lag costs nothing at the nodes.
     slope, sign = _SLOPES[e.func]
     turned = ((sp.cos(lag), e.func), (sign * sp.sin(lag), slope))
     return _sum([_one(c, a, b) for c, wave in turned for a, b in _THEOREMS[wave](own, theirs)])
 
 
 def _one(c: sp.Expr, a: sp.Expr, b: sp.Expr) -> Products:
-    """One product, its numbers in front."""
+    """Return one product, with the numbers of both functions in its coefficient."""
     (p, a), (q, b) = a.as_coeff_Mul(), b.as_coeff_Mul()
     return {(a, b): p * q * c}
 
@@ -191,19 +192,20 @@ def _times(left: Products | None, right: Products | None) -> Products | None:
 
 
 def _vanishes(e: sp.Expr) -> bool:
-    """True if an expression is proved to be zero: its expansion in exponentials has no term."""
+    """Return True if the expansion of an expression in exponentials has no term."""
     return bool(sp.expand(e.rewrite([sp.sin, sp.cos, sp.sinh, sp.cosh], sp.exp)) == 0)
 
 
 def _shifted(edge: Edge, sources: set[sp.Expr]) -> tuple[int, ...]:
-    """States whose common shift changes nothing, but those that enter sines and cosines alone, which stay small."""
+    """Return the states whose common shift changes nothing, without those that enter sines and cosines alone."""
     distance = sp.Dummy("shift", real=True)
-    found = []
+    shifted = []
     for k, (here, there) in enumerate(zip(edge.here, edge.there, strict=True)):
+        # Sines and cosines are bounded: states in them alone need no shift.
         waves = {wave: sp.Dummy(real=True) for b in sources for wave in b.atoms(sp.sin, sp.cos)}
         if not any(b.xreplace(waves).has(there) for b in sources):
             continue
         moved: Mapping[sp.Expr, sp.Expr] = {here: here + distance, there: there + distance}
         if all(_vanishes(e.xreplace(moved) - e) for e in edge.rhs):
-            found.append(k)
-    return tuple(found)
+            shifted.append(k)
+    return tuple(shifted)

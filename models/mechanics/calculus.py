@@ -13,40 +13,41 @@ from functools import lru_cache
 import sympy as sp
 
 LARGEST_CANCELLED = 200
-"""Operations of an expression up to which it is cancelled: longer ones are products of minors, which grow by it."""
+"""Most operations of an expression that is cancelled (a choice): longer ones are products of minors, which grow."""
 
 MOST_TERMS = 5000
-"""Terms of the expanded expression up to which it is cancelled or expanded: that multiplies out all powers of sums."""
+"""Most terms, when multiplied out, of an expression that is cancelled or expanded (a choice): both multiply out."""
 
 
 def operations(expressions: Sequence[sp.Expr]) -> int:
-    """The number of operations that evaluate the expressions together, what they share once."""
-    shared, left = sp.cse(expressions)
-    return sum(int(sp.count_ops(e)) for e in (*(e for _, e in shared), *left))
+    """Return the number of operations that evaluate expressions together, common subexpressions once."""
+    shared, reduced = sp.cse(expressions)
+    return sum(int(sp.count_ops(e)) for e in (*(e for _, e in shared), *reduced))
 
 
 def cancelled(expressions: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
-    """The expressions over their common denominators without common factors, if that saves operations; else unchanged."""
+    """Return expressions as fractions without common factors, if that saves operations; else unchanged."""
+    # sp.cancel multiplies out, which takes minutes for long expressions.
     if any(sp.count_ops(e) > LARGEST_CANCELLED or expanded_terms(e) > MOST_TERMS for e in expressions):
         return tuple(expressions)
-    found = tuple(map(sp.cancel, expressions))
-    return found if operations(found) < operations(expressions) else tuple(expressions)
+    fractions = tuple(map(sp.cancel, expressions))
+    return fractions if operations(fractions) < operations(expressions) else tuple(expressions)
 
 
 def expanded(expressions: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
-    """The expressions multiplied out, each that gets shorter by it."""
+    """Multiply out each expression that gets shorter by it."""
     return tuple(e if expanded_terms(e) > MOST_TERMS else min(e, sp.expand(e), key=sp.count_ops) for e in expressions)
 
 
 def expanded_terms(e: sp.Expr) -> int:
-    """Return at most how many terms an expression has when its products and powers of sums are multiplied out."""
+    """Return a bound on the number of terms of an expression that is multiplied out."""
     if isinstance(e, sp.Add):
         return sum(map(expanded_terms, e.args))
     if isinstance(e, sp.Mul):
         return math.prod(map(expanded_terms, e.args))
     if isinstance(e, sp.Pow) and e.exp.is_Integer:
         terms, times = expanded_terms(e.base), abs(int(e.exp))
-        return math.comb(terms + times - 1, times)
+        return math.comb(terms + times - 1, times)  # monomials of that degree
     return 1
 
 
@@ -59,27 +60,31 @@ def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
     expression = sp.sympify(expression)
     if symbol not in expression.free_symbols:
         return sp.S.Zero
+    # Replace each kink by a constant; xreplace works from the outside in: of |a + |b|| only the outer one is replaced.
     kinks = sorted(expression.atoms(sp.Abs, sp.sign), key=sp.default_sort_key)
     hidden = {kink: sp.Dummy(f"kink{i}", real=True) for i, kink in enumerate(kinks)}
-    smooth = expression.xreplace(hidden)  # from the outside in: of |a + |b|| only the outer kink is hidden
+    smooth = expression.xreplace(hidden)
     shown = {dummy: kink for kink, dummy in hidden.items()}
-    # SymPy differentiates all terms of a sum, also those without the symbol, in tenths of a millisecond each
+    # SymPy differentiates all terms of a sum, also those without the symbol, in tenths of a millisecond each.
     moving = [term for term in sp.Add.make_args(smooth) if symbol in term.free_symbols]
     total = sp.Add(*(term.diff(symbol) for term in moving)).xreplace(shown)
+    # Chain rule through the kinks: d|w| = sign(w) dw; d sign(w) = 0 adds nothing.
     for kink, dummy in hidden.items():
         if isinstance(kink, sp.Abs) and kink.has(symbol):
             inner = kink.args[0]
             outer = smooth.diff(dummy).xreplace(shown)
             total += outer * sp.sign(inner) * derivative(inner, symbol)
-    return _joined(_settled(total))
+    return _joined_powers(_without_distributions(total))
 
 
-def _joined(e: sp.Expr) -> sp.Expr:
-    """An expression whose products have one power of each base: w sign(w) |w|**p/|w| is |w|**p, which is a number at w = 0."""
+def _joined_powers(e: sp.Expr) -> sp.Expr:
+    """Join the powers of each base: w sign(w) |w|**p/|w| becomes |w|**p, which is a number at w = 0."""
+    # Powers with integer exponents alone are joined by SymPy already.
     powers = [p for p in e.atoms(sp.Pow) if p.base.free_symbols and not p.exp.is_Integer]
     if not any(p.exp.free_symbols or p.base.has(sp.Abs, sp.Max, sp.Min) for p in powers):
         return e
 
+    # SymPy joins powers of one base only if bases are equal: write w sign(w) as |w| first.
     def joined(product: sp.Mul) -> sp.Expr:
         factors = set(product.args)
         for sign in sorted(factors & product.atoms(sp.sign), key=sp.default_sort_key):
@@ -91,19 +96,18 @@ def _joined(e: sp.Expr) -> sp.Expr:
     return e.replace(lambda part: isinstance(part, sp.Mul), joined)
 
 
-def _settled(e: sp.Expr) -> sp.Expr:
-    """What SymPy leaves behind of Max, Min, floor and ceiling, as choices and zeros."""
-    jumps = (sp.floor, sp.ceiling)
+def _without_distributions(e: sp.Expr) -> sp.Expr:
+    """Replace what SymPy makes of derivatives of Max, Min, floor and ceiling by choices and zeros."""
     if not e.has(sp.Heaviside, sp.Derivative, sp.Subs):
         return e
-    e = e.replace(lambda part: isinstance(part, sp.Derivative) and part.has(*jumps), lambda part: sp.S.Zero)
+    e = e.replace(lambda part: isinstance(part, sp.Derivative) and part.has(sp.floor, sp.ceiling), lambda _: sp.S.Zero)
     e = e.replace(lambda part: isinstance(part, sp.Subs), lambda part: part.doit())
     e = e.replace(lambda part: isinstance(part, sp.Mul), _without_steps)
     return e.replace(sp.Heaviside, lambda x, *_: sp.Piecewise((sp.S.One, x > 0), (sp.S.Zero, True)))
 
 
 def _without_steps(product: sp.Mul) -> sp.Expr:
-    """A product without steps beside what is zero below them: Max(0, x) Heaviside(x) is Max(0, x)."""
+    """Drop steps beside a factor that is zero below them: Max(0, x) Heaviside(x) is Max(0, x)."""
     bases = {factor.as_base_exp()[0] for factor in product.args}
     needless = [
         factor

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
@@ -21,15 +21,6 @@ WEIGHT_NUMBER = sp.Symbol("W", real=True)
 """The weight of a link as a parameter, a number of the run in place of an exact one of the graph."""
 
 
-def _vanishes(e: sp.Expr) -> bool:
-    """True if an expression is 0; one that is not 0 at some place needs no simplification, which may take minutes."""
-    place = {s: sp.Rational(13 + 7 * k, 17) for k, s in enumerate(sorted(e.free_symbols, key=str))}
-    value = e.xreplace(place).evalf(30)
-    if value.is_number and value.is_finite and abs(value) > 1e-12:
-        return False
-    return bool(sp.simplify(e) == 0)
-
-
 @dataclass(frozen=True, slots=True)
 class Node:
     """One uncoupled oscillator: M d(state)/dt = rhs(state, t; parameters)."""
@@ -38,26 +29,21 @@ class Node:
     rhs: tuple[sp.Expr, ...]  # the right-hand side of each state: its rate where M is the identity
     parameters: tuple[sp.Symbol, ...]
     events: tuple[Event, ...] = ()  # set-valued friction has one; a node has at most one
-    # the friction coefficient as a function of `SLIDING`; it is for printing alone
-    law: sp.Expr | None = field(default=None, compare=False)
+    law: sp.Expr | None = field(default=None, compare=False)  # friction coefficient of `SLIDING`, for printing alone
     inertia: Block = ()  # m(state; parameters), a row and a column for each state; empty if M is the identity
 
     def __post_init__(self) -> None:
-        _differ("node", (TIME, *self.state, *self.parameters))
-        known = {TIME, *self.state, *self.parameters}
-        _check("node", self.rhs, len(self.state), known)
+        _check_names("node", (TIME, *self.state, *self.parameters))
+        declared = {TIME, *self.state, *self.parameters}
+        size = len(self.state)
+        _check("node", self.rhs, size, declared)
         for event in self.events:
             if self.state[2:3] != (event.mode,):
                 raise ValueError(f"a node with set-valued friction has the states x, v, slip, …; found {self.state}")
-            _check("contact", event.expressions, len(event.expressions), known)
-        if self.inertia:
-            self._check_inertia(known - {TIME})
-
-    def _check_inertia(self, known: set[sp.Symbol]) -> None:
-        if self.events:
+            _check("contact", event.expressions, len(event.expressions), declared)
+        if self.inertia and self.events:
             raise ValueError("node: found set-valued friction beside a mass matrix; expected one coordinate")
-        size = len(self.state)
-        if len(self.inertia) != size:
+        if self.inertia and len(self.inertia) != size:
             raise ValueError(
                 f"node: found a mass matrix of {len(self.inertia)} rows; expected one for each of {size} states"
             )
@@ -66,7 +52,7 @@ class Node:
                 raise ValueError(
                     f"node: the masses {row} depend on time; expected a mass matrix of states and parameters"
                 )
-            _check("node inertia", row, size, known)
+            _check("node inertia", row, size, declared - {TIME})
 
     @property
     def forced(self) -> bool:
@@ -82,72 +68,69 @@ class Node:
     def expressions(self) -> tuple[sp.Expr, ...]:
         """The right-hand side, the conditions of events and the entries of M."""
         conditions = (e for event in self.events for e in event.expressions)
-        return (*self.rhs, *conditions, *(e for row in self.inertia for e in row))
+        return (*self.rhs, *conditions, *_entries((self.inertia,)))
 
     @property
     def constant_inertia(self) -> bool:
         """True if M depends on parameters alone."""
-        return not any(e.free_symbols & set(self.state) for row in self.inertia for e in row)
+        return not any(e.free_symbols & set(self.state) for e in _entries((self.inertia,)))
 
     def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Node:
         """Return the node with every symbol and expression changed."""
         state, rhs, parameters = (tuple(map(change, part)) for part in (self.state, self.rhs, self.parameters))
         events = tuple(event.map(change) for event in self.events)
-        inertia = tuple(tuple(map(change, row)) for row in self.inertia)
-        return Node(state, rhs, tuple(p for p in parameters if p.is_Symbol), events, inertia=inertia)
+        # A parameter that became a number is one no longer.
+        return Node(
+            state, rhs, tuple(p for p in parameters if p.is_Symbol), events, inertia=_mapped(self.inertia, change)
+        )
 
-    def without_unused_parameters(self, kept: Container[sp.Symbol] = ()) -> Node:
-        """The same without the parameters that do not occur, but those that are `kept` for the links."""
+    def without_unused_parameters(self, needed: Container[sp.Symbol] = ()) -> Node:
+        """Return the node without parameters that do not occur, except those that links need."""
         used = set(_occurring(self.parameters, self.expressions))
-        return replace(self, parameters=tuple(p for p in self.parameters if p in used or p in kept))
+        return replace(self, parameters=tuple(p for p in self.parameters if p in used or p in needed))
 
-    def jacobian(self) -> tuple[tuple[sp.Expr, ...], ...]:
-        """d(rhs)/d(state), one-sided at kinks (see `synchain.models.mechanics.calculus`)."""
-        return tuple(tuple(derivative(e, s) for s in self.state) for e in self.rhs)
+    def jacobian(self) -> Block:
+        """Return d(rhs)/d(state), one-sided at kinks (see `synchain.models.mechanics.calculus`)."""
+        return _jacobian(self.rhs, self.state)
 
     def time_derivative(self) -> tuple[sp.Expr, ...]:
-        """The partial derivative of rhs with respect to time."""
+        """Return the partial derivative of rhs with respect to time."""
         return tuple(derivative(e, TIME) for e in self.rhs)
 
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """What one link adds to the right-hand side of its target: rhs(here, there, t; weight, parameters).
+    """What one link adds to the right-hand side of its target: rhs(here, there, t; weight, parameters)."""
 
-    `here` are the state symbols of the target, `there` those of the source, both in the order of Node.state.  `inertia` is
-    empty, or two blocks, rows those of the target: what the link adds to M in M d(state)/dt = rhs by the rates of the target
-    and by those of the source.  Parameters of the target go by their own names; `theirs` are symbols for parameters of the
-    source, each with the parameter that it is.  The weight of an `oriented` edge is the sign of the link's direction.
-    """
-
-    here: tuple[sp.Symbol, ...]
+    here: tuple[sp.Symbol, ...]  # states of the target and of the source, both in the order of Node.state
     there: tuple[sp.Symbol, ...]
-    weight: sp.Symbol
+    weight: sp.Symbol  # of an oriented edge: the sign of the link's direction
     rhs: tuple[sp.Expr, ...]
-    parameters: tuple[sp.Symbol, ...]
+    parameters: tuple[sp.Symbol, ...]  # of the link and of the target
+    # Empty, or what the link adds to the rows of M of its target: the columns of the target, and those of the source.
     inertia: tuple[Block, ...] = ()
-    theirs: tuple[tuple[sp.Symbol, sp.Symbol], ...] = ()
+    theirs: tuple[tuple[sp.Symbol, sp.Symbol], ...] = ()  # symbols for parameters of the source, and these parameters
     oriented: bool = False
 
     def __post_init__(self) -> None:
         sources = tuple(s for s, _ in self.theirs)
-        _differ("edge", (TIME, self.weight, *self.here, *self.there, *self.parameters, *sources))
-        known = {self.weight, *self.here, *self.there, *self.parameters}
-        _check("edge", self.rhs, len(self.here), {TIME, *known, *sources})
+        _check_names("edge", (TIME, self.weight, *self.here, *self.there, *self.parameters, *sources))
+        declared = {self.weight, *self.here, *self.there, *self.parameters}
+        _check("edge", self.rhs, len(self.here), {TIME, *declared, *sources})
         for block in self.inertia:
             for row in block:
-                _check("edge inertia", row, len(row), known)
+                _check("edge inertia", row, len(row), declared)
 
-    def jacobian_here(self) -> tuple[tuple[sp.Expr, ...], ...]:
-        """d(rhs)/d(here)."""
-        return tuple(tuple(derivative(e, s) for s in self.here) for e in self.rhs)
+    def jacobian_here(self) -> Block:
+        """Return d(rhs)/d(here)."""
+        return _jacobian(self.rhs, self.here)
 
-    def jacobian_there(self) -> tuple[tuple[sp.Expr, ...], ...]:
-        """d(rhs)/d(there)."""
-        return tuple(tuple(derivative(e, s) for s in self.there) for e in self.rhs)
+    def jacobian_there(self) -> Block:
+        """Return d(rhs)/d(there)."""
+        return _jacobian(self.rhs, self.there)
 
     def time_derivative(self) -> tuple[sp.Expr, ...]:
-        """The partial derivative of rhs with respect to time."""
+        """Return the partial derivative of rhs with respect to time."""
         return tuple(derivative(e, TIME) for e in self.rhs)
 
     @property
@@ -158,27 +141,25 @@ class Edge:
     @property
     def expressions(self) -> tuple[sp.Expr, ...]:
         """The right-hand side and the entries of the inertia."""
-        return (*self.rhs, *(e for block in self.inertia for row in block for e in row))
+        return (*self.rhs, *_entries(self.inertia))
 
     @property
     def acts(self) -> bool:
-        """True if the link does anything: if a force or an inertia is not zero."""
+        """True if a force or an inertia of the link is not zero."""
         return any(e != 0 for e in self.expressions)
 
     @property
     def constant_inertia(self) -> bool:
         """True if the inertia depends on parameters alone."""
         states = {*self.here, *self.there}
-        return not any(e.free_symbols & states for block in self.inertia for row in block for e in row)
+        return not any(e.free_symbols & states for e in _entries(self.inertia))
 
     def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Edge:
         """Return the edge with every symbol and expression changed."""
         here, there, rhs, parameters = (
             tuple(map(change, part)) for part in (self.here, self.there, self.rhs, self.parameters)
         )
-        inertia = tuple(tuple(tuple(map(change, row)) for row in block) for block in self.inertia)
-        if not any(e != 0 for block in inertia for row in block for e in row):
-            inertia = ()
+        inertia = tuple(_mapped(block, change) for block in self.inertia)
         return replace(
             self,
             here=here,
@@ -186,30 +167,30 @@ class Edge:
             weight=change(self.weight),
             rhs=rhs,
             parameters=tuple(p for p in parameters if p.is_Symbol),
-            inertia=inertia,
+            inertia=inertia if any(e != 0 for e in _entries(inertia)) else (),
             theirs=tuple((change(a), change(b)) for a, b in self.theirs),
         )
 
     def without_unused_parameters(self) -> Edge:
-        """The same without the parameters that do not occur."""
+        """Return the edge without parameters that do not occur."""
         used = _occurring(tuple(s for s, _ in self.theirs), self.expressions)
         theirs = tuple(pair for pair in self.theirs if pair[0] in used)
         return replace(self, parameters=_occurring(self.parameters, self.expressions), theirs=theirs)
 
     def with_shared(self, varied: Iterable[str]) -> Edge:
-        """The same with one symbol for a parameter of both ends, but those of `varied`, which differ from node to node."""
-        shared = {s: own for s, own in self.theirs if own.name not in varied}
+        """Return the edge with one symbol for a parameter of both ends, unless it is `varied` from node to node."""
+        shared = {s: parameter for s, parameter in self.theirs if parameter.name not in varied}
         if not shared:
             return self
-        more = tuple(own for own in shared.values() if own not in self.parameters)
+        more = tuple(parameter for parameter in shared.values() if parameter not in self.parameters)
         theirs = tuple(pair for pair in self.theirs if pair[0] not in shared)
         rhs = tuple(e.xreplace(shared) for e in self.rhs)
         return replace(self, rhs=rhs, parameters=(*self.parameters, *more), theirs=theirs)
 
     def with_weight_number(self) -> Edge:
-        """The same with the parameter `WEIGHT_NUMBER` in place of the weight."""
+        """Return the edge with the parameter `WEIGHT_NUMBER` in place of the weight."""
         swap = {self.weight: WEIGHT_NUMBER}
-        inertia = tuple(tuple(tuple(e.xreplace(swap) for e in row) for row in block) for block in self.inertia)
+        inertia = tuple(_mapped(block, lambda e: e.xreplace(swap)) for block in self.inertia)
         rhs = tuple(e.xreplace(swap) for e in self.rhs)
         return replace(self, rhs=rhs, parameters=(*self.parameters, WEIGHT_NUMBER), inertia=inertia)
 
@@ -220,13 +201,35 @@ class Edge:
         return all(_vanishes(e.xreplace(equal)) for e in self.rhs)
 
 
+def _entries(blocks: Iterable[Block]) -> Iterator[sp.Expr]:
+    return (e for block in blocks for row in block for e in row)
+
+
+def _mapped(block: Block, change: Callable[[sp.Expr], sp.Expr]) -> Block:
+    return tuple(tuple(map(change, row)) for row in block)
+
+
+def _jacobian(rhs: tuple[sp.Expr, ...], symbols: tuple[sp.Symbol, ...]) -> Block:
+    return tuple(tuple(derivative(e, s) for s in symbols) for e in rhs)
+
+
+def _vanishes(e: sp.Expr) -> bool:
+    """Return True if an expression is 0."""
+    # An expression that is not 0 at one point needs no simplification, which may take minutes.
+    point = {s: sp.Rational(13 + 7 * k, 17) for k, s in enumerate(sorted(e.free_symbols, key=str))}
+    value = e.xreplace(point).evalf(30)
+    if value.is_number and value.is_finite and abs(value) > 1e-12:
+        return False
+    return bool(sp.simplify(e) == 0)
+
+
 def _occurring(parameters: tuple[sp.Symbol, ...], expressions: tuple[sp.Expr, ...]) -> tuple[sp.Symbol, ...]:
-    """Those of the parameters that occur in some expressions."""
     used = {s for e in expressions for s in e.free_symbols}
     return tuple(p for p in parameters if p in used)
 
 
-def _differ(what: str, symbols: tuple[sp.Symbol, ...]) -> None:
+def _check_names(what: str, symbols: tuple[sp.Symbol, ...]) -> None:
+    """Raise ValueError if two symbols have one name."""
     names = [s.name for s in symbols]
     twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
     if twice is not None:
@@ -234,14 +237,15 @@ def _differ(what: str, symbols: tuple[sp.Symbol, ...]) -> None:
         raise ValueError(f"{what}: the name {twice!r} {meaning}; rename that state or parameter")
 
 
-def _check(what: str, rhs: tuple[sp.Expr, ...], size: int, known: set[sp.Symbol]) -> None:
+def _check(what: str, rhs: tuple[sp.Expr, ...], size: int, declared: set[sp.Symbol]) -> None:
+    """Raise ValueError for a wrong number of expressions, undeclared symbols and decimals, which are not exact."""
     if len(rhs) != size:
         raise ValueError(f"{what}: {len(rhs)} equations for {size} states; expected one each")
     for expression in rhs:
-        unknown = sorted(s.name for s in expression.free_symbols - known)
-        if unknown:
+        undeclared = sorted(s.name for s in expression.free_symbols - declared)
+        if undeclared:
             raise ValueError(
-                f"{what}: undeclared symbol {unknown[0]!r} in {expression}; declare it as a state or parameter"
+                f"{what}: undeclared symbol {undeclared[0]!r} in {expression}; declare it as a state or parameter"
             )
         floats = sorted(expression.atoms(sp.Float), key=str)
         if floats:

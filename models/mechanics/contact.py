@@ -24,7 +24,7 @@ class ContactModel(Word):
     ATAN = "atan"
     """Smoothed by the arcus tangent."""
     SIGN = "sign"
-    """Left as it is, with sign(0) = 0."""
+    """Unchanged, with sign(0) = 0."""
     SET_VALUED = "set-valued"
     """Stick and slip."""
 
@@ -38,7 +38,7 @@ SLIP = sp.Symbol("slip", real=True)
 """The mode of an oscillator: +1 or -1 while it slips, 0 while it sticks."""
 
 TINY, SMALL = sp.Rational(1, 10**30), 1e-6
-"""A sliding velocity next to none, and a coefficient that is larger only where a law jumps."""
+"""A sliding velocity close to zero, and a difference of coefficients that only a jump exceeds (choices)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,20 +48,20 @@ class FrictionLaw:
     Parameters
     ----------
     name : str
-        What messages and scene files call it.
+        Name in messages and scene files.
     parameters : mapping of str to Parameter
         Parameters of the law, real symbols in its expressions.
     force : Expr
         Friction force over normal load, of the velocity w (`SLIDING`) of the ground relative to the body; w f(w) >= 0.
         Its jump at w = 0 is written with sign.
     static : Expr, optional
-        The static friction coefficient if it exceeds f(0+); only set-valued contact knows it.
+        The static friction coefficient if it exceeds f(0+); only set-valued contact uses it.
     order : tuple of (str, str)
         Pairs of parameters of which the first must not exceed the second under set-valued contact.
     self_exciting : bool
         True if the law is meant to feed energy.
     summary, source : str
-        What it is, and where it was published.
+        A description, and the publication.
 
     Raises
     ------
@@ -107,20 +107,25 @@ def regularise(law: sp.Expr, argument: sp.Symbol, kappa: sp.Expr) -> sp.Expr:
 
 
 def _jump(e: sp.Expr, argument: sp.Symbol) -> bool:
-    """True if an expression jumps where its argument passes zero; other symbols are numbers without a meaning."""
+    """Return True if an expression jumps where its argument passes zero, at arbitrary values of its other symbols."""
     others = sorted(e.free_symbols - {argument}, key=str)
-    numbers = {symbol: sp.Rational(2 * k + 3, 2 * k + 5) for k, symbol in enumerate(others)}
-    above, below = (complex(e.xreplace({**numbers, argument: w}).evalf(60)) for w in (TINY, -TINY))
+    values = {symbol: sp.Rational(2 * k + 3, 2 * k + 5) for k, symbol in enumerate(others)}
+    above, below = (complex(e.xreplace({**values, argument: w}).evalf(60)) for w in (TINY, -TINY))
     return abs(above - below) > SMALL
 
 
 def in_slip(law: sp.Expr, argument: sp.Symbol) -> sp.Expr:
-    """The law in slip, with the mode for the sign of its argument; ValueError if it is not odd or not smooth at zero."""
+    """Return the law in slip, with the mode for the sign of its argument.
+
+    Raises ValueError for a law that is not odd, or that is not smooth on either side of zero.
+    """
     what, speed = f"set-valued contact: the law {law.xreplace({argument: SLIDING})}", sp.Dummy("w", positive=True)
+    # f(-w) = -f(w), so that one law serves both directions of slip.
     both = sp.simplify(law.xreplace({argument: speed}) + law.xreplace({argument: -speed}))
     if both != 0:
         raise ValueError(f"{what} has f(w) + f(-w) = {both.xreplace({speed: SLIDING})}; expected 0, an odd law")
     moving = _by_mode(law, argument)
+    # Past its jump the law must be smooth at w = 0: series and derivatives are taken there.
     slipping = moving.xreplace({SLIP: sp.S.One})
     if coefficient_at_rest(slipping, argument).has(sp.nan, sp.zoo, sp.oo, -sp.oo):
         raise ValueError(f"{what} has no finite value at w = 0; expected one for slow slip")
@@ -130,7 +135,8 @@ def in_slip(law: sp.Expr, argument: sp.Symbol) -> sp.Expr:
 
 
 def coefficient_at_rest(moving: sp.Expr, argument: sp.Symbol) -> sp.Expr:
-    """The limit of a law in slip as w falls to zero: powers of w with a letter as exponent, which is positive, go to zero."""
+    """Return the limit of a law in slip as w falls to zero."""
+    # Powers of w with a symbol as exponent, which is positive, go to zero.
     speed = sp.Dummy("w", positive=True)
     above = moving.xreplace({argument: speed, SLIP: sp.S.One})
     powers = {p: sp.S.Zero for p in _powers_from_zero(above, speed) if not p.exp.is_number}
@@ -138,32 +144,30 @@ def coefficient_at_rest(moving: sp.Expr, argument: sp.Symbol) -> sp.Expr:
 
 
 def _powers_from_zero(e: sp.Expr, argument: sp.Symbol) -> list[sp.Pow]:
-    """The powers in an expression that are no polynomials and whose base is zero with the argument."""
+    """Return the powers of an expression that are no polynomials and whose base is zero with the argument."""
     powers = (p for p in e.atoms(sp.Pow) if not p.exp.is_integer and p.base.has(argument))
     return [p for p in powers if p.base.xreplace({argument: sp.S.Zero}) == 0]
 
 
 def beyond_rest(moving: sp.Expr, argument: sp.Symbol) -> sp.Expr:
-    """The law in slip with |w|**p for (s w)**p, which has no value where trial steps go past rest."""
+    """Write |w|**p for (s w)**p in a law in slip: trial steps go past rest, where s w < 0 has no power p."""
     powers = _powers_from_zero(moving, argument)
     return moving.xreplace({p: sp.Abs(p.base.xreplace({SLIP: sp.S.One})) ** p.exp for p in powers})
 
 
 def _by_mode(e: sp.Basic, argument: sp.Symbol) -> sp.Basic:
-    """An expression with the mode for the signs that follow that of its argument; others stay."""
-    if isinstance(e, sp.Abs | sp.sign):
-        return sp.Mul(
-            *(_factor_by_mode(e.func, factor, argument) for factor in sp.Mul.make_args(sp.factor_terms(e.args[0])))
-        )
-    return e.func(*(_by_mode(part, argument) for part in e.args)) if e.args else e
-
-
-def _factor_by_mode(outer: type[sp.Abs | sp.sign], factor: sp.Expr, argument: sp.Symbol) -> sp.Expr:
-    """The sign or the size of a factor: by the mode if SymPy knows its sign on either side of zero."""
+    """Write the mode for each sign of an expression that follows the sign of its argument."""
+    if not isinstance(e, sp.Abs | sp.sign):
+        return e.func(*(_by_mode(part, argument) for part in e.args)) if e.args else e
     speed = sp.Dummy("w", positive=True)
-    above, below = (sp.sign(factor.xreplace({argument: w})) for w in (speed, -speed))
-    inner = _by_mode(factor, argument)
-    if not (above.is_number and below.is_number):
-        return outer(inner)
-    sign = above if above == below else above * SLIP
-    return sign if outer is sp.sign else sign * inner
+    product = []
+    for factor in sp.Mul.make_args(sp.factor_terms(e.args[0])):
+        # By the mode if SymPy finds the sign of the factor on either side of zero.
+        above, below = (sp.sign(factor.xreplace({argument: w})) for w in (speed, -speed))
+        inner = _by_mode(factor, argument)
+        if above.is_number and below.is_number:
+            sign = above if above == below else above * SLIP
+            product.append(sign if isinstance(e, sp.sign) else sign * inner)
+        else:
+            product.append(e.func(inner))
+    return sp.Mul(*product)

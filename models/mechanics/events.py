@@ -30,10 +30,8 @@ class Event:
     mode: sp.Symbol  # the state that is the sign of the level, and 0 while the motion is held
     level: sp.Expr  # friction: the sliding velocity w; it falls with the held state
     target: sp.Expr  # value of the held state on the surface; friction: the velocity of the ground
-    limits: tuple[sp.Expr, sp.Expr]  # rates under static friction; the motion is held while limits[1] <= 0 <= limits[0]
-    departures: tuple[
-        sp.Expr, sp.Expr
-    ]  # rates with which the motion leaves the surface; friction: at the start of slip
+    limits: tuple[sp.Expr, sp.Expr]  # under static friction; the motion is held while limits[1] <= 0 <= limits[0]
+    departures: tuple[sp.Expr, sp.Expr]  # at the start of slip; equal to the limits if static friction is kinetic
     shown: sp.Expr  # the rate off the surface with the sign of the level written out, for printing
 
     def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Event:
@@ -62,7 +60,7 @@ class Event:
 
     @property
     def jumps(self) -> bool:
-        """True if the rate jumps where the motion leaves the surface: static friction exceeds that of slow slip."""
+        """True if the rate jumps at the start of slip: static friction exceeds that of slow slip."""
         return any(sp.simplify(a - b) != 0 for a, b in zip(self.limits, self.departures, strict=True))
 
 

@@ -1,8 +1,7 @@
-"""Expressions of models as text, and back: the one form in which a scene file or a result carries a model.
+"""Expressions of models as text, and back: the form in which scene files and results store a model.
 
-`written` knows every piece of an expression that a model may have and refuses all others; `read` runs nothing and
-makes of the text the same expression again.  So what is read from what was written is the form of an expression that
-a model keeps, wherever it comes from.
+`written` prints the functions that a model may have and refuses all others; `read` parses the text without running
+it and returns the same expression.  `exact` brings any expression into the form that its own text reproduces.
 """
 
 from __future__ import annotations
@@ -25,23 +24,23 @@ from .components import TIME
 from .oscillator import FRICTION
 
 LENGTH = 20_000
-"""Most characters."""
+"""Most characters of a text (a choice)."""
 
 _FORMS = 6
-"""Most forms of an expression that are tried until its text makes it again."""
+"""Most rounds of writing and reading until an expression reproduces itself (a choice; nearly all need one)."""
 
 DIGITS = 10**1000
-"""Largest whole number, above and below a line."""
+"""Largest numerator and denominator (a choice)."""
 
 FRICTION_NAME = "friction"
-"""The friction coefficient of a velocity, in text."""
+"""Name of the friction coefficient as a function of the sliding velocity, in text."""
 
 RESERVED = frozenset({"pi", TIME.name, FRICTION_NAME})
-"""Names that text has for other things than states and parameters."""
+"""Names with a fixed meaning, which states and parameters cannot have."""
 
-_CALLED = dict(sorted({**FUNCTIONS, **COMPOSED, FRICTION_NAME: FRICTION}.items()))
+_FUNCTIONS = dict(sorted({**FUNCTIONS, **COMPOSED, FRICTION_NAME: FRICTION}.items()))
 _NAMES = {function: name for name, function in FUNCTIONS.items()}
-_OTHERWISE: Mapping[type, Callable[..., sp.Basic]] = {
+_REWRITTEN: Mapping[type, Callable[..., sp.Basic]] = {
     sp.cot: lambda x: sp.cos(x) / sp.sin(x),
     sp.sec: lambda x: 1 / sp.cos(x),
     sp.csc: lambda x: 1 / sp.sin(x),
@@ -54,7 +53,7 @@ _OTHERWISE: Mapping[type, Callable[..., sp.Basic]] = {
     sp.Ne: lambda a, b: sp.Or(a < b, a > b),
     sp.Eq: lambda a, b: sp.And(a <= b, a >= b),
 }
-"""Functions and relations of SymPy, as cot(x) that it makes of tan(pi/2 - x), by those that a model may have."""
+"""Functions and relations that SymPy produces, as cot(x) from tan(pi/2 - x), by those that a model may have."""
 _SIGNS: Mapping[type, str] = {
     sp.StrictLessThan: "<",
     sp.LessThan: "<=",
@@ -62,7 +61,7 @@ _SIGNS: Mapping[type, str] = {
     sp.GreaterThan: ">=",
 }
 _WORDS = frozenset({"if", "else", "and", "or"})
-"""Words of Python that a text may have."""
+"""Keywords of Python that a text may have."""
 _RELATIONS = {**{sign: relation for relation, sign in _SIGNS.items()}, "==": sp.Eq, "!=": sp.Ne}
 
 
@@ -73,21 +72,23 @@ def exact(what: str, value: object, names: Mapping[str, sp.Symbol]) -> sp.Expr:
     if isinstance(value, bool) or not isinstance(value, int | float | Fraction | sp.Expr):
         kind = type(value).__name__
         raise TypeError(f"{what}: found {short_repr(value)} ({kind}); expected an expression")
-    given = _otherwise(sp.sympify(value).replace(sp.Heaviside, _unit_step))
-    strange = sorted({s.name for s in given.free_symbols} - {*names})
-    if strange:
-        raise ValueError(f"{what}: {_undeclared(strange[0], names)}")
-    numbers = {number: _rational(what, number) for number in given.atoms(sp.Float)}
-    symbols = {s: names[s.name] for s in given.free_symbols}
+    # Known functions, declared real symbols and exact numbers; then the form that its text reproduces.
+    e = _rewritten(sp.sympify(value).replace(sp.Heaviside, _unit_step))
+    undeclared = sorted({s.name for s in e.free_symbols} - {*names})
+    if undeclared:
+        raise ValueError(f"{what}: {_undeclared(undeclared[0], names)}")
+    rationals = {number: _rational(what, number) for number in e.atoms(sp.Float)}
+    symbols = {s: names[s.name] for s in e.free_symbols}
     try:
-        text = written(given.xreplace({**numbers, **symbols}))
+        text = written(e.xreplace({**rationals, **symbols}))
     except ValueError as error:
         raise ValueError(f"{what}: {error}") from None
     return _settled(what, read(what, text, names), names)
 
 
 def _settled(what: str, e: sp.Expr, names: Mapping[str, sp.Symbol]) -> sp.Expr:
-    """The form of an expression that its own text makes again, so that files keep what runs; ValueError if none is found."""
+    """Return the form of an expression that its own text reproduces; ValueError if there is none."""
+    # SymPy may reorder or evaluate what it reads, so iterate to a fixed point.
     for _ in range(_FORMS):
         try:
             again = read(what, written(e), names)
@@ -102,16 +103,17 @@ def _settled(what: str, e: sp.Expr, names: Mapping[str, sp.Symbol]) -> sp.Expr:
     raise ValueError(f"{what}: found {short_repr(e)}, which SymPy changes each time it reads it; expected another form")
 
 
-def _otherwise(e: sp.Expr) -> sp.Expr:
-    """An expression by functions and relations that a model may have."""
-    for function, written_otherwise in _OTHERWISE.items():
-        e = e.replace(function, written_otherwise) if e.has(function) else e
+def _rewritten(e: sp.Expr) -> sp.Expr:
+    """Write an expression with functions and relations that a model may have."""
+    for function, replacement in _REWRITTEN.items():
+        e = e.replace(function, replacement) if e.has(function) else e
     return e.replace(lambda part: part.is_Mul and part.has(sp.Abs), _with_limit)
 
 
 def _with_limit(product: sp.Mul) -> sp.Expr:
-    """x/sqrt(|x|) as sign(x) sqrt(|x|), and other products x**k |x|**a of positive degree, which are 0/0 at x = 0."""
+    """Write x/sqrt(|x|) as sign(x) sqrt(|x|), and other products x**k |x|**a of positive degree, which are 0/0 at x = 0."""
     for size in product.args:
+        # A factor |x|**degree with degree < 0, and a factor (c x)**k that outweighs it.
         base, degree = size.as_base_exp()
         if not (isinstance(base, sp.Abs) and degree.is_Rational and degree < 0):
             continue
@@ -126,7 +128,7 @@ def _with_limit(product: sp.Mul) -> sp.Expr:
 
 
 def _unit_step(x: sp.Expr, at_zero: sp.Expr = sp.S.Half) -> sp.Expr:
-    """Heaviside's function as a sign or a choice, by its value at zero; as it is if that is another one than 0, 1/2 and 1."""
+    """Write Heaviside's function as a sign or a choice, by its value at zero; keep it unless that is 0, 1/2 or 1."""
     if at_zero == sp.S.Half:
         return (1 + sp.sign(x)) / 2
     if at_zero in (0, 1):
@@ -139,7 +141,7 @@ def _undeclared(name: str, names: Mapping[str, sp.Symbol]) -> str:
 
 
 def _rational(what: str, number: sp.Float) -> sp.Rational:
-    """The number that a decimal says: the shortest decimal of a double, all digits of a longer one."""
+    """Return a decimal as a fraction: the shortest decimal of a double, all digits of a longer one."""
     if not number.is_finite:
         raise ValueError(f"{what}: found {number}; expected finite real numbers")
     return sp.Rational(repr(float(number)) if number._prec <= 53 else str(number))
@@ -148,10 +150,10 @@ def _rational(what: str, number: sp.Float) -> sp.Rational:
 # -- from expressions to text ------------------------------------------------------------------------------------
 
 _CHOICE, _OR, _AND, _NOT, _COMPARE, _SUM, _PRODUCT, _POWER, _ATOM = range(9)
-"""How tightly the pieces of a text hold together."""
+"""Precedence of operators, loosest first."""
 
 _LONGEST = 8
-"""Most terms or factors in a row; longer rows are halved by parentheses, so that text nests little."""
+"""Most terms or factors in a row (a choice): longer rows are halved by parentheses, so that the parser nests little."""
 
 
 def written(e: sp.Basic) -> str:
@@ -160,13 +162,13 @@ def written(e: sp.Basic) -> str:
 
 
 def _inside(e: sp.Basic, level: int) -> str:
-    """The text of an expression where nothing looser than `level` may stand without parentheses."""
-    text, own = _text(e)
-    return text if own >= level else f"({text})"
+    """Return the text of an expression, in parentheses if its operator is looser than `level`."""
+    text, precedence = _text(e)
+    return text if precedence >= level else f"({text})"
 
 
 def _text(e: sp.Basic) -> tuple[str, int]:
-    """The text of an expression, and how tightly it holds together."""
+    """Return the text of an expression and its precedence."""
     if isinstance(e, sp.Symbol):
         return e.name, _ATOM
     if isinstance(e, sp.Number) or e in (sp.pi, sp.E):
@@ -206,24 +208,20 @@ def _number(e: sp.Expr) -> tuple[str, int]:
 
 
 def _signed(term: sp.Expr) -> tuple[str, str]:
-    """The sign of a term, and what follows it."""
-    if _is_negative(term):
+    """Return the sign of a term and the text of its size."""
+    if term.as_coeff_Mul()[0].is_negative:
         return "-", _inside(_negated(term), _PRODUCT)
     return "+", _inside(term, _PRODUCT)
 
 
-def _is_negative(e: sp.Expr) -> bool:
-    return bool(e.as_coeff_Mul()[0].is_negative)
-
-
 def _negated(e: sp.Expr) -> sp.Expr:
-    """The negative of a product with a negative number in front, its other factors as they are."""
-    number, rest = e.as_coeff_Mul()
-    return -number if rest == 1 else sp.Mul(-number, *sp.Mul.make_args(rest))
+    """Return the negative of a product with a negative number in front, its other factors unchanged."""
+    number, others = e.as_coeff_Mul()
+    return -number if others == 1 else sp.Mul(-number, *sp.Mul.make_args(others))
 
 
 def _row(terms: Sequence[tuple[str, str]]) -> str:
-    """The text of a sum of signed terms."""
+    """Return the text of a sum of signed terms."""
     if len(terms) > _LONGEST:
         half = len(terms) // 2
         return f"({_row(terms[:half])}) + ({_row(terms[half:])})"
@@ -234,17 +232,17 @@ def _row(terms: Sequence[tuple[str, str]]) -> str:
 
 
 def _product(e: sp.Mul) -> tuple[str, int]:
-    """Factors and divisions from left to right; a number stays behind a sum, which would take it in."""
-    number, rest = e.as_coeff_Mul()
+    """Return the text of a product, factors and divisions from left to right."""
+    number, others = e.as_coeff_Mul()
     if not isinstance(number, sp.Rational):
         raise ValueError(f"found {number}; expected rational numbers, decimals and pi")
     if number < 0:
         return _row([("-", _inside(_negated(e), _PRODUCT))]), _SUM
-    factors = rest.as_ordered_factors()
+    factors = others.as_ordered_factors()
     below = [factor for factor in factors if isinstance(factor, sp.Pow) and factor.exp.is_Rational and factor.exp < 0]
     above = [_inside(factor, _POWER) for factor in factors if factor not in below]
     divisors = [_inside(1 / factor, _POWER) for factor in below]
-    last = any(isinstance(factor, sp.Add) for factor in factors)
+    last = any(isinstance(factor, sp.Add) for factor in factors)  # SymPy multiplies a number in front into a sum
     if number.p != 1 and not last:
         above.insert(0, str(number.p))
     text = "/".join([_factors(above) if above else "1", *divisors])
@@ -292,9 +290,10 @@ def _call(e: sp.Basic) -> tuple[str, int]:
 
 
 def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
-    """Return the expression of a text; nothing in it is run."""
+    """Return the expression of a text without running it."""
     if len(text) > LENGTH:
         raise ValueError(f"{what}: found {len(text)} characters; expected at most {LENGTH}")
+    # Python's parser reads the text; reserved words have a separate message.
     expression = parse(text)
     if expression is None:
         word = next((w for w in re.findall(r"\w+", text) if iskeyword(w) and w not in _WORDS), None)
@@ -302,12 +301,13 @@ def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
             raise ValueError(
                 f"{what}: {word!r} is a word of Python, which no text can use; call a parameter {word}_ or {word[:3]}"
             )
-        found = f"{short_repr(text)}{unpaired(text)}"
-        raise ValueError(f"{what}: unreadable expression {found}; expected such as '-k*x + u*cos(omega*t)'")
-    found = _otherwise(_OfModels(what, names).read(expression))
-    if found.has(sp.I):
-        raise ValueError(f"{what}: found the complex {short_repr(found)}; expected a real value; {COMPLEX}")
-    return found
+        raise ValueError(
+            f"{what}: unreadable expression {short_repr(text)}{unpaired(text)}; expected such as '-k*x + u*cos(omega*t)'"
+        )
+    e = _rewritten(_OfModels(what, names).read(expression))
+    if e.has(sp.I):
+        raise ValueError(f"{what}: found the complex {short_repr(e)}; expected a real value; {COMPLEX}")
+    return e
 
 
 @dataclass(frozen=True, slots=True)
@@ -317,7 +317,7 @@ class _OfModels(Expressions):
     names: Mapping[str, sp.Symbol]
     whole = DIGITS
     numbers = "finite real numbers (of a complex state, real and imaginary part are two states)"
-    functions = _CALLED
+    functions = _FUNCTIONS
 
     def pieces(self) -> str:
         return f"pi, + - * / **, {' '.join((*FUNCTIONS, *COMPOSED))} friction, a if x > 0 else b, and {', '.join(self.names)}"
@@ -351,7 +351,7 @@ class _OfModels(Expressions):
         return Expressions.fits(self, number) and bool(number.is_Rational or sp.N(number).is_real)
 
     def condition(self, e: sp.Basic) -> Boolean:
-        """The condition, if it is one."""
+        """Return a condition; refuse a value."""
         if not isinstance(e, Boolean) or isinstance(e, sp.Expr):
             raise NoMeaning(f"found {short_repr(e)}, which is no condition; expected one such as x > 0")
         return e

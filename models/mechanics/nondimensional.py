@@ -1,7 +1,7 @@
-"""From a physical Lagrangian to non-dimensional equations, by substitution: no scaled equation is typed in.
+"""Non-dimensional equations from a physical Lagrangian, by substitution: no scaled equation is typed in.
 
 Every physical quantity of unit kg^a m^b s^c is written as its non-dimensional value times M^a L^b T^c, where M, L and T are
-the oscillator's own units of mass, length and time.  Put into the energies and the forces, M, L and T must cancel.
+the oscillator's units of mass, length and time.  In energies and forces M, L and T must cancel.
 """
 
 from __future__ import annotations
@@ -17,32 +17,23 @@ from .lagrangian import Mechanics
 from .oscillator import FRICTION, LagrangianModel, Oscillator
 from .parameter import Parameter, dimension
 
-__all__ = [
-    "FRICTION",
-    "friction_coefficient",
-    "nondimensional",
-    "physical",
-    "scale",
-    "static_coefficient",
-]
-
 MASS, LENGTH, DURATION = sp.symbols("M L T", positive=True)
 
 
 def magnitude(unit: str) -> sp.Expr:
-    """Return the amount M^a L^b T^c of a quantity that the non-dimensional value 1 stands for."""
+    """Return the amount M^a L^b T^c of a quantity with the non-dimensional value 1."""
     mass, length, duration = dimension(unit)
     return MASS**mass * LENGTH**length * DURATION**duration
 
 
 def scale(oscillator: Oscillator, unit: str) -> sp.Expr:
-    """Return the amount of a quantity that the value 1 stands for, in the physical symbols of an oscillator."""
+    """Return the amount of a quantity with the value 1, in the physical symbols of an oscillator."""
     scaling = oscillator.model.scaling if isinstance(oscillator.model, LagrangianModel) else None
     if scaling is None:
         return sp.S.One
     values = {MASS: scaling.scales["kg"], LENGTH: scaling.scales["m"], DURATION: scaling.scales["s"]}
-    for name, own in scaling.units.items():
-        value = sp.powdenest(sp.Symbol(name, positive=True) / magnitude(own).xreplace(values), force=True)
+    for name, quantity_unit in scaling.units.items():
+        value = sp.powdenest(sp.Symbol(name, positive=True) / magnitude(quantity_unit).xreplace(values), force=True)
         if value != 1:
             raise ValueError(f"{oscillator}.scales: {name} becomes {value}; expected 1: correct the scales or UNITS")
     return sp.powdenest(magnitude(unit).xreplace(values), force=True)
@@ -53,15 +44,13 @@ def physical(oscillator: Oscillator) -> Mechanics:
     model = oscillator.model
     if not isinstance(model, LagrangianModel):
         raise ValueError(f"oscillator {oscillator.name!r} is a vector field; expected one with a Lagrangian")
-    speeds = [_real(c.velocity) for c in model.coordinates]
-    lost = [derivative(model.dissipation, speed) for speed in speeds] if model.dissipation != 0 else []
-    return Mechanics(
-        tuple(_real(c.name) for c in model.coordinates),
-        tuple(speeds),
-        model.kinetic,
-        model.potential,
-        tuple(force - rate for force, rate in zip(model.forces, lost, strict=True)) if lost else model.forces,
-    )
+    speeds = tuple(_real(c.velocity) for c in model.coordinates)
+    forces = model.forces
+    if model.dissipation != 0:  # Rayleigh: Q = -dR/dv
+        lost = (derivative(model.dissipation, speed) for speed in speeds)
+        forces = tuple(force - rate for force, rate in zip(forces, lost, strict=True))
+    positions = tuple(_real(c.name) for c in model.coordinates)
+    return Mechanics(positions, speeds, model.kinetic, model.potential, forces)
 
 
 def nondimensional(oscillator: Oscillator) -> Mechanics:
@@ -69,7 +58,8 @@ def nondimensional(oscillator: Oscillator) -> Mechanics:
     system, model = physical(oscillator), oscillator.model
     if not isinstance(model, LagrangianModel) or model.scaling is None:
         return system
-    scale(oscillator, "1")  # the scales must turn every quantity of UNITS into 1
+    scale(oscillator, "1")  # raises ValueError unless the scales turn every quantity of UNITS into 1
+    # Each physical symbol as its non-dimensional value times its amount.
     amounts = {sp.Symbol(name, positive=True): magnitude(unit) for name, unit in model.scaling.units.items()}
     for name, parameter in oscillator.parameters.items():
         amounts[_real(model.scaling.physical[name])] = _real(name) * magnitude(parameter.unit)
@@ -79,7 +69,7 @@ def nondimensional(oscillator: Oscillator) -> Mechanics:
     amounts[TIME] = TIME * DURATION
     energy = magnitude("N*m")
 
-    def put(expression: sp.Expr, over: sp.Expr, what: str) -> sp.Expr:
+    def scaled_by(expression: sp.Expr, over: sp.Expr, what: str) -> sp.Expr:
         scaled = expression.xreplace(amounts).replace(
             FRICTION, lambda w: FRICTION(_cancel(w / magnitude("m/s"), f"{oscillator}: sliding velocity"))
         )
@@ -88,10 +78,10 @@ def nondimensional(oscillator: Oscillator) -> Mechanics:
     return Mechanics(
         system.coordinates,
         system.velocities,
-        put(system.kinetic, energy, "kinetic energy"),
-        put(system.potential, energy, "potential energy"),
+        scaled_by(system.kinetic, energy, "kinetic energy"),
+        scaled_by(system.potential, energy, "potential energy"),
         tuple(
-            put(force, energy / magnitude(c.unit), f"force on {c.name}")
+            scaled_by(force, energy / magnitude(c.unit), f"force on {c.name}")
             for force, c in zip(system.forces, model.coordinates, strict=True)
         ),
     )
@@ -100,8 +90,8 @@ def nondimensional(oscillator: Oscillator) -> Mechanics:
 def friction_coefficient(law: FrictionLaw, contact: str) -> Callable[[sp.Expr], sp.Expr]:
     """Return f(w), the friction coefficient as a function of the non-dimensional sliding velocity.
 
-    The parameters of a law have units too, so they scale with the rest: a rate of decay a = 2.5 of unit s/m decays
-    with 2.5 |w| only when w is measured in L/T.  If none has a unit, w is a number as they are.
+    The parameters of a law have units too: a rate of decay a = 2.5 of unit s/m decays with 2.5 |w| only when w is
+    measured in L/T.  If no parameter has a unit, w has none.
     """
     treatment = ContactModel.parse("contact", contact)
     w = sp.Dummy("w", real=True)
@@ -114,14 +104,14 @@ def friction_coefficient(law: FrictionLaw, contact: str) -> Callable[[sp.Expr], 
 
 
 def static_coefficient(law: FrictionLaw) -> sp.Expr | None:
-    """Return the static friction coefficient of a law that has one of its own, None of any other."""
+    """Return the static friction coefficient of a law; None if the law names none."""
     if law.static is None:
         return None
     return _cancel(law.static.xreplace(_amounts(law.parameters)), f"friction law {law}: static")
 
 
 def _amounts(parameters: Mapping[str, Parameter]) -> dict[sp.Symbol, sp.Expr]:
-    """Each parameter as its non-dimensional value times its magnitude."""
+    """Return each parameter as its non-dimensional value times its magnitude."""
     return {_real(name): _real(name) * magnitude(parameter.unit) for name, parameter in parameters.items()}
 
 
@@ -130,10 +120,9 @@ def _real(name: str) -> sp.Symbol:
 
 
 def _cancel(expression: sp.Expr, what: str) -> sp.Expr:
-    """The expression with common factors taken out; ValueError if a unit has not cancelled."""
+    """Take out common factors; raise ValueError if a unit does not cancel."""
     result = sp.factor_terms(sp.sympify(expression))
-    left = {MASS: "kg", LENGTH: "m", DURATION: "s"}.items()
-    found = [name for symbol, name in left if result.has(symbol)]
-    if found:
-        raise ValueError(f"{what}: the unit {found[0]} does not cancel in {result}; check the units of the parameters")
+    for symbol, unit in {MASS: "kg", LENGTH: "m", DURATION: "s"}.items():
+        if result.has(symbol):
+            raise ValueError(f"{what}: the unit {unit} does not cancel in {result}; check the units of the parameters")
     return result

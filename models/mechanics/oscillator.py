@@ -1,4 +1,4 @@
-"""One oscillator as a value: a Lagrangian or a vector field with its parameters, wherever it comes from."""
+"""One oscillator as a value: a Lagrangian or a vector field with its parameters."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .contact import ContactModel, FrictionLaw
 from .parameter import Parameter
 
 FRICTION = sp.Function("f", real=True)
-"""The friction coefficient as an unknown function of the sliding velocity; a law takes its place at the end."""
+"""The friction coefficient as an unknown function of the sliding velocity, which a friction law replaces."""
 
 
 def friction(velocity: sp.Expr) -> sp.Expr:
@@ -55,9 +55,9 @@ class Scaling:
 
     units: FrozenDict[str]  # unit of each quantity that fixes the scales
     physical: FrozenDict[str]  # physical quantity behind each parameter
-    # the units of mass, length and time (keys kg, m, s), made of the quantities of `units`, which are positive
-    # symbols
-    scales: FrozenDict[sp.Expr]
+    scales: FrozenDict[
+        sp.Expr
+    ]  # units of mass, length, time (keys kg, m, s) in positive symbols of the names in `units`
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +72,7 @@ class LagrangianModel:
     kinetic: sp.Expr  # the energies
     potential: sp.Expr
     forces: tuple[sp.Expr, ...]  # a generalised force for each coordinate, without those of `dissipation`
-    # rayleigh's function, half the power lost; its negative derivatives are added to the forces
-    dissipation: sp.Expr = sp.S.Zero
+    dissipation: sp.Expr = sp.S.Zero  # Rayleigh's function R, half the power lost; -dR/dv is added to the forces
     scaling: Scaling | None = None  # the units of physical quantities
 
     @property
@@ -102,19 +101,19 @@ class Oscillator:
     Parameters
     ----------
     name : str
-        What messages and scene files call it.
+        Name in messages and scene files.
     parameters : mapping of str to Parameter
         Parameters of the non-dimensional equations.
     model : LagrangianModel or FieldModel
-        What moves it.
+        The equations: energies and forces, or rates.
     initial : mapping of str to float, optional
         The state around which oscillators start, 0 for the states left out.
     friction : FrictionLaw, optional
         The law of its friction unless another is given.
     contact : ContactModel
-        How the jump of a law at rest is treated unless said otherwise.
+        Default treatment of the jump of a law at rest.
     summary, source : str
-        What it is, and where it was published.
+        A description, and the publication.
 
     Attributes
     ----------

@@ -1,8 +1,9 @@
-"""What is known about a parameter before it has a value: default, unit, meaning, allowed range."""
+"""Parameters before they have values: default, unit, meaning, allowed range."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,13 +22,13 @@ class Parameter:
     unit : str
         The SI unit of the physical quantity behind the number, such as "N/m"; "1" if it is a number by itself.
     meaning : str
-        A phrase that says what it is.
+        A short description.
     minimum, maximum : float, optional
         The range, both ends included.
     positive : bool
         True if zero and negative values are not allowed.
     scale : str
-        How much of the quantity the value 1 stands for, in the physical symbols of the oscillator: a belt speed 0.1
+        The amount of the quantity with the value 1, in the physical symbols of the oscillator: a belt speed 0.1
         with unit m/s and scale g*sqrt(m)/sqrt(k) is 0.1 g sqrt(m/k) metres per second.
 
     Raises
@@ -52,31 +53,18 @@ class Parameter:
 
     @classmethod
     def of_table(cls, what: str, table: Mapping[Any, object], keys: Sequence[str], **usual: object) -> Parameter:
-        """Return the parameter of a table.
+        """Return the parameter of a table of arguments, of which `usual` ones may be missing.
 
-        Parameters
-        ----------
-        what : str
-            The subject of errors.
-        table : mapping
-            Arguments by their names.
-        keys : sequence of str
-            The names that it may have.
-        **usual
-            Arguments that it may leave out.
-
-        Raises
-        ------
-        ValueError, TypeError
-            For other names, values of a wrong type, and a table without a default.
+        Raises ValueError or TypeError, beginning with `what`, for names outside `keys`, values of a wrong type, and a
+        table without a default.
         """
         check_keys(what, table, keys)
         if "default" not in table:
             raise ValueError(
                 f"{what}: 'default' is missing in {short_repr(dict(table))}; expected a table with a default"
             )
-        given = {**usual, **table}
-        return cls(**{key: _CHECKS.get(key, check_text)(f"{what}: {key}", value) for key, value in given.items()})
+        arguments = {**usual, **table}
+        return cls(**{key: _CHECKS.get(key, check_text)(f"{what}: {key}", value) for key, value in arguments.items()})
 
     def check(self, name: str, value: float) -> float:
         """Return `value` as a float, or raise ValueError (TypeError: no number) that names it and the range."""
@@ -91,15 +79,15 @@ class Parameter:
 
     @property
     def range(self) -> str:
-        """The allowed values in words."""
-        words = []
+        """The allowed values, for messages."""
+        limits = []
         if self.positive:
-            words.append("above 0")
+            limits.append("above 0")
         if self.minimum is not None and not (self.positive and self.minimum <= 0):
-            words.append(f"at least {self.minimum:g}")
+            limits.append(f"at least {self.minimum:g}")
         if self.maximum is not None:
-            words.append(f"at most {self.maximum:g}")
-        return "a finite number" + (" " + " and ".join(words) if words else "")
+            limits.append(f"at most {self.maximum:g}")
+        return "a finite number" + (" " + " and ".join(limits) if limits else "")
 
 
 _CHECKS: Mapping[str, Callable[[str, object], Any]] = {
@@ -108,7 +96,7 @@ _CHECKS: Mapping[str, Callable[[str, object], Any]] = {
     "maximum": check_number,
     "positive": check_flag,
 }
-"""What checks the arguments that are no text."""
+"""Checks of the arguments that are no text."""
 
 Dimension = tuple[int, int, int]
 """Powers of (kg, m, s)."""
@@ -131,22 +119,14 @@ def dimension(unit: str) -> Dimension:
     if not isinstance(unit, str):
         raise TypeError(f"unit {unit!r} is a {type(unit).__name__}; expected text such as 'N/m' or '1'")
     total = [0, 0, 0]
-    sign, rest = 1, unit.replace(" ", "")
-    while True:
-        cut = min((i for i in (rest.find("*"), rest.find("/")) if i >= 0), default=len(rest))
-        name, raised, power = rest[:cut].partition("^")
-        power = power if raised else "1"
-        if name not in UNITS or not _is_integer(power):
+    # Products and quotients from left to right, each factor with an integer power.
+    for sign, factor in re.findall(r"(^|[*/])([^*/]*)", unit.replace(" ", "")):
+        name, raised, power = factor.partition("^")
+        if name not in UNITS or (raised and not re.fullmatch(r"-?[0-9]+", power)):
             raise ValueError(
-                f"unit {unit!r}: cannot read {rest[:cut]!r}; expected products and quotients of "
+                f"unit {unit!r}: cannot read {factor!r}; expected products and quotients of "
                 f"{', '.join(UNITS)} with integer powers, such as 'N/m' or 'kg*m/s^2'"
             )
-        for k, exponent in enumerate(UNITS[name]):
-            total[k] += sign * int(power) * exponent
-        if cut == len(rest):
-            return (total[0], total[1], total[2])
-        sign, rest = (1 if rest[cut] == "*" else -1), rest[cut + 1 :]
-
-
-def _is_integer(text: str) -> bool:
-    return text.removeprefix("-").isascii() and text.removeprefix("-").isdigit()
+        times = int(power or 1) * (-1 if sign == "/" else 1)
+        total = [sum_of + times * exponent for sum_of, exponent in zip(total, UNITS[name], strict=True)]
+    return (total[0], total[1], total[2])

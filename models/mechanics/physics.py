@@ -1,4 +1,4 @@
-"""Wrong physics is refused early: friction that feeds energy without saying so, and masses that are not positive."""
+"""Checks of the physics of a model: friction must not feed energy unless declared, masses must be positive."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .nondimensional import friction_coefficient, nondimensional
 from .oscillator import FieldModel, Oscillator
 
 SPEEDS = tuple(side * 10.0 ** (k / 4) for k in range(-24, 9) for side in (1.0, -1.0))
-"""Sliding velocities at which a law is looked at, from 1e-6 to 100 and both ways."""
+"""Sliding velocities at which a law is checked (a choice): four a decade from 1e-6 to 100, both ways."""
 
 
 def check_power(law: FrictionLaw, values: Mapping[str, float]) -> None:
@@ -21,10 +21,10 @@ def check_power(law: FrictionLaw, values: Mapping[str, float]) -> None:
     if law.self_exciting:
         return
     coefficient, names = _coefficient(law)
-    given = [values[name] for name in names]
+    parameters = [values[name] for name in names]
     for w in SPEEDS:
         try:
-            f = coefficient(w, *given)
+            f = coefficient(w, *parameters)
         except (ArithmeticError, ValueError):  # a pole or an overflow is for the integration to report
             continue
         if w * f < 0.0:
@@ -36,7 +36,7 @@ def check_power(law: FrictionLaw, values: Mapping[str, float]) -> None:
 
 @lru_cache(maxsize=64)
 def _coefficient(law: FrictionLaw) -> tuple[Callable[..., float], tuple[str, ...]]:
-    """f(w, …) as a plain function, and the names of its parameters."""
+    """Return f(w, …) as a plain function, and the names of its parameters."""
     names = tuple(law.parameters)
     w = sp.Symbol("w", real=True)
     value = friction_coefficient(law, ContactModel.SIGN)(w)
@@ -46,39 +46,33 @@ def _coefficient(law: FrictionLaw) -> tuple[Callable[..., float], tuple[str, ...
 
 
 def check_masses(oscillator: Oscillator, values: Mapping[str, float]) -> None:
-    """Raise ValueError if the kinetic energy of an oscillator is not positive for every velocity (Sylvester).
+    """Raise ValueError if the kinetic energy of an oscillator is not positive for every velocity.
 
-    A mass that depends on the state is not looked at.
+    Masses that depend on the state are not checked, nor are vector fields.
     """
-    found = _masses(oscillator)
-    if found is None:
+    if isinstance(oscillator.model, FieldModel):
         return
-    used = {s.name for s in found[0].free_symbols}
-    _check_masses(oscillator, tuple((name, value) for name, value in values.items() if name in used))
+    names = {s.name for s in _masses(oscillator)[0].free_symbols}
+    _check_masses(oscillator, tuple((name, value) for name, value in values.items() if name in names))
 
 
 @lru_cache(maxsize=1024)
 def _check_masses(oscillator: Oscillator, values: tuple[tuple[str, float], ...]) -> None:
-    """The check in the parameters that the masses depend on: nodes that differ in others need none of their own."""
-    found = _masses(oscillator)
-    if found is None:
+    """Check the masses at values of their parameters; nodes that differ in other parameters share one check."""
+    masses, velocities = _masses(oscillator)
+    matrix = masses.subs({sp.Symbol(name, real=True): sp.Float(value) for name, value in values})
+    if matrix.free_symbols:
         return
-    masses, velocities = found
-    numbers = masses.subs({sp.Symbol(name, real=True): sp.Float(value) for name, value in values})
-    if numbers.free_symbols:
-        return
-    for k, velocity in enumerate(velocities):
-        if not numbers[: k + 1, : k + 1].det() > 0:
+    for k, velocity in enumerate(velocities):  # Sylvester's criterion: all leading minors are positive
+        if not matrix[: k + 1, : k + 1].det() > 0:
             raise ValueError(
-                f"oscillator {oscillator.name!r}: the mass of the velocity {velocity} is {numbers[k, k]}, and its kinetic energy "
+                f"oscillator {oscillator.name!r}: the mass of the velocity {velocity} is {matrix[k, k]}, and its kinetic energy "
                 "not positive; expected T > 0 for every motion; correct T or the parameters"
             )
 
 
 @lru_cache(maxsize=64)
-def _masses(oscillator: Oscillator) -> tuple[sp.Matrix, tuple[sp.Symbol, ...]] | None:
-    """The mass matrix in the parameters, None for a vector field."""
-    if isinstance(oscillator.model, FieldModel):
-        return None
+def _masses(oscillator: Oscillator) -> tuple[sp.Matrix, tuple[sp.Symbol, ...]]:
+    """Return the mass matrix in the parameters, and the velocities of its rows."""
     system = nondimensional(oscillator)
     return mass_matrix(system.kinetic, system.velocities), system.velocities

@@ -39,7 +39,7 @@ def balance(scene: Scene) -> sp.Expr:
     found, power = energy(scene).whole()
     state, half = sp.symbols(equations.state, real=True), equations.dimension // 2
     rates = equations.rhs()
-    return total_derivative(found, state[:half], state[half:], rates[half:], TIME) - power
+    return total_derivative(found, state[:half], state[half:], rates[half:]) - power
 
 
 @pytest.mark.parametrize("coupling", FORCES)
