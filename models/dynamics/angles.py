@@ -1,4 +1,4 @@
-"""States in which the equations of a network are periodic: angles, of which only the value modulo a period counts."""
+"""Angles: states in which the equations of a network are periodic."""
 
 from __future__ import annotations
 
@@ -22,20 +22,31 @@ def periods_of_kinds(equations: Equations) -> tuple[Periods, ...]:
     """Return the periods in which the equations repeat themselves, by kind of node and by state.
 
     A state is an angle if it occurs only as q*state + … within sines, cosines and tangents, with rational numbers q: in the
-    equations of its node, and in those of all links as the state of the target and as that of the source.  The form of the
-    equations decides; nothing is simplified.
+    equations of its node, and in those of all links as the state of the target and as that of the source.  Expressions are
+    not simplified before.
     """
+    # The expressions that the states of a kind of node enter, with the symbols of these states there.
+    uses = [(kind, node.expressions, node.state) for kind, node in enumerate(equations.nodes)]
+    for (target, source), edge in equations.edge_of:
+        uses += [(target, edge.expressions, edge.here), (source, edge.expressions, edge.there)]
+
+    # Periods (in units of pi) of the terms that hold a state, and the states that occur outside of such terms.
     bare = [set[int]() for _ in equations.nodes]
     turns = [[set[sp.Rational]() for _ in node.state] for node in equations.nodes]
-    for kind, expressions, symbols in _uses(equations):
+    for kind, expressions, symbols in uses:
         number = {s: c for c, s in enumerate(symbols)}
         for s, period in _occurrences(expressions, number):
             if period is None:
                 bare[kind].add(number[s])
             else:
                 turns[kind][number[s]].add(period)
+
+    def common(periods: Collection[sp.Rational]) -> float:
+        """Return the smallest common multiple of rational numbers, times pi."""
+        return math.pi * math.lcm(*(int(r.p) for r in periods)) / math.gcd(*(int(r.q) for r in periods))
+
     return tuple(
-        tuple(_common(periods) if periods and c not in bare[kind] else None for c, periods in enumerate(turns[kind]))
+        tuple(common(periods) if periods and c not in bare[kind] else None for c, periods in enumerate(turns[kind]))
         for kind in range(len(equations.nodes))
     )
 
@@ -47,15 +58,6 @@ def periods_of_states(equations: Equations) -> Periods:
     for kind, places in zip(equations.kind_of, equations.places, strict=True):
         periods.update(zip(places, by_kind[kind], strict=True))
     return tuple(periods[slot] for slot in range(equations.dimension))
-
-
-def _uses(equations: Equations) -> Iterator[tuple[int, Iterable[sp.Expr], tuple[sp.Symbol, ...]]]:
-    """Yield kinds of nodes with the expressions that their states enter, and what the states are called there."""
-    for kind, node in enumerate(equations.nodes):
-        yield kind, node.expressions, node.state
-    for (target, source), edge in equations.edge_of:
-        yield target, edge.expressions, edge.here
-        yield source, edge.expressions, edge.there
 
 
 def _occurrences(
@@ -71,17 +73,14 @@ def _occurrences(
         seen.add(e)
         if e in symbols:
             yield e, None
+        # Outside of a sine, cosine or tangent: look into the arguments.
         elif (half_turns := HALF_TURNS.get(e.func)) is None:
             waiting += e.args
         else:
+            # In sin(q x + …) the term q x makes x an angle of period 2 pi/|q|; other terms are searched.
             for term in sp.Add.make_args(e.args[0]):
                 factor, inner = term.as_coeff_Mul()
                 if inner in symbols and factor.is_Rational:
                     yield inner, half_turns / abs(factor)
                 else:
                     waiting.append(term)
-
-
-def _common(periods: Collection[sp.Rational]) -> float:
-    """The smallest common multiple of some rational numbers, times pi."""
-    return math.pi * math.lcm(*(int(r.p) for r in periods)) / math.gcd(*(int(r.q) for r in periods))

@@ -1,12 +1,13 @@
 """Equations of motion of a network: templates of its nodes and links, and the list of its links.
 
-Printing, code generation, spectra and variational equations read these values and nothing else.
-The templates do not depend on the size of the network, so a large network costs no algebra.
+Printing, code generation, spectra and variational equations read `Equations` alone.  Templates do not depend on the size
+of the network, so a large network costs no algebra.
 """
 
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -27,11 +28,11 @@ Ends = tuple[int, int]
 Entry = tuple[tuple[int, int], sp.Expr]
 
 DIGEST_LIMIT = 10_000
-"""Most links of all pairs that a digest lists, to be that of the same links in a list."""
+"""Most links of all pairs that a digest lists, so that it equals the digest of the same links in a list (a choice)."""
 
 
 class _Cached:
-    """Gives a value with slots a dictionary for its cached properties, which pickles do not hold."""
+    """Give a value with slots a dictionary for its cached properties, which pickles omit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,28 +40,27 @@ class Layer:
     """The links of one coupling on one graph."""
 
     edge_of: tuple[tuple[Ends, Edge], ...]  # the templates of the links, by the kinds of their targets and sources
-    # target and source (0-based) and weight of each link. Links of all pairs make a mean field of an edge that
-    # separates (`synchain.models.interactions.separation`)
+    # Target and source (0-based) and weight of each link. Links of all pairs make a mean field of an edge that
+    # separates (`synchain.models.interactions.separation`).
     links: Links
-    # parameters of the templates that have one number for each link, k_1_2 where node 1 feels node 2
-    varied: tuple[str, ...] = ()
-    mutual: bool = False  # True if a link and the one that runs back have one number, that of their edge
+    varied: tuple[str, ...] = ()  # parameters with a value for each link, k_1_2 where node 1 feels node 2
+    mutual: bool = False  # True if a link and the one that runs back share these values
 
     def map(self, change: Callable[[Edge], Edge], renamed: Mapping[sp.Symbol, sp.Symbol] | None = None) -> Layer:
-        """The same links with changed templates; parameters in `varied` that no template has any more leave it."""
+        """Return the same links with changed templates; `varied` keeps the parameters that templates still have."""
         edge_of = tuple((ends, change(edge)) for ends, edge in self.edge_of)
         names = {s.name for _, edge in edge_of for s in edge.parameters}
         varied = tuple(name for name in _renamed(self.varied, renamed) if name in names)
         return replace(self, edge_of=edge_of, varied=varied)
 
     def name(self, parameter: str, link: Link) -> str:
-        """What a parameter of `varied` is called at one link."""
+        """Return the name of a parameter of `varied` at one link."""
         target, source, _ = link
         ends = (source, target) if self.mutual and source < target else (target, source)
         return str(LinkName(parameter, *ends))
 
     def names(self, parameter: str) -> tuple[str, ...]:
-        """What a parameter of `varied` is called at all links, each name once."""
+        """Return the distinct names of a parameter of `varied` at all links."""
         return tuple(dict.fromkeys(self.name(parameter, link) for link in self.links))
 
 
@@ -72,10 +72,10 @@ class Equations(_Cached, HasLatex):
     v_1 … v_n; components that all kinds of nodes have come first.
     """
 
-    nodes: tuple[Node, ...]  # the templates of the nodes, by kind. A network of equal nodes has one
-    kind_of: tuple[int, ...]  # the kind of each node; its length is the number of nodes n
+    nodes: tuple[Node, ...]  # the templates of the nodes, by kind; one for equal nodes
+    kind_of: tuple[int, ...]  # the kind of each of the n nodes
     layers: tuple[Layer, ...] = ()  # the links, coupling by coupling
-    varied: tuple[str, ...] = ()  # parameters of nodes that have one value for each node: a_1 … a_n
+    varied: tuple[str, ...] = ()  # parameters with a value for each node, a_1 … a_n
 
     def __post_init__(self) -> None:
         check(self)
@@ -123,23 +123,25 @@ class Equations(_Cached, HasLatex):
     @property
     def links(self) -> Links:
         """Target, source and weight of each link, layer by layer."""
-        return self.layers[0].links if len(self.layers) == 1 else tuple(k for own in self.layers for k in own.links)
+        if len(self.layers) == 1:
+            return self.layers[0].links
+        return tuple(link for layer in self.layers for link in layer.links)
 
     @property
     def link_count(self) -> int:
-        """Number of links, which are not listed for it."""
+        """Number of links, without listing them."""
         return sum(len(layer.links) for layer in self.layers)
 
     @property
     def listed(self) -> tuple[Layer, ...]:
-        """The layers whose links stand in a list."""
+        """The layers whose links are a list."""
         return tuple(layer for layer in self.layers if layer.links and not isinstance(layer.links, AllPairs))
 
     @property
     def fields(self) -> tuple[tuple[Edge, AllPairs], ...]:
         """The mean fields: templates with the links of all pairs."""
-        found = ((layer.edge_of[0][1], layer.links) for layer in self.layers)
-        return tuple((edge, links) for edge, links in found if isinstance(links, AllPairs) and links)
+        pairs = ((layer.edge_of[0][1], layer.links) for layer in self.layers)
+        return tuple((edge, links) for edge, links in pairs if isinstance(links, AllPairs) and links)
 
     def without_fields(self) -> Equations:
         """Return the same equations with every link in a list; ValueError for more than LINK_LIMIT links."""
@@ -159,16 +161,16 @@ class Equations(_Cached, HasLatex):
     def linked(self) -> Iterator[tuple[Link, Edge]]:
         """Yield each link with its template, layer by layer."""
         for layer in self.layers:
-            known = dict(layer.edge_of)
+            templates = dict(layer.edge_of)
             for link in layer.links:
-                yield link, known[self.ends(link)]
+                yield link, templates[self.ends(link)]
 
     def node_at(self, i: int) -> Node:
-        """The template of node `i` (0-based)."""
+        """Return the template of node `i` (0-based)."""
         return self.nodes[self.kind_of[i]]
 
     def ends(self, link: Link) -> Ends:
-        """The kinds of the target and the source of a link."""
+        """Return the kinds of the target and the source of a link."""
         return self.kind_of[link[0]], self.kind_of[link[1]]
 
     def map_templates(
@@ -193,6 +195,7 @@ class Equations(_Cached, HasLatex):
         """Raise ValueError unless the nodes are equal, the links are of one layer and M is the identity."""
         if not varied_too:
             self.expect_exact_links(what)
+        # The first problem that holds becomes the message.
         problems = {
             "nodes of several kinds": self.mixed,
             f"nodes that differ in {', '.join(self.varied)}": bool(self.varied) and not varied_too,
@@ -200,10 +203,10 @@ class Equations(_Cached, HasLatex):
             "nodes with a mass matrix (more than three coupled coordinates)": any(node.inertia for node in self.nodes),
             f"{len(self.layers)} layers of links": len(self.layers) > 1 and not layers_too,
         }
-        found = next((words for words, holds in problems.items() if holds), None)
-        if found is not None:
-            expected = "links of one layer" if found.endswith("layers of links") else "links that have no inertia"
-            raise ValueError(f"{what}: found {found}; expected equal nodes with {expected}")
+        problem = next((text for text, holds in problems.items() if holds), None)
+        if problem is not None:
+            expected = "links of one layer" if problem.endswith("layers of links") else "links that have no inertia"
+            raise ValueError(f"{what}: found {problem}; expected equal nodes with {expected}")
 
     def expect_exact_links(self, what: str) -> None:
         """Raise ValueError if links differ in more than the weights of their graph; the message begins with `what`."""
@@ -245,34 +248,34 @@ class Equations(_Cached, HasLatex):
 
     @cached_property
     def parameters(self) -> tuple[str, ...]:
-        """Names of all parameters, nodes first; one that differs is a_1 … a_n, or k_1_2 … of links."""
+        """Names of all parameters, nodes first; with a value for each node a_1 … a_n, for each link k_1_2 …"""
         names: list[str] = []
         for name in dict.fromkeys(s.name for node in self.nodes for s in node.parameters):
             names += [f"{name}_{i + 1}" for i in self.holders(name)] if name in self.varied else [name]
-        known = {*names, *self.varied}
+        of_nodes = {*names, *self.varied}
         for name in dict.fromkeys(s.name for edge in self.edges for s in edge.parameters):
-            if name not in known:
+            if name not in of_nodes:
                 names += self.numbered[name].names(name) if name in self.numbered else [name]
         return tuple(names)
 
     @cached_property
     def numbered(self) -> Mapping[str, Layer]:
-        """The parameters that have one number for each link, and their layers."""
+        """The parameters with a value for each link, and their layers."""
         return {name: layer for layer in self.layers for name in layer.varied}
 
     @property
     def differing(self) -> tuple[str, ...]:
-        """The parameters that have one number for each node or for each link."""
+        """The parameters with a value for each node or for each link."""
         return (*self.varied, *self.numbered)
 
     @cached_property
     def single(self) -> frozenset[str]:
         """The parameters of single nodes and links, a_1 … a_n and k_1_2 …"""
-        own = {f"{name}_{i + 1}" for name in self.varied for i in range(self.n)}
-        return frozenset(own.union(*(layer.names(name) for name, layer in self.numbered.items())))
+        of_nodes = {f"{name}_{i + 1}" for name in self.varied for i in range(self.n)}
+        return frozenset(of_nodes.union(*(layer.names(name) for name, layer in self.numbered.items())))
 
     def holders(self, name: str) -> tuple[int, ...]:
-        """The nodes (0-based) that have a parameter or a state of that name."""
+        """Return the nodes (0-based) that have a parameter or a state of that name."""
         has = [any(s.name == name for s in (*node.state, *node.parameters)) for node in self.nodes]
         return tuple(compress(count(), map(has.__getitem__, self.kind_of)))
 
@@ -285,8 +288,8 @@ class Equations(_Cached, HasLatex):
     @cached_property
     def common(self) -> frozenset[str]:
         """The components that nodes of all kinds have."""
-        first, *rest = ({s.name for s in node.state} for node in self.nodes)
-        return frozenset(first.intersection(*rest))
+        first, *others = ({s.name for s in node.state} for node in self.nodes)
+        return frozenset(first.intersection(*others))
 
     @property
     def compared(self) -> tuple[str, ...]:
@@ -300,36 +303,35 @@ class Equations(_Cached, HasLatex):
 
     @cached_property
     def places(self) -> tuple[tuple[int, ...], ...]:
-        """For each node the places of its states in the state of the network."""
-        places: list[dict[str, int]] = [{} for _ in self.kind_of]
-        slots = ((i, name) for name in self.components for i in self.holders(name))
-        for place, (i, name) in enumerate(slots):
-            places[i][name] = place
-        return tuple(tuple(own[s.name] for s in self.node_at(i).state) for i, own in enumerate(places))
+        """For each node the indices of its states in the state of the network."""
+        indices: list[dict[str, int]] = [{} for _ in self.kind_of]
+        ordered = ((i, name) for name in self.components for i in self.holders(name))
+        for index, (i, name) in enumerate(ordered):
+            indices[i][name] = index
+        return tuple(tuple(of_node[s.name] for s in self.node_at(i).state) for i, of_node in enumerate(indices))
 
     def symbols(self, i: int) -> tuple[sp.Symbol, ...]:
-        """The state symbols of node `i` (0-based)."""
+        """Return the state symbols of node `i` (0-based)."""
         return tuple(_numbered(s, i) for s in self.node_at(i).state)
 
     def at_node(self, i: int) -> dict[sp.Symbol, sp.Symbol]:
-        """The substitution that turns the node template into node `i`."""
+        """Return the substitution that turns the node template into node `i`."""
         node = self.node_at(i)
         states = dict(zip(node.state, self.symbols(i), strict=True))
         return states | {s: _numbered(s, i) for s in node.parameters if s.name in self.varied}
 
     def at_link(self, link: Link, edge: Edge) -> dict[sp.Symbol, sp.Expr]:
-        """The substitution that turns an edge template into one link."""
+        """Return the substitution that turns an edge template into one link."""
         target, source, weight = link
-        here = dict(zip(edge.here, self.symbols(target), strict=True))
-        there = dict(zip(edge.there, self.symbols(source), strict=True))
-        own = {s: _numbered(s, target) for s in edge.parameters if s.name in self.varied}
-        own |= {
-            s: sp.Symbol(self.numbered[s.name].name(s.name, link), real=True)
-            for s in edge.parameters
-            if s.name in self.numbered
-        }
-        theirs = {s: _numbered(of, source) for s, of in edge.theirs}
-        return {**here, **there, **own, **theirs, edge.weight: sp.Rational(weight.numerator, weight.denominator)}
+        values: dict[sp.Symbol, sp.Expr] = {edge.weight: sp.Rational(weight.numerator, weight.denominator)}
+        values |= zip(edge.here, self.symbols(target), strict=True)
+        values |= zip(edge.there, self.symbols(source), strict=True)
+        for s in edge.parameters:
+            if s.name in self.varied:
+                values[s] = _numbered(s, target)
+            if s.name in self.numbered:
+                values[s] = sp.Symbol(self.numbered[s.name].name(s.name, link), real=True)
+        return values | {s: _numbered(parameter, source) for s, parameter in edge.theirs}
 
     def events_at(self, i: int) -> tuple[Event, ...]:
         """Return the events of node `i` (0-based) under the forces of its links, in the symbols of the network."""
@@ -344,26 +346,32 @@ class Equations(_Cached, HasLatex):
         return tuple(e.under(force.xreplace({e.mode: sp.S.One, velocity: e.target})) for e in events)
 
     def rhs(self) -> tuple[sp.Expr, ...]:
-        """The right-hand side in state order.  The algebra grows with n: meant for small n."""
-        rates = [sp.S.Zero] * self.dimension
-        for i, places in enumerate(self.places):
-            for k, e in zip(places, self.node_at(i).rhs, strict=True):
-                rates[k] = e.xreplace(self.at_node(i))
+        """Return the right-hand side in state order.  The algebra grows with n: meant for small n."""
+        rates = self._of_nodes([node.rhs for node in self.nodes])
         for link, edge in self.linked():
             values = self.at_link(link, edge)
             for k, e in zip(self.places[link[0]], edge.rhs, strict=True):
                 rates[k] += e.xreplace(values)
         return tuple(rates)
 
+    def _of_nodes(self, by_kind: list[tuple[sp.Expr, ...]]) -> list[sp.Expr]:
+        """Return expressions for each state of a kind of node in state order, in the symbols of the network."""
+        column = [sp.S.Zero] * self.dimension
+        for i, places in enumerate(self.places):
+            for k, e in zip(places, by_kind[self.kind_of[i]], strict=True):
+                column[k] = e.xreplace(self.at_node(i))
+        return column
+
     def mass(self) -> dict[tuple[int, int], sp.Expr]:
-        """The non-zero entries of M by (row, column); empty if M is the identity."""
+        """Return the non-zero entries of M by (row, column); empty if M is the identity."""
         if not self.inertial:
             return {}
         places = self.places
         entries: dict[tuple[int, int], sp.Expr] = {}
-        for i, own in enumerate(places):
+        for i, rows in enumerate(places):
             inertia = self.node_at(i).inertia
-            entries |= _block(inertia, own, own, self.at_node(i)) if inertia else {(k, k): sp.S.One for k in own}
+            # Where some nodes have inertia and others none, M is the identity for the latter.
+            entries |= _block(inertia, rows, rows, self.at_node(i)) if inertia else {(k, k): sp.S.One for k in rows}
         for link, edge in self.linked():
             values = self.at_link(link, edge)
             for block, end in zip(edge.inertia, link[:2], strict=False):
@@ -372,7 +380,7 @@ class Equations(_Cached, HasLatex):
         return {key: entries[key] for key in sorted(entries) if entries[key] != 0}
 
     def jacobian(self) -> dict[tuple[int, int], sp.Expr]:
-        """The non-zero entries of d(rhs)/d(state) by (row, column), in state order."""
+        """Return the non-zero entries of d(rhs)/d(state) by (row, column), in state order."""
         entries: dict[tuple[int, int], sp.Expr] = {}
         blocks = [node.jacobian() for node in self.nodes]
         for i, places in enumerate(self.places):
@@ -382,7 +390,7 @@ class Equations(_Cached, HasLatex):
         return {key: entries[key] for key in sorted(entries) if entries[key] != 0}
 
     def link_jacobian(self) -> Iterator[Entry]:
-        """Yield ((row, column), entry) for what each link adds to the Jacobian; keys repeat."""
+        """Yield ((row, column), entry) for the term of each link in the Jacobian; keys repeat."""
         places = self.places
         blocks = {edge: (edge.jacobian_here(), edge.jacobian_there()) for edge in self.edges}
         for link, edge in self.linked():
@@ -392,18 +400,14 @@ class Equations(_Cached, HasLatex):
             yield from _block(there, places[link[0]], places[link[1]], values)
 
     def time_derivative(self) -> tuple[sp.Expr, ...]:
-        """The partial derivative of the right-hand side with respect to time, in state order."""
-        slopes = [node.time_derivative() for node in self.nodes]
-        rates = [sp.S.Zero] * self.dimension
-        for i, places in enumerate(self.places):
-            for k, e in zip(places, slopes[self.kind_of[i]], strict=True):
-                rates[k] = e.xreplace(self.at_node(i))
+        """Return the partial derivative of the right-hand side with respect to time, in state order."""
+        rates = self._of_nodes([node.time_derivative() for node in self.nodes])
         for k, e in self.link_time_derivative():
             rates[k] += e
         return tuple(rates)
 
     def link_time_derivative(self) -> Iterator[tuple[int, sp.Expr]]:
-        """Yield (place, entry) for what each link adds to the partial derivative by time; places repeat."""
+        """Yield (row, entry) for the term of each link in the partial derivative by time; rows repeat."""
         slopes = {edge: edge.time_derivative() for edge in self.edges if edge.forced}
         for link, edge in self.linked() if slopes else ():
             for k, e in zip(self.places[link[0]], slopes.get(edge, ()), strict=False):
@@ -413,6 +417,7 @@ class Equations(_Cached, HasLatex):
     @cached_property
     def digest(self) -> str:
         """Hexadecimal SHA-256 of the equations; equal equations have equal digests."""
+        # Parts are added only where a feature occurs, so that digests of other equations stay the same.
         first, *others = self.nodes
         large = any(len(pairs) > DIGEST_LIMIT for _, pairs in self.fields)
         links = repr([layer.links for layer in self.layers] if large else tuple(self.links))
@@ -433,14 +438,14 @@ class Equations(_Cached, HasLatex):
 
 
 def _renamed(names: Iterable[str], renamed: Mapping[sp.Symbol, sp.Symbol] | None) -> Iterator[str]:
-    """Names of parameters, of which some symbols are new."""
+    """Yield the names of parameters after their symbols are renamed."""
     for name in names:
         s = sp.Symbol(name, real=True)
         yield name if renamed is None else renamed.get(s, s).name
 
 
 def _numbered(s: sp.Symbol, i: int) -> sp.Symbol:
-    """The symbol of a template at node `i` (0-based)."""
+    """Return the symbol of a template at node `i` (0-based)."""
     return sp.Symbol(f"{s.name}_{i + 1}", real=True)
 
 
@@ -461,37 +466,54 @@ def check(eq: Equations) -> None:
     """Raise ValueError if nodes, links and names do not fit together (see `Equations`)."""
     if eq.n < 1:
         raise ValueError(f"a network needs at least one node, found n = {eq.n}")
-    _check_kinds(eq)
-    _check_links(eq)
-    _check_numbered(eq)
-    _check_names(eq)
-
-
-def _check_kinds(eq: Equations) -> None:
     if set(eq.kind_of) != set(range(len(eq.nodes))):
         raise ValueError(f"kinds of nodes: found {len(eq.nodes)} templates and the kinds {sorted(set(eq.kind_of))}")
-    if eq.sticks and eq.mixed:
+    if eq.sticks:
+        _check_friction(eq)
+    _check_links(eq)
+    _check_numbered(eq)
+
+    # Each name has one meaning.
+    of_nodes = {s.name for node in eq.nodes for s in node.parameters}
+    for name in eq.varied:
+        if name not in of_nodes:
+            raise ValueError(f"{name!r} has a value for each node, but no node has it as a parameter")
+    twice = next((name for name, times in Counter(eq.parameters).items() if times > 1), None)
+    if twice is not None:
+        raise ValueError(f"the name {twice!r} stands for two parameters; rename one")
+    states = chain(eq.state, (s.name for node in eq.nodes for s in node.state))
+    taken = sorted(set(eq.parameters).intersection(states))
+    if taken:
+        raise ValueError(f"the parameter {taken[0]!r} has the name of a state variable; rename it")
+
+
+def _check_friction(eq: Equations) -> None:
+    """Raise ValueError for networks in which set-valued friction is not supported."""
+    if eq.mixed:
         raise ValueError(
             "nodes of several kinds: found set-valued friction; expected smooth contacts; use contact 'atan'"
         )
-    if eq.sticks and eq.inertial:
+    if eq.inertial:
         raise ValueError("links with inertia: found set-valued friction; expected a smooth contact; use contact 'atan'")
-    if eq.sticks and (len(eq.layers) > 1 or any(edge.forced or edge.theirs for edge in eq.edges)):
+    if len(eq.layers) > 1 or any(edge.forced or edge.theirs for edge in eq.edges):
         found = "several layers" if len(eq.layers) > 1 else "time, or a parameter of the source that differs,"
         raise ValueError(
             f"links with set-valued friction: found {found}; expected one layer of links of the states; use contact 'atan'"
         )
+
+
+def _check_links(eq: Equations) -> None:
+    """Raise ValueError for templates that do not fit their nodes, and for links between nodes that do not exist."""
     for (target, source), edge in (pair for layer in eq.layers for pair in layer.edge_of):
         for end, symbols in ((target, edge.here), (source, edge.there)):
             states = len(eq.nodes[end].state)
             if len(symbols) != states:
                 raise ValueError(f"the edge joins nodes of {len(symbols)} states, the node has {states}")
-        for s, own in edge.theirs:
-            if own.name not in eq.varied:
-                raise ValueError(f"the edge takes {own.name!r} of its source as {s.name!r}, but all nodes share it")
-
-
-def _check_links(eq: Equations) -> None:
+        for s, parameter in edge.theirs:
+            if parameter.name not in eq.varied:
+                raise ValueError(
+                    f"the edge takes {parameter.name!r} of its source as {s.name!r}, but all nodes share it"
+                )
     for edge, pairs in eq.fields:
         if pairs.n != eq.n or eq.mixed or separated(edge, eq.varied) is None:
             raise ValueError(
@@ -511,36 +533,15 @@ def _check_links(eq: Equations) -> None:
 
 
 def _check_numbered(eq: Equations) -> None:
+    """Raise ValueError for parameters with a value for each link that no link has, or links of two layers."""
     for name, layer in eq.numbered.items():
-        if sum(name in own.varied for own in eq.layers) > 1 or isinstance(layer.links, AllPairs):
+        if sum(name in each.varied for each in eq.layers) > 1 or isinstance(layer.links, AllPairs):
             raise ValueError(f"{name!r} has a number for each link of two layers, or of all pairs; expected one list")
         if not any(s.name == name for _, edge in layer.edge_of for s in edge.parameters):
             raise ValueError(f"{name!r} has a number for each link, but no link of its layer has it as a parameter")
     for layer in (layer for layer in eq.layers if layer.mutual):
         pairs = {link[:2] for link in layer.links}
+        # A value of an edge needs a link in either direction.
         back = next(((i, j) for i, j in pairs if (j, i) not in pairs), None)
         if back is not None:
             raise ValueError(f"numbers of edges: link {back[0]} <- {back[1]} has none that runs back")
-
-
-def _check_names(eq: Equations) -> None:
-    own = {s.name for node in eq.nodes for s in node.parameters}
-    for name in eq.varied:
-        if name not in own:
-            raise ValueError(f"{name!r} has a value for each node, but no node has it as a parameter")
-    twice = _repeated(eq.parameters)
-    if twice is not None:
-        raise ValueError(f"the name {twice!r} stands for two parameters; rename one")
-    states = chain(eq.state, (s.name for node in eq.nodes for s in node.state))
-    taken = sorted(set(eq.parameters).intersection(states))
-    if taken:
-        raise ValueError(f"the parameter {taken[0]!r} has the name of a state variable; rename it")
-
-
-def _repeated(names: Iterable[str]) -> str | None:
-    seen: set[str] = set()
-    for name in names:
-        if name in seen:
-            return name
-        seen.add(name)
-    return None

@@ -1,9 +1,8 @@
 """Transversal modes of links with inertia: one strength for their stiffness and their inertia.
 
-A mode of strength alpha = -sigma gamma obeys (1 + alpha B) d' = (J - alpha H) d; B is the inertia of
-a link over sigma at equal states.  If B B = b B and B H = b H with a number b (the forces and the
-inertia of a link act on the same coordinates), this is d' = (J - tau (H + B J)) d with
-tau = alpha/(1 + b alpha), which is linear in one strength again.
+A mode of strength alpha = -sigma gamma obeys (1 + alpha B) d' = (J - alpha H) d, with the inertia B of a link over sigma
+at equal states.  If B B = b B and B H = b H with a number b (forces and inertia of a link act on the same coordinates),
+then d' = (J - tau (H + B J)) d with tau = alpha/(1 + b alpha), which is linear in one strength again.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from .equations import Equations
 
 
 def inertia_of_modes(equations: Equations) -> tuple[sp.Matrix, sp.Expr]:
-    """Return the inertia of links as modes feel it."""
+    """Return B and b of the links, both 0 without inertia; raise ValueError if there is no such b."""
     node = equations.node
     size = len(node.state)
     edge = equations.edge if equations.inertial_links else None
@@ -29,17 +28,14 @@ def inertia_of_modes(equations: Equations) -> tuple[sp.Matrix, sp.Expr]:
         )
     sigma = strength(edge, node.parameters)
     equal = dict(zip((*edge.here, *edge.there), node.state * 2, strict=True))
-    own = here.xreplace(equal)
-    b_matrix = own.xreplace({edge.weight: sp.S.One}).diff(sigma)
-    known = {*node.state, *node.parameters}
-    if (own - sigma * edge.weight * b_matrix).applyfunc(sp.simplify) != sp.zeros(size, size) or (
-        b_matrix.free_symbols - known
-    ):
+    at_equal = here.xreplace(equal)
+    b_matrix = at_equal.xreplace({edge.weight: sp.S.One}).diff(sigma)
+    proportional = (at_equal - sigma * edge.weight * b_matrix).applyfunc(sp.simplify) == sp.zeros(size, size)
+    if not proportional or b_matrix.free_symbols - {*node.state, *node.parameters}:
         raise ValueError("the inertia of links is not proportional to sigma; a mode has no single strength alpha")
-    share = sp.simplify(b_matrix.trace() / b_matrix.rank())
-    if share.has(*node.state) or (b_matrix * b_matrix - share * b_matrix).applyfunc(sp.simplify) != sp.zeros(
-        size, size
-    ):
+    share = sp.simplify(b_matrix.trace() / b_matrix.rank())  # b: B/b is a projector, whose trace is its rank
+    residual = (b_matrix * b_matrix - share * b_matrix).applyfunc(sp.simplify)
+    if share.has(*node.state) or residual != sp.zeros(size, size):
         raise ValueError(
             "links have inertia that joins coordinates by different masses, or masses that depend on the state; a mode has "
             "no single strength alpha; expected one mass for all coordinates that a link joins"
@@ -48,7 +44,7 @@ def inertia_of_modes(equations: Equations) -> tuple[sp.Matrix, sp.Expr]:
 
 
 def effective_slope(equations: Equations, slope: sp.Matrix) -> sp.Matrix:
-    """Return the matrix that multiplies the strength of a mode."""
+    """Return the matrix that multiplies the strength tau of a mode, H + B J."""
     b_matrix, share = inertia_of_modes(equations)
     if share == 0:
         return slope

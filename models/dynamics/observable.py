@@ -1,7 +1,7 @@
-"""What a run observes: expressions of the states, reduced over the nodes and then over the window.
+"""Observables of a run: expressions of the states, reduced over the nodes and then over the window.
 
-Symbols inside ``nodes.mean(…)`` and its like, and those of a value for each node, are states and parameters of one
-node: ``x``.  The names of the network's states, ``x_1`` … ``x_n``, are known everywhere.
+Symbols inside ``nodes.mean(…)`` and other reductions, and those of a value for each node, are states and parameters of one
+node: ``x``.  The states of the network, ``x_1`` … ``x_n``, may occur everywhere.
 """
 
 from __future__ import annotations
@@ -17,36 +17,9 @@ from sympy.core.function import AppliedUndef
 from ..inputs.checks import short_repr
 from ..inputs.words import Word
 
-__all__ = [
-    "ENERGY",
-    "AtNode",
-    "Energy",
-    "NodeMaximum",
-    "NodeMean",
-    "NodeMinimum",
-    "NodeSum",
-    "Nodes",
-    "Observable",
-    "Rate",
-    "Reduction",
-    "RowSum",
-    "Rows",
-    "Window",
-    "end",
-    "energy",
-    "maximum",
-    "mean",
-    "minimum",
-    "node_symbols",
-    "nodes",
-    "rate",
-    "real",
-    "variance",
-]
-
 
 class Window(Word):
-    """What is kept of a value over the window."""
+    """Reductions of a value over the window."""
 
     MEAN = "mean"
     MAXIMUM = "maximum"
@@ -72,7 +45,7 @@ class Rate(_Real):
 
 
 class Reduction(_Real):
-    """One value out of those of all nodes."""
+    """One value computed from the values of all nodes."""
 
 
 class NodeSum(Reduction):
@@ -107,7 +80,9 @@ class AtNode(Reduction):
 
 
 class RowSum(Reduction):
-    """The sum of a value over some `Rows`, those of the number that is its argument."""
+    """The sum of a value over the `Rows` whose index is its argument."""
+
+    spelling = "rows.sum"
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,20 +90,22 @@ class Rows:
     """A value at each of some nodes or links."""
 
     value: sp.Expr  # an expression of the symbols in `at`, of parameters that all share, and of t
-    # what a symbol is in each row: names of states, or of parameters, or numbers
+    # For a symbol its value in each row: names of states or parameters, or numbers.
     at: tuple[tuple[sp.Symbol, tuple[str, ...] | tuple[float, ...]], ...]
     count: int  # the number of rows
 
     @classmethod
-    def of(cls, value: sp.Expr, places: Sequence[Mapping[sp.Symbol, sp.Expr]]) -> Rows:
-        """Return the rows of a value whose symbols are a symbol of the network or a number in each of some places."""
-        used = sorted(value.free_symbols & set(places[0]), key=lambda s: s.name)
-        found = {s: tuple(place[s] for place in places) for s in used}
-        fixed = {s: row[0] for s, row in found.items() if len(set(row)) == 1}
-        rows = (
-            (s, tuple(e.name if e.is_Symbol else float(e) for e in row)) for s, row in found.items() if s not in fixed
+    def of(cls, value: sp.Expr, substitutions: Sequence[Mapping[sp.Symbol, sp.Expr]]) -> Rows:
+        """Return the rows of a value; a substitution for each row gives a symbol of the network or a number."""
+        used = sorted(value.free_symbols & set(substitutions[0]), key=lambda s: s.name)
+        columns = {s: tuple(row[s] for row in substitutions) for s in used}
+        fixed = {s: column[0] for s, column in columns.items() if len(set(column)) == 1}
+        at = (
+            (s, tuple(e.name if e.is_Symbol else float(e) for e in column))
+            for s, column in columns.items()
+            if s not in fixed
         )
-        return cls(value.xreplace(fixed), tuple(rows), len(places))
+        return cls(value.xreplace(fixed), tuple(at), len(substitutions))
 
     @property
     def names(self) -> frozenset[str]:
@@ -145,7 +122,7 @@ energy = Energy("energy", real=True)
 """The energy of the whole network, of its nodes and its links."""
 
 ENERGY = sp.Symbol(energy.name, real=True)
-"""What stands for it in values, which are made of plain symbols."""
+"""The plain symbol of the energy in values."""
 
 
 class Nodes:
@@ -169,8 +146,8 @@ class Nodes:
 
     def std(self, value: object) -> sp.Expr:
         """Return the standard deviation of a value over the nodes, of n and not of n - 1 of them."""
-        own = real(value)
-        return sp.sqrt(NodeMean((own - NodeMean(own)) ** 2))
+        e = real(value)
+        return sp.sqrt(NodeMean((e - NodeMean(e)) ** 2))
 
     def __getitem__(self, number: int) -> Callable[[object], sp.Expr]:
         """Return the function that takes the value of one node, counted from 1."""
@@ -180,15 +157,15 @@ class Nodes:
 
 
 nodes = Nodes()
-"""The nodes of the network, whose values expressions of observables reduce."""
+"""The nodes of the network, in observables."""
 
 
 def _linear(kind: type[Reduction], value: object, **more: sp.Expr) -> sp.Expr:
-    """A reduction of the real and of the imaginary part."""
-    own = _made_real(value)
-    if not own.has(sp.I):
-        return kind(own, *more.values())
-    parts = own.as_real_imag()
+    """Reduce the real and the imaginary part."""
+    e = _made_real(value)
+    if not e.has(sp.I):
+        return kind(e, *more.values())
+    parts = e.as_real_imag()
     return kind(parts[0], *more.values()) + sp.I * kind(parts[1], *more.values())
 
 
@@ -197,45 +174,45 @@ def rate(state: object) -> sp.Expr:
 
     Its mean is the difference of the states at the ends of the window, over the length of the window.
     """
-    own = real(state)
-    if not own.is_Symbol:
-        raise ValueError(f"rate: found {short_repr(own)}; expected one state, such as rate(theta)")
-    return Rate(own)
+    e = real(state)
+    if not e.is_Symbol:
+        raise ValueError(f"rate: found {short_repr(e)}; expected one state, such as rate(theta)")
+    return Rate(e)
 
 
 def _made_real(value: object) -> sp.Expr:
-    """An expression with real symbols and exact numbers; functions of time become states, their derivatives rates."""
+    """Return an expression with real symbols and exact numbers; functions of time become states, derivatives rates."""
     if isinstance(value, bool) or not isinstance(value, int | float | sp.Expr):
         kind = type(value).__name__
         raise TypeError(f"observable: found {short_repr(value)} ({kind}); expected an expression of states")
     e = sp.sympify(value)
-    e = e.replace(lambda p: isinstance(p, sp.Derivative) and isinstance(p.expr, AppliedUndef), _as_rate)
+
+    # d theta(t)/dt is the rate of theta, and theta(t) the state theta.
+    derivatives = {p for p in e.atoms(sp.Derivative) if isinstance(p.expr, AppliedUndef)}
+    for p in sorted(derivatives, key=str):
+        if p.derivative_count != 1:
+            raise ValueError(f"observable: found {short_repr(p)}; expected first derivatives of states by time")
+    rates = {p: Rate(sp.Symbol(p.expr.func.__name__, real=True)) for p in derivatives}
+    e = e.xreplace(rates)
     states = {p: sp.Symbol(p.func.__name__, real=True) for p in e.atoms(AppliedUndef)}
+
     symbols = {s: sp.Symbol(s.name, real=True) for s in e.free_symbols}
-    numbers = {number: _exact(number) for number in e.atoms(sp.Float)}
+    numbers = {}
+    for number in e.atoms(sp.Float):
+        if not number.is_finite:
+            raise ValueError(f"observable: found {number}; expected finite real numbers")
+        numbers[number] = sp.Rational(repr(float(number)))
     return e.xreplace(states).xreplace({**symbols, **numbers})
-
-
-def _as_rate(derivative: sp.Derivative) -> sp.Expr:
-    if derivative.derivative_count != 1:
-        raise ValueError(f"observable: found {short_repr(derivative)}; expected first derivatives of states by time")
-    return Rate(sp.Symbol(derivative.expr.func.__name__, real=True))
-
-
-def _exact(number: sp.Float) -> sp.Rational:
-    if not number.is_finite:
-        raise ValueError(f"observable: found {number}; expected finite real numbers")
-    return sp.Rational(repr(float(number)))
 
 
 def real(value: object) -> sp.Expr:
     """Return an expression with real symbols and exact numbers."""
-    own = _made_real(value)
-    if own.has(sp.I):
-        own = sp.expand_complex(own)
-    if own.has(sp.I, sp.re, sp.im, sp.zoo, sp.nan, sp.oo):
-        raise ValueError(f"observable: found {short_repr(own)}; expected a real value; take abs(…) of a complex one")
-    return own
+    e = _made_real(value)
+    if e.has(sp.I):
+        e = sp.expand_complex(e)
+    if e.has(sp.I, sp.re, sp.im, sp.zoo, sp.nan, sp.oo):
+        raise ValueError(f"observable: found {short_repr(e)}; expected a real value; take abs(…) of a complex one")
+    return e
 
 
 def node_symbols(e: sp.Expr) -> Iterator[sp.Symbol]:
@@ -249,7 +226,7 @@ def node_symbols(e: sp.Expr) -> Iterator[sp.Symbol]:
 
 @dataclass(frozen=True, slots=True)
 class Observable:
-    """A value of the network, or of each node, and what is kept of it over the window.
+    """A value of the network, or of each node, and its reduction over the window.
 
     `mean`, `maximum`, `minimum`, `end` and `variance` make observables.
 

@@ -1,4 +1,4 @@
-"""Observables as text: ``mean(nodes.mean(v**2/2))``; nothing in a text is run."""
+"""Observables as text: ``mean(nodes.mean(v**2/2))``, parsed without running it."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from ..inputs.reader import Algebra, NoMeaning, ParsedText, parse, unpaired
 from .observable import Observable, Window, nodes, rate, real
 
 LENGTH = 4000
-"""Most characters."""
+"""Most characters of a text (a choice)."""
 
-KNOWN: Mapping[str, Callable[..., sp.Expr]] = {
+VALUE_FUNCTIONS: Mapping[str, Callable[..., sp.Expr]] = {
     **FUNCTIONS,
     **COMPOSED,
     "rate": rate,
@@ -27,13 +27,13 @@ KNOWN: Mapping[str, Callable[..., sp.Expr]] = {
 """The functions of observables, by their names in text."""
 
 SPELLINGS = {"Abs": "abs", "Max": "max", "Min": "min", "Mod": "mod"}
-"""How SymPy spells some of them."""
+"""Names of functions in texts that SymPy prints, and in `VALUE_FUNCTIONS`."""
 
 _ONE_NODE = re.compile(r"nodes\[(\d+)\]")
 
 
 def as_observable(what: str, value: object) -> Observable:
-    """Return an observable in the form that its text says, from an observable or from a text."""
+    """Return an observable in the form that its text reproduces, from an observable or from a text."""
     if isinstance(value, Observable):
         return _read(what, str(value))
     if not isinstance(value, str):
@@ -45,7 +45,7 @@ def as_observable(what: str, value: object) -> Observable:
 
 
 def as_value(what: str, value: object) -> sp.Expr:
-    """Return an expression of states in the form that its text says, from an expression or from a text.
+    """Return an expression of states in the form that its text reproduces, from an expression or from a text.
 
     Parameters and errors are those of `as_observable`, without a window.
     """
@@ -69,18 +69,19 @@ def _read(what: str, text: str) -> Observable:
 
 
 def _parsed(what: str, text: str, example: str) -> ParsedText:
-    """The expression that a text is; ValueError with an example for any other text."""
+    """Parse a text; raise ValueError with an example if it is no expression."""
     if len(text) > LENGTH:
         raise ValueError(f"{what}: found {len(text)} characters; expected at most {LENGTH}; define parts of it")
     expression = parse(text)
     if expression is None:
-        found = f"{short_repr(text)}{unpaired(text)}"
-        raise ValueError(f"{what}: unreadable expression {found}; expected such as {example!r}")
+        raise ValueError(
+            f"{what}: unreadable expression {short_repr(text)}{unpaired(text)}; expected such as {example!r}"
+        )
     return expression
 
 
 def _real(what: str, expression: ParsedText) -> sp.Expr:
-    """The value of an expression, made of real symbols."""
+    """Return the value of an expression, of real symbols."""
     try:
         return real(_OfNodes(what).read(expression))
     except ValueError as error:
@@ -96,10 +97,10 @@ class _OfNodes(Expressions):
     """Expressions of states, of any names; constants may be complex, as in abs(nodes.mean(exp(sqrt(-1)*theta)))."""
 
     deepest = 60
-    functions = KNOWN
+    functions = VALUE_FUNCTIONS
 
     def pieces(self) -> str:
-        return f"names, pi, + - * / ** and {', '.join(KNOWN)}"
+        return f"names, pi, + - * / ** and {', '.join(VALUE_FUNCTIONS)}"
 
     def name(self, name: str) -> sp.Basic:
         return sp.pi if name == "pi" else sp.Symbol(name, real=True)
@@ -113,7 +114,7 @@ class _OfNodes(Expressions):
     def function(self, name: str) -> Callable[..., sp.Expr] | None:
         one = _ONE_NODE.fullmatch(name)
         if one is None:
-            return KNOWN.get(SPELLINGS.get(name, name))
+            return VALUE_FUNCTIONS.get(SPELLINGS.get(name, name))
         try:
             return nodes[int(one[1])]
         except ValueError as error:

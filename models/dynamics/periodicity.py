@@ -17,49 +17,46 @@ from ..mechanics.jumps import JUMPING, KINKED, gaps_of
 from .equations import Equations
 
 HIGHEST, MOST_TIMES = 8, 64
-"""Highest power of waves that is written as a sum, and most shares of a period that are tried."""
+"""Highest power of waves that is written as a sum, and most fractions of a period that are tried (choices)."""
 
 LARGEST, ROUNDING = 1000, 1e-14
-"""Largest denominator of a ratio of two frequencies that is found in their values, and how well it agrees with them."""
+"""Largest denominator of a ratio of two frequencies, and the relative error at which two values have it (choices)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
     """The drive of a network, derived from its equations."""
 
-    # angular frequencies of the sines and cosines of time, expressions of the parameters
-    waves: tuple[sp.Expr, ...] = ()
-    # the angular frequency whose period 2 pi over its absolute value is the least one of the right-hand side; None if
-    # there is no such frequency. Where the values of parameters decide, it is their function `common`
+    waves: tuple[sp.Expr, ...] = ()  # angular frequencies of the sines and cosines of time, of the parameters
+    # The right-hand side has the least period 2 pi/|frequency|; None if it has none. If that depends on the values of
+    # parameters, the frequency is their function `common`.
     frequency: sp.Expr | None = None
-    problem: str = ""  # why there is none, or may be none at some values, as a predicate of the oscillator
-    # pi over the lengths in which other functions of time can rise and fall again, expressions of the parameters:
-    # sqrt(pi)/w for exp(-(t/w)**2)
+    problem: str = ""  # the reason for no period, or none at some values, as a predicate of the oscillator
+    # pi over the lengths in which other functions of time rise and fall again: sqrt(pi)/w for exp(-(t/w)**2).
     bends: tuple[sp.Expr, ...] = ()
-    # expressions of time and the parameters at whose zeros the drive jumps or has a kink
-    gaps: tuple[sp.Expr, ...] = ()
-    # those at whose zeros a part of the drive rises once, as tanh, within the time in which they change by about one
+    gaps: tuple[sp.Expr, ...] = ()  # expressions of time at whose zeros the drive jumps or has a kink
+    # Expressions at whose zeros a part of the drive, such as tanh, rises once while the expression changes by about one.
     rises: tuple[sp.Expr, ...] = ()
 
     @property
     def paces(self) -> tuple[sp.Expr, ...]:
-        """pi over each of the lengths in which the drive can rise and fall again."""
+        """pi over each of the lengths in which the drive rises and falls again."""
         return (*self.waves, *self.bends)
 
     @property
     def by_values(self) -> bool:
-        """True if there is a period at some values of the parameters alone."""
+        """True if the values of the parameters decide whether there is a period."""
         return self.frequency is not None and self.frequency.has(common)
 
 
 class common(sp.Function):
-    """The largest number of which some numbers, those that are 0 left out, are whole multiples; nan if there is none."""
+    """The largest number of which all arguments other than 0 are integer multiples; nan if there is none."""
 
     is_real = True
 
 
 def _common(*waves: float) -> float:
-    """The value of `common`, from ratios of small whole numbers that agree to rounding."""
+    """Return the value of `common`, from ratios of small integers that agree to rounding."""
     moving = [abs(wave) for wave in waves if wave]
     if not moving:
         return 0.0
@@ -79,38 +76,47 @@ def drive_of(templates: tuple[Node | Edge, ...], varied: tuple[str, ...] = ()) -
     """Return the drive of a network."""
     if not any(template.forced for template in templates):
         return Drive(problem="is not driven")
-    sided, risen = (set[sp.Expr]().union(*map(of, templates)) for of in (gaps, rises))
-    bends, zeros, turns = (tuple(sorted(e, key=sp.default_sort_key)) for e in (_bends(templates), sided, risen))
+    jumping, rising = (set[sp.Expr]().union(*map(of, templates)) for of in (gaps, rises))
+    bends, zeros, turns = (tuple(sorted(e, key=sp.default_sort_key)) for e in (_bends(templates), jumping, rising))
     return replace(_periodic(templates, varied), bends=bends, gaps=zeros, rises=turns)
 
 
 def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Drive:
-    """The waves of a driven network and the largest frequency of which all are multiples, whatever form the rates have."""
-    waves: set[sp.Expr] = set()
-    rest = [_without_waves(e, _local(template), waves) for template in templates for e in template.rhs]
-    found = tuple(sorted(waves, key=sp.default_sort_key))
-    if any(e.has(TIME) for e in rest):
-        return Drive(found, problem="depends on time other than by sines and cosines of a t + b, a constant")
-    own = sorted({s.name for wave in found for s in wave.free_symbols} & set(varied))
-    if own:
-        return Drive(
-            found, problem=f"is driven at a frequency that differs from node to node or link to link ({', '.join(own)})"
-        )
+    """Return the waves of a driven network and the largest frequency of which all are integer multiples."""
+    # All frequencies, as the rates are written. Time must occur in sines and cosines alone.
+    frequencies: set[sp.Expr] = set()
+    without = [_without_waves(e, _local(template), frequencies) for template in templates for e in template.rhs]
+    waves = tuple(sorted(frequencies, key=sp.default_sort_key))
+    if any(e.has(TIME) for e in without):
+        return Drive(waves, problem="depends on time other than by sines and cosines of a t + b, a constant")
+    differing = sorted({s.name for wave in waves for s in wave.free_symbols} & set(varied))
+    if differing:
+        problem = f"is driven at a frequency that differs from node to node or link to link ({', '.join(differing)})"
+        return Drive(waves, problem=problem)
+
+    # Products and powers as sums of waves: cos(w t)**2 has the frequency 2 w alone.
     rates = [(_sum_of_waves(e), _local(template)) for template in templates for e in template.rhs if e.has(TIME)]
     summed: set[sp.Expr] = set()
     for e, states in rates:
         _without_waves(e, states, summed)
-    paces = tuple(sorted(summed, key=sp.default_sort_key)) or found
+    paces = tuple(sorted(summed, key=sp.default_sort_key)) or waves
     ratios = [sp.cancel(wave / paces[0]) for wave in paces]
-    strange = next((wave for wave, ratio in zip(paces, ratios, strict=True) if not ratio.is_Rational), None)
-    if strange is not None:  # the values of the parameters decide
-        return Drive(found, common(*paces), f"is driven at {paces[0]} and {strange}, which have no common period")
+    other = next((wave for wave, ratio in zip(paces, ratios, strict=True) if not ratio.is_Rational), None)
+    if other is not None:  # the values of the parameters decide
+        return Drive(waves, common(*paces), f"is driven at {paces[0]} and {other}, which have no common period")
     share = sp.Rational(math.gcd(*(int(r.p) for r in ratios)), math.lcm(*(int(r.q) for r in ratios)))
-    return Drive(found, _multiple(rates, share * paces[0]) * share * paces[0])
+    frequency = share * paces[0]
+
+    # Rates may repeat themselves earlier, as |sin(w t)| does; products of 2, 3 and 5 are tried.
+    times = 1
+    for k in (2, 3, 5):
+        while times < MOST_TIMES and all(_repeats(e, states, frequency, k * times) for e, states in rates):
+            times *= k
+    return Drive(waves, times * share * paces[0])
 
 
 def _sum_of_waves(e: sp.Expr) -> sp.Expr:
-    """Write products and powers of sines and cosines of time as sums; what is free of time stays as it is."""
+    """Write products and powers of sines and cosines of time as sums; keep factors without time."""
     free: dict[sp.Basic, sp.Dummy] = {}
 
     def without_free(part: sp.Basic) -> sp.Basic:
@@ -127,17 +133,8 @@ def _sum_of_waves(e: sp.Expr) -> sp.Expr:
     return timed.xreplace({dummy: part for part, dummy in free.items()})
 
 
-def _multiple(rates: list[tuple[sp.Expr, set[sp.Symbol]]], frequency: sp.Expr) -> int:
-    """How many times the rates repeat themselves in the period of a frequency: products of 2, 3 and 5 are tried."""
-    times = 1
-    for k in (2, 3, 5):
-        while times < MOST_TIMES and all(_repeats(e, states, frequency, k * times) for e, states in rates):
-            times *= k
-    return times
-
-
 def _repeats(e: sp.Expr, states: set[sp.Symbol], frequency: sp.Expr, parts: int) -> bool:
-    """Whether a rate is the same a part of a period later, for all values of its waves."""
+    """Return True if a rate is the same 1/parts of a period later."""
     slopes = {wave: _slope(wave, states) for wave in e.atoms(sp.sin, sp.cos)}
     turns = {
         wave: 2 * sp.pi / parts * sp.cancel(slope / frequency) for wave, slope in slopes.items() if slope is not None
@@ -147,7 +144,7 @@ def _repeats(e: sp.Expr, states: set[sp.Symbol], frequency: sp.Expr, parts: int)
 
 
 def _ordered(e: sp.Expr) -> sp.Expr:
-    """Write choices between two cases with the condition that comes first; both hold at no more than single times."""
+    """Write choices between two cases with the condition that SymPy sorts first; at isolated times they may differ."""
 
     def chosen(*cases: tuple[sp.Expr, sp.Basic]) -> sp.Expr:
         if len(cases) != 2 or cases[1][1] != sp.true or not isinstance(cases[0][1], Relational):
@@ -161,27 +158,27 @@ def _ordered(e: sp.Expr) -> sp.Expr:
 
 
 def _local(template: Node | Edge) -> set[sp.Symbol]:
-    """What is no constant of a whole network: the states, and what differs from link to link."""
+    """Return the symbols that are no constants of a network: states, weights and parameters of sources."""
     if isinstance(template, Node):
         return set(template.state)
     return {*template.here, *template.there, template.weight, *(s for s, _ in template.theirs)}
 
 
-def _without_waves(e: sp.Expr, states: set[sp.Symbol], found: set[sp.Expr]) -> sp.Expr:
+def _without_waves(e: sp.Expr, states: set[sp.Symbol], frequencies: set[sp.Expr]) -> sp.Expr:
     """Replace each sine and cosine of a t + b by a symbol; collect the frequencies a."""
 
     def note(wave: sp.Expr) -> sp.Expr:
         slope = _slope(wave, states)
         if slope is None:
             return wave
-        found.add(slope)
+        frequencies.add(slope)
         return sp.Symbol("wave")
 
     return e.replace(lambda a: isinstance(a, sp.sin | sp.cos) and a.has(TIME), note)
 
 
 def _slope(wave: sp.Expr, states: set[sp.Symbol]) -> sp.Expr | None:
-    """The constant a of a function of a t + b; None for any other argument."""
+    """Return the constant a of a function of a t + b; None for any other argument."""
     if not wave.has(TIME):
         return None
     slope = sp.diff(wave.args[0], TIME)
@@ -190,20 +187,20 @@ def _slope(wave: sp.Expr, states: set[sp.Symbol]) -> sp.Expr | None:
 
 
 def _bends(templates: tuple[Node | Edge, ...]) -> set[sp.Expr]:
-    """pi over the lengths in which functions of time alone can rise and fall again, sines and cosines left out."""
-    found: set[sp.Expr] = set()
+    """Return pi over the lengths in which functions of time alone rise and fall again, without sines and cosines."""
+    bends: set[sp.Expr] = set()
     for template in templates:
         states = _local(template)
         for e in template.rhs:
             for part in e.atoms(sp.Function, sp.Max, sp.Min, sp.Pow, Relational):
                 for inner, power in _bent(part):
                     if inner.has(TIME) and not inner.free_symbols & states:
-                        found |= set(_paces(sp.expand(inner), power, isinstance(part, sp.cosh)))
-    return found
+                        bends |= set(_paces(sp.expand(inner), power, isinstance(part, sp.cosh)))
+    return bends
 
 
 def _bent(part: sp.Basic) -> Iterator[tuple[sp.Expr, int]]:
-    """What a part is a function of that is not linear, and to what power it raises it."""
+    """Yield the arguments of a nonlinear function, each with the power to which it is raised."""
     if isinstance(part, Relational):
         yield part.lhs - part.rhs, 1
     elif isinstance(part, sp.Pow):
@@ -214,52 +211,54 @@ def _bent(part: sp.Basic) -> Iterator[tuple[sp.Expr, int]]:
 
 
 def gaps(template: Node | Edge) -> set[sp.Expr]:
-    """What passes zero at the jumps and kinks of functions of time alone in the rates of a template."""
+    """Return the expressions that pass zero at jumps and kinks of functions of time alone in the rates of a template."""
     parts = {part for e in template.rhs for part in e.atoms(*KINKED, *JUMPING, Relational)}
     return _of_time(template, (gap for part in parts for gap in gaps_of(part)))
 
 
 def rises(template: Node | Edge) -> set[sp.Expr]:
-    """What passes zero where functions of time alone rise once and stay; two of them make a window.
+    """Return expressions that pass zero where functions of time alone rise once and stay; two of them make a window.
 
     A function that rises and falls again at one place, such as tanh**2, tanh tanh or exp(-|t|), counts as two.
     """
-    found: set[sp.Expr] = set()
+    rising: set[sp.Expr] = set()
     for e in template.rhs:
-        powers = [p.base for p in e.atoms(sp.Pow) if p.exp.is_number and p.exp > 1]
+        bases = [p.base for p in e.atoms(sp.Pow) if p.exp.is_number and p.exp > 1]
         for part in e.atoms(*RISING):
-            own = set(_risen(part))
-            squared = any(base.has(part) for base in powers)
-            met = own and any(sum(f.has(part) for f in product.args) > 1 for product in e.atoms(sp.Mul))
-            turned = {gap + 2 for gap in own} if part.has(sp.Abs) or squared or met else set()
-            found |= own | turned
-    return _of_time(template, found)
+            zeros = set(_risen(part))
+            # tanh**2, tanh*tanh and exp(-|t|) fall again behind their rise: a second zero stands for the fall.
+            squared = any(base.has(part) for base in bases)
+            multiplied = zeros and any(sum(f.has(part) for f in product.args) > 1 for product in e.atoms(sp.Mul))
+            falling = {zero + 2 for zero in zeros} if part.has(sp.Abs) or squared or multiplied else set()
+            rising |= zeros | falling
+    return _of_time(template, rising)
 
 
-def _of_time(template: Node | Edge, found: Iterable[sp.Expr]) -> set[sp.Expr]:
-    """Those of some expressions that time moves, and no state of a template."""
-    return {gap for gap in found if gap.has(TIME) and not gap.free_symbols & _local(template)}
+def _of_time(template: Node | Edge, expressions: Iterable[sp.Expr]) -> set[sp.Expr]:
+    """Select the expressions that depend on time and on no state of a template."""
+    return {e for e in expressions if e.has(TIME) and not e.free_symbols & _local(template)}
 
 
 RISING = (sp.tanh, sp.erf, sp.exp, sp.Pow)
-"""What rises once: exp counts within 1/(c + d exp), and of a size."""
+"""Functions that rise once: exp counts within 1/(c + d exp), and of an absolute value."""
 
 
 def _risen(part: sp.Expr) -> Iterator[sp.Expr]:
-    """The argument of tanh and erf, that of 1/(c + d exp) from where both terms are equal; sizes without their turn."""
+    """Yield the argument of tanh and erf, and for 1/(c + d exp(x)) the distance of x from c = d exp(x), without Abs."""
     if isinstance(part, sp.Pow):
         waves = [a for a in sp.Add.make_args(part.base) if isinstance(a.as_coeff_Mul()[1], sp.exp)]
         if part.exp.is_negative and len(waves) == 1:
             factor, wave = waves[0].as_coeff_Mul()
-            rest = part.base - waves[0]
-            if factor.is_positive and rest.is_number and rest.is_positive:
-                yield wave.args[0] - sp.log(rest / factor)
+            constant = part.base - waves[0]
+            # 1/(c + d exp(x)) falls where c = d exp(x), at x = log(c/d).
+            if factor.is_positive and constant.is_number and constant.is_positive:
+                yield wave.args[0] - sp.log(constant / factor)
     elif not isinstance(part, sp.exp) or part.has(sp.Abs):
         yield part.args[0].replace(sp.Abs, lambda size: size)
 
 
 def _paces(inner: sp.Expr, power: int, even: bool) -> Iterator[sp.Expr]:
-    """pi over the lengths in which a function bends whose argument is made of waves, or is a polynomial in time.
+    """Yield pi over the lengths in which a function bends, for arguments of waves and polynomials in time.
 
     In that length waves leave their crests by pi, and a polynomial of second or higher degree, or of the first in an
     `even` function, changes by pi.
@@ -279,11 +278,12 @@ def _paces(inner: sp.Expr, power: int, even: bool) -> Iterator[sp.Expr]:
 def as_function(frequency: sp.Expr) -> Callable[..., float]:
     """Return a frequency as a function of numbers in the order of `names_in`; nan if undefined."""
     names = [sp.Symbol(name, real=True) for name in names_in(frequency)]
-    written = sp.lambdify(names, frequency, [{"common": _common}, "math"])
+    evaluate = sp.lambdify(names, frequency, [{"common": _common}, "math"])
 
-    def value(*numbers: float) -> float:
+    # Values outside the domain of a frequency, such as sqrt(-1), have none.
+    def value(*parameters: float) -> float:
         try:
-            return float(written(*numbers))
+            return float(evaluate(*parameters))
         except (ArithmeticError, TypeError, ValueError):
             return math.nan
 
@@ -291,7 +291,7 @@ def as_function(frequency: sp.Expr) -> Callable[..., float]:
 
 
 def names_in(frequency: sp.Expr) -> tuple[str, ...]:
-    """Names of the parameters that a frequency depends on."""
+    """Return the names of the parameters that a frequency depends on."""
     return tuple(sorted(s.name for s in frequency.free_symbols))
 
 
@@ -299,5 +299,5 @@ def period_of(frequency: float) -> float | None:
     """Return the period of an angular frequency; None if there is none, as at the frequency 0."""
     if not frequency:
         return None
-    found = 2 * math.pi / abs(frequency)
-    return found if 0.0 < found < math.inf else None
+    period = 2 * math.pi / abs(frequency)
+    return period if 0.0 < period < math.inf else None

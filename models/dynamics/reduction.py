@@ -1,9 +1,8 @@
 """Exact reductions of a network: constants in place of parameters, one node in place of equal ones.
 
-Nodes that start equal stay equal if they belong to one class of a balanced partition: a partition in
-which all nodes of a class feel every other class with the same total weight.  The quotient network
-has one node for each class and the same solutions.  Links inside a class drop out, because they are
-zero between equal states; such partitions are also called external equitable partitions.
+Nodes of a class that start equal stay equal if the partition is balanced: all nodes of a class feel every other class with
+the same total weight.  The quotient network has one node for each class and the same solutions.  Links inside a class drop
+out, because they are zero between equal states; such partitions are also called external equitable partitions.
 
 References
 ----------
@@ -29,7 +28,7 @@ from .equations import Equations
 
 
 class NoQuotient(ValueError):
-    """The coupling has no exact quotient network, whatever the partition."""
+    """The coupling has no exact quotient network for any partition."""
 
 
 def substitute_constants(equations: Equations, values: Mapping[str, int | Fraction]) -> Equations:
@@ -46,18 +45,20 @@ def substitute_constants(equations: Equations, values: Mapping[str, int | Fracti
             raise ValueError(f"fold: a right-hand side of the {what} is undefined at {at}; leave it a parameter")
         return value
 
-    linked = {s for edge in equations.edges for s in (*edge.parameters, *(own for _, own in edge.theirs))}
-    kept = {s for s in linked if s.name in equations.varied}
+    # Parameters of nodes that only links use stay, if they differ from node to node.
+    of_links = {s for edge in equations.edges for s in (*edge.parameters, *(of for _, of in edge.theirs))}
+    needed = {s for s in of_links if s.name in equations.varied}
     reduced = equations.map_templates(
-        lambda node: node.map(partial(change, "node")).without_unused_parameters(kept),
+        lambda node: node.map(partial(change, "node")).without_unused_parameters(needed),
         lambda edge: edge.map(partial(change, "edge")).without_unused_parameters(),
     )
+    # A layer whose links became zero drops out.
     acting = tuple(layer for layer in reduced.layers if any(edge.acts for _, edge in layer.edge_of))
     return replace(reduced, layers=acting)
 
 
 def without_drive(equations: Equations, values: Mapping[str, float]) -> Equations:
-    """Return the equations without a drive whose strength is 0; the same equations if there is none, or another drive."""
+    """Return the equations without a drive whose strength is 0; the same equations if another drive remains."""
     if not equations.forced or equations.mixed:
         return equations
     common = set(equations.parameters) - equations.single
@@ -66,8 +67,9 @@ def without_drive(equations: Equations, values: Mapping[str, float]) -> Equation
 
 @lru_cache(maxsize=64)
 def _without_drive(equations: Equations, zeros: tuple[str, ...]) -> Equations:
-    """The same for parameters that are 0; Newton's method on an orbit needs it at every step."""
+    """Set parameters of the drive to 0; cached, since Newton's method on an orbit calls it at every step."""
     rates = [*(e for node in equations.nodes for e in node.rhs), *(e for edge in equations.edges for e in edge.rhs)]
+    # Only parameters in terms with time can remove the drive.
     timed = {s.name for e in rates for term in sp.Add.make_args(e) if term.has(TIME) for s in term.free_symbols}
     quiet = substitute_constants(equations, {name: 0 for name in zeros if name in timed})
     return equations if quiet.forced or len(quiet.layers) < len(equations.layers) else quiet
@@ -97,14 +99,14 @@ def quotient(equations: Equations, colours: Sequence[Hashable]) -> tuple[Equatio
 
 
 def _balanced(equations: Equations, colours: Sequence[Hashable]) -> tuple[int, ...]:
-    """The coarsest partition with classes of one colour that is balanced in every layer."""
-    found = coarsest_balanced(equations.n, (), colours)
-    while True:
-        before = found
+    """Return the coarsest partition with classes of one colour that is balanced in every layer."""
+    classes = coarsest_balanced(equations.n, (), colours)
+    while True:  # refining for one layer may unbalance another one
+        before = classes
         for layer in equations.layers:
-            found = coarsest_balanced(equations.n, layer.links, found)
-        if found == before or len(equations.layers) < 2:
-            return found
+            classes = coarsest_balanced(equations.n, layer.links, classes)
+        if classes == before or len(equations.layers) < 2:
+            return classes
 
 
 def collapse(equations: Equations, classes: Sequence[int]) -> Equations:
@@ -120,15 +122,16 @@ def collapse(equations: Equations, classes: Sequence[int]) -> Equations:
         raise NoQuotient(f"quotient: the links differ in {', '.join(equations.numbered)}; nodes are stepped one by one")
     if equations.mixed or equations.inertial_links:
         raise NoQuotient("quotient: nodes of several kinds or links with inertia are stepped one by one")
+    # Weights of links to one class are added, links inside a class dropped.
     for edge in equations.edges:
         _check_coupling(edge)
-    layers = (replace(own, links=class_links(equations.n, own.links, classes)) for own in equations.layers)
-    return replace(equations, kind_of=(0,) * count, layers=tuple(own for own in layers if own.links))
+    layers = (replace(layer, links=class_links(equations.n, layer.links, classes)) for layer in equations.layers)
+    return replace(equations, kind_of=(0,) * count, layers=tuple(layer for layer in layers if layer.links))
 
 
 @lru_cache(maxsize=64)
 def _check_coupling(edge: Edge) -> None:
-    """Prove that links add up by their weights and vanish between equal states."""
+    """Raise NoQuotient unless links add up by their weights and vanish between equal states."""
     if not edge.diffusive:
         raise NoQuotient(
             "quotient: the coupling is not zero between equal states, so links inside a class would remain"

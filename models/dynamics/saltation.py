@@ -1,16 +1,14 @@
-"""What the events of set-valued friction do to small deviations from an orbit.
+"""Saltation: jumps of small deviations from an orbit at the events of set-valued friction.
 
-At an event h = 0 a deviation d is multiplied by S = I + (F+ - F-) n / (n F- + dh/dt), n the gradient
-of h.  Landing in stick makes the velocity zero, and a turn without stick multiplies it by the ratio
-of the accelerations.  When slip begins, F+ = F- and S = I for laws without a jump at rest; if static
-friction drops at once to a smaller value, the velocity begins with the jump of the acceleration
-times the time by which slip begins earlier.  The maps change velocities only, by positions only, so
-those of contacts that change at the same instant commute.
+At an event h = 0 a deviation d is multiplied by the saltation matrix S = I + (F+ - F-) n / (n F- + dh/dt), with the rates
+F- and F+ before and after it and n = grad h.  Landing in stick makes the velocity of d zero, and a turn without stick
+multiplies it by the ratio of the accelerations.  At the start of slip F+ = F- and S = I, unless static friction exceeds
+that of slow slip: the velocity of d is then the jump of the acceleration times the time by which slip begins earlier.
+The matrices change velocities by positions, so those of contacts that change at the same instant commute.
 
 References
 ----------
-Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (Springer, 2004),
-chapter 7.
+Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (Springer, 2004), chapter 7.
 """
 
 from __future__ import annotations
@@ -35,15 +33,14 @@ Entry = tuple[tuple[int, int], sp.Expr]
 
 @dataclass(frozen=True, slots=True)
 class Events:
-    """The rows of a deviation that are velocities, and what the start of slip makes of them."""
+    """The rows of a deviation that are velocities, and their saltation at the start of slip."""
 
-    owners: tuple[int, ...]  # the contact that the row is a velocity of, -1 for a position
-    # for each contact the entries of the matrix that the start of slip with w > 0, and with w < 0, multiplies its
-    # rows by; empty if friction sets in without a jump
+    owners: tuple[int, ...]  # for each row the contact that it is a velocity of, -1 for a position
+    # For each contact the rows of S at the start of slip with w > 0, and with w < 0; empty if S = I.
     exits: tuple[tuple[tuple[Entry, ...], tuple[Entry, ...]], ...] = ()
 
     def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Events:
-        """The same with every expression changed."""
+        """Return the events with every expression changed."""
         both = ((tuple((key, change(e)) for key, e in side) for side in pair) for pair in self.exits)
         return Events(self.owners, tuple((up, down) for up, down in both))
 
@@ -54,46 +51,45 @@ class Events:
 
 
 @dataclass(frozen=True, slots=True)
-class Release:
+class _Release:
     """The start of slip of one contact in one direction, in the symbols of a network."""
 
-    gradient: tuple[sp.Expr, ...]  # derivatives of the event function by the positions
-    own: sp.Expr  # its derivative by the position of the contact without the links
-    lead: sp.Expr  # change of the velocity for each unit that the event function is ahead
+    gradient: tuple[sp.Expr, ...]  # derivatives of the limit of the load by the positions
+    alone: sp.Expr  # derivative of the limit without links by the position of the contact
+    lead: sp.Expr  # change of the velocity for each unit by which the limit is ahead
 
 
-def _releases(orbit: Equations) -> tuple[tuple[Release, Release], ...]:
+def _releases(orbit: Equations) -> tuple[tuple[_Release, _Release], ...]:
     """Return slip with w > 0 and with w < 0 for each contact; empty if slip begins without a jump.
 
     Raises ValueError for links that act on velocities.
     """
     if not any(event.jumps for event in orbit.node.events):
         return ()
-    (alone,) = orbit.node.events
-    _check_release(orbit.edges)
+    _check_springs(orbit.edges)
+    (single,) = orbit.node.events
+    states = [orbit.symbols(j) for j in range(orbit.n)]
+    positions = [state[0] for state in states]
     releases = []
     for i in range(orbit.n):
         (event,) = orbit.events_at(i)
-        sides = zip(event.limits, event.departures, alone.limits, strict=True)
-        up, down = (_release(orbit, i, event.target, *side) for side in sides)
-        releases.append((up, down))
+        rates = [event.target if j == i else state[1] for j, state in enumerate(states)]
+        sides = []
+        for limit, departure, limit_alone in zip(event.limits, event.departures, single.limits, strict=True):
+            # n = grad h of h = limit; lead = (a+ - a-)/(n x' + dh/dt), with a- = 0 in stick.
+            gradient = tuple(derivative(limit, x) for x in positions)
+            moved = sp.Add(derivative(limit, TIME), *(g * v for g, v in zip(gradient, rates, strict=True)))
+            alone = derivative(limit_alone, orbit.node.state[0]).xreplace(orbit.at_node(i))
+            sides.append(_Release(gradient, alone, departure / moved))
+        releases.append((sides[0], sides[1]))
     return tuple(releases)
 
 
-def _release(orbit: Equations, i: int, speed: sp.Expr, event: sp.Expr, jump: sp.Expr, alone: sp.Expr) -> Release:
-    positions = [orbit.symbols(j)[0] for j in range(orbit.n)]
-    rates = [speed if j == i else orbit.symbols(j)[1] for j in range(orbit.n)]
-    gradient = tuple(derivative(event, x) for x in positions)
-    moved = sp.Add(derivative(event, TIME), *(g * v for g, v in zip(gradient, rates, strict=True)))
-    own = derivative(alone, orbit.node.state[0]).xreplace(orbit.at_node(i))
-    return Release(gradient, own, jump / moved)
-
-
-def _check_release(edges: Iterable[Edge]) -> None:
+def _check_springs(edges: Iterable[Edge]) -> None:
     """Raise ValueError for links that act on velocities.
 
-    Bodies that let go at the same instant then hasten each other, and the order of their releases
-    decides what becomes of a deviation.
+    Bodies that let go at the same instant then accelerate each other, and a deviation after the event depends on the
+    order in which they let go.
     """
     if any(edge.rhs[1].has(ends[1]) for edge in edges for ends in (edge.here, edge.there)):
         raise ValueError(
@@ -103,7 +99,7 @@ def _check_release(edges: Iterable[Edge]) -> None:
 
 
 def _force_slope(slope: sp.Matrix) -> sp.Expr:
-    """The derivative of the force of a link by a position in slip, of H of `source_slopes`."""
+    """Return the derivative of the force of a link by a position in slip, from H of `source_slopes`."""
     return slope[1, 0].xreplace({SLIP: sp.S.One})
 
 
@@ -113,18 +109,19 @@ def of_mode(
     """Return the events of a mode; on the synchronous orbit the forces of links vanish."""
     if not orbit.sticks:
         return None
-    found = _releases(orbit)
-    if found:
-        _check_release(edge for _, edge in equations.edge_of)
+    releases = _releases(orbit)
+    if releases:
+        _check_springs(equations.edges)
     alpha, beta = strength
     turned = _force_slope(slope).xreplace(orbit.at_node(0))
 
-    def entries(side: Release) -> tuple[Entry, ...]:
-        real = side.lead * (side.own - alpha * turned)
+    def entries(side: _Release) -> tuple[Entry, ...]:
+        # The gradient of a mode is that of the node alone minus strength times the slope of the link force.
+        real = side.lead * (side.alone - alpha * turned)
         aside = side.lead * beta * turned
         return (((1, 0), real), ((1, 2), aside), ((3, 0), -aside), ((3, 2), real)) if plane else (((1, 0), real),)
 
-    return Events((-1, 0, -1, 0) if plane else (-1, 0), tuple((entries(up), entries(down)) for up, down in found))
+    return Events((-1, 0, -1, 0) if plane else (-1, 0), tuple((entries(up), entries(down)) for up, down in releases))
 
 
 def of_network(equations: Equations) -> Events | None:
@@ -133,7 +130,7 @@ def of_network(equations: Equations) -> Events | None:
     if not equations.sticks:
         return None
 
-    def entries(i: int, side: Release) -> tuple[Entry, ...]:
+    def entries(i: int, side: _Release) -> tuple[Entry, ...]:
         return tuple(((n + i, j), side.lead * g) for j, g in enumerate(side.gradient) if g != 0)
 
     exits = tuple((entries(i, up), entries(i, down)) for i, (up, down) in enumerate(_releases(equations)))
@@ -143,22 +140,26 @@ def of_network(equations: Equations) -> Events | None:
 def of_blocks(
     equations: Equations, blocks: Sequence[Block], orbit: Equations, slope: sp.Matrix, strength: sp.Symbol
 ) -> Events | None:
-    """Return the events of the clusters' contacts, which change differences within clusters too."""
-    own = of_network(orbit)
-    if own is None:
+    """Return the events of the contacts of clusters, which change differences within clusters too."""
+    of_clusters = of_network(orbit)
+    if of_clusters is None:
         return None
-    sides = _releases(orbit)
-    if sides:
-        _check_release(edge for _, edge in equations.edge_of)
-    owners, exits = list(own.owners), [[list(up), list(down)] for up, down in own.exits]
+    releases = _releases(orbit)
+    if releases:
+        _check_springs(equations.edges)
+    owners, exits = list(of_clusters.owners), [[list(up), list(down)] for up, down in of_clusters.exits]
+    # Rows of a block: positions, then velocities, one for each of its coordinates.
     for block in blocks:
         first, size = len(owners), len(block.nodes)
         owners += [*[-1] * size, *block.nodes]
-        for k, cluster in enumerate(block.nodes if sides else ()):
+        for k, cluster in enumerate(block.nodes if releases else ()):
             turned = strength * _force_slope(slope).xreplace(orbit.at_node(cluster))
-            for made, side in zip(exits[cluster], sides[cluster], strict=True):
+            for entries, side in zip(exits[cluster], releases[cluster], strict=True):
                 for j, weight in enumerate(block.matrix[k]):
-                    gradient = sp.Rational(weight.numerator, weight.denominator) * turned + (side.own if j == k else 0)
+                    # Coordinate k feels coordinate j by the entry (k, j) of the block.
+                    gradient = sp.Rational(weight.numerator, weight.denominator) * turned + (
+                        side.alone if j == k else 0
+                    )
                     if gradient != 0:
-                        made.append(((first + size + k, first + j), side.lead * gradient))
+                        entries.append(((first + size + k, first + j), side.lead * gradient))
     return Events(tuple(owners), tuple((tuple(up), tuple(down)) for up, down in exits))

@@ -14,14 +14,14 @@ from .equations import Equations, Layer
 
 
 class NoSynchrony(ValueError):
-    """Equal motion of all nodes is no solution of a network."""
+    """Raised where equal motion of all nodes is no solution of a network."""
 
 
 def synchronous_node(equations: Equations) -> Node:
     """Return the equations of each node while all are equal, s' = F(s) + sum of the links h(s, s).
 
-    Links that vanish between equal states add nothing.  Others add k h(s, s), k the sum of weights at a node, which must
-    be that of every other node.
+    Links that vanish between equal states add nothing.  Others add k h(s, s), with the sum k of weights at a node, which
+    must be equal for all nodes.
     """
     apart = replace(equations, layers=())
     apart.expect_alike("complete synchronisation")
@@ -34,9 +34,9 @@ def synchronous_node(equations: Equations) -> Node:
 
 
 def expect_vanishing(what: str, equations: Equations) -> None:
-    """Raise ValueError if a link acts between equal states, is not proportional to its weight, or has own numbers.
+    """Raise ValueError if a link acts between equal states, is not proportional to its weight, or has numbers of its own.
 
-    `what` needs one synchronous motion for all strengths, and modes that are those of the graph.
+    One synchronous motion for all strengths, and modes of the graph, need links without these properties.
     """
     equations.expect_exact_links(what)
     if not all(edge.diffusive for edge in equations.edges):
@@ -50,7 +50,7 @@ def expect_vanishing(what: str, equations: Equations) -> None:
 
 
 def _with_links(node: Node, layer: Layer, edge: Edge, n: int) -> Node:
-    """The node with what its links add between equal states."""
+    """Return the node with the terms of its links between equal states."""
     if isinstance(layer.links, AllPairs):
         weights = [[layer.links.weight] * (n - 1)]
     else:
@@ -61,12 +61,13 @@ def _with_links(node: Node, layer: Layer, edge: Edge, n: int) -> Node:
     felt = [e.xreplace(equal) for e in edge.rhs]
     if any(e.has(sp.nan, sp.zoo, sp.oo, -sp.oo) for e in felt):
         raise _no_solution(f"a link {', '.join(map(str, edge.rhs))} has no value between equal states")
-    own = [name for name in layer.varied if any(e.has(sp.Symbol(name, real=True)) for e in felt)]
-    if own:
-        raise _no_solution(f"a link acts between equal states and {', '.join(own)} differs from link to link")
+    differing = [name for name in layer.varied if any(e.has(sp.Symbol(name, real=True)) for e in felt)]
+    if differing:
+        raise _no_solution(f"a link acts between equal states and {', '.join(differing)} differs from link to link")
+    # Each node must feel the same weights; where the weight is a factor, the same sum of weights.
     if _proportional(felt, edge.weight):
-        weights = [[sum(own, Fraction(0))] for own in weights]
-    if len({tuple(sorted(own)) for own in weights}) > 1:
+        weights = [[sum(of_node, Fraction(0))] for of_node in weights]
+    if len({tuple(sorted(of_node)) for of_node in weights}) > 1:
         raise _no_solution("a link acts between equal states and the sums of weights differ from node to node")
     values = [{edge.weight: sp.Rational(w.numerator, w.denominator)} for w in weights[0]]
     rates = tuple(rate + sp.Add(*(e.xreplace(w) for w in values)) for rate, e in zip(node.rhs, felt, strict=True))
@@ -76,9 +77,9 @@ def _with_links(node: Node, layer: Layer, edge: Edge, n: int) -> Node:
 
 
 def _proportional(rates: Iterable[sp.Expr], weight: sp.Symbol) -> bool:
-    """True if a weight is a factor of all rates."""
+    """Return True if a weight is a factor of all rates."""
     return all(sp.expand(e - weight * e.xreplace({weight: sp.S.One})) == 0 for e in rates)
 
 
-def _no_solution(found: str) -> NoSynchrony:
-    return NoSynchrony(f"{found}, so complete synchronisation is no solution of this network")
+def _no_solution(reason: str) -> NoSynchrony:
+    return NoSynchrony(f"{reason}, so complete synchronisation is no solution of this network")

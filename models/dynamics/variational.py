@@ -1,7 +1,7 @@
 """Variational equations: the linear equations of small deviations along an orbit.
 
-`mode`, `network_variation` and `clustered` keep the orbit apart from the linear equation of the
-deviations, so that one orbit carries any number of them.
+`mode`, `network_variation` and `clustered` return the orbit and the linear equation of deviations apart, so that one orbit
+carries any number of deviations.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ STRENGTH = sp.Symbol("mode_sigma", real=True)
 """Coupling strength sigma in the variational equation of a cluster state."""
 
 PHASE = sp.Symbol("phase", real=True)
-"""Time at which the clock of shifted equations stands at 0."""
+"""Time at which the clock of shifted equations shows 0."""
 
 LOG_VOLUME = sp.Symbol("log_volume", real=True)
-"""One oscillator's share of the logarithm of a volume of states that is carried along."""
+"""Share of one oscillator in the logarithm of a volume of states that moves with the flow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +44,10 @@ class Variation:
 
     orbit: Equations
     size: int  # the number of deviations; slip states of contacts do not deviate
-    # the non-zero entries of A by (row, column), in the symbols of the orbit (x_1 …), its parameters, t and
-    # `parameters`
+    # The non-zero entries of A by (row, column), in the symbols of the orbit (x_1 …), its parameters, t and `parameters`.
     matrix: tuple[Entry, ...]
     parameters: tuple[sp.Symbol, ...] = ()  # numbers that differ from mode to mode; A is linear in them
-    events: Events | None = None  # what stick and slip do to a deviation; None for smooth equations
+    events: Events | None = None  # saltation by stick and slip; None for smooth equations
 
     def __post_init__(self) -> None:
         names = {*self.orbit.state, *self.orbit.parameters, "t"}
@@ -64,19 +63,21 @@ class Variation:
             unknown = {s.name for s in e.free_symbols} - names - {s.name for s in self.parameters}
             if unknown:
                 raise ValueError(f"variation: unknown symbol {min(unknown)!r} in entry ({row}, {column})")
+            # Linear in the strengths, so that one evaluation serves all modes.
             slopes = [e.diff(s) for s in self.parameters]
             if any(slope.has(*self.parameters) for slope in slopes):
                 raise ValueError(f"variation: entry ({row}, {column}) is not linear in the strengths of a mode: {e}")
 
     def parts(self, e: sp.Expr) -> list[tuple[sp.Expr, sp.Expr]]:
         """Return an entry of A as coefficients that are not zero, each with the strength that it multiplies, or 1."""
-        rest = e.xreplace(dict.fromkeys(self.parameters, sp.S.Zero))
-        found = [(rest, sp.S.One), *((e.diff(s), s) for s in self.parameters)]
-        return [(coefficient, strength) for coefficient, strength in found if coefficient != 0]
+        constant = e.xreplace(dict.fromkeys(self.parameters, sp.S.Zero))
+        parts = [(constant, sp.S.One), *((e.diff(s), s) for s in self.parameters)]
+        return [(coefficient, strength) for coefficient, strength in parts if coefficient != 0]
 
 
 def expect_continuous(orbit: Equations) -> None:
-    """Raise ValueError for rates that jump in the state; that of a volume may, nothing depends on it."""
+    """Raise ValueError for rates that jump in the state; the rate of `LOG_VOLUME` may, since no rate depends on it."""
+    # Modes of events jump at events alone, which saltation covers.
     templates = [(node.state, node.rhs, node.continuous) for node in orbit.nodes]
     templates += [(edge.here, edge.rhs, (*edge.here, *edge.there)) for edge in orbit.edges]
     for states, rates, moving in templates:
@@ -112,26 +113,22 @@ def mode(equations: Equations, plane: bool = False) -> Variation:
     more = {s for slope in slopes for e in slope for s in e.free_symbols} - {*node.state, *node.parameters}
     node = replace(node, parameters=(*node.parameters, *sorted(more, key=lambda s: s.name)))
     orbit = Equations.of_equal_nodes(node, None, 1)
+
+    # d' = (J - sum of alpha_l H_l) d; in the plane of complex strengths d' = (J - (alpha + i beta) H) d by real parts.
     here = orbit.at_node(0)
     size = len(node.continuous)
-    own = sp.Matrix(node.jacobian())[:size, :size].xreplace(here)
+    jacobian = sp.Matrix(node.jacobian())[:size, :size].xreplace(here)
     pushes = [slope[:size, :size].xreplace(here) for slope in slopes]
-    alphas, betas = zip(*_strengths(len(slopes)), strict=True)
+    alphas, betas = ((s,) for s in MODE)
+    if len(slopes) > 1:
+        alphas, betas = (tuple(sp.Symbol(f"{s.name}_{k + 1}", real=True) for k in range(len(slopes))) for s in MODE)
     events = of_mode(equations, orbit, slopes[0], MODE, plane)
-    real = own - sum((s * push for s, push in zip(alphas, pushes, strict=True)), sp.zeros(size, size))
+    real = jacobian - sum((s * push for s, push in zip(alphas, pushes, strict=True)), sp.zeros(size, size))
     if not plane:
         return Variation(orbit, size, _entries(real), alphas, events)
     aside = sum((s * push for s, push in zip(betas, pushes, strict=True)), sp.zeros(size, size))
     both = sp.Matrix(sp.BlockMatrix([[real, aside], [-aside, real]]))
     return Variation(orbit, 2 * size, _entries(both), (*alphas, *betas), events)
-
-
-def _strengths(layers: int) -> tuple[tuple[sp.Symbol, sp.Symbol], ...]:
-    """Real and imaginary part of the strength of each layer, `MODE` of a single one."""
-    if layers == 1:
-        return (MODE,)
-    named = ([sp.Symbol(f"{s.name}_{k + 1}", real=True) for s in MODE] for k in range(layers))
-    return tuple((alpha, beta) for alpha, beta in named)
 
 
 def network_variation(equations: Equations) -> Variation:
@@ -142,7 +139,7 @@ def network_variation(equations: Equations) -> Variation:
     return Variation(equations, size, matrix, (), of_network(equations))
 
 
-def clustered(equations: Equations, found: Clusters) -> Variation:
+def clustered(equations: Equations, clusters: Clusters) -> Variation:
     """Return the variational equation of a cluster state.
 
     The orbit is that of the quotient network.  Coordinate k of a block lives on the orbit of its
@@ -154,23 +151,24 @@ def clustered(equations: Equations, found: Clusters) -> Variation:
     """
     equations.expect_alike("cluster states")
     slope = _constant_slope(equations)
-    orbit = collapse(equations, found.classes)
+    orbit = collapse(equations, clusters.classes)
     components = len(orbit.node.continuous)
+    # The deviations of the quotient network come first, then the blocks of differences within clusters.
     first = orbit.n * components
     entries = {key: e for key, e in orbit.jacobian().items() if max(key) < first}
-    for block in found.blocks:
+    for block in clusters.blocks:
         for (row, column), e in _of_block(block, orbit, slope):
             key = (first + row, first + column)
             entries[key] = entries.get(key, sp.S.Zero) + e
         first += len(block.nodes) * components
-    kept = tuple((key, e) for key, e in sorted(entries.items()) if e != 0)
-    return Variation(orbit, first, kept, (STRENGTH,), of_blocks(equations, found.blocks, orbit, slope, STRENGTH))
+    matrix = tuple((key, e) for key, e in sorted(entries.items()) if e != 0)
+    return Variation(orbit, first, matrix, (STRENGTH,), of_blocks(equations, clusters.blocks, orbit, slope, STRENGTH))
 
 
 def _of_block(block: Block, orbit: Equations, slope: sp.Matrix) -> Iterator[tuple[tuple[int, int], sp.Expr]]:
     """Yield ((row, column), entry) of one block, component by component; keys repeat."""
-    size, own, components = len(block.nodes), orbit.node.jacobian(), len(orbit.node.continuous)
-    for r, line in enumerate(own[:components]):
+    size, jacobian, components = len(block.nodes), orbit.node.jacobian(), len(orbit.node.continuous)
+    for r, line in enumerate(jacobian[:components]):
         for c, entry in enumerate(line[:components]):
             for k, cluster in enumerate(block.nodes):
                 yield (r * size + k, c * size + k), entry.xreplace(orbit.at_node(cluster))
@@ -181,7 +179,7 @@ def _of_block(block: Block, orbit: Equations, slope: sp.Matrix) -> Iterator[tupl
 
 
 def _constant_slope(equations: Equations) -> sp.Matrix:
-    """H of a link that is linear in the difference of the states it joins."""
+    """Return H of a link that is linear in the difference of the states at its ends; else raise ValueError."""
     edge = equations.edge
     if edge is not None and not edge.diffusive:
         raise ValueError(
@@ -191,6 +189,7 @@ def _constant_slope(equations: Equations) -> sp.Matrix:
         raise ValueError("these equations have no coupling; differences within clusters need links")
     (slope,) = source_slopes(equations)
     size = len(equations.node.continuous)
+    # Links of set-valued friction act in slip: the mode is 1.
     slips = dict.fromkeys(edge.here[size:], sp.S.One)
     here, there = (
         sp.Matrix(block)[:size, :size].xreplace(slips) for block in (edge.jacobian_here(), edge.jacobian_there())
@@ -209,14 +208,13 @@ def phase_shifted(variation: Variation) -> Variation:
     def later(e: sp.Expr) -> sp.Expr:
         return e.xreplace({TIME: TIME + PHASE})
 
-    def shifted(node: Node) -> Node:
-        known = replace(node, parameters=(*node.parameters, PHASE))
-        return known.map(later)
+    def of_node(node: Node) -> Node:
+        return replace(node, parameters=(*node.parameters, PHASE)).map(later)
 
-    def linked(edge: Edge) -> Edge:
+    def of_edge(edge: Edge) -> Edge:
         return replace(edge, parameters=(*edge.parameters, PHASE)).map(later) if edge.forced else edge
 
-    orbit = variation.orbit.map_templates(shifted, linked)
+    orbit = variation.orbit.map_templates(of_node, of_edge)
     matrix = tuple((key, later(e)) for key, e in variation.matrix)
     events = None if variation.events is None else variation.events.map(later)
     return replace(variation, orbit=orbit, matrix=matrix, events=events)
@@ -231,20 +229,19 @@ def with_volume(equations: Equations) -> Equations:
     if equations.sticks:
         raise ValueError("volumes of states: found set-valued friction, whose stick makes them zero")
     equations.expect_alike("volumes of states", varied_too=True, layers_too=True)
-    return equations.map_templates(_node_with_volume, _edge_with_volume)
 
+    def divergence(rates: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...]) -> sp.Expr:
+        return sp.Add(*(derivative(e, s) for e, s in zip(rates, states, strict=True)))
 
-def _node_with_volume(node: Node) -> Node:
-    """The node with its share of the divergence as the rate of one more state."""
-    rate = sp.Add(*(derivative(e, s) for e, s in zip(node.rhs, node.state, strict=True)))
-    return Node((*node.state, LOG_VOLUME), (*node.rhs, rate), node.parameters)
+    def of_node(node: Node) -> Node:
+        return Node((*node.state, LOG_VOLUME), (*node.rhs, divergence(node.rhs, node.state)), node.parameters)
 
+    def of_edge(edge: Edge) -> Edge:
+        here, there = (sp.Symbol(f"{LOG_VOLUME}_{end}", real=True) for end in ("here", "there"))
+        rates = (*edge.rhs, divergence(edge.rhs, edge.here))
+        return replace(edge, here=(*edge.here, here), there=(*edge.there, there), rhs=rates)
 
-def _edge_with_volume(edge: Edge) -> Edge:
-    """The edge between such nodes."""
-    share = sp.Add(*(derivative(e, s) for e, s in zip(edge.rhs, edge.here, strict=True)))
-    here, there = (sp.Symbol(f"{LOG_VOLUME}_{end}", real=True) for end in ("here", "there"))
-    return replace(edge, here=(*edge.here, here), there=(*edge.there, there), rhs=(*edge.rhs, share))
+    return equations.map_templates(of_node, of_edge)
 
 
 def _entries(matrix: sp.Matrix) -> tuple[Entry, ...]:
@@ -266,7 +263,7 @@ def source_slopes(equations: Equations) -> tuple[sp.Matrix, ...]:
 
 
 def _source_slope(edge: Edge, node: Node) -> sp.Matrix:
-    """H of one layer, without inertia."""
+    """Return H of one layer, without inertia."""
     sigma = strength(edge, node.parameters)
     equal = {**dict(zip((*edge.here, *edge.there), node.state * 2, strict=True)), **dict(edge.theirs)}
     part = next((part for e in edge.rhs if (part := rough_at(e, equal, edge.there)) is not None), None)
@@ -274,6 +271,7 @@ def _source_slope(edge: Edge, node: Node) -> sp.Matrix:
         raise ValueError(
             f"small deviations: found {part}, by which a link jumps or has a kink between equal states; expected a derivative there"
         )
+    # The slope must be sigma W H(s), with W the weight: then sigma gamma is the strength of a mode.
     weighted = sp.Matrix(edge.jacobian_there()).xreplace(equal)
     matrix = weighted.xreplace({edge.weight: sp.S.One})
     zero = sp.zeros(*matrix.shape)

@@ -1,7 +1,6 @@
 """The energy of a network and the power that changes it, as exact expressions for one node and one link of each kind.
 
-E = sum over nodes of sum v dL/dv - L, plus the same of the links; dE/dt = sum v Q - (partial) dL/dt, plus what Rayleigh
-functions of the links take away.
+E is the sum of v dL/dv - L over nodes and links; dE/dt = sum v Q - (partial) dL/dt, with Q = -dR/dv of Rayleigh functions R.
 Source: Goldstein, Poole & Safko, Classical Mechanics, 3rd ed. (Addison-Wesley, 2002), sect. 2.7.
 """
 
@@ -22,14 +21,14 @@ from ..interactions.ends import Pair, Terms
 from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, WEIGHT_NUMBER, Edge
 from ..mechanics.contact import ContactModel
-from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional
-from ..mechanics.oscillator import FieldModel
+from ..mechanics.nondimensional import friction_coefficient, nondimensional
+from ..mechanics.oscillator import FRICTION, FieldModel
 from .model import Model, NodeKind
 
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """What one node or one link has of the energy of a network, and the power that it feeds in."""
+    """The energy of one node or one link, and the power that it feeds in."""
 
     energy: sp.Expr = sp.S.Zero
     power: sp.Expr = sp.S.Zero
@@ -39,8 +38,8 @@ class Share:
 class EnergyTerms:
     """Energy and power of a node of each kind, in its states, and of a link of each edge, in those of its two ends.
 
-    All is non-dimensional.  `nodes` follow equations.nodes, `links` equations.edges.  A pair of links, there and back, is
-    one spring or damper: `pairs` are the links that count, each pair once.
+    All is non-dimensional.  `nodes` follow equations.nodes, `links` equations.edges.  Two links, there and back, are one
+    spring or damper, of which `pairs` has one link.
     """
 
     equations: Equations
@@ -49,16 +48,13 @@ class EnergyTerms:
 
     @property
     def pairs(self) -> tuple[tuple[Link, int], ...]:
-        """One link (target, source, weight) of each pair, the one whose target has the smaller number, and its edge.
-
-        An edge goes by its number in equations.edges.
-        """
-        eq, found, first = self.equations, list[tuple[Link, int]](), 0
+        """The link (target, source, weight) of each pair with target < source, and its index in equations.edges."""
+        eq, pairs, first = self.equations, list[tuple[Link, int]](), 0
         for layer in (layer for layer in eq.layers if layer.links):
-            numbers = {ends: k for k, (ends, _) in enumerate(layer.edge_of, start=first)}
-            first += len(numbers)
-            found += [(link, numbers[eq.ends(link)]) for link in layer.links if link[0] < link[1]]
-        return tuple(found)
+            edges = {ends: k for k, (ends, _) in enumerate(layer.edge_of, start=first)}
+            first += len(edges)
+            pairs += [(link, edges[eq.ends(link)]) for link in layer.links if link[0] < link[1]]
+        return tuple(pairs)
 
     @property
     def conservative(self) -> bool:
@@ -67,25 +63,24 @@ class EnergyTerms:
 
     def whole(self) -> tuple[sp.Expr, sp.Expr]:
         """Return energy and power of the whole network in its state symbols (algebra grows with n: meant for small n)."""
-        eq = self.equations
-        placed = [(self.nodes[eq.kind_of[i]], eq.at_node(i)) for i in range(eq.n)]
-        shares: list[tuple[Share, dict[sp.Symbol, sp.Expr]]] = [
-            *placed,
-            *((self.links[k], eq.at_link(link, eq.edges[k])) for link, k in self.pairs),
-        ]
-        found = sp.Add(*(share.energy.xreplace(values) for share, values in shares))
-        return found, sp.Add(*(share.power.xreplace(values) for share, values in shares))
+        shares = [(share, values) for share, places in self._shares() for values in places]
+        energy = sp.Add(*(share.energy.xreplace(values) for share, values in shares))
+        return energy, sp.Add(*(share.power.xreplace(values) for share, values in shares))
 
     def rows(self) -> tuple[sp.Expr, tuple[Rows, ...]]:
         """Return the energy of the whole network as sums over nodes of each kind and links of each edge, for observables."""
-        eq, places = self.equations, [list[dict[sp.Symbol, sp.Expr]]() for _ in (*self.nodes, *self.links)]
+        rows = [Rows.of(share.energy, places) for share, places in self._shares() if places and share.energy != 0]
+        return sp.Add(*(RowSum(sp.Integer(k)) for k in range(len(rows)))), tuple(rows)
+
+    def _shares(self) -> list[tuple[Share, list[dict[sp.Symbol, sp.Expr]]]]:
+        """Return the share of each kind of node and each edge, with the substitutions for its nodes and links."""
+        eq = self.equations
+        places = [list[dict[sp.Symbol, sp.Expr]]() for _ in (*self.nodes, *self.links)]
         for i, kind in enumerate(eq.kind_of):
             places[kind].append(dict(eq.at_node(i)))
         for link, k in self.pairs:
             places[len(self.nodes) + k].append(eq.at_link(link, eq.edges[k]))
-        shares = [(share.energy, own) for share, own in zip((*self.nodes, *self.links), places, strict=True) if own]
-        found = tuple(Rows.of(value, own) for value, own in shares if value != 0)
-        return sp.Add(*(RowSum(sp.Integer(k)) for k in range(len(found)))), found
+        return list(zip((*self.nodes, *self.links), places, strict=True))
 
 
 @lru_cache(maxsize=16)
@@ -105,9 +100,11 @@ def energy_of(model: Model, varied: tuple[str, ...] = ()) -> EnergyTerms:
         _check(coupling, graph)
         edges = []
         for (a, b), edge in layer.edge_of:
+            # The same terms that make the forces of the link give its energy.
             pair = Pair((equations.nodes[a], equations.nodes[b]), (kinds[a].oscillator, kinds[b].oscillator))
             share, joint = _of_link(edge, pair, coupling.terms(pair), equations.varied)
             if WEIGHT_NUMBER.name in layer.varied:
+                # Weights as numbers of the run are a parameter.
                 share = Share(*(e.xreplace({edge.weight: WEIGHT_NUMBER}) for e in (share.energy, share.power)))
             links.append(share)
             edges.append(((a, b), joint))
@@ -116,7 +113,7 @@ def energy_of(model: Model, varied: tuple[str, ...] = ()) -> EnergyTerms:
 
 
 def _of_node(kind: NodeKind, contact: ContactModel) -> Share:
-    """Energy and power of one oscillator by itself."""
+    """Return energy and power of one oscillator by itself."""
     system = nondimensional(kind.oscillator)
     lagrangian = system.kinetic - system.potential
     power = sp.Add(*(v * f for v, f in zip(system.velocities, system.forces, strict=True)))
@@ -139,20 +136,17 @@ def _check(coupling: Coupling, graph: Topology) -> None:
 
 
 def _of_link(edge: Edge, pair: Pair, terms: Terms, varied: tuple[str, ...]) -> tuple[Share, Edge]:
-    """The energy of a link, and the power it feeds in: minus v dR/dv at either end.
-
-    The edge gets the parameters of its nodes that the energy uses, though its forces may not.
-    """
-    shared = {s: own for s, own in pair.theirs.items() if own.name not in varied}
+    """Return the energy of a link and its power, -v dR/dv at both ends, and the edge with all parameters of the energy."""
+    shared = {s: parameter for s, parameter in pair.theirs.items() if parameter.name not in varied}
     kinetic, potential, dissipation = (e.xreplace(shared) for e in (terms.kinetic, terms.potential, terms.dissipation))
     lost = sp.Add(*(v * derivative(dissipation, v) for v in pair.velocities))
     share = Share(potential if kinetic == 0 else _of_lagrangian(kinetic - potential, pair.velocities), -lost)
     used = share.energy.free_symbols | share.power.free_symbols
     more = tuple(s for s in pair.nodes[0].parameters if s in used and s not in edge.parameters)
-    theirs = tuple((s, own) for s, own in pair.theirs.items() if s in used)
+    theirs = tuple((s, parameter) for s, parameter in pair.theirs.items() if s in used)
     return share, replace(edge, parameters=(*edge.parameters, *more), theirs=theirs)
 
 
 def _of_lagrangian(lagrangian: sp.Expr, velocities: Sequence[sp.Symbol]) -> sp.Expr:
-    """The energy function sum v dL/dv - L."""
+    """Return the energy function sum v dL/dv - L."""
     return sp.expand(sp.Add(*(v * derivative(lagrangian, v) for v in velocities)) - lagrangian)

@@ -1,4 +1,4 @@
-"""The parts of a model from what a user gives: values, their names, tables of a scene file."""
+"""The parts of a model from values, names of plug-ins and tables of a scene file."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from ..mechanics.oscillator import Oscillator
 from .model import Group
 
 MOST = 100_000
-"""Most nodes that groups may name."""
+"""Most groups and layers that are read (a choice)."""
 
 
 def as_oscillator(value: object, what: str = "oscillator") -> Oscillator:
-    """Return an oscillator as it is, or make the one of a table or a name; ValueError or TypeError for other values."""
+    """Return an oscillator, or that of a table or a name; raise ValueError or TypeError for other values."""
     if isinstance(value, Mapping):
         return oscillator_of_table(value)
     return value if isinstance(value, Oscillator) else load_oscillator(part(what, value))
 
 
 def as_law(value: object, oscillator: Oscillator) -> FrictionLaw | None:
-    """Return a friction law as it is, or load the one of a name."""
+    """Return a friction law, or that of a table or a name; None for "none"."""
     if value == "default":
         return oscillator.friction
     if value is None or isinstance(value, FrictionLaw):
@@ -42,7 +42,7 @@ def as_law(value: object, oscillator: Oscillator) -> FrictionLaw | None:
 
 
 def as_contact(value: object, oscillators: Iterable[Oscillator]) -> ContactModel:
-    """Return the contact of a word; None stands for that of the oscillators which take friction.
+    """Return the contact of a text; for None the contact of the oscillators that take friction.
 
     Raises ValueError if these differ.
     """
@@ -53,26 +53,26 @@ def as_contact(value: object, oscillators: Iterable[Oscillator]) -> ContactModel
                 f"contact: found {str(contact)!r} and no node with friction; expected a node with friction"
             )
         return contact
-    found = dict.fromkeys(oscillator.contact for oscillator in oscillators if oscillator.takes_friction)
-    if len(found) > 1:
-        raise ValueError(f"contact: the nodes have {' and '.join(map(repr, found))}; expected one; give contact")
-    return next(iter(found), ContactModel.ATAN)
+    contacts = dict.fromkeys(oscillator.contact for oscillator in oscillators if oscillator.takes_friction)
+    if len(contacts) > 1:
+        raise ValueError(f"contact: the nodes have {' and '.join(map(repr, contacts))}; expected one; give contact")
+    return next(iter(contacts), ContactModel.ATAN)
 
 
 def as_coupling(value: object) -> Coupling | None:
-    """Return a coupling as it is, or read the one of a text or of a table of expressions; None for None and "none"."""
+    """Return a coupling, or that of a text or of a table of expressions; None for None and "none"."""
     if value is None or isinstance(value, COUPLINGS):
         return value
     if isinstance(value, Mapping):
         return coupling_of_table(value)
     if isinstance(value, Topology):
         raise TypeError(f"coupling: found the graph {value.name}({value.n}); expected a coupling; write topology=…")
-    words = part("coupling", value)
-    return None if words == "none" else read_coupling(words)
+    text = part("coupling", value)
+    return None if text == "none" else read_coupling(text)
 
 
 def as_topology(value: object) -> Topology:
-    """Return the graph that a value is or stands for, one node alone for None; ValueError for the name of another graph."""
+    """Return a graph, or that of another form of it; one node for None."""
     return topology("chain", 1) if value is None else checked_name("topology", readers.as_topology("topology", value))
 
 
@@ -84,17 +84,18 @@ def as_layers(links: object, coupling: Coupling | None, graph: object) -> tuple[
         raise ValueError("links: found a topology beside it; expected each layer with its own graph; leave one out")
     if isinstance(links, str | bytes | Mapping) or not isinstance(links, Iterable):
         raise TypeError(f"links: found {short_repr(links)}; expected pairs, e.g. [('spring', ring(4))]")
-    found: list[tuple[Coupling | None, Topology]] = []
+    layers: list[tuple[Coupling | None, Topology]] = []
     for k, entry in enumerate(islice(links, MOST), start=1):
         if not isinstance(entry, tuple | list) or len(entry) != 2:
             raise TypeError(f"links {k}: found {short_repr(entry)}; expected a pair (coupling, graph)")
-        found.append((as_coupling(entry[0]), as_topology(entry[1])))
-    if not found:
+        layers.append((as_coupling(entry[0]), as_topology(entry[1])))
+    if not layers:
         raise ValueError("links: found no layer; expected one at least, e.g. [('spring', ring(4))]")
-    sizes = sorted({graph.n for _, graph in found})
+    # All layers join the same nodes.
+    sizes = sorted({graph.n for _, graph in layers})
     if len(sizes) > 1:
         raise ValueError(f"links: found graphs of {', '.join(map(str, sizes))} nodes; expected one number of nodes")
-    return tuple(found)
+    return tuple(layers)
 
 
 def as_groups(value: object, n: int) -> tuple[Group, ...]:
@@ -129,7 +130,7 @@ def _group(what: str, value: object, n: int) -> Group:
     at = entry["at"]
     if isinstance(at, str | bytes | Mapping | set | frozenset) or not isinstance(at, Iterable):
         raise TypeError(f"{what}: at is {short_repr(at)}; expected a list of nodes, e.g. [1, 3]")
-    numbers = tuple(sorted(check_integer(f"{what}: at", i, 1, n) for i in islice(at, n + 1)))
-    if not numbers or len(set(numbers)) < len(numbers):
-        raise ValueError(f"{what}: at is {short_repr(list(numbers))}; expected at least one node and each node once")
-    return Group(oscillator, as_law(entry.get("friction", "default"), oscillator), numbers)
+    nodes = tuple(sorted(check_integer(f"{what}: at", i, 1, n) for i in islice(at, n + 1)))
+    if not nodes or len(set(nodes)) < len(nodes):
+        raise ValueError(f"{what}: at is {short_repr(list(nodes))}; expected at least one node and each node once")
+    return Group(oscillator, as_law(entry.get("friction", "default"), oscillator), nodes)

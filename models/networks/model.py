@@ -1,4 +1,4 @@
-"""What a scene's equations are made of: oscillators by kind, their friction laws, couplings and their graphs."""
+"""The model of a network: oscillators by kind, their friction laws, couplings and their graphs."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from ..mechanics.oscillator import Oscillator
 from ..mechanics.parameter import Parameter
 
 MOST_NODES = 1_000_000
-"""Most nodes of a model: they take 2 s and 700 MB."""
+"""Most nodes of a model (a choice: measured 2 s and 700 MB)."""
 
 MOST_NUMBERED = 1_000_000
-"""Most links that have numbers of their own, a name and a parameter each: more take gigabytes."""
+"""Most links with a value of a parameter for each (a choice): a name and a parameter each, more take gigabytes."""
 
 WEIGHTS = WEIGHT_NUMBER.name
-"""What the weights of links are called where a run draws or sweeps them."""
+"""Name of the weights of links where a run draws or sweeps them."""
 
 _WEIGHT = Parameter(1.0, "1", "weight of a link")
 
@@ -62,16 +62,14 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """What decides on the equations of a network."""
+    """Oscillators, friction and couplings, which determine the equations of a network."""
 
-    kinds: tuple[NodeKind, ...]  # the kinds of nodes that there are, in the order of their first nodes
+    kinds: tuple[NodeKind, ...]  # the kinds of nodes, in the order of their first nodes
     kind_of: tuple[int, ...]  # the kind of each node
-    contact: ContactModel  # how the jump of a friction law at rest is treated
-    # couplings and their graphs, at least one, all of as many nodes
-    layers: tuple[tuple[Coupling | None, Topology], ...]
-    unlinked: Equations = field(init=False, repr=False, compare=False)  # the equations of the nodes without their links
-    # the parameters of all kinds, and those of the couplings whose graphs have links; a name has the default of the
-    # first kind that has it
+    contact: ContactModel  # treatment of the jump of a friction law at rest
+    layers: tuple[tuple[Coupling | None, Topology], ...]  # couplings and their graphs, at least one, of equal size
+    unlinked: Equations = field(init=False, repr=False, compare=False)  # the equations of the nodes without links
+    # The parameters of all kinds, each with the default of the first kind that has it, and those of couplings with links.
     parameters: FrozenDict[Parameter] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -96,13 +94,16 @@ class Model:
             raise ValueError(
                 f"topology {graph.name}: n = {graph.n}; expected at most {MOST_NODES} nodes in a model: reduce n"
             )
-        known = [kind, *(NodeKind(group.oscillator, group.friction) for group in groups)]
+        # Equal groups are one kind, and kinds are numbered by their first nodes.
+        all_kinds = [kind, *(NodeKind(group.oscillator, group.friction) for group in groups)]
         nodes = [0] * graph.n
-        for group, node in zip(groups, known[1:], strict=True):
+        for group, of_group in zip(groups, all_kinds[1:], strict=True):
             for i in group.at:
-                nodes[i - 1] = known.index(node)
-        kinds = tuple(known[k] for k in dict.fromkeys(nodes))
+                nodes[i - 1] = all_kinds.index(of_group)
+        kinds = tuple(all_kinds[k] for k in dict.fromkeys(nodes))
         model = cls(kinds, numbered(nodes), contact, tuple((None, graph) for _, graph in layers))
+
+        # The spelling of a coupling depends on the components of the nodes.
         spelt = []
         for coupling, graph in layers:
             if coupling is None and graph.link_count:
@@ -110,8 +111,8 @@ class Model:
                     f"coupling: found none for {graph.name}({graph.n}), which has links; "
                     "expected the name of a coupling, e.g. 'spring'"
                 )
-            own = None if coupling is None else coupling.canonical(model.components, model.coordinates)
-            spelt.append((own, graph))
+            canonical = None if coupling is None else coupling.canonical(model.components, model.coordinates)
+            spelt.append((canonical, graph))
         model = replace(model, layers=tuple(spelt))
         model.check_links()
         return model
@@ -128,7 +129,7 @@ class Model:
 
     @property
     def topology(self) -> Topology:
-        """The graph of a single layer; of several layers the union of their graphs, which nodes feel which at all."""
+        """The graph of a single layer, or the union of the graphs of several layers."""
         graphs = tuple(graph for _, graph in self.layers)
         return graphs[0] if len(graphs) == 1 else union_of(graphs, " and ".join(graph.name for graph in graphs))
 
@@ -174,14 +175,14 @@ class Model:
         return parts if parts is not None and parts.index in self.holders(parts.base) else None
 
     def parameter(self, name: str) -> Parameter | None:
-        """Return the parameter that a name such as "a", "a_2" or "k_1_2" means, None if it means none."""
+        """Return the parameter of a name such as "a", "a_2" or "k_1_2"; None for an unknown name."""
         parts = self.single(name)
         if parts is not None and parts.base == WEIGHTS and WEIGHTS not in self.parameters:
             return _WEIGHT
         return self.parameters.get(name if parts is None else parts.base)
 
     def single(self, name: str) -> NodeName | LinkName | None:
-        """Return the parts of the name of a parameter of one node or link; ValueError if it means one of each."""
+        """Return the parts of the name of a parameter of one node or link; raise ValueError if both have the name."""
         node, link = self.node_parameter(name), self.link_parameter(name)
         if node is not None and link is not None:
             raise ValueError(
@@ -198,10 +199,10 @@ class Model:
         return parts
 
     def link_names(self, name: str) -> Mapping[tuple[int, int], LinkName]:
-        """Return what a parameter of links, or "W", their weights, is called at each (target, source); none of a node's.
+        """Return the names of a parameter of links, or of their weights "W", by (target, source); none for one of nodes.
 
-        A link that acts on both ends has one name with the link that runs back, that of their edge.  Raises ValueError for
-        more than MOST_NUMBERED links.
+        A link that acts on both ends shares its name with the link that runs back.  Raises ValueError for more than
+        MOST_NUMBERED links.
         """
         return _link_names(self, name)
 
@@ -211,24 +212,25 @@ class Model:
         return "".join(f" on {graph.name}({graph.n})" for graph in islice(graphs, 1))
 
     def no_link(self, name: str) -> str:
-        """Return why a name such as "k_1_9" is that of no link, and which are; "" for a name of another form."""
+        """Return the reason why no link has a name such as "k_1_9", with valid names; "" for a name of another form."""
         link = LinkName.parse(name)
         names = {} if link is None else self.link_names(link.base)
         if link is None or not names:
             return ""
+        # The link exists, but its name is that of its edge, with the smaller node first.
         back = names.get((link.target, link.source))
         if back is not None:
             return f"expected {str(back)!r}, the one number of a link that acts on both of its ends"
-        own = dict.fromkeys(names.values())
-        near = nsmallest(3, own, key=lambda one: abs(one.target - link.target) + abs(one.source - link.source))
+        valid = dict.fromkeys(names.values())
+        near = nsmallest(3, valid, key=lambda one: abs(one.target - link.target) + abs(one.source - link.source))
         return (
-            f"found no link where node {link.target + 1} feels node {link.source + 1}; expected one of the {len(own)}, "
+            f"found no link where node {link.target + 1} feels node {link.source + 1}; expected one of the {len(valid)}, "
             f"such as {', '.join(map(str, near))}"
         )
 
-    def unknown(self, name: str, what: str, known: Iterable[str]) -> str:
-        """Return the sentence that refuses a name; a parameter of the coupling without links has its own."""
-        known, reason = tuple(known), self.no_link(name) or unsupported(name)
+    def unknown(self, name: str, what: str, valid_names: Iterable[str]) -> str:
+        """Return the message that refuses a name, or a parameter of a coupling without links."""
+        known, reason = tuple(valid_names), self.no_link(name) or unsupported(name)
         if reason:
             return f"unknown {what} {name!r}; {reason}"
         for coupling, graph in self.layers:
@@ -240,17 +242,17 @@ class Model:
         return f"unknown {what} {short_repr(name)}; known: {listed(known)}{suggestion(name, known)}"
 
     def check_state(self, name: str, what: str) -> None:
-        """Raise ValueError if a name such as "v_2" is no state of the network; `what` says what the name is for."""
+        """Raise ValueError if a name such as "v_2" is no state of the network; `what` is its role, for the message."""
         apart, parts = self.unlinked, NodeName.parse(name)
         if parts is not None and parts.base in apart.components and parts.index in apart.holders(parts.base):
             return
-        known = ", ".join(_states(c, apart.holders(c)) for c in apart.components)
-        raise ValueError(f"unknown {what} {short_repr(name)}; expected a state: {known}; correct the name")
+        states = ", ".join(_states(c, apart.holders(c)) for c in apart.components)
+        raise ValueError(f"unknown {what} {short_repr(name)}; expected a state: {states}; correct the name")
 
 
 @lru_cache(maxsize=64)
 def _unlinked(kinds: tuple[NodeKind, ...], kind_of: tuple[int, ...], contact: ContactModel) -> Equations:
-    """The equations of nodes without links."""
+    """Return the equations of nodes without links."""
     nodes = [network.node(kind.oscillator, kind.friction, contact) for kind in kinds]
     return network.layered_network([kind.oscillator for kind in kinds], nodes, kind_of, ())
 
@@ -269,6 +271,7 @@ def union_of(graphs: tuple[Topology, ...], name: str) -> Topology:
                 "labels in all graphs"
             )
         labels = tuple(graph.labels) if graph.labelled else labels
+    # All pairs contain every other graph, and need no list.
     if any(graph.all_to_all is not None for graph in graphs):
         return Topology(name, n, rule=topology("complete", n).rule, labels=labels)
     pairs = sorted({link[:2] for graph in graphs for link in graph.links})
@@ -277,15 +280,15 @@ def union_of(graphs: tuple[Topology, ...], name: str) -> Topology:
 
 @lru_cache(maxsize=64)
 def _equations(model: Model, varied: tuple[str, ...]) -> Equations:
-    """The equations of a whole network."""
+    """Return the equations of a whole network."""
     oscillators = [kind.oscillator for kind in model.kinds]
     return network.layered_network(oscillators, model.unlinked.nodes, model.kind_of, model.linked, varied)
 
 
 @lru_cache(maxsize=64)
 def _link_names(model: Model, name: str) -> Mapping[tuple[int, int], LinkName]:
-    """The names of a parameter of links, or of their weights, by target and source."""
-    found: dict[tuple[int, int], LinkName] = {}
+    """Return the names of a parameter of links, or of their weights, by target and source."""
+    link_names: dict[tuple[int, int], LinkName] = {}
     weights = name == WEIGHTS and name not in model.parameters and len(model.linked) == 1
     for coupling, graph in () if model.holders(name) else model.linked:
         if weights or name in coupling.parameters:
@@ -294,16 +297,17 @@ def _link_names(model: Model, name: str) -> Mapping[tuple[int, int], LinkName]:
                     f"{name}: found numbers of {graph.link_count} links; expected at most {MOST_NUMBERED} links with numbers of "
                     "their own"
                 )
+            # Forces of an energy act on both ends of an edge.
             mutual = isinstance(coupling, LagrangianCoupling | Potential) and graph.symmetric
             for target, source, _ in graph.links:
                 ends = (source, target) if mutual and source < target else (target, source)
-                found[target, source] = found[ends] if ends in found else LinkName(name, *ends)
-    return MappingProxyType(found)
+                link_names[target, source] = link_names[ends] if ends in link_names else LinkName(name, *ends)
+    return MappingProxyType(link_names)
 
 
 @lru_cache(maxsize=64)
 def _kind_parameters(kind: NodeKind, contact: ContactModel, couplings: tuple[Coupling, ...]) -> FrozenDict[Parameter]:
-    """Every parameter of nodes of one kind with its default, unit and range."""
+    """Return every parameter of nodes of one kind with its default, unit and range."""
     return FrozenDict(network.parameters(kind.oscillator, kind.friction, contact, couplings))
 
 
@@ -311,17 +315,17 @@ def _kind_parameters(kind: NodeKind, contact: ContactModel, couplings: tuple[Cou
 def _parameters(
     kinds: tuple[NodeKind, ...], contact: ContactModel, couplings: tuple[Coupling, ...]
 ) -> FrozenDict[Parameter]:
-    """The parameters of all kinds, each with the default of the first kind that has it, then those of the couplings."""
-    known: dict[str, Parameter] = {}
+    """Return the parameters of all kinds, each with the default of the first kind that has it, then those of couplings."""
+    parameters: dict[str, Parameter] = {}
     for joined in ((), couplings):
         for kind in kinds:
             for name, parameter in _kind_parameters(kind, contact, joined).items():
-                known.setdefault(name, parameter)
-    return FrozenDict(known)
+                parameters.setdefault(name, parameter)
+    return FrozenDict(parameters)
 
 
 def _states(component: str, holders: tuple[int, ...]) -> str:
-    """The states of one component: x_1 … x_4, or of some nodes only theta_2, theta_3."""
+    """Return the states of one component as text: x_1 … x_4, or of some nodes only theta_2, theta_3."""
     if len(holders) > 1 and holders == tuple(range(len(holders))):
         return f"{component}_1 … {component}_{len(holders)}"
     return ", ".join(str(NodeName(component, i)) for i in holders)

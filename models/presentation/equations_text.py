@@ -16,7 +16,7 @@ from ..dynamics.equations import Equations
 from ..inputs.checks import check_instance
 from ..mechanics.components import TIME, WEIGHT_NUMBER, Edge, Node
 from ..mechanics.contact import SLIDING
-from ..mechanics.nondimensional import FRICTION
+from ..mechanics.oscillator import FRICTION
 from .writer import ExpressionWriter, Latex, Style, Text
 
 LARGEST = 6

@@ -13,7 +13,7 @@ from synchain.codegen.kernels.kernel_text import NamedEquations
 from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.program.functions import LANES
 from synchain.codegen.program.printers import Lanes
-from synchain.models.dynamics.observable_text import KNOWN, as_observable
+from synchain.models.dynamics.observable_text import VALUE_FUNCTIONS, as_observable
 
 INSIDE = ("rate(v)", "x", "x_2", "rate(x_1)", "nodes.mean(x*rate(v))", "mu", "t")
 PLACES = (
@@ -56,7 +56,7 @@ def test_functions_in_all_places_read_what_is_defined() -> None:
 
 
 @pytest.mark.parametrize(
-    "function", [name for name in KNOWN if name not in ("rate", "nodes[3]", "atan2", "max", "min", "mod")]
+    "function", [name for name in VALUE_FUNCTIONS if name not in ("rate", "nodes[3]", "atan2", "max", "min", "mod")]
 )
 def test_functions_of_rates_and_states(function: str) -> None:
     for text in ("rate(v)*x", "rate(x)/3", "x*v/(5 + t)"):
