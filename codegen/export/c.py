@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 
 from synchain.models.dynamics.equations import Equations
 
-from ..program.expressions import Expression, Name, Number, call
+from ..program.expressions import Name, Number, call
 from ..program.printers import C99
 from ..program.statements import Array, Do, Statement, called, mentioned
-from .body import is_unrolled, link_places, link_tables, node_places, weights, wrapped
+from .body import is_unrolled, link_jacobian, link_tables, node_jacobian, weights, wrapped
 from .header import Exported
 from .loops import jacobian_statements, mass_statements, rhs_statements
 
@@ -49,6 +49,16 @@ SOLVE = """static void solve(double *mass, double *right, int columns)
 """
 """Solves a dense system of DIMENSION equations for several right-hand sides in place."""
 
+USE = """
+rhs writes d(state)/dt to rates; state and rates have DIMENSION numbers, numbers has PARAMETERS."""
+
+DENSE = """
+jacobian writes d(rates)/d(state) to matrix, row by row, DIMENSION*DIMENSION numbers."""
+
+SPARSE = """
+jacobian writes the ENTRIES entries of d(rates)/d(state) to values; jacobian_places writes their rows and
+columns (from 0).  Entries at one place add up, as in the coordinate format of sparse matrices."""
+
 
 def to_c(equations: Equations, values: Mapping[str, float] | None = None) -> str:
     """Return a C99 source with `rhs` and `jacobian`; up to eight nodes are written out, more are loops.
@@ -57,54 +67,47 @@ def to_c(equations: Equations, values: Mapping[str, float] | None = None) -> str
     unknown or missing values.
     """
     exported = Exported.of(equations, values, "c")
-    model, known, small = exported.model, exported.numbers, is_unrolled(exported.model)
-    rhs = [*rhs_statements(model), *_solved(model, "rates", Number(1))]
-    jacobian = _jacobian(model, small)
-    functions = [*_function(f"void rhs({ARGUMENTS}rates)", rhs), ""]
-    functions += _function(f"void jacobian({ARGUMENTS}{'matrix' if small else 'values'})", jacobian)
-    functions += [] if small else ["", *_places(model)]
-    lines = [
-        "/*",
-        *(f" * {_safe(line)}".rstrip() for line in exported.head),
-        *_usage(small),
-        " */",
-        "",
-    ]
+    model, numbers, small = exported.model, exported.numbers, is_unrolled(exported.model)
+
+    # rhs and jacobian end in a solution with M, where it is not the identity
+    masses = mass_statements(model) if model.inertial else []
+    rhs = rhs_statements(model)
+    jacobian = jacobian_statements(model)
+    if small:
+        rates: list[Statement] = [Array("rates", Name("DIMENSION")), Do(call("rhs", "t", "state", "numbers", "rates"))]
+        cleared = Do(call("memset", "matrix", 0, Name("sizeof(double)") * "DIMENSION" * "DIMENSION"))
+        jacobian = [*([] if model.constant_mass else rates), cleared, *jacobian]
+    if model.inertial:
+        rhs += [*masses, Do(call("solve", "mass_", "rates", Number(1)))]
+        jacobian += [*masses, Do(call("solve", "mass_", "matrix", Name("DIMENSION")))]
+
+    usage = (USE + (DENSE if small else SPARSE)).splitlines()
+    lines = ["/*", *(f" * {line}".rstrip() for line in (*map(_safe, exported.head), *usage)), " */", ""]
     lines += ["#include <math.h>", *(["#include <string.h>"] if small else []), ""]
     lines += _sizes(model, small)
-    if known:
+    if numbers:
         lines += ["/* values of the scene, in the order of `numbers` */"]
-        lines += ["const double defaults[PARAMETERS] = {", *wrapped(map(repr, known.values())), "};", ""]
+        lines += ["const double defaults[PARAMETERS] = {", *wrapped(map(repr, numbers.values())), "};", ""]
     lines += [*SOLVE.splitlines(), ""] if model.inertial else []
-    lines += [*(SIGN if "sign" in called([*rhs, *jacobian]) else []), *functions]
+    lines += SIGN if "sign" in called([*rhs, *jacobian]) else []
+    lines += [*_function(f"void rhs({ARGUMENTS}rates)", rhs), ""]
+    lines += _function(f"void jacobian({ARGUMENTS}{'matrix' if small else 'values'})", jacobian)
+    lines += [] if small else ["", *_places(model)]
     return "\n".join(lines) + "\n"
 
 
 def _safe(line: str) -> str:
-    """Text that cannot end the comment it stands in."""
+    """Return text that cannot end the comment around it."""
     return line.replace("\\", "/").replace("*/", "* /").replace("/*", "/ *")
 
 
-def _usage(small: bool) -> list[str]:
-    lines = [
-        " *",
-        " * rhs writes d(state)/dt to rates; state and rates have DIMENSION numbers, numbers has PARAMETERS.",
-    ]
-    if small:
-        return [*lines, " * jacobian writes d(rates)/d(state) to matrix, row by row, DIMENSION*DIMENSION numbers."]
-    return [
-        *lines,
-        " * jacobian writes the ENTRIES entries of d(rates)/d(state) to values; jacobian_places writes their rows and",
-        " * columns (from 0).  Entries at one place add up, as in the coordinate format of sparse matrices.",
-    ]
-
-
 def _sizes(model: Equations, small: bool) -> list[str]:
-    names = {"NODES": model.n, "DIMENSION": model.dimension, "PARAMETERS": len(model.parameters)}
+    """Return the lines of the sizes and, for many nodes, of the tables of the links."""
+    sizes = {"NODES": model.n, "DIMENSION": model.dimension, "PARAMETERS": len(model.parameters)}
     if not small:
         links = len(model.links)
-        names |= {"LINKS": links, "ENTRIES": len(node_places(model)) * model.n + len(link_places(model)) * links}
-    lines = [f"enum {{ {', '.join(f'{name} = {value}' for name, value in names.items())} }};", ""]
+        sizes |= {"LINKS": links, "ENTRIES": len(node_jacobian(model)) * model.n + len(link_jacobian(model)) * links}
+    lines = [f"enum {{ {', '.join(f'{name} = {value}' for name, value in sizes.items())} }};", ""]
     if small or not model.links:
         return lines
     for name, table in link_tables(model).items():
@@ -115,39 +118,19 @@ def _sizes(model: Equations, small: bool) -> list[str]:
 
 
 def _function(head: str, body: Sequence[Statement]) -> list[str]:
-    """A function; arguments that are not used are named, so that compilers do not warn."""
+    """Return the lines of a function; arguments that are not used are named, so that compilers do not warn."""
     arguments = re.findall(r"(\w+)[,)]", head)
     unused = [f"(void){name};" for name in arguments if name not in mentioned(body)]
     return [head, "{", *(f"    {line}" for line in (*unused, *C99.lines(body))), "}"]
 
 
-def _solved(model: Equations, name: str, columns: Expression) -> list[Statement]:
-    """Statements that multiply by the inverse of the mass matrix where it is not the identity."""
-    if not model.inertial:
-        return []
-    return [*mass_statements(model), Do(call("solve", "mass_", name, columns))]
-
-
-def _jacobian(model: Equations, small: bool) -> list[Statement]:
-    if not small:
-        return jacobian_statements(model)
-    rates: list[Statement] = [Array("rates", Name("DIMENSION")), Do(call("rhs", "t", "state", "numbers", "rates"))]
-    cleared = Do(call("memset", "matrix", 0, Name("sizeof(double)") * "DIMENSION" * "DIMENSION"))
-    solved = _solved(model, "matrix", Name("DIMENSION"))
-    return [*([] if model.constant_mass else rates), cleared, *jacobian_statements(model), *solved]
-
-
 def _places(model: Equations) -> list[str]:
-    """The function that says where the entries of the Jacobian are."""
-    lines = []
-    for r, c in node_places(model):
-        lines.append(_place("i", "NODES", f"{r}*NODES + i", f"{c}*NODES + i"))
-    for there, (r, c) in link_places(model):
-        end = "SOURCE" if there else "TARGET"
-        lines.append(_place("link", "LINKS", f"{r}*NODES + TARGET[link]", f"{c}*NODES + {end}[link]"))
-    inner = ["int k = 0;", *lines] if lines else ["(void)rows;", "(void)columns;"]
-    return ["void jacobian_places(int *rows, int *columns)", "{", *(f"    {line}" for line in inner), "}"]
-
-
-def _place(index: str, end: str, row: str, column: str) -> str:
-    return f"for (int {index} = 0; {index} < {end}; {index}++) {{ rows[k] = {row}; columns[k++] = {column}; }}"
+    """Return the function that writes the rows and columns of the entries of the Jacobian of many nodes."""
+    loops = [("i", "NODES", f"{e.row}*NODES + i", f"{e.column}*NODES + i") for e in node_jacobian(model)]
+    for e in link_jacobian(model):
+        end = "SOURCE" if e.source else "TARGET"
+        loops.append(("link", "LINKS", f"{e.row}*NODES + TARGET[link]", f"{e.column}*NODES + {end}[link]"))
+    lines = ["int k = 0;"] if loops else ["(void)rows;", "(void)columns;"]
+    for i, end, row, column in loops:
+        lines.append(f"for (int {i} = 0; {i} < {end}; {i}++) {{ rows[k] = {row}; columns[k++] = {column}; }}")
+    return ["void jacobian_places(int *rows, int *columns)", "{", *(f"    {line}" for line in lines), "}"]

@@ -26,35 +26,30 @@ class Exported:
     @classmethod
     def of(cls, equations: Equations, values: Mapping[str, float] | None, language: str) -> Exported:
         """Rename what needs it; ValueError for values that do not fit, and for masses that a language cannot solve for."""
-        known = _given(equations, values)
+        checked = _checked(equations, values)
         model, changed = portable(equations)
         check_inertia(model, language)
-        known = dict(zip(model.parameters, known.values(), strict=bool(known)))
-        return cls(model, known, _header(equations, model, changed, known))
+        numbers = dict(zip(model.parameters, checked.values(), strict=bool(checked)))
+
+        # the head, without comment marks
+        states = list(model.state)
+        if len(states) > SHOWN:
+            states = [*states[:3], "…", *states[-3:]]
+        names = [f"{name} = {numbers[name]!r}" if name in numbers else name for name in model.parameters]
+        lines = [
+            f"{equations.n} oscillator{'s' * (equations.n != 1)}, {equations.link_count} links, written by synchain",
+            "",
+            *_formulas(equations),
+            "",
+            f"State ({equations.dimension}): {', '.join(states)}",
+            f"Parameters ({len(names)}): {', '.join(names) or 'none'}",
+            f"Equations: {equations.digest[:16]}",
+            *(f"Renamed: {old} is called {new}" for old, new in changed.items()),
+        ]
+        return cls(model, numbers, [" ".join(line.splitlines()) for line in lines])
 
 
-def _header(
-    equations: Equations, model: Equations, changed: Mapping[str, str], values: Mapping[str, float]
-) -> list[str]:
-    """Lines without comment marks; `model` has the names of the text, `changed` lists those that differ."""
-    states = list(model.state)
-    if len(states) > SHOWN:
-        states = [*states[:3], "…", *states[-3:]]
-    names = [f"{name} = {values[name]!r}" if name in values else name for name in model.parameters]
-    lines = [
-        f"{equations.n} oscillator{'s' * (equations.n != 1)}, {equations.link_count} links, written by synchain",
-        "",
-        *_equations(equations),
-        "",
-        f"State ({equations.dimension}): {', '.join(states)}",
-        f"Parameters ({len(names)}): {', '.join(names) or 'none'}",
-        f"Equations: {equations.digest[:16]}",
-    ]
-    lines += [f"Renamed: {old} is called {new}" for old, new in changed.items()]
-    return [" ".join(line.splitlines()) for line in lines]
-
-
-def _equations(equations: Equations) -> list[str]:
+def _formulas(equations: Equations) -> list[str]:
     from synchain.models.presentation.equations_text import text
 
     try:
@@ -63,15 +58,15 @@ def _equations(equations: Equations) -> list[str]:
         return ["(equations with functions that have no short form: see below)"]
 
 
-def _given(equations: Equations, values: Mapping[str, float] | None) -> dict[str, float]:
+def _checked(equations: Equations, values: Mapping[str, float] | None) -> dict[str, float]:
     """Return the values of all parameters, or none; ValueError where one is unknown, missing or not finite."""
     if values is None:
         return {}
     for name in values:
         if name not in equations.parameters:
-            known = ", ".join(equations.parameters) or "none"
+            valid = ", ".join(equations.parameters) or "none"
             raise ValueError(
-                f"unknown parameter {short_repr(name)}; known: {known}{suggestion(name, equations.parameters)}"
+                f"unknown parameter {short_repr(name)}; known: {valid}{suggestion(name, equations.parameters)}"
             )
     for name in equations.parameters:
         if name not in values:

@@ -35,6 +35,7 @@ def to_numba(equations: Equations, values: Mapping[str, float] | None = None) ->
     lines += ["@cfunc(lsoda_sig)", "def rhs(t, state, rates, numbers):"]
     body = rhs_statements(model)
     if model.inertial:
+        # the rates are M^-1 times the right-hand side; NumPy solves arrays, `rates` is a pointer
         k = Name("k_")
         body += [*mass_statements(model), Array("right_", Name("DIMENSION"))]
         body += [Loop("k_", Number(0), Name("DIMENSION"), (store("right_", k, Load("rates", k, None)),))]

@@ -6,6 +6,7 @@ import builtins
 import keyword
 import re
 import unicodedata
+from functools import partial
 
 import sympy as sp
 
@@ -31,70 +32,68 @@ RESERVED = {*f"{_C} {_MATH} {_OWN}".split(), *keyword.kwlist, *keyword.softkwlis
 """Words of the languages, of their mathematics and of the exported text; a symbol of that name gets an underscore."""
 
 _MACRO = re.compile(r"(M|FP|MATH)_\w+")
+"""Macros of the mathematical libraries of C."""
+
 _LATER = re.compile(r"w[0-9]+|rate_[ij][0-9]+|mass_[0-9]+_")
+"""Names of the exported text with a number."""
 
 
 def portable(equations: Equations) -> tuple[Equations, dict[str, str]]:
     """Return the same equations in names that every exported language accepts, and the names that changed."""
-    swap: dict[sp.Symbol, sp.Symbol] = {}
-    shown = dict.fromkeys(s for node in equations.nodes for s in (*node.state, *node.parameters))
-    taken = {s.name for s in shown if _fine(s.name)} | {"t"}
-    for s in shown:
-        swap[s] = _renamed(s, taken)
-    of_nodes = dict(swap)
-    changed = {s.name: new.name for s, new in swap.items() if s.name != new.name}
+    symbols = dict.fromkeys(s for node in equations.nodes for s in (*node.state, *node.parameters))
+    taken = {s.name for s in symbols if _accepted(s.name)} | {"t"}
+    of_nodes = {s: _renamed(s, taken) for s in symbols}
+    changed = {s.name: new.name for s, new in of_nodes.items() if s.name != new.name}
+    # links: parameters that nodes or other links share keep their names, states and weight get free ones
+    shared = dict(of_nodes)
     edges: dict[Edge, Edge] = {}
     for edge in equations.edges:
-        edges[edge], more = _edge(edge, swap, taken)
-        swap |= dict(zip(edge.parameters, edges[edge].parameters, strict=True))  # other links share them
-        changed |= more
+        for s in edge.parameters:
+            if s not in shared:
+                free = s.name not in taken and _accepted(s.name)
+                shared[s] = real(s.name) if free else _renamed(s, taken, True)
+                taken.add(shared[s].name)
+                if shared[s].name != s.name:
+                    changed[s.name] = shared[s].name
+        swap = {s: shared[s] for s in edge.parameters}
+        for s in (*edge.here, *edge.there):
+            swap[s] = _renamed(s, taken, s.name in taken)
+            taken.add(swap[s].name)
+        swap[edge.weight] = real("weight_")
+        edges[edge] = edge.map(partial(_replaced, swap))
     renamed = equations.map_templates(
-        lambda node: node.map(lambda e: e.xreplace(of_nodes)), lambda edge: edges.get(edge, edge), swap
+        lambda node: node.map(partial(_replaced, of_nodes)), lambda edge: edges.get(edge, edge), shared
     )
     return renamed, changed
 
 
-def _edge(edge: Edge, outer: dict[sp.Symbol, sp.Symbol], taken: set[str]) -> tuple[Edge, dict[str, str]]:
-    """The edge in portable names: parameters that the node shares keep theirs, states and weight get free ones."""
-    swap: dict[sp.Symbol, sp.Symbol] = {}
-    changed = {}
-    for s in edge.parameters:
-        if s in outer:
-            swap[s] = outer[s]
-        else:
-            free = s.name not in taken and _fine(s.name)
-            swap[s] = real(s.name) if free else _renamed(s, taken, True)
-            taken.add(swap[s].name)
-            if swap[s].name != s.name:
-                changed[s.name] = swap[s].name
-    for s in (*edge.here, *edge.there):
-        swap[s] = _renamed(s, taken, s.name in taken)
-        taken.add(swap[s].name)
-    swap[edge.weight] = real("weight_")
-    return edge.map(lambda e: e.xreplace(swap)), changed
+def _replaced(swap: dict[sp.Symbol, sp.Symbol], e: sp.Expr) -> sp.Expr:
+    return e.xreplace(swap)
 
 
-def _fine(name: str) -> bool:
+def _accepted(name: str) -> bool:
+    """Return True for a name that no language, library or exported text uses."""
     plain = re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) is not None and "__" not in name
     return plain and name not in RESERVED and not _MACRO.fullmatch(name) and not _LATER.fullmatch(name)
 
 
 def _renamed(s: sp.Symbol, taken: set[str], occupied: bool = False) -> sp.Symbol:
-    """The symbol itself where its name is fine and free, else one of a similar name."""
-    if _fine(s.name) and not occupied:
+    """Return the symbol itself where its name is accepted and free, else one of a similar name."""
+    if _accepted(s.name) and not occupied:
         return real(s.name)
+    # letters, digits and single underscores, a letter first; then a number until the name is free
     name = re.sub("_+", "_", "".join(map(_ascii, unicodedata.normalize("NFKC", s.name)))).strip("_") or "symbol"
     name = name if name[0].isalpha() else f"s_{name}"
-    base, number = name if _fine(name) else f"{name}_", 2
+    base, number = name if _accepted(name) else f"{name}_", 2
     name = base
-    while name in taken or not _fine(name):
+    while name in taken or not _accepted(name):
         name, number = f"{base.rstrip('_')}_{number}", number + 1
     taken.add(name)
     return real(name)
 
 
 def _ascii(letter: str) -> str:
-    """A letter of C: Greek ones by their names, whatever else there is as an underscore."""
+    """Return a letter of C: Greek letters by their names, an underscore for all others."""
     if letter.isascii():
         return letter if letter.isalnum() else "_"
     words = unicodedata.name(letter, "").split()
