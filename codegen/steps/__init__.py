@@ -7,7 +7,9 @@
 `step` holds the stages of all methods. A small network keeps each state in a register (`unrolled_step`, with the
 elimination of `elimination`); a large one keeps vectors in memory (`looped_step`, with the elimination of `sparse_plan`).
 `mass_solve` adds a mass matrix, `contact_step` the events of set-valued friction.
-The two writers are two programs: the written-out one adds links to Jacobian entries before it emits code and skips zeros
-and units, which saves a fifth of the operations of a Rosenbrock step. Loops over memory cannot do that.
+The two writers are two programs. An unroll pass over the loops, with all zeros and units folded, would hardly change the
+operations of explicit steps, but need 12 to 25 % more in a Rosenbrock step, 50 % more with inertia (counted for 23 networks of
+up to eight nodes): the written-out step adds up Jacobian entries in SymPy, before it emits code, and goes on from the state
+of the stage before.
 The room imports neither the driver nor the disk.
 """
