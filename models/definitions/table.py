@@ -18,7 +18,7 @@ from ..mechanics.parameter import Parameter
 from .inline import Field, Lagrangian, friction_law, link_energy
 from .loader import load_friction_law, load_oscillator, read_coupling
 
-_COMMON = ("name", "parameters", "initial")
+_COMMON = ("name", "source", "parameters", "initial")
 _FIELD = (*_COMMON, "rates")
 _LAGRANGIAN = (
     *_COMMON,
@@ -31,8 +31,8 @@ _LAGRANGIAN = (
     "contact",
     "scaling",
 )
-_LAW = ("name", "parameters", "force", "static", "order", "self_exciting")
-_LINK = ("name", "parameters", "energies", "on")
+_LAW = ("name", "source", "parameters", "force", "static", "order", "self_exciting")
+_LINK = ("name", "source", "parameters", "energies", "on")
 _ENERGIES = ("potential", "dissipation", "kinetic")
 
 
@@ -155,7 +155,7 @@ def _oscillator_table(node: Oscillator) -> dict[str, Any]:
     model = node.model
     scaling = model.scaling if isinstance(model, LagrangianModel) else None
     texts = _Texts(f"oscillator {node.name!r}", (*node.states, *node.parameters, TIME.name), scaling)
-    table: dict[str, Any] = {"name": node.name}
+    table: dict[str, Any] = _names(node)
     if isinstance(model, FieldModel):
         table["rates"] = dict(zip(model.state, map(texts.write, model.rates), strict=True))
     else:
@@ -194,7 +194,7 @@ def _scaling_table(scaling: Scaling, coordinates: Iterable[Coordinate], texts: _
 
 def _law_table(law: FrictionLaw) -> dict[str, Any]:
     texts = _Texts(f"friction law {law.name!r}", (SLIDING.name, *law.parameters))
-    table: dict[str, Any] = {"name": law.name, "force": texts.write(law.force)}
+    table: dict[str, Any] = {**_names(law), "force": texts.write(law.force)}
     if law.static is not None:
         table["static"] = texts.write(law.static)
     if law.order:
@@ -210,12 +210,21 @@ def _link_table(coupling: LagrangianCoupling) -> dict[str, Any]:
         raise ValueError(
             f"{what}: found a coupling between {' and '.join(coupling.between)} and no file; write it in a file"
         )
-    texts = _Texts(what, ("q_i", "q_j", "v_i", "v_j", WEIGHT.name, *coupling.parameters))
+    texts = _Texts(what, ("q_i", "q_j", "v_i", "v_j", "W", *coupling.parameters))
     energies = zip(_ENERGIES, (coupling.potential, coupling.dissipation, coupling.kinetic), strict=True)
-    table: dict[str, Any] = {"name": coupling.name, "energies": {key: texts.write(e) for key, e in energies if e != 0}}
+    weight = {WEIGHT: texts.names["W"]}  # the name of the weight in texts
+    table: dict[str, Any] = {
+        **_names(coupling),
+        "energies": {key: texts.write(e.xreplace(weight)) for key, e in energies if e != 0},
+    }
     if coupling.coordinates is not None:
         table["on"] = list(coupling.coordinates)
     return {**table, "parameters": _parameter_tables(coupling.parameters)}
+
+
+def _names(part: Oscillator | FrictionLaw | LagrangianCoupling) -> dict[str, Any]:
+    """The name of a part, and where it was published if that is known."""
+    return {"name": part.name, **({"source": part.source} if part.source else {})}
 
 
 class _Texts:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any, TypeAlias, get_args, get_origin, get_type_hints
 
 from ..definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
+from ..definitions.inline import LONGEST_SOURCE
 from ..definitions.loader import load_friction_law, load_oscillator, read_coupling
 from ..graphs.families import Family, family
 from ..graphs.families import names as families
@@ -26,6 +27,7 @@ from .section import Direction
 Table: TypeAlias = dict[str, Any]
 
 TEXT: Table = {"type": "string", "maxLength": 200}
+CITATION: Table = {"type": "string", "maxLength": LONGEST_SOURCE}
 FILE: Table = {"type": "string", "pattern": r"\.py$"}
 """The path of a part outside the package."""
 
@@ -76,7 +78,12 @@ def _rows() -> dict[str, Table]:
     numbers = {"type": "array", "items": NUMBER, "minItems": 1}
     values = _either(numbers, {"type": "array", "items": numbers, "minItems": 1})
     expressions: Table = {"type": "object", "additionalProperties": NUMBER}
-    link = {"name": TEXT, "on": {"type": "array", "items": TEXT, "minItems": 1}, "parameters": {"type": "object"}}
+    link = {
+        "name": TEXT,
+        "source": CITATION,
+        "on": {"type": "array", "items": TEXT, "minItems": 1},
+        "parameters": {"type": "object"},
+    }
     tables = [
         _table({"energies": EXPRESSIONS, **link}, "energies"),
         _table({"rates": expressions, "parameters": {"type": "object"}}, "rates"),
@@ -158,10 +165,10 @@ def _written_out() -> tuple[Table, Table]:
     anything: Table = {"type": "object"}
     contact = {"enum": [str(word) for word in ContactModel]}
     law = _part(FRICTION_LAW, "none", "default")
-    keys = {"name": TEXT, "force": NUMBER, "static": NUMBER, "order": {"type": "array"}}
+    keys = {"name": TEXT, "source": CITATION, "force": NUMBER, "static": NUMBER, "order": {"type": "array"}}
     table = _table({**keys, "self_exciting": {"type": "boolean"}, "parameters": anything}, "force")
     friction = {"anyOf": [*law["anyOf"], table]}
-    common = {"name": TEXT, "parameters": anything, "initial": anything}
+    common = {"name": TEXT, "source": CITATION, "parameters": anything, "initial": anything}
     field = _table({**common, "rates": EXPRESSIONS}, "rates")
     energies = {"coordinates": anything, "kinetic": NUMBER, "potential": NUMBER, "dissipation": NUMBER}
     more = {"forces": EXPRESSIONS, "friction": friction, "contact": contact, "scaling": anything}

@@ -5,21 +5,23 @@ directions.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from math import isqrt, prod
 from typing import TYPE_CHECKING
 
 from ..graphs.families import Eigenvalues, Family
 from ..inputs.options import integers_option
+from .chain import formula as chain_formula
 
 if TYPE_CHECKING:
     from ..graphs.closed_forms import ClosedForm
 
 
-def settle(n: int, shape: object) -> dict[str, object]:
-    """One or more nodes in each direction, n in all."""
+def settle_shape(n: int, shape: object, least: int) -> dict[str, object]:
+    """At least `least` nodes in each direction, n in all."""
     if shape is None:
         return {}
-    sizes = integers_option("shape", shape, 1)
+    sizes = integers_option("shape", shape, least)
     if prod(sizes) != n:
         raise ValueError(f"shape = {sizes} has {prod(sizes)} nodes; expected n = {n}")
     return {"shape": sizes}
@@ -50,25 +52,22 @@ def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> Eigenvalues:
     return box(sizes, (False,) * len(sizes))
 
 
-def formula(shape: str | Iterable[object] = ("p", "q")) -> ClosedForm:
-    """Sums of -4 sin² of each direction, sizes as letters or numbers; the last varies fastest."""
-    from dataclasses import replace
-
+def box_formula(one: ClosedForm, shape: str | Iterable[object]) -> ClosedForm:
+    """Sums of the eigenvalues of one direction, sizes as letters or numbers; the last varies fastest."""
     from ..graphs.closed_forms import entries
     from ..graphs.closed_products import box, counters
-    from .chain import formula as one
 
     sizes = entries("shape", shape)
-    return replace(box(one(), sizes, counters(sizes)), options={"shape": sizes})
+    return replace(box(one, sizes, counters(sizes)), options={"shape": sizes})
 
 
 TOPOLOGY = Family(
     edges,
     minimum=1,
-    settle=settle,
+    settle=lambda n, shape: settle_shape(n, shape, 1),
     count=lambda n, *, shape=None: sum(n // size * (size - 1) for size in shape or sides(n)),
     spectrum=spectrum,
-    formula=formula,
+    formula=lambda shape=("p", "q"): box_formula(chain_formula(), shape),
     sides=sides,
     source="A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.6 (Cartesian product of "
     "paths)",

@@ -4,25 +4,12 @@ directions.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from math import isqrt, prod
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from math import isqrt
 
 from ..graphs.families import Eigenvalues, Family
-from ..inputs.options import integers_option
-
-if TYPE_CHECKING:
-    from ..graphs.closed_forms import ClosedForm
-
-
-def settle(n: int, shape: object) -> dict[str, object]:
-    """Three or more nodes in each direction, n in all."""
-    if shape is None:
-        return {}
-    sizes = integers_option("shape", shape, 3)
-    if prod(sizes) != n:
-        raise ValueError(f"shape = {sizes} has {prod(sizes)} nodes; expected n = {n}")
-    return {"shape": sizes}
+from .grid import box_formula, settle_shape
+from .ring import formula as ring_formula
 
 
 def sides(n: int) -> tuple[int, ...]:
@@ -50,25 +37,13 @@ def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> Eigenvalues:
     return box(sizes, (True,) * len(sizes))
 
 
-def formula(shape: str | Iterable[object] = ("p", "q")) -> ClosedForm:
-    """Sums of -4 sin² of each direction, sizes as letters or numbers; the last varies fastest."""
-    from dataclasses import replace
-
-    from ..graphs.closed_forms import entries
-    from ..graphs.closed_products import box, counters
-    from .ring import formula as one
-
-    sizes = entries("shape", shape)
-    return replace(box(one(), sizes, counters(sizes)), options={"shape": sizes})
-
-
 TOPOLOGY = Family(
     edges,
     minimum=3,
-    settle=settle,
+    settle=lambda n, shape: settle_shape(n, shape, 3),
     count=lambda n, *, shape=None: n * len(shape or sides(n)),
     spectrum=spectrum,
-    formula=formula,
+    formula=lambda shape=("p", "q"): box_formula(ring_formula(), shape),
     sides=sides,
     source="A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.6 (Cartesian product of "
     "cycles)",

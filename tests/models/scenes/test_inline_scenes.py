@@ -156,6 +156,7 @@ def test_a_model_with_scales_is_a_name_or_a_table(name: str) -> None:
     scene = Scene(replace(shipped, name="mine"))
     again = Scene.from_dict(json.loads(json.dumps(scene.as_dict())))
     assert again == scene
+    assert again.oscillator.source == shipped.source
     assert again.equations.digest == Scene(name).equations.digest
 
 
@@ -176,6 +177,7 @@ def test_energies_of_links_in_a_notebook_are_those_of_a_scene_file() -> None:
     scene = Scene("duffing", spring, chain(2))
     assert Scene("duffing", table, chain(2)) == scene
     assert Scene.from_dict(scene.as_dict()) == scene
+    assert scene.as_dict()["coupling"]["energies"] == {"potential": "W*k*(q_i - q_j)**2/2"}
     sigma, own = sp.symbols("sigma k", real=True)
     assert scene.equations.edge.rhs[1] == Scene("duffing", "spring", chain(2)).equations.edge.rhs[1].subs(sigma, own)
 
