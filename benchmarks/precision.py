@@ -20,7 +20,7 @@ import numpy as np
 from tqdm import tqdm
 
 from synchain.codegen.simd.lane_types import native_width
-from synchain.codegen.taylor import jump
+from synchain.codegen.taylor import taylor_obstacle
 
 from . import peers
 from .kit.cases import CASES as STORED
@@ -84,7 +84,7 @@ class Method:
         the smoothed law; power series need functions without jumps between events.
         """
         if self.integrator in EXPLICIT:
-            return not case.stiff and (self.integrator != "taylor" or jump(case.scene.equations) is None)
+            return not case.stiff and (self.integrator != "taylor" or taylor_obstacle(case.scene.equations) is None)
         return case.smoothed
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .looped_series import write_looped
-from .passable import is_analytic, is_linear, jump, may_cross_singularity, unpassed
+from .passable import is_analytic, is_linear, may_cross_singularity, taylor_obstacle, unpassed
 from .rolled import is_large, write_rolled
 from .series_order import order_for
 from .tangent import TangentStep, write_tangent
@@ -16,9 +16,9 @@ __all__ = [
     "is_analytic",
     "is_large",
     "is_linear",
-    "jump",
     "may_cross_singularity",
     "order_for",
+    "taylor_obstacle",
     "unpassed",
     "write_looped",
     "write_rolled",

@@ -31,7 +31,7 @@ from ..steps.safe_names import NAMES
 from ..steps.step import lane
 from .event_location import Stored, side_by
 from .mass_matrix import moving, solved
-from .passable import check_jumps
+from .passable import check_passable
 from .series import MINUS, Constant, Series, State, magnitude
 from .series_graph import SeriesGraph, Template
 from .series_writer import Gaps, SeriesWriter
@@ -665,5 +665,5 @@ def write_looped(equations: Equations, order: int) -> TaylorStep:
     if equations.inertial and equations.link_count:
         kind = "links with inertia" if equations.inertial_links else "links of nodes with a mass matrix"
         raise ValueError(f"taylor: found {kind} in a network that is stepped in loops; use dop853 or rodas5p")
-    check_jumps(equations)
+    check_passable(equations)
     return LoopedSeries(equations, order).step("graph", "weights")

@@ -35,12 +35,12 @@ BOUNDED = (sp.sin, sp.cos, sp.tanh, sp.erf, sp.asinh)
 Ends = tuple[tuple[sp.Symbol, ...], ...]
 
 
-def jump(equations: Equations) -> sp.Expr | None:
+def taylor_obstacle(equations: Equations) -> sp.Expr | None:
     """Return a part of some equations that no Taylor step passes; None if there is none."""
     return next(iter(_obstacles(equations)), None)
 
 
-def check_jumps(equations: Equations) -> None:
+def check_passable(equations: Equations) -> None:
     """Raise ValueError for equations with a part that no Taylor step passes."""
     for part, why in _obstacles(equations).items():
         raise ValueError(

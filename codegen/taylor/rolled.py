@@ -26,7 +26,7 @@ from ..program.statements import Assign, Do, Loop, Statement, Store, let, mentio
 from ..steps.places import NodeKindLayout, span
 from ..steps.step import lane
 from .looped_series import CONVOLUTION, START, Hoisted, LoopedSeries, Outer, SeriesLoop, Slot
-from .passable import check_jumps
+from .passable import check_passable
 from .series import Constant, Exponential, Kink, Linear, Product, Series, Square
 from .series_graph import SeriesGraph
 from .simplify import absolute
@@ -396,5 +396,5 @@ def is_large(equations: Equations) -> bool:
 
 def write_rolled(equations: Equations, order: int) -> TaylorStep:
     """Return the Taylor step of some order of a node for which `is_large` holds; see `write_step`."""
-    check_jumps(equations)
+    check_passable(equations)
     return Rolled(equations, order).step("graph", "weights")

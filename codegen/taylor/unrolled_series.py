@@ -23,7 +23,7 @@ from ..program.statements import Comment, If, Statement, Store, let, store
 from ..steps.step import lane
 from .event_location import Stored, side_by
 from .mass_matrix import moving, solved
-from .passable import check_jumps
+from .passable import check_passable
 from .series import Constant, Exponential, Series, State, Time, magnitude
 from .series_graph import SeriesGraph, Template
 from .series_writer import Gaps, SeriesWriter
@@ -330,5 +330,5 @@ def _masses_of_link(edge: Edge) -> list[sp.Expr]:
 def write_step(equations: Equations, order: int) -> TaylorStep:
     """Return the Taylor step of some order for equations with names that a kernel can use (`tidy`)."""
     check_order(order)
-    check_jumps(equations)
+    check_passable(equations)
     return UnrolledSeries(equations, order).step()

@@ -12,7 +12,15 @@ from synchain.codegen.driver.clock_slots import WORTH
 from synchain.codegen.driver.columns import Count, SpanColumn, SumColumn
 from synchain.codegen.integrators import Integrator, integrator
 from synchain.codegen.kernels.sweep_kernel import AUTO
-from synchain.codegen.taylor import is_analytic, is_large, is_linear, jump, may_cross_singularity, order_for, unpassed
+from synchain.codegen.taylor import (
+    is_analytic,
+    is_large,
+    is_linear,
+    may_cross_singularity,
+    order_for,
+    taylor_obstacle,
+    unpassed,
+)
 from synchain.models.dynamics.angles import periods_of_states
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation
@@ -228,7 +236,7 @@ def _has_series(equations: Equations) -> bool:
     No motion may slide along a jump, or pass another point without a series.  The recurrences of a dense mass matrix take
     longer to compile than most runs take.
     """
-    return not equations.inertial and jump(equations) is None and not may_cross_singularity(equations)
+    return not equations.inertial and taylor_obstacle(equations) is None and not may_cross_singularity(equations)
 
 
 def chosen_for_rows(scene: Scene, equations: Equations, rows: CellRows) -> Integrator:

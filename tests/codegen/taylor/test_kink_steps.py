@@ -13,7 +13,7 @@ from plain import Text, march
 from samples import path, spring
 
 from synchain.codegen.steps.safe_names import tidy
-from synchain.codegen.taylor import jump, write_looped
+from synchain.codegen.taylor import taylor_obstacle, write_looped
 from synchain.models import Scene, chain
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME as T
@@ -266,7 +266,7 @@ def test_states_that_are_no_numbers_give_no_length():
 )  # fmt: skip
 def test_functions_that_jump_or_are_roots_at_a_kink_are_refused(jumping):
     equations = alone([X, V], [V, -X - jumping], [A])
-    assert jump(equations) is not None
+    assert taylor_obstacle(equations) is not None
     for write in (step_of, lambda e, order: write_looped(tidy(e), order)):
         with pytest.raises(
             ValueError,
@@ -281,7 +281,7 @@ def test_functions_that_jump_or_are_roots_at_a_kink_are_refused(jumping):
      sp.Piecewise((X**2, X * A > 0), (sp.sin(X), True)), sp.Abs(sp.Abs(X) - 1)],
 )  # fmt: skip
 def test_continuous_functions_are_taken(joined):
-    assert jump(alone([X, V], [V, -X - joined], [A])) is None
+    assert taylor_obstacle(alone([X, V], [V, -X - joined], [A])) is None
 
 
 def test_nested_kinks_follow_the_solution():

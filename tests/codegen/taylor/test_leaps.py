@@ -14,7 +14,7 @@ from samples import path
 from scipy.integrate import solve_ivp
 
 from synchain.codegen.steps.safe_names import tidy
-from synchain.codegen.taylor import jump, write_looped, write_step
+from synchain.codegen.taylor import taylor_obstacle, write_looped, write_step
 from synchain.models import Field, Rates, Scene, chain, ring
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME as T
@@ -193,14 +193,14 @@ def stages(scene: Scene) -> tuple[np.ndarray, int]:
 def test_a_network_is_that_of_another_method():
     """Two nodes as machine code; three run as Python below."""
     scene = LINE.replace(topology=chain(2), initial={"x": (0.0, 0.4), "v": (0.5, 0.0)})
-    assert jump(scene.equations) is None
+    assert taylor_obstacle(scene.equations) is None
     found, (end, steps) = run(scene, show_progress=False).data, stages(scene)
     assert int(found.steps) < 0.1 * steps
     assert np.abs(found.end.values.ravel() - end).max() < 1e-9
 
 
 def test_lines_and_loops_agree_on_the_network():
-    assert jump(LINE.equations) is None
+    assert taylor_obstacle(LINE.equations) is None
     both = [march(LINE.equations, 18, LINE.y0, 20.0, 1e-12, looped=looped) for looped in (False, True)]
     (lines, count), (loops, _) = both
     end, steps = stages(LINE)
@@ -233,7 +233,7 @@ def link(rate: sp.Expr, to: int = 1) -> Equations:
     ids=["velocity", "both", "in turn", "and", "link", "link of phases"],
 )
 def test_a_jump_along_which_motion_may_slide_is_refused(equations):
-    assert jump(equations) is not None
+    assert taylor_obstacle(equations) is not None
     for write in (write_step, write_looped):
         with pytest.raises(ValueError, match=r"taylor: found .*, along which motion may slide.*; use .* dop853"):
             write(tidy(equations), 8)
@@ -248,7 +248,7 @@ def test_a_jump_along_which_motion_may_slide_is_refused(equations):
 def test_poles_of_pieces_gaps_and_arcs_are_refused(rate):
     """A step would end at the pole of a piece that is not chosen, and arcs go on smoothly over one."""
     equations = alone([X, V], [sp.S.One, rate])
-    assert jump(equations) is not None
+    assert taylor_obstacle(equations) is not None
     with pytest.raises(
         ValueError, match=r"taylor: found .*, a part of which has a pole, or no value, somewhere; expected"
     ):
@@ -259,22 +259,22 @@ def test_poles_of_pieces_gaps_and_arcs_are_refused(rate):
     "rate", [sp.Piecewise((1 / (1 + X**2), X > 1), (sp.sqrt(2 + X**2), True)), sp.sign(sp.exp(X) - 2), sp.atan(X * V)]
 )
 def test_pieces_gaps_and_arcs_with_values_everywhere_are_taken(rate):
-    assert jump(alone([X, V], [sp.S.One, rate])) is None
+    assert taylor_obstacle(alone([X, V], [sp.S.One, rate])) is None
 
 
 def test_pieces_that_agree_on_one_side_of_a_product_alone_jump():
     """1 - 2 x for x v > 0 and 1 elsewhere agree where x = 0, not where v = 0, along which motion slides."""
     for one, other in ((X, V), (V, X)):
         rate = sp.Piecewise((1 - 2 * one, one * other > 0), (1, True))
-        assert jump(alone([one, other], [sp.S.Zero, rate])) == rate
+        assert taylor_obstacle(alone([one, other], [sp.S.Zero, rate])) == rate
 
 
 def test_links_that_pass_jumps_are_taken():
-    assert jump(link(sp.sign(X))) is None
+    assert taylor_obstacle(link(sp.sign(X))) is None
 
 
 def test_loads_of_contacts_and_masses_may_not_jump():
     stuck = Scene(topology=ring(3), contact="set-valued", coupling=Rates({"v": "W*(x_j - x_i + sign(x_j - x_i))"}))
-    assert str(jump(stuck.equations)).startswith("sign(")
+    assert str(taylor_obstacle(stuck.equations)).startswith("sign(")
     smooth = stuck.replace(coupling=Rates({"v": "W*(x_j - x_i)"}))
-    assert jump(smooth.equations) is None
+    assert taylor_obstacle(smooth.equations) is None
