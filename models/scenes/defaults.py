@@ -54,6 +54,9 @@ LIMITS: Mapping[str, tuple[Any, Any]] = {
 }
 """The range of each number that belongs to a keyword, both ends in it."""
 
+SAMPLES = (401, 40, 20_001)
+"""Points of a trajectory by default: the fewest, those of a unit of the window, the most; 40 a turn draw a smooth curve."""
+
 
 def integrators() -> tuple[str, ...]:
     """Return the names of all integrators: shipped files, and entry points of installed packages."""
@@ -99,7 +102,7 @@ def complete(keywords: Mapping[str, Any]) -> dict[str, Any]:
     recorded = (*values["record"], *values["observe"], *values["sections"])
     if recorded and values["window"] == 0.0:
         raise ValueError(f"window: found 0, in which {str(recorded[0])!r} has nothing to record; give a window > 0")
-    values |= _numerics(keywords, values["record"])
+    values |= _numerics(keywords, values["record"], values["window"])
     # Checks of several keywords together.
     values["continuation"] = check_sweep(model, values)
     check_draws(model, values, drawn)
@@ -233,7 +236,7 @@ def _time_unit(model: Model, parameter_values: Mapping[str, float], unit_text: o
     return unit
 
 
-def _numerics(keywords: Mapping[str, object], records: Sequence[Record]) -> dict[str, object]:
+def _numerics(keywords: Mapping[str, object], records: Sequence[Record], window: float) -> dict[str, object]:
     """Return the integrator, its tolerances and limits."""
     rtol = check_number("rtol", keywords["rtol"], *LIMITS["rtol"])
     atol = rtol / 10 if keywords["atol"] is None else check_number("atol", keywords["atol"], *LIMITS["atol"])
@@ -243,8 +246,12 @@ def _numerics(keywords: Mapping[str, object], records: Sequence[Record]) -> dict
             f"atol: found {atol!r}; expected a number above 0, since states pass through 0; take e.g. 1e-10"
         )
     max_steps = check_integer("max_steps", keywords["max_steps"], *LIMITS["max_steps"])
-    samples = check_integer("samples", keywords["samples"], *LIMITS["samples"])
-    if Record.TRAJECTORY in records and samples < 2:
+    trajectory = Record.TRAJECTORY in records
+    if keywords["samples"] is None:
+        samples = round(min(max(SAMPLES[0], SAMPLES[1] * window + 1), SAMPLES[2])) if trajectory else 0
+    else:
+        samples = check_integer("samples", keywords["samples"], *LIMITS["samples"])
+    if trajectory and samples < 2:
         raise ValueError(
             f"samples: found {samples} for the trajectory; expected at least 2, "
             "since both ends of the window are included; raise samples"

@@ -90,8 +90,9 @@ class Scene(HasDrawing, HasLatex):
     time_unit : str, optional
         "period" (of the drive; the default if the equations repeat themselves in time at all values of the parameters)
         or "time".
-    samples : int
-        Points of a trajectory.
+    samples : int, optional
+        Points of a trajectory, both ends of the window included; by default 40 a period or unit of time, between 401
+        and 20 001.
     integrator : str
         The method; "auto" chooses one.
     rtol, atol : float
@@ -197,7 +198,7 @@ class Scene(HasDrawing, HasLatex):
         transient: float = 300.0,
         window: float = 100.0,
         time_unit: str | None = None,
-        samples: int = 0,
+        samples: int | None = None,
         integrator: str = "auto",
         rtol: float = 1e-8,
         atol: float | None = None,
@@ -463,7 +464,15 @@ def _spectrum(graph: Topology) -> Spectrum:
 KEYWORDS = tuple(row.name for row in fields(Scene) if row.compare)
 """The keywords of a scene, which are the keys of a scene file."""
 
-_FOLLOWING = {"friction": "default", "contact": None, "record": None, "section": None, "time_unit": None, "atol": None}
+_FOLLOWING = {
+    "friction": "default",
+    "contact": None,
+    "record": None,
+    "section": None,
+    "time_unit": None,
+    "atol": None,
+    "samples": None,
+}
 """Keywords whose default depends on other keywords, with the value that means this default."""
 
 

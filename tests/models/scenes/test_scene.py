@@ -258,7 +258,7 @@ REFUSED = [
     ({"record": "sync_error"}, "expected a list"),
     ({"record": ["sync_eror"]}, "did you mean 'sync_error'?"),
     ({"record": ["section", "section"]}, "each record once"),
-    ({"record": ["trajectory"]}, "expected at least 2"),
+    ({"record": ["trajectory"], "samples": 1}, "expected at least 2"),
     ({"section": "v_3 falling"}, "unknown section variable 'v_3'"),
     ({"section": "v_0 falling"}, "unknown section variable 'v_0'"),
     ({"section": "v_01 falling"}, "unknown section variable 'v_01'"),

@@ -54,7 +54,8 @@ def test_scenes_of_the_documentation_are_valid() -> None:
     blocks = re.findall(r"^```toml\n(.*?)^```", pages, re.MULTILINE | re.DOTALL)
     assert len(blocks) >= 4
     for block in blocks:
-        assert problems(tomllib.loads(block)) == []
+        if "project" not in (table := tomllib.loads(block)):  # that of a package with plug-ins
+            assert problems(table) == []
 
 
 def a_graph(name: str) -> Topology:
