@@ -29,7 +29,7 @@ from synchain.models.scenes.scene import Scene, check_scene
 from ..cells.run_keywords import Given
 from ..results.labelled import Labelled, dataset, scene_text
 from ..stability.attractor import RETURN, cycle_propagators
-from ..stability.exponents import coupled_cell, single_cell
+from ..stability.exponents import coupled_cell
 from ..stability.limit_cycle import limit_cycle
 from ..stability.motion import Turns, rests
 from ..stability.orbits import OrbitProblem, unit_of_time, within
@@ -359,7 +359,7 @@ def strobe(
 
 def _driven(given: Given, scene: Scene) -> Scene:
     """Scene with its parameters at the tolerance of orbits; ValueError if it has no drive."""
-    scene = single_cell(given, scene, TOLERANCE)
+    scene = given.scene(scene, rtol=TOLERANCE)
     unit_of_time(scene)
     if not scene.period:
         raise ValueError(

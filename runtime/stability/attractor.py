@@ -50,7 +50,7 @@ class Motion(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Attractor:
-    """Motion of one start, with what its exponents follow from."""
+    """Motion of one start, with the propagators that give its exponents."""
 
     motion: Motion  # kind of the motion
     cycle: float  # length of one cycle in units of non-dimensional time; 0 if the motion is not a cycle
@@ -131,7 +131,7 @@ def _periodic(
     """Motion along which the variational equation repeats itself after some drive periods, or other units."""
     unit = problem.unit if unit is None else unit
     block = unit / problem.unit
-    # the second cycle tells what the first one was off by, and its looser repetition the error of the steps
+    # the first cycle shows how far the motion has settled, looser steps over the second one show their error
     *first, settled = cycle_propagators(problem, state, periods, block)
     *second, _ = cycle_propagators(problem, settled, periods, block)
     *looser, _ = cycle_propagators(problem, settled, periods, block, TOLERANCE_RATIO)

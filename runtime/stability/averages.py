@@ -245,10 +245,7 @@ class Batches:
         return np.asarray(np.sum(self.sums[: self.count], axis=0) / self.time)
 
     def error_by_start(self) -> np.ndarray:
-        """Estimate the standard error of each start: half of what the mean is within in 95 of 100 runs.
-
-        Shapes: returns (starts, m).
-        """
+        """Estimate the standard error (starts, m) of each start: the mean lies within two of them in 95 of 100 runs."""
         complete, frequencies = self.blocks // self.per_batch, self.frequencies
         sums = self.sums[:complete]
         if frequencies < FEWEST:

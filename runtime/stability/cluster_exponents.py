@@ -1,14 +1,14 @@
 """Stability of cluster states: transversal exponents of a network, block by block.
 
 One orbit of the quotient network carries a deviation for each block and one for the motion of the
-clusters themselves.
+clusters themselves: an `OrbitProblem` whose strengths are all sigma, and one integrator.
 
 Source: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from synchain.models.dynamics.reduction import without_drive
-from synchain.models.dynamics.variational import Variation, clustered
+from synchain.models.dynamics.variational import clustered
 from synchain.models.inputs.keywords import warn
 from synchain.models.scenes.scene import Scene
 from synchain.models.symmetries.clusters import Clusters, clusters
@@ -27,15 +27,14 @@ from ..support.error_text import with_error
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .averages import Averaging, Batches, document_keywords
-from .exponents import single_cell
 from .orbits import OrbitProblem
 from .variational_integrator import VariationalIntegrator
 
 MERGED = 1e-9
-"""Distance below which two clusters count as one."""
+"""Distance below which two clusters count as one (a choice)."""
 
 APPROACH = 0.5
-"""Two clusters approach each other if their largest distance falls below this part of what it was earlier."""
+"""Two clusters approach each other if their largest distance falls below this part of its earlier value (a choice)."""
 
 
 class BlockVerdict(StrEnum):
@@ -101,7 +100,7 @@ class ClusterExponents(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """The clusters, each block with its verdict, what has merged and what is about to."""
+        """The clusters, each block with its verdict, and the clusters that merged or approach each other."""
         members = [", ".join(str(i + 1) for i in nodes) for nodes in self.state.members]
         blocks = [
             f"{verdict} ({with_error(exponent, error)}): clusters {', '.join(str(c + 1) for c in block.clusters)}"
@@ -112,9 +111,9 @@ class ClusterExponents(Labelled):
         pairs = (("merged", self.merged), ("approaching", self.approaching))
         return (
             ("clusters", "; ".join(f"{k}: {nodes}" for k, nodes in enumerate(members, 1))),
-            *((f"block {k}", words) for k, words in enumerate(blocks, 1)),
+            *((f"block {k}", verdict) for k, verdict in enumerate(blocks, 1)),
             ("own motion", with_error(self.motion, self.motion_error)),
-            *((name, _words(found)) for name, found in pairs if found),
+            *((name, _text(merging)) for name, merging in pairs if merging),
             *((("unit", self.unit),) if self.unit else ()),
         )
 
@@ -132,9 +131,7 @@ class ClusterExponents(Labelled):
 
     @property
     def merged(self) -> tuple[tuple[int, int], ...]:
-        """Pairs of clusters that never were more than 1e-9 apart; the motion is that of fewer
-        clusters.
-        """
+        """Pairs of clusters that never were more than 1e-9 apart; the motion is that of fewer clusters."""
         return _pairs(self.separation < MERGED)
 
     def as_dict(self) -> dict[str, object]:
@@ -222,18 +219,17 @@ def cluster_exponents(
         half of the motion after the first half of the transient.
     """
     averaging = Averaging(precision, periods, transient, seed, Execution(1, None, show_progress, progress))
-    scene = single_cell(Given(cluster_exponents, parameters, more, ONE_ORBIT), scene, rtol)
+    scene = Given(cluster_exponents, parameters, more, ONE_ORBIT).scene(scene, rtol=rtol)
     partition = _of_graph(scene, state)
-    variation = clustered(without_drive(scene.equations, scene.parameters), partition)
     reporter = averaging.reporter()
-    problem, integrator = _integrator(scene, partition, variation, averaging.seed)
-    unit = problem.unit
-    batches, dropped = Batches(unit), round(averaging.transient)
-    gaps: list[np.ndarray] = []
+    problem, integrator = _integrator(scene, partition, averaging.seed)
+    batches, dropped = Batches(problem.unit), round(averaging.transient)
+    gaps: list[np.ndarray] = []  # (clusters, clusters) after each unit of time: largest difference of a component
 
     def advance() -> np.ndarray:
-        growth = integrator.advance(unit)
-        gaps.append(_differences(integrator.state[0], partition.quotient.n, _deviating(variation)))
+        growth = integrator.advance(problem.unit)
+        states = integrator.state[0].reshape(-1, partition.quotient.n)[: problem.components]
+        gaps.append(np.abs(states[:, :, None] - states[:, None, :]).max(axis=0))
         return growth
 
     with reporter:
@@ -242,12 +238,16 @@ def cluster_exponents(
             reporter.advance(1)
         for _ in averaging.rounds(batches, batches.error, reporter):
             batches.add(advance())
-        steps = integrator.error_of_steps(unit)
-    apart = np.max(gaps[dropped:], axis=0)
-    approaching = _pairs(_falls(np.array(gaps[dropped // 2 :])) & (apart >= MERGED))
+        steps = integrator.error_of_steps(problem.unit)
+
+    # distances that halve in the second half of the motion after the first half of the transient
+    apart, settled = np.max(gaps[dropped:], axis=0), np.array(gaps[dropped // 2 :])
+    half = len(settled) // 2
+    early, late = (part.max(axis=0, initial=0.0) for part in (settled[:half], settled[half:]))
+    approaching = _pairs((late < APPROACH * early) & (apart >= MERGED))
     if approaching:
         warn(
-            f"cluster_exponents: found clusters that approach each other, {_words(approaching)}; expected settled ones, "
+            f"cluster_exponents: found clusters that approach each other, {_text(approaching)}; expected settled ones, "
             f"the exponents may be those of fewer clusters; raise transient = {averaging.transient:g}"
         )
     mean, error, time = batches.mean()[0], np.hypot(batches.error_by_start(), steps)[0], batches.time
@@ -270,59 +270,33 @@ def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
     return partition
 
 
-def _integrator(
-    scene: Scene, partition: Clusters, variation: Variation, seed: int
-) -> tuple[OrbitProblem, VariationalIntegrator]:
+def _integrator(scene: Scene, partition: Clusters, seed: int) -> tuple[OrbitProblem, VariationalIntegrator]:
     """The quotient's orbit with one random deviation along it and one in each block."""
+    variation = clustered(without_drive(scene.equations, scene.parameters), partition)
     firsts = [members[0] for members in partition.members]
     start = np.array([[values[i] for values in scene.initial.values() for i in firsts]])
-    parts = list(_parts(partition, _deviating(variation)))
-    strengths = np.full(len(parts), scene.parameters[scene.strength])
+    strengths = np.full(1 + len(partition.blocks), scene.parameters[scene.strength])
     problem = OrbitProblem.of(scene, variation, strengths, start)
     state = problem.with_slip_states(start)
     if not problem.forced:
         problem = problem.with_turns(problem.observed_turns(state, strengths), start)
     integrator = problem.integrator(state)
+    # rows of the variational equation: the clusters' own motion, then one block after the other
+    sizes = [partition.quotient.n, *(len(block.nodes) for block in partition.blocks)]
+    ends = np.cumsum(sizes) * problem.components
     random = np.random.default_rng(seed)
-    deviations = np.zeros((1, variation.size, len(parts)))
-    for k, part in enumerate(parts):
-        deviations[0, part, k] = random.normal(size=part.stop - part.start)
+    deviations = np.zeros((1, variation.size, len(sizes)))
+    for k, (first, last) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):
+        deviations[0, first:last, k] = random.normal(size=last - first)
     integrator.set_deviations(deviations)
     return problem, integrator
 
 
-def _deviating(variation: Variation) -> int:
-    """Number of components of an oscillator that deviate: all but the slip state of a contact."""
-    return len(variation.orbit.node.continuous)
-
-
-def _parts(partition: Clusters, components: int) -> Iterator[slice]:
-    """Yield the slices of the clusters' motion and of each block in the variational equation."""
-    first, last = 0, partition.quotient.n * components
-    yield slice(first, last)
-    for block in partition.blocks:
-        first, last = last, last + len(block.nodes) * components
-        yield slice(first, last)
-
-
-def _falls(gaps: np.ndarray) -> np.ndarray:
-    """True (clusters, clusters) for distances (blocks, clusters, clusters) that are smaller in the later half of the blocks."""
-    half = len(gaps) // 2
-    early, late = (part.max(axis=0, initial=0.0) for part in (gaps[:half], gaps[half:]))
-    return np.asarray(late < APPROACH * early)
-
-
-def _pairs(found: np.ndarray) -> tuple[tuple[int, int], ...]:
+def _pairs(table: np.ndarray) -> tuple[tuple[int, int], ...]:
     """The pairs of clusters for which a symmetric table is true."""
-    first, second = np.nonzero(np.triu(found, 1))
+    first, second = np.nonzero(np.triu(table, 1))
     return tuple((int(a), int(b)) for a, b in zip(first, second, strict=True))
 
 
-def _words(pairs: Sequence[tuple[int, int]]) -> str:
+def _text(pairs: Sequence[tuple[int, int]]) -> str:
     return "; ".join(f"{a + 1} and {b + 1}" for a, b in pairs)
-
-
-def _differences(state: np.ndarray, count: int, components: int) -> np.ndarray:
-    """Largest difference between the components of every two of `count` clusters."""
-    rows = state.reshape(-1, count)[:components]
-    return np.asarray(np.abs(rows[:, :, None] - rows[:, None, :]).max(axis=0))

@@ -1,10 +1,9 @@
 """Transversal Lyapunov exponents of the synchronous state: the master stability function.
 
-One orbit carries the modes of all strengths alpha + i beta = -sigma gamma at once
-(`synchain.codegen.kernels.mode_kernel`). The propagators of most modes are interpolated in the strength
-(`synchain.runtime.stability.interpolation`). On a fixed point or a periodic orbit locked to the
-drive the exponents follow from eigenvalues. Elsewhere they are the mean growth of a deviation, with
-an error from batch means (`Batches`).
+One orbit carries the modes of all strengths alpha + i beta = -sigma gamma at once. On a fixed point or a
+cycle the exponents follow from eigenvalues (`attractor`). Elsewhere they are the mean growth of a deviation
+(`march`), with an error from batch means (`averages`); propagators of most modes are interpolated in the
+strength (`interpolation`). `along` is the road from starts to `Exponents`.
 
 Sources: Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); Benettin, Galgani, Giorgilli &
 Strelcyn, Meccanica 15, 9 (1980).
@@ -42,10 +41,10 @@ from .slow_motion import warn_of_slow_motion
 from .transversal_modes import unused_axes
 
 APART = 5.0
-"""Averages of two starts that differ by more errors, at any strength, are those of two motions."""
+"""Two starts are on two motions if their averages differ by more than APART errors at any strength (a choice)."""
 
 ROUNDING = 1e-9
-"""Share of the largest exponent that is no sign of the first one."""
+"""The exponent at the first strength is zero below this share of the largest one."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -62,7 +61,7 @@ class Exponents(Labelled):
         Exponents per unit of non-dimensional time.
     stderr : ndarray, shape (m,)
         Standard errors. On fixed points and periodic orbits, the difference of two cycles, or of two tolerances;
-        elsewhere half of what the truth lies within in 95 of 100 runs, inf below 59 periods, with the error of the
+        elsewhere the mean lies within two of them in 95 of 100 runs; infinite below 59 periods; with the error of the
         steps (docs/accuracy.md).
     time : float
         Time averaged over for each start.
@@ -77,7 +76,7 @@ class Exponents(Labelled):
     unit : str
         Unit of time in which transients and averages are counted.
     precision : float
-        Standard error that was asked for.
+        Standard error that the average had to reach.
     """
 
     alpha: np.ndarray
@@ -129,7 +128,7 @@ class Exponents(Labelled):
 
     @property
     def accuracy(self) -> tuple[tuple[str, str], ...]:
-        """The largest error beside the one that was asked for, undecided signs, and the unit of time, for a summary."""
+        """Undecided signs, the largest error if it exceeds the precision, and the unit of time, for a summary."""
         rows: list[tuple[str, str]] = []
         if self.undecided:
             rows.append(("undecided for alpha", interval_text(self.undecided)))
@@ -159,8 +158,8 @@ class Exponents(Labelled):
     def ranges(self) -> tuple[tuple[Interval, Interval], ...]:
         """The intervals as ((low, its uncertainty), (high, its uncertainty)).
 
-        The uncertainty is the standard error over the slope, and what the function may bend between
-        two strengths; 0 at the ends of the grid.
+        The uncertainty is the standard error over the slope, and the effect of a bend between two strengths; 0 at
+        the ends of the grid.
 
         Raises
         ------
@@ -172,19 +171,25 @@ class Exponents(Labelled):
             kind = "complex" if np.iscomplexobj(x) else f"those of {x.shape[1]} layers"
             raise ValueError(f"strengths are {kind}; ranges need real ones of a single layer")
         y, stable, _ = self._judged
-        # beside a stretch of undecided signs an end lies anywhere within it
+        # an end beside a stretch of undecided signs lies anywhere within it
         blurred = np.zeros(len(x), dtype=bool)
         for first, last in _uncertain(y, error):
             blurred[max(first - 1, 0) : last + 1] = True
         ends: list[Interval] = [(float(x[0]), 0.0)] if stable[0] else []
         for i in map(int, np.flatnonzero(stable[1:] != stable[:-1])):
+            # the zero by the line through points i and i + 1, its slope by a fit to five points
             a, b = max(i - 2, 0), min(i + 3, len(x) - 1)
             step = y[i + 1] - y[i] if np.isfinite(y[i] * y[i + 1]) else np.inf  # an exponent of -inf has no slope
             smooth = b - a >= 3 and bool(np.all(np.isfinite(y[a:b])))
             slope = abs(np.polyfit(x[a:b], y[a:b], 1)[0] if smooth else step / (x[i + 1] - x[i]))
             zero = x[i] - y[i] / step * (x[i + 1] - x[i]) if np.isfinite(step) else (x[i] if y[i] >= 0 else x[i + 1])
             spread = float(max(error[i], error[i + 1]) / max(slope, 1e-300))
-            ends.append((float(zero), spread + _bend(x, y, i, float(zero)) + _stretch(x, blurred, i)))
+            first = last = i
+            while blurred[i] and last + 1 < len(x) and blurred[last]:
+                last += 1
+            while blurred[i] and first > 0 and blurred[first]:
+                first -= 1
+            ends.append((float(zero), spread + _bend(x, y, i, float(zero)) + float(x[last] - x[first])))
         if stable[-1]:
             ends.append((float(x[-1]), 0.0))
         return tuple(zip(ends[::2], ends[1::2], strict=True))
@@ -197,7 +202,7 @@ class Exponents(Labelled):
 
     @property
     def _judged(self) -> tuple[np.ndarray, np.ndarray, tuple[tuple[int, int], ...]]:
-        """The exponents (m,) with a first one that is zero to its error; which are in an interval; the undecided stretches."""
+        """The exponents (m,) with the first set to zero within its error; True (m,) in an interval; the undecided stretches."""
         y, error = self.exponent, self.stderr
         rounding = ROUNDING * np.max(np.abs(y[np.isfinite(y)]), initial=0.0)
         if abs(y[0]) <= max(2.0 * error[0], rounding) < np.inf:
@@ -229,9 +234,9 @@ def exponent_rows(
 
 
 def _uncertain(y: np.ndarray, error: np.ndarray) -> list[tuple[int, int]]:
-    """The first and last indices of stretches in which no sign is certain, of one or several runs of one sign each.
+    """First and last indices of stretches of runs of one sign in which no sign is certain.
 
-    A sign is certain if one exponent of the run is two errors from zero; an error that is unknown casts no doubt.
+    A sign is certain if one exponent of the run is two errors from zero, or if its error is unknown.
     """
     certain = ~np.isfinite(error) | (y + 2.0 * error < 0.0) | (y - 2.0 * error >= 0.0)
     runs = np.cumsum(np.append(0, (y[1:] < 0) != (y[:-1] < 0)))
@@ -240,22 +245,12 @@ def _uncertain(y: np.ndarray, error: np.ndarray) -> list[tuple[int, int]]:
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _stretch(x: np.ndarray, blurred: np.ndarray, i: int) -> float:
-    """Length of the undecided stretch that point i lies at the end of; 0 if there is none."""
-    first = last = i
-    while last + 1 < len(x) and blurred[i] and blurred[last]:
-        last += 1
-    while first > 0 and blurred[i] and blurred[first]:
-        first -= 1
-    return float(x[last] - x[first])
-
-
 def _bend(x: np.ndarray, y: np.ndarray, i: int, zero: float) -> float:
-    """How far the zero of a bent function may lie from that of the line through points i and i + 1.
+    """Largest distance of the zero of a bent function from that of the line through points i and i + 1.
 
-    At the share z of the way, a function whose slope changes by J leaves the line by at most
-    J z (1 - z) times the gap, even if it has a kink.  The slopes beside the gap tell J and the least
-    slope at the zero.  Without them, or if they differ in sign, the zero lies anywhere in the gap.
+    At the share z of the way, a function whose slope changes by J is at most J z (1 - z) times the gap
+    from the line, even if it has a kink.  The slopes beside the gap give J and the least slope at the
+    zero.  Without them, or if they differ in sign, the zero lies anywhere in the gap.
     """
     if y[i] == 0.0 or y[i + 1] == 0.0:
         return 0.0
@@ -314,16 +309,15 @@ def exponents(
 
     Notes
     -----
-    Of the scene's fields count its model, parameters, first initial state, `contact`, `integrator`, `atol` and
-    `max_steps`; `rtol`, `transient` and `seed` are keywords here, and what a run records does not matter.
+    Of the scene's fields the model, parameters, first initial state, `contact`, `integrator`, `atol` and `max_steps` are
+    used; `rtol`, `transient` and `seed` are keywords here.
 
     Raises
     ------
     ValueError
         If the network has no coupling, if the coupling has no synchronous state, if time enters
-        without a known period, for a scene with a stop, and with draws, or axes on which the orbit depends: for
-        their cells there is no one answer.  An axis of the strength of links that vanish between equal
-        states is no such axis.
+        without a known period, for a scene with a stop, and with draws, or axes that move the orbit; the
+        strength of links that vanish between equal states does not.
     FloatingPointError
         If an integration fails.
     """
@@ -340,10 +334,7 @@ def exponents(
 def transversal(
     given: Given, scene: Scene, strengths: np.ndarray, starts: int, rtol: float, averaging: Averaging
 ) -> Exponents:
-    """Compute what `exponents` returns, for whichever public function was called.
-
-    Shapes: strengths (m,) or (m, layers).
-    """
+    """Compute the exponents at strengths (m,) or (m, layers) for a public function's call."""
     reporter = averaging.reporter()
     problem, states = orbits_of(coupled_cell(given, scene, rtol), strengths, starts, averaging)
     with reporter:
@@ -432,12 +423,12 @@ def _settled(
 
 
 def coupled_cell(given: Given, scene: Scene, rtol: float) -> Scene:
-    """Return a single cell whose network has a coupling: a lone oscillator gets a partner, if there is a link for it.
+    """Return a single cell with a coupling: a lone oscillator gets a partner, if there is a link for it.
 
     The scene may sweep strengths that do not move the synchronous orbit.
     """
     given.expect_one_cell(scene, unused_axes(scene))
-    return single_cell(given, with_partner(scene), rtol)
+    return given.scene(with_partner(scene), rtol=rtol)
 
 
 def with_partner(scene: Scene) -> Scene:
@@ -453,11 +444,6 @@ def with_partner(scene: Scene) -> Scene:
         return scene.replace(**ONE_CELL)
     expect_vanishing("a lone oscillator gets a partner", coupled.equations)
     return coupled
-
-
-def single_cell(given: Given, scene: Scene, rtol: float) -> Scene:
-    """Return the single cell of a scene, with the parameters passed to a public function."""
-    return given.scene(scene, rtol=rtol)
 
 
 def initial_states(scene: Scene, starts: int, seed: int) -> np.ndarray:

@@ -38,7 +38,6 @@ from ..support.error_text import with_error
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .averages import TOLERANCE_RATIO, TRIED, Averaging, Batches, document_keywords, error_of_steps
-from .exponents import single_cell
 from .interpolation import Interpolation, Panel
 from .motion import rates_of
 from .orbits import LOOKS, OrbitProblem
@@ -92,8 +91,8 @@ class Lyapunov(Labelled):
     stderr : ndarray, shape (count,)
         Standard errors.
     resolved : ndarray of bool, shape (count,)
-        False if several directions decay faster than can be followed; their exponents are -inf. Their errors are 0 with
-        set-valued friction, whose stick makes directions vanish, else nan: they are only known to decay fast.
+        False if several directions decay too fast to be followed; their exponents are -inf. Their errors are 0 with
+        set-valued friction, where stick makes directions vanish, else nan.
     divergence : float
         Mean divergence along the orbit: the sum of all exponents of the network. With set-valued
         friction it is that sum itself, -inf if an oscillator has stuck, nan if not all exponents
@@ -233,9 +232,12 @@ def lyapunov_spectrum(
         If the integration fails.
     """
     averaging = Averaging(precision, periods, transient, seed, Execution(1, None, show_progress, progress))
-    scene = single_cell(Given(lyapunov_spectrum, parameters, more, ONE_ORBIT), scene, rtol)
+    scene = Given(lyapunov_spectrum, parameters, more, ONE_ORBIT).scene(scene, rtol=rtol)
     reporter = averaging.reporter()
-    frame = TangentFrame.make(scene, _counted(scene, count), averaging.seed)
+    dimension = scene.n * len(scene.equations.nodes[0].continuous)
+    if count is not None and not 1 <= check_integer("count", count, -dimension) <= dimension:
+        raise ValueError(f"count = {count}; expected 1 … {dimension}, the components of the network's state")
+    frame = TangentFrame.make(scene, dimension if count is None else count, averaging.seed)
     if frame.rtol > LARGEST_RTOL:
         raise ValueError(
             f"rtol: found {frame.rtol:g}; expected at most {LARGEST_RTOL:g} for a whole spectrum, whose directions must "
@@ -279,16 +281,6 @@ def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray, steps: np.n
         components=frame.variation.size,
         unit=str(frame.problem.turns),
     )
-
-
-def _counted(scene: Scene, count: int | None) -> int:
-    """Number of exponents to compute, checked against the network's state."""
-    dimension = scene.n * len(scene.equations.nodes[0].continuous)
-    if count is None:
-        return dimension
-    if not 1 <= check_integer("count", count, -dimension) <= dimension:
-        raise ValueError(f"count = {count}; expected 1 … {dimension}, the components of the network's state")
-    return count
 
 
 @dataclass(slots=True)
@@ -412,7 +404,7 @@ class TangentFrame:
         return np.append(np.where(np.isfinite(growth), growth, 0.0), volume), lost
 
     def measure_group(self, blocks: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Advance by several blocks; yield for each what `measure` returns."""
+        """Advance by several blocks; yield growth and lost directions of each, as `measure` does."""
         begun, basis = self.integrator.state, self.basis
         if blocks > 1:
             growths, angles, volumes = self.advance_group(blocks)

@@ -1,8 +1,8 @@
 """Mean growth of the deviations of many strengths along orbits, block by block.
 
 1. `interpolation_for(problem, states, periods)` tries choices, the cheapest first, on the next blocks, and
-   returns a `BlockInterpolation`: the length of a block, and the few strengths whose propagators over it are
-   integrated for all to be interpolated from.
+   returns a `BlockInterpolation`: the length of a block, and the few strengths (nodes) that are integrated; the
+   propagators of all others are interpolated from theirs.
 2. `March.begin(problem, states, interpolation)` sets an integrator of those few at the states, with one
    deviation for each of all strengths.
 3. `March.growths(batches)` advances: in, blocks in each batch; out, the logarithm of the growth of every

@@ -50,7 +50,7 @@ CLEAR = 1 / 32
 """Least rise and fall of a turn, relative to the extent of its component (a choice)."""
 
 ENOUGH = 12
-"""Turns whose mean is taken (a choice)."""
+"""Turns of which the mean is taken (a choice)."""
 
 REST = 1e-9
 """Rates are zero if they are below their change over this part of the extent of the motion."""
@@ -206,7 +206,7 @@ def shortest_time(rates: RateFunctions, state: np.ndarray) -> float:
 def turns_of(integrator: VariationalIntegrator, rates: RateFunctions, hidden: int = 0) -> Turns:
     """Measure the mean return time of an undriven orbit, or the slowest rate of the equilibrium that it comes to.
 
-    A motion whose rates do not change any more, such as that of locked phases, is at an equilibrium that drifts.  A turn
+    A motion with constant rates, such as that of locked phases, is at an equilibrium that drifts.  A turn
     of a component lasts from one top to the next, with a fall and a rise by CLEAR of its extent at least between them.
     The component with most turns counts; they are looked for in the later three quarters of a path.
     """
@@ -231,9 +231,9 @@ def turns_of(integrator: VariationalIntegrator, rates: RateFunctions, hidden: in
                     break
                 if k % OFTEN == 0 and _drift(rates, times, states, velocities, extent, closed) is not None:
                     break
-        except FloatingPointError:  # what grows without bound is refused where it is settled
+        except FloatingPointError:  # an unbounded motion is refused in its transient
             pass
-    # beside an even drift only what approaches it counts as motion: locked phases turn on at one speed
+    # beside an even drift only the approach to it counts as motion: locked phases turn on at one speed
     at_rest = rests(rates, states[-1], REST, extent)
     even = np.zeros_like(start) if at_rest else _drift(rates, times, states, velocities, extent, closed)
     early, path_states = len(times) // 4, np.array(states)

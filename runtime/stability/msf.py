@@ -144,7 +144,7 @@ class MSF(Labelled):
 
     @property
     def _why_no_windows(self) -> str:
-        """Why the windows of the network are not known; empty if they are."""
+        """The reason why the network has no windows; empty if it has."""
         graph = self.scene.topology
         if not graph.link_count:
             return "not known: no links"
@@ -327,7 +327,7 @@ class Plane(Labelled):
     time : float
         Time averaged over, the longest one.
     names : (str, str)
-        What the axes are: "alpha", "beta", or parameters.
+        Names of the axes: "alpha", "beta", or parameters.
     modes : tuple of str
         Over two parameters, the exact eigenvalues of each transversal mode, those of all layers together.
     mode : ndarray of int, shape (a, b), optional
@@ -666,11 +666,8 @@ def _over_parameters(
         orbits = list(shared_orbits(cell, {name: values.ravel() for name, values in zip(axes, grid, strict=True)}))
     else:  # one orbit for each value of the parameter, with the strengths alpha of a single mode
         points = np.arange(math.prod(shape)).reshape(shape)
-        index = np.arange(shape[0])[:, None]
-        orbits = [
-            SharedOrbit(points[:, k], {second: float(value)}, axes[first], index)
-            for k, value in enumerate(axes[second])
-        ]
+        place = np.arange(shape[0])[:, None]
+        orbits = [SharedOrbit(points[:, k], {second: float(x)}, axes[first], place) for k, x in enumerate(axes[second])]
 
     exponent, stderr, worst = np.empty(shape), np.empty(shape), np.empty(shape, dtype=int)
     kinds, longest = np.empty((*shape, check_integer("starts", starts, 1)), dtype=object), 0.0
@@ -688,19 +685,8 @@ def _over_parameters(
             reporter.advance(reporter.total * done / len(orbits) - reporter.done)
     unmoved = still if modes else strengths
     attractors = kinds[tuple(slice(1) if name in unmoved else slice(None) for name in axes)].astype(str)
-    return Plane(
-        shown,
-        axes[first],
-        axes[second],
-        exponent,
-        stderr,
-        attractors,
-        longest,
-        (first, second),
-        modes,
-        worst if modes else None,
-        strengths,
-    )
+    index = worst if modes else None
+    return Plane(shown, *axes.values(), exponent, stderr, attractors, longest, (first, second), modes, index, strengths)
 
 
 def _coupling(scene: Scene) -> str:

@@ -1,4 +1,4 @@
-"""Orbits with deviations along them: what is integrated, in which unit of time, and by which method.
+"""Orbits with deviations along them: equations, strengths, unit of time and method as one value.
 
 An `OrbitProblem` is a value: the scene, the variational equation, the strengths of the modes, the unit
 of time with the extent of the motion, and the integrator that suits all of them. States travel beside
@@ -68,12 +68,12 @@ class OrbitProblem:
         workers: int | None = 1, turns: Turns | None = None,
     ) -> OrbitProblem:  # fmt: skip
         """Return a problem in units of `turns`, else of the drive's period, else of 2 pi. Shapes: starts (starts, components)."""
-        known = turns or Turns(unit_of_time(scene), np.zeros(starts.shape[1]), "period of the drive")
+        unit = turns or Turns(unit_of_time(scene), np.zeros(starts.shape[1]), "period of the drive")
         values = np.tile(_parameter_values(scene, variation.orbit), (len(starts), 1))
         rows = (variation, with_modes(variation.orbit, starts, values), values, _rows(strengths))
         # without a drive, motion may be arbitrarily fast until it is observed: power series find the length of their steps
-        pace = 2.0 * math.pi / known.time if turns or variation.orbit.forced else math.inf
-        return cls(scene, variation, strengths, known, chosen_for_modes(scene, *rows, pace), columns, workers)
+        pace = 2.0 * math.pi / unit.time if turns or variation.orbit.forced else math.inf
+        return cls(scene, variation, strengths, unit, chosen_for_modes(scene, *rows, pace), columns, workers)
 
     @classmethod
     def of_modes(

@@ -201,7 +201,7 @@ def basin(
 ) -> Basin:
     """Start a scene's network from random states and count those that synchronise.
 
-    Every oscillator has a state of its own, uniform in `ranges`.  The result depends on the seed
+    The state of every oscillator is uniform in `ranges`, independent of the others.  The result depends on the seed
     and not on the workers, and the first starts of a larger sample are those of a smaller one.
 
     Parameters
@@ -215,7 +215,7 @@ def basin(
         that is not named starts as in the scene.
     tolerance : float, optional
         A start is synchronous if its mean synchronisation error over the window is below this; by default a thousandth of
-        what the synchronous motion moves, for each component too.
+        the extent of the synchronous motion, for each component too.
     transient, window : float, optional
         In the scene's unit of time; by default as for a `Criterion`.
     seed : int, optional
@@ -230,8 +230,8 @@ def basin(
     Returns
     -------
     Basin
-        A cell takes at most a hundred times the steps of the synchronous motion; what needs more has escaped or is not
-        finished.
+        A cell takes at most a hundred times the steps of the synchronous motion; cells that need more have escaped or are
+        not finished.
 
     Raises
     ------

@@ -109,34 +109,34 @@ def test_coarse_nodes_are_seen_by_the_strengths_for_comparison() -> None:
     assert 1e-9 < found[13] < 1e-5
 
 
-LEGS = {
+STICKS = {
     "landings in every period": (1.15, 4.0, 2),
-    "legs longer than a block": (1.4, 0.5, 2),
-    "legs of up to four periods": (1.55, 4.0, 2),
+    "intervals longer than a block": (1.4, 0.5, 2),
+    "intervals of up to four periods": (1.55, 4.0, 2),
     "no landings": (3.0, 4.0, 16),
 }
 """Frequencies of the drive, blocks in periods, and blocks of the last batch."""
 
 
-@pytest.mark.parametrize("case", LEGS)
+@pytest.mark.parametrize("case", STICKS)
 def test_growth_from_landing_to_landing_is_that_of_products_of_propagators(case: str) -> None:
-    omega, block, last = LEGS[case]
+    omega, block, last = STICKS[case]
     sliding = {"oscillator": "friction", "contact": "set-valued", "parameters": {"omega": omega}}
     if case == "no landings":  # a belt so fast that the body never sticks
         sliding["parameters"] = {"omega": omega, "theta_b": 20.0}
     orbit = settled(LINE, starts=2, **sliding)
     wanted = expected(*orbit, block, 4 + last)
     nodes = strength_interpolation(LINE, 29)
-    legs = strength_interpolation(nodes.nodes, 21)
-    assert len(legs.nodes) < len(nodes.nodes) < len(LINE)
-    march = march_of(*orbit, nodes, block, 1.0, legs)
+    intervals = strength_interpolation(nodes.nodes, 21)
+    assert len(intervals.nodes) < len(nodes.nodes) < len(LINE)
+    march = march_of(*orbit, nodes, block, 1.0, intervals)
     close = np.abs(march.growths(np.array([1, 3, last])).sum(axis=0) - wanted)
     assert np.median(close) < 1e-9
     assert close.max() < 1e-5  # where a multiplier passes zero
     assert march.deviations.error < 1e-9
 
 
-def test_legs_multiply_modes_of_very_different_growth() -> None:
+def test_stick_intervals_multiply_modes_of_very_different_growth() -> None:
     """Beside one that grows by e^1000 in each block, products of others stay in the range of numbers."""
     strengths = np.array([-4000.0, -1.0, 0.0, 0.5])
     orbit = settled(strengths, rtol=1e-9, contact="set-valued", parameters={"omega": 1.15})
@@ -147,7 +147,7 @@ def test_legs_multiply_modes_of_very_different_growth() -> None:
     np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-6)
 
 
-def test_a_leg_on_too_few_nodes_is_seen_by_the_strengths_for_comparison() -> None:
+def test_a_stick_interval_on_too_few_nodes_is_seen_by_the_strengths_for_comparison() -> None:
     orbit = settled(LINE, contact="set-valued", parameters={"omega": 1.4})
     nodes = strength_interpolation(LINE, 29)
     found = {}
