@@ -59,7 +59,11 @@ def limit_cycle(problem: OrbitProblem, start: np.ndarray, closed: float) -> Cycl
         cycle = _newton(alone, start, time, extent, closed)
         if cycle is not None:
             cycle = _least(alone, cycle, extent, closed)
-            return cycle if _attracts(cycle.matrix, problem.scene.rtol) else None
+            # it attracts if all multipliers but that of the motion itself are well inside the unit circle
+            multipliers = np.linalg.eigvals(cycle.matrix)
+            others = np.delete(multipliers, np.abs(multipliers - 1.0).argmin())
+            attracts = np.all(np.abs(others) < 1.0 - APART * math.sqrt(problem.scene.rtol))
+            return cycle if attracts else None
     return None
 
 
@@ -152,10 +156,3 @@ def _flow(problem: OrbitProblem, state: np.ndarray, period: float) -> tuple[np.n
     integrator = problem.integrator(state[None])
     propagators, logarithms = problem.propagators(integrator, period / problem.unit)
     return integrator.state[0], propagators[0, 0].real * float(np.exp(logarithms[0, 0]))
-
-
-def _attracts(matrix: np.ndarray, rtol: float) -> bool:
-    """True if all multipliers but that of the motion itself lie well inside the unit circle."""
-    multipliers = np.linalg.eigvals(matrix)
-    others = np.delete(multipliers, np.abs(multipliers - 1.0).argmin())
-    return bool(np.all(np.abs(others) < 1.0 - APART * math.sqrt(rtol)))

@@ -295,11 +295,17 @@ class TangentFrame:
     group: int = 1  # blocks between two orthogonalisations, over which propagators are multiplied
     # integrator of the propagator of the network, and the directions that it moves; made at the first call
     carried: tuple[VariationalIntegrator, Deviations] | None = None
-    # the matrix (size, size) of the variational equation as a function of states and parameters
+    # matrix (size, size) of the variational equation at time 0, as a function of states and parameters
     matrix: Callable[..., np.ndarray] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.matrix = _matrix(self.variation)
+        orbit, size = self.variation.orbit, self.variation.size
+        table = sp.zeros(size, size)
+        for (row, column), e in self.variation.matrix:
+            table[row, column] = e.xreplace({sp.Symbol("t", real=True): sp.S.Zero})
+        self.matrix = sp.lambdify(
+            [sp.Symbol(name, real=True) for name in (*orbit.state, *orbit.parameters)], table, "numpy"
+        )
 
     @classmethod
     def make(cls, scene: Scene, count: int, seed: int) -> TangentFrame:
@@ -515,12 +521,3 @@ def _scaled(variation: Variation, extent: np.ndarray) -> Variation:
     powers = np.where(moving, np.round(logarithms - np.median(logarithms[moving])), 0.0).astype(int)
     matrix = tuple(((r, c), e * sp.Integer(UNIT) ** int(powers[c] - powers[r])) for (r, c), e in variation.matrix)
     return Variation(variation.orbit, variation.size, matrix)
-
-
-def _matrix(variation: Variation) -> Callable[..., np.ndarray]:
-    """The matrix of a variational equation at time 0, as a function of states and parameters."""
-    names = [sp.Symbol(name, real=True) for name in (*variation.orbit.state, *variation.orbit.parameters)]
-    table = sp.zeros(variation.size, variation.size)
-    for (row, column), e in variation.matrix:
-        table[row, column] = e.xreplace({sp.Symbol("t", real=True): sp.S.Zero})
-    return sp.lambdify(names, table, "numpy")

@@ -14,7 +14,6 @@ The costs below count multiplications. They were fitted to timings of this packa
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -180,29 +179,20 @@ def _choices(problem: OrbitProblem, states: np.ndarray, periods: float) -> list[
     one = problem.integrator(states, problem.strengths[:1], MODE_TOLERANCE_RATIO)
     one.advance(problem.unit)
     node_cost = STEP * problem.components * one.steps / len(states)
-    count, lines = len(problem.strengths), 1
-    if problem.strengths.ndim > 1:
-        lines = len(lines_of(problem.strengths)[1])
+    count = len(problem.strengths)
+    lines = 1 if problem.strengths.ndim == 1 else len(lines_of(problem.strengths)[1])
     blocks = [b for b in BLOCKS if b <= max(4.0, periods / BATCHES) and periods % b == 0.0]
     choices: list[InterpolationChoice] = []
     if problem.lands and lines == 1:
-        choices += _choices_from_landings([b for b in blocks if b >= LONGEST_STICK], node_cost, count)
+        # a body that sticks: one column of two is integrated, one entry of four is interpolated
+        long_blocks = [b for b in blocks if b >= LONGEST_STICK]
+        for block, stick_nodes, nodes, parts in itertools.product(long_blocks, NODES, NODES, PARTS):
+            if stick_nodes < nodes:
+                cost = stick_nodes * parts * (node_cost / 2 + nodes) + LANDINGS + count * (nodes + STRENGTH / 4) / block
+                choices.append(InterpolationChoice(cost, block, nodes, parts, stick_nodes))
     if not choices:
-        blocks = blocks if problem.forced else list(FREE_BLOCKS)
-        choices += _choices_of_blocks(blocks, lines * node_cost, count * problem.components**2)
+        entries = count * problem.components**2  # of the propagators of all strengths
+        for block, nodes, parts in itertools.product(blocks if problem.forced else FREE_BLOCKS, NODES, PARTS):
+            cost = nodes * parts * (lines * node_cost) + (entries * (nodes + STRENGTH) + BLOCK) / block
+            choices.append(InterpolationChoice(cost, block, nodes, parts))
     return sorted(choices, key=lambda choice: choice.cost)
-
-
-def _choices_of_blocks(blocks: Sequence[float], node_cost: float, entries: int) -> Iterator[InterpolationChoice]:
-    """Yield choices without landings; `entries`: numbers in the propagators of all strengths."""
-    for block, nodes, parts in itertools.product(blocks, NODES, PARTS):
-        cost = nodes * parts * node_cost + (entries * (nodes + STRENGTH) + BLOCK) / block
-        yield InterpolationChoice(cost, block, nodes, parts)
-
-
-def _choices_from_landings(blocks: Sequence[float], node_cost: float, count: int) -> Iterator[InterpolationChoice]:
-    """Yield choices for `count` strengths of a body that sticks: one column of two is integrated, one entry of four interpolated."""
-    for block, stick_nodes, nodes, parts in itertools.product(blocks, NODES, NODES, PARTS):
-        if stick_nodes < nodes:
-            cost = stick_nodes * parts * (node_cost / 2 + nodes) + LANDINGS + count * (nodes + STRENGTH / 4) / block
-            yield InterpolationChoice(cost, block, nodes, parts, stick_nodes)
