@@ -15,7 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from synchain.codegen.driver.columns import Control
+from synchain.codegen.driver.columns import Control, SpanColumn
 from synchain.codegen.integrators import Integrator
 from synchain.codegen.kernels.mode_kernel import emit_modes
 from synchain.codegen.machine_code.compile import Kernel, load
@@ -261,28 +261,19 @@ class VariationalIntegrator:
     def _run(
         self, length: float | np.ndarray, panels: tuple[np.ndarray, ...], vectors: np.ndarray, growth: np.ndarray
     ) -> None:
-        """Call the kernel for all cells, and go on from where it ends."""
+        """Call the kernel for all cells, and continue from the states at its end."""
         cells, dimension = self.state.shape
-        spans = np.zeros((cells, 4))
-        spans[:, 1], spans[:, 2] = length, self.period
+        cell_times = np.zeros((cells, 4))
+        cell_times[:, SpanColumn.END], cell_times[:, SpanColumn.PERIOD] = length, self.period
         end, sums, counts = np.empty((cells, dimension)), np.empty((cells, 4)), np.zeros((cells, 6), dtype=np.int64)
-        orbits = (
-            self.state,
-            self.parameter_values,
-            spans,
-            self.control,
-            self.strengths,
-            vectors,
-            growth,
-            end,
-            sums,
-            counts,
-        )
+        before = (self.state, self.parameter_values, cell_times, self.control, self.strengths)
+        arguments = (*before, vectors, growth, end, sums, counts, *panels)
         if min(cells, self.workers) == 1:
-            self.kernel.drive(0, cells, *orbits, *panels)
+            self.kernel.drive(0, cells, *arguments)
         else:
-            self._share(np.linspace(0, cells, min(cells, self.workers) + 1).astype(int), (*orbits, *panels))
-        times = panels[0].sum() * spans[:, 1]
+            self._share(np.linspace(0, cells, min(cells, self.workers) + 1).astype(int), arguments)
+        # raise for orbits that grow without bound or take too many steps, in the kernel or over all stretches so far
+        times = panels[0].sum() * cell_times[:, SpanColumn.END]
         status = self.watch.status(
             counts[:, 0], counts[:, 1:3].sum(axis=1), times, np.abs(end).max(axis=1), self.control[Control.MAX_STEPS]
         )
@@ -290,10 +281,11 @@ class VariationalIntegrator:
             largest = np.hypot.reduce(self.strengths).max()
             modes = f" of strengths up to {largest:g}" if largest else ""
             raise FloatingPointError(f"the orbit with its deviations{modes} cannot be integrated: {status.message}")
+        # power series begin the next stretch with the mean step of this one, and warn if it was short
         taken = int(counts[:, 1:3].sum())
         series = self.kernel.origin.method.series
         if taken and (series or self.observes):
-            step = float(panels[0].sum()) * float(spans[:, 1].sum()) / taken
+            step = float(panels[0].sum()) * float(cell_times[:, SpanColumn.END].sum()) / taken
             self.control[Control.FIRST_STEP] = step  # only a hint: step control corrects it within a few steps
             self.warned = self.warned or (
                 series
