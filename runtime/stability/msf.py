@@ -685,8 +685,8 @@ def _over_parameters(
             reporter.advance(reporter.total * done / len(orbits) - reporter.done)
     unmoved = still if modes else strengths
     attractors = kinds[tuple(slice(1) if name in unmoved else slice(None) for name in axes)].astype(str)
-    index = worst if modes else None
-    return Plane(shown, *axes.values(), exponent, stderr, attractors, longest, (first, second), modes, index, strengths)
+    (across, up), index = axes.values(), worst if modes else None
+    return Plane(shown, across, up, exponent, stderr, attractors, longest, (first, second), modes, index, strengths)
 
 
 def _coupling(scene: Scene) -> str:
