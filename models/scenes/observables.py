@@ -78,7 +78,7 @@ def stop(model: Model, values: Mapping[str, float], text: object) -> str | None:
         )
     if model.unlinked.sticks:
         raise ValueError("stop: found set-valued contacts; expected smooth equations; take contact 'atan'")
-    return sp.sstr(function, order="lex")
+    return str(sp.sstr(function, order="lex"))
 
 
 def has_own_energy(model: Model) -> bool:

@@ -95,4 +95,4 @@ class Section:
 
 def _text(what: str, value: object) -> str:
     """Return the text of an expression, with its terms in lexicographic order."""
-    return sp.sstr(as_value(what, value), order="lex")
+    return str(sp.sstr(as_value(what, value), order="lex"))

@@ -137,7 +137,7 @@ class Templates:
         time = np.zeros(len(state))
         with np.errstate(all="ignore"):
             speed = np.abs(self._rates(state, parameters, time)).max(axis=1)
-            return np.nan_to_num(speed / _sizes(self.blocks(state, parameters, time)), nan=0.0, posinf=0.0)
+            return np.asarray(np.nan_to_num(speed / _sizes(self.blocks(state, parameters, time)), nan=0.0, posinf=0.0))
 
     def layers(self, state: np.ndarray, parameters: np.ndarray) -> Iterator[np.ndarray]:
         """Yield the blocks (cells, count, p, p) of nodes and links in the middle of each smoothed jump, and close by."""
@@ -203,7 +203,7 @@ def fastest_rates(equations: Equations, states: np.ndarray, parameters: np.ndarr
     """Return the fastest decay, growth or turning (states,) at states (states, dimension) with one row of parameters."""
     count = len(states)
     paces = Templates(equations).paces(states, np.tile(parameters, (count, 1)), np.zeros(count), np.ones(count), None)
-    return np.maximum(paces.fastest, paces.turning)
+    return np.asarray(np.maximum(paces.fastest, paces.turning))
 
 
 def _node_parts(equations: Equations, slots: dict[str, int]) -> Iterator[TemplateRates]:

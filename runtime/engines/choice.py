@@ -174,7 +174,7 @@ class Ladder:
         left = rows.spans[:, SpanColumn.END] - buffers.sums[:, SumColumn.STOPPED_AT]
         steady = (lengths < 2.0 * before) & (before < 2.0 * lengths)
         hopeless = left > SLIDE * self.scene.max_steps * lengths
-        return self.jumps & steady & hopeless & (SLIDE * buffers.steps > self.scene.max_steps)
+        return np.asarray(self.jumps & steady & hopeless & (SLIDE * buffers.steps > self.scene.max_steps))
 
     def tolerances(self, rows: CellRows) -> tuple[np.ndarray, np.ndarray]:
         """Return (rtol, atol), each (cells,), of the integration.
@@ -242,7 +242,7 @@ def _has_series(equations: Equations) -> bool:
 def chosen_for_rows(scene: Scene, equations: Equations, rows: CellRows) -> Integrator:
     """Return the one integrator for equations whose cells come as rows: the last one that any cell begins with."""
     ladder = Ladder(scene, equations)
-    return ladder.methods[ladder.first(rows).max()]
+    return ladder.methods[int(ladder.first(rows).max())]
 
 
 def chosen_for_modes(
