@@ -17,7 +17,7 @@ from ..program.passes import real
 from ..program.printers import NUMPY
 from ..program.statements import Do, Statement, Store, let, whole
 from .body import Entry, ExportBody, array_tables, link_jacobian, link_mass, link_rhs, node_jacobian, node_rhs
-from .loops import place_of
+from .loops import element_of
 
 
 def rhs_arrays(model: Equations) -> list[Statement]:
@@ -96,7 +96,7 @@ def _loads(model: Equations) -> tuple[dict[sp.Symbol, Expression], dict[sp.Symbo
 
 def _element(component: int, nodes: str) -> Expression:
     """Return the indices of a component of some nodes."""
-    return place_of(component, "NODES", nodes)
+    return element_of(component, "NODES", nodes)
 
 
 def _of_links(entry: Entry) -> tuple[Expression, Expression]:

@@ -44,7 +44,7 @@ class Site:
     """A node, or a link with its target and its source.
 
     here, there: the index in the state of a component of the target (or of the node itself) and of the source; loads: where
-    its symbols are; title: of its block, empty for the site that a loop runs over; node, link: whose templates it has.
+    its symbols are; title: of its block, empty for the site that a loop runs over; node, link: those that its templates belong to.
     """
 
     here: Index
@@ -100,10 +100,10 @@ def jacobian_statements(equations: Equations, reads: bool = True) -> list[Statem
             return site.entries("matrix")
         of_node, of_link = list(node_jacobian(equations)), list(link_jacobian(equations))
         if site.there is None:
-            return lambda entry, value: Store("values", place_of(of_node.index(entry), "NODES", "i_"), value)
+            return lambda entry, value: Store("values", element_of(of_node.index(entry), "NODES", "i_"), value)
         # the values of all links are behind those of all nodes
         begin = [len(of_node) * Name("NODES")] if of_node else []
-        slots = {entry: plus(*begin, place_of(k, "LINKS", "link_")) for k, entry in enumerate(of_link)}
+        slots = {entry: plus(*begin, element_of(k, "LINKS", "link_")) for k, entry in enumerate(of_link)}
         return lambda entry, value: Store("values", slots[entry], value)
 
     return [
@@ -120,7 +120,7 @@ def mass_statements(equations: Equations, reads: bool = True) -> list[Statement]
     return [Identity("mass_", Name("DIMENSION")), *(block for block in blocks if block.body)]
 
 
-def place_of(block: int, size: str, index: str) -> Expression:
+def element_of(block: int, size: str, index: str) -> Expression:
     """Return the index of an element of one of several blocks of some size."""
     return Name(index) if block == 0 else (Name(size) if block == 1 else block * Name(size)) + index
 
@@ -185,7 +185,7 @@ def _literal(slots: tuple[int, ...]) -> Index:
 
 
 def _indexed(name: str) -> Index:
-    return lambda c: place_of(c, "NODES", name)
+    return lambda c: element_of(c, "NODES", name)
 
 
 def _parameters(

@@ -96,6 +96,6 @@ def _ascii(letter: str) -> str:
     """Return a letter of C: Greek letters by their names, an underscore for all others."""
     if letter.isascii():
         return letter if letter.isalnum() else "_"
-    words = unicodedata.name(letter, "").split()
-    greek = words[:1] == ["GREEK"] and "LETTER" in words
-    return words[words.index("LETTER") + 1].lower() if greek else "_"
+    parts = unicodedata.name(letter, "").split()
+    greek = parts[:1] == ["GREEK"] and "LETTER" in parts
+    return parts[parts.index("LETTER") + 1].lower() if greek else "_"

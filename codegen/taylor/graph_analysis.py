@@ -36,13 +36,13 @@ PLAIN = 3
 
 def needed(roots: Iterable[Series]) -> set[Series]:
     """Return the roots and all series that they need for a coefficient."""
-    found, pending = set[Series](), list(roots)
+    result, pending = set[Series](), list(roots)
     while pending:
         s = pending.pop()
-        if s not in found:
-            found.add(s)
+        if s not in result:
+            result.add(s)
             pending += [*s.linear, *s.convolved, *s.started]
-    return found
+    return result
 
 
 def is_affine(series: Series) -> bool:

@@ -379,7 +379,7 @@ class Power(Series):
 
 @dataclass(eq=False, slots=True)
 class Kink(Series):
-    """The side of zero, 1 or -1, on which a series lies just after the start; 0 while only zeros are known of it.
+    """The side of zero, 1 or -1, on which a series lies just after the start; 0 while all coefficients so far are zero.
 
     Its value is the same at all orders.  If the series begins at zero, up to rounding of the terms that it is the sum of,
     the first coefficient that is not zero decides the side, and the step computes all coefficients again.

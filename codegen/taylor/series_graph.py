@@ -173,22 +173,22 @@ class SeriesGraph:
 
     @property
     def gaps(self) -> list[Series]:
-        """Return the series whose zeros are kinks and whose error the step controls: not sums of states, which it knows."""
+        """Return the series whose zeros are kinks and whose error limits the step: sums of states have that of the states."""
         return list(dict.fromkeys(kink.base for kink in self.kinks if not is_affine(kink.base)))
 
     @property
     def positive(self) -> list[Series]:
         """Return the series that cannot pass zero: roots, and arguments of roots, powers and logarithms."""
-        found: list[Series] = []
+        series: list[Series] = []
         for s in self.series:
             match s:
                 case SquareRoot():
-                    found.append(s)
+                    series.append(s)
                 case Power():
-                    found += [s, s.base]
+                    series += [s, s.base]
                 case QuotientIntegral() if s.function == "log":
-                    found.append(s.argument)
-        return list(dict.fromkeys(found))
+                    series.append(s.argument)
+        return list(dict.fromkeys(series))
 
     def behind(self, roots: Iterable[Series]) -> list[Series]:
         """Return the roots and all that they need for a coefficient, in the order of `series`."""
@@ -395,7 +395,7 @@ class SeriesGraph:
         slope, kind = self.unique(Slope, argument), Exponential if function is sp.exp else Integral
         integral = self.enter(key, kind(name, argument, slope, value, name=self.fresh(name)))
         if function is sp.tanh:
-            # 1/cosh(a)**2 is a series of its own, which has digits where 1 - tanh(a)**2 has none
+            # a separate series for 1/cosh(a)**2 has digits where 1 - tanh(a)**2 has none
             bell = SquaredSecant("cosh", argument, slope, -2.0, name=self.fresh("squaredsecant"))
             self.series.append(bell)
             integral.factor, bell.factor = bell, self.product(integral, bell)

@@ -46,7 +46,7 @@ def common_length(lengths, longest, new, place):
             longest = min(longest, new[place*LANES + lane])
     return longest
 '''.strip()
-"""A mode whose step is at most a 32nd shorter (0.96875 = 31/32) goes along: its error is larger by exp(order/32) at most."""
+"""A mode whose step is at most a 32nd shorter (0.96875 = 31/32) goes along: its error grows by (32/31)**order at most."""
 
 CARRY = '''
 @njit(error_model="numpy", cache=True)

@@ -53,7 +53,7 @@ SOONEST = let("nearest", 1e-13 * call("maximum", "t", 1.0) / "scale")
 """How soon a step may end at a contact or a jump: about 450 roundings of the time, so that time goes on; a choice."""
 
 LEAST_ORDER = 6
-"""The least order: the length of a step is a root of order at most (order - 2)/(order - 4)."""
+"""The least order: the last three orders, which decide the length of a step, lie above the low ones (`step_length.LOW`)."""
 
 
 @dataclass(frozen=True, slots=True)
