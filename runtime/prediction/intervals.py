@@ -12,7 +12,7 @@ Predicate = Callable[[np.ndarray], np.ndarray]
 """Maps an array of points to an array of truth values."""
 
 ROUNDING = 8.0 * float(np.finfo(float).eps)
-"""Least width of a bracket relative to its ends: points inside a narrower one are no longer apart."""
+"""Least width of a bracket relative to its ends; points inside a narrower one are equal by rounding."""
 
 
 def grid_intervals(x: np.ndarray, good: np.ndarray) -> list[Interval]:
@@ -47,7 +47,7 @@ def find(
 def refine(
     judge: Predicate, x: np.ndarray, verdict: np.ndarray, resolution: float | np.ndarray, fan: int = 7
 ) -> list[Interval]:
-    """Return the intervals of `find`, if the verdict (m,) on the grid `x` is known already."""
+    """Return the intervals of `find` from the verdict on the grid. Shapes: x (k,), verdict (k,)."""
     changes = np.flatnonzero(verdict[1:] != verdict[:-1])
     good = np.where(verdict[changes], x[changes], x[changes + 1])
     bad = np.where(verdict[changes], x[changes + 1], x[changes])
@@ -55,7 +55,7 @@ def refine(
     while True:
         finest = ROUNDING * np.maximum(np.abs(good), np.abs(bad))
         wide = np.flatnonzero(np.abs(bad - good) > np.maximum(wanted, finest))
-        if not len(wide):
+        if not len(wide):  # all brackets are narrow enough, or at the limit of rounding
             break
         good[wide], bad[wide] = _narrow(judge, good[wide], bad[wide], fan)
     ends = list(0.5 * (good + bad))

@@ -91,12 +91,12 @@ def largest_network(
 
 
 def _open(ranges: Sequence[StableRange]) -> bool:
-    """True if one range admits every eigenratio: some alpha > 0, from 0 or without end."""
+    """Return whether one range admits every eigenratio: some alpha > 0, from 0 or without end."""
     return any(r.high is None or (r.low == 0 and r.high > 0) for r in ranges)
 
 
 def _by_ratio(family: str, ranges: Sequence[StableRange]) -> int | None:
-    """Largest size by the closed form of the eigenratio."""
+    """Return the largest size by the closed form of the eigenratio."""
     if _open(ranges):
         return None
     if not ranges or ranges[0].high is None or ranges[0].high == 0:
@@ -107,6 +107,7 @@ def _by_ratio(family: str, ranges: Sequence[StableRange]) -> int | None:
         return None
     if ratio is _itself:
         return max(first, allowed.numerator // allowed.denominator)
+    # The ratio grows with the size: double until it is too large, then bisect.
     low, high = first, 2 * first
     while _fits(ratio, high, allowed):
         low, high = high, 2 * high
@@ -117,7 +118,7 @@ def _by_ratio(family: str, ranges: Sequence[StableRange]) -> int | None:
 
 
 def _fits(ratio: Callable[[int], Ball], n: int, allowed: Fraction) -> bool:
-    """True if the ratio at n is at most the allowed one; balls are refined until they decide."""
+    """Return whether the ratio at n is at most the allowed one; refine balls until they decide."""
     bound, bits = fmpq(allowed.numerator, allowed.denominator), 64
     while True:
         with precision(bits + 4 * n.bit_length()):
@@ -130,19 +131,18 @@ def _fits(ratio: Callable[[int], Ball], n: int, allowed: Fraction) -> bool:
 
 
 def _chain(n: int) -> Ball:
-    """cot²(π/2n), which is (1 + cos(π/n)) / (1 - cos(π/n))."""
+    """Return cot²(π/2n) = (1 + cos(π/n)) / (1 - cos(π/n))."""
     return {2: 1, 3: 3}.get(n) or cotangent(fmpq(1, 2 * n)) ** 2
 
 
 def _ring(n: int) -> Ball:
-    """4 / (4 sin²(π/n)) for even n; for odd n the numerator is 4 cos²(π/2n)."""
+    """Return 4 / (4 sin²(π/n)) for even n; for odd n the numerator is 4 cos²(π/2n)."""
     if n in (3, 4, 6):
         return {3: 1, 4: 2, 6: 4}[n]
     return 1 / (arb.sin_pi_fmpq(fmpq(1, n)) ** 2 if n % 2 == 0 else 4 * arb.sin_pi_fmpq(fmpq(1, 2 * n)) ** 2)
 
 
 def _itself(n: int) -> Ball:
-    """The size."""
     return n
 
 
@@ -168,7 +168,7 @@ def eigenratio(family: str, n: int) -> Ball:
 
 
 def _by_search(family: str, ranges: Sequence[StableRange], limit: int) -> int | None:
-    """Largest size up to a limit, by trial of every network."""
+    """Return the largest size up to a limit, by trial of every network."""
     if _open(ranges) and not family_plugin(family).directed:
         return None
     cube = family == "hypercube"

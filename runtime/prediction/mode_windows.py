@@ -11,7 +11,7 @@ from synchain.models.spectra.eigenvalue import Eigenvalue
 from synchain.models.spectra.jordan import geometric_multiplicity
 
 VECTOR_LIMIT = 2000
-"""Most nodes for which an eigenvector is computed, since the matrix is dense."""
+"""Most nodes for which an eigenvector is computed, since the matrix is dense: 32 MB (a choice)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class NetworkMode:
 
     @property
     def defective(self) -> bool:
-        """True if there are fewer independent eigenvectors than the multiplicity (exact rank)."""
+        """Whether there are fewer independent eigenvectors than the multiplicity (exact rank)."""
         return geometric_multiplicity(self.graph, self.eigenvalue) < self.multiplicity
 
     @property
@@ -47,9 +47,11 @@ class NetworkMode:
         n = self.graph.n
         if n > VECTOR_LIMIT:
             raise ValueError(f"eigenvector of {self.graph.name}({n}): expected at most {VECTOR_LIMIT} nodes")
+        # The null space of G - gamma I, by the right singular vectors of the smallest singular values.
         shifted = np.array([[float(x) for x in row] for row in self.graph.rows]) - self.eigenvalue.value * np.eye(n)
         independent = geometric_multiplicity(self.graph, self.eigenvalue)
         basis = np.linalg.svd(shifted)[2][n - independent :].conj().T
+        # The projection of a node's unit vector on this space is largest for the node of largest weight.
         weight = np.sum(np.abs(basis) ** 2, axis=1)
         column = basis @ basis[int(np.argmax(weight >= weight.max() - 1e-9))].conj()
         return np.asarray(column / np.linalg.norm(column))
@@ -72,5 +74,5 @@ def defective_rows(graph: Topology) -> list[tuple[str, str]]:
 
 
 def has_loose_parts(graph: Topology) -> bool:
-    """True if 0 is a multiple eigenvalue: no coupling connects some parts of the network."""
+    """Return whether 0 is a multiple eigenvalue: no coupling connects some parts of the network."""
     return graph.spectrum.zeros > 1

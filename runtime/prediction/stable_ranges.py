@@ -60,7 +60,7 @@ def exact_ranges(
 
 
 def _exact(x: float) -> Fraction:
-    """The rational that a number is; numbers of NumPy are converted to float first."""
+    """Return the rational value of a number; numbers of NumPy are converted to float first."""
     return Fraction(x) if isinstance(x, (int, float, Fraction)) else Fraction(float(x))
 
 

@@ -61,7 +61,7 @@ Region = Callable[[np.ndarray], np.ndarray]
 """Maps complex alpha (m,) with an imaginary part >= 0 to truth values (m,)."""
 
 LONGEST = 60
-"""Most letters of an exact ratio that is written out."""
+"""Most letters of an exact ratio that is shown (a choice)."""
 
 _EVERYTHING = StableRange(Fraction(0), None)
 
@@ -72,8 +72,7 @@ class Window:
 
     low: float  # ends of the interval
     high: float
-    # uncertainties of the ends, in sigma: infinite at the end of a grid, beyond which nothing is known, 0 at sigma =
-    # 0
+    # uncertainties of the ends, in sigma: infinite at the end of a grid, since the window may go on; 0 at sigma = 0
     low_error: float
     high_error: float
     # first mode that is lost beyond the end; None if the end is 0, infinite, or the end of a grid
@@ -129,7 +128,7 @@ class Verdict:
 
 
 def _exact(mode: NetworkMode | None) -> str | None:
-    """The eigenvalue of a mode as exact text."""
+    """Return the eigenvalue of a mode as exact text."""
     return None if mode is None else mode.eigenvalue.text
 
 
@@ -144,21 +143,22 @@ class OneWay:
 
 @dataclass(frozen=True, slots=True)
 class _End:
-    """sigma = alpha / |gamma| of a mode at an end of a range.
-
-    Without a mode it is 0, or infinite for an open range.
-    """
+    """sigma = alpha / |gamma| of a mode at an end of a range; without a mode the end of 0 … infinity."""
 
     range: StableRange
     upper: bool
     mode: NetworkMode | None
 
     @property
+    def alpha(self) -> Fraction | None:
+        """The end of the range; None at infinity."""
+        return self.range.high if self.upper else self.range.low
+
+    @property
     def sigma(self) -> float:
-        alpha = self.range.high if self.upper else self.range.low
-        if alpha is None:
+        if self.alpha is None:
             return math.inf
-        return float(alpha) / self.mode.size if self.mode else 0.0
+        return float(self.alpha) / self.mode.size if self.mode else 0.0
 
     @property
     def error(self) -> float:
@@ -172,30 +172,26 @@ def windows(
 
     Ranges below alpha = 0 give intervals of negative sigma.
     """
-    above = [_window(low, high) for low, high in _intersection(exact_ranges(ranges, errors), graph)]
+    above = [
+        Window(low.sigma, high.sigma, low.error, high.error, low.mode, high.mode)
+        for low, high in _intersection(exact_ranges(ranges, errors), graph)
+    ]
+    # Ranges below 0: mirror them, find the windows of -sigma, and mirror those.
     pairs = zip(ranges, [(0.0, 0.0)] * len(ranges) if errors is None else errors, strict=True)
     mirrored = [((max(-high, 0.0), -low), error[::-1]) for (low, high), error in reversed(list(pairs)) if low < 0.0]
     if not mirrored:
         return tuple(above)
     exact = exact_ranges([r for r, _ in mirrored], [error for _, error in mirrored])
-    below = [_mirrored(_window(low, high)) for low, high in reversed(_intersection(exact, graph))]
+    below = [
+        Window(0.0 - high.sigma, 0.0 - low.sigma, high.error, low.error, high.mode, low.mode)
+        for low, high in reversed(_intersection(exact, graph))
+    ]
+    # Windows that meet at sigma = 0 are one.
     if below and above and below[-1].high == above[0].low:
         right = above.pop(0)
         if right.high > 0.0:
             below[-1] = replace(below[-1], high=right.high, high_error=right.high_error, high_mode=right.high_mode)
     return (*below, *above)
-
-
-def _mirrored(window: Window) -> Window:
-    """The window of -sigma."""
-    return Window(
-        0.0 - window.high,
-        0.0 - window.low,
-        window.high_error,
-        window.low_error,
-        window.high_mode,
-        window.low_mode,
-    )
 
 
 def windows_complex(
@@ -206,10 +202,12 @@ def windows_complex(
     They are found on a grid and refined by bisection.
     Shapes: sigma_grid (k,).
     """
+    # Of a conjugate pair one mode is enough; unconnected parts add a mode with gamma = 0.
     modes = tuple(mode for mode in transversal_modes(graph) if complex(mode.eigenvalue.value).imag <= 0)
     values = np.array([mode.eigenvalue.value for mode in modes] + [0.0] * has_loose_parts(graph), dtype=complex)
 
     def verdicts(sigma: np.ndarray) -> np.ndarray:
+        """Return whether each mode is stable at each sigma. Shapes: sigma (m,); returns (m, modes)."""
         alpha = -np.multiply.outer(sigma, values)
         answer = np.asarray(stable(alpha.ravel() + 0.0), dtype=bool)
         if answer.shape != (alpha.size,):
@@ -219,31 +217,26 @@ def windows_complex(
         return answer.reshape(alpha.shape)
 
     def lost(sigma: float) -> NetworkMode | None:
+        """Return the first mode that is unstable at a sigma."""
         bad = np.flatnonzero(~verdicts(np.array([sigma]))[0, : len(modes)])
         return modes[bad[0]] if len(bad) else None
 
     grid = np.asarray(sigma_grid, dtype=float)
     intervals, _ = find(lambda sigma: np.atleast_1d(verdicts(sigma).all(axis=1)), grid, resolution)
     reach = 0.5 * resolution
+
+    def error_and_mode(end: float, step: float) -> tuple[float, NetworkMode | None]:
+        """Return the error of an end and the mode lost a step beyond it."""
+        if grid[0] < end < grid[-1]:
+            return reach, lost(end + step)
+        # The window may go on beyond the grid, but for sigma = 0, where couplings begin.
+        return (0.0 if end == 0.0 else math.inf), None
+
     windows = []
     for low, high in intervals:
-        inner_low, inner_high = low > grid[0], high < grid[-1]
-        windows.append(
-            Window(
-                low,
-                high,
-                low_error=reach if inner_low else _beyond(low),
-                high_error=reach if inner_high else _beyond(high),
-                low_mode=lost(low - reach) if inner_low else None,
-                high_mode=lost(high + reach) if inner_high else None,
-            )
-        )
+        (low_error, low_mode), (high_error, high_mode) = error_and_mode(low, -reach), error_and_mode(high, reach)
+        windows.append(Window(low, high, low_error, high_error, low_mode, high_mode))
     return OneWay(tuple(windows), tuple(mode for mode in transversal_modes(graph) if mode.defective))
-
-
-def _beyond(end: float) -> float:
-    """Error of an end of a grid, beyond which nothing is known; none at 0, where couplings begin."""
-    return 0.0 if end == 0.0 else math.inf
 
 
 def verdict(
@@ -267,54 +260,36 @@ def verdict(
 
 def possible(ranges: Sequence[StableRange], graph: Topology) -> bool:
     """Decide whether some sigma > 0 puts every mode of a graph into one of the exact ranges."""
-    return any(_follows(high) for _, high in _intersection(ranges, graph))
-
-
-def _follows(high: _End) -> bool:
-    """True if an upper end lies above sigma = 0."""
-    return high.range.high is None or (high.mode is not None and high.range.high > 0)
+    ends = [high for _, high in _intersection(ranges, graph)]
+    return any(high.alpha is None or (high.mode is not None and high.alpha > 0) for high in ends)
 
 
 def _intersection(ranges: Sequence[StableRange], graph: Topology) -> list[tuple[_End, _End]]:
-    """The windows as pairs of exact ends."""
+    """Return the windows as pairs of exact ends."""
     modes = _real_modes(graph)
+    # Between unconnected parts deviations have alpha = 0.
     if has_loose_parts(graph) and not any(r.low == 0 for r in ranges):
         return []
+    # Start with all sigma, and keep what each mode allows.
     allowed = [(_End(_EVERYTHING, False, None), _End(_EVERYTHING, True, None))]
     for mode in modes:
         ends = [(_End(r, False, mode), _End(r, True, mode)) for r in ranges]
-        met = [(_later(a, c), _earlier(b, d)) for a, b in allowed for c, d in ends]
-        allowed = [(low, high) for low, high in met if _order(low, high) <= 0]
+        overlaps = [(c if _order(c, a) > 0 else a, d if _order(d, b) < 0 else b) for a, b in allowed for c, d in ends]
+        allowed = [(low, high) for low, high in overlaps if _order(low, high) <= 0]
     return allowed
 
 
-def _later(x: _End, y: _End) -> _End:
-    """The end with the larger sigma."""
-    return y if _order(y, x) > 0 else x
-
-
-def _earlier(x: _End, y: _End) -> _End:
-    """The end with the smaller sigma."""
-    return y if _order(y, x) < 0 else x
-
-
 def _order(x: _End, y: _End) -> int:
-    """Sign of the difference of the sigma of two ends, exactly."""
-    alphas = [end.range.high if end.upper else end.range.low for end in (x, y)]
-    if alphas[0] is None or alphas[1] is None:
-        return (alphas[0] is None) - (alphas[1] is None)
+    """Return the sign of the difference of the sigma of two ends, exactly."""
+    if x.alpha is None or y.alpha is None:
+        return (x.alpha is None) - (y.alpha is None)
     if x.mode is None or y.mode is None:  # an end at 0
-        return (alphas[0] > 0) - (alphas[1] > 0)
-    return compare(alphas[0], x.mode.eigenvalue, alphas[1], y.mode.eigenvalue)
-
-
-def _window(low: _End, high: _End) -> Window:
-    """Round the exact ends of a window."""
-    return Window(low.sigma, high.sigma, low.error, high.error, low.mode, high.mode)
+        return (x.alpha > 0) - (y.alpha > 0)
+    return compare(x.alpha, x.mode.eigenvalue, y.alpha, y.mode.eigenvalue)
 
 
 def _real_modes(graph: Topology) -> tuple[NetworkMode, ...]:
-    """The transversal modes; ValueError if an eigenvalue is complex or positive."""
+    """Return the transversal modes; raise ValueError if an eigenvalue is complex or positive."""
     modes = transversal_modes(graph)
     for mode in modes:
         gamma = mode.eigenvalue.value
@@ -337,7 +312,7 @@ def expect_no_repulsion(graph: Topology, gamma: float) -> None:
 
 
 def _exact_ratio(slowest: NetworkMode | None, fastest: NetworkMode | None) -> sp.Expr | None:
-    """The eigenratio as a short SymPy expression, or None."""
+    """Return the eigenratio as a SymPy expression, or None if it is long."""
     if slowest is None or fastest is None:
         return None
     top, bottom = fastest.eigenvalue.number, slowest.eigenvalue.number

@@ -12,14 +12,13 @@ LARGEST = 1e300
 
 
 def numbers(what: str, values: object, *, complex_too: bool = False) -> np.ndarray:
-    """Return the values as an array of any shape, of floats or, if `complex_too`, of complex
-    numbers.
-    """
+    """Return the values as an array of any shape, of floats or, if `complex_too`, of complex numbers."""
     try:
-        found = np.asarray(values)
-        if found.dtype.kind in ("US" if complex_too else "USc") or (found.dtype.kind == "O" and None in found):
+        array = np.asarray(values)
+        # NumPy reads the text "1" as a number, and None as nan
+        if array.dtype.kind in ("US" if complex_too else "USc") or (array.dtype.kind == "O" and None in array):
             raise ValueError
-        return found if found.dtype.kind == "c" else found.astype(float)
+        return array if array.dtype.kind == "c" else array.astype(float)
     except (TypeError, ValueError):
         kind = "numbers" if complex_too else "real numbers"
         raise ValueError(f"{what}: found {short_repr(values)}; expected {kind}") from None
@@ -27,17 +26,16 @@ def numbers(what: str, values: object, *, complex_too: bool = False) -> np.ndarr
 
 def row(what: str, values: ArrayLike, least: int = 1, *, rising: bool = False, complex_too: bool = False) -> np.ndarray:
     """Return the values as one row (m,) of floats or, if `complex_too`, of complex numbers, up to LARGEST in size."""
-    found = np.atleast_1d(numbers(what, values, complex_too=complex_too))
-    if not np.all(np.isfinite(found)):
-        raise ValueError(f"{what}: found {found[~np.isfinite(found)][0]}; expected finite numbers")
-    large = np.maximum(np.abs(found.real), np.abs(found.imag)) > LARGEST
+    array = np.atleast_1d(numbers(what, values, complex_too=complex_too))
+    if not np.all(np.isfinite(array)):
+        raise ValueError(f"{what}: found {array[~np.isfinite(array)][0]}; expected finite numbers")
+    large = np.maximum(np.abs(array.real), np.abs(array.imag)) > LARGEST
     if large.any():
-        raise ValueError(f"{what}: found {found[large][0]:g}; expected numbers of at most {LARGEST:g} in size")
-    if found.ndim != 1 or len(found) < least:
+        raise ValueError(f"{what}: found {array[large][0]:g}; expected numbers of at most {LARGEST:g} in size")
+    if array.ndim != 1 or len(array) < least:
+        shape = array.shape if np.ndim(values) else ()
         wanted = f"a row of at least {least} number{'s' * (least > 1)}"
-        raise ValueError(
-            f"{what}: found an array of shape {np.shape(found) if np.ndim(values) else ()}; expected {wanted}"
-        )
-    if rising and not np.all(np.diff(found) > 0.0):
+        raise ValueError(f"{what}: found an array of shape {shape}; expected {wanted}")
+    if rising and not np.all(np.diff(array) > 0.0):
         raise ValueError(f"{what}: found numbers that do not increase; expected them from low to high")
-    return found
+    return array

@@ -32,12 +32,12 @@ def with_error(value: float, error: float = 0.0) -> str:
         return f"{value:z.4f}" if value == 0.0 or abs(value) >= 1e-3 else f"{value:.4g}"
     # the decimal place of the error's second digit, after rounding: 0.0996 is 0.10
     rounded = f"{error:.1e}"
-    place = 1 - int(rounded.partition("e")[2])
-    if place > LONGEST:
+    digits = 1 - int(rounded.partition("e")[2])
+    if digits > LONGEST:
         return f"{value:.4g} ± {rounded}"
-    decimals = max(place, 0)
-    spread = f"{float(rounded):.{decimals}f}" if place <= 6 else rounded
-    return f"{round(value, place):z.{decimals}f} ± {spread}"
+    decimals = max(digits, 0)
+    spread = f"{float(rounded):.{decimals}f}" if digits <= 6 else rounded
+    return f"{round(value, digits):z.{decimals}f} ± {spread}"
 
 
 def interval_text(

@@ -1,4 +1,4 @@
-"""Who does the work of a call, and who hears how far it is."""
+"""Threads or an executor for a call, and its reports of progress."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .threads import worker_count
 
 @dataclass(frozen=True, slots=True)
 class Execution:
-    """Who does the work of a call, and who hears how far it is; checked."""
+    """Threads or an executor for a call, and its reports of progress; checked."""
 
     workers: int | None = None  # number of threads (default: all cores)
     executor: Executor | None = None  # runs the blocks in place of threads (docs/scale.md)
@@ -33,14 +33,12 @@ class Execution:
         object.__setattr__(self, "size", _size(self.executor, self.workers))
 
     def reporter(self, total: float, unit: str = "cell") -> Reporter:
-        """Return the reporter of so many cells, periods or values; its time begins now."""
+        """Return the reporter of a number of cells, periods or values; its time begins now."""
         return Reporter(total, self.show_progress, self.progress, unit)
 
 
 def _size(executor: Executor | None, workers: int | None) -> int:
-    """How many blocks can run at a time: `workers`, else as far as the executor tells, else all
-    cores.
-    """
+    """Return how many blocks run at a time: `workers`, else the size of the executor, else all cores."""
     if executor is None or workers is not None:
         return worker_count(workers)
     client = getattr(executor, "_client", None)  # of dask.distributed

@@ -13,9 +13,7 @@ from pathlib import Path
 
 @contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path beside `path`; it replaces `path` at the end of the with block, or
-    vanishes on an error.
-    """
+    """Yield a temporary path beside `path`; move it there at the end of the with block, delete it on an error."""
     target = Path(path)
     check_replaceable(target)
     with _cannot_write(target):
@@ -33,9 +31,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 @contextmanager
 def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary folder beside `path`, which takes its place as that of `whole_file` does;
-    a former folder is deleted after that.
-    """
+    """Yield a temporary folder beside `path`, as `whole_file` does; delete a former folder in the end."""
     target = Path(path)
     with _cannot_write(target):
         name = tempfile.mkdtemp(dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix)
@@ -54,7 +50,7 @@ def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def synced(path: Path) -> None:
-    """Ask the system to put a file, or all files of a folder, on the disk itself."""
+    """Ask the system to write a file, or all files of a folder, to the disk itself."""
     for part in (path, *path.rglob("*")):
         if part.is_file():
             with open(part, "rb+") as file:
@@ -90,9 +86,7 @@ def check_replaceable(target: Path) -> None:
 
 
 def drop_leftovers(path: str | os.PathLike[str]) -> None:
-    """Delete temporary files and folders of processes that were killed while they wrote `path`; no
-    other process may be writing it.
-    """
+    """Delete temporary files of processes that were killed while they wrote `path`; no other may be writing it."""
     target = Path(path)
     for leftover in target.parent.glob(f".{escape(target.stem)}-*{escape(target.suffix)}"):
         if leftover.is_dir():
@@ -103,16 +97,14 @@ def drop_leftovers(path: str | os.PathLike[str]) -> None:
 
 @contextmanager
 def understood(path: Path) -> Iterator[None]:
-    """Turn any error that a forged file makes its reader raise into one ValueError that names the
-    file.
-    """
+    """Turn any error that a forged file causes in its reader into one ValueError that names the file."""
     try:
         yield
     except (OSError, MemoryError):
         raise
-    except Exception as problem:  # what was forged may break anything
-        words = " ".join(str(problem).split()) or type(problem).__name__
-        raise ValueError(words if str(path) in words else f"cannot use {path}: {words}") from problem
+    except Exception as problem:  # forged contents may break anything
+        message = " ".join(str(problem).split()) or type(problem).__name__
+        raise ValueError(message if str(path) in message else f"cannot use {path}: {message}") from problem
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
@@ -122,7 +114,7 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
 
 
 def output_folder(path: str | os.PathLike[str]) -> Path:
-    """Create a folder for output and return it; OSError in a clear sentence if that cannot be done."""
+    """Create a folder for output and return it; raise OSError with a remedy if that cannot be done."""
     folder = Path(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)

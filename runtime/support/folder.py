@@ -17,7 +17,8 @@ def names(path: Iterable[str]) -> tuple[str, ...]:
 
 def load(what: str, name: str, package: str, path: Iterable[str]) -> ModuleType:
     """Return a module of a package."""
-    known = names(path)
-    if name not in known:
-        raise ValueError(f"unknown {what} {short_repr(name)}; known: {', '.join(known)}{suggestion(name, known)}")
+    valid_names = names(path)
+    if name not in valid_names:
+        listing = ", ".join(valid_names)
+        raise ValueError(f"unknown {what} {short_repr(name)}; known: {listing}{suggestion(name, valid_names)}")
     return import_module(f".{name}", package)

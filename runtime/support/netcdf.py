@@ -1,12 +1,9 @@
-"""A netCDF file written piece by piece: as large as the disk, with no more in memory than one
-piece.
+"""A netCDF file written piece by piece: as large as the disk, with one piece in memory.
 
-The form is that of netCDF "64-bit offset" files, as SciPy writes it for `Result.save`, byte for
-byte: the header says where each variable begins, then the variables follow, whole, big endian
-(NetCDF Classic Format Specification, Unidata).
-
-The first attribute of a result is a digest of the whole file, taken with zeros in the place of the
-digest itself.
+The bytes are those that SciPy writes for `Result.save`, a netCDF "64-bit offset" file: the header has
+the offset of each variable, then the variables follow, big endian (NetCDF Classic Format
+Specification, Unidata). The first attribute of a result is a digest of the file, computed with zeros
+in place of the digest itself.
 """
 
 from __future__ import annotations
@@ -31,62 +28,54 @@ TYPES = {"b": 1, "c": 2, "h": 3, "i": 4, "l": 4, "f": 5, "d": 6}
 PIECE = 2**20
 """Bytes that are read at a time."""
 LARGEST = 2**32 - 4
-"""Bytes of the largest variable whose size the header can hold; of a larger one it says 2^32 - 1,
-and readers count.
+"""Bytes of the largest variable whose size fits into the header; a larger one has 2^32 - 1 there, and readers compute
+its size from its dimensions.
 """
 
 
 class Sheet:
-    """A file for data shaped like `template` but for other lengths of some dimensions; written by
-    `put`.
-
-    The template holds the variables, dimensions and attributes; if a length is given, the
-    template's own is not used.
-    """
+    """A file with the variables, dimensions and attributes of a template, but for the given lengths."""
 
     def __init__(self, file: BinaryIO, template: xr.Dataset, lengths: Mapping[str, int]) -> None:
         self.file = file
-        with netcdf_file(io.BytesIO(_bytes(template)), mmap=False) as made:
-            self.sizes = {name: lengths.get(name, size) for name, size in made.dimensions.items()}
-            shapes = {name: tuple(self.sizes[d] for d in v.dimensions) for name, v in made.variables.items()}
+        # SciPy writes the template; its header, with the lengths changed, is that of this file.
+        with netcdf_file(io.BytesIO(_bytes(template)), mmap=False) as source:
+            self.sizes = {name: lengths.get(name, size) for name, size in source.dimensions.items()}
+            shapes = {name: tuple(self.sizes[d] for d in v.dimensions) for name, v in source.variables.items()}
             order = sorted(map(str, template.variables), key=lambda name: shapes[name], reverse=True)
-            variables = {name: made.variables[name] for name in order}
+            variables = {name: source.variables[name] for name in order}
             self.types = {name: np.dtype(v.typecode()).newbyteorder(">") for name, v in variables.items()}
             heads = [self._head(name, v, shapes[name]) for name, v in variables.items()]
-            first = b"CDF\2" + ABSENT + _dimensions(self.sizes) + _attributes(made._attributes)
+            first = b"CDF\2" + ABSENT + _dimensions(self.sizes) + _attributes(source._attributes)
             fixed = {name: np.array(v.data) for name, v in variables.items() if not set(v.dimensions) & set(lengths)}
         first += VARIABLE + struct.pack(">i", len(heads))
-        place = len(first) + sum(len(head) + 8 for head in heads)
-        self.shapes, self.begins = shapes, {}
+        # Each head ends with the offset of its variable, which is padded to four bytes.
+        offset = len(first) + sum(len(head) + 8 for head in heads)
+        self.begins = {}
         for name, head in zip(order, heads, strict=True):
-            first += head + struct.pack(">q", place)
-            self.begins[name] = place
-            place += -(-self._bytes(name) // 4) * 4
+            first += head + struct.pack(">q", offset)
+            self.begins[name] = offset
+            offset += -(-int(prod(shapes[name]) * self.types[name].itemsize) // 4) * 4
         file.write(first)
-        file.truncate(place)
+        file.truncate(offset)
+        # Variables without a long dimension are already complete.
         for name, values in fixed.items():
             self._write(self.begins[name], np.asarray(values, dtype=self.types[name]))
 
     def put(self, name: str, rows: np.ndarray, values: np.ndarray) -> None:
-        """Write rows of a variable, numbered over its leading dimensions together; values (rows,
-        …).
-        """
+        """Write rows of a variable, numbered over its leading dimensions together. Shapes: values (rows, …)."""
         values = np.ascontiguousarray(values, dtype=self.types[name])
         length = values.nbytes // max(len(rows), 1)
         for run in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(rows) != 1) + 1):
             if len(run):
                 self._write(self.begins[name] + int(rows[run[0]]) * length, values[run[0] : run[-1] + 1])
 
-    def _write(self, place: int, values: np.ndarray) -> None:
-        self.file.seek(place)
+    def _write(self, offset: int, values: np.ndarray) -> None:
+        self.file.seek(offset)
         self.file.write(values.tobytes())
 
-    def _bytes(self, name: str) -> int:
-        """Bytes of a variable."""
-        return int(prod(self.shapes[name]) * self.types[name].itemsize)
-
     def _head(self, name: str, variable: Any, shape: tuple[int, ...]) -> bytes:
-        """All that the header says of a variable but its place."""
+        """Return the entry of a variable in the header, without its offset."""
         numbers = [list(self.sizes).index(d) for d in variable.dimensions]
         size = -(-prod(shape) * variable.itemsize() // 4) * 4
         size = size if size <= LARGEST else 2**32 - 1
@@ -106,42 +95,41 @@ def unsealed(data: xr.Dataset) -> xr.Dataset:
 
 
 def seal(file: BinaryIO) -> None:
-    """Write the digest of a file of `unsealed` data, which is open for reading and writing, into
-    its room.
-    """
-    place = _digest_place(file)
-    if place is None:
+    """Write the digest of a file of `unsealed` data, open for reading and writing, into its room."""
+    offset = _digest_offset(file)
+    if offset is None:
         raise ValueError("the file has no room for a digest")
-    digest = _digest(file, place)
-    file.seek(place)
+    digest = _digest(file, offset)
+    file.seek(offset)
     file.write(digest)
 
 
 def is_sealed(file: BinaryIO) -> bool | None:
-    """True if a file is as it was sealed, False if it has changed since, None if it has no digest."""
-    place = _digest_place(file)
-    if place is None:
+    """Return whether a file fits its digest, or None if it has none."""
+    offset = _digest_offset(file)
+    if offset is None:
         return None
-    file.seek(place)
-    return file.read(len(BLANK)) == _digest(file, place)
+    file.seek(offset)
+    return file.read(len(BLANK)) == _digest(file, offset)
 
 
-def _digest_place(file: BinaryIO) -> int | None:
-    """Where the digest stands; before it there are only the names of the dimensions."""
+def _digest_offset(file: BinaryIO) -> int | None:
+    """Return the offset of the digest, which only the names of the dimensions precede."""
     file.seek(0)
-    before = _text(DIGEST) + struct.pack(">ii", TYPES["c"], len(BLANK))
-    found = file.read(PIECE).find(before)
-    return None if found < 0 else found + len(before)
+    head = _text(DIGEST) + struct.pack(">ii", TYPES["c"], len(BLANK))
+    index = file.read(PIECE).find(head)
+    return None if index < 0 else index + len(head)
 
 
-def _digest(file: BinaryIO, place: int) -> bytes:
-    total, here = hashlib.sha256(), 0
+def _digest(file: BinaryIO, offset: int) -> bytes:
+    """Return the SHA-256 of a file with zeros in place of the digest at `offset`."""
+    total, position = hashlib.sha256(), 0
     file.seek(0)
     while piece := bytearray(file.read(PIECE)):
-        for k in range(max(place - here, 0), min(place + len(BLANK) - here, len(piece))):
+        for k in range(max(offset - position, 0), min(offset + len(BLANK) - position, len(piece))):
             piece[k] = ord("0")
         total.update(piece)
-        here += len(piece)
+        position += len(piece)
     return total.hexdigest().encode()
 
 
@@ -173,7 +161,7 @@ def _attributes(values: Mapping[str, object]) -> bytes:
 
 
 def _value(value: object) -> bytes:
-    """An attribute: text as bytes, or numbers of any of the types."""
+    """Return an attribute as bytes: text, or numbers of any of the types."""
     if isinstance(value, bytes):
         return struct.pack(">ii", TYPES["c"], len(value)) + _padded(value)
     numbers = np.atleast_1d(np.asarray(value))

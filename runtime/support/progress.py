@@ -91,7 +91,7 @@ Hook = Callable[[Progress], object]
 
 
 def duration(seconds: float) -> str:
-    """A time in the largest unit that fits: 40 s, 12 min, 3.5 h."""
+    """Return a time in the largest unit that fits: 40 s, 12 min, 3.5 h."""
     if seconds == float("inf"):
         return "unknown time"
     if seconds < 90.0:
@@ -100,29 +100,27 @@ def duration(seconds: float) -> str:
 
 
 def _has_bars() -> bool:
-    """Whether stderr is a terminal, or this process the kernel of a notebook."""
+    """Return whether stderr is a terminal, or this process the kernel of a notebook."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     return bool(getattr(sys.stderr, "isatty", bool)()) or "IPKernelApp" in getattr(shell, "config", ())
 
 
 @dataclass(slots=True)
 class Reporter:
-    """Counts what has ended and shows a bar on a terminal or in a notebook, else a line every minute; `show` False
-    shows nothing.
-    """
+    """Counts what has ended and shows a bar on a terminal or in a notebook, else a line every minute."""
 
     total: float
-    show: bool | None = None
-    hook: Hook | None = None
+    show: bool | None = None  # False shows nothing, None a bar or lines, True a bar everywhere
+    hook: Hook | None = None  # called with a `Progress` after each change
     unit: str = "cell"
-    counts: np.ndarray = field(default_factory=lambda: np.zeros(CODES, dtype=np.int64))
+    counts: np.ndarray = field(default_factory=lambda: np.zeros(CODES, dtype=np.int64))  # (CODES,): ended cells
     done: float = 0
-    kept: float = 0
+    kept: float = 0  # of these from an earlier run
     preparing: float = 0.0
     compiling: float = 0.0
     began: float = field(default_factory=time.perf_counter)
     every: float = EVERY
-    _said: float = 0.0
+    _last_line: float = 0.0
     _bar: tqdm | None = None
 
     def __enter__(self) -> Reporter:
@@ -130,28 +128,28 @@ class Reporter:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *problem: object) -> None:
-        if kind is None and self.done < self.total:
+        if kind is None and self.done < self.total:  # an average that is precise enough early, or a branch that ends
             self.total = self.done
             if self._bar is not None:
                 self._bar.total = self.done
                 self._bar.refresh()
-            self._tell()
+            self._call_hook()
         self.close()
 
     def start(self, counts: np.ndarray | None = None, compiling: float = 0.0) -> None:
         """Begin to count. Shapes: counts (CODES,)."""
         now = time.perf_counter()
         self.preparing, self.compiling = now - self.began - compiling, compiling
-        self.began, self._said = now, now
+        self.began, self._last_line = now, now
         if counts is not None:
             self.counts = self.counts + counts
             self.done = self.kept = int(counts.sum())
         if self.show or (self.show is None and _has_bars()):
-            from tqdm.auto import tqdm  # which is one of widgets in a notebook that has them
+            from tqdm.auto import tqdm  # with widgets in a notebook that has them
 
-            said = f"compiled in {duration(compiling)}" if compiling >= 1.0 else None
-            self._bar = tqdm(total=self.total, initial=self.kept, desc=said, unit=self.unit, file=sys.stderr)
-        self._tell()
+            note = f"compiled in {duration(compiling)}" if compiling >= 1.0 else None
+            self._bar = tqdm(total=self.total, initial=self.kept, desc=note, unit=self.unit, file=sys.stderr)
+        self._call_hook()
 
     def add(self, counts: np.ndarray) -> None:
         """Count cells that have ended; counts (CODES,)."""
@@ -164,10 +162,10 @@ class Reporter:
         if self._bar is not None:
             self._bar.set_postfix_str(self.now.failures, refresh=False)
             self._bar.update(amount)
-        elif self.show is None and time.perf_counter() - self._said > self.every and sys.stderr is not None:
-            self._said = time.perf_counter()
+        elif self.show is None and time.perf_counter() - self._last_line > self.every and sys.stderr is not None:
+            self._last_line = time.perf_counter()
             print(self.now, file=sys.stderr, flush=True)
-        self._tell()
+        self._call_hook()
 
     def each(self, values: Iterable[T]) -> Iterator[T]:
         """Yield values and count each of them when the next one is asked for."""
@@ -177,17 +175,16 @@ class Reporter:
 
     @property
     def now(self) -> Progress:
-        """How far the call is."""
-        found = {status: int(self.counts[status]) for status in Status if self.counts[status]}
+        """Present state of the call."""
+        statuses = MappingProxyType({s: int(self.counts[s]) for s in Status if self.counts[s]})
         running = time.perf_counter() - self.began
-        ended = MappingProxyType(found)
-        return Progress(self.total, self.done, self.kept, ended, self.compiling, running, self.preparing, self.unit)
+        return Progress(self.total, self.done, self.kept, statuses, self.compiling, running, self.preparing, self.unit)
 
     def close(self) -> None:
-        """Leave the bar as it stands."""
+        """End the bar."""
         if self._bar is not None:
             self._bar.close()
 
-    def _tell(self) -> None:
+    def _call_hook(self) -> None:
         if self.hook is not None:
             self.hook(self.now)

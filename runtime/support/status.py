@@ -1,4 +1,4 @@
-"""How a cell ended: a code in every result, and a sentence for every code."""
+"""Status codes of cells, in every result, with a sentence for each code."""
 
 from __future__ import annotations
 
@@ -51,5 +51,5 @@ _MESSAGES = {
 
 
 def tally(codes: np.ndarray) -> np.ndarray:
-    """How many cells (CODES,) ended with each code."""
+    """Return the number of cells that ended with each code. Shapes: codes (cells,), returns (CODES,)."""
     return np.bincount(codes, minlength=CODES)
