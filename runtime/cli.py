@@ -1,6 +1,4 @@
-"""The command `synchain`: finds the command, runs it, and turns every error into a sentence and an
-exit code.
-"""
+"""The command `synchain`: find the command, run it, turn every error into a sentence and an exit code."""
 
 from __future__ import annotations
 
@@ -45,54 +43,53 @@ class Parser(ArgumentParser):
             self.optional_positionals = True
         return super().add_argument(*names, **options)
 
-    def read(self, words: Sequence[str]) -> Namespace:
-        """Parse the words after the command."""
-        words = _negative_values(words)
-        return self.parse_intermixed_args(words) if self.optional_positionals else self.parse_args(words)
+    def read(self, texts: Sequence[str]) -> Namespace:
+        """Parse the arguments after the command."""
+        texts = _negative_values(texts)
+        return self.parse_intermixed_args(texts) if self.optional_positionals else self.parse_args(texts)
 
     def error(self, message: str) -> NoReturn:
-        """Raise with a hint where the help is."""
+        """Raise WrongUse with a hint to the help."""
         raise WrongUse(f"{' '.join(message.split())}\nsee: {self.prog} --help")
 
 
-def _negative_values(words: Sequence[str]) -> list[str]:
+def _negative_values(texts: Sequence[str]) -> list[str]:
     """Join "--rtol", "-1e-8" to "--rtol=-1e-8": argparse would take such a number for an option."""
     joined: list[str] = []
-    for word in words:
-        if joined and joined[-1].startswith("--") and "=" not in joined[-1] and re.match(r"-\.?[0-9]", word):
-            joined[-1] += f"={word}"
+    for text in texts:
+        if joined and joined[-1].startswith("--") and "=" not in joined[-1] and re.match(r"-\.?[0-9]", text):
+            joined[-1] += f"={text}"
         else:
-            joined.append(word)
+            joined.append(text)
     return joined
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run `synchain` with these words (default: the command line's) and return its exit code, 0, 1
-    or 2.
-    """
-    words = list(sys.argv[1:] if argv is None else argv)
-    name = f"synchain {words[0]}" if words and words[0] in names() else "synchain"
-    _readable(sys.stdout)
+    """Run `synchain` with arguments (default: the command line's) and return its exit code: 0, 1 or 2."""
+    line = list(sys.argv[1:] if argv is None else argv)
+    name = f"synchain {line[0]}" if line and line[0] in names() else "synchain"
+    _escape_unknown_characters(sys.stdout)
     try:
-        with _short_warnings(), _news(name):
-            code = _dispatch(words)
+        with _short_warnings(), _log_lines(name):
+            code = _dispatch(line)
         if sys.stdout is not None:
             sys.stdout.flush()
         return code
-    except BrokenPipeError:  # the reader of the output has seen enough
+    except BrokenPipeError:  # the reader of the output has closed it
         discard_output()
         return FINE
     except (Exception, KeyboardInterrupt) as problem:
-        if argv is None:  # the program ends: a second Ctrl-C cannot cut its last words short, nor change its exit code
-            with suppress(ValueError):  # only the main thread may ask for that
+        if argv is None:  # the program ends: a second Ctrl-C must not cut its message short or change its exit code
+            with suppress(ValueError):  # only the main thread may set a signal handler
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
         return _report(name, problem)
 
 
-def _dispatch(words: list[str]) -> int:
-    if not words:
+def _dispatch(line: list[str]) -> int:
+    """Run the command of a line, or answer --help and --version."""
+    if not line:
         raise WrongUse(f"expected a command: {', '.join(names())}\nsee: synchain --help")
-    first, rest = words[0], words[1:]
+    first, *others = line
     if first in ("-h", "--help"):
         print(_help())
         return FINE
@@ -108,10 +105,10 @@ def _dispatch(words: list[str]) -> int:
     except ValueError as problem:
         raise WrongUse(f"{problem}\nsee: synchain --help") from None
     try:
-        arguments = parser(first).read(rest)
+        arguments = parser(first).read(others)
     except SystemExit:  # --help has been printed
         return FINE
-    arguments.command_line = ("synchain", *words)
+    arguments.command_line = ("synchain", *line)
     if getattr(arguments, "allow_code", None):
         from synchain.models.inputs.plugins import allow_code
 
@@ -121,7 +118,7 @@ def _dispatch(words: list[str]) -> int:
 
 
 def parser(name: str) -> Parser:
-    """Return the parser of a command; ValueError if there is none of this name."""
+    """Return the parser of a command; raise ValueError for an unknown name."""
     module = command(name)
     reader = Parser(
         prog=f"synchain {name}",
@@ -136,8 +133,8 @@ def parser(name: str) -> Parser:
 
 def _help() -> str:
     rows = [(name, command(name).SUMMARY) for name in names()]
-    wide = max(len(name) for name, _ in rows)
-    listed = "\n".join(f"  {name:<{wide}}  {summary}" for name, summary in rows)
+    width = max(len(name) for name, _ in rows)
+    listed = "\n".join(f"  {name:<{width}}  {summary}" for name, summary in rows)
     return (
         f"usage: synchain COMMAND ... | --version | --help\n\n{ABOUT}\n\ncommands:\n{listed}\n\n"
         f"{_examples(EXAMPLES)}\n\nsynchain COMMAND --help describes a command\n{CODES}"
@@ -149,7 +146,7 @@ def _examples(lines: Sequence[str]) -> str:
 
 
 def _after_ctrl_c(problem: BaseException) -> bool:
-    """True if an error came after Ctrl-C: pressed again, it may cut the end of a lock short."""
+    """Return whether an error came after Ctrl-C: pressed again, it may cut the end of a lock short."""
     earlier = problem.__context__
     return earlier is not None and (isinstance(earlier, KeyboardInterrupt) or _after_ctrl_c(earlier))
 
@@ -162,30 +159,30 @@ def _report(name: str, problem: BaseException) -> int:
         traceback.print_exception(problem, file=sys.stderr)
     code = FAILED
     if isinstance(problem, WrongUse):
-        words, code = str(problem), WRONG_USE
+        message, code = str(problem), WRONG_USE
     elif isinstance(problem, Failed):
-        words = str(problem)
+        message = str(problem)
     elif isinstance(problem, KeyboardInterrupt) or (isinstance(problem, RuntimeError) and _after_ctrl_c(problem)):
-        words = "interrupted"
+        message = "interrupted"
     elif isinstance(problem, MemoryError):
-        words = "not enough memory; use a smaller network, fewer cells or a shorter record"
+        message = "not enough memory; use a smaller network, fewer cells or a shorter record"
     elif isinstance(problem, ModuleNotFoundError) and not str(problem.name).startswith("synchain"):
         package = str(problem.name).partition(".")[0]
-        words = f"the package {package} is missing; install it: python -m pip install {package}"
+        message = f"the package {package} is missing; install it: python -m pip install {package}"
     elif isinstance(problem, OSError | InstallationError):
-        words = sentence(problem)
+        message = sentence(problem)
     elif isinstance(problem, RuntimeError) and "can't start new thread" in str(problem):
-        words = (
+        message = (
             "no thread can be started: not enough memory, or too many processes; use fewer workers or raise the limit"
         )
     else:
-        words = (
+        message = (
             f"internal error, a bug in synchain: {type(problem).__name__}: {sentence(problem)}\n"
             "please report it with this command line; SYNCHAIN_DEBUG=1 shows where it happened"
         )
     if sys.stderr is not None:
         with suppress(OSError):
-            print(f"{name}: {words}", file=sys.stderr)
+            print(f"{name}: {message}", file=sys.stderr)
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -196,9 +193,9 @@ def _report(name: str, problem: BaseException) -> int:
 
 @contextmanager
 def _short_warnings() -> Iterator[None]:
-    """Python's warnings as one line without file and line number."""
+    """Print warnings on one line, without file and line number."""
 
-    def show(message: Warning | str, *rest: object, **more: object) -> None:
+    def show(message: Warning | str, *_: object, **__: object) -> None:
         print(f"warning: {' '.join(str(message).split())}", file=sys.stderr)
 
     with warnings.catch_warnings():
@@ -207,8 +204,8 @@ def _short_warnings() -> Iterator[None]:
 
 
 @contextmanager
-def _news(name: str) -> Iterator[None]:
-    """What the package tells of its own accord, such as that it compiles, as lines on stderr."""
+def _log_lines(name: str) -> Iterator[None]:
+    """Print messages of the package's logger, such as that it compiles, on stderr."""
     handler, logger = logging.StreamHandler(sys.stderr), logging.getLogger("synchain")
     handler.setFormatter(logging.Formatter(f"{name}: %(message)s"))
     before = logger.level
@@ -221,7 +218,7 @@ def _news(name: str) -> Iterator[None]:
         logger.removeHandler(handler)
 
 
-def _readable(stream: object) -> None:
+def _escape_unknown_characters(stream: object) -> None:
     """Write characters that the stream's encoding lacks as escapes instead of failing."""
     if getattr(stream, "errors", None) in ("strict", "surrogateescape") and hasattr(stream, "reconfigure"):
         stream.reconfigure(errors="backslashreplace")

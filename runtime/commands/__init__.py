@@ -15,10 +15,10 @@ __all__ = ["command", "names"]
 
 
 def names() -> tuple[str, ...]:
-    """All commands: the files of this folder, sorted."""
+    """Return the names of all commands: the files of this folder, sorted."""
     return folder.names(__path__)
 
 
 def command(name: str) -> ModuleType:
-    """The module of a command; ValueError on an unknown name."""
+    """Return the module of a command; raise ValueError for an unknown name."""
     return folder.load("command", name, __name__, __path__)

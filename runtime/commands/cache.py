@@ -34,8 +34,8 @@ def execute(arguments: Namespace) -> int:
             print(f"size     {_size(int(info['bytes']))}")
         else:
             counts = clear()
-            found = " and ".join(counted(counts[f"{kind}s"], kind) for kind in ("kernel", "driver"))
-            print(f"deleted {found} from {info['folder']}")
+            deleted = " and ".join(counted(counts[f"{kind}s"], kind) for kind in ("kernel", "driver"))
+            print(f"deleted {deleted} from {info['folder']}")
     except PermissionError as problem:
         raise Failed(f"the kernel cache cannot be read or emptied: {sentence(problem)}") from problem
     except RuntimeError as problem:  # no home folder
@@ -44,15 +44,15 @@ def execute(arguments: Namespace) -> int:
 
 
 def _warm() -> int:
-    """Compile the common drivers that the folder does not hold yet, with a line for each."""
+    """Compile the common drivers that the folder lacks, with a line for each."""
     from synchain.codegen.kernels import driver
     from synchain.codegen.machine_code.compile import load_shared
 
     for common in driver.common_drivers():
-        made = load_shared(common)
-        if made.problem:
-            raise Failed(f"drivers are not kept on disk: {made.problem}")
-        print(f"{'was there' if made.from_cache else 'compiled':9}  {common}", flush=True)
+        shared = load_shared(common)
+        if shared.problem:
+            raise Failed(f"drivers are not kept on disk: {shared.problem}")
+        print(f"{'was there' if shared.from_cache else 'compiled':9}  {common}", flush=True)
     return FINE
 
 

@@ -25,7 +25,7 @@ Undecided: TypeAlias = tuple[int, str, str]
 """Line, text and reason of a claim that cannot be decided."""
 
 SHOWN = 3
-"""Of a line about a range of n, so many wrong sizes are described."""
+"""Wrong sizes that are described of a line about a range of n."""
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -59,7 +59,7 @@ def execute(arguments: Namespace) -> int:
     code = FAILED if _wrong(judged) else FINE
     try:
         _print(arguments, judged, undecided)
-    except BrokenPipeError:  # the reader has seen enough, but the answer counts
+    except BrokenPipeError:  # the reader has closed the output, but the exit code counts
         discard_output()
         return code
     if undecided:
@@ -70,7 +70,7 @@ def execute(arguments: Namespace) -> int:
 
 
 def _wrong(judged: Sequence[Sequence[Verdict]]) -> int:
-    """How many lines hold a wrong claim."""
+    """Return the number of lines with a wrong claim."""
     return sum(not all(v.right for v in line) for line in judged)
 
 
@@ -83,35 +83,28 @@ def _print(arguments: Namespace, judged: Sequence[Sequence[Verdict]], undecided:
         counts = {"right": len(judged) - wrong, "wrong": wrong}
         print_json({"file": arguments.file, **counts, "claims": claims, "undecided": reasons})
     else:
-        for verdicts in judged:
-            print("\n".join(_report(verdicts)))
+        for line in judged:
+            state = "right" if all(v.right for v in line) else "WRONG"
+            unproved = "" if all(v.proved for v in line) else " (closed form, not multiplied out)"
+            heading = f"line {line[0].claim.line}: {_name(line)}: {state}{unproved}"
+            print("\n".join([heading, *_problems(line)]))
         print(f"{counted(len(judged), 'claim')}: {len(judged) - wrong} right, {wrong} wrong")
     if sys.stdout is not None:
         sys.stdout.flush()
 
 
 def _name(line: Sequence[Verdict]) -> str:
-    """The graphs of a line."""
+    """Return the family of graphs of a line, its sizes and its options."""
     first, last = line[0].claim, line[-1].claim
     if "(" in first.graph.name and first.n is None:
         return first.graph.name
     sizes = f"n = {first.n} … {last.n}" if first.n is not None else str(first.graph.n)
-    options = "".join(f" {key}={_option(value)}" for key, value in first.graph.options)
-    return f"{first.graph.name} {sizes}{options}"
-
-
-def _option(value: object) -> str:
-    return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
-
-
-def _report(line: Sequence[Verdict]) -> list[str]:
-    wrong = [v for v in line if not v.right]
-    unproved = "" if all(v.proved for v in line) else " (closed form, not multiplied out)"
-    return [f"line {line[0].claim.line}: {_name(line)}: {'WRONG' if wrong else 'right'}{unproved}", *_problems(line)]
+    options = ((key, value if isinstance(value, tuple) else (value,)) for key, value in first.graph.options)
+    return f"{first.graph.name} {sizes}" + "".join(f" {key}={','.join(map(str, values))}" for key, values in options)
 
 
 def _problems(line: Sequence[Verdict]) -> list[str]:
-    """What is wrong with a line and what would be right, indented."""
+    """Return what is wrong with a line and what is right, indented."""
     wrong = [v for v in line if not v.right]
     rows = []
     for v in wrong[:SHOWN]:
@@ -154,8 +147,8 @@ def _write_junit(path: str, file: str, judged: Sequence[Sequence[Verdict]], unde
     suite = Tree.SubElement(suites, "testsuite", {"name": _legal(f"synchain check {file}"), **counts})
 
     def case(number: int, text: str) -> Tree.Element:
-        about = {"name": _legal(f"line {number}: {text}"), "classname": "claims", "file": _legal(file)}
-        return Tree.SubElement(suite, "testcase", about)
+        attributes = {"name": _legal(f"line {number}: {text}"), "classname": "claims", "file": _legal(file)}
+        return Tree.SubElement(suite, "testcase", attributes)
 
     for line in judged:
         one = case(line[0].claim.line, line[0].claim.text)
@@ -169,5 +162,5 @@ def _write_junit(path: str, file: str, judged: Sequence[Sequence[Verdict]], unde
 
 
 def _legal(text: str) -> str:
-    """The text without characters that XML cannot hold."""
+    """Replace characters that XML cannot hold."""
     return re.sub("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "�", text)

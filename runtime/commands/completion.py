@@ -1,4 +1,4 @@
-"""`synchain completion`: what a shell needs to complete command lines."""
+"""`synchain completion`: the script by which a shell completes command lines."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ def execute(arguments: Namespace) -> int:
     from synchain.models.scenes.file import scene_names
 
     preamble = PREAMBLE[arguments.shell].format(names=" ".join(scene_names()))
-    print(shtab.complete(_whole(), arguments.shell, preamble={arguments.shell: preamble}))
+    print(shtab.complete(_parser_of_all(), arguments.shell, preamble={arguments.shell: preamble}))
     return FINE
 
 
-def _whole() -> ArgumentParser:
-    """One parser of all commands, whose arguments say by their placeholders what completes them."""
+def _parser_of_all() -> ArgumentParser:
+    """Return one parser of all commands, with completions by the placeholders of the arguments."""
     import shtab
 
     from synchain.models.graphs.families import names as families
@@ -66,18 +66,18 @@ def _whole() -> ArgumentParser:
     from ..paper import names as figures
     from . import command, names
 
-    places = {"DIR": shtab.DIRECTORY, "FILE": shtab.FILE, "XML": shtab.FILE, "SCENE": SCENES}
-    words = {"TOPOLOGY": families(), "FIGURE": figures(extra=True)}
-    whole = ArgumentParser(prog="synchain")
-    whole.add_argument("--version", action="store_true", help="print the version")
-    commands = whole.add_subparsers(dest="command")
+    paths = {"DIR": shtab.DIRECTORY, "FILE": shtab.FILE, "XML": shtab.FILE, "SCENE": SCENES}
+    choices = {"TOPOLOGY": families(), "FIGURE": figures(extra=True)}
+    all_commands = ArgumentParser(prog="synchain")
+    all_commands.add_argument("--version", action="store_true", help="print the version")
+    commands = all_commands.add_subparsers(dest="command")
     for name in names():
         module = command(name)
         parser = commands.add_parser(name, help=module.SUMMARY, description=module.SUMMARY)
         module.configure(parser)
         for action in parser._actions:
-            if action.metavar in places:
-                action.complete = places[action.metavar]  # type: ignore[attr-defined]  # where shtab looks
-            elif action.metavar in words:
-                action.choices = words[action.metavar]
-    return whole
+            if action.metavar in paths:
+                action.complete = paths[action.metavar]  # type: ignore[attr-defined]  # where shtab looks
+            elif action.metavar in choices:
+                action.choices = choices[action.metavar]
+    return all_commands

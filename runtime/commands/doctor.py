@@ -1,7 +1,4 @@
-"""`synchain doctor`: is this installation sound?
-
-It looks at versions, cache, processor, an exact spectrum and a trial kernel.
-"""
+"""`synchain doctor`: check the installation: versions, cache, processor, an exact spectrum, a trial kernel."""
 
 from __future__ import annotations
 
@@ -79,7 +76,7 @@ class Check:
     remedy: str = ""  # what the user can do; empty if the outcome is fine
 
     def as_dict(self) -> dict[str, str]:
-        """The check in JSON types."""
+        """Return the check in JSON types."""
         return {"name": self.name, "outcome": self.outcome, "found": self.found, "remedy": self.remedy}
 
 
@@ -126,8 +123,8 @@ def _cache() -> Answer:
             opened.delete(probe)
             folder = opened.path
     except (OSError, RuntimeError) as problem:  # RuntimeError: no home folder
-        words = " ".join(str(problem).split())
-        return DOUBTFUL, f"every process compiles its kernels: {words}", "set SYNCHAIN_CACHE to a folder of yours"
+        reason = " ".join(str(problem).split())
+        return DOUBTFUL, f"every process compiles its kernels: {reason}", "set SYNCHAIN_CACHE to a folder of yours"
     mode = f", mode {folder.stat().st_mode & 0o777:o}" if os.name == "posix" else ""
     return SOUND, f"{folder}, {describe()['kernels']} kernels{mode}", ""
 
@@ -185,17 +182,17 @@ def _trajectory() -> Answer:
         rtol=1e-11,
         atol=1e-12,
     )
-    found = run(scene, width=1, workers=1, show_progress=False)
-    states = found.trajectory.values.reshape(periods + 1, 2)[1:]  # of the ends of the periods
-    return judge_trajectory(float(np.abs(states - DRIVE_PERIODS).max()), int(found.steps))
+    result = run(scene, width=1, workers=1, show_progress=False)
+    states = result.trajectory.values.reshape(periods + 1, 2)[1:]  # at the ends of the periods
+    return judge_trajectory(float(np.abs(states - DRIVE_PERIODS).max()), int(result.steps))
 
 
 def judge_trajectory(error: float, steps: int) -> Answer:
     """Judge the largest error of a state over five drive periods; NaN is wrong."""
-    words = f"stick-slip over 5 periods: error {error:.1e} in {steps} steps"
+    text = f"stick-slip over 5 periods: error {error:.1e} in {steps} steps"
     if not error <= TRAJECTORY_ERROR:
-        return WRONG, f"{words}; expected at most {TRAJECTORY_ERROR:g}", "run: synchain cache clear"
-    return SOUND, words, ""
+        return WRONG, f"{text}; expected at most {TRAJECTORY_ERROR:g}", "run: synchain cache clear"
+    return SOUND, text, ""
 
 
 CHECKS: Mapping[str, Callable[[], Answer]] = {
@@ -205,4 +202,4 @@ CHECKS: Mapping[str, Callable[[], Answer]] = {
     "spectrum": _spectrum,
     "trajectory": _trajectory,
 }
-"""Name -> check."""
+"""Checks by name."""

@@ -82,8 +82,8 @@ def execute(arguments: Namespace) -> int:
     from ..support.files import output_folder
 
     with wrong_use():
-        numbers, rows = _parted(arguments)
-        scene = _scene(arguments, numbers, rows)
+        constants, rows = _constants_and_rows(arguments)
+        scene = _scene(arguments, constants, rows)
         alpha = np.linspace(*LINE) if arguments.alpha is None else np.array(arguments.alpha)
         complex_modes = _check(scene, arguments, rows, alpha)
         target = None if arguments.out is None else output_folder(arguments.out)
@@ -91,26 +91,26 @@ def execute(arguments: Namespace) -> int:
     options: dict[str, Any] = {"workers": arguments.workers, "show_progress": None}
     effort = {name: getattr(arguments, name) for name in ("precision", "periods", "starts")}
     options.update({name: value for name, value in effort.items() if value is not None})
-    found: MSF | Plane
+    function: MSF | Plane
     try:
         if rows:
-            with wrong_use():  # what cannot be an axis is known when the orbits and the modes of the network are
-                found = plane(scene, None if len(rows) == 2 else alpha, parameters=rows, **options)
+            with wrong_use():  # a wrong axis shows only in the orbits and the modes of the network
+                function = plane(scene, None if len(rows) == 2 else alpha, parameters=rows, **options)
         elif arguments.beta is not None:
-            found = plane(scene, alpha, np.array(arguments.beta), **options)
+            function = plane(scene, alpha, np.array(arguments.beta), **options)
         else:
-            found = msf(scene, alpha, **options)
+            function = msf(scene, alpha, **options)
     except FloatingPointError as problem:
         raise Failed(sentence(problem)) from problem
-    files = [] if target is None else _write(found, target)
+    files = [] if target is None else _write(function, target)
     if arguments.json:
-        print_json({**found.as_dict(), **({"files": list(map(str, files))} if files else {})})
+        print_json({**function.as_dict(), **({"files": list(map(str, files))} if files else {})})
     else:
-        print(found, *(f"  {file}" for file in files), sep="\n")
+        print(function, *(f"  {file}" for file in files), sep="\n")
     return FINE
 
 
-def _write(found: MSF | Plane, folder: Path) -> list[Path]:
+def _write(function: MSF | Plane, folder: Path) -> list[Path]:
     """Write numbers and plot, over complex strengths with the rays of modes; return both paths."""
     from ..plots.canvas import SIZE
     from ..plots.csv_table import as_csv
@@ -119,39 +119,39 @@ def _write(found: MSF | Plane, folder: Path) -> list[Path]:
     from ..stability.msf import Plane
     from ..support.files import whole_file, write_text
 
-    paths = [folder / f"{type(found).__name__.lower()}{ending}" for ending in (".csv", ".png")]
-    numbers = found.data[["exponent", "stderr"]].to_dataframe().reset_index()
-    write_text(paths[0], as_csv(tuple(numbers.columns), numbers.itertuples(index=False, name=None)))
+    paths = [folder / f"{type(function).__name__.lower()}{ending}" for ending in (".csv", ".png")]
+    table = function.data[["exponent", "stderr"]].to_dataframe().reset_index()
+    write_text(paths[0], as_csv(tuple(table.columns), table.itertuples(index=False, name=None)))
     with context(), whole_file(paths[1]) as temporary:
-        figure, scene = new_figure(SIZE), found.scene
-        axes = found.plot(figure.add_subplot())
-        if isinstance(found, Plane) and found.has_windows:
-            draw_rays(axes, found, scene.parameters[scene.strength] or None)
+        figure, scene = new_figure(SIZE), function.scene
+        axes = function.plot(figure.add_subplot())
+        if isinstance(function, Plane) and function.has_windows:
+            draw_rays(axes, function, scene.parameters[scene.strength] or None)
         figure.savefig(temporary, dpi=200)
     return paths
 
 
-def _parted(arguments: Namespace) -> tuple[dict[str, float], Rows]:
-    """The numbers and the rows of --set; WrongUse if these are no axes of a map."""
+def _constants_and_rows(arguments: Namespace) -> tuple[dict[str, float], Rows]:
+    """Return the numbers and the rows of --set; raise WrongUse if the rows are no axes of a map."""
     from synchain.models.sweeps.axis import Axis
 
-    found = settings(arguments)
-    numbers = {name: value for name, value in found.items() if isinstance(value, float)}
+    values = settings(arguments)
+    constants = {name: value for name, value in values.items() if isinstance(value, float)}
     rows = {
         name: Axis.from_table(name, value).values if isinstance(value, dict) else value
-        for name, value in found.items()
+        for name, value in values.items()
         if not isinstance(value, float)
     }
     if len(rows) > 2:
         raise WrongUse(f"--set: found the axes {', '.join(rows)}; expected at most two")
-    for option, given, least in (("--beta", arguments.beta, 1), ("--alpha", arguments.alpha, 2)):
-        if given is not None and len(rows) >= least:
+    for option, grid, most in (("--beta", arguments.beta, 1), ("--alpha", arguments.alpha, 2)):
+        if grid is not None and len(rows) >= most:
             raise WrongUse(f"found {option} beside the axes {', '.join(rows)} of --set; expected two axes")
-    return numbers, rows
+    return constants, rows
 
 
-def _scene(arguments: Namespace, numbers: dict[str, float], rows: Rows) -> Scene:
-    """The oscillator with its network and its parameters; a lone oscillator without a network."""
+def _scene(arguments: Namespace, constants: dict[str, float], rows: Rows) -> Scene:
+    """Return the oscillator with its network and its parameters; without a network a single oscillator."""
     from synchain.models.graphs.families import topology
     from synchain.models.scenes.file import load_scene
 
@@ -163,15 +163,15 @@ def _scene(arguments: Namespace, numbers: dict[str, float], rows: Rows) -> Scene
         raise WrongUse(
             f"{network.name}({network.n}) has no links; expected a network of at least two coupled oscillators"
         )
-    given = {**numbers, **{name: values[0] for name, values in rows.items()}}
+    parameters = {**constants, **{name: values[0] for name, values in rows.items()}}
     layered = scene is not None and scene.links is not None and len(rows) == 2
     if network is None and not layered:
         network = topology("chain", 1) if scene is None else scene.topology
-    placed = scene_on(network, scene, arguments, given)
-    for name in given:
-        if not placed.takes(name):
-            raise WrongUse(f"--set: {placed.model.unknown(name, 'parameter', tuple(placed.parameters))}")
-    return with_numbers(placed, given)
+    cell = scene_on(network, scene, arguments, parameters)
+    for name in parameters:
+        if not cell.takes(name):
+            raise WrongUse(f"--set: {cell.model.unknown(name, 'parameter', tuple(cell.parameters))}")
+    return with_numbers(cell, parameters)
 
 
 def _check(scene: Scene, arguments: Namespace, rows: Rows, alpha: np.ndarray) -> list[str]:

@@ -88,7 +88,7 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Explain the scene where asked to; run it to a file, draw, and say how the cells ended."""
+    """Explain the scene with --explain; run it to a file, draw it, and print how the cells ended."""
     from ..cells.reduce import explain, reduce_scene
     from ..engines.scene_kernels import kernel
     from ..support.status import Status
@@ -128,7 +128,7 @@ def execute(arguments: Namespace) -> int:
 
 
 def _target(path: Path) -> Path:
-    """The file of the result; Failed if the package of its form is not installed."""
+    """Return the path of the result; raise Failed if the package of its form is not installed."""
     from ..results.store import form_of
 
     try:
@@ -139,7 +139,7 @@ def _target(path: Path) -> Path:
 
 
 def changed_scene(arguments: Namespace) -> Scene:
-    """The scene with the changes of --set and --rtol; ValueError where they do not fit."""
+    """Return the scene with the changes of --set and --rtol; raise ValueError if they do not fit."""
     from synchain.models.scenes.file import load_scene
 
     from ..cells.run_keywords import Given
@@ -148,15 +148,15 @@ def changed_scene(arguments: Namespace) -> Scene:
     scene = load_scene(arguments.scene)
     changes = {name: _fitting(scene, name, value) for name, value in settings(arguments).items()}
     fields = {name: changes[name] for name in SETTINGS if name in changes and not scene.takes(name)}
-    own = {name: value for name, value in changes.items() if name not in fields}
-    scene = Given(run, own).sweep(scene.replace(**fields))
+    keywords = {name: value for name, value in changes.items() if name not in fields}
+    scene = Given(run, keywords).sweep(scene.replace(**fields))
     if changes:
         scene = scene.replace(title=f"{scene.title or arguments.scene}, changed: {', '.join(changes)}")
     return scene if arguments.rtol is None else scene.replace(rtol=arguments.rtol)
 
 
 def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[str, object]) -> object:
-    """The value of a setting as the scene wants it."""
+    """Return the value of a setting in the type of the scene's field; raise WrongUse if it does not fit."""
     from synchain.models.inputs.names import NodeName
 
     if scene.takes(name) or name in scene.equations.state:
@@ -176,7 +176,7 @@ def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[st
 
 
 def _check(skip: ReducedScene, arguments: Namespace) -> None:
-    """Raise now what would stop the run later."""
+    """Raise the errors of the run before it begins."""
     from ..cells.plan import Planner
     from ..engines.scene_kernels import kernel_source
     from ..sweeps.certify import check_certifiable
@@ -190,30 +190,26 @@ def _check(skip: ReducedScene, arguments: Namespace) -> None:
 
 
 def _nothing_to_do(target: Path) -> int:
-    """Say that the result is there already; the exit code of the run that made it."""
+    """Print that the result is complete already; return the exit code of its run."""
     from ..results.result import read_result
 
-    kept = read_result(target)
+    result = read_result(target)
     print(f"{target} holds the result of this scene already; nothing was run (--overwrite runs it again)")
-    print(f"  made with {kept.data.attrs['versions']}\n  {kept.message}")
+    print(f"  made with {result.data.attrs['versions']}\n  {result.message}")
     if not target.with_suffix(".png").exists():
         print(f"  {_drawn(target)}")
-    return FINE if kept.success else FAILED
+    return FINE if result.success else FAILED
 
 
 @contextmanager
 def stopped_by_signals() -> Iterator[None]:
-    """SIGTERM, with which batch systems announce the end, and SIGHUP of a closed terminal stop like
-    Ctrl-C.
-
-    A signal that is ignored (nohup) stays so.
-    """
+    """Treat SIGTERM (of batch systems) and SIGHUP (of a closed terminal) like Ctrl-C; keep ignored signals ignored."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    known = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    before = {sign: signal.getsignal(sign) for sign in known}
-    caught = [sign for sign, handler in before.items() if handler is not signal.SIG_IGN]
+    signals = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    before = {sign: signal.getsignal(sign) for sign in signals}
+    caught = [sign for sign, handler in before.items() if handler is not signal.SIG_IGN]  # nohup ignores SIGHUP
     for sign in caught:
         signal.signal(sign, signal.default_int_handler)
     try:
@@ -225,7 +221,7 @@ def stopped_by_signals() -> Iterator[None]:
 
 @contextmanager
 def _executor(address: str | None) -> Iterator[Executor | None]:
-    """The workers of a Dask scheduler; None, which means threads, without an address."""
+    """Yield the workers of a Dask scheduler, or None without an address: threads."""
     if address is None:
         yield None
         return
@@ -248,43 +244,38 @@ def _executor(address: str | None) -> Iterator[Executor | None]:
 
 
 def _stopped(stop: SweepInterrupted | SweepFailed, target: Path, arguments: Namespace) -> Failed:
-    """What to say about a run that did not come to its end, and how to go on."""
+    """Return the message about a run that did not finish, with the command line that continues it."""
     from ..results.partial import partial_path
 
-    words = [word for word in arguments.command_line if word != "--overwrite"]
-    again = shlex.join([*words, *(() if arguments.resume else ("--resume",))])
+    line = [text for text in arguments.command_line if text != "--overwrite"]
+    again = shlex.join([*line, *(() if arguments.resume else ("--resume",))])
     partial = partial_path(target)
-    kept = f"{stop.finished} of {stop.cells} cells finished, kept in {partial}\ncontinue with: {again}"
+    state = f"{stop.finished} of {stop.cells} cells finished, kept in {partial}\ncontinue with: {again}"
     if stop.finished == 0:
         partial.unlink(missing_ok=True)
-        kept = "no cell finished; nothing was written"
-    return Failed(f"interrupted with {kept}" if isinstance(stop, KeyboardInterrupt) else f"{stop.reason}; {kept}")
+        state = "no cell finished; nothing was written"
+    return Failed(f"interrupted with {state}" if isinstance(stop, KeyboardInterrupt) else f"{stop.reason}; {state}")
 
 
 def _drawn(target: Path) -> Path:
-    """Draw the figure; an error says that the result itself is complete."""
+    """Draw the figure of a result from its file; raise Failed with the reason if that fails."""
+    path = target.with_suffix(".png")
     try:
-        return _draw(target)
+        from ..plots.canvas import SIZE
+        from ..plots.result_plot import draw_result
+        from ..plots.style import context, new_figure
+        from ..results.labels import scene_of
+        from ..results.result import Result
+        from ..results.store import opened
+
+        with opened(target) as data, context():  # read as far as it is drawn
+            figure = new_figure(SIZE)
+            draw_result(Result(data, scene_of(data.attrs)), figure.add_subplot())
+            with whole_file(path) as temporary:
+                figure.savefig(temporary, dpi=150)
+        return path
     except (Exception, KeyboardInterrupt) as problem:
         why = "interrupted" if isinstance(problem, KeyboardInterrupt) else sentence(problem)
         raise Failed(
             f"the result is complete: {target}; its figure was not drawn: {why}; the same command again draws it"
         ) from problem
-
-
-def _draw(target: Path) -> Path:
-    """Write the figure of a result, which is read from its file as far as it is drawn."""
-    from ..plots.canvas import SIZE
-    from ..plots.result_plot import draw_result
-    from ..plots.style import context, new_figure
-    from ..results.labels import scene_of
-    from ..results.result import Result
-    from ..results.store import opened
-
-    path = target.with_suffix(".png")
-    with opened(target) as data, context():
-        figure = new_figure(SIZE)
-        draw_result(Result(data, scene_of(data.attrs)), figure.add_subplot())
-        with whole_file(path) as temporary:
-            figure.savefig(temporary, dpi=150)
-    return path

@@ -27,7 +27,7 @@ EXAMPLES = (
 )
 
 PROVED = 500
-"""Up to so many nodes closed forms are multiplied out here; this takes about two seconds."""
+"""Most nodes for which closed forms are multiplied out; this takes about two seconds."""
 
 SHOWN = 200
 """Distinct eigenvalues in a table without --all."""
@@ -36,7 +36,7 @@ OTHERS = ("adjacency", "laplacian", "signless_laplacian", "random_walk_laplacian
 """The matrices of `--of`: attributes of a graph."""
 
 CHECKED = 1000
-"""Up to so many nodes they are multiplied out modulo primes; this takes some seconds."""
+"""Most nodes for which they are multiplied out modulo primes; this takes some seconds."""
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -108,9 +108,7 @@ def execute(arguments: Namespace) -> int:
 
 
 def _symbolic(arguments: Namespace) -> int:
-    """Print the closed form of a family with symbols for its size, or the spectrum of a matrix of
-    letters.
-    """
+    """Print the closed form of a family with symbols for its size, or the spectrum of a matrix of letters."""
     from synchain.models.graphs.closed_forms import closed_form
     from synchain.models.graphs.graph_text import is_composed, read_form
 

@@ -25,7 +25,7 @@ EXAMPLES = (
 )
 
 COARSE = 2e-3
-"""How closely a first look locates the ends of the ranges in sigma."""
+"""Width in sigma to which a first look refines the ends of the ranges."""
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -85,15 +85,15 @@ def execute(arguments: Namespace) -> int:
 
 
 def _criterion(arguments: Namespace) -> Criterion:
-    """The full criterion, or that of --quick, with what is given."""
+    """Return the full criterion, or that of --quick, with --starts and --transient."""
     from ..synchronisation.criterion import QUICK, Criterion
 
-    given = {name: getattr(arguments, name) for name in ("starts", "transient") if getattr(arguments, name)}
-    return replace(QUICK if arguments.quick else Criterion(), **given)
+    changes = {name: getattr(arguments, name) for name in ("starts", "transient") if getattr(arguments, name)}
+    return replace(QUICK if arguments.quick else Criterion(), **changes)
 
 
 def _scene(arguments: Namespace) -> Scene:
-    """The network that the arguments describe; ValueError if there is none."""
+    """Return the network that the arguments describe; raise WrongUse if there is none."""
     from synchain.models.scenes.file import load_scene
 
     scene = None if arguments.scene is None else load_scene(arguments.scene)

@@ -13,7 +13,7 @@ from synchain.models.sweeps.axis import Axis
 from .outcome import WrongUse
 
 NODES = 100_000
-"""Largest number of oscillators that can be asked for."""
+"""Largest number of oscillators on the command line (a choice)."""
 
 
 FILES = (".csv", ".html", ".json", ".nc", ".nc4", ".pdf", ".png", ".svg", ".toml", ".txt", ".zarr")
@@ -21,7 +21,7 @@ FILES = (".csv", ".html", ".json", ".nc", ".nc4", ".pdf", ".png", ".svg", ".toml
 
 
 def whole(text: str, least: int = -NODES, most: int = NODES) -> int:
-    """A whole number from `least` to `most`."""
+    """Read a whole number from `least` to `most`."""
     try:
         return integer_option("number", text, least, most)
     except (TypeError, ValueError) as error:
@@ -29,12 +29,12 @@ def whole(text: str, least: int = -NODES, most: int = NODES) -> int:
 
 
 def positive(text: str, most: int = NODES) -> int:
-    """A whole number of at least 1."""
+    """Read a whole number of at least 1."""
     return whole(text, 1, most)
 
 
 def folder(text: str) -> str:
-    """The name of a folder, which may not exist yet."""
+    """Read the name of a folder, which may not exist yet."""
     if not text.strip():
         raise ArgumentTypeError("found an empty name; expected a folder, e.g. results")
     if text.endswith(FILES):
@@ -43,7 +43,7 @@ def folder(text: str) -> str:
 
 
 def number(text: str) -> float:
-    """A finite number, or a constant such as 2*pi/5, of at most MAGNITUDE in size."""
+    """Read a finite number, or a constant such as 2*pi/5, of at most MAGNITUDE in size."""
     try:
         return constant(text)
     except ValueError:
@@ -53,7 +53,7 @@ def number(text: str) -> float:
 
 
 def above_zero(text: str) -> float:
-    """A finite number above 0."""
+    """Read a finite number above 0."""
     value = number(text)
     if not value > 0:
         raise ArgumentTypeError(f"found {text}; expected a number above 0")
@@ -61,7 +61,7 @@ def above_zero(text: str) -> float:
 
 
 def at_least_zero(text: str) -> float:
-    """A finite number of at least 0."""
+    """Read a finite number of at least 0."""
     value = number(text)
     if not value >= 0:
         raise ArgumentTypeError(f"found {text}; expected a number of at least 0")
@@ -69,7 +69,7 @@ def at_least_zero(text: str) -> float:
 
 
 def periods(text: str) -> float:
-    """A whole number of periods above 0."""
+    """Read a whole number of periods above 0."""
     value = above_zero(text)
     if not value.is_integer():
         raise ArgumentTypeError(f"found {text}; expected a whole number of periods")
@@ -77,7 +77,7 @@ def periods(text: str) -> float:
 
 
 def tolerance(text: str) -> float:
-    """A relative tolerance, above 0 and at most 0.1."""
+    """Read a relative tolerance, above 0 and at most 0.1."""
     value = number(text)
     if not 0 < value <= 0.1:
         raise ArgumentTypeError(f"found {text}; expected a number above 0 and at most 0.1, e.g. 1e-8")
@@ -85,7 +85,7 @@ def tolerance(text: str) -> float:
 
 
 def span(text: str) -> dict[str, object]:
-    """LO:HI:N as the table from, to and count of an axis, none of whose values is built."""
+    """Read LO:HI:N as the table from, to and count of an axis, without its values."""
     parts = text.split(":")
     if len(parts) != 3:
         raise ArgumentTypeError(f"found {short_repr(text)}; expected LO:HI:N, e.g. 0:0.6:241")
@@ -96,12 +96,12 @@ def span(text: str) -> dict[str, object]:
 
 
 def spaced(text: str) -> tuple[float, ...]:
-    """LO:HI:N as N equally spaced numbers."""
+    """Read LO:HI:N as N equally spaced numbers."""
     return Axis.from_table("grid", span(text)).values
 
 
 def setting(text: str) -> tuple[str, float | tuple[float, ...] | dict[str, object]]:
-    """name=value, name=a,b,c or name=LO:HI:N."""
+    """Read name=value, name=a,b,c or name=LO:HI:N."""
     name, equals, value = text.partition("=")
     if not (name.isidentifier() and equals and value):
         raise ArgumentTypeError(
@@ -115,32 +115,32 @@ def setting(text: str) -> tuple[str, float | tuple[float, ...] | dict[str, objec
 
 
 def settings(arguments: Namespace) -> dict[str, float | tuple[float, ...] | dict[str, object]]:
-    """The names and values of --set; WrongUse if one is given twice."""
-    found: dict[str, float | tuple[float, ...] | dict[str, object]] = {}
+    """Return the names and values of --set; raise WrongUse if one is given twice."""
+    values: dict[str, float | tuple[float, ...] | dict[str, object]] = {}
     for name, value in arguments.set:
-        if name in found:
+        if name in values:
             raise WrongUse(f"--set gives {name} twice; expected it once")
-        found[name] = value
-    return found
+        values[name] = value
+    return values
 
 
-def add_set(parser: ArgumentParser, words: str) -> None:
-    """Add the option --set, whose help says what it sets."""
-    parser.add_argument("--set", metavar="NAME=VALUE", nargs="+", action="extend", type=setting, default=[], help=words)
+def add_set(parser: ArgumentParser, text: str) -> None:
+    """Add the option --set with its help."""
+    parser.add_argument("--set", metavar="NAME=VALUE", nargs="+", action="extend", type=setting, default=[], help=text)
 
 
 def add_scene(parser: ArgumentParser, default: str = "") -> None:
     """Add the argument SCENE; it may be left out if there is a default."""
-    known = "a shipped name (see: synchain scenes) or a path to a .toml file"
+    text = "a shipped name (see: synchain scenes) or a path to a .toml file"
     if default:
-        parser.add_argument("scene", metavar="SCENE", nargs="?", help=f"{known} (default: {default})")
+        parser.add_argument("scene", metavar="SCENE", nargs="?", help=f"{text} (default: {default})")
     else:
-        parser.add_argument("scene", metavar="SCENE", help=known)
+        parser.add_argument("scene", metavar="SCENE", help=text)
     add_allow_code(parser)
 
 
 def add_allow_code(parser: ArgumentParser) -> None:
-    """Add the option --allow-code, which every command obeys before it reads a scene."""
+    """Add the option --allow-code, which `synchain.runtime.cli` applies before the command runs."""
     parser.add_argument(
         "--allow-code",
         metavar="FILE",

@@ -1,4 +1,4 @@
-"""The network that the words of a command line mean: by file, by family and size, or by a scene."""
+"""The network of a command line: by file, by family and size, or by a scene."""
 
 from __future__ import annotations
 
@@ -107,6 +107,11 @@ def _at_frequency(scene: Scene, omega: float | None, where: str | None, given: C
 
 def named_graph(arguments: Namespace) -> Topology:
     """Return the graph of a family and a size, of a product, or of one of the files."""
+    from synchain.models.graphs.families import topology
+    from synchain.models.graphs.graph_text import is_composed, read_graph
+    from synchain.models.graphs.readers import read_edges, read_graphml
+    from synchain.models.graphs.topology import read_matrix
+
     files = [key for key in FILES if getattr(arguments, key) is not None]
     if arguments.directed and files != ["edges"]:
         raise WrongUse("found --directed without --edges; GraphML files and matrices say themselves what is one-way")
@@ -114,26 +119,13 @@ def named_graph(arguments: Namespace) -> Topology:
         raise WrongUse(f"found {' and '.join(f'--{key}' for key in files)}; expected one of them")
     if files and (arguments.topology is not None or arguments.option):
         raise WrongUse(f"found both a topology and --{files[0]}; expected one of them")
-    return _graph_of_file(arguments) if files else _graph_of_family(arguments)
-
-
-def _graph_of_file(arguments: Namespace) -> Topology:
-    """The graph of the file that is given."""
-    from synchain.models.graphs.readers import read_edges, read_graphml
-    from synchain.models.graphs.topology import read_matrix
-
     if arguments.matrix is not None:
         return read_matrix(arguments.matrix)
     if arguments.edges is not None:
         return read_edges(arguments.edges, directed=arguments.directed)
-    return read_graphml(arguments.graphml)
-
-
-def _graph_of_family(arguments: Namespace) -> Topology:
-    """The graph of a family and a size, or of the text of a product."""
-    from synchain.models.graphs.families import topology
-    from synchain.models.graphs.graph_text import is_composed, read_graph
-
+    if arguments.graphml is not None:
+        return read_graphml(arguments.graphml)
+    # No file: a family and a size, or the text of a product.
     name, n = arguments.topology, arguments.n
     if name is not None and is_composed(name):
         if n is not None or arguments.option:
@@ -142,15 +134,15 @@ def _graph_of_family(arguments: Namespace) -> Topology:
             )
         return read_graph(name)
     if name is None or n is None:
-        files = ", ".join(f"--{key} FILE" for key in FILES)
-        raise WrongUse(f"expected TOPOLOGY and N, e.g. synchain spectrum chain 4, or one of {files}")
+        options = ", ".join(f"--{key} FILE" for key in FILES)
+        raise WrongUse(f"expected TOPOLOGY and N, e.g. synchain spectrum chain 4, or one of {options}")
     return topology(name, n, **named_values(arguments.option))
 
 
 def named_values(
     texts: Sequence[str], flag: str = "--option", example: str = "NAME=VALUE, e.g. offsets=1,3"
 ) -> dict[str, str]:
-    """Return names and values of texts NAME=VALUE; WrongUse if one is wrong or occurs twice."""
+    """Return names and values of texts NAME=VALUE; raise WrongUse if one is wrong or occurs twice."""
     values: dict[str, str] = {}
     for text in texts:
         name, equals, value = text.partition("=")

@@ -11,7 +11,7 @@ FINE, FAILED, WRONG_USE = 0, 1, 2
 
 
 class WrongUse(Exception):
-    """The user asked for something that cannot be: exit code 2."""
+    """The command line cannot be carried out as written: exit code 2."""
 
 
 class Failed(Exception):
@@ -19,7 +19,7 @@ class Failed(Exception):
 
 
 def sentence(problem: BaseException) -> str:
-    """The message of an exception on one line; of a bare system error, the file and the reason."""
+    """Return the message of an exception on one line; of a bare system error, the file and the reason."""
     if isinstance(problem, OSError) and problem.strerror and len(problem.args) > 1:
         where = f"{problem.filename}: " if problem.filename else ""
         return f"{where}{problem.strerror}"
@@ -28,12 +28,10 @@ def sentence(problem: BaseException) -> str:
 
 @contextmanager
 def wrong_use() -> Iterator[None]:
-    """Errors about values, types and files inside the block are the user's; anything else stays
-    what it is.
-    """
+    """Turn errors about values, types and files inside the block into WrongUse."""
     try:
         yield
-    except BrokenPipeError:  # no mistake: the reader of the output has seen enough
+    except BrokenPipeError:  # no mistake: the reader of the output has closed it
         raise
     except (ValueError, TypeError, OSError) as problem:
         raise WrongUse(sentence(problem)) from problem
@@ -41,14 +39,12 @@ def wrong_use() -> Iterator[None]:
 
 def warn(sentences: Iterable[str]) -> None:
     """Write warnings to stderr, one a line."""
-    for words in sentences:
-        print(f"warning: {words}", file=sys.stderr)
+    for text in sentences:
+        print(f"warning: {text}", file=sys.stderr)
 
 
 def discard_output() -> None:
-    """Send the rest of stdout's buffer to nowhere, so that the interpreter ends without a
-    complaint.
-    """
+    """Send the rest of stdout's buffer to nowhere, so that the interpreter ends without an error message."""
     with suppress(OSError, ValueError):
         descriptor = sys.stdout.fileno()
         nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -57,7 +53,7 @@ def discard_output() -> None:
 
 
 def print_json(value: object) -> None:
-    """Write JSON to stdout; NaN and infinity are refused."""
+    """Write JSON to stdout; raise ValueError for NaN and infinity."""
     import json
 
     print(json.dumps(value, indent=2, allow_nan=False))

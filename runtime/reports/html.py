@@ -50,10 +50,10 @@ vertical-align:middle}
 """Rules for all fragments; colours are those of the page around."""
 
 LINES, ROWS = 14, 12
-"""Most lines of equations, and most rows of a table."""
+"""Most lines of equations, and most rows of a table (a choice)."""
 
 LONG = 400
-"""Characters of LaTeX from which on an equation is plain text, whose lines break."""
+"""Characters of LaTeX above which an equation is plain text, whose lines break."""
 
 EXACT = 40
 """Largest graph without a closed form whose spectrum is computed to be shown."""
@@ -83,7 +83,7 @@ def latex(value: object) -> str:
 
 @singledispatch
 def body(value: object) -> str:
-    """Return a value as HTML without the rules of its style; TypeError if it cannot be shown."""
+    """Return a value as HTML without style rules; raise TypeError if it cannot be shown."""
     raise TypeError(f"found {type(value).__name__}; expected a value that can be shown")
 
 
@@ -104,14 +104,14 @@ def _(value: Spectrum) -> str:
     if len(value) > len(rows):
         listed.insert(len(rows) - 1, f'<tr><td colspan="3">… {len(value) - len(rows)} more</td></tr>')
     state = "proved" if value.verified else "not multiplied out (closed form of a large graph, or modulo primes)"
-    words = f"{value.n} eigenvalues, {len(value)} distinct; characteristic polynomial: {state}"
+    counts = f"{value.n} eigenvalues, {len(value)} distinct; characteristic polynomial: {state}"
     head = "<tr><th>eigenvalue γ</th><th>decimal</th><th>multiplicity</th></tr>"
-    return f'<table>{head}{"".join(listed)}</table><p class="quiet">{words}</p>'
+    return f'<table>{head}{"".join(listed)}</table><p class="quiet">{counts}</p>'
 
 
 @body.register
 def _(value: Topology) -> str:
-    return f"<p><b>{escape(_graph_words(value))}</b></p>{_beside(svg(value), _spectrum_body(value))}"
+    return f"<p><b>{escape(_graph_text(value))}</b></p>{_beside(svg(value), _spectrum_body(value))}"
 
 
 @body.register
@@ -119,7 +119,7 @@ def _(value: Scene) -> str:
     title = escape(value.title or "Scene")
     rows = [("oscillators", _oscillators(value)), *_records(value)]
     parts = [f"<p><b>{title}</b></p>", body(value.equations), rows_table(rows)]
-    parts += [f"<p><b>{escape(_graph_words(value.topology))}</b></p>"]
+    parts += [f"<p><b>{escape(_graph_text(value.topology))}</b></p>"]
     parts += [_beside(svg(value), _spectrum_body(value.topology))] if value.n > 1 else []
     return "".join(parts)
 
@@ -131,17 +131,17 @@ def _(value: Labelled) -> str:
 
 
 def rows_table(rows: Iterable[tuple[str, str]]) -> str:
-    """Return names and words as a table."""
-    listed = "".join(f"<tr><th>{escape(name)}</th><td>{escape(words)}</td></tr>" for name, words in rows)
+    """Return names and texts as a table."""
+    listed = "".join(f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, text in rows)
     return f"<table>{listed}</table>"
 
 
-def figure(axes: Axes, about: str) -> str:
+def figure(axes: Axes, description: str) -> str:
     """Return a plot as an image that is part of the page."""
     buffer = io.BytesIO()
     axes.figure.figure.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
     text = base64.b64encode(buffer.getvalue()).decode()
-    return f'<img alt="{escape(about, quote=True)}" src="data:image/png;base64,{text}"/>'
+    return f'<img alt="{escape(description, quote=True)}" src="data:image/png;base64,{text}"/>'
 
 
 def spectrum_of(graph: Topology) -> Spectrum | None:
@@ -150,7 +150,7 @@ def spectrum_of(graph: Topology) -> Spectrum | None:
 
 
 def provenance_rows(scene: Scene) -> list[tuple[str, str]]:
-    """Return the numbers of a scene in words: parameters, start, method, tolerances."""
+    """Return the numbers of a scene as names and texts: parameters, start, method, tolerances."""
     unit = "drive periods" if scene.time_unit == "period" else "units of time"
     numbers = [f"{name} = {value:g}" for name, value in scene.parameters.items()]
     start = [f"{name} = {_numbers(values)}" for name, values in scene.initial.items()]
@@ -172,17 +172,17 @@ def provenance_rows(scene: Scene) -> list[tuple[str, str]]:
 
 
 def _spectrum_body(graph: Topology) -> str:
-    found = spectrum_of(graph)
-    if found is None:
+    spectrum = spectrum_of(graph)
+    if spectrum is None:
         return '<p class="quiet">its spectrum has no closed form; <code>.spectrum</code> computes it exactly</p>'
-    return body(found)
+    return body(spectrum)
 
 
 def _beside(first: str, second: str) -> str:
     return f'<div class="side"><div>{first}</div><div>{second}</div></div>'
 
 
-def _graph_words(graph: Topology) -> str:
+def _graph_text(graph: Topology) -> str:
     options = "".join(f", {key} = {value}" for key, value in graph.options)
     links = f"{graph.link_count} links" if graph.link_count != 1 else "1 link"
     return f"{graph.name}: {graph.n} node{'s' * (graph.n > 1)}, {links}{options}"
@@ -198,7 +198,7 @@ def _oscillators(scene: Scene) -> str:
 
 
 def _records(scene: Scene) -> list[tuple[str, str]]:
-    """What will be recorded, and for which cells."""
+    """Return what is recorded, and for which cells."""
     record = ", ".join(map(str, scene.record)) or "the end of the window only"
     if "section" in scene.record:
         record += f" ({scene.section})"
@@ -213,13 +213,13 @@ def _numbers(values: Sequence[float]) -> str:
     return _few([f"{value:g}" for value in values])
 
 
-def _few(words: Sequence[str], most: int = 12) -> str:
-    more = [f"… {len(words) - most} more"] if len(words) > most else []
-    return ", ".join([*words[:most], *more])
+def _few(texts: Sequence[str], most: int = 12) -> str:
+    more = [f"… {len(texts) - most} more"] if len(texts) > most else []
+    return ", ".join([*texts[:most], *more])
 
 
 def _short(equations: Equations) -> bool:
-    """True if all equations are shown."""
+    """Return whether all equations are shown."""
     return len(list(islice(lines(equations, Latex()), LINES + 1))) <= LINES
 
 
@@ -228,20 +228,20 @@ def _joined(equations: Equations) -> list[str]:
 
 
 def _chosen(spectrum: Spectrum) -> list[Eigenvalue]:
-    """The first eigenvalues and the last."""
+    """Return the first eigenvalues and the last."""
     if len(spectrum) <= ROWS:
         return list(spectrum)
     return [*spectrum[: ROWS - 2], spectrum[-1]]
 
 
 def _exact(e: Eigenvalue) -> str:
-    """An eigenvalue as LaTeX; a root of a long polynomial by its decimals."""
+    """Return an eigenvalue as LaTeX; a root of a long polynomial by its decimals."""
     if isinstance(e.number, sp.Expr) and not e.number.atoms(sp.Piecewise):
         return PLAIN.write(e.number)
     return f"\\text{{{e}}}"
 
 
 def _shown(e: Eigenvalue) -> str:
-    """An eigenvalue as a formula."""
+    """Return an eigenvalue as a formula."""
     text = _exact(e)
     return escape(str(e)) if text.startswith("\\text") or len(text) > 300 else formula(text)

@@ -1,6 +1,6 @@
 """One page of HTML on a scene: equations, graph, exact spectrum, stability, a sweep, origin.
 
-The page is whole in itself: no script, no font, no image comes from elsewhere.
+The page is complete in itself: no script, no font, no image is loaded from elsewhere.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ QUICK = Effort(strengths=61, precision=1e-2, periods=300.0, values=25)
 def report(
     scene: Scene, effort: Effort | None = None, *, workers: int | None = None, show_progress: bool | None = None
 ) -> str:
-    """Compute what there is to say of a scene, and return it as a page of HTML."""
+    """Compute the report of a scene and return it as a page of HTML."""
     effort = Effort() if effort is None else effort
     title = escape(check_scene(scene).title or repr(scene))
     parts = [f"<h1>{title}</h1>", *(f"<p>Note: {escape(words)}</p>" for words in scene.warnings)]
@@ -88,9 +88,9 @@ def _section(name: str, content: str) -> str:
 
 
 def _stability(scene: Scene, effort: Effort, workers: int | None, show_progress: bool | None) -> str:
-    """The function with its windows, or why there is none."""
+    """Return the function with its windows, or the reason why there is none."""
     try:
-        found = msf(
+        function = msf(
             scene.replace(axes=()),
             _strengths(scene, effort.strengths),
             precision=effort.precision,
@@ -98,14 +98,14 @@ def _stability(scene: Scene, effort: Effort, workers: int | None, show_progress:
             workers=workers,
             show_progress=show_progress,
         )
-        picture = figure(found.plot(), "exponent over strength")
-        return f"{rows_table(found.summary[1:])}{picture}{_ends(found)}{_fixed(scene)}"
+        picture = figure(function.plot(), "exponent over strength")
+        return f"{rows_table(function.summary[1:])}{picture}{_ends(function)}{_fixed(scene)}"
     except (ValueError, FloatingPointError) as problem:
         return f"<p>This scene has none: {escape(str(problem))}</p>"
 
 
 def _strengths(scene: Scene, count: int) -> np.ndarray:
-    """Strengths of all modes over the sweep of sigma, and 0; 0 … 1.2 if sigma is 0 throughout."""
+    """Return strengths that cover all modes over the sweep of sigma, and 0; 0 … 1.2 if sigma is 0 throughout."""
     fixed = scene.parameters[scene.strength]
     swept = next((axis.values for axis in scene.axes if axis.name == scene.strength), (2.0 * fixed,))
     largest = max(abs(value) for value in scene.topology.spectrum.values)
@@ -113,38 +113,38 @@ def _strengths(scene: Scene, count: int) -> np.ndarray:
     return np.linspace(low, high if high > low else DEFAULT, count)
 
 
-def _ends(found: MSF) -> str:
-    """A sentence if a range goes on beyond the grid; strengths begin at 0."""
-    first, last = found.fine.alpha[[0, -1]]
-    cut = [low for low, _ in found.intervals if low == first != 0.0]
-    cut += [high for _, high in found.intervals if high == last]
-    words = " and at ".join(f"{end:g}" for end in cut)
-    return f'<p class="quiet">The range that ends at alpha = {words} ends there with the grid.</p>' if cut else ""
+def _ends(function: MSF) -> str:
+    """Return a sentence if a range may go on beyond the grid; strengths begin at 0."""
+    first, last = function.fine.alpha[[0, -1]]
+    cut = [low for low, _ in function.intervals if low == first != 0.0]
+    cut += [high for _, high in function.intervals if high == last]
+    ends = " and at ".join(f"{end:g}" for end in cut)
+    return f'<p class="quiet">The range that ends at alpha = {ends} ends there with the grid.</p>' if cut else ""
 
 
 def _fixed(scene: Scene) -> str:
-    """A sentence if the sweep moves more than the strength."""
+    """Return a sentence if the sweep changes more than the strength."""
     moved = [axis.name for axis in scene.axes if axis.name != scene.strength]
-    words = f"The sweep moves {', '.join(moved)}; this function is that of the scene's own values."
-    return f'<p class="quiet">{escape(words)}</p>' if moved else ""
+    text = f"The sweep moves {', '.join(moved)}; this function is that of the scene's own values."
+    return f'<p class="quiet">{escape(text)}</p>' if moved else ""
 
 
 def _sweep(scene: Scene, effort: Effort, workers: int | None, show_progress: bool | None) -> str:
-    """The scene's own sweep, with fewer values if the effort says so."""
+    """Return the sweep of the scene, with at most the values of the effort."""
     thinned = scene.replace(axes=tuple(_thinned(axis, effort.values) for axis in scene.axes))
-    found = run(thinned, workers=workers, show_progress=show_progress)
+    result = run(thinned, workers=workers, show_progress=show_progress)
     plain = [None] if not scene.observe or {"sync_error", "section"} & set(scene.record) else []
-    pictures = "".join(figure(found.plot(kind=kind), kind or "sweep") for kind in (*plain, *scene.observe))
-    words = "" if thinned.cells == scene.cells else f"<p>{thinned.cells} of the scene's {scene.cells} cells.</p>"
-    return f"{words}{rows_table(found.summary[1:3])}{pictures}"
+    pictures = "".join(figure(result.plot(kind=kind), kind or "sweep") for kind in (*plain, *scene.observe))
+    count = "" if thinned.cells == scene.cells else f"<p>{thinned.cells} of the scene's {scene.cells} cells.</p>"
+    return f"{count}{rows_table(result.summary[1:3])}{pictures}"
 
 
 def _thinned(axis: Axis, most: int | None) -> Axis:
-    """Some of the values of an axis, its ends among them."""
+    """Return at most `most` values of an axis, both ends among them."""
     if most is None or len(axis) <= most:
         return axis
-    places = np.unique(np.linspace(0, len(axis) - 1, most).round().astype(int))
-    return Axis(axis.name, tuple(axis.values[k] for k in places))
+    indices = np.unique(np.linspace(0, len(axis) - 1, most).round().astype(int))
+    return Axis(axis.name, tuple(axis.values[k] for k in indices))
 
 
 def _provenance(scene: Scene) -> str:

@@ -92,7 +92,7 @@ def test_compiling_is_told_and_loading_is_not(tmp_path, monkeypatch, caplog):
 def test_the_command_line_prints_what_is_told_and_leaves_no_trace(capsys):
     logger = logging.getLogger("synchain")
     before = logger.level, list(logger.handlers)
-    with cli._news("synchain run"):
+    with cli._log_lines("synchain run"):
         logging.getLogger("synchain.codegen.machine_code.compile").info("compiling a kernel")
     assert capsys.readouterr().err == "synchain run: compiling a kernel\n"
     assert (logger.level, logger.handlers) == before
@@ -172,10 +172,10 @@ def test_a_result_without_its_figure_is_drawn(tmp_path, monkeypatch, capsys):
     target = tmp_path / "a.nc"
     kept = SimpleNamespace(data=SimpleNamespace(attrs={"versions": "v"}), message="m", success=True)
     monkeypatch.setattr("synchain.runtime.results.result.read_result", lambda path: kept)
-    monkeypatch.setattr("synchain.runtime.commands.run._draw", lambda path: path.with_suffix(".png").write_text("x"))
+    monkeypatch.setattr("synchain.runtime.commands.run._drawn", lambda path: path.with_suffix(".png").write_text("x"))
     assert _nothing_to_do(target) == 0
     assert target.with_suffix(".png").exists()
-    monkeypatch.setattr("synchain.runtime.commands.run._draw", lambda path: pytest.fail("drawn again"))
+    monkeypatch.setattr("synchain.runtime.commands.run._drawn", lambda path: pytest.fail("drawn again"))
     assert _nothing_to_do(target) == 0
     assert "nothing was run" in capsys.readouterr().out
 
