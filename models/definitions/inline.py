@@ -248,7 +248,7 @@ def friction_law(
     parameters : mapping, optional
         The default of each parameter.  If none has a unit, w is the non-dimensional velocity.
     static : Expr, number or str, optional
-        The static friction coefficient if it exceeds f(0+); set-valued contact alone knows it.
+        The static friction coefficient if it exceeds f(0+); for set-valued contact alone.
     order : iterable of (str, str)
         Pairs of parameters of which the first must not exceed the second under set-valued contact.
     self_exciting : bool
@@ -342,34 +342,34 @@ def link_energy(
     """
     what = f"coupling {_called(name)!r}"
     defaults = _parameters(what, parameters)
-    kinds, states = _joined(what, between)
+    # The ends in the energies: coordinates and velocities of any oscillator, or the states of two given ones.
+    kinds: tuple[str, str] | None = None
+    ends = {"V": ["q_i", "q_j"], "R": ["v_i", "v_j"], "T": ["v_i", "v_j"]}
+    if between is not None:
+        table: Mapping[Any, Any] = check_table(f"{what}: between", between)
+        if len(table) != 2 or not all(isinstance(states, list | tuple) for states in table.values()):
+            raise ValueError(
+                f"{what}: between is {short_repr(dict(table))}; expected two oscillators and their states, "
+                "such as {'clock': ['theta'], 'beam': ['x']}"
+            )
+        first, second = map(str, table)
+        kinds, states = (first, second), [_name(what, "state", state) for row in table.values() for state in row]
+        twice = next((state for state in states if states.count(state) > 1), None)
+        if twice is not None:
+            raise ValueError(f"{what}: between has the state {twice!r} twice; expected states of different names")
+        ends = dict.fromkeys(ends, states)
     energies = []
-    for about, value, ends in (("V", V, "q_i q_j"), ("R", R, "v_i v_j"), ("T", T, "v_i v_j")):
-        names = _ModelNames.of_link(f"{what}: {about}", states or ends.split(), defaults)
+    for about, value in (("V", V), ("R", R), ("T", T)):
+        names = _ModelNames.of_link(f"{what}: {about}", ends[about], defaults)
         energies.append(names.expression("energy", value))
     if any(e.has(FRICTION) for e in energies):
         raise ValueError(f"{what}: found friction(…); expected it in the forces of a Lagrangian")
     if not any(e.has(WEIGHT) for e in energies):
         raise ValueError(f"{what}: no energy has the weight W of a link; expected it as a factor, k*W*(q_i - q_j)**2/2")
-    own = replace(names, what=what).used_parameters(energies)
+    link_parameters = replace(names, what=what).used_parameters(energies)
     potential, dissipation, kinetic = energies
-    return LagrangianCoupling(
-        name, own, potential, dissipation, kinetic, kinds, source=check_text("source", source, LONGEST_SOURCE)
-    )
-
-
-def _joined(what: str, between: object) -> tuple[tuple[str, str] | None, list[str]]:
-    """The names of the two oscillators that a coupling joins, and the states in its energies."""
-    if between is None:
-        return None, []
-    table: Mapping[Any, Any] = check_table(f"{what}: between", between)
-    if len(table) != 2 or not all(isinstance(states, list | tuple) for states in table.values()):
-        raise ValueError(
-            f"{what}: between is {short_repr(dict(table))}; expected two oscillators and their states, "
-            "such as {'clock': ['theta'], 'beam': ['x']}"
-        )
-    (first, own), (second, others) = table.items()
-    return (str(first), str(second)), [_name(what, "state", state) for state in (*own, *others)]
+    citation = check_text("source", source, LONGEST_SOURCE)
+    return LagrangianCoupling(name, link_parameters, potential, dissipation, kinetic, kinds, source=citation)
 
 
 def _called(name: object) -> str:

@@ -59,7 +59,7 @@ TOPOLOGY = PluginKind(
 
 
 class _Signature:
-    """The signature of a call of a family: n, and its options with their defaults; the class has its own."""
+    """The signature of a call of a family: n, and the options with their defaults."""
 
     def __get__(self, instance: Family | None, owner: type[Family]) -> inspect.Signature:
         if instance is None:
@@ -214,7 +214,7 @@ class Family:
             )
 
     def _size(self, n: object) -> int:
-        """The number of nodes; TypeError if it is no integer, ValueError if it is too small."""
+        """Return the number of nodes; TypeError for no integer, ValueError below the minimum."""
         if isinstance(n, bool) or not hasattr(n, "__index__"):
             raise TypeError(f"topology {self.name}: n = {n!r} is a {type(n).__name__}; expected an integer")
         size = operator.index(n)
@@ -223,11 +223,11 @@ class Family:
         return size
 
     def _settled(self, n: int, options: Mapping[str, object]) -> Options:
-        """All options as they are stored, checked by the family's `settle`."""
+        """Return the options as a graph stores them, checked by `settle`."""
         for key in options:
             if key not in self.options:
-                words = f"known: {', '.join(self.options)}" if self.options else "this family has none: remove it"
-                raise ValueError(f"topology {self.name}: unknown option {key!r}; {words}")
+                known = f"known: {', '.join(self.options)}" if self.options else "this family has none: remove it"
+                raise ValueError(f"topology {self.name}: unknown option {key!r}; {known}")
         if self.settle is None:
             return ()
         try:
@@ -328,17 +328,17 @@ def family(name: str) -> Family:
     if not isinstance(name, str):
         raise TypeError(f"topology name {name!r} is no text; expected one of {', '.join(names())}")
     canonical = plugins.named(TOPOLOGY, name)
-    made: Family = plugins.load(TOPOLOGY, canonical)
+    loaded: Family = plugins.load(TOPOLOGY, canonical)
     if plugins.is_shipped(TOPOLOGY, canonical):
-        return made
+        return loaded
     # Errors in the functions of a file from outside name file and line.
-    guarded: dict[str, Any] = {"edges": _guarded_edges(made.edges)}
+    guarded: dict[str, Any] = {"edges": _guarded_edges(loaded.edges)}
     for key in ("count", "expected"):
-        if (function := getattr(made, key)) is not None:
+        if (function := getattr(loaded, key)) is not None:
             guarded[key] = plugins.blamed(function)(function)
-    if made.spectrum is not None:
-        guarded["spectrum"] = _guarded_spectrum(made.spectrum, getattr(canonical, "path", name))
-    return replace(made, **guarded)
+    if loaded.spectrum is not None:
+        guarded["spectrum"] = _guarded_spectrum(loaded.spectrum, getattr(canonical, "path", name))
+    return replace(loaded, **guarded)
 
 
 def _guarded_edges(edges: Edges) -> Edges:

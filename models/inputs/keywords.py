@@ -48,7 +48,7 @@ def check_methods(kind: type) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class _Signature:
+class _Arguments:
     """The arguments of a function."""
 
     name: str  # the function's name, the class's for `__init__`
@@ -60,7 +60,7 @@ class _Signature:
     any_name: bool  # True with **keywords
 
     @classmethod
-    def of(cls, function: Callable[..., Any]) -> _Signature:
+    def of(cls, function: Callable[..., Any]) -> _Arguments:
         parameters = signature(function).parameters.values()
         further = {each.kind for each in parameters} & {Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD}
         named = [each for each in parameters if each.kind not in further]
@@ -113,7 +113,7 @@ class _Signature:
 @cache
 def _checked(function: Callable[..., Any], package: str) -> Callable[..., Any]:
     """The function with a better message if its arguments do not fit; they are compared only after a TypeError."""
-    accepted = _Signature.of(function)
+    accepted = _Arguments.of(function)
 
     @wraps(function)
     def checked(*arguments: Any, **keywords: Any) -> Any:

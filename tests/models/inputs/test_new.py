@@ -441,6 +441,11 @@ FAMILY = (
         ("coupling", PULL.replace("*W", "*W*x_i"), "V: energy: undeclared symbol 'x_i'; declared: q_i, q_j, sigma, W"),
         (
             "coupling",
+            PULL.replace("parameters", "between={'clock': ['q_i'], 'beam': ['q_j', 'q_i']}, parameters"),
+            "between has the state 'q_i' twice; expected states of different names",
+        ),
+        (
+            "coupling",
             PULL.replace("parameters", "between={'clock': ['x']}, parameters"),
             "expected two oscillators and",
         ),
