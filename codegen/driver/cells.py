@@ -33,198 +33,199 @@ def aligned(count):
 
 
 @njit(error_model="numpy", forceinline=True)
-def put(array, slot, which, value):
+def put(array, slot, lane, value):
     """Write one number of one lane as part of a whole register: reading that register back need not wait for memory."""
-    store(array, slot, select(one_lane(which, WIDTH), broadcast(value, WIDTH), load(array, slot, WIDTH)))
+    store(array, slot, select(one_lane(lane, WIDTH), broadcast(value, WIDTH), load(array, slot, WIDTH)))
 
 
 @njit(error_model="numpy")
-def fill(which, cell, start, numbers, spans, control, clock, y, dims):
-    """Put a cell into a lane; a lane without a cell of its own (cell < 0) idles on a copy of the first one."""
+def fill(lane, cell, rows, clock, y, dims):
+    """Put a cell into a lane; a lane without a cell (cell < 0) idles on a copy of the first one."""
     idle, cell = cell < 0, max(cell, 0)
+    spans, control = rows.spans, rows.control
     for slot in range(CLOCK):
-        put(clock, slot, which, 0.0)
+        put(clock, slot, lane, 0.0)
     for slot in range(2 * dims.dimension + dims.parameters + len(REPEATING)):
-        put(y, slot, which, 0.0)
+        put(y, slot, lane, 0.0)
     for c in range(dims.dimension):
-        put(y, c, which, start[cell, c])
+        put(y, c, lane, rows.start[cell, c])
     for c in range(dims.parameters):
-        put(y, dims.dimension + c, which, numbers[cell, c])
-    put(clock, PERIOD, which, spans[cell, 2] if spans[cell, 2] > 0.0 else math.inf)
-    put(clock, FROM, which, spans[cell, 0])
-    put(clock, UNTIL, which, spans[cell, 1])
+        put(y, dims.dimension + c, lane, rows.values[cell, c])
+    put(clock, PERIOD, lane, spans[cell, 2] if spans[cell, 2] > 0.0 else math.inf)
+    put(clock, FROM, lane, spans[cell, 0])
+    put(clock, UNTIL, lane, spans[cell, 1])
     if SERIES and not spans[cell, 3] > 0.0:
-        put(clock, DUE, which, PROBE if dims.repeats else math.inf)
-    put(clock, STEP, which, control[FIRST_STEP])
-    put(clock, LONGEST, which, control[MAX_STEP])
-    put(clock, LOOK, which, math.inf)
-    put(clock, CHANGE, which, math.inf)
-    put(clock, POWER, which, 1.0)
-    put(clock, LEFT, which, -1.0)
-    put(clock, NEXT_SAMPLE, which, spans[cell, 0])
-    watch(which, control, clock)
-    begin(which, cell, spans, clock)
+        put(clock, DUE, lane, PROBE if dims.repeats else math.inf)
+    put(clock, STEP, lane, control[FIRST_STEP])
+    put(clock, LONGEST, lane, control[MAX_STEP])
+    put(clock, LOOK, lane, math.inf)
+    put(clock, CHANGE, lane, math.inf)
+    put(clock, POWER, lane, 1.0)
+    put(clock, LEFT, lane, -1.0)
+    put(clock, NEXT_SAMPLE, lane, spans[cell, 0])
+    watch(lane, control, clock)
+    begin(lane, cell, spans, clock)
     if idle:
-        vacate(which, clock)
+        vacate(lane, clock)
 
 
 @njit(error_model="numpy")
-def watch(which, control, clock):
+def watch(lane, control, clock):
     """Begin to watch the growth of a cell."""
     for group in (MARKED_AT, LAPSE, HIGH, RECORD, ORIGIN):
-        put(clock, group, which, 0.0)
-    put(clock, MARK, which, min(FIRST_MARK, control[MAX_STEPS]))
+        put(clock, group, lane, 0.0)
+    put(clock, MARK, lane, min(FIRST_MARK, control[MAX_STEPS]))
 
 
 @njit(error_model="numpy")
-def vacate(which, clock):
+def vacate(lane, clock):
     """Let a lane run idly on what it holds: it never stops, and nobody asks for it."""
     for group in (STOP, START, END, PERIOD, BOUND, NEXT_SAMPLE):
-        put(clock, group, which, math.inf)
-    put(clock, ACCEPTED, which, -math.inf)
+        put(clock, group, lane, math.inf)
+    put(clock, ACCEPTED, lane, -math.inf)
 
 
 @njit(error_model="numpy")
-def begin(which, cell, spans, clock):
+def begin(lane, cell, spans, clock):
     """Set the clock of a lane to the beginning of its current period and find the next stop."""
-    period, periods = clock[PERIOD * WIDTH + which], clock[PERIODS * WIDTH + which]
+    period, periods = clock[PERIOD * WIDTH + lane], clock[PERIODS * WIDTH + lane]
     base = periods * period if periods > 0.0 else 0.0
     start, end = spans[cell, 0] - base, spans[cell, 1] - base
-    put(clock, BASE, which, base)
-    put(clock, TIME, which, 0.0)
-    put(clock, START, which, start)
-    put(clock, END, which, end)
-    bound = period if periods + 1.0 >= clock[DUE * WIDTH + which] else math.inf
-    put(clock, BOUND, which, bound)
-    put(clock, STOP, which, min(start if start > 0.0 else end, bound))
+    put(clock, BASE, lane, base)
+    put(clock, TIME, lane, 0.0)
+    put(clock, START, lane, start)
+    put(clock, END, lane, end)
+    bound = period if periods + 1.0 >= clock[DUE * WIDTH + lane] else math.inf
+    put(clock, BOUND, lane, bound)
+    put(clock, STOP, lane, min(start if start > 0.0 else end, bound))
 
 
 @njit(error_model="numpy")
-def turn_over(which, cell, spans, control, clock, y, dims):
+def turn_over(lane, cell, spans, control, clock, y, dims):
     """Begin the next period of the drive; jump where the computation is known to repeat itself."""
-    put(clock, PERIODS, which, clock[PERIODS * WIDTH + which] + 1.0)
-    restart(which, clock)
+    put(clock, PERIODS, lane, clock[PERIODS * WIDTH + lane] + 1.0)
+    restart(lane, clock)
     if dims.repeats:
-        if clock[DUE * WIDTH + which] > 0.0:
-            approach(which, clock, y, control, dims)
-        elif disturbed(which, clock):
-            put(clock, CYCLE, which, 0.0)
-            put(clock, POWER, which, 1.0)
-            save(which, clock, y, dims)
-        elif clock[CYCLE * WIDTH + which] == 0.0:
-            compare(which, clock, y, dims)
-        if clock[CYCLE * WIDTH + which] > 0.0 and control[NO_JUMPS] == 0.0:
-            jump(which, cell, spans, clock)
-    begin(which, cell, spans, clock)
+        if clock[DUE * WIDTH + lane] > 0.0:
+            approach(lane, clock, y, control, dims)
+        elif disturbed(lane, clock):
+            put(clock, CYCLE, lane, 0.0)
+            put(clock, POWER, lane, 1.0)
+            save(lane, clock, y, dims)
+        elif clock[CYCLE * WIDTH + lane] == 0.0:
+            compare(lane, clock, y, dims)
+        if clock[CYCLE * WIDTH + lane] > 0.0 and control[NO_JUMPS] == 0.0:
+            jump(lane, cell, spans, clock)
+    begin(lane, cell, spans, clock)
 
 
 @njit(error_model="numpy")
-def settle_down(which, cell, spans, clock):
+def settle_down(lane, cell, spans, clock):
     """End a cell that is known to stay synchronous: its error counts as what it is now for the rest of the window."""
-    error, start, end = clock[SYNC * WIDTH + which], spans[cell, 0], spans[cell, 1]
-    now = clock[BASE * WIDTH + which] + clock[TIME * WIDTH + which]
-    put(clock, SYNC_SUM, which, clock[SYNC_SUM * WIDTH + which] + error * (end - max(start, now)))
-    put(clock, SYNC_PEAK, which, max(error, clock[SYNC_PEAK * WIDTH + which]))
-    put(clock, END, which, -math.inf)
+    error, start, end = clock[SYNC * WIDTH + lane], spans[cell, 0], spans[cell, 1]
+    now = clock[BASE * WIDTH + lane] + clock[TIME * WIDTH + lane]
+    put(clock, SYNC_SUM, lane, clock[SYNC_SUM * WIDTH + lane] + error * (end - max(start, now)))
+    put(clock, SYNC_PEAK, lane, max(error, clock[SYNC_PEAK * WIDTH + lane]))
+    put(clock, END, lane, -math.inf)
 
 
 @njit(error_model="numpy")
-def restart(which, clock):
+def restart(lane, clock):
     """Let the step control begin the period with nothing in mind but a power of two.
 
     What the steps of a period are then depends on the state at its beginning alone, and a computation on a periodic orbit
     comes to repeat itself, which the wandering of a step size that remembers would prevent.
     """
-    _, exponent = math.frexp(clock[STEP * WIDTH + which])
-    put(clock, STEP, which, math.ldexp(0.5, exponent))
-    put(clock, MEMORY, which, 0.0)
-    put(clock, CHANGE, which, math.inf)
+    _, exponent = math.frexp(clock[STEP * WIDTH + lane])
+    put(clock, STEP, lane, math.ldexp(0.5, exponent))
+    put(clock, MEMORY, lane, 0.0)
+    put(clock, CHANGE, lane, math.inf)
 
 
 @njit(error_model="numpy")
-def approach(which, clock, y, control, dims):
+def approach(lane, clock, y, control, dims):
     """Look whether a free clock comes near a motion that repeats itself: its steps stop at the ends of all periods then."""
     saved, gap, size = dims.dimension + dims.parameters, 0.0, 0.0
     for c in range(dims.dimension):
-        gap += abs(y[c * WIDTH + which] - y[(saved + c) * WIDTH + which])
-        size += abs(y[c * WIDTH + which])
+        gap += abs(y[c * WIDTH + lane] - y[(saved + c) * WIDTH + lane])
+        size += abs(y[c * WIDTH + lane])
     near = gap <= max(NEAR, JITTER * control[RTOL]) * size
-    put(clock, DUE, which, 0.0 if near else clock[PERIODS * WIDTH + which] + PROBE)
-    save(which, clock, y, dims)
+    put(clock, DUE, lane, 0.0 if near else clock[PERIODS * WIDTH + lane] + PROBE)
+    save(lane, clock, y, dims)
 
 
 @njit(error_model="numpy")
-def disturbed(which, clock):
+def disturbed(lane, clock):
     """Whether the window began within a period after the saved one: a step ended there, as none does in other periods.
 
     What repeated itself before need not do so behind it: the state is another one, by as much as the tolerance allows.
     """
-    period, start = clock[PERIOD * WIDTH + which], clock[FROM * WIDTH + which]
-    begun = clock[SAVED_AT * WIDTH + which] * period < start < clock[PERIODS * WIDTH + which] * period
+    period, start = clock[PERIOD * WIDTH + lane], clock[FROM * WIDTH + lane]
+    begun = clock[SAVED_AT * WIDTH + lane] * period < start < clock[PERIODS * WIDTH + lane] * period
     return begun and math.floor(start / period + 0.5) * period != start
 
 
 @njit(error_model="numpy")
-def compare(which, clock, y, dims):
+def compare(lane, clock, y, dims):
     """Look for a cycle of periods: compare with a saved period, and save the present one after 1, 2, 4 … 32, 32 … periods.
 
     Source: Brent, BIT Numerical Mathematics 20, 176 (1980), with a bound that finds short cycles soon.
     """
     saved, same = dims.dimension + dims.parameters, True
     for c in range(dims.dimension):
-        same = same and y[c * WIDTH + which] == y[(saved + c) * WIDTH + which]
+        same = same and y[c * WIDTH + lane] == y[(saved + c) * WIDTH + lane]
     for k, group in enumerate(REPEATING):
-        same = same and clock[group * WIDTH + which] == y[(saved + dims.dimension + k) * WIDTH + which]
-    lag = clock[PERIODS * WIDTH + which] - clock[SAVED_AT * WIDTH + which]
+        same = same and clock[group * WIDTH + lane] == y[(saved + dims.dimension + k) * WIDTH + lane]
+    lag = clock[PERIODS * WIDTH + lane] - clock[SAVED_AT * WIDTH + lane]
     if same:
-        put(clock, CYCLE, which, lag)
-    elif lag >= clock[POWER * WIDTH + which]:
-        put(clock, POWER, which, min(LONGEST_CYCLE, clock[POWER * WIDTH + which] * 2.0))
-        save(which, clock, y, dims)
+        put(clock, CYCLE, lane, lag)
+    elif lag >= clock[POWER * WIDTH + lane]:
+        put(clock, POWER, lane, min(LONGEST_CYCLE, clock[POWER * WIDTH + lane] * 2.0))
+        save(lane, clock, y, dims)
 
 
 @njit(error_model="numpy")
-def save(which, clock, y, dims):
+def save(lane, clock, y, dims):
     """Save the state and what else must repeat, behind state and parameters."""
     saved = dims.dimension + dims.parameters
-    put(clock, SAVED_AT, which, clock[PERIODS * WIDTH + which])
+    put(clock, SAVED_AT, lane, clock[PERIODS * WIDTH + lane])
     for c in range(dims.dimension):
-        put(y, saved + c, which, y[c * WIDTH + which])
+        put(y, saved + c, lane, y[c * WIDTH + lane])
     for k, group in enumerate(REPEATING):
-        put(y, saved + dims.dimension + k, which, clock[group * WIDTH + which])
+        put(y, saved + dims.dimension + k, lane, clock[group * WIDTH + lane])
 
 
 @njit(error_model="numpy")
-def jump(which, cell, spans, clock):
+def jump(lane, cell, spans, clock):
     """Leave out whole cycles: before the window always, inside it after one whole cycle was measured, unless LEFT is 0."""
-    period, now = clock[PERIOD * WIDTH + which], clock[PERIODS * WIDTH + which]
-    cycle = clock[CYCLE * WIDTH + which]
+    period, now = clock[PERIOD * WIDTH + lane], clock[PERIODS * WIDTH + lane]
+    cycle = clock[CYCLE * WIDTH + lane]
     start, end = spans[cell, 0], spans[cell, 1]
     if now * period < start:
-        leap(which, math.floor((start / period - now) / cycle + 1e-9) * cycle, clock)
+        leap(lane, math.floor((start / period - now) / cycle + 1e-9) * cycle, clock)
     else:
-        left = clock[LEFT * WIDTH + which]
+        left = clock[LEFT * WIDTH + lane]
         if left < 0.0:
-            put(clock, LEFT, which, cycle)
-            put(clock, SUM_BEFORE, which, clock[SYNC_SUM * WIDTH + which])
+            put(clock, LEFT, lane, cycle)
+            put(clock, SUM_BEFORE, lane, clock[SYNC_SUM * WIDTH + lane])
         elif left > 0.0:
-            put(clock, LEFT, which, left - 1.0)
+            put(clock, LEFT, lane, left - 1.0)
             if left == 1.0:
                 cycles = max(0.0, math.floor((end / period - now) / cycle + 1e-9))
-                leap(which, cycles * cycle, clock)
-                gain = clock[SYNC_SUM * WIDTH + which] - clock[SUM_BEFORE * WIDTH + which]
-                put(clock, SYNC_SUM, which, clock[SYNC_SUM * WIDTH + which] + cycles * gain)
+                leap(lane, cycles * cycle, clock)
+                gain = clock[SYNC_SUM * WIDTH + lane] - clock[SUM_BEFORE * WIDTH + lane]
+                put(clock, SYNC_SUM, lane, clock[SYNC_SUM * WIDTH + lane] + cycles * gain)
 
 
 @njit(error_model="numpy")
-def leap(which, periods, clock):
+def leap(lane, periods, clock):
     """Move the clock on by whole periods."""
-    put(clock, PERIODS, which, clock[PERIODS * WIDTH + which] + max(0.0, periods))
-    put(clock, SKIPPED, which, clock[SKIPPED * WIDTH + which] + max(0.0, periods))
+    put(clock, PERIODS, lane, clock[PERIODS * WIDTH + lane] + max(0.0, periods))
+    put(clock, SKIPPED, lane, clock[SKIPPED * WIDTH + lane] + max(0.0, periods))
 
 
 @njit(error_model="numpy")
-def unbounded(which, clock, control):
+def unbounded(lane, clock, control):
     """Whether the state grows while the steps shrink with it, so that their number will not reach the end.
 
     Looks when the number of steps has doubled.  If doublings take equal times, the work grows exponentially; bounded
@@ -232,94 +233,97 @@ def unbounded(which, clock, control):
     longer and longer.  Those of a jump between slow motions take ever shorter.  Even if growth ended here, the steps
     that are left would not do.
     """
-    steps = clock[ACCEPTED * WIDTH + which] + clock[REJECTED * WIDTH + which]
-    if steps < clock[MARK * WIDTH + which]:
+    steps = clock[ACCEPTED * WIDTH + lane] + clock[REJECTED * WIDTH + lane]
+    if steps < clock[MARK * WIDTH + lane]:
         return False
-    t, size, before = clock[TIME * WIDTH + which], clock[HIGH * WIDTH + which], clock[LAPSE * WIDTH + which]
-    now = clock[BASE * WIDTH + which] + t
-    lapse = now - clock[MARKED_AT * WIDTH + which]
-    if size < CLIMB * clock[RECORD * WIDTH + which] or max(lapse, before) > PACE * min(lapse, before):
-        put(clock, ORIGIN, which, size)
-    put(clock, MARK, which, min(2.0 * steps, control[MAX_STEPS]))
-    put(clock, MARKED_AT, which, now)
-    put(clock, LAPSE, which, lapse)
-    put(clock, RECORD, which, size)
-    put(clock, HIGH, which, 0.0)
-    if size < TOWER * clock[ORIGIN * WIDTH + which]:
+    t, size, before = clock[TIME * WIDTH + lane], clock[HIGH * WIDTH + lane], clock[LAPSE * WIDTH + lane]
+    now = clock[BASE * WIDTH + lane] + t
+    lapse = now - clock[MARKED_AT * WIDTH + lane]
+    if size < CLIMB * clock[RECORD * WIDTH + lane] or max(lapse, before) > PACE * min(lapse, before):
+        put(clock, ORIGIN, lane, size)
+    put(clock, MARK, lane, min(2.0 * steps, control[MAX_STEPS]))
+    put(clock, MARKED_AT, lane, now)
+    put(clock, LAPSE, lane, lapse)
+    put(clock, RECORD, lane, size)
+    put(clock, HIGH, lane, 0.0)
+    if size < TOWER * clock[ORIGIN * WIDTH + lane]:
         return False
-    left = clock[END * WIDTH + which] - t
+    left = clock[END * WIDTH + lane] - t
     return steps + 0.5 * steps * left / lapse >= control[MAX_STEPS]
 
 
 @njit(error_model="numpy")
-def outcome(which, clock, y, control, dims):
+def outcome(lane, clock, y, control, dims):
     """Status of the cell in a lane, 0 while it runs."""
-    t = clock[TIME * WIDTH + which]
+    t = clock[TIME * WIDTH + lane]
     largest = 0.0
     for c in range(dims.dimension):
-        size = abs(y[c * WIDTH + which])
+        size = abs(y[c * WIDTH + lane])
         if not size < FAR:  # NaN too
             return DIVERGED
         largest = max(largest, size)
-    if clock[HALTED * WIDTH + which] != 0.0:
+    if clock[HALTED * WIDTH + lane] != 0.0:
         return STOPPED
-    if t >= clock[END * WIDTH + which]:
+    if t >= clock[END * WIDTH + lane]:
         return FINISHED
     if control[CANCEL] != 0.0:
         return INTERRUPTED
-    if clock[ACCEPTED * WIDTH + which] + clock[REJECTED * WIDTH + which] >= control[MAX_STEPS]:
+    if clock[ACCEPTED * WIDTH + lane] + clock[REJECTED * WIDTH + lane] >= control[MAX_STEPS]:
         return BUDGET
-    if unbounded(which, clock, control):
+    if unbounded(lane, clock, control):
         return DIVERGED
-    if pauses(which, clock):
+    if pauses(lane, clock):
         return PAUSED
-    if CONTACTS and clock[RUSH * WIDTH + which] >= LONGEST_RUSH:
+    if CONTACTS and clock[RUSH * WIDTH + lane] >= LONGEST_RUSH:
         return CHATTERING
-    if clock[STEP * WIDTH + which] <= 4e-16 * max(min(1.0, clock[UNTIL * WIDTH + which]), t):
+    if clock[STEP * WIDTH + lane] <= 4e-16 * max(min(1.0, clock[UNTIL * WIDTH + lane]), t):
         return DIVERGED if largest > 1e8 else UNDERFLOW  # a blow-up in finite time stops the steps first
     return 0
 
 
 @njit(error_model="numpy")
-def pauses(which, clock):
+def pauses(lane, clock):
     """Whether a cell is to pause, so that its integrator is looked at: at LOOKS times as many steps each time."""
-    steps = clock[ACCEPTED * WIDTH + which] + clock[REJECTED * WIDTH + which]
-    if steps < clock[LOOK * WIDTH + which]:
+    steps = clock[ACCEPTED * WIDTH + lane] + clock[REJECTED * WIDTH + lane]
+    if steps < clock[LOOK * WIDTH + lane]:
         return False
-    now, until = clock[BASE * WIDTH + which] + clock[TIME * WIDTH + which], clock[UNTIL * WIDTH + which]
-    taken, lapse = steps - clock[LOOK * WIDTH + which] / LOOKS, now - clock[LOOKED_AT * WIDTH + which]
-    put(clock, LOOK, which, LOOKS * steps)
-    put(clock, LOOKED_AT, which, now)
+    now, until = clock[BASE * WIDTH + lane] + clock[TIME * WIDTH + lane], clock[UNTIL * WIDTH + lane]
+    taken, lapse = steps - clock[LOOK * WIDTH + lane] / LOOKS, now - clock[LOOKED_AT * WIDTH + lane]
+    put(clock, LOOK, lane, LOOKS * steps)
+    put(clock, LOOKED_AT, lane, now)
     return taken * (until - now) >= WORTH * lapse
 
 
 @njit(error_model="numpy")
-def come_back(which, clock, y, lane):
+def come_back(lane, clock, y, saved):
     """Put a cell that has paused into a lane, to the last bit as it left it."""
     for slot in range(CLOCK):
-        put(clock, slot, which, lane[slot])
-    for slot in range(lane.size - CLOCK):
-        put(y, slot, which, lane[CLOCK + slot])
+        put(clock, slot, lane, saved[slot])
+    for slot in range(saved.size - CLOCK):
+        put(y, slot, lane, saved[CLOCK + slot])
 
 
 @njit(error_model="numpy")
-def finish(which, status, clock, y, i, spans, end, sums, counts, lanes, dims):
-    """Write what is known about the cell in a lane."""
+def finish(lane, status, clock, y, i, spans, results, dims):
+    """Write the results of the cell in a lane."""
+    end, sums, counts, paused = results.end, results.sums, results.counts, results.paused
+    # a cell that another integrator may continue leaves its whole lane
     comes_back = (status == PAUSED) | (status == UNDERFLOW)
-    if lanes.shape[0] > 0 and comes_back:
+    if paused.shape[0] > 0 and comes_back:
         for slot in range(CLOCK):
-            lanes[i, slot] = clock[slot * WIDTH + which]
-        for slot in range(lanes.shape[1] - CLOCK):
-            lanes[i, CLOCK + slot] = y[slot * WIDTH + which]
+            paused[i, slot] = clock[slot * WIDTH + lane]
+        for slot in range(paused.shape[1] - CLOCK):
+            paused[i, CLOCK + slot] = y[slot * WIDTH + lane]
     for c in range(dims.dimension):
-        end[i, c] = y[c * WIDTH + which]
-    stopped, early = clock[BASE * WIDTH + which] + clock[TIME * WIDTH + which], clock[END * WIDTH + which] == -math.inf
+        end[i, c] = y[c * WIDTH + lane]
+    # averages over the window, which a stop may have cut short
+    stopped, early = clock[BASE * WIDTH + lane] + clock[TIME * WIDTH + lane], clock[END * WIDTH + lane] == -math.inf
     length = (stopped if status == STOPPED else spans[i, 1]) - spans[i, 0]
-    sums[i, MEAN] = clock[SYNC_SUM * WIDTH + which] / length if length > 0.0 else clock[SYNC * WIDTH + which]
-    sums[i, PEAK] = clock[SYNC_PEAK * WIDTH + which] if length > 0.0 else clock[SYNC * WIDTH + which]
-    sums[i, LAST] = clock[SYNC * WIDTH + which]
+    sums[i, MEAN] = clock[SYNC_SUM * WIDTH + lane] / length if length > 0.0 else clock[SYNC * WIDTH + lane]
+    sums[i, PEAK] = clock[SYNC_PEAK * WIDTH + lane] if length > 0.0 else clock[SYNC * WIDTH + lane]
+    sums[i, LAST] = clock[SYNC * WIDTH + lane]
     sums[i, STOPPED_AT] = spans[i, 1] if status == FINISHED and spans[i, 1] > 0.0 and not early else stopped
     counts[i, STATUS] = status
-    counts[i, N_ACCEPTED] = int(clock[ACCEPTED * WIDTH + which])
-    counts[i, N_REJECTED] = int(clock[REJECTED * WIDTH + which])
-    counts[i, N_SKIPPED] = int(clock[SKIPPED * WIDTH + which])
+    counts[i, N_ACCEPTED] = int(clock[ACCEPTED * WIDTH + lane])
+    counts[i, N_REJECTED] = int(clock[REJECTED * WIDTH + lane])
+    counts[i, N_SKIPPED] = int(clock[SKIPPED * WIDTH + lane])

@@ -1,7 +1,7 @@
 """Columns of the arrays that a kernel reads and writes, by name.
 
-The text of every kernel defines the same numbers for itself (`clock_slots.py`); a test compares the
-two.
+Kernels are compiled from plain integers, which `clock_slots.py` defines; tests/codegen/driver/test_columns.py compares
+both.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from enum import IntEnum
 
 
 class Control(IntEnum):
-    """Entries of the array `control` that steers a kernel."""
+    """Entries of the array `control`: tolerances and limits of a kernel."""
 
     RTOL = 0
     ATOL = 1
@@ -24,7 +24,7 @@ class Control(IntEnum):
     NO_JUMPS = 7
     """A number other than 0 integrates a cell that repeats itself to its end."""
     FURTHER = 8
-    """Behind those of every kernel: the directions of the second section and of those behind it."""
+    """First entry beyond those of every kernel: the direction of the second section; those of further ones follow."""
 
 
 class SpanColumn(IntEnum):
@@ -33,22 +33,18 @@ class SpanColumn(IntEnum):
     START = 0
     END = 1
     PERIOD = 2
-    """After so much time the equations repeat themselves; 0 if they do not."""
+    """Period of the equations in time; 0 if they have none."""
     NEAR = 3
-    """Synchronisation error below which a cell is known to stay synchronous; 0 if that is not
-    known.
-    """
+    """Synchronisation error below which a proof keeps a cell synchronous; 0 without a proof."""
     FIRST_STEP = 4
     LONGEST = 5
-    """No step is longer: none can miss a swing of the drive."""
+    """Longest step, so that no step misses a swing of the drive."""
     LOOK = 6
-    """Steps after which the cell first looks whether to pause; inf if it never does."""
+    """Steps after which the cell first tests whether to pause; inf without this test."""
 
 
 class SumColumn(IntEnum):
-    """Columns of `sums` (cells, 4): synchronisation error over the window, and the time at which
-    the cell stopped.
-    """
+    """Columns of `sums` (cells, 4): synchronisation error over the window, and the time of the end of the cell."""
 
     MEAN = 0
     PEAK = 1
@@ -57,12 +53,10 @@ class SumColumn(IntEnum):
 
 
 class Tally(IntEnum):
-    """Columns of each observed value in `sums`; behind those of `SumColumn` stands the time that was
-    observed, then come the values one after the other.
-    """
+    """Columns of each observed value in `sums`, which follow those of `SumColumn` and the length of the window so far."""
 
     FIRST = 0
-    """The value at the beginning of the window."""
+    """Value at the beginning of the window."""
     SUM = 1
     """Integral of the distance from the first value."""
     SQUARES = 2
@@ -70,7 +64,7 @@ class Tally(IntEnum):
     LEAST = 4
     LATEST = 5
     SIZE = 6
-    """The largest absolute value at the points of the last step."""
+    """Largest absolute value at the points of the last step."""
 
 
 class Count(IntEnum):
@@ -81,19 +75,19 @@ class Count(IntEnum):
     REJECTED = 2
     POINTS = 3
     SKIPPED = 4
-    """Periods of the drive that were jumped over."""
+    """Periods of the drive that the cell skipped."""
     BY_METHOD = 5
-    """Behind those that a kernel writes: the steps by each of up to MOST_METHODS integrators."""
+    """First column beyond those of a kernel: the steps by each of up to MOST_METHODS integrators."""
 
 
 MOST_METHODS = 3
-"""Integrators that one cell may go through."""
+"""Largest number of integrators of one cell."""
 
 TOLERANCES = slice(Count.BY_METHOD + MOST_METHODS, Count.BY_METHOD + MOST_METHODS + 2)
-"""Columns of `counts` behind those: the bits of rtol and atol, with which the cell was integrated."""
+"""Columns of `counts` for the bits of rtol and atol of the cell."""
 
 COUNTS = TOLERANCES.stop
-"""Columns of `counts`."""
+"""Number of columns of `counts`."""
 
 
 class PointColumn(IntEnum):

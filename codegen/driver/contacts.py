@@ -35,16 +35,16 @@ def gap_of(i, p, out, dims):
 
 
 @njit(error_model="numpy", forceinline=True)
-def smallest_gap(t, y, p, out, network, dims, pushes):
-    """The smallest gap of all contacts at a state."""
+def smallest_gap(t, y, p, friction):
+    """Return the smallest gap of all contacts at a state."""
     if LOOPED:
-        graph, weights = network
-        pushes(t, y, p, out, graph, weights)
+        graph, weights = friction.network
+        friction.pushes(t, y, p, friction.out, graph, weights)
     else:
-        pushes(t, y, p, out)
+        friction.pushes(t, y, p, friction.out)
     least = broadcast(1e300, WIDTH)
-    for i in range(dims.nodes):
-        least = minimum(least, gap_of(i, p, out, dims))
+    for i in range(friction.dims.nodes):
+        least = minimum(least, gap_of(i, p, friction.out, friction.dims))
     return least
 
 
@@ -55,14 +55,15 @@ def on_side(side, gap, out, dims):
 
 
 @njit(error_model="numpy")
-def gap_inside(theta, t, h, y, y_new, dense, middle, out, network, dims, pushes):
-    """The smallest gap at a fraction of the step."""
-    for i in range(dims.nodes):  # both states of a node together, so that neither waits for the other
-        place = inside(theta, i, y, y_new, dense, dims)
-        speed = inside(theta, dims.nodes + i, y, y_new, dense, dims)
-        store(middle, i, place)
-        store(middle, dims.nodes + i, speed)
-    return smallest_gap(t + theta * h, middle, y, out, network, dims, pushes)
+def gap_inside(theta, step, friction):
+    """Return the smallest gap at a fraction of the step."""
+    nodes = friction.dims.nodes
+    for i in range(nodes):  # both states of a node together, so that neither waits for the other
+        position = inside(theta, i, step.y, step.y_new, step.dense, friction.dims)
+        speed = inside(theta, nodes + i, step.y, step.y_new, step.dense, friction.dims)
+        store(friction.middle, i, position)
+        store(friction.middle, nodes + i, speed)
+    return smallest_gap(step.t + theta * step.h, friction.middle, step.y, friction)
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -73,34 +74,35 @@ def keep_gaps(look, p, out, dims):
 
 
 @njit(error_model="numpy")
-def bottom(i, theta, span, t, h, y, y_new, dense, middle, out, network, dims, pushes):
-    """The least gap of a contact near a fraction of the step where a parabola has its bottom, and its place.
+def bottom(i, theta, span, step, friction):
+    """Return where the gap of a contact is least near a fraction of the step, by parabolas, and that gap.
 
     A gap that dips below zero and comes back between two looks would otherwise pass unseen.
     """
-    gap_inside(theta, t, h, y, y_new, dense, middle, out, network, dims, pushes)
-    place, least = theta, gap_of(i, y, out, dims)
+    gap_inside(theta, step, friction)
+    dip, least = theta, gap_of(i, step.y, friction.out, friction.dims)
     for divisor in (8.0, 64.0):
         part = span / divisor
-        gap_inside(place - part, t, h, y, y_new, dense, middle, out, network, dims, pushes)
-        before = gap_of(i, y, out, dims)
-        gap_inside(place + part, t, h, y, y_new, dense, middle, out, network, dims, pushes)
-        after = gap_of(i, y, out, dims)
+        gap_inside(dip - part, step, friction)
+        before = gap_of(i, step.y, friction.out, friction.dims)
+        gap_inside(dip + part, step, friction)
+        after = gap_of(i, step.y, friction.out, friction.dims)
         bend, slope = before - 2.0 * least + after, 0.5 * (after - before)
         turn = minimum(maximum(select(bend > 0.0, -slope / bend, 0.0 * bend), -1.0), 1.0)
-        shifted = minimum(maximum(place + part * turn, maximum(theta - span, 0.0)), minimum(theta + span, 1.0))
-        gap_inside(shifted, t, h, y, y_new, dense, middle, out, network, dims, pushes)
-        gap = gap_of(i, y, out, dims)
+        shifted = minimum(maximum(dip + part * turn, maximum(theta - span, 0.0)), minimum(theta + span, 1.0))
+        gap_inside(shifted, step, friction)
+        gap = gap_of(i, step.y, friction.out, friction.dims)
         better = gap < least
-        place, least = select(better, shifted, place), select(better, gap, least)
-    return place, least
+        dip, least = select(better, shifted, dip), select(better, gap, least)
+    return dip, least
 
 
 @njit(error_model="numpy")
-def first_dip(k, open_lanes, t, h, y, y_new, dense, middle, out, network, dims, pushes):
-    """The first place (2: none) between looks k-2 and k where the gap of a contact dips below zero, and that gap."""
+def first_dip(k, open_lanes, step, friction):
+    """The first fraction (2: none) between looks k-2 and k where the gap of a contact dips below zero, and that gap."""
     span = 1.0 / LOOKS
     first, depth = broadcast(2.0, WIDTH), broadcast(0.0, WIDTH)
+    out, dims = friction.out, friction.dims
     for i in range(dims.nodes):
         earlier = load(out, (6 + (k - 2) % 3) * dims.nodes + i, WIDTH)
         before = load(out, (6 + (k - 1) % 3) * dims.nodes + i, WIDTH)
@@ -109,62 +111,63 @@ def first_dip(k, open_lanes, t, h, y, y_new, dense, middle, out, network, dims, 
         dips = open_lanes & (absolute(slope) < 0.999 * bend) & (before - 0.5 * slope * slope / bend < SHALLOW * gap)
         if any_lane(dips):
             turn = minimum(maximum(span * (k - 1.0 - slope / bend), 0.0), 1.0)
-            place, least = bottom(i, turn, span, t, h, y, y_new, dense, middle, out, network, dims, pushes)
-            sunk = dips & (least < -PASSED) & (place < first)
-            first, depth = select(sunk, place, first), select(sunk, least, depth)
+            dip, least = bottom(i, turn, span, step, friction)
+            sunk = dips & (least < -PASSED) & (dip < first)
+            first, depth = select(sunk, dip, first), select(sunk, least, depth)
     return first, depth
 
 
 @njit(error_model="numpy")
-def first_passage(accept, t, h, y, y_new, dense, middle, out, network, dims, pushes):
+def first_passage(accept, step, friction):
     """The fraction of the step after which the first gap has just become negative; 2 in lanes where none does."""
     zero, span = broadcast(0.0, WIDTH), 1.0 / LOOKS
     low, high, f_low, f_high = zero, broadcast(2.0, WIDTH), zero, broadcast(-1.0, WIDTH)
-    earlier, before, open_lanes = zero, smallest_gap(t, y, y, out, network, dims, pushes), accept
+    earlier, before, open_lanes = zero, smallest_gap(step.t, step.y, step.y, friction), accept
+    out, dims = friction.out, friction.dims
     side = load(out, 9 * dims.nodes + 1, WIDTH)
-    keep_gaps(0, y, out, dims)
+    keep_gaps(0, step.y, out, dims)
     for k in range(1, LOOKS + 1):
         theta = broadcast(k * span, WIDTH)
         if k == LOOKS:
-            gap = smallest_gap(t + h, y_new, y, out, network, dims, pushes)
+            gap = smallest_gap(step.t + step.h, step.y_new, step.y, friction)
         else:
-            gap = gap_inside(theta, t, h, y, y_new, dense, middle, out, network, dims, pushes)
+            gap = gap_inside(theta, step, friction)
         gap = on_side(side, gap, out, dims)
-        keep_gaps(k, y, out, dims)
+        keep_gaps(k, step.y, out, dims)
         hit = open_lanes & (gap < -PASSED)
         f_low, low = select(hit, maximum(before, 0.0), f_low), select(hit, theta - span, low)
         f_high, high = select(hit, gap, f_high), select(hit, theta, high)
         if k > 1:
-            place, least = first_dip(k, open_lanes & ~hit, t, h, y, y_new, dense, middle, out, network, dims, pushes)
-            sunk, late = place < 1.5, place > theta - span
+            dip, least = first_dip(k, open_lanes & ~hit, step, friction)
+            sunk, late = dip < 1.5, dip > theta - span
             f_low, low = (
                 select(sunk, maximum(select(late, before, earlier), 0.0), f_low),
                 select(sunk, select(late, theta - span, theta - 2.0 * span), low),
             )
-            f_high, high = select(sunk, least, f_high), select(sunk, place, high)
+            f_high, high = select(sunk, least, f_high), select(sunk, dip, high)
             hit = hit | sunk
         earlier, before, open_lanes = before, gap, open_lanes & ~hit
-    return narrowed(side, low, high, f_low, f_high, t, h, y, y_new, dense, middle, out, network, dims, pushes)
+    return narrowed(side, low, high, f_low, f_high, step, friction)
 
 
 @njit(error_model="numpy")
-def narrowed(side, low, high, f_low, f_high, t, h, y, y_new, dense, middle, out, network, dims, pushes):
+def narrowed(side, low, high, f_low, f_high, step, friction):
     """The end of the bracket `high` (2: no bracket) moved back until its gap is just below zero.
 
     Regula falsi with the weight of Anderson & Bjorck, BIT 13, 253 (1973), for the passage of a level just below zero.
     """
-    found = high < 1.5
-    if any_lane(found):
+    bracketed = high < 1.5
+    if any_lane(bracketed):
         level, last, depth = -0.75 * PASSED, 0.0 * high, f_high
         for k in range(60):
-            active = found & (depth < -PASSED) & (high - low > 1e-15)  # what it is there, whatever it weighs
+            active = bracketed & (depth < -PASSED) & (high - low > 1e-15)  # what it is there, whatever it weighs
             if not any_lane(active):
                 break
             secant = high - (f_high - level) * (high - low) / (f_high - f_low)
             fit = (secant > low) & (secant < high)
             theta = 0.5 * (low + high) if k % 4 == 3 else select(fit, secant, 0.5 * (low + high))
             theta = select(active, theta, 0.0 * high)
-            gap = on_side(side, gap_inside(theta, t, h, y, y_new, dense, middle, out, network, dims, pushes), out, dims)
+            gap = on_side(side, gap_inside(theta, step, friction), friction.out, friction.dims)
             below = active & (gap < level + 0.25 * PASSED)
             above = active & ~(gap < level + 0.25 * PASSED)
             # an end that stays a second time is weighed less, the less the other one has gained
@@ -186,9 +189,10 @@ def note_rush(accept, t, h, clock):
 
 
 @njit(error_model="numpy", forceinline=True)
-def take_back(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, pushes):
+def take_back(accept, step, clock, friction):
     """Take back the steps that pass an event before their end, and aim at it; returns the lanes that go on."""
-    theta = first_passage(accept, t, h, y, y_new, dense, middle, out, network, dims, pushes)
+    t, h = step.t, step.h
+    theta = first_passage(accept, step, friction)
     least = SHORTEST * maximum(t, 1.0)
     wanted = maximum(theta * h, least)
     # behind a jump a gap is closed to the end of the step, however near it is
@@ -204,10 +208,11 @@ def take_back(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, 
 
 
 @njit(error_model="numpy")
-def change_modes(moved, t, y, out, network, dims, pushes):
+def change_modes(moved, t, y, friction):
     """Let every contact whose gap has closed stick, slip or turn, by what acts on it; `t` is the time of the event."""
-    if not any_lane(moved & (smallest_gap(t, y, y, out, network, dims, pushes) <= 0.0)):
+    if not any_lane(moved & (smallest_gap(t, y, y, friction) <= 0.0)):
         return
+    out, dims = friction.out, friction.dims
     for i in range(dims.nodes):
         slip, speed = load(y, 2 * dims.nodes + i, WIDTH), load(y, dims.nodes + i, WIDTH)
         up, down = load(out, 2 * dims.nodes + i, WIDTH), load(out, 3 * dims.nodes + i, WIDTH)

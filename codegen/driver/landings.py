@@ -33,35 +33,41 @@ from .propagators import (
 
 # --- kernel text below ---
 @njit(error_model="numpy")
-def fill_in(numbers, registers, value):
-    """Let all numbers have one value."""
-    for which in range(registers):
-        store(numbers, which, broadcast(value, LANES))
+def fill_in(factors, registers, value):
+    """Set all factors to one value."""
+    for register in range(registers):
+        store(factors, register, broadcast(value, LANES))
 
 
 @njit(error_model="numpy")
-def copy(numbers, registers, out):
-    """Copy numbers in registers."""
-    for which in range(registers):
-        store(out, which, load(numbers, which, LANES))
+def copy(factors, registers, out):
+    """Copy factors in registers."""
+    for register in range(registers):
+        store(out, register, load(factors, register, LANES))
 
 
 @njit(error_model="numpy")
-def gather(numbers, where, out):
-    """Bring what is in registers into the order of the nodes."""
+def gather(factors, where, out):
+    """Copy factors from registers into the order of the nodes."""
     for node in range(where.size):
-        out[node] = numbers[int(where[node])]
+        out[node] = factors[int(where[node])]
 
 
 @njit(error_model="numpy")
-def lay_out(modes, powers, registers, table, exponents, stride):
-    """As `tabulate`, of a single deviation of each node."""
-    for which in range(registers):
-        x, y = load(modes, 2 * which, LANES), load(modes, 2 * which + 1, LANES)
-        store(table, which, x)
-        store(address(table, stride), which, y)
+def room_of(legs):
+    """Return the length of an array with a number for each node of panels, padded to registers."""
+    return int(legs.panels[legs.panels.shape[0] - 1, TO]) * LANES
+
+
+@njit(error_model="numpy")
+def lay_out(modes, powers, registers, nodes):
+    """Write the two components of one deviation of each node to the table of propagators, as `tabulate`."""
+    for register in range(registers):
+        x, y = load(modes, 2 * register, LANES), load(modes, 2 * register + 1, LANES)
+        store(nodes.table, register, x)
+        store(address(nodes.table, nodes.stride), register, y)
         some = maximum(absolute(x), absolute(y)) > 0.0
-        store(exponents, which, select(some, load(powers, which, LANES), 0.0))
+        store(nodes.exponents, register, select(some, load(powers, register, LANES), 0.0))
 
 
 @njit(error_model="numpy")
@@ -74,67 +80,64 @@ def multiply_all(panels, weights, factors, exponents, numbers, powers):
 
 
 @njit(error_model="numpy")
-def refine(table, exponents, stride, ways, products):
-    """Write the propagators of the nodes of blocks from those of the nodes of legs; returns the error."""
-    legs, shares, where = ways
-    _, _, fine, heights, work, _, _ = products
-    room = int(legs[legs.shape[0] - 1, TO]) * LANES
-    powers, worst = address(work, room), largest_misfit(legs, shares, table, exponents, 2, 2, 1, stride)
+def refine(nodes, legs):
+    """Write the propagators of the nodes of panels from those that are integrated; return the error."""
+    room, table, exponents, stride = room_of(legs), nodes.table, nodes.exponents, nodes.stride
+    powers, worst = (
+        address(legs.work, room),
+        largest_misfit(legs.panels, legs.weights, table, exponents, 2, 2, 1, stride),
+    )
     for slot in range(4):
-        fill_in(work, room // LANES, 1.0)
+        fill_in(legs.work, room // LANES, 1.0)
         fill_in(powers, room // LANES, 0.0)
-        multiply_all(legs, shares, address(table, slot * stride), exponents, work, powers)
-        gather(work, where, address(fine, slot * room))
-    gather(powers, where, heights)
+        multiply_all(legs.panels, legs.weights, address(table, slot * stride), exponents, legs.work, powers)
+        gather(legs.work, legs.where, address(legs.fine, slot * room))
+    gather(powers, legs.where, legs.heights)
     return worst
 
 
 @njit(error_model="numpy")
 def begin_leg(modes, powers, registers, left):
     """Let the deviation of every node be 1 in the component that a landing leaves."""
-    for which in range(registers):
-        store(modes, 2 * which + left, broadcast(1.0, LANES))
-        store(modes, 2 * which + 1 - left, broadcast(0.0, LANES))
-        store(powers, which, broadcast(0.0, LANES))
+    for register in range(registers):
+        store(modes, 2 * register + left, broadcast(1.0, LANES))
+        store(modes, 2 * register + 1 - left, broadcast(0.0, LANES))
+        store(powers, register, broadcast(0.0, LANES))
 
 
 @njit(error_model="numpy")
-def begin_products(moved, lifts, left, legs, products, groups):
+def begin_products(travellers, legs):
     """Let the products of legs begin at a landing, which has left one component of all deviations."""
-    _, _, _, _, _, kept, kept_powers = products
-    for s in range(groups):
-        store(kept, s, load(moved, 2 * s + left, LANES))
-    copy(lifts, groups, kept_powers)
-    renew_products(legs, products, groups)
+    for s in range(travellers.groups):
+        store(travellers.kept, s, load(travellers.moved, 2 * s + legs.left, LANES))
+    copy(travellers.lifts, travellers.groups, travellers.kept_powers)
+    renew_products(travellers, legs)
 
 
 @njit(error_model="numpy")
-def renew_products(legs, products, groups):
-    """Let the products of legs begin anew, and scale what there is of all strengths."""
-    share, share_powers, _, _, _, kept, kept_powers = products
-    scale(kept, kept_powers, groups, 1)
-    fill_in(share, int(legs[legs.shape[0] - 1, TO]), 1.0)
-    fill_in(share_powers, int(legs[legs.shape[0] - 1, TO]), 0.0)
+def renew_products(travellers, legs):
+    """Let the products of legs begin anew, and scale the components that are left of all strengths."""
+    scale(travellers.kept, travellers.kept_powers, travellers.groups, 1)
+    fill_in(legs.share, room_of(legs) // LANES, 1.0)
+    fill_in(legs.share_powers, room_of(legs) // LANES, 0.0)
 
 
 @njit(error_model="numpy")
-def hand_over(panels, weights, ways, products, groups):
-    """Move the products of earlier legs to all strengths; returns the error."""
-    legs, _, where = ways
-    share, share_powers, fine, heights, _, kept, kept_powers = products
-    gather(share, where, fine)
-    gather(share_powers, where, heights)
-    worst = largest_misfit(panels, weights, fine, heights, 1, 1, 1, int(legs[legs.shape[0] - 1, TO]) * LANES)
-    multiply_all(panels, weights, fine, heights, kept, kept_powers)
-    renew_products(legs, products, groups)
+def hand_over(panels, travellers, legs):
+    """Move the products of earlier legs to all strengths; return the error."""
+    gather(legs.share, legs.where, legs.fine)
+    gather(legs.share_powers, legs.where, legs.heights)
+    worst = largest_misfit(panels.panels, panels.weights, legs.fine, legs.heights, 1, 1, 1, room_of(legs))
+    multiply_all(panels.panels, panels.weights, legs.fine, legs.heights, travellers.kept, travellers.kept_powers)
+    renew_products(travellers, legs)
     return worst
 
 
 @njit(error_model="numpy")
-def close_batch(groups, products, gains):
-    """Write the logarithms of how much what landings leave has grown, and give it unit size; zeros stay zeros."""
-    _, _, _, _, _, kept, kept_powers = products
-    for s in range(groups):
+def close_batch(travellers, gains):
+    """Write the logarithms of the growth of the components that landings leave, and scale these to 1; zeros stay zeros."""
+    kept, kept_powers = travellers.kept, travellers.kept_powers
+    for s in range(travellers.groups):
         value = load(kept, s, LANES)
         store(gains, s, load(kept_powers, s, LANES) * 0.6931471805599453 + log(absolute(value)))
         store(kept, s, select(value > 0.0, 1.0, select(value < 0.0, -1.0, value)))
@@ -142,16 +145,14 @@ def close_batch(groups, products, gains):
 
 
 @njit(error_model="numpy")
-def land(table, exponents, stride, left, ways, products):
-    """End a leg; returns the error.
+def land(nodes, legs):
+    """End a leg: multiply the products of legs by its factors; return the error.
 
-    Powers of two of each leg are counted, and what is left of its factors leaves the products within range.
+    The powers of two of each leg are counted, so that the products stay within range.
     """
-    legs, shares, _ = ways
-    share, share_powers, _, _, _, _, _ = products
-    numbers = address(table, left * stride)
-    worst = largest_misfit(legs, shares, numbers, exponents, 1, 1, 1, stride)
-    multiply_all(legs, shares, numbers, exponents, share, share_powers)
+    factors = address(nodes.table, legs.left * nodes.stride)
+    worst = largest_misfit(legs.panels, legs.weights, factors, nodes.exponents, 1, 1, 1, nodes.stride)
+    multiply_all(legs.panels, legs.weights, factors, nodes.exponents, legs.share, legs.share_powers)
     return worst
 
 
@@ -160,63 +161,62 @@ def multiply_twice(panel, weights, fine, room, numbers, out):
     """Write the products of each number of a panel with two factors, as `multiply`, beside each other."""
     points, first, count = int(panel[POINTS]), int(panel[FROM]), int(panel[TO]) - int(panel[FROM])
     x, y = address(fine, int(panel[NODE])), address(fine, room + int(panel[NODE]))
-    for which in range(0, count, 2):
-        second, zero = min(which + 1, count - 1), broadcast(0.0, LANES)
-        a, b = int(panel[WEIGHTS]) + points * which, int(panel[WEIGHTS]) + points * second
+    for register in range(0, count, 2):
+        second, zero = min(register + 1, count - 1), broadcast(0.0, LANES)
+        a, b = int(panel[WEIGHTS]) + points * register, int(panel[WEIGHTS]) + points * second
         p, q, r, s = zero, zero, zero, zero
         for j in range(points):
             one, two = load(weights, a + j, LANES), load(weights, b + j, LANES)
             p, r = fma(one, broadcast(x[j], LANES), p), fma(two, broadcast(x[j], LANES), r)
             q, s = fma(one, broadcast(y[j], LANES), q), fma(two, broadcast(y[j], LANES), s)
         if points == 0:
-            p, q = load(x, which, LANES), load(y, which, LANES)
+            p, q = load(x, register, LANES), load(y, register, LANES)
             r, s = load(x, second, LANES), load(y, second, LANES)
-        for at, by_x, by_y in ((first + which, p, q), (first + second, r, s)):
+        for at, by_x, by_y in ((first + register, p, q), (first + second, r, s)):
             number = load(numbers, at, LANES)
             store(out, 2 * at, by_x * number)
             store(out, 2 * at + 1, by_y * number)
 
 
 @njit(error_model="numpy")
-def compose(table, exponents, stride, panels, weights, ways, products, moved, lifts, groups):
-    """Write the deviations of all strengths within a leg, from what was left at its beginning; returns the error."""
-    legs, shares, where = ways
-    share, share_powers, fine, heights, work, kept, kept_powers = products
-    registers = int(legs[legs.shape[0] - 1, TO])
-    room = registers * LANES
-    powers = address(work, room)
-    worst = largest_misfit(legs, shares, table, exponents, 1, 2, 1, stride)
+def compose(nodes, panels, travellers, legs):
+    """Write the deviations of all strengths within a leg, from the components at its beginning; return the error."""
+    table, exponents, stride, room = nodes.table, nodes.exponents, nodes.stride, room_of(legs)
+    registers, powers = room // LANES, address(legs.work, room)
+    # 1. both components at the nodes of panels: products of earlier legs times the factors of this one
+    worst = largest_misfit(legs.panels, legs.weights, table, exponents, 1, 2, 1, stride)
     for slot in range(2):
-        copy(share, registers, work)
-        copy(share_powers, registers, powers)
-        multiply_all(legs, shares, address(table, slot * stride), exponents, work, powers)
-        gather(work, where, address(fine, slot * room))
-    gather(powers, where, heights)
-    worst = larger(worst, largest_misfit(panels, weights, fine, heights, 1, 2, 1, room))
-    copy(kept_powers, groups, lifts)
-    for k in range(panels.shape[0]):
-        panel = address(panels, len(PANEL) * k)
-        multiply_twice(panel, weights, fine, room, kept, moved)
-        lift(panel, heights, lifts)
+        copy(legs.share, registers, legs.work)
+        copy(legs.share_powers, registers, powers)
+        multiply_all(legs.panels, legs.weights, address(table, slot * stride), exponents, legs.work, powers)
+        gather(legs.work, legs.where, address(legs.fine, slot * room))
+    gather(powers, legs.where, legs.heights)
+    # 2. the same at all strengths
+    worst = larger(worst, largest_misfit(panels.panels, panels.weights, legs.fine, legs.heights, 1, 2, 1, room))
+    copy(travellers.kept_powers, travellers.groups, travellers.lifts)
+    for k in range(panels.panels.shape[0]):
+        panel = address(panels.panels, len(PANEL) * k)
+        multiply_twice(panel, panels.weights, legs.fine, room, travellers.kept, travellers.moved)
+        lift(panel, legs.heights, travellers.lifts)
     return worst
 
 
 @njit(error_model="numpy")
-def bring(
-    parted, modes, powers, spots, few, nodes, table, exponents, stride, panels, weights, ways, products, moved, lifts, found,
-    groups,
-):  # fmt: skip
-    """Write the deviations of all strengths as they are now; returns the error.
+def bring(parted, old, modes, nodes, panels, travellers, legs):
+    """Write the present deviations of all strengths; return the error.
 
-    They come from what a landing has left of them, if `parted`, else from what they were when propagators were begun.
+    They come from the components that a landing has left, if `parted`, else from the deviations at the last cut.
     """
+    moved, lifts, found = travellers.moved, travellers.lifts, travellers.found
     if parted:
-        lay_out(modes, powers, few, table, exponents, stride)
-        worst = compose(table, exponents, stride, panels, weights, ways, products, moved, lifts, groups)
+        lay_out(old, modes.powers, modes.node_registers, nodes)
+        worst = compose(nodes, panels, travellers, legs)
     else:
-        tabulate(modes, powers, spots, nodes, 2, table, exponents, 2, stride)
-        worst = refine(table, exponents, stride, ways, products)
-        room = int(ways[0][ways[0].shape[0] - 1, TO]) * LANES
-        worst = larger(worst, apply(panels, weights, products[2], products[3], moved, lifts, found, 2, 2, room))
-    scale(moved, lifts, groups, 2)
+        tabulate(old, modes.powers, nodes.places, nodes.nodes, 2, nodes.table, nodes.exponents, 2, nodes.stride)
+        worst = refine(nodes, legs)
+        worst = larger(
+            worst,
+            apply(panels.panels, panels.weights, legs.fine, legs.heights, moved, lifts, found, 2, 2, room_of(legs)),
+        )
+    scale(moved, lifts, travellers.groups, 2)
     return worst

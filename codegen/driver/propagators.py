@@ -28,16 +28,16 @@ TILE = 2
 @njit(error_model="numpy")
 def scale(modes, powers, registers, parts):
     """Scale every deviation by a power of two to a size between 1 and 2; a deviation of zero stays zero."""
-    for which in range(registers):
-        size = absolute(load(modes, parts * which, LANES))
+    for register in range(registers):
+        size = absolute(load(modes, parts * register, LANES))
         for c in range(1, parts):
-            size = maximum(size, absolute(load(modes, parts * which + c, LANES)))
+            size = maximum(size, absolute(load(modes, parts * register + c, LANES)))
         normal = (size > 1e-290) & (size < 1e290)
         _, power = split_binary(select(normal, size, 1.0), 1.0)
         for c in range(parts):
-            value = load(modes, parts * which + c, LANES)
-            store(modes, parts * which + c, value * scale_binary(broadcast(1.0, LANES), 6755399441055744.0 - power))
-        store(powers, which, load(powers, which, LANES) + power)
+            value = load(modes, parts * register + c, LANES)
+            store(modes, parts * register + c, value * scale_binary(broadcast(1.0, LANES), 6755399441055744.0 - power))
+        store(powers, register, load(powers, register, LANES) + power)
 
 
 @njit(error_model="numpy")
@@ -114,13 +114,13 @@ def misfit(panel, weights, table, columns, rows, kinds, stride):
 
 
 @njit(error_model="numpy")
-def real_entries(which, count, panel, weights, table, columns, stride, found):
+def real_entries(register, count, panel, weights, table, columns, stride, found):
     """The real propagators in the registers which … which+1 of a panel of `count`: register TILE*slot + k of `found`.
 
     Behind the last register of the panel it stands again, and behind the last of four entries so does this one.
     """
     points, node, first, last = int(panel[POINTS]), int(panel[NODE]), int(panel[WEIGHTS]), columns * columns - 1
-    a, b = first + points * which, first + points * min(which + 1, count - 1)
+    a, b = first + points * register, first + points * min(register + 1, count - 1)
     for slot in range(0, last + 1, 4):
         second, third, fourth = min(slot + 1, last), min(slot + 2, last), min(slot + 3, last)
         p, q, r, s = slot * stride + node, second * stride + node, third * stride + node, fourth * stride + node
@@ -138,11 +138,11 @@ def real_entries(which, count, panel, weights, table, columns, stride, found):
 
 
 @njit(error_model="numpy")
-def complex_entries(which, count, panel, weights, table, columns, stride, found):
+def complex_entries(register, count, panel, weights, table, columns, stride, found):
     """As `real_entries`, of complex propagators: the imaginary part of an entry is `columns` slots further on."""
     points, node, last, apart = int(panel[POINTS]), int(panel[NODE]), columns * columns - 1, columns * stride
-    for k in range(min(TILE, count - which)):
-        at = int(panel[WEIGHTS]) + 2 * points * (which + k)
+    for k in range(min(TILE, count - register)):
+        at = int(panel[WEIGHTS]) + 2 * points * (register + k)
         for entry in range(0, last + 1, 2):
             other = min(entry + 1, last)
             one, two = entry + entry // columns * columns, other + other // columns * columns
@@ -161,11 +161,13 @@ def complex_entries(which, count, panel, weights, table, columns, stride, found)
 
 
 @njit(error_model="numpy")
-def own_entries(which, count, panel, table, entries, stride, found):
+def own_entries(register, count, panel, table, entries, stride, found):
     """As `real_entries`, of a panel whose strengths are nodes themselves."""
-    for k in range(min(TILE, count - which)):
+    for k in range(min(TILE, count - register)):
         for slot in range(entries):
-            store(found, TILE * slot + k, load(table, (slot * stride + int(panel[NODE])) // LANES + which + k, LANES))
+            store(
+                found, TILE * slot + k, load(table, (slot * stride + int(panel[NODE])) // LANES + register + k, LANES)
+            )
 
 
 @njit(error_model="numpy")
@@ -207,15 +209,15 @@ def transport(panel, weights, table, exponents, travellers, lifts, found, column
     `found` has room for the propagators of TILE registers, and for one deviation behind them.
     """
     count = int(panel[TO]) - int(panel[FROM])
-    for which in range(0, count, TILE):
+    for register in range(0, count, TILE):
         if int(panel[POINTS]) == 0:
-            own_entries(which, count, panel, table, columns * parts, stride, found)
+            own_entries(register, count, panel, table, columns * parts, stride, found)
         elif parts == columns:
-            real_entries(which, count, panel, weights, table, columns, stride, found)
+            real_entries(register, count, panel, weights, table, columns, stride, found)
         else:
-            complex_entries(which, count, panel, weights, table, columns, stride, found)
-        for k in range(min(TILE, count - which)):
-            s = int(panel[FROM]) + which + k
+            complex_entries(register, count, panel, weights, table, columns, stride, found)
+        for k in range(min(TILE, count - register)):
+            s = int(panel[FROM]) + register + k
             product(parts * s, k, travellers, found, columns, parts)
     lift(panel, exponents, lifts)
 
@@ -254,18 +256,18 @@ def multiply(panel, weights, factors, numbers):
             factor = load(factors, int(panel[NODE]) // LANES + k, LANES)
             store(numbers, first + k, load(numbers, first + k, LANES) * factor)
         return
-    for which in range(0, count, 4):
-        second, third, fourth = min(which + 1, count - 1), min(which + 2, count - 1), min(which + 3, count - 1)
+    for register in range(0, count, 4):
+        second, third, fourth = min(register + 1, count - 1), min(register + 2, count - 1), min(register + 3, count - 1)
         begin, zero = int(panel[WEIGHTS]), broadcast(0.0, LANES)
-        a, b, c, d = begin + points * which, begin + points * second, begin + points * third, begin + points * fourth
+        a, b, c, d = begin + points * register, begin + points * second, begin + points * third, begin + points * fourth
         p, q, r, s = zero, zero, zero, zero
         for j in range(points):
             factor = broadcast(factors[int(panel[NODE]) + j], LANES)
             p, q = fma(load(weights, a + j, LANES), factor, p), fma(load(weights, b + j, LANES), factor, q)
             r, s = fma(load(weights, c + j, LANES), factor, r), fma(load(weights, d + j, LANES), factor, s)
-        p, q = p * load(numbers, first + which, LANES), q * load(numbers, first + second, LANES)
+        p, q = p * load(numbers, first + register, LANES), q * load(numbers, first + second, LANES)
         r, s = r * load(numbers, first + third, LANES), s * load(numbers, first + fourth, LANES)
-        for at, number in ((which, p), (second, q), (third, r), (fourth, s)):
+        for at, number in ((register, p), (second, q), (third, r), (fourth, s)):
             store(numbers, first + at, number)
 
 

@@ -16,72 +16,79 @@ from .cells import REPEATING, aligned, come_back, fill, finish, outcome, put, se
 from .clock_slots import *
 from .contacts import change_modes, note_rush, take_back
 from .control import accept_series, advance, aim, arrive, judge, pause, wrap
+from .records import Friction, Results, Rows, Step
 from .spread import spread
 
 
 # --- kernel text below ---
 @njit(error_model="numpy", forceinline=True)
-def whole(dims):
-    """True if every step of the window counts: nothing in it can be left out."""
+def counts_every_step(dims):
+    """True if every step of the window is recorded, so that no cycle can be left out."""
     return dims.sections + dims.observed + dims.sampled > 0
 
 
 @njit(error_model="numpy")
-def enter(which, cell, start, numbers, spans, control, clock, y, multiplicity, dims):
-    """Put a cell into a lane, with what its records begin with."""
-    fill(which, cell, start, numbers, spans, control, clock, y, dims)
-    put(clock, STEP, which, spans[max(cell, 0), FIRST_OF_CELL])
-    put(clock, LONGEST, which, spans[max(cell, 0), LONGEST_OF_CELL])
-    put(clock, LOOK, which, spans[max(cell, 0), FIRST_LOOK])
-    if whole(dims):
-        put(clock, LEFT, which, 0.0)
+def enter(lane, cell, rows, clock, y, multiplicity, dims):
+    """Put a cell into a lane, with the first values of its records."""
+    fill(lane, cell, rows, clock, y, dims)
+    put(clock, STEP, lane, rows.spans[max(cell, 0), FIRST_OF_CELL])
+    put(clock, LONGEST, lane, rows.spans[max(cell, 0), LONGEST_OF_CELL])
+    put(clock, LOOK, lane, rows.spans[max(cell, 0), FIRST_LOOK])
+    if counts_every_step(dims):
+        put(clock, LEFT, lane, 0.0)
     if dims.stops:
-        put(clock, MARK, which, control[MAX_STEPS])
+        put(clock, MARK, lane, rows.control[MAX_STEPS])
     if dims.components > 0:
         now = np.empty(WIDTH)
         store(now, 0, spread(y, multiplicity, dims))
-        put(clock, SYNC, which, now[which])
+        put(clock, SYNC, lane, now[lane])
 
 
 @njit(error_model="numpy")
-def settle(
-    look, queue, last, clock, y, cell, start, numbers, spans, control, end, sums, counts, lanes, multiplicity, dims,
-):  # fmt: skip
-    """See to the lanes in `look`: periods turn over, finished cells leave, new ones enter; returns the queue's head."""
-    for which in range(WIDTH):
-        while (look >> which) & 1:
-            if cell[which] < 0:
-                if queue == last or control[CANCEL] != 0.0:
-                    vacate(which, clock)
+def turn(lane, cell, rows, clock, y, dims):
+    """Return the status of the cell in a lane; a cell at the end of its period begins the next one first."""
+    status = outcome(lane, clock, y, rows.control, dims)
+    if status == 0 and clock[TIME * WIDTH + lane] >= clock[BOUND * WIDTH + lane]:
+        turn_over(lane, cell, rows.spans, rows.control, clock, y, dims)
+        near = clock[SYNC * WIDTH + lane] < rows.spans[cell, 3]
+        if near and dims.components > 0 and not counts_every_step(dims):
+            settle_down(lane, cell, rows.spans, clock)
+        status = outcome(lane, clock, y, rows.control, dims)
+    return status
+
+
+@njit(error_model="numpy")
+def refill_lanes(look, queue, last, cell, clock, y, rows, results, multiplicity, dims):
+    """Replace the finished cells of the lanes in `look` by the next ones of the queue; return the head of the queue."""
+    for lane in range(WIDTH):
+        # a cell may finish as soon as it enters, so the lane takes cells until one runs
+        while (look >> lane) & 1:
+            if cell[lane] < 0:
+                if queue == last or rows.control[CANCEL] != 0.0:
+                    vacate(lane, clock)
                     break
-                cell[which] = queue
-                if counts[queue, STATUS] == PAUSED:
-                    come_back(which, clock, y, lanes[queue])
+                cell[lane] = queue
+                if results.counts[queue, STATUS] == PAUSED:
+                    come_back(lane, clock, y, results.paused[queue])
                 else:
-                    enter(which, queue, start, numbers, spans, control, clock, y, multiplicity, dims)
+                    enter(lane, queue, rows, clock, y, multiplicity, dims)
                 queue += 1
-            status = outcome(which, clock, y, control, dims)
-            if status == 0 and clock[TIME * WIDTH + which] >= clock[BOUND * WIDTH + which]:
-                turn_over(which, cell[which], spans, control, clock, y, dims)
-                near = clock[SYNC * WIDTH + which] < spans[cell[which], 3]
-                if near and dims.components > 0 and not whole(dims):
-                    settle_down(which, cell[which], spans, clock)
-                status = outcome(which, clock, y, control, dims)
+            status = turn(lane, cell[lane], rows, clock, y, dims)
             if status == 0:
                 break
-            finish(which, status, clock, y, cell[which], spans, end, sums, counts, lanes, dims)
-            cell[which] = -1
+            finish(lane, status, clock, y, cell[lane], rows.spans, results, dims)
+            cell[lane] = -1
     return queue
 
 
 @njit(error_model="numpy", forceinline=True)
-def attempt(clock, y, dense, y_new, middle, out, control, dims, functions, network):
-    """One step of all lanes: times, lengths and the mask of accepted steps."""
+def attempt(clock, y, dense, y_new, control, dims, functions, friction):
+    """Take one step of all lanes; return their times and lengths, and the mask of accepted steps."""
     t, h = load(clock, TIME, WIDTH), aim(clock)
     if SERIES:
         limit = minimum(load(clock, STOP, WIDTH) - t, load(clock, LONGEST, WIDTH))
         if LOOPED:
-            graph, weights = network
+            graph, weights = friction.network
             h, reach = functions.step(
                 t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL], graph, weights
             )
@@ -94,92 +101,92 @@ def attempt(clock, y, dense, y_new, middle, out, control, dims, functions, netwo
             note_rush(accept, t, h, clock)
         return t, h, accept
     if LOOPED:
-        graph, weights = network
+        graph, weights = friction.network
         error = functions.step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL], graph, weights)
     else:
         error = functions.step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
     accept = judge(clock, h, error, 1.0 / (dims.error_order + 1.0))
     if CONTACTS:
-        accept = take_back(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, functions.pushes)
+        accept = take_back(accept, Step(t, h, y, y_new, dense), clock, friction)
     return t, h, accept
 
 
 @njit(error_model="numpy", nogil=True, cache=True)
-def drive(
-    functions, dims, multiplicity, rule, network, first, last, start, numbers, spans, control, end, sums, counts, points,
-    samples, lanes,
-):  # fmt: skip
+def drive(functions, dims, multiplicity, rule, network, first, last, inputs, outputs):
     """Run the cells first … last-1.
 
-    functions: those of a scene and those that record.  dims: the sizes of its arrays; what is 0 there is not recorded,
-    and its functions are not called.
-    multiplicity (nodes): how many oscillators each node stands for.  rule (points, 4 + points): of the panels of a step
-    (codegen/kernels/observable_text.py).  network: of one that is stepped through in loops, the arrays of its
-    program (codegen/steps/sparse_plan.py) and the weights of its links.
-    start (cells, dimension), numbers (cells, parameters), spans (cells, 7): start and end of the window, the period after
-    which the right-hand side repeats (0: none), the synchronisation error below which a cell that records nothing
-    else may end early (0: never), the first step, the longest one, and the steps after which the cell first looks
-    whether to pause; control: see the column names above.  Filled: end (cells, dimension), sums (cells, 4,
-    or more if values are observed), counts (cells, 5 or more), points (cells, room, dimension + 1, or
-    2 + kept of sections on functions), samples (cells, samples, dimension), lanes (cells, any): those of
-    cells that pause, and of cells whose steps underflow; a cell that has paused goes on from there.
+    functions: those of the scene and the recorders.  dims: `Dimensions`; the recorder of a size that is 0 is not called.
+    multiplicity (nodes): oscillators that each node represents.  rule (points, 4 + points): rule of the panels of a step
+    (codegen/kernels/observable_text.py).  network: of steps in loops, the arrays of the elimination program
+    (codegen/steps/sparse_plan.py) and the weights of the links, else ().  inputs: the fields of `Rows` as a tuple.
+    outputs: the fields of `Results` as a tuple; a cell whose status is PAUSED continues from its saved lane.
     """
+    # Python passes plain tuples, whose types Numba finds faster than those of records
+    start, values, spans, control = inputs
+    end, sums, counts, points, samples, paused = outputs
+    rows, results = Rows(start, values, spans, control), Results(end, sums, counts, points, samples, paused)
     steering, members = address(control, 0), address(multiplicity, 0)
-    size, rows = dims.dimension, dims.dense_rows * dims.dimension
-    group = CLOCK + 2 * size + dims.parameters + len(REPEATING)
-    scratch = 9 * dims.nodes + 2 if CONTACTS else 0
-    watched = len(rule) * (dims.observed + dims.gaps + dims.depths)
+
+    # 1. Lay out the workspace: y_new, middle, contacts, clock, y, dense output, values of observables and of sections.
+    size, dense_size = dims.dimension, dims.dense_rows * dims.dimension
+    lane_size = CLOCK + 2 * size + dims.parameters + len(REPEATING)
+    contact_size = 9 * dims.nodes + 2 if CONTACTS else 0
+    observed = len(rule) * (dims.observed + dims.gaps + dims.depths)
     crossed = (len(rule) + 1) * (dims.sections * (3 + max(0, dims.kept)) + 3 * dims.stops)
-    block = aligned((2 * size + group + rows + dims.workspace + scratch + watched + crossed) * WIDTH)
+    block = aligned((2 * size + lane_size + dense_size + dims.workspace + contact_size + observed + crossed) * WIDTH)
     y_new, middle, out = address(block, 0), address(block, size * WIDTH), address(block, 2 * size * WIDTH)
-    first_group = (2 * size + scratch) * WIDTH
-    clock, y = address(block, first_group), address(block, first_group + CLOCK * WIDTH)
-    dense = address(block, first_group + group * WIDTH)
-    seen = address(dense, (rows + dims.workspace) * WIDTH)
-    found = address(seen, watched * WIDTH)
+    first_lane = (2 * size + contact_size) * WIDTH
+    clock, y = address(block, first_lane), address(block, first_lane + CLOCK * WIDTH)
+    dense = address(block, first_lane + lane_size * WIDTH)
+    seen = address(dense, (dense_size + dims.workspace) * WIDTH)
+    crossings = address(seen, observed * WIDTH)
+    friction = Friction(middle, out, network, dims, functions.pushes)
+
+    # 2. All lanes are empty; tallies of cells that do not continue begin at 0.
     cell = np.full(WIDTH, -1)
-    for which in range(WIDTH):
-        enter(which, -1, start, numbers, spans, control, clock, y, members, dims)
+    for lane in range(WIDTH):
+        enter(lane, -1, rows, clock, y, members, dims)
     for i in range(first, last):
         if counts[i, STATUS] == PAUSED:
             continue
         for column in range(OBSERVED, sums.shape[1]):
             sums[i, column] = 0.0
+
     queue, look = first, ALL
     while True:
+        # 3. Lanes in `look` turn over their period or change their cell. The end: no lane holds a cell.
         if look != 0:
-            queue = settle(
-                look, queue, last, clock, y, cell, start, numbers, spans, control, end, sums, counts, lanes, members,
-                dims,
-            )  # fmt: skip
-            # stop once no lane holds a cell
+            queue = refill_lanes(look, queue, last, cell, clock, y, rows, results, members, dims)
             busy = False
-            for which in range(WIDTH):
-                busy = busy or cell[which] >= 0
+            for lane in range(WIDTH):
+                busy = busy or cell[lane] >= 0
             if not busy:
                 break
-        t, h, accept = attempt(clock, y, dense, y_new, middle, out, steering, dims, functions, network)
+
+        # 4. One step of all lanes; a stop may end it early.
+        t, h, accept = attempt(clock, y, dense, y_new, steering, dims, functions, friction)
         if dims.stops:
-            h = functions.halt(accept, t, h, clock, y, y_new, dense, found, steering, rule, dims, functions.section)
-        # record what the step passed
+            h = functions.halt(
+                accept, Step(t, h, y, y_new, dense), clock, crossings, steering, rule, dims, functions.section
+            )
+
+        # 5. Record inside the accepted steps; `counted` are those in the window, `now` is their time from t = 0.
         t_new = arrive(clock, t, h)
         counted, now = accept & (t >= load(clock, START, WIDTH)), load(clock, BASE, WIDTH) + t
+        step = Step(now, h, y, y_new, dense)
         if dims.components > 0:
-            functions.observe(counted, accept, h, clock, y, y_new, dense, middle, members, dims)
+            functions.observe(counted, accept, step, clock, middle, members, dims)
         if dims.sections > 0 and any_lane(counted):
-            functions.cut(
-                counted, now, h, y, y_new, dense, found, cell, counts, points, steering, rule, dims, functions.section
-            )
+            functions.cut(counted, step, crossings, cell, counts, points, steering, rule, dims, functions.section)
         if dims.observed > 0 and any_lane(counted):
-            functions.tally(
-                lane_bits(counted), now, h, y, y_new, dense, seen, cell, sums, steering, rule, dims, functions.values
-            )
+            functions.tally(lane_bits(counted), step, seen, cell, sums, steering, rule, dims, functions.values)
         if dims.sampled and any_lane(accept):
-            functions.sample(lane_bits(accept), t_new, h, clock, y, y_new, dense, cell, spans, samples, dims)
-        # move the accepted lanes on
+            functions.sample(lane_bits(accept), t_new, step, clock, cell, spans, samples, dims)
+
+        # 6. Move the accepted lanes to the end of the step, and find the lanes that step 3 must look at.
         largest = advance(clock, y, t, t_new, accept, y_new, dims)
         if CONTACTS:
-            change_modes(accept, t_new, y, out, network, dims, functions.pushes)
+            change_modes(accept, t_new, y, friction)
         if SERIES:
             wrap(clock)
         look = ALL if steering[CANCEL] != 0.0 else lane_bits(pause(clock, largest))

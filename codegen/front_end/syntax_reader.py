@@ -74,12 +74,16 @@ def read(context: Any, function: Any, args: Sequence[types.Type], result: types.
     return _TreeReader(context, function.__globals__).function(tree_of(function), args, result)
 
 
-def gathered(parts: Sequence[TypedExpr]) -> TypedExpr:
-    """A tuple."""
+def gathered(parts: Sequence[TypedExpr], record: type | None = None) -> TypedExpr:
+    """Return a tuple, or a NamedTuple of the class `record`."""
     if any(part.owned for part in parts):
         raise UnreadError
-    kind = types.BaseTuple.from_types([part.kind for part in parts])
-    return TypedExpr(kind, lambda w: w.context.make_tuple(w.builder, kind, [part.write(w) for part in parts]))
+    kinds = [part.kind if record is None else types.unliteral(part.kind) for part in parts]
+    kind, writes = (
+        types.BaseTuple.from_types(kinds, record),
+        [part.cast(k) for part, k in zip(parts, kinds, strict=True)],
+    )
+    return TypedExpr(kind, lambda w: w.context.make_tuple(w.builder, kind, [write(w) for write in writes]))
 
 
 def part(value: TypedExpr, k: int) -> TypedExpr:
@@ -280,6 +284,8 @@ class _TreeReader(ast.NodeVisitor):
         if self.is_known(node):
             return self.known(self.found(node))
         base: TypedExpr = self.visit(node.value)
+        if isinstance(base.kind, types.BaseNamedTuple):
+            return part(base, base.kind.fields.index(name))
         kind = self.context.resolve_getattr(typ=base.kind, attr=name)
         if kind is None or isinstance(kind, types.Callable | types.Array) or base.owned:
             raise UnreadError
@@ -346,7 +352,10 @@ class _TreeReader(ast.NodeVisitor):
         if node.keywords:
             raise UnreadError
         if self.is_known(node.func):
-            return self.call(self.found(node.func), *map(self.visit, node.args))
+            function, values = self.found(node.func), [self.visit(value) for value in node.args]
+            if isinstance(function, type) and issubclass(function, tuple) and function is not tuple:
+                return gathered(values, function)
+            return self.call(function, *values)
         return self.pointed(self.visit(node.func), [self.visit(value) for value in node.args])
 
     def pointed(self, function: TypedExpr, values: Sequence[TypedExpr]) -> TypedExpr:

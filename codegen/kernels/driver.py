@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
+from itertools import pairwise
+from typing import Any
 
 from .. import driver, simd
+from ..driver import records
 from ..simd.lanes import native_width
 
 
@@ -75,6 +79,11 @@ class Driver:
         """Name of the function that runs cells or orbits."""
         return "march" if self.kind is KernelKind.MODES else "drive"
 
+    def grouped(self, arrays: Sequence[Any]) -> Iterator[tuple[Any, ...]]:
+        """Return the tuples that the entry takes: input, deviations if there are modes, output, propagation."""
+        ends = (0, 4, 7, 10, 21) if self.kind is KernelKind.MODES else (0, 4, 10)
+        return (tuple(arrays[first:last]) for first, last in pairwise(ends))
+
     @property
     def text(self) -> str:
         modes = self.kind is KernelKind.MODES
@@ -117,6 +126,9 @@ def common_drivers() -> list[Driver | Recorder]:
     return list(dict.fromkeys([*sweeps, *modes, *recorders]))
 
 
+RECORDS = {name for name, value in vars(records).items() if isinstance(value, type) and issubclass(value, tuple)}
+"""Names of the records that the text of a driver may construct."""
+
 WORDS = re.compile(r'"""(?:.|\n)*?"""|"[^"\n]*"|\'[^\'\n]*\'|#[^\n]*|(?<![\w.])([A-Za-z_]\w*)')
 """Matches a string, a comment or a name. The group holds a name that is not an attribute."""
 
@@ -126,4 +138,7 @@ def imports(text: str) -> str:
     named = set(WORDS.findall(text))
     modules = [line for name, line in (("math", "import math"), ("np", "import numpy as np")) if name in named]
     used = ", ".join(sorted(named.intersection(simd.__all__)))
-    return "\n\n".join([*modules, f"from synchain.codegen.simd import {used}"])
+    lines = [*modules, f"from synchain.codegen.simd import {used}"]
+    if taken := sorted(named & RECORDS):
+        lines.append(f"from synchain.codegen.driver.records import {', '.join(taken)}")
+    return "\n\n".join(lines)

@@ -33,8 +33,9 @@ from numba.core.serialize import dumps
 from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.keywords import warn
 
-from ..driver import dimensions
+from ..driver import dimensions, records
 from ..driver.dimensions import Dimensions, ModeDimensions
+from ..driver.records import Step
 from ..front_end import decorator, syntax_trees
 from ..kernels.driver import Driver, KernelKind, Recorder
 from ..kernels.kernel_text import KernelSource
@@ -66,15 +67,15 @@ def _recorded(width: int) -> dict[str, Any]:
     lane, mask, sizes = Lane(width), Mask(width), _sizes(Dimensions)
     values = types.void(lane, lane, lane, *[ADDRESS] * 4, types.UniTuple(types.int64, 2))
     called, cells = types.FunctionType(values), types.int64[::1]
-    step = (lane, lane, *[ADDRESS] * 3)
+    step = types.NamedTuple((lane, lane, *[ADDRESS] * 3), Step)
     return {
         "section": values,
         "values": values,
-        "halt": lane(mask, lane, lane, *[ADDRESS] * 6, _matrix, sizes, called),
-        "observe": types.void(mask, mask, lane, *[ADDRESS] * 6, sizes),
-        "cut": types.void(mask, *step, ADDRESS, cells, _counts, _cube, ADDRESS, _matrix, sizes, called),
-        "tally": types.void(types.int64, *step, ADDRESS, cells, _matrix, ADDRESS, _matrix, sizes, called),
-        "sample": types.void(types.int64, lane, lane, *[ADDRESS] * 4, cells, _input, _cube, sizes),
+        "halt": lane(mask, step, *[ADDRESS] * 3, _matrix, sizes, called),
+        "observe": types.void(mask, mask, step, *[ADDRESS] * 3, sizes),
+        "cut": types.void(mask, step, ADDRESS, cells, _counts, _cube, ADDRESS, _matrix, sizes, called),
+        "tally": types.void(types.int64, step, ADDRESS, cells, _matrix, ADDRESS, _matrix, sizes, called),
+        "sample": types.void(types.int64, lane, step, ADDRESS, cells, _input, _cube, sizes),
     }
 
 
@@ -92,9 +93,9 @@ def signatures(driver: Driver) -> dict[str, Any]:
             "pushes": types.void(one, *[ADDRESS] * 3),
             "release": types.void(types.int64, *[types.float64] * 2, *[ADDRESS] * 3, types.int64),
         }
-        arrays = (*[_input] * 3, _vector, _input, _cube, _matrix, _matrix, _matrix, _counts)
-        arrays += (types.int64[::1], _matrix, _matrix, _vector, _matrix, _cube, _vector)
-        arrays += (_matrix, _vector, _vector, _cube)
+        propagation = (types.int64[::1], _matrix, _matrix, _vector, _matrix, _cube, _vector)
+        propagation += (_matrix, _vector, _vector, _cube)
+        arrays: tuple[Any, ...] = ((_input, _cube, _matrix), (_matrix, _matrix, _counts), propagation)
         own: tuple[Any, ...] = (_sizes(ModeDimensions), types.int64[::1])
     else:
         lane = Lane(driver.width)
@@ -103,10 +104,11 @@ def signatures(driver: Driver) -> dict[str, Any]:
         step = result(*times, *[ADDRESS] * 4, types.float64, types.float64, *more)
         pushes = types.void(lane, *[ADDRESS] * 3, *more)
         known = {"step": step, "pushes": pushes, **_recorded(driver.width)}
-        arrays = (*[_input] * 3, _vector, _matrix, _matrix, _counts, _cube, _cube, _matrix)
+        arrays = ((_matrix, _matrix, _counts, _cube, _cube, _matrix),)
         own = (_sizes(Dimensions), _vector, _matrix, types.Tuple(more))
     functions = FunctionsType({name: known[name] for name in driver.functions})
-    return {**known, driver.entry: types.void(functions, *own, types.int64, types.int64, *arrays)}
+    tuples = (types.Tuple(kinds) for kinds in ((*[_input] * 3, _vector), *arrays))
+    return {**known, driver.entry: types.void(functions, *own, types.int64, types.int64, *tuples)}
 
 
 LOG = logging.getLogger(__name__)
@@ -173,7 +175,8 @@ class Kernel:
 
     def drive(self, first: int, last: int, *arrays: np.ndarray) -> None:
         """Run the cells first … last-1."""
-        self.entry(*self.own, first, last, *arrays)
+        # Numba finds the types of few tuples faster than those of many arrays
+        self.entry(*self.own, first, last, *self.origin.driver.grouped(arrays))
 
     @property
     def source(self) -> str:
@@ -389,6 +392,7 @@ def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) 
 SOURCES = [
     *sorted(path for file in (decorator.__file__, lane_types.__file__) for path in Path(file).parent.glob("*.py")),
     Path(dimensions.__file__),
+    Path(records.__file__),
     Path(function_table.__file__),
 ]
 """The files, besides the text of a module, whose code is in its machine code."""

@@ -12,8 +12,9 @@ from ..simd.lanes import broadcast, load, maximum, select, store
 
 # --- kernel text below ---
 @njit(error_model="numpy", cache=True)
-def observe(counted, accept, h, clock, y, y_new, dense, middle, multiplicity, dims):
+def observe(counted, accept, step, clock, middle, multiplicity, dims):
     """Add the step to the time integral of the synchronisation error (Simpson) and to its maximum."""
+    y, y_new, dense = step.y, step.y_new, step.dense
     peak, first, last = load(clock, SYNC_PEAK, WIDTH), load(clock, SYNC, WIDTH), spread(y_new, multiplicity, dims)
     panels = 4 if SERIES else 1  # of the rule; a Taylor step is several times longer than others
     total, half = first, broadcast(0.0, WIDTH)
@@ -23,7 +24,7 @@ def observe(counted, accept, h, clock, y, y_new, dense, middle, multiplicity, di
         value = spread(middle, multiplicity, dims)
         total = total + (4.0 if k % 2 else 2.0) * value
         half = maximum(half, value)
-    area = h * (total + last) / (6.0 * panels)
+    area = step.h * (total + last) / (6.0 * panels)
     store(clock, SYNC_SUM, load(clock, SYNC_SUM, WIDTH) + select(counted, area, 0.0))
     store(clock, SYNC_PEAK, select(counted, maximum(peak, maximum(first, maximum(half, last))), peak))
     store(clock, SYNC, select(accept, last, first))

@@ -6,6 +6,7 @@ from numba import njit
 
 from ..driver.clock_slots import BASE, HALTED, MARK, SERIES, WIDTH
 from ..driver.dense import inside
+from ..driver.records import Step, Zeros
 from ..simd.lanes import any_lane, broadcast, load, select, store
 from .crossings import at_point, begin, crosses, locate, look, ready
 from .panels import following
@@ -13,8 +14,9 @@ from .panels import following
 
 # --- kernel text below ---
 @njit(error_model="numpy")
-def shorten(hits, part, y, y_new, dense, dims):
+def shorten(hits, part, step, dims):
     """Let the step of some lanes end at a fraction of it: the new state, and the dense output of the shorter step."""
+    y, y_new, dense = step.y, step.y_new, step.dense
     for c in range(dims.dimension):
         old, end = load(y, c, WIDTH), inside(part, c, y, y_new, dense, dims)
         carried = part * (load(y_new, c, WIDTH) - old) - (end - old)
@@ -32,29 +34,28 @@ def shorten(hits, part, y, y_new, dense, dims):
 
 
 @njit(error_model="numpy", cache=True)
-def halt(accept, t, h, clock, y, y_new, dense, found, control, rule, dims, section):
-    """End the step of a lane where the last section function passes zero, and mark the lane; returns the lengths."""
-    now, k = load(clock, BASE, WIDTH) + t, dims.sections
+def halt(accept, step, clock, found, control, rule, dims, section):
+    """End the step of a lane where the last section function passes zero, and mark the lane; return the lengths."""
+    now, k, h = load(clock, BASE, WIDTH) + step.t, dims.sections, step.h
+    zeros = Zeros(Step(now, h, step.y, step.y_new, step.dense), found, rule, dims, section)
     part, hits = broadcast(1.0, WIDTH), accept & ~accept
-    begin(k, accept, found, rule, dims)
+    begin(k, accept, zeros)
     level, place = 0, 0
     while True:
         width = 1.0 / (1 << level)
-        look(place, width, now, h, y, y_new, dense, found, rule, dims, section)
-        done, halved = ready(k, level, found, rule, control, dims)
+        look(place, width, zeros)
+        done, halved = ready(k, level, zeros, control)
         for point in range(len(rule) - 1):
-            g_low, g_high = at_point(k, point, found, rule, dims), at_point(k, point + 1, found, rule, dims)
+            g_low, g_high = at_point(k, point, zeros), at_point(k, point + 1, zeros)
             passes = crosses(g_low, g_high, 0.0) & done & ~hits
             if any_lane(passes):
-                zero, passes = locate(
-                    k, passes, point, place, width, now, h, y, y_new, dense, found, rule, dims, section
-                )
+                zero, passes = locate(k, passes, point, place, width, zeros)
                 part, hits = select(passes, zero, part), hits | passes
         level, place = following(level, place, halved)
         if level == 0:
             break
     if any_lane(hits):
-        shorten(hits, part, y, y_new, dense, dims)
+        shorten(hits, part, step, dims)
         store(clock, HALTED, select(hits, 1.0, load(clock, HALTED, WIDTH)))
         store(clock, MARK, select(hits, 0.0, load(clock, MARK, WIDTH)))  # at once, they need a look
     return part * h

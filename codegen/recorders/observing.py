@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from ..driver.clock_slots import ATOL, OBSERVED, RTOL, WIDTH
+from ..driver.records import Tallied
 from ..simd.addresses import address
 from ..simd.lanes import broadcast, lane_bits, load, store
 from .panels import NEXT, POINT, TOP, WEIGHT, following, gentle, simple
@@ -48,7 +49,7 @@ def hidden(seen, rule, control, dims):
 
 
 @njit(error_model="numpy")
-def rough(which, i, width, seen, sums, rule, control, dims):
+def rough(lane, i, width, seen, sums, rule, control, dims):
     """True if the rule is not good enough for a value of a lane: its last Legendre coefficients are too large.
 
     The rule is exact to about twice the degree of the interpolant, so its error is about the square of the last
@@ -60,7 +61,7 @@ def rough(which, i, width, seen, sums, rule, control, dims):
     for k in range(dims.observed):
         top = following = size = 0.0
         for point in range(len(rule)):
-            value = seen[(point * computed(dims) + k) * WIDTH + which]
+            value = seen[(point * computed(dims) + k) * WIDTH + lane]
             top += rule[point, TOP] * value
             following += rule[point, NEXT] * value
             size = max(size, abs(value))
@@ -76,7 +77,7 @@ def rough(which, i, width, seen, sums, rule, control, dims):
 
 
 @njit(error_model="numpy")
-def add(which, i, length, seen, sums, rule, dims):
+def add(lane, i, length, seen, sums, rule, dims):
     """Add a panel of some length to the integrals of a cell, and look for extremes.
 
     The integrals are those of the distance from the first value, so that variances keep their digits.
@@ -84,7 +85,7 @@ def add(which, i, length, seen, sums, rule, dims):
     for point in range(len(rule)):
         share, begins = length * rule[point, WEIGHT], point == 0 and sums[i, OBSERVED] == 0.0
         for k in range(dims.observed):
-            value, at = seen[(point * computed(dims) + k) * WIDTH + which], TALLIES + TALLY * k
+            value, at = seen[(point * computed(dims) + k) * WIDTH + lane], TALLIES + TALLY * k
             if begins:
                 sums[i, at + FIRST] = sums[i, at + LARGEST] = sums[i, at + LEAST] = value
             gap = value - sums[i, at + FIRST]
@@ -108,7 +109,7 @@ def vertex(a, m, b, at_a, at_m, at_b):
 
 
 @njit(error_model="numpy")
-def bracket(which, k, sign, best, seen, rule, ends, dims):
+def bracket(lane, k, sign, best, seen, rule, ends, dims):
     """Write into `ends` the neighbours of the point of a panel beside which sign * value k may be highest, and values.
 
     Returns where it may be, as a share of the panel, and whether it is higher than `best` there.
@@ -117,9 +118,9 @@ def bracket(which, k, sign, best, seen, rule, ends, dims):
     for point in range(last + 1):
         low, high, centre = max(point - 1, 0), min(point + 1, last), min(max(point, 1), last - 1)
         at_low, at_point, at_high = (
-            sign * seen[(low * computed(dims) + k) * WIDTH + which],
-            sign * seen[(point * computed(dims) + k) * WIDTH + which],
-            sign * seen[(high * computed(dims) + k) * WIDTH + which],
+            sign * seen[(low * computed(dims) + k) * WIDTH + lane],
+            sign * seen[(point * computed(dims) + k) * WIDTH + lane],
+            sign * seen[(high * computed(dims) + k) * WIDTH + lane],
         )
         if at_low > at_point or at_high > at_point:
             continue
@@ -127,9 +128,9 @@ def bracket(which, k, sign, best, seen, rule, ends, dims):
             rule[centre - 1, POINT],
             rule[centre, POINT],
             rule[centre + 1, POINT],
-            sign * seen[((centre - 1) * computed(dims) + k) * WIDTH + which],
-            sign * seen[(centre * computed(dims) + k) * WIDTH + which],
-            sign * seen[((centre + 1) * computed(dims) + k) * WIDTH + which],
+            sign * seen[((centre - 1) * computed(dims) + k) * WIDTH + lane],
+            sign * seen[(centre * computed(dims) + k) * WIDTH + lane],
+            sign * seen[((centre + 1) * computed(dims) + k) * WIDTH + lane],
         )
         if height > best and rule[low, POINT] < place < rule[high, POINT]:
             found, best, guess = True, height, place
@@ -138,70 +139,90 @@ def bracket(which, k, sign, best, seen, rule, ends, dims):
     return guess, found
 
 
+@njit(error_model="numpy", forceinline=True)
+def evaluate(theta, out, tallied):
+    """Compute all values at a fraction of the step."""
+    step = tallied.step
+    tallied.values(theta, step.t, step.h, step.y, step.y_new, step.dense, out, tallied.dims[:2])
+
+
 @njit(error_model="numpy")
-def climb(added, begin, width, t, h, y, y_new, dense, seen, cell, sums, control, rule, dims, values):
+def narrow(row, u, at_u):
+    """Shrink a bracket by the height at u: `row` holds three fractions, the middle one highest, and their heights."""
+    a, m, b, at_a, at_m, at_b = row[0], row[1], row[2], row[3], row[4], row[5]
+    if at_u > at_m:
+        (a, at_a), (b, at_b) = ((m, at_m), (b, at_b)) if u > m else ((a, at_a), (m, at_m))
+        m, at_m = u, at_u
+    else:
+        (a, at_a), (b, at_b) = ((a, at_a), (u, at_u)) if u > m else ((u, at_u), (b, at_b))
+    row[0], row[1], row[2], row[3], row[4], row[5] = a, m, b, at_a, at_m, at_b
+
+
+@njit(error_model="numpy")
+def climb(added, begin, width, tallied, cell, sums, control):
     """Raise the extremes of the cells in `added` to those between the points of a panel, by successive parabolas.
 
-    Only an extreme beyond those that are known is looked for, and no closer than the tolerances.
+    Only an extreme beyond those that are known is sought, and no closer than the tolerances.
     """
+    seen, rule, dims = tallied.seen, tallied.rule, tallied.dims
     ends, there, at = np.empty((WIDTH, 6)), np.empty(WIDTH), np.empty(computed(dims) * WIDTH)
     for k in range(dims.observed):
         for column in (LARGEST, LEAST):
-            sign, place, open_lanes = 1.0 if column == LARGEST else -1.0, TALLIES + TALLY * k + column, 0
-            for which in range(WIDTH):
-                there[which] = 0.0
-                if (added >> which) & 1:
-                    best = sign * sums[cell[which], place]
+            sign, extreme, open_lanes = 1.0 if column == LARGEST else -1.0, TALLIES + TALLY * k + column, 0
+            # 1. bracket an extreme in each lane
+            for lane in range(WIDTH):
+                there[lane] = 0.0
+                if (added >> lane) & 1:
+                    best = sign * sums[cell[lane], extreme]
                     best += control[RTOL] * abs(best) + control[ATOL]
-                    there[which], higher = bracket(which, k, sign, best, seen, rule, ends[which], dims)
-                    open_lanes |= higher << which
+                    there[lane], higher = bracket(lane, k, sign, best, seen, rule, ends[lane], dims)
+                    open_lanes |= higher << lane
+            # 2. move to the vertex of the parabola through each bracket, until it rises by less than the tolerances
             for _ in range(CLIMBS):
                 if open_lanes == 0:
                     break
-                values((load(there, 0, WIDTH) + begin) * width, t, h, y, y_new, dense, address(at, 0), dims[:2])
-                for which in range(WIDTH):
-                    if (open_lanes >> which) & 1:
-                        row = ends[which]
+                evaluate((load(there, 0, WIDTH) + begin) * width, address(at, 0), tallied)
+                for lane in range(WIDTH):
+                    if (open_lanes >> lane) & 1:
+                        row = ends[lane]
+                        narrow(row, there[lane], sign * at[k * WIDTH + lane])
                         a, m, b, at_a, at_m, at_b = row[0], row[1], row[2], row[3], row[4], row[5]
-                        u, at_u = there[which], sign * at[k * WIDTH + which]
-                        if at_u > at_m:
-                            (a, at_a), (b, at_b) = ((m, at_m), (b, at_b)) if u > m else ((a, at_a), (m, at_m))
-                            m, at_m = u, at_u
-                        else:
-                            (a, at_a), (b, at_b) = ((a, at_a), (u, at_u)) if u > m else ((u, at_u), (b, at_b))
-                        sums[cell[which], place] = sign * max(sign * sums[cell[which], place], at_m)
-                        ends[which] = a, m, b, at_a, at_m, at_b
-                        there[which], height = vertex(a, m, b, at_a, at_m, at_b) if a < m < b else (m, at_m)
+                        sums[cell[lane], extreme] = sign * max(sign * sums[cell[lane], extreme], at_m)
+                        there[lane], height = vertex(a, m, b, at_a, at_m, at_b) if a < m < b else (m, at_m)
                         if not (
-                            a < there[which] < b and height - at_m > 0.1 * (control[RTOL] * abs(at_m) + control[ATOL])
+                            a < there[lane] < b and height - at_m > 0.1 * (control[RTOL] * abs(at_m) + control[ATOL])
                         ):
-                            open_lanes &= ~(1 << which)
+                            open_lanes &= ~(1 << lane)
 
 
 @njit(error_model="numpy", cache=True)
-def tally(counted, t, h, y, y_new, dense, seen, cell, sums, control, rule, dims, values):
-    """Add the step of the lanes in `counted` to what is observed; each lane halves the panels that it needs."""
-    points, lengths = len(rule), np.empty(WIDTH)
-    store(lengths, 0, h)
+def tally(counted, step, seen, cell, sums, control, rule, dims, values):
+    """Add the step of the lanes in `counted` to the tallies; each lane halves the panels that it needs."""
+    tallied, points, lengths = Tallied(step, seen, rule, dims, values), len(rule), np.empty(WIDTH)
+    store(lengths, 0, step.h)
+    # of each level: lanes that still need its panels, and lanes that seek kinks and jumps there
     open_lanes, sought = np.zeros(DEEPEST + 1, np.int64), np.zeros(DEEPEST + 1, np.int64)
     open_lanes[0], sought[0], level, k = counted, counted, 0, 0
     while True:
+        # 1. values at the points of panel k of the level
         width, halved, added = 1.0 / (1 << level), 0, 0
         for point in range(points):
             theta = broadcast((k + rule[point, POINT]) * width, WIDTH)
-            values(theta, t, h, y, y_new, dense, address(seen, point * computed(dims) * WIDTH), dims[:2])
+            evaluate(theta, address(seen, point * computed(dims) * WIDTH), tallied)
         unseen = sought[level]
         if unseen != 0:
             unseen &= hidden(seen, rule, control, dims) if level < SOUGHT else 0
-        for which in range(WIDTH):
-            if (open_lanes[level] >> which) & 1:
-                bad = rough(which, cell[which], width, seen, sums, rule, control, dims) | ((unseen >> which) & 1 != 0)
+        # 2. each lane adds the panel, or halves it
+        for lane in range(WIDTH):
+            if (open_lanes[level] >> lane) & 1:
+                bad = rough(lane, cell[lane], width, seen, sums, rule, control, dims) | ((unseen >> lane) & 1 != 0)
                 if bad and level < DEEPEST:
-                    halved |= 1 << which
+                    halved |= 1 << lane
                 else:
-                    add(which, cell[which], width * lengths[which], seen, sums, rule, dims)
-                    added |= 1 << which
-        climb(added, float(k), width, t, h, y, y_new, dense, seen, cell, sums, control, rule, dims, values)
+                    add(lane, cell[lane], width * lengths[lane], seen, sums, rule, dims)
+                    added |= 1 << lane
+        climb(added, float(k), width, tallied, cell, sums, control)
+        # 3. the next panel: the first half of this one, or the one behind it
         level, k = following(level, k, halved != 0)
         if level == 0:
             break

@@ -61,10 +61,9 @@ from synchain.codegen.simd import address, broadcast, njit
 
 
 @njit(error_model="numpy", nogil=True, cache=True)
-def drive(
-    functions, dims, multiplicity, rule, network, first, last, start, numbers, spans, control, end, sums, counts, points,
-    samples, lanes,
-):
+def drive(functions, dims, multiplicity, rule, network, first, last, inputs, outputs):
+    start, _, _, _ = inputs
+    end, _, _, _, _, _ = outputs
     zero = broadcast(0.0, 1)
     for i in range(first, last):
         y, y_new = address(start[i], 0), address(end[i], 0)
