@@ -16,17 +16,17 @@ from ..simd.lanes import broadcast, load, one_lane, select, store
 from .clock_slots import *
 
 # --- kernel text below ---
-# What must repeat for the future to repeat, saved behind state and parameters: the state and these of the clock.
+# If the state and these slots of the clock repeat, the future repeats; they are saved behind state and parameters.
 REPEATING = (STEP, SYNC)
-LONGEST_CYCLE = 32.0
-# Taylor steps go on beyond the ends of periods, but for one in PROBE, a multiple of many lengths of cycles.  Once a state
-# there is as near as NEAR, or so many rtol, to that at the last one, the steps stop at the ends of all periods.
+LONGEST_CYCLE = 32.0  # periods; longer cycles are not found (a choice)
+# Taylor steps pass the ends of periods except every PROBE-th, a multiple of many lengths of cycles.  Once two successive
+# states there differ by less than NEAR, or JITTER rtol, the steps stop at the ends of all periods (choices).
 PROBE, NEAR, JITTER = 60.0, 1e-6, 100.0
 
 
 @njit(error_model="numpy")
 def aligned(count):
-    """Zeros that begin on a cache line: a register that lies across two is slow to read and slower to read back."""
+    """Return zeros that begin on a cache line: a register across two of them is slow to read and slower to read back."""
     block = np.zeros(count + 8)
     shift = (64 - block.ctypes.data % 64) % 64 // 8
     return block[shift : shift + count]
@@ -34,7 +34,7 @@ def aligned(count):
 
 @njit(error_model="numpy", forceinline=True)
 def put(array, slot, lane, value):
-    """Write one number of one lane as part of a whole register: reading that register back need not wait for memory."""
+    """Write one number of one lane as part of a whole register, so that reading the register back need not wait for memory."""
     store(array, slot, select(one_lane(lane, WIDTH), broadcast(value, WIDTH), load(array, slot, WIDTH)))
 
 
@@ -79,7 +79,7 @@ def watch(lane, control, clock):
 
 @njit(error_model="numpy")
 def vacate(lane, clock):
-    """Let a lane run idly on what it holds: it never stops, and nobody asks for it."""
+    """Let a lane run idly on its present state, without stops and results."""
     for group in (STOP, START, END, PERIOD, BOUND, NEXT_SAMPLE):
         put(clock, group, lane, math.inf)
     put(clock, ACCEPTED, lane, -math.inf)
@@ -102,7 +102,7 @@ def begin(lane, cell, spans, clock):
 
 @njit(error_model="numpy")
 def turn_over(lane, cell, spans, control, clock, y, dims):
-    """Begin the next period of the drive; jump where the computation is known to repeat itself."""
+    """Begin the next period of the drive; skip whole cycles if the computation repeats itself."""
     put(clock, PERIODS, lane, clock[PERIODS * WIDTH + lane] + 1.0)
     restart(lane, clock)
     if dims.repeats:
@@ -121,7 +121,7 @@ def turn_over(lane, cell, spans, control, clock, y, dims):
 
 @njit(error_model="numpy")
 def settle_down(lane, cell, spans, clock):
-    """End a cell that is known to stay synchronous: its error counts as what it is now for the rest of the window."""
+    """End a cell that stays synchronous; its present error counts for the remaining window."""
     error, start, end = clock[SYNC * WIDTH + lane], spans[cell, 0], spans[cell, 1]
     now = clock[BASE * WIDTH + lane] + clock[TIME * WIDTH + lane]
     put(clock, SYNC_SUM, lane, clock[SYNC_SUM * WIDTH + lane] + error * (end - max(start, now)))
@@ -131,10 +131,10 @@ def settle_down(lane, cell, spans, clock):
 
 @njit(error_model="numpy")
 def restart(lane, clock):
-    """Let the step control begin the period with nothing in mind but a power of two.
+    """Let the step control begin the period with a power of two as the step and no other memory.
 
-    What the steps of a period are then depends on the state at its beginning alone, and a computation on a periodic orbit
-    comes to repeat itself, which the wandering of a step size that remembers would prevent.
+    The steps of a period then depend only on the state at its beginning, so that the computation of a periodic orbit
+    repeats itself bit for bit after a transient.
     """
     _, exponent = math.frexp(clock[STEP * WIDTH + lane])
     put(clock, STEP, lane, math.ldexp(0.5, exponent))
@@ -144,7 +144,7 @@ def restart(lane, clock):
 
 @njit(error_model="numpy")
 def approach(lane, clock, y, control, dims):
-    """Look whether a free clock comes near a motion that repeats itself: its steps stop at the ends of all periods then."""
+    """Test whether a free clock is near a periodic motion; if it is, steps stop at the ends of all periods."""
     saved, gap, size = dims.dimension + dims.parameters, 0.0, 0.0
     for c in range(dims.dimension):
         gap += abs(y[c * WIDTH + lane] - y[(saved + c) * WIDTH + lane])
@@ -156,9 +156,9 @@ def approach(lane, clock, y, control, dims):
 
 @njit(error_model="numpy")
 def disturbed(lane, clock):
-    """Whether the window began within a period after the saved one: a step ended there, as none does in other periods.
+    """Return True if the window began within a period after the saved one: only in that period a step ends there.
 
-    What repeated itself before need not do so behind it: the state is another one, by as much as the tolerance allows.
+    The additional end of a step changes the state within the tolerance, so that an earlier cycle need not go on.
     """
     period, start = clock[PERIOD * WIDTH + lane], clock[FROM * WIDTH + lane]
     begun = clock[SAVED_AT * WIDTH + lane] * period < start < clock[PERIODS * WIDTH + lane] * period
@@ -186,7 +186,7 @@ def compare(lane, clock, y, dims):
 
 @njit(error_model="numpy")
 def save(lane, clock, y, dims):
-    """Save the state and what else must repeat, behind state and parameters."""
+    """Save the state and the slots REPEATING of the clock, behind state and parameters."""
     saved = dims.dimension + dims.parameters
     put(clock, SAVED_AT, lane, clock[PERIODS * WIDTH + lane])
     for c in range(dims.dimension):
@@ -197,7 +197,7 @@ def save(lane, clock, y, dims):
 
 @njit(error_model="numpy")
 def jump(lane, cell, spans, clock):
-    """Leave out whole cycles: before the window always, inside it after one whole cycle was measured, unless LEFT is 0."""
+    """Skip whole cycles: before the window always, inside it once a whole cycle was measured, unless LEFT is 0."""
     period, now = clock[PERIOD * WIDTH + lane], clock[PERIODS * WIDTH + lane]
     cycle = clock[CYCLE * WIDTH + lane]
     start, end = spans[cell, 0], spans[cell, 1]
@@ -226,12 +226,12 @@ def leap(lane, periods, clock):
 
 @njit(error_model="numpy")
 def unbounded(lane, clock, control):
-    """Whether the state grows while the steps shrink with it, so that their number will not reach the end.
+    """Return True if the state grows and the steps shrink with it, so that MAX_STEPS steps will not reach the end.
 
-    Looks when the number of steps has doubled.  If doublings take equal times, the work grows exponentially; bounded
-    motions have work in proportion to time, and an angle that turns ever faster has a power of it: their doublings take
-    longer and longer.  Those of a jump between slow motions take ever shorter.  Even if growth ended here, the steps
-    that are left would not do.
+    The test runs when the number of steps has doubled.  If doublings take equal times, the work grows exponentially.
+    A bounded motion has work in proportion to time, and an angle that turns ever faster has work like a power of time:
+    their doublings take longer and longer.  Doublings at a jump between slow motions become shorter and shorter.
+    The remaining steps must be too few even if growth ends now.
     """
     steps = clock[ACCEPTED * WIDTH + lane] + clock[REJECTED * WIDTH + lane]
     if steps < clock[MARK * WIDTH + lane]:
@@ -254,7 +254,7 @@ def unbounded(lane, clock, control):
 
 @njit(error_model="numpy")
 def outcome(lane, clock, y, control, dims):
-    """Status of the cell in a lane, 0 while it runs."""
+    """Return the status of the cell in a lane, 0 while it runs."""
     t = clock[TIME * WIDTH + lane]
     largest = 0.0
     for c in range(dims.dimension):
@@ -283,7 +283,7 @@ def outcome(lane, clock, y, control, dims):
 
 @njit(error_model="numpy")
 def pauses(lane, clock):
-    """Whether a cell is to pause, so that its integrator is looked at: at LOOKS times as many steps each time."""
+    """Return True if a cell must pause for another choice of its integrator; each test is LOOKS times as many steps later."""
     steps = clock[ACCEPTED * WIDTH + lane] + clock[REJECTED * WIDTH + lane]
     if steps < clock[LOOK * WIDTH + lane]:
         return False
@@ -296,7 +296,7 @@ def pauses(lane, clock):
 
 @njit(error_model="numpy")
 def come_back(lane, clock, y, saved):
-    """Put a cell that has paused into a lane, to the last bit as it left it."""
+    """Put a paused cell back into a lane, with the same bits."""
     for slot in range(CLOCK):
         put(clock, slot, lane, saved[slot])
     for slot in range(saved.size - CLOCK):

@@ -28,7 +28,7 @@ LOOKS, SHALLOW = 4, 0.2
 
 @njit(error_model="numpy", forceinline=True)
 def gap_of(i, p, out, dims):
-    """The gap of one contact, from what `pushes` has written."""
+    """Return the gap of one contact from the output of `pushes`."""
     slip = load(p, 2 * dims.nodes + i, WIDTH)
     held = minimum(load(out, 2 * dims.nodes + i, WIDTH), -load(out, 3 * dims.nodes + i, WIDTH))
     return select(absolute(slip) < 0.5, held, slip * load(out, i, WIDTH))
@@ -50,7 +50,7 @@ def smallest_gap(t, y, p, friction):
 
 @njit(error_model="numpy", forceinline=True)
 def on_side(side, gap, out, dims):
-    """A gap as long as all jumps and kinks in time are on their side, a closed one behind the first of them."""
+    """Return the gap while all jumps and kinks in time are on their side, -1 behind the first of them."""
     return select(load(out, 9 * dims.nodes, WIDTH) == side, gap, -1.0)
 
 
@@ -68,7 +68,7 @@ def gap_inside(theta, step, friction):
 
 @njit(error_model="numpy", forceinline=True)
 def keep_gaps(look, p, out, dims):
-    """Keep the gaps of all contacts at a look; of three looks the gaps are known."""
+    """Store the gaps of all contacts at a look; those of three looks are stored."""
     for i in range(dims.nodes):
         store(out, (6 + look % 3) * dims.nodes + i, gap_of(i, p, out, dims))
 
@@ -99,7 +99,7 @@ def bottom(i, theta, span, step, friction):
 
 @njit(error_model="numpy")
 def first_dip(k, open_lanes, step, friction):
-    """The first fraction (2: none) between looks k-2 and k where the gap of a contact dips below zero, and that gap."""
+    """Return the first fraction (2: none) between looks k-2 and k where a gap dips below zero, and that gap."""
     span = 1.0 / LOOKS
     first, depth = broadcast(2.0, WIDTH), broadcast(0.0, WIDTH)
     out, dims = friction.out, friction.dims
@@ -119,7 +119,7 @@ def first_dip(k, open_lanes, step, friction):
 
 @njit(error_model="numpy")
 def first_passage(accept, step, friction):
-    """The fraction of the step after which the first gap has just become negative; 2 in lanes where none does."""
+    """Return the fraction of the step after which the first gap has just become negative; 2 in lanes where none does."""
     zero, span = broadcast(0.0, WIDTH), 1.0 / LOOKS
     low, high, f_low, f_high = zero, broadcast(2.0, WIDTH), zero, broadcast(-1.0, WIDTH)
     earlier, before, open_lanes = zero, smallest_gap(step.t, step.y, step.y, friction), accept
@@ -152,7 +152,7 @@ def first_passage(accept, step, friction):
 
 @njit(error_model="numpy")
 def narrowed(side, low, high, f_low, f_high, step, friction):
-    """The end of the bracket `high` (2: no bracket) moved back until its gap is just below zero.
+    """Return the end of the bracket `high` (2: no bracket), moved back until its gap is just below zero.
 
     Regula falsi with the weight of Anderson & Bjorck, BIT 13, 253 (1973), for the passage of a level just below zero.
     """
@@ -190,7 +190,7 @@ def note_rush(accept, t, h, clock):
 
 @njit(error_model="numpy", forceinline=True)
 def take_back(accept, step, clock, friction):
-    """Take back the steps that pass an event before their end, and aim at it; returns the lanes that go on."""
+    """Reject the steps that pass an event before their end, and aim at it; return the other accepted lanes."""
     t, h = step.t, step.h
     theta = first_passage(accept, step, friction)
     least = SHORTEST * maximum(t, 1.0)
@@ -209,7 +209,7 @@ def take_back(accept, step, clock, friction):
 
 @njit(error_model="numpy")
 def change_modes(moved, t, y, friction):
-    """Let every contact whose gap has closed stick, slip or turn, by what acts on it; `t` is the time of the event."""
+    """Let every contact with a closed gap stick, slip or turn, by the forces on it; `t` is the time of the event."""
     if not any_lane(moved & (smallest_gap(t, y, y, friction) <= 0.0)):
         return
     out, dims = friction.out, friction.dims

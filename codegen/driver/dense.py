@@ -11,7 +11,7 @@ from .clock_slots import SERIES, WIDTH
 # --- kernel text below ---
 @njit(error_model="numpy", forceinline=True)
 def inside(theta, c, y, y_new, dense, dims):
-    """State variable c at the fraction theta of the step; of `dims`, the first two are looked at."""
+    """Return state variable c at the fraction theta of the step; only the first two of `dims` are read."""
     dimension, rows = dims[0], dims[1]
     if SERIES:
         value = load(dense, (rows - 1) * dimension + c, WIDTH)
@@ -22,5 +22,5 @@ def inside(theta, c, y, y_new, dense, dims):
     inner = load(dense, (rows - 1) * dimension + c, WIDTH)
     for j in range(rows - 2, -1, -1):
         inner = load(dense, j * dimension + c, WIDTH) + theta * inner
-    rest = 1.0 - theta
-    return rest * load(y, c, WIDTH) + theta * (load(y_new, c, WIDTH) + rest * inner)
+    left = 1.0 - theta
+    return left * load(y, c, WIDTH) + theta * (load(y_new, c, WIDTH) + left * inner)

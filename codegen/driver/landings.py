@@ -71,11 +71,11 @@ def lay_out(modes, powers, registers, nodes):
 
 
 @njit(error_model="numpy")
-def multiply_all(panels, weights, factors, exponents, numbers, powers):
+def multiply_all(panels, weights, factors, exponents, products, powers):
     """Multiply numbers by factors that are interpolated from those of nodes; powers of two are counted."""
     for k in range(panels.shape[0]):
         panel = address(panels, len(PANEL) * k)
-        multiply(panel, weights, factors, numbers)
+        multiply(panel, weights, factors, products)
         lift(panel, exponents, powers)
 
 
@@ -157,7 +157,7 @@ def land(nodes, legs):
 
 
 @njit(error_model="numpy")
-def multiply_twice(panel, weights, fine, room, numbers, out):
+def multiply_twice(panel, weights, fine, room, products, out):
     """Write the products of each number of a panel with two factors, as `multiply`, beside each other."""
     points, first, count = int(panel[POINTS]), int(panel[FROM]), int(panel[TO]) - int(panel[FROM])
     x, y = address(fine, int(panel[NODE])), address(fine, room + int(panel[NODE]))
@@ -173,7 +173,7 @@ def multiply_twice(panel, weights, fine, room, numbers, out):
             p, q = load(x, register, LANES), load(y, register, LANES)
             r, s = load(x, second, LANES), load(y, second, LANES)
         for at, by_x, by_y in ((first + register, p, q), (first + second, r, s)):
-            number = load(numbers, at, LANES)
+            number = load(products, at, LANES)
             store(out, 2 * at, by_x * number)
             store(out, 2 * at + 1, by_y * number)
 

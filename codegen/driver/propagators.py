@@ -80,16 +80,16 @@ def even(panel, table, exponents, entries, stride):
 
 
 @njit(error_model="numpy", forceinline=True)
-def larger(known, other):
-    """The larger of two sizes; NaN if either is."""
-    return other if other > known or other != other else known
+def larger(size, other):
+    """Return the larger of two sizes; NaN if either is."""
+    return other if other > size or other != other else size
 
 
 @njit(error_model="numpy")
 def misfit(panel, weights, table, columns, rows, kinds, stride):
-    """The largest difference of interpolated from integrated propagators, relative to the size of the propagator.
+    """Return the largest difference of interpolated from integrated propagators, relative to their size.
 
-    A single number may pass zero, and is compared with what it is interpolated from.  kinds: 2 for complex numbers, else 1.
+    A single number may pass zero, so its size is that of the terms of the interpolation.  kinds: 2 for complex numbers, else 1.
     """
     node, points, worst = int(panel[NODE]), int(panel[POINTS]), 0.0
     for extra in range(int(panel[EXTRAS])):
@@ -114,10 +114,10 @@ def misfit(panel, weights, table, columns, rows, kinds, stride):
 
 
 @njit(error_model="numpy")
-def real_entries(register, count, panel, weights, table, columns, stride, found):
-    """The real propagators in the registers which … which+1 of a panel of `count`: register TILE*slot + k of `found`.
+def real_entries(register, count, panel, weights, table, columns, stride, scratch):
+    """Interpolate the real propagators in registers `register` and `register + 1` of a panel of `count`.
 
-    Behind the last register of the panel it stands again, and behind the last of four entries so does this one.
+    Entry `slot` of the first is register TILE*slot of `scratch`.  Indices beyond the end repeat the last register or entry.
     """
     points, node, first, last = int(panel[POINTS]), int(panel[NODE]), int(panel[WEIGHTS]), columns * columns - 1
     a, b = first + points * register, first + points * min(register + 1, count - 1)
@@ -133,13 +133,13 @@ def real_entries(register, count, panel, weights, table, columns, stride, found)
             x, y = broadcast(table[r + j], LANES), broadcast(table[s + j], LANES)
             a_r, b_r, a_s, b_s = fma(u, x, a_r), fma(v, x, b_r), fma(u, y, a_s), fma(v, y, b_s)
         for at, one, two in ((slot, a_p, b_p), (second, a_q, b_q), (third, a_r, b_r), (fourth, a_s, b_s)):
-            store(found, TILE * at, one)
-            store(found, TILE * at + 1, two)
+            store(scratch, TILE * at, one)
+            store(scratch, TILE * at + 1, two)
 
 
 @njit(error_model="numpy")
-def complex_entries(register, count, panel, weights, table, columns, stride, found):
-    """As `real_entries`, of complex propagators: the imaginary part of an entry is `columns` slots further on."""
+def complex_entries(register, count, panel, weights, table, columns, stride, scratch):
+    """Interpolate complex propagators as `real_entries`; the imaginary part of an entry is `columns` slots further on."""
     points, node, last, apart = int(panel[POINTS]), int(panel[NODE]), columns * columns - 1, columns * stride
     for k in range(min(TILE, count - register)):
         at = int(panel[WEIGHTS]) + 2 * points * (register + k)
@@ -154,34 +154,34 @@ def complex_entries(register, count, panel, weights, table, columns, stride, fou
                 real_p, imaginary_p = fma(u, x, fma(v, -y, real_p)), fma(u, y, fma(v, x, imaginary_p))
                 x, y = table[q + j], table[q + apart + j]
                 real_q, imaginary_q = fma(u, x, fma(v, -y, real_q)), fma(u, y, fma(v, x, imaginary_q))
-            store(found, TILE * one + k, real_p)
-            store(found, TILE * (one + columns) + k, imaginary_p)
-            store(found, TILE * two + k, real_q)
-            store(found, TILE * (two + columns) + k, imaginary_q)
+            store(scratch, TILE * one + k, real_p)
+            store(scratch, TILE * (one + columns) + k, imaginary_p)
+            store(scratch, TILE * two + k, real_q)
+            store(scratch, TILE * (two + columns) + k, imaginary_q)
 
 
 @njit(error_model="numpy")
-def own_entries(register, count, panel, table, entries, stride, found):
-    """As `real_entries`, of a panel whose strengths are nodes themselves."""
+def node_entries(register, count, panel, table, entries, stride, scratch):
+    """Copy the propagators of a panel whose strengths are nodes, as `real_entries`."""
     for k in range(min(TILE, count - register)):
         for slot in range(entries):
             store(
-                found, TILE * slot + k, load(table, (slot * stride + int(panel[NODE])) // LANES + register + k, LANES)
+                scratch, TILE * slot + k, load(table, (slot * stride + int(panel[NODE])) // LANES + register + k, LANES)
             )
 
 
 @njit(error_model="numpy")
-def product(first, k, travellers, found, columns, parts):
-    """Apply the propagators of register k of `found` to the deviations of one register."""
-    moved = address(found, TILE * columns * parts * LANES)
+def product(first, k, travellers, scratch, columns, parts):
+    """Apply the propagators of register k of `scratch` to the deviations of one register."""
+    moved = address(scratch, TILE * columns * parts * LANES)
     for r in range(columns):
         real, imaginary = broadcast(0.0, LANES), broadcast(0.0, LANES)
         for c in range(columns):
-            a, x = load(found, TILE * (parts * c + r) + k, LANES), load(travellers, first + c, LANES)
+            a, x = load(scratch, TILE * (parts * c + r) + k, LANES), load(travellers, first + c, LANES)
             real = fma(a, x, real)
             if parts > columns:
                 b, y = (
-                    load(found, TILE * (parts * c + columns + r) + k, LANES), load(travellers, first + columns + c, LANES)
+                    load(scratch, TILE * (parts * c + columns + r) + k, LANES), load(travellers, first + columns + c, LANES)
                 )  # fmt: skip
                 real, imaginary = fma(-b, y, real), fma(a, y, fma(b, x, imaginary))
         store(moved, r, real)
@@ -203,22 +203,22 @@ def lift(panel, exponents, powers):
 
 
 @njit(error_model="numpy")
-def transport(panel, weights, table, exponents, travellers, lifts, found, columns, parts, stride):
+def transport(panel, weights, table, exponents, travellers, lifts, scratch, columns, parts, stride):
     """Apply the propagators of one panel to the deviations of its strengths; powers of two are counted in `lifts`.
 
-    `found` has room for the propagators of TILE registers, and for one deviation behind them.
+    `scratch` has room for the propagators of TILE registers, and for one deviation behind them.
     """
     count = int(panel[TO]) - int(panel[FROM])
     for register in range(0, count, TILE):
         if int(panel[POINTS]) == 0:
-            own_entries(register, count, panel, table, columns * parts, stride, found)
+            node_entries(register, count, panel, table, columns * parts, stride, scratch)
         elif parts == columns:
-            real_entries(register, count, panel, weights, table, columns, stride, found)
+            real_entries(register, count, panel, weights, table, columns, stride, scratch)
         else:
-            complex_entries(register, count, panel, weights, table, columns, stride, found)
+            complex_entries(register, count, panel, weights, table, columns, stride, scratch)
         for k in range(min(TILE, count - register)):
             s = int(panel[FROM]) + register + k
-            product(parts * s, k, travellers, found, columns, parts)
+            product(parts * s, k, travellers, scratch, columns, parts)
     lift(panel, exponents, lifts)
 
 
@@ -235,26 +235,26 @@ def largest_misfit(panels, weights, table, exponents, columns, rows, kinds, stri
 
 
 @njit(error_model="numpy")
-def apply(panels, weights, table, exponents, travellers, lifts, found, columns, parts, stride):
-    """Apply the propagators of all panels to the deviations; returns the largest error of the interpolation."""
+def apply(panels, weights, table, exponents, travellers, lifts, scratch, columns, parts, stride):
+    """Apply the propagators of all panels to the deviations; return the largest error of the interpolation."""
     worst = largest_misfit(panels, weights, table, exponents, columns, columns, parts // columns, stride)
     for k in range(panels.shape[0]):
         panel = address(panels, len(PANEL) * k)
-        transport(panel, weights, table, exponents, travellers, lifts, found, columns, parts, stride)
+        transport(panel, weights, table, exponents, travellers, lifts, scratch, columns, parts, stride)
     return worst
 
 
 @njit(error_model="numpy")
-def multiply(panel, weights, factors, numbers):
+def multiply(panel, weights, factors, products):
     """Multiply each number of a panel by a factor that is interpolated from those of the nodes.
 
-    numbers: in registers, as the panel has them.  factors: of all nodes.
+    products: registers of the panel.  factors: of all nodes.
     """
     points, first, count = int(panel[POINTS]), int(panel[FROM]), int(panel[TO]) - int(panel[FROM])
     if points == 0:
         for k in range(count):
             factor = load(factors, int(panel[NODE]) // LANES + k, LANES)
-            store(numbers, first + k, load(numbers, first + k, LANES) * factor)
+            store(products, first + k, load(products, first + k, LANES) * factor)
         return
     for register in range(0, count, 4):
         second, third, fourth = min(register + 1, count - 1), min(register + 2, count - 1), min(register + 3, count - 1)
@@ -265,17 +265,17 @@ def multiply(panel, weights, factors, numbers):
             factor = broadcast(factors[int(panel[NODE]) + j], LANES)
             p, q = fma(load(weights, a + j, LANES), factor, p), fma(load(weights, b + j, LANES), factor, q)
             r, s = fma(load(weights, c + j, LANES), factor, r), fma(load(weights, d + j, LANES), factor, s)
-        p, q = p * load(numbers, first + register, LANES), q * load(numbers, first + second, LANES)
-        r, s = r * load(numbers, first + third, LANES), s * load(numbers, first + fourth, LANES)
+        p, q = p * load(products, first + register, LANES), q * load(products, first + second, LANES)
+        r, s = r * load(products, first + third, LANES), s * load(products, first + fourth, LANES)
         for at, number in ((register, p), (second, q), (third, r), (fourth, s)):
-            store(numbers, first + at, number)
+            store(products, first + at, number)
 
 
 @njit(error_model="numpy")
 def settle(travellers, lifts, registers, gains, parts, kept, kept_powers, follow):
     """Give all deviations unit length, and write the logarithms of how much they have grown; zeros stay zeros.
 
-    If `follow`, the numbers that they were made of follow suit.
+    If `follow`, the components at the last landing are scaled alike.
     """
     for s in range(registers):
         square = broadcast(0.0, LANES)

@@ -11,7 +11,7 @@ from .clock_slots import SERIES, WIDTH
 # --- kernel text below ---
 @njit(error_model="numpy", forceinline=True)
 def slope(theta, c, y, y_new, dense, dims):
-    """Derivative of state variable c by the fraction of the step; of `dims`, the first two are looked at."""
+    """Return the derivative of state variable c by the fraction of the step; only the first two of `dims` are read."""
     dimension, rows = dims[0], dims[1]
     inner = load(dense, (rows - 1) * dimension + c, WIDTH)
     bent = 0.0 * inner

@@ -26,56 +26,56 @@ def factorise(work, first, apart, scratch, order, place, row_start, after_start,
     if apart > 0:
         for k in range(DIMENSION + column.size):
             store(work, first + apart + k, load(work, first + k, WIDTH))
-    first, rest = first + apart, first + apart + DIMENSION
+    first, off_diagonal = first + apart, first + apart + DIMENSION
     for q in range(DIMENSION):
         k = order[q]
         store(work, scratch + k, load(work, first + k, WIDTH))
         for s in range(row_start[q], row_start[q + 1]):
-            store(work, scratch + column[s], load(work, rest + s, WIDTH))
+            store(work, scratch + column[s], load(work, off_diagonal + s, WIDTH))
         for s in range(row_start[q], after_start[q]):
             j = column[s]
             factor = load(work, scratch + j, WIDTH) * load(work, first + j, WIDTH)
-            store(work, rest + s, factor)
+            store(work, off_diagonal + s, factor)
             for u in range(after_start[place[j]], row_start[place[j] + 1]):
                 old = load(work, scratch + column[u], WIDTH)
-                store(work, scratch + column[u], old - factor * load(work, rest + u, WIDTH))
+                store(work, scratch + column[u], old - factor * load(work, off_diagonal + u, WIDTH))
         for s in range(after_start[q], row_start[q + 1]):
-            store(work, rest + s, load(work, scratch + column[s], WIDTH))
+            store(work, off_diagonal + s, load(work, scratch + column[s], WIDTH))
         pivot = load(work, scratch + k, WIDTH)
         store(work, first + k, 1.0 / pivot + 0.0 * pivot)
 
 
 @njit(error_model="numpy")
 def substitute(work, first, x, order, row_start, after_start, column):
-    """Solve in place by the factors for the right-hand side that stands from group x on."""
-    rest = first + DIMENSION
+    """Solve in place by the factors for the right-hand side in the groups from x on."""
+    off_diagonal = first + DIMENSION
     for q in range(DIMENSION):
         value = load(work, x + order[q], WIDTH)
         for s in range(row_start[q], after_start[q]):
-            value = value - load(work, rest + s, WIDTH) * load(work, x + column[s], WIDTH)
+            value = value - load(work, off_diagonal + s, WIDTH) * load(work, x + column[s], WIDTH)
         store(work, x + order[q], value)
     for q in range(DIMENSION - 1, -1, -1):
         value = load(work, x + order[q], WIDTH)
         for s in range(after_start[q], row_start[q + 1]):
-            value = value - load(work, rest + s, WIDTH) * load(work, x + column[s], WIDTH)
+            value = value - load(work, off_diagonal + s, WIDTH) * load(work, x + column[s], WIDTH)
         store(work, x + order[q], value * load(work, first + order[q], WIDTH))
 
 
 @njit(error_model="numpy")
 def residual(work, first, x, right, out, order, row_start, column):
-    """Write what the equations still lack at x: right-hand side minus matrix times x."""
-    rest = first + DIMENSION
+    """Write the residual at x: right-hand side minus matrix times x."""
+    off_diagonal = first + DIMENSION
     for q in range(DIMENSION):
         k = order[q]
         value = load(work, right + k, WIDTH) - load(work, first + k, WIDTH) * load(work, x + k, WIDTH)
         for s in range(row_start[q], row_start[q + 1]):
-            value = value - load(work, rest + s, WIDTH) * load(work, x + column[s], WIDTH)
+            value = value - load(work, off_diagonal + s, WIDTH) * load(work, x + column[s], WIDTH)
         store(work, out + k, value)
 
 
 @njit(error_model="numpy")
 def largest(work, x):
-    """The largest modulus of a vector."""
+    """Return the largest modulus of a vector."""
     size = broadcast(0.0, WIDTH)
     for k in range(DIMENSION):
         size = maximum(size, absolute(load(work, x + k, WIDTH)))
@@ -84,7 +84,7 @@ def largest(work, x):
 
 @njit(error_model="numpy")
 def solve(work, first, apart, x, right, change, order, row_start, after_start, column):
-    """Solve in place for the right-hand side that stands from group x on; `right` and `change` are scratch vectors.
+    """Solve in place for the right-hand side in the groups from x on; `right` and `change` are scratch vectors.
 
     Refinement ends, each lane by itself, where the correction times its own rate of decrease is below rounding (Hairer &
     Wanner, Solving Ordinary Differential Equations II, 1996, section IV.8); a lane whose corrections do not decrease gets

@@ -11,7 +11,7 @@ from .clock_slots import WIDTH
 # --- kernel text below ---
 @njit(error_model="numpy", forceinline=True)
 def spread(y, multiplicity, dims):
-    """Synchronisation error: sum over the oscillators of their distance from the first in state space."""
+    """Return the synchronisation error: the sum of the distances of the oscillators from the first in state space."""
     total = broadcast(0.0, WIDTH)
     for i in range(1, dims.nodes):
         square = broadcast(0.0, WIDTH)

@@ -23,7 +23,7 @@ from .spread import spread
 # --- kernel text below ---
 @njit(error_model="numpy", forceinline=True)
 def counts_every_step(dims):
-    """True if every step of the window is recorded, so that no cycle can be left out."""
+    """Return True if every step of the window is recorded, so that no cycle can be left out."""
     return dims.sections + dims.observed + dims.sampled > 0
 
 

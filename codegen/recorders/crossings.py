@@ -71,11 +71,11 @@ def begin(k, wanted, zeros):
 
 
 @njit(error_model="numpy")
-def look(place, width, zeros):
-    """Compute all functions at the points of panel `place` of a width, and settle them."""
+def look(panel, width, zeros):
+    """Compute all functions at the points of a panel of a width, and settle them."""
     dims, rule = zeros.dims, zeros.rule
     for point in range(len(rule)):
-        evaluate(broadcast((place + rule[point, POINT]) * width, WIDTH), point + 1, zeros)
+        evaluate(broadcast((panel + rule[point, POINT]) * width, WIDTH), point + 1, zeros)
         for k in range(dims.sections + dims.stops):
             store(zeros.found, memory(k, zeros) + 1 + point, settled(k, point + 1, zeros))
 
@@ -125,14 +125,14 @@ def arrive(k, low, high, zeros):
 
 
 @njit(error_model="numpy")
-def locate(k, hits, point, place, width, zeros):
+def locate(k, hits, point, panel, width, zeros):
     """Return the zero of section function k between two points of a panel, and the lanes of `hits` that have one.
 
     Regula falsi with the Anderson-Bjorck weight (BIT 13, 253, 1973), bisection where that stalls.  A stretch of zeros has
     its beginning as the zero; a pole is none.
     """
-    low = broadcast((place + zeros.rule[point, POINT]) * width, WIDTH)
-    high = broadcast((place + zeros.rule[point + 1, POINT]) * width, WIDTH)
+    low = broadcast((panel + zeros.rule[point, POINT]) * width, WIDTH)
+    high = broadcast((panel + zeros.rule[point + 1, POINT]) * width, WIDTH)
     g_low, g_high = value_of(k, point + 1, zeros), value_of(k, point + 2, zeros)
     # without a change of sign the function stays zero from some fraction on
     stays = hits & ~(g_low * g_high < 0.0)

@@ -48,13 +48,13 @@ def keep_points(k, theta, hits, zeros, cell, counts, points):
 
 
 @njit(error_model="numpy")
-def cut_panel(k, done, place, width, zeros, cell, counts, points, direction):
+def cut_panel(k, done, panel, width, zeros, cell, counts, points, direction):
     """Find the points of section k between the points of a panel, in the lanes of `done`."""
     for point in range(len(zeros.rule) - 1):
         g_low, g_high = at_point(k, point, zeros), at_point(k, point + 1, zeros)
         hits = crosses(g_low, g_high, direction) & done
         if any_lane(hits):
-            theta, hits = locate(k, hits, point, place, width, zeros)
+            theta, hits = locate(k, hits, point, panel, width, zeros)
             keep_points(k, theta, lane_bits(hits), zeros, cell, counts, points)
 
 
@@ -64,16 +64,16 @@ def cut(counted, step, found, cell, counts, points, control, rule, dims, section
     zeros = Zeros(step, found, rule, dims, section)
     for k in range(dims.sections):
         begin(k, counted, zeros)
-    level, place = 0, 0
+    level, panel = 0, 0
     while True:
         # all sections share the values in a panel; each halves the panel where it needs that
         width, halved = 1.0 / (1 << level), False
-        look(place, width, zeros)
+        look(panel, width, zeros)
         for k in range(dims.sections):
             direction = control[DIRECTION if k == 0 else FURTHER + k - 1]
             done, deeper = ready(k, level, zeros, control)
-            cut_panel(k, done, place, width, zeros, cell, counts, points, direction)
+            cut_panel(k, done, panel, width, zeros, cell, counts, points, direction)
             halved = halved | deeper
-        level, place = following(level, place, halved)
+        level, panel = following(level, panel, halved)
         if level == 0:
             break

@@ -40,18 +40,18 @@ def halt(accept, step, clock, found, control, rule, dims, section):
     zeros = Zeros(Step(now, h, step.y, step.y_new, step.dense), found, rule, dims, section)
     part, hits = broadcast(1.0, WIDTH), accept & ~accept
     begin(k, accept, zeros)
-    level, place = 0, 0
+    level, panel = 0, 0
     while True:
         width = 1.0 / (1 << level)
-        look(place, width, zeros)
+        look(panel, width, zeros)
         done, halved = ready(k, level, zeros, control)
         for point in range(len(rule) - 1):
             g_low, g_high = at_point(k, point, zeros), at_point(k, point + 1, zeros)
             passes = crosses(g_low, g_high, 0.0) & done & ~hits
             if any_lane(passes):
-                zero, passes = locate(k, passes, point, place, width, zeros)
+                zero, passes = locate(k, passes, point, panel, width, zeros)
                 part, hits = select(passes, zero, part), hits | passes
-        level, place = following(level, place, halved)
+        level, panel = following(level, panel, halved)
         if level == 0:
             break
     if any_lane(hits):

@@ -17,11 +17,11 @@ from .panels import NEXT, POINT, TOP, WEIGHT, following, gentle, simple
 # Columns of `sums` behind the time that was observed: seven for each value.
 TALLIES, TALLY = OBSERVED + 1, 7
 FIRST, SUM, SQUARES, LARGEST, LEAST, LATEST, SIZE = 0, 1, 2, 3, 4, 5, 6
-# Panels of this width and less hold a jump or a singular place, and are halved while what they add is not exact enough.
+# Panels up to this width, 2^-12 of a step, hold a jump or a singularity; they are halved while their integral is inexact.
 NARROW = 0.000244140625
 # No panel of a step is shorter than 2^-DEEPEST.
 DEEPEST = 40
-# What stands between the points of a panel is looked for in panels longer than 2^-SOUGHT of a step.
+# Fast changes between the points are sought in panels longer than 2^-SOUGHT of a step (a choice).
 SOUGHT = 20
 # Most parabolas for an extreme between the points of a panel.
 CLIMBS = 8
@@ -29,15 +29,15 @@ CLIMBS = 8
 
 @njit(error_model="numpy", forceinline=True)
 def computed(dims):
-    """How many numbers are computed at a point: observed values, and what tells where the rule may not see them."""
+    """Count the values at a point: observed values, and the gaps and depths that locate their fast changes."""
     return dims.observed + dims.gaps + dims.depths
 
 
 @njit(error_model="numpy")
 def hidden(seen, rule, control, dims):
-    """The lanes in which kinks, jumps, peaks or pits of an observed value may stand between the points of a panel.
+    """Return the lanes in which an observed value may have kinks, jumps or narrow peaks between the points of a panel.
 
-    Where none do, none do in its halves.
+    Lanes without them have none in the halves of the panel.
     """
     count = computed(dims)
     good = broadcast(0.0, WIDTH) == 0.0
@@ -50,14 +50,14 @@ def hidden(seen, rule, control, dims):
 
 @njit(error_model="numpy")
 def rough(lane, i, width, seen, sums, rule, control, dims):
-    """True if the rule is not good enough for a value of a lane: its last Legendre coefficients are too large.
+    """Return True if the rule is too coarse for a value of a lane: its last Legendre coefficients are too large.
 
     The rule is exact to about twice the degree of the interpolant, so its error is about the square of the last
     coefficient over the size of the value (Trefethen, SIAM Review 50, 67 (2008), theorem 4.5, for analytic functions).  A
     narrow panel is compared with the size of the value at the points of the whole step; a value that is not exact enough
     in the narrowest panel is NaN.
     """
-    found = False
+    coarse = False
     for k in range(dims.observed):
         top = following = size = 0.0
         for point in range(len(rule)):
@@ -70,10 +70,10 @@ def rough(lane, i, width, seen, sums, rule, control, dims):
             sums[i, at + SIZE] = size
         allowed = control[RTOL] * sums[i, at + SIZE] + control[ATOL]
         if last * last > size * (control[RTOL] * size + control[ATOL]):
-            found = found | (width > NARROW) | (16.0 * width * last > allowed)
+            coarse = coarse | (width > NARROW) | (16.0 * width * last > allowed)
             if width * (1 << DEEPEST) <= 1.0 and width * last > 16.0 * allowed:
                 sums[i, at + SUM] = math.nan
-    return found
+    return coarse
 
 
 @njit(error_model="numpy")
@@ -99,22 +99,22 @@ def add(lane, i, length, seen, sums, rule, dims):
 
 @njit(error_model="numpy", forceinline=True)
 def vertex(a, m, b, at_a, at_m, at_b):
-    """Where the parabola through three points is highest, and its value there; m itself if it opens upwards."""
+    """Return the vertex of the parabola through three points, and its value; m if it opens upwards."""
     left, right = (at_m - at_a) / (m - a), (at_b - at_m) / (b - m)
     bend = (right - left) / (b - a)
     if not bend < 0.0:
         return m, at_m
-    place = 0.5 * (a + m - left / bend)
-    return place, at_a + (place - a) * (left + bend * (place - m))
+    top = 0.5 * (a + m - left / bend)
+    return top, at_a + (top - a) * (left + bend * (top - m))
 
 
 @njit(error_model="numpy")
 def bracket(lane, k, sign, best, seen, rule, ends, dims):
-    """Write into `ends` the neighbours of the point of a panel beside which sign * value k may be highest, and values.
+    """Write to `ends` the points of a panel around the maximum of sign * value k, and its values there.
 
-    Returns where it may be, as a share of the panel, and whether it is higher than `best` there.
+    Return the maximum of the parabola through them, as a fraction of the panel, and whether it exceeds `best`.
     """
-    last, found, guess = len(rule) - 1, False, 0.0
+    last, higher, guess = len(rule) - 1, False, 0.0
     for point in range(last + 1):
         low, high, centre = max(point - 1, 0), min(point + 1, last), min(max(point, 1), last - 1)
         at_low, at_point, at_high = (
@@ -124,7 +124,7 @@ def bracket(lane, k, sign, best, seen, rule, ends, dims):
         )
         if at_low > at_point or at_high > at_point:
             continue
-        place, height = vertex(
+        top, height = vertex(
             rule[centre - 1, POINT],
             rule[centre, POINT],
             rule[centre + 1, POINT],
@@ -132,11 +132,11 @@ def bracket(lane, k, sign, best, seen, rule, ends, dims):
             sign * seen[(centre * computed(dims) + k) * WIDTH + lane],
             sign * seen[((centre + 1) * computed(dims) + k) * WIDTH + lane],
         )
-        if height > best and rule[low, POINT] < place < rule[high, POINT]:
-            found, best, guess = True, height, place
+        if height > best and rule[low, POINT] < top < rule[high, POINT]:
+            higher, best, guess = True, height, top
             ends[0], ends[1], ends[2] = rule[low, POINT], rule[point, POINT], rule[high, POINT]
             ends[3], ends[4], ends[5] = at_low, at_point, at_high
-    return guess, found
+    return guess, higher
 
 
 @njit(error_model="numpy", forceinline=True)

@@ -24,21 +24,21 @@ DEPTH, SPAN = 40.0, 20.0
 
 
 @njit(error_model="numpy", forceinline=True)
-def following(level, place, halved):
-    """The level and place of the next panel, its own first half if one is `halved`; level 0 behind the last one.
+def following(level, panel, halved):
+    """Return level and index of the next panel, the first half of this one if it is `halved`; level 0 behind the last one.
 
     Panel k of some level spans k 2^-level … (k + 1) 2^-level of the step.
     """
     if halved:
-        return level + 1, 2 * place
-    while place & 1:
-        level, place = level - 1, place >> 1
-    return level, place + 1
+        return level + 1, 2 * panel
+    while panel & 1:
+        level, panel = level - 1, panel >> 1
+    return level, panel + 1
 
 
 @njit(error_model="numpy", forceinline=True)
 def combined(row, column, first, stride, values, rule):
-    """The values of a function at the points of a panel times the numbers of the rule from some column of a row on."""
+    """Return the sum of the values of a function at the points of a panel times a row of the rule from a column on."""
     total = broadcast(0.0, WIDTH)
     for point in range(len(rule)):
         total = total + rule[row, column + point] * load(values, first + stride * point, WIDTH)
@@ -47,7 +47,7 @@ def combined(row, column, first, stride, values, rule):
 
 @njit(error_model="numpy", forceinline=True)
 def upper(first, stride, values, rule):
-    """The sum of the sizes of the upper half of the Legendre coefficients; NaN if the function has no value at some point."""
+    """Return the sum of the moduli of the upper half of the Legendre coefficients; NaN if a value is missing."""
     total = broadcast(0.0, WIDTH)
     for column in range(TOP, rule.shape[1] - len(rule)):
         coefficient = broadcast(0.0, WIDTH)
@@ -59,7 +59,7 @@ def upper(first, stride, values, rule):
 
 @njit(error_model="numpy")
 def simple(first, stride, values, rule, control):
-    """Where a function passes zero at most once in a panel, or where it has no value at all.
+    """Return the lanes where a function passes zero at most once in a panel, or has no value at all.
 
     It does so where all Bernstein coefficients lie on one side of zero; where all of their differences do, so that the
     function is monotonic; and where they change sides once and what the polynomial misses is within the tolerances.
@@ -67,29 +67,29 @@ def simple(first, stride, values, rule, control):
     """
     zero = broadcast(0.0, WIDTH)
     matrix = rule.shape[1] - len(rule)
-    size, known, missed = zero, zero > 0.0, MARGIN * upper(first, stride, values, rule)
+    size, defined, missed = zero, zero > 0.0, MARGIN * upper(first, stride, values, rule)
     for point in range(len(rule)):
         value = load(values, first + stride * point, WIDTH)
-        size, known = maximum(size, absolute(value)), known | (value == value)
+        size, defined = maximum(size, absolute(value)), defined | (value == value)
     small = max(control[RTOL], ROUNDING) * size + control[ATOL]
     least, slack = maximum(missed, small), missed + ROUNDING * size
     side, changes, before = zero, zero, zero
     clear, rising, falling = zero == 0.0, zero == 0.0, zero == 0.0
     for row in range(len(rule)):
         coefficient = combined(row, matrix, first, stride, values, rule)
-        here = select(coefficient > least, 1.0, select(coefficient < -least, -1.0, zero))
-        changes = changes + select(here * side < 0.0, 1.0, zero)
-        clear, side = clear & ~(here == 0.0), select(here == 0.0, side, here)
+        sign = select(coefficient > least, 1.0, select(coefficient < -least, -1.0, zero))
+        changes = changes + select(sign * side < 0.0, 1.0, zero)
+        clear, side = clear & ~(sign == 0.0), select(sign == 0.0, side, sign)
         if row > 0:
             rising, falling = rising & (coefficient - before > slack), falling & (before - coefficient > slack)
         before = coefficient
     resolved = (missed <= small) & (changes < 1.5)
-    return (clear & (changes == 0.0)) | rising | falling | resolved | ~known
+    return (clear & (changes == 0.0)) | rising | falling | resolved | ~defined
 
 
 @njit(error_model="numpy")
 def gentle(first, stride, values, rule):
-    """Where a function changes by less than SPAN in a panel, what lies beyond DEPTH left out, or has no value at a point."""
+    """Return the lanes where a function, cut at DEPTH, changes by less than SPAN in a panel, or has no value at a point."""
     matrix, missed = rule.shape[1] - len(rule), upper(first, stride, values, rule)
     low, high = load(values, first, WIDTH), load(values, first, WIDTH)
     for row in range(len(rule)):
