@@ -93,8 +93,8 @@ def signatures(driver: Driver) -> dict[str, Any]:
             "pushes": types.void(one, *[ADDRESS] * 3),
             "release": types.void(types.int64, *[types.float64] * 2, *[ADDRESS] * 3, types.int64),
         }
-        propagation = (types.int64[::1], _matrix, _matrix, _vector, _matrix, _cube, _vector)
-        propagation += (_matrix, _vector, _vector, _cube)
+        to_strengths = (types.int64[::1], _matrix, _matrix, _vector, _matrix, _cube, _vector)
+        propagation = (*to_strengths, _matrix, _vector, _vector, _cube)
         arrays: tuple[Any, ...] = ((_input, _cube, _matrix), (_matrix, _matrix, _counts), propagation)
         own: tuple[Any, ...] = (_sizes(ModeDimensions), types.int64[::1])
     else:
