@@ -247,7 +247,9 @@ def test_the_models_of_the_docs_can_be_made(page: str) -> None:
     inline = [block for block in blocks if "sc." in block]
     known: dict[str, object] = {}
     for block in inline:
-        lines = [line for line in block.splitlines() if "sc.run(" not in line and not line.startswith("result")]
+        lines = [
+            line for line in block.splitlines() if "sc.run(" not in line and not line.startswith(("result", "plt"))
+        ]
         exec("\n".join(lines), known)
     assert isinstance(known["scene"], synchain.Scene)
     assert len(inline) == (2 if page == "README.md" else 3)

@@ -137,7 +137,7 @@ def _error(axes: Axes, data: xr.Dataset, result: Result, style: dict[str, Any]) 
         axes.set_ylim(-0.05 * ROUNDING, ROUNDING)
     elif np.nanmax(error) > DECADES * (least := float(np.nanmin(error[error > ROUNDING]))):
         # decades of errors, and a linear scale from zero to the smallest that is no rounding error
-        axes.set_yscale("symlog", linthresh=least, linscale=0.3)
+        axes.set_yscale("symlog", linthresh=least, linscale=1.0)
         axes.set_ylim(bottom=0.0)
 
 
