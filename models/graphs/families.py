@@ -161,9 +161,9 @@ class Family:
         for function in ("settle", "count", "expected", "spectrum"):
             if getattr(self, function) is None:
                 continue
-            taken = list(inspect.signature(getattr(self, function)).parameters)[1:]
-            for name in taken:
-                if name not in self.options:
+            taken = dict(list(inspect.signature(getattr(self, function)).parameters.items())[1:])
+            for name, parameter in taken.items():
+                if name not in self.options and parameter.default is inspect.Parameter.empty:
                     raise ValueError(f"{function} has the argument {name!r}, which is no option of edges")
             for name in self.options:
                 if name not in taken:
