@@ -8,6 +8,7 @@ import runpy
 import shlex
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from mutants import TESTS
@@ -16,7 +17,8 @@ from synchain.runtime.cli import parser
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
-RECIPES = sorted((ROOT / "docs" / "how-to").glob("*.md"))
+PROGRAM = ROOT / "docs" / "program.md"
+RECIPES = [PROGRAM, *sorted((ROOT / "docs" / "how-to").glob("*.md"))]
 EXAMPLES = sorted((ROOT / "docs" / "gallery").glob("*.py"))
 MOST_LINES = 25
 """Lines of model and run of an example, without those that are empty."""
@@ -85,6 +87,22 @@ def test_recipes_run(page: Path) -> None:
     namespace: dict[str, object] = {}
     for block in blocks:
         exec(compile(block, str(page), "exec"), namespace)
+
+
+def test_the_kernel_that_is_read_line_by_line_is_the_generated_one() -> None:
+    text = PROGRAM.read_text("utf-8")
+    (model,) = re.findall(r"^```python\n(import.*?)^```", text, re.MULTILINE | re.DOTALL)
+    namespace: dict[str, Any] = {}
+    exec(model, namespace)
+    generated = namespace["sc"].kernel(namespace["scene"]).source.splitlines()
+    section = text[text.index("## A kernel, line by line") : text.index("## Where things are")]
+    quoted = [
+        line
+        for block in re.findall(r"^```\n(.*?)^```", section, re.MULTILINE | re.DOTALL)
+        for line in block.splitlines()
+    ]
+    assert len(quoted) > 20
+    assert not [line for line in quoted if line not in generated]
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
