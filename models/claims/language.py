@@ -26,11 +26,13 @@ from ..graphs.families import topology
 from ..graphs.graph_text import is_composed, read_graph
 from ..graphs.topology import Topology, read_matrix
 from ..inputs.checks import short_repr
-from .cosine_text import angle_number, angle_wave
+from .cosine_text import cosine_sum
 from .number_text import exact_number, whole_number
 from .parts import LARGEST, WORDS, PartClaim, interval, is_part, read_part
 
 BYTES, REPETITIONS = 1_000_000, 100_000
+"""Largest file, and most eigenvalues of a line with their multiplicities; both chosen to end within seconds."""
+
 _OPTIONS = r"((?:\s+[A-Za-z_]\w*=\S+)*)"
 _RANGE = re.compile(r"(\w+)\s+n\s*=\s*([0-9]{1,6})\s*\.\.\s*([0-9]{1,6})" + _OPTIONS)
 _ONE = re.compile(r"(\w+)\s+([0-9]{1,9})" + _OPTIONS)
@@ -40,9 +42,9 @@ _FORMS = "expected 'chain 4: …', 'star n=3..12: …', 'torus 9 shape=3x3: …'
 
 @dataclass(frozen=True, slots=True)
 class Claimed:
-    """A number as it was written."""
+    """A number of a claim: exactly one of `exact`, `interval` and `angle` is set."""
 
-    text: str  # the number as it was written
+    text: str  # the number as messages show it
     count: int  # how often it is claimed
     exact: sp.Expr | None = None  # the number, if it is neither a sum of cosines nor an approximation
     interval: tuple[Fraction, Fraction] | None = None  # the numbers that round to an approximation
@@ -61,15 +63,8 @@ class Claimed:
         return self.angle
 
     @property
-    def ends(self) -> tuple[Fraction, Fraction]:
-        """The interval of an approximation; ValueError for an exact number."""
-        if self.interval is None:
-            raise ValueError(f"{self.text} is an exact number; expected an approximation")
-        return self.interval
-
-    @property
     def words(self) -> str:
-        """The number as a sentence names it."""
+        """The number as messages name it."""
         return self.text if self.angle is None else sp.sstr(self.number)
 
 
@@ -86,49 +81,56 @@ class Claim:
 
 
 def read_claims(path: str | Path) -> list[tuple[Claim, ...]]:
-    """Return the claims of a text file; nothing in the file is run."""
-    place = Path(path)
-    if not place.exists():
-        raise FileNotFoundError(f"claims {short_repr(str(place))}: no such file; expected a text file; check the path")
-    if not place.is_file() or place.stat().st_size > BYTES:
-        raise ValueError(
-            f"claims {short_repr(str(place))}: expected a text file of at most {BYTES} bytes; check the path"
-        )
+    """Return the claims of a text file, those of a line together; nothing in the file is run."""
+    file = Path(path)
+    shown = f"claims {short_repr(str(file))}"
+    if not file.exists():
+        raise FileNotFoundError(f"{shown}: no such file; expected a text file; check the path")
+    if not file.is_file() or file.stat().st_size > BYTES:
+        raise ValueError(f"{shown}: expected a text file of at most {BYTES} bytes; check the path")
     try:
-        lines = place.read_text(encoding="utf-8-sig").splitlines()
+        lines = file.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError:
-        raise ValueError(
-            f"claims {short_repr(str(place))}: not UTF-8; expected UTF-8 text; save it in that encoding"
-        ) from None
-    found = []
+        raise ValueError(f"{shown}: not UTF-8; expected UTF-8 text; save it in that encoding") from None
+    claims = []
     for number, line in enumerate(lines, 1):
-        bare = line.partition("#")[0].strip()
-        if bare:
+        if text := line.partition("#")[0].strip():
             try:
-                found.append(_line(number, bare, place.parent))
+                claims.append(_line(number, text, file.parent))
             except (ValueError, TypeError, OSError) as error:
-                raise ValueError(f"{place.name}, line {number}: {' '.join(str(error).split())}") from None
-    if not found:
-        raise ValueError(f"claims {short_repr(str(place))}: found no claim; {_FORMS}")
-    return found
+                raise ValueError(f"{file.name}, line {number}: {' '.join(str(error).split())}") from None
+    if not claims:
+        raise ValueError(f"{shown}: found no claim; {_FORMS}")
+    return claims
 
 
 def _line(number: int, text: str, folder: Path) -> tuple[Claim, ...]:
+    """Return a claim for each graph of a line, "GRAPH: NUMBERS" or "GRAPH: PARTS"."""
     head, colon, listed = (part.strip() for part in text.rpartition(":"))
     if not colon or not head:
         raise ValueError(f"found {short_repr(text)}; {_FORMS}")
-    one, many = _ONE.fullmatch(head), _RANGE.fullmatch(head)
     largest = None if is_part(listed) else LARGEST
-    if many:
+
+    def claim(graph: Topology, n: int | None = None) -> Claim:
+        values = {} if text.startswith("matrix") else {"n": graph.n}  # a matrix has no letter for its size
+        if is_part(listed):
+            parts = tuple(read_part(part, values) for part in _split(listed, ","))
+            return Claim(number, text, graph, (), n, parts)
+        numbers = tuple(claimed for entry in _split(listed, ",") for claimed in _entry(entry, values))
+        if sum(claimed.count for claimed in numbers) > REPETITIONS:
+            raise ValueError(f"found more than {REPETITIONS} eigenvalues; expected as many as the graph has nodes")
+        return Claim(number, text, graph, numbers, n)
+
+    if many := _RANGE.fullmatch(head):
         low, high = int(many[2]), int(many[3])
         if not low <= high <= LARGEST:
             raise ValueError(f"found n = {low} … {high}; expected a range that rises and ends at {LARGEST} or before")
-        return tuple(_claim(number, text, _family(many[1], n, many[4], None), listed, n) for n in range(low, high + 1))
+        return tuple(claim(_family(many[1], n, many[4], None), n) for n in range(low, high + 1))
     if head.split()[0] == "matrix":
         graph = read_matrix(folder / head[6:].strip())
     elif is_composed(head):
         graph = read_graph(head, largest)
-    elif one:
+    elif one := _ONE.fullmatch(head):
         graph = _family(one[1], int(one[2]), one[3], largest)
     else:
         raise ValueError(f"found {short_repr(head)} before the colon; {_FORMS}")
@@ -136,22 +138,13 @@ def _line(number: int, text: str, folder: Path) -> tuple[Claim, ...]:
         raise ValueError(
             f"{graph.name} has {graph.n} nodes; expected at most {largest}; spectra are proved up to there"
         )
-    return (_claim(number, text, graph, listed),)
+    return (claim(graph),)
 
 
-def _claim(number: int, text: str, graph: Topology, listed: str, n: int | None = None) -> Claim:
-    """The claim of a line for one graph; the letter n has its size, but for a matrix."""
-    values = {} if text.startswith("matrix") else {"n": graph.n}
-    if is_part(listed):
-        parts = tuple(read_part(part, values) for part in _split(listed, ","))
-        return Claim(number, text, graph, (), n, parts)
-    return Claim(number, text, graph, _numbers(listed, values), n)
-
-
-def _family(name: str, n: int, written: str, largest: int | None) -> Topology:
+def _family(name: str, n: int, options_text: str, largest: int | None) -> Topology:
     options: dict[str, str] = {}
-    for word in written.split():
-        key, _, value = word.partition("=")
+    for option in options_text.split():
+        key, _, value = option.partition("=")
         if key in options:
             raise ValueError(f"option {key} is given twice; expected it once")
         options[key] = value
@@ -163,73 +156,52 @@ def _family(name: str, n: int, written: str, largest: int | None) -> Topology:
     return topology(name, n, **options)
 
 
-def _numbers(listed: str, values: dict[str, int]) -> tuple[Claimed, ...]:
-    found = [claimed for part in _split(listed, ",") for claimed in _entry(part, values)]
-    if sum(claimed.count for claimed in found) > REPETITIONS:
-        raise ValueError(f"found more than {REPETITIONS} eigenvalues; expected as many as the graph has nodes")
-    return tuple(found)
-
-
 def _split(text: str, mark: str) -> Iterator[str]:
-    """The parts of a text between marks outside parentheses."""
+    """Yield the parts of a text between marks outside parentheses."""
     depth, begin = 0, 0
-    for place, letter in enumerate(text):
+    for end, letter in enumerate(text):
         depth += (letter == "(") - (letter == ")")
         if letter == mark and depth == 0:
-            yield text[begin:place].strip()
-            begin = place + 1
+            yield text[begin:end].strip()
+            begin = end + 1
     yield text[begin:].strip()
 
 
-def _entry(part: str, values: dict[str, int]) -> Iterator[Claimed]:
-    """One entry: a number, perhaps with a multiplicity, perhaps for a range of a letter."""
-    if not part:
+def _entry(text: str, values: dict[str, int]) -> Iterator[Claimed]:
+    """Yield the numbers of an entry such as -2, -1^(n-2) or 2*k for k=0..3."""
+    if not text:
         raise ValueError("found an empty entry between commas; expected a number")
-    many = _FOR.fullmatch(part)
-    if many:
+    if many := _FOR.fullmatch(text):
         body, letter = many[1], many[2]
         if letter in (*values, "I"):
             raise ValueError(
-                f"{short_repr(part)}: the letter {letter!r} has a meaning already; expected another, e.g. k"
+                f"{short_repr(text)}: the letter {letter!r} has a meaning already; expected another, e.g. k"
             )
         low, high = whole_number(many[3], values), whole_number(many[4], values)
         if high - low > LARGEST:
             raise ValueError(
-                f"{short_repr(part)}: found {high - low + 1} values of {letter}; expected at most {LARGEST + 1}"
+                f"{short_repr(text)}: found {high - low + 1} values of {letter}; expected at most {LARGEST + 1}"
             )
-        yield from _each(body, values, letter, range(low, high + 1))
-        return
-    pieces = list(_split(part, "^"))
-    if len(pieces) > 2:
-        raise ValueError(
-            f"found {short_repr(part)} with {len(pieces) - 1} times ^; expected number^multiplicity, ** for powers"
-        )
-    count = whole_number(pieces[1], values) if len(pieces) == 2 else 1
-    if count < 0:
-        raise ValueError(f"{short_repr(part)}: multiplicity {count}{_where(values)}; expected at least 0")
-    if count:
-        yield _number(pieces[0], count, values)
-
-
-def _each(body: str, values: dict[str, int], letter: str, places: range) -> Iterator[Claimed]:
-    """An entry for each value of a letter; a sum of cosines is read once for all of them."""
-    wave = angle_wave(body, values, letter) if places else None
-    if wave is None:
-        for k in places:
+        for k in range(low, high + 1):
             yield from _entry(body, {**values, letter: k})
+        return
+    number, *powers = _split(text, "^")
+    if len(powers) > 1:
+        raise ValueError(
+            f"found {short_repr(text)} with {len(powers)} times ^; expected number^multiplicity, ** for powers"
+        )
+    count = whole_number(powers[0], values) if powers else 1
+    if count < 0:
+        where = ", ".join(f"{name} = {value}" for name, value in values.items())
+        raise ValueError(f"{short_repr(text)}: multiplicity {count}{where and f' for {where}'}; expected at least 0")
+    if not count:
+        return
+    if number.startswith("~"):
+        yield Claimed(number, count, interval=interval(number))
+    elif (angle := cosine_sum(number, values)) is not None:
+        yield Claimed(number, count, angle=angle)
     else:
-        yield from (Claimed(body, 1, angle=number) for number in wave.at(places[0], places[-1]))
-
-
-def _where(values: dict[str, int]) -> str:
-    return f" for {', '.join(f'{name} = {value}' for name, value in values.items())}" if values else ""
-
-
-def _number(text: str, count: int, values: dict[str, int]) -> Claimed:
-    if not text.startswith("~"):
-        angle = angle_number(text, values)
-        if angle is not None:
-            return Claimed(text, count, angle=angle)
-        exact = exact_number(text, values)
-        return Claimed(text if exact.is_Rational is False and not values else sp.sstr(exact), count, exact=exact)
-    return Claimed(text, count, interval=interval(text))
+        exact = exact_number(number, values)
+        # show a number without letters in the form of the file
+        shown = number if exact.is_Rational is False and not values else sp.sstr(exact)
+        yield Claimed(shown, count, exact=exact)

@@ -20,9 +20,13 @@ from ..algebra.equality import check_size, equal
 from ..inputs.reader import Algebra, Arithmetic, NoMeaning, parse, stray_character
 
 LENGTH, DEPTH, DIGITS, BITS = 300, 24, 30, 20_000
+"""Most characters, nested operations, digits of a literal and bits of a value; chosen so that a number takes no second."""
+
 GRAMMAR = "whole numbers, + - * / **, parentheses, sqrt, I, and sin cos exp of rational multiples of pi"
+
 _PI = sp.Dummy("pi", real=True)
-"""Stands for pi in the argument of sin, cos or exp while its factor is not known."""
+"""pi in the argument of sin, cos or exp, so that SymPy evaluates no function of it before its factor is reduced."""
+
 _DECIMAL = re.compile(r"(?<![A-Za-z_])(?:[0-9]+\.[0-9]*|\.[0-9]+|[0-9]+(?=[eE][+-]?[0-9]))(?:[eE][+-]?[0-9]+)?")
 
 
@@ -58,7 +62,7 @@ def whole_number(text: str, values: Mapping[str, int] | None = None) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _ExactNumbers(Arithmetic[sp.Expr]):
-    """SymPy numbers without floats; in an argument of sin, cos, exp (`angle`) pi times one too."""
+    """SymPy numbers without floats; multiples of pi too in an argument of sin, cos or exp (`angle`)."""
 
     text: str
     values: Mapping[str, int]
@@ -123,13 +127,13 @@ class _ExactNumbers(Arithmetic[sp.Expr]):
         (argument,) = arguments
         if function == "sqrt":
             return sp.sqrt(argument)
-        unit, words = (sp.I, "I*pi") if function == "exp" else (sp.S.One, "pi")
+        unit, unit_text = (sp.I, "I*pi") if function == "exp" else (sp.S.One, "pi")
         turn = argument.coeff(_PI, 1) / unit
         if sp.expand(argument - turn * _PI * unit) != 0 or not turn.is_Rational:
-            raise NoMeaning(f"expected a rational times {words}")
+            raise NoMeaning(f"expected a rational times {unit_text}")
         if turn.q > 10_000:
             raise NoMeaning("expected a denominator up to 10000")
-        turn -= 2 * sp.floor(turn / 2)
+        turn -= 2 * sp.floor(turn / 2)  # the functions have the period 2π
         if function == "exp":
             return sp.exp(turn * sp.pi * sp.I)
         # SymPy writes other angles as nested radicals, which generate far larger fields

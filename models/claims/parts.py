@@ -35,14 +35,14 @@ from ..graphs.topology import Topology
 from ..spectra.eigenvalue import Eigenvalue, words
 from ..spectra.solve import Proof, has_closed_form, spectrum
 from ..spectra.spectrum import Spectrum
-from .cosine_text import angle_number
+from .cosine_text import cosine_sum
 from .number_text import exact_number
 
 LARGEST = 500
-"""Largest graph whose spectrum is proved here: above it, closed forms take long to prove."""
+"""Largest graph whose spectrum is proved here; chosen, since proofs of closed forms take seconds above it."""
 
 LISTED = 5000
-"""Closed forms with as many different eigenvalues as nodes are listed up to so many nodes."""
+"""Largest graph whose eigenvalues are listed, unless there are few or each is computed alone; chosen, a few seconds."""
 
 WORDS = ("largest", "slowest", "ratio", "distinct", "multiplicity")
 T = TypeVar("T", bound=Number)
@@ -74,10 +74,10 @@ def is_part(text: str) -> bool:
 
 def read_part(text: str, values: Mapping[str, int]) -> PartClaim:
     """Return the claim in a text such as "ratio < 37.9"."""
-    found = _PART.fullmatch(text)
-    if found is None:
+    match = _PART.fullmatch(text)
+    if match is None:
         raise ValueError(f"found {text[:60]!r}; expected e.g. largest = -4, ratio < 37.9 or multiplicity(-2) = 3")
-    word, inner, relation, right = found.groups()
+    word, inner, relation, right = match.groups()
     relation = "=" if relation == "==" else relation
     of = None
     if word == "multiplicity":
@@ -96,13 +96,13 @@ def read_part(text: str, values: Mapping[str, int]) -> PartClaim:
 
 
 def exact(text: str, values: Mapping[str, int]) -> Exact:
-    """A number as a sum of cosines if it is one, else as a SymPy expression."""
-    found = angle_number(text, values)
-    if found is not None:
-        return found
-    number = exact_number(text, values)
-    as_sum = read(number)
-    return number if as_sum is None else as_sum
+    """Return a number as a sum of cosines if it is one, else as a SymPy expression."""
+    angle = cosine_sum(text, values)
+    if angle is None:
+        number = exact_number(text, values)
+        angle = read(number)
+        return number if angle is None else angle
+    return angle
 
 
 def interval(text: str) -> tuple[Fraction, Fraction]:
@@ -126,23 +126,20 @@ def verify_parts(graph: Topology, parts: Sequence[PartClaim]) -> tuple[tuple[str
     eigenvalues: the extreme ones are sums of those of the factors.  Other closed forms are listed
     up to LISTED nodes.
     """
-    known = _Known(graph)
+    true_parts = _Parts(graph)
     problems, right = [], []
     for part in parts:
-        holds, value = _decided(part, known)
-        right.append(f"{_subject(part)} = {value}")
+        holds, value = _compare(part, true_parts)
+        subject = part.word if part.of is None else f"{part.word}({sp.sstr(_expression(part.of))})"
+        right.append(f"{subject} = {value}")
         if not holds:
-            problems.append(f"claimed {part.text}: {_subject(part)} is {value}")
+            problems.append(f"claimed {part.text}: {subject} is {value}")
     return tuple(problems), graph.n <= LARGEST, ", ".join(dict.fromkeys(right))
 
 
-def _subject(part: PartClaim) -> str:
-    return part.word if part.of is None else f"{part.word}({sp.sstr(_number(part.of))})"
-
-
 @dataclass
-class _Known:
-    """The parts of a graph's spectrum, each computed when it is asked for."""
+class _Parts:
+    """The parts of a graph's spectrum, each computed on first use."""
 
     graph: Topology
 
@@ -152,7 +149,7 @@ class _Known:
         n = self.graph.n
         if n > LARGEST and not has_closed_form(self.graph):
             raise ValueError(f"{self.graph.name} {n}: a graph without a closed form; expected at most {LARGEST} nodes")
-        if n > LISTED and not _short(self.graph):
+        if n > LISTED and not _is_short(self.graph):
             raise ValueError(
                 f"{self.graph.name} {n}: expected at most {LISTED} nodes for this part of the spectrum of this graph"
             )
@@ -178,14 +175,22 @@ class _Known:
         return reduce(lambda a, b: b if _order(b, a) > 0 else a, [_sum(axis.spectrum.slowest) for axis in self.axes])
 
     def multiplicity(self, number: Exact) -> int:
-        """How often a number is an eigenvalue."""
-        found = self.spectrum.eigenvalues
-        near = _neighbours(found, number) if isinstance(found, LazyEigenvalues) else found
-        return sum(e.multiplicity for e in near if _same(e, number))
+        """Return how often a number is an eigenvalue."""
+        eigenvalues = self.spectrum.eigenvalues
+        low, high = 0, len(eigenvalues)
+        if isinstance(eigenvalues, LazyEigenvalues):  # chains and rings descend: bisect, and compare two neighbours
+            while low < high:
+                middle = (low + high) // 2
+                if _order(_value(eigenvalues[middle].exact), number) > 0:
+                    low = middle + 1
+                else:
+                    high = middle
+            low, high = max(low - 1, 0), low + 2
+        return sum(e.multiplicity for e in eigenvalues[low:high] if _is_equal(e, number))
 
 
 def _axes(graph: Topology) -> Iterator[Topology]:
-    """The factors of a Cartesian product with more than one node.
+    """Yield the factors of a Cartesian product with more than one node.
 
     Products are taken apart if the spectrum of each factor is short and not above 0.
     """
@@ -194,47 +199,45 @@ def _axes(graph: Topology) -> Iterator[Topology]:
         shape = dict(graph.options).get("shape")
         sizes = shape if isinstance(shape, tuple) else sides(graph.n)
         yield from (topology("ring" if graph.name == "torus" else "chain", size) for size in sizes if size > 1)
-    elif pair is None or not all(_short(axis) for part in pair for axis in _axes(part)):
+    elif pair is None or not all(_is_short(axis) for part in pair for axis in _axes(part)):
         yield graph
     else:
         yield from (axis for part in pair for axis in _axes(part) if axis.n > 1)
 
 
-def _short(graph: Topology) -> bool:
-    """Whether a closed form has few different eigenvalues, or makes them one by one."""
+def _is_short(graph: Topology) -> bool:
+    """Return whether a closed form has few different eigenvalues, or computes them one by one."""
     return graph.name in ("chain", "ring", "complete", "complete_bipartite", "star", "hypercube", "feed_forward")
 
 
-def _neighbours(found: LazyEigenvalues[Eigenvalue], number: Exact) -> Sequence[Eigenvalue]:
-    """The eigenvalues of a chain or ring beside the place where a number would stand."""
-    low, high = 0, len(found)
-    while low < high:
-        middle = (low + high) // 2
-        if _order(_value(found[middle].exact), number) > 0:
-            low = middle + 1
-        else:
-            high = middle
-    return found[max(low - 1, 0) : low + 2]
-
-
-def _decided(part: PartClaim, known: _Known) -> tuple[bool, str]:
-    """Whether a part is as claimed, and its value in words."""
+def _compare(part: PartClaim, true_parts: _Parts) -> tuple[bool, str]:
+    """Return whether a part is as claimed, and its true value as text."""
+    one = AngleSum.rational(1)
     if part.word in ("distinct", "multiplicity"):
         of = part.of if part.of is not None else AngleSum.rational(0)
-        count = len(known.spectrum) if part.word == "distinct" else known.multiplicity(of)
-        return _holds(part, AngleSum.rational(count), AngleSum.rational(1)), str(count)
+        count = len(true_parts.spectrum) if part.word == "distinct" else true_parts.multiplicity(of)
+        return _holds(part, AngleSum.rational(count), one), str(count)
     if part.word == "ratio":
-        return _holds(part, known.largest, known.slowest), _quotient(known.largest, known.slowest)
-    value = known.largest if part.word == "largest" else known.slowest
-    shown = words(Eigenvalue(_number(value), 1))
-    if _complex(value) and part.relation == "=" and part.number is not None:
-        return equal(_number(value), _number(part.number)), shown
-    return _holds(part, value, AngleSum.rational(1)), shown
+        value, unit = true_parts.largest, true_parts.slowest
+        if isinstance(value, AngleSum) and isinstance(unit, AngleSum) and not (value.terms or unit.terms):
+            shown = str(value.shift / unit.shift)
+        elif _is_complex(value) or _is_complex(unit):
+            shown = "complex"
+        else:
+            top, bottom = (Eigenvalue(_expression(x), 1).enclosure(128) for x in (value, unit))
+            shown = f"{float(arb(top) / arb(bottom)):.12g}"
+        return _holds(part, value, unit), shown
+    value = true_parts.largest if part.word == "largest" else true_parts.slowest
+    if _is_complex(value) and part.relation == "=" and part.number is not None:
+        holds = equal(_expression(value), _expression(part.number))
+    else:
+        holds = _holds(part, value, one)
+    return holds, words(Eigenvalue(_expression(value), 1))
 
 
 def _holds(part: PartClaim, value: Value, unit: Value) -> bool:
-    """Whether value / unit is as claimed; the unit is 1, or the slowest eigenvalue."""
-    if _complex(value) or _complex(unit):
+    """Return whether value / unit is as claimed; the unit is 1, or the slowest eigenvalue."""
+    if _is_complex(value) or _is_complex(unit):
         raise ValueError(f"{part.text}: complex eigenvalues have no order; expected = and an exact number")
     if part.interval is not None:
         low, high = (AngleSum.rational(end) for end in part.interval)
@@ -245,56 +248,48 @@ def _holds(part: PartClaim, value: Value, unit: Value) -> bool:
 
 
 def _quotient_order(value: Value, unit: Value, number: Exact) -> int:
-    """The sign of value / unit - number."""
+    """Return the sign of value / unit - number."""
     if unit == AngleSum.rational(1):
         return _order(value, number)
     if isinstance(value, AngleSum) and isinstance(unit, AngleSum) and isinstance(number, AngleSum):
         return (value + -(number * unit)).sign() * unit.sign()
-    return sign((_number(value),), (_number(number), _number(unit))) * _order(unit, AngleSum.rational(0))
+    return sign((_expression(value),), (_expression(number), _expression(unit))) * _order(unit, AngleSum.rational(0))
 
 
 def _order(value: Value, number: Exact) -> int:
-    """The sign of value - number."""
+    """Return the sign of value - number."""
     if isinstance(value, AngleSum) and isinstance(number, AngleSum):
         return (value + -number).sign()
-    return sign((_number(value),), (_number(number),))
+    return sign((_expression(value),), (_expression(number),))
 
 
-def _same(e: Eigenvalue, number: Exact) -> bool:
-    middle = complex(sp.N(_number(number), 20))
-    if abs(complex(e.value) - middle) > 1e-9 * max(1.0, abs(middle)):
+def _is_equal(e: Eigenvalue, number: Exact) -> bool:
+    middle = complex(sp.N(_expression(number), 20))
+    if abs(complex(e.value) - middle) > 1e-9 * max(1.0, abs(middle)):  # floats decide without a proof
         return False
     value = _value(e.number)
     if isinstance(value, AngleSum) and isinstance(number, AngleSum):
         return (value + -number).sign() == 0
-    return equal(e.number, _number(number))
-
-
-def _quotient(value: Value, unit: Value) -> str:
-    """value / unit by twelve digits, or as a whole number if it is one."""
-    if isinstance(value, AngleSum) and isinstance(unit, AngleSum) and not (value.terms or unit.terms):
-        return str(value.shift / unit.shift)
-    top, bottom = (Eigenvalue(_number(x), 1).enclosure(128) for x in (value, unit))
-    return f"{float(arb(top) / arb(bottom)):.12g}" if not (_complex(value) or _complex(unit)) else "complex"
+    return equal(e.number, _expression(number))
 
 
 def _value(number: Number) -> Value:
-    """An eigenvalue as a sum of cosines if it is one."""
-    found = None if isinstance(number, Root) else read(number)
-    return number if found is None else found
+    """Return an eigenvalue as a sum of cosines if it is one."""
+    angle = None if isinstance(number, Root) else read(number)
+    return number if angle is None else angle
 
 
 def _sum(number: sp.Expr) -> AngleSum:
-    found = read(number)
-    if found is None:
+    angle = read(number)
+    if angle is None:
         raise ValueError(f"{number} is no sum of cosines; expected one of a chain or ring")
-    return found
+    return angle
 
 
-def _number(value: AngleSum | T) -> sp.Expr | T:
-    """A sum of cosines as an expression, anything else as it is."""
+def _expression(value: AngleSum | T) -> sp.Expr | T:
+    """Return a sum of cosines as an expression, anything else unchanged."""
     return expression(value.risen) if isinstance(value, AngleSum) else value
 
 
-def _complex(value: Value) -> bool:
+def _is_complex(value: Value) -> bool:
     return not isinstance(value, AngleSum) and isinstance(Eigenvalue(value, 1).value, complex)

@@ -8,7 +8,7 @@ import pytest
 
 from synchain.models.algebra.cosine_sums import AngleSum, expression
 from synchain.models.algebra.equality import equal
-from synchain.models.claims.cosine_text import angle_number
+from synchain.models.claims.cosine_text import cosine_sum
 from synchain.models.claims.language import _line
 from synchain.models.claims.number_text import exact_number
 from synchain.models.claims.verdict import verify
@@ -31,7 +31,7 @@ from synchain.models.graphs.families import topology
 )
 def test_the_number_is_that_of_sympy(text: str) -> None:
     for values in ({"n": 5, "k": 2}, {"n": 12, "k": 7}, {"n": 31, "k": 0}):
-        found = angle_number(text, values)
+        found = cosine_sum(text, values)
         assert found is not None
         assert equal(expression(found), exact_number(text, values))
 
@@ -58,7 +58,7 @@ def test_the_number_is_that_of_sympy(text: str) -> None:
     ],
 )
 def test_other_texts_are_left(text: str) -> None:
-    assert angle_number(text, {"n": 5}) is None
+    assert cosine_sum(text, {"n": 5}) is None
 
 
 def test_folded_sums_of_one_number_are_the_same() -> None:
