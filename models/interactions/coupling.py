@@ -225,8 +225,15 @@ class LagrangianCoupling:
             raise ValueError(
                 f"coupling {str(self)!r} joins {' and '.join(kinds)}; found a link between {pair.described}"
             )
-        symbols = dict(zip(pair.nodes[0].state, pair.here, strict=True))
-        symbols |= dict(zip(pair.nodes[1].state, pair.there, strict=True))
+        here, there = (node.state for node in pair.nodes)
+        used = {s.name for e in (self.kinetic, self.potential, self.dissipation) for s in e.free_symbols}
+        if both := sorted({s.name for s in here} & {s.name for s in there} & used):
+            raise ValueError(
+                f"coupling {str(self)!r}: {pair.described} both have a state {both[0]!r}; expected a name that only one of "
+                "them has; rename it in one oscillator"
+            )
+        symbols = dict(zip(here, pair.here, strict=True))
+        symbols |= dict(zip(there, pair.there, strict=True))
         kinetic, potential, dissipation = (
             e.xreplace(symbols) for e in (self.kinetic, self.potential, self.dissipation)
         )

@@ -13,7 +13,7 @@ from variational_reference import transversal_equations
 from synchain.codegen.export.python import to_python
 from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
-from synchain.models import Field, chain, ring, star
+from synchain.models import Field, Lagrangian, chain, link_energy, ring, star
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Node
@@ -246,6 +246,15 @@ def test_a_coupling_between_other_kinds_is_refused() -> None:
         Scene(oscillator="clock", coupling="hanging", topology=chain(2))
     with pytest.raises(ValueError, match="no states of one name to compare"):
         load_scene("huygens").replace(record=("sync_error",))
+
+
+def test_an_energy_of_a_state_that_both_oscillators_have_is_refused() -> None:
+    """The state of one end was taken, whatever `between` said."""
+    wheel = Lagrangian("v**2/2", "x**2/2", coordinates={"x": "v"}, name="wheel")
+    cart = Lagrangian("v**2", "2*x**2", coordinates={"x": "v"}, name="cart")
+    rod = link_energy("k*W*x**2/2", between={"wheel": ["x"], "cart": []}, parameters={"k": 1}, name="rod")
+    with pytest.raises(ValueError, match=r"coupling 'rod': .* both have a state 'x'; .* rename it in one oscillator"):
+        Scene(wheel, rod, chain(2), nodes=[{"oscillator": cart, "at": [2]}])
 
 
 def test_friction_laws_of_two_kinds() -> None:
