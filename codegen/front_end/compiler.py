@@ -1,4 +1,4 @@
-"""The pipeline of kernel functions: read from the syntax tree, written as LLVM; `decorator` goes on without it."""
+"""A Numba compiler of two passes: read the syntax tree, emit LLVM; `decorator` goes on without it if it raises."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from numba.core.compiler_machinery import FunctionPass, PassManager, register_pa
 from numba.core.typed_passes import NativeLowering, NoPythonBackend
 
 from . import syntax_reader
-from .emitter import ReadFunction
+from .emitter import TypedFunction
 
 
-class _Linked(JITCodeLibrary):
-    """LLVM code of a function that only others of its module call: they link it, and it is optimised with them.
+class _LinkedCode(JITCodeLibrary):
+    """LLVM code of an inner function: callers link it, and it is optimised as a part of the entry point.
 
-    Numba optimises a function and makes machine code of it before it links it into those that call it, and there it does
-    so again.  Nothing calls this machine code, so all of it waits for the entry point.
+    Numba optimises each function and generates its machine code before it links the function into its callers, where
+    both are done again.  Nothing calls the first machine code, and so this class skips it.
     """
 
     def _optimize_final_module(self) -> None:
@@ -28,31 +28,31 @@ class _Linked(JITCodeLibrary):
         self._finalized = True
 
     def get_pointer_to_function(self, name: str) -> int:
-        """Finish the code; there is no machine code to point to."""
+        """Finish the code; return 0, because there is no machine code."""
         self._ensure_finalized()
         return 0
 
     @property
-    def codegen(self) -> _Linked:
+    def codegen(self) -> _LinkedCode:
         return self
 
     def set_env(self, name: str, environment: object) -> None:
-        """Do nothing; only machine code has a place for objects of Python."""
+        """Do nothing: only machine code refers to an environment of Python objects."""
 
 
-class _Function(ir.FunctionIR):
-    """What Numba asks of a function that was read from its syntax tree."""
+class _FunctionIR(ir.FunctionIR):
+    """A typed function in the form that Numba's passes expect: one empty block stands for its body."""
 
-    def __init__(self, identity: Any, program: ReadFunction) -> None:
-        place = ir.Loc(identity.filename, identity.firstlineno)
-        blocks = {0: ir.Block(ir.Scope(None, place), place)}
-        super().__init__(blocks, False, identity, place, {}, identity.arg_count, identity.arg_names)
-        self.program = program
+    def __init__(self, identity: Any, function: TypedFunction, noinline: bool) -> None:
+        location = ir.Loc(identity.filename, identity.firstlineno)
+        blocks = {0: ir.Block(ir.Scope(None, location), location)}
+        super().__init__(blocks, False, identity, location, {}, identity.arg_count, identity.arg_names)
+        self.typed_function, self.noinline = function, noinline
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _Reading(FunctionPass):
-    """Reads a function."""
+    """Read the syntax tree of a function for the types of its arguments."""
 
     _name = "reading"
 
@@ -61,79 +61,48 @@ class _Reading(FunctionPass):
 
     def run_pass(self, state: Any) -> bool:
         identity = state.func_id
-        program = syntax_reader.read(state.typingctx, identity.func, state.args, state.return_type)
-        state.func_ir, state.return_type = _Function(identity, program), program.result
-        state.calltypes = dict(enumerate(program.calls))  # some versions of Numba look for calls that return arrays
+        function = syntax_reader.read(state.typingctx, identity.func, state.args, state.return_type)
+        state.func_ir = _FunctionIR(identity, function, state.pipeline.noinline)
+        state.return_type = function.result
+        state.calltypes = dict(enumerate(function.calls))  # some versions of Numba look for calls that return arrays
         state.typemap = {f"arg.{name}": kind for name, kind in zip(identity.arg_names, state.args, strict=True)}
         return True
 
 
 class _Lower(lowering.Lower):
-    """Lowering of a function that was read."""
+    """Emit the body of a typed function; Numba's base class emits what surrounds it."""
 
     def lower_normal_function(self, fndesc: Any) -> None:
         self.setup_function(fndesc)
-        self.func_ir.program.write(self, self.extract_function_arguments())
+        self.func_ir.typed_function.emit(self, self.extract_function_arguments())
+        if self.func_ir.noinline:
+            self.function.attributes.add("noinline")
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _Lowering(NativeLowering):
-    """Writes a function that was read."""
+    """Emit LLVM for a typed function."""
 
     _name = "writing"
     lowering_class = _Lower
 
 
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _LinkedLowering(_Lowering):
-    """Writes a function into a `_Linked` library."""
+class FrontEnd(CompilerBase):
+    """Compile a function from its syntax tree; an `inner` one to LLVM code that its callers link."""
 
-    _name = "linked_writing"
-
-    def run_pass(self, state: Any) -> bool:
-        state.library = _Linked(state.targetctx.codegen(), state.func_id.func_qualname)
-        return bool(super().run_pass(state))
-
-
-class EntryCompiler(CompilerBase):
-    """Compiles a function from its syntax tree."""
-
-    lowering: type = _Lowering
+    def __init__(self, *arguments: Any, inner: bool, noinline: bool) -> None:
+        super().__init__(*arguments)
+        self.inner, self.noinline = inner, noinline
 
     def compile_extra(self, func: Any) -> Any:
-        self.state.func_id, self.state.lifted = bytecode.FunctionIdentity.from_function(func), ()
+        state = self.state
+        state.func_id, state.lifted = bytecode.FunctionIdentity.from_function(func), ()
+        if self.inner:
+            state.library = _LinkedCode(state.targetctx.codegen(), state.func_id.func_qualname)
         return self._compile_core()
 
     def define_pipelines(self) -> list[PassManager]:
         manager = PassManager("syntax")
-        manager.passes = [(_Reading, "read"), (self.lowering, "write"), (NoPythonBackend, "finish")]
+        manager.passes = [(_Reading, "read"), (_Lowering, "write"), (NoPythonBackend, "finish")]
         manager.finalize()
         return [manager]
-
-
-class InnerCompiler(EntryCompiler):
-    """The compiler of functions that others link."""
-
-    lowering = _LinkedLowering
-
-
-class _SeparateLower(_Lower):
-    """Lowering of a function that LLVM does not inline."""
-
-    def lower_normal_function(self, fndesc: Any) -> None:
-        super().lower_normal_function(fndesc)
-        self.function.attributes.add("noinline")
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _SeparateLowering(_LinkedLowering):
-    """Writes a function that LLVM does not inline into a `_Linked` library."""
-
-    _name = "separate_writing"
-    lowering_class = _SeparateLower
-
-
-class SeparateCompiler(InnerCompiler):
-    """The compiler of functions that others link and call."""
-
-    lowering = _SeparateLowering

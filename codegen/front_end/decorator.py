@@ -1,8 +1,4 @@
-"""The decorator of the functions of a kernel: Numba's, without what nobody calls.
-
-A function is compiled by the front end (`compiler`), which reads its syntax tree.  Where the front end fails, for example
-with a version of Numba that it does not know, Numba's own pipeline compiles the function, in two to four times the time.
-"""
+"""`njit` for kernel functions: no Python wrapper, and no machine code for functions that only kernels call."""
 
 from __future__ import annotations
 
@@ -14,7 +10,7 @@ import numba
 from numba.core.compiler import Compiler
 
 front_end_problems: list[str] = []
-"""Why Numba's own pipeline compiled functions of this process."""
+"""Reasons for which Numba's own pipeline compiled functions of this process, one per function."""
 
 
 def uses_front_end() -> bool:
@@ -29,9 +25,10 @@ def uses_front_end() -> bool:
 
 
 class _Compiler(Compiler):
-    """Compiles a function by the front end, or by Numba's own pipeline if the front end fails."""
+    """Compiler of entry points: the front end, or Numba's own pipeline if the front end raises."""
 
-    front_end = "EntryCompiler"
+    inner = False  # True: only kernels call the function, and link its LLVM code
+    noinline = False  # True: LLVM must not inline the function into its callers
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
@@ -41,39 +38,49 @@ class _Compiler(Compiler):
         problem = ""
         if uses_front_end():
             try:
-                from . import compiler
+                from . import compiler  # here, because the import itself fails if Numba has renamed something
 
-                return getattr(compiler, self.front_end)(*self.arguments).compile_extra(func)
+                return compiler.FrontEnd(*self.arguments, inner=self.inner, noinline=self.noinline).compile_extra(func)
             except Exception as error:  # another version of Numba may raise anything
                 problem = f"{func.__name__}: {type(error).__name__}: {' '.join(str(error).split())}"
-        compiled = super().compile_extra(func)  # raises what is wrong with the function itself
+        # A function with an error in itself fails here too, with Numba's message, and is no problem of the front end.
+        compiled = super().compile_extra(func)
         if problem:
             front_end_problems.append(problem)
         return compiled
 
 
 class _InnerCompiler(_Compiler):
-    """The compiler of functions that only kernels call."""
-
-    front_end = "InnerCompiler"
+    inner = True
 
 
-class _SeparateCompiler(_Compiler):
-    """The compiler of functions that kernels call without taking them in."""
-
-    front_end = "SeparateCompiler"
-
-
-ENTRY = {"pipeline_class": _Compiler}
-INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": _InnerCompiler}
+class _NoInlineCompiler(_InnerCompiler):
+    noinline = True
 
 
 def njit(*, cache: bool = False, separate: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return `numba.njit(**options)`; a function without `cache` cannot be called from Python, only by kernels.
+    """Return `numba.njit(**options)` with the compiler of kernel functions.
 
-    A kernel has some eighty functions and one entry point; wrappers and machine code of them all are half of its compilation.
-    `cache` marks entry points, whose machine code `machine_code.compile` keeps: Numba's own cache is not used.  `separate` keeps
-    LLVM from inlining a function with many callers.
+    Without `cache`, only kernels can call the function, not Python.  A kernel has some eighty functions and one entry
+    point; wrappers and machine code of them all would be half of its compilation.
+
+    Parameters
+    ----------
+    cache : bool
+        Mark an entry point, whose machine code `machine_code.compile` keeps; Numba's own cache is not used.
+    separate : bool
+        Keep LLVM from inlining an inner function with many callers.
+    **options
+        Options of `numba.njit`.
+
+    Examples
+    --------
+    >>> from synchain.codegen.simd import njit
+    >>> @njit(cache=True, error_model="numpy")
+    ... def double(x):
+    ...     return 2.0 * x
     """
-    pipeline = {"pipeline_class": _SeparateCompiler} if separate else {}
-    return numba.njit(**{**options, **(ENTRY if cache else INNER), **pipeline})
+    if cache:
+        return numba.njit(pipeline_class=_Compiler, **options)
+    compiler = _NoInlineCompiler if separate else _InnerCompiler
+    return numba.njit(pipeline_class=compiler, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)

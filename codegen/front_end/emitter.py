@@ -1,4 +1,15 @@
-"""Where functions of kernels are written: values of LLVM, variables, blocks, loops, and arrays that are kept alive."""
+"""Emit LLVM: the values of variables, basic blocks, loops, and the reference counts of arrays.
+
+`syntax_reader` translates an expression into a `TypedExpr` and a statement into an `Emit`, functions that take the `Emitter` of
+the function under construction.  They run after the whole function was read, when the types of all variables are final.
+
+Variables.  One that lives in a single basic block is an LLVM register, as in Numba.  The others are stack slots (`alloca`),
+which LLVM turns into registers.
+
+Arrays are counted by Numba's runtime (NRT).  An array variable holds one reference, which an assignment or `return` releases.
+An expression either refers to an array that a variable holds, or returns a new reference (`returns_new_reference`): a variable
+takes this over, and a call borrows it and releases it afterwards.
+"""
 
 from __future__ import annotations
 
@@ -11,57 +22,62 @@ from numba import types
 from numba.core import cgutils, lowering
 
 Value: TypeAlias = ir.Value
-Write: TypeAlias = "Callable[[CodeWriter], Any]"
+Emit: TypeAlias = "Callable[[Emitter], Any]"
 
 
 @dataclass(frozen=True, slots=True)
 class TypedExpr:
-    """An expression: its type, what writes its code and returns its value, and whether that is an array of nobody else."""
+    """An expression: its Numba type, and `emit`, which emits its code and returns its value."""
 
-    kind: types.Type
-    write: Write
-    owned: bool = False
+    type: types.Type
+    emit: Emit
+    returns_new_reference: bool = False  # to an array, which the consumer must release
 
-    def cast(self, kind: types.Type) -> Write:
-        """What writes the value as one of another type."""
-        if kind == self.kind:
-            return self.write
-        return lambda w: w.context.cast(w.builder, self.write(w), self.kind, kind)
+    def cast(self, target: types.Type) -> Emit:
+        """Return the `emit` of this expression converted to another type."""
+        if target == self.type:
+            return self.emit
+        return lambda e: e.context.cast(e.builder, self.emit(e), self.type, target)
 
 
 @dataclass(frozen=True, slots=True)
-class ReadFunction:
-    """A function that was read."""
+class TypedFunction:
+    """A function with the types of all its variables."""
 
-    statements: tuple[Write, ...]  # what writes its statements
-    result: types.Type  # the type of what it returns
-    local: frozenset[str]  # the variables of one block alone
-    arrays: dict[str, types.Type]  # the variables that keep arrays alive, and their types
-    calls: tuple[Any, ...]
+    statements: tuple[Emit, ...]
+    result: types.Type
+    registers: frozenset[str]  # the variables that live in a single basic block
+    arrays: dict[str, types.Type]  # the variables that hold a reference to an array, with their types
+    calls: tuple[Any, ...]  # Numba's signatures of all operators and calls
 
-    def write(self, lower: lowering.Lower, arguments: Sequence[Value]) -> None:
-        """Write the code of the function, whose arguments have these values."""
-        writer = CodeWriter(lower, self)
-        for name, kind in self.arrays.items():
-            whole = lower.context.get_value_type(kind)
-            writer.slots[name] = cgutils.alloca_once(writer.builder, whole, zfill=True)
+    def emit(self, lower: lowering.Lower, arguments: Sequence[Value]) -> None:
+        """Emit the body of the function, given the LLVM values of its arguments."""
+        emitter = Emitter(lower, self)
+        for name, array_type in self.arrays.items():
+            # Zeros are a null reference, which the first assignment may release.
+            llvm_type = lower.context.get_value_type(array_type)
+            emitter.slots[name] = cgutils.alloca_once(emitter.builder, llvm_type, zfill=True)
         for name, value in zip(lower.fndesc.args, arguments, strict=True):
-            writer.set(name, writer.keep(self.arrays[name], value) if name in self.arrays else value)
-        writer.write(self.statements)
-        if not writer.ended:
-            writer.builder.unreachable()
+            if name in self.arrays:  # the caller holds the argument, the variable needs a reference as well
+                emitter.add_reference(self.arrays[name], value)
+            emitter.set_variable(name, value)
+        emitter.emit_all(self.statements)
+        if not emitter.block_ended:
+            emitter.builder.unreachable()
 
 
 @dataclass(slots=True)
-class CodeWriter:
-    """Where code is written: the function, the values of its variables, and where `continue` and `break` lead."""
+class Emitter:
+    """The state of a function under construction."""
 
     lower: lowering.Lower
-    program: ReadFunction
-    values: dict[str, Value] = field(default_factory=dict)
-    slots: dict[str, Value] = field(default_factory=dict)
-    ends: list[tuple[ir.Block, ir.Block]] = field(default_factory=list)
-    lent: list[tuple[types.Type, Value]] = field(default_factory=list)
+    function: TypedFunction
+    registers: dict[str, Value] = field(default_factory=dict)  # values of the variables in registers
+    slots: dict[str, Value] = field(default_factory=dict)  # stack slots of the other variables
+    loops: list[tuple[ir.Block, ir.Block]] = field(
+        default_factory=list
+    )  # targets of `continue`, `break`; innermost last
+    borrowed: list[tuple[types.Type, Value]] = field(default_factory=list)  # new arrays that the current calls borrow
 
     @property
     def builder(self) -> ir.IRBuilder:
@@ -69,98 +85,96 @@ class CodeWriter:
 
     @property
     def context(self) -> Any:
-        """What Numba knows of the processor."""
+        """Numba's target context, which emits operators, calls and conversions."""
         return self.lower.context
 
     @property
-    def ended(self) -> bool:
-        """True behind a statement that leaves the block."""
+    def block_ended(self) -> bool:
+        """True after a `return`, `break` or `continue`."""
         return bool(self.builder.block.is_terminated)
 
-    def write(self, statements: Sequence[Write]) -> None:
-        """Write statements up to one that leaves the block."""
+    def emit_all(self, statements: Sequence[Emit]) -> None:
+        """Emit statements in turn, up to one that ends the basic block."""
         for statement in statements:
-            if self.ended:
+            if self.block_ended:
                 return
             statement(self)
 
-    def get(self, name: str) -> Value:
-        """The value of a variable."""
-        return self.values[name] if name in self.values else self.builder.load(self.slots[name])
+    # -- variables and references -----------------------------------------------------------------------------
 
-    def set(self, name: str, value: Value) -> None:
-        """Give a variable a value: in a register if it lives in one block, else in memory, which LLVM removes."""
-        if name in self.program.local:
-            self.values[name] = value
+    def get_variable(self, name: str) -> Value:
+        return self.registers[name] if name in self.registers else self.builder.load(self.slots[name])
+
+    def set_variable(self, name: str, value: Value) -> None:
+        if name in self.function.registers:
+            self.registers[name] = value
         elif name in self.slots:
-            self.release(name)
+            self.release_variable(name)
             self.builder.store(value, self.slots[name])
         else:
-            self.slots[name] = self.memory(value)
+            self.slots[name] = self.stack_slot(value)
 
-    def keep(self, kind: types.Type, value: Value) -> Value:
-        """An array that one variable more keeps alive."""
-        self.context.nrt.incref(self.builder, kind, value)
-        return value
-
-    def release(self, name: str) -> None:
-        """Keep the array of a variable alive no longer."""
-        if name in self.program.arrays:
-            self.context.nrt.decref(self.builder, self.program.arrays[name], self.get(name))
-
-    def take_back(self, first: int) -> None:
-        """Keep arrays that were lent to a function alive no longer."""
-        for kind, value in self.lent[first:]:
-            self.context.nrt.decref(self.builder, kind, value)
-        del self.lent[first:]
-
-    def memory(self, value: Value) -> Value:
-        """Memory that holds a value to begin with."""
+    def stack_slot(self, value: Value) -> Value:
+        """Return new stack memory with an initial value."""
         slot = cgutils.alloca_once(self.builder, value.type)
         self.builder.store(value, slot)
         return slot
 
-    def blocks(self, count: int) -> list[ir.Block]:
-        """New blocks of code."""
+    def add_reference(self, array_type: types.Type, value: Value) -> None:
+        self.context.nrt.incref(self.builder, array_type, value)
+
+    def release_variable(self, name: str) -> None:
+        """Release the array that a variable holds; do nothing for other variables."""
+        if name in self.function.arrays:
+            self.context.nrt.decref(self.builder, self.function.arrays[name], self.get_variable(name))
+
+    def release_borrowed(self, first: int) -> None:
+        """Release the borrowed arrays from number `first` on."""
+        for array_type, value in self.borrowed[first:]:
+            self.context.nrt.decref(self.builder, array_type, value)
+        del self.borrowed[first:]
+
+    # -- control flow -----------------------------------------------------------------------------------------
+
+    def new_blocks(self, count: int) -> list[ir.Block]:
         return [self.builder.append_basic_block() for _ in range(count)]
 
-    def inside(self, block: ir.Block, write: Write, after: ir.Block) -> None:
-        """Write a block, from which the program goes on at another one."""
+    def fill_block(self, block: ir.Block, emit: Emit, successor: ir.Block) -> None:
+        """Emit code into a basic block, which goes on at `successor` unless the code ends it."""
         self.builder.position_at_end(block)
-        write(self)
-        if not self.ended:
-            self.builder.branch(after)
+        emit(self)
+        if not self.block_ended:
+            self.builder.branch(successor)
 
-    def choose(self, test: Write, yes: Write, no: Write) -> None:
-        """Write what is done if a condition holds, and if not."""
-        holds, fails, after = self.blocks(3)
-        self.builder.cbranch(test(self), holds, fails)
-        self.inside(holds, yes, after)
-        self.inside(fails, no, after)
+    def if_else(self, condition: Emit, yes: Emit, no: Emit) -> None:
+        yes_block, no_block, after = self.new_blocks(3)
+        self.builder.cbranch(condition(self), yes_block, no_block)
+        self.fill_block(yes_block, yes, after)
+        self.fill_block(no_block, no, after)
         self.builder.position_at_end(after)
 
-    def each(self, bodies: Sequence[Write]) -> None:
-        """Write what is done in turn."""
-        (after,) = self.blocks(1)
+    def unrolled_loop(self, bodies: Sequence[Emit]) -> None:
+        """Emit one body for each turn of a loop; `continue` leads to the next body, `break` behind the last."""
+        (after,) = self.new_blocks(1)
         for body in bodies:
-            (on,) = self.blocks(1)
-            self.ends.append((on, after))
-            self.inside(self.builder.block, body, on)
-            self.ends.pop()
-            self.builder.position_at_end(on)
+            (following,) = self.new_blocks(1)
+            self.loops.append((following, after))
+            self.fill_block(self.builder.block, body, following)
+            self.loops.pop()
+            self.builder.position_at_end(following)
         self.builder.branch(after)
         self.builder.position_at_end(after)
 
-    def loop(self, test: Write | None, body: Write) -> None:
-        """Write what is done while a condition holds."""
-        again, inside, after = self.blocks(3)
-        self.builder.branch(again)
-        self.builder.position_at_end(again)
-        if test is None:
+    def while_loop(self, condition: Emit | None, body: Emit) -> None:
+        """Emit a loop; without a condition an endless one, which only `break` and `return` leave."""
+        head, inside, after = self.new_blocks(3)
+        self.builder.branch(head)
+        self.builder.position_at_end(head)
+        if condition is None:
             self.builder.branch(inside)
         else:
-            self.builder.cbranch(test(self), inside, after)
-        self.ends.append((again, after))
-        self.inside(inside, body, again)
-        self.ends.pop()
+            self.builder.cbranch(condition(self), inside, after)
+        self.loops.append((head, after))
+        self.fill_block(inside, body, head)
+        self.loops.pop()
         self.builder.position_at_end(after)

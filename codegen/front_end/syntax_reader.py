@@ -1,9 +1,14 @@
-"""From the syntax tree of a function to LLVM: what Numba does by bytecode, SSA form, type inference and lowering.
+"""Type the syntax tree of a function: expressions become `TypedExpr`, statements become `Emit` (see `emitter`).
 
-A step is thousands of lines of plain arithmetic, for which Numba's own way takes twice as long as LLVM takes to make
-machine code of them.  Here each expression is read once: it has a type, and a function that writes its code.  Numba says
-what operators and functions mean for given types, so that kernels have the bits that Numba itself would give them, but
-for one case: a product in a variable that several blocks give values to, which is added to something in its own block.
+Types are resolved in the order of the text, without inference backwards: a variable of several basic blocks has one type.
+Numba's typing context returns the types of operators, attributes and calls.  The basic blocks are numbered as in Numba,
+because a sum is fused with a product that stands in a register (codegen/simd/lanes.py): the same variables must be registers.
+Exception: a product assigned to a variable of several basic blocks, and added to something in its own block.  Numba renames
+such a variable in each block (SSA form) and fuses the sum; here the product is loaded from a stack slot and not fused.
+
+The subset of Python: assignments to names, elements and tuples; `if`, `while`, `for` over `range`, tuples and `enumerate` of
+tuples; arithmetic, comparisons, `and`, `or`, conditional expressions; NamedTuples; calls without keywords.  Anything else
+raises `UnreadError`.
 """
 
 from __future__ import annotations
@@ -22,7 +27,7 @@ from numba import types
 from numba.core import cgutils, errors
 from numba.core.typing.templates import fold_arguments
 
-from .emitter import CodeWriter, ReadFunction, TypedExpr, Value, Write
+from .emitter import Emit, Emitter, TypedExpr, TypedFunction, Value
 from .syntax_trees import TREES, functions
 
 OPERATORS: dict[type, Callable[..., Any]] = {
@@ -50,501 +55,523 @@ OPERATORS: dict[type, Callable[..., Any]] = {
 
 
 class UnreadError(errors.NumbaError):
-    """Syntax that is not read, or a type that it is not read for."""
+    """Raised for syntax outside the subset, and for types that it is not read for."""
 
-    def __init__(self, found: str = "") -> None:
-        super().__init__(found)
-        self.found = found
+    def __init__(self, syntax: str = "") -> None:
+        super().__init__(syntax)
+        self.syntax = syntax  # empty at first: `visit` fills in the innermost node
 
     def __str__(self) -> str:
-        return f"functions of kernels: found {self.found}; expected what codegen/front_end/syntax_reader.py reads"
+        return f"functions of kernels: found {self.syntax}; expected what codegen/front_end/syntax_reader.py reads"
 
 
-def tree_of(function: Any) -> ast.FunctionDef:
-    """Return the syntax tree of a function at the top of a module."""
-    if TREES not in function.__globals__:
-        text = Path(function.__code__.co_filename).read_text(encoding="utf-8")
-        function.__globals__[TREES] = functions(ast.parse(text))
-    found: ast.FunctionDef = function.__globals__[TREES][function.__code__.co_firstlineno]
-    return found
+def read(context: Any, function: Any, args: Sequence[types.Type], result: types.Type | None) -> TypedFunction:
+    """Type a top-level function of a module for given types of its arguments and, unless None, of its result."""
+    module = function.__globals__
+    if TREES not in module:  # a module that Python imported: drivers, recorders, elementary functions
+        module[TREES] = functions(ast.parse(Path(function.__code__.co_filename).read_text(encoding="utf-8")))
+    return _TreeReader(context, module).function(module[TREES][function.__code__.co_firstlineno], args, result)
 
 
-def read(context: Any, function: Any, args: Sequence[types.Type], result: types.Type | None) -> ReadFunction:
-    """Read a function."""
-    return _TreeReader(context, function.__globals__).function(tree_of(function), args, result)
+# -- compositions of expressions and of statements -------------------------------------------------------------
 
 
-def gathered(parts: Sequence[TypedExpr], record: type | None = None) -> TypedExpr:
-    """Return a tuple, or a NamedTuple of the class `record`."""
-    if any(part.owned for part in parts):
+def sequence(statements: Sequence[Emit]) -> Emit:
+    return lambda e: e.emit_all(statements)
+
+
+def tuple_of(items: Sequence[TypedExpr], record: type | None = None) -> TypedExpr:
+    """Make a tuple, or a NamedTuple of the class `record`, whose fields have no literal types."""
+    if any(item.returns_new_reference for item in items):
         raise UnreadError
-    kinds = [part.kind if record is None else types.unliteral(part.kind) for part in parts]
-    kind, writes = (
-        types.BaseTuple.from_types(kinds, record),
-        [part.cast(k) for part, k in zip(parts, kinds, strict=True)],
-    )
-    return TypedExpr(kind, lambda w: w.context.make_tuple(w.builder, kind, [write(w) for write in writes]))
+    item_types = [item.type if record is None else types.unliteral(item.type) for item in items]
+    tuple_type = types.BaseTuple.from_types(item_types, record)
+    emits = [item.cast(item_type) for item, item_type in zip(items, item_types, strict=True)]
+    return TypedExpr(tuple_type, lambda e: e.context.make_tuple(e.builder, tuple_type, [emit(e) for emit in emits]))
 
 
-def part(value: TypedExpr, k: int) -> TypedExpr:
-    """A part of a tuple."""
-    return TypedExpr(value.kind.types[k], lambda w: w.builder.extract_value(value.write(w), k))
+def tuple_item(value: TypedExpr, k: int) -> TypedExpr:
+    return TypedExpr(value.type.types[k], lambda e: e.builder.extract_value(value.emit(e), k))
 
 
-def lent(value: TypedExpr) -> TypedExpr:
-    """The argument of a function, which has it to its end."""
-    if not value.owned:
+def evaluated_once(value: TypedExpr) -> tuple[Emit, TypedExpr]:
+    """Split an expression into a statement that evaluates it, and a reference to the result for later statements."""
+    results: list[Value] = []
+    reference = TypedExpr(value.type, lambda e: results[-1], value.returns_new_reference)
+    return lambda e: results.append(value.emit(e)), reference
+
+
+def borrowed(value: TypedExpr) -> TypedExpr:
+    """Borrow an array for one call: a new array is released after the call (`call_expr`)."""
+    if not value.returns_new_reference:
         return value
 
-    def write(w: CodeWriter) -> Value:
-        found = value.write(w)
-        w.lent.append((value.kind, found))
-        return found
+    def emit(e: Emitter) -> Value:
+        array = value.emit(e)
+        e.borrowed.append((value.type, array))
+        return array
 
-    return TypedExpr(value.kind, write)
-
-
-def called(kind: types.Type, given: Sequence[Write], call: Callable[[CodeWriter, Sequence[Value]], Value]) -> TypedExpr:
-    """What a function returns, which gives back the arrays that were lent to it."""
-
-    def write(w: CodeWriter) -> Value:
-        before = len(w.lent)
-        found = call(w, [argument(w) for argument in given])
-        w.take_back(before)
-        return found
-
-    return TypedExpr(kind, write, isinstance(kind, types.Array))
+    return TypedExpr(value.type, emit)
 
 
-def held(value: TypedExpr) -> tuple[Write, TypedExpr]:
-    """What computes a value, and the value for those that are written behind it."""
-    place: list[Value] = []
-    return lambda w: place.append(value.write(w)), TypedExpr(value.kind, lambda w: place[-1], value.owned)
+def call_expr(
+    result: types.Type, operands: Sequence[Emit], call: Callable[[Emitter, Sequence[Value]], Value]
+) -> TypedExpr:
+    """Emit the operands and a call, then release the arrays that the call borrowed."""
 
+    def emit(e: Emitter) -> Value:
+        before = len(e.borrowed)
+        value = call(e, [operand(e) for operand in operands])
+        e.release_borrowed(before)
+        return value
 
-def in_turn(writes: Sequence[Write]) -> Write:
-    """What writes statements that follow each other."""
-    return lambda w: w.write(writes)
+    return TypedExpr(result, emit, returns_new_reference=isinstance(result, types.Array))
 
 
 class _TreeReader(ast.NodeVisitor):
-    """Reads the nodes of a syntax tree, expressions into `TypedExpr`, statements into what writes them.
+    """Read one function; `visit` returns a `TypedExpr` for an expression, an `Emit` for a statement."""
 
-    Blocks are those of Numba, and a variable is kept in a register if Numba does so: sums are fused with products that stand
-    in registers (codegen/simd/lanes.py).
-    """
-
-    def __init__(self, context: Any, names: dict[str, Any]) -> None:
-        self.context, self.names = context, names
-        self.kinds: dict[str, types.Type] = {}
-        self.blocks: defaultdict[str, set[int]] = defaultdict(set)
-        self.place = 0
-        self.changing: set[str] = set()
-        self.arrays: dict[str, types.Type] = {}
+    def __init__(self, context: Any, module: dict[str, Any]) -> None:
+        self.context, self.module = context, module
+        self.types: dict[str, types.Type] = {}  # of each variable
+        self.retyped: set[str] = set()  # variables of several types
+        self.arrays: dict[str, types.Type] = {}  # variables that hold a reference to an array
+        self.block = 0  # the number of the current basic block
+        self.blocks: defaultdict[str, set[int]] = defaultdict(set)  # where each variable is assigned or used
         self.results: list[TypedExpr] = []
-        self.meanings: dict[Any, tuple[types.Type, Any]] = {}
+        self.signatures: dict[Any, tuple[types.Type, Any]] = {}  # by function and types of its arguments
 
-    def function(self, tree: ast.FunctionDef, args: Sequence[types.Type], result: types.Type | None) -> ReadFunction:
-        for argument, kind in zip(tree.args.args, args, strict=True):
-            self.declare(argument.arg, kind)
-        statements = self.body(tree.body)
+    def function(self, tree: ast.FunctionDef, args: Sequence[types.Type], result: types.Type | None) -> TypedFunction:
+        for argument, argument_type in zip(tree.args.args, args, strict=True):
+            self.declare(argument.arg, argument_type)
+        statements = self.read_body(tree.body)
         if not isinstance(tree.body[-1], ast.Return):
             statements.append(self.visit_Return(ast.Return()))
-        kind = result or self.common(self.results)
-        local = frozenset(name for name, blocks in self.blocks.items() if len(blocks) == 1 and name not in self.arrays)
-        if not self.changing <= local:
-            raise UnreadError(f"{', '.join(sorted(self.changing - local))} of several types")
-        calls = tuple(signature for _, signature in self.meanings.values())
-        return ReadFunction(tuple(statements), kind, local, self.arrays, calls)
+        registers = frozenset(
+            name for name, blocks in self.blocks.items() if len(blocks) == 1 and name not in self.arrays
+        )
+        # A register may change its type with its value; a stack slot cannot.
+        if not self.retyped <= registers:
+            raise UnreadError(f"{', '.join(sorted(self.retyped - registers))} of several types")
+        calls = tuple(signature for _, signature in self.signatures.values())
+        return TypedFunction(tuple(statements), result or self.common_type(self.results), registers, self.arrays, calls)
 
     def visit(self, node: ast.AST) -> Any:
-        """Read a node."""
         try:
             return super().visit(node)
         except UnreadError as error:
-            error.found = error.found or f"{ast.unparse(node)!r} in line {getattr(node, 'lineno', 0)}"
+            error.syntax = error.syntax or f"{ast.unparse(node)!r} in line {getattr(node, 'lineno', 0)}"
             raise
 
     def generic_visit(self, node: ast.AST) -> Any:
-        """Refuse what has no method here."""
+        """Raise for nodes without a method here."""
         raise UnreadError
 
-    def turn(self) -> None:
-        """Begin another block."""
-        self.place += 1
+    def next_block(self) -> None:
+        self.block += 1
 
-    def declare(self, name: str, kind: types.Type) -> types.Type:
-        """Return the type of a variable that gets a value; a variable of one block may have another type each time."""
-        kind = types.unliteral(kind)
-        if self.kinds.setdefault(name, kind) != kind:
-            self.changing.add(name)
-            self.kinds[name] = kind
-        self.blocks[name].add(self.place)
-        return kind
+    def declare(self, name: str, value_type: types.Type) -> types.Type:
+        """Record an assignment to a variable in the current block; return the type that the variable gets."""
+        variable_type = types.unliteral(value_type)
+        if self.types.setdefault(name, variable_type) != variable_type:
+            self.retyped.add(name)
+            self.types[name] = variable_type
+        self.blocks[name].add(self.block)
+        return variable_type
 
-    # -- expressions ------------------------------------------------------------------------------------------
-
-    def call(self, function: Any, *values: TypedExpr) -> TypedExpr:
-        """The value of a function or of an operator."""
-        kind, signature = self.meaning(function, tuple(value.kind for value in values))
-        if signature is None or signature.recvr:
+    def common_type(self, values: Sequence[TypedExpr]) -> types.Type:
+        """Return the type to which all values convert, or raise."""
+        unified = self.context.unify_types(*(types.unliteral(value.type) for value in values))
+        if unified is None or not unified.is_precise():
             raise UnreadError
-        wanted, operands = signature.args, [lent(value) for value in values]
-        if signature.pysig is None:
-            given = [value.cast(kind) for value, kind in zip(operands, wanted, strict=True)]
-        else:
-            given = fold_arguments(
-                signature.pysig,
-                operands,
-                {},
-                lambda index, _, value: value.cast(wanted[index]),
-                lambda index, _, value: lambda w: w.context.get_constant_generic(w.builder, wanted[index], value),
-                lambda index, _, values: gathered(values).cast(wanted[index]),
-            )
+        return unified
 
-        def write(w: CodeWriter, arguments: Sequence[Value]) -> Value:
-            found = w.context.get_function(kind, signature)(w.builder, arguments)
-            return w.context.get_dummy_value() if found is None else found
+    # -- constants: literals, and globals of the module, whose values are final ---------------------------------
 
-        return called(signature.return_type, given, write)
+    def constant(self, value: Any) -> TypedExpr:
+        constant_type = types.maybe_literal(value) or self.context.resolve_value_type(value)
+        return TypedExpr(constant_type, lambda e: e.context.get_constant_generic(e.builder, constant_type, value))
 
-    def meaning(self, function: Any, kinds: tuple[types.Type, ...]) -> tuple[types.Type, Any]:
-        """The type of a function or of an operator, and what it takes and returns for operands of some types.
-
-        It is found out once: a step adds and multiplies thousands of times.  A function is compiled for integers, not for
-        3, 4 and 5 apart.
-        """
-        if (function, kinds) not in self.meanings:
-            kind = self.context.resolve_value_type(function)
-            given = tuple(map(types.unliteral, kinds)) if isinstance(kind, types.Dispatcher) else kinds
-            self.meanings[function, kinds] = kind, self.context.resolve_function_type(kind, given, {})
-        return self.meanings[function, kinds]
-
-    def known(self, value: Any) -> TypedExpr:
-        """A value that is known when the function is read."""
-        kind = types.maybe_literal(value) or self.context.resolve_value_type(value)
-        return TypedExpr(kind, lambda w: w.context.get_constant_generic(w.builder, kind, value))
-
-    def is_known(self, node: ast.expr) -> bool:
-        """True for a name of the module, or an attribute of one: it has a value when the function is read."""
+    def is_global(self, node: ast.expr) -> bool:
+        """Return True for a name that is no variable, and for `name.attribute…` of one."""
         while isinstance(node, ast.Attribute):
             node = node.value
-        return isinstance(node, ast.Name) and node.id not in self.kinds
+        return isinstance(node, ast.Name) and node.id not in self.types
 
-    def found(self, node: ast.expr) -> Any:
-        """What a name of the module stands for, or an attribute of another module."""
-        if isinstance(node, ast.Attribute) and isinstance(module := self.found(node.value), ModuleType):
+    def global_value(self, node: ast.expr) -> Any:
+        """Look up a name in the module and in the builtins, or an attribute of an imported module."""
+        if isinstance(node, ast.Attribute) and isinstance(module := self.global_value(node.value), ModuleType):
             return getattr(module, node.attr)
-        if not isinstance(node, ast.Name) or node.id in self.kinds:
+        if not isinstance(node, ast.Name) or node.id in self.types:
             raise UnreadError
-        if node.id in self.names:
-            return self.names[node.id]
+        if node.id in self.module:
+            return self.module[node.id]
         if not hasattr(builtins, node.id):
             raise UnreadError
         return getattr(builtins, node.id)
 
-    def common(self, values: Sequence[TypedExpr]) -> types.Type:
-        """The type that values of several can have."""
-        kind = self.context.unify_types(*(types.unliteral(value.kind) for value in values))
-        if kind is None or not kind.is_precise():
+    # -- calls, and operators, which are calls of functions of the module `operator` -----------------------------
+
+    def call(self, function: Any, *values: TypedExpr) -> TypedExpr:
+        function_type, signature = self.signature(function, tuple(value.type for value in values))
+        if signature is None or signature.recvr:
             raise UnreadError
-        return kind
-
-    def chosen(self, test: TypedExpr, yes: TypedExpr, no: TypedExpr) -> TypedExpr:
-        """One value if a condition holds, else another one."""
-        if yes.owned or no.owned:
-            raise UnreadError
-        kind = self.common([yes, no])
-        first, second = yes.cast(kind), no.cast(kind)
-
-        def write(w: CodeWriter) -> Value:
-            slot = cgutils.alloca_once(w.builder, w.context.get_value_type(kind))
-            w.choose(test.write, lambda w: w.builder.store(first(w), slot), lambda w: w.builder.store(second(w), slot))
-            return w.builder.load(slot)
-
-        return TypedExpr(kind, write)
-
-    def test(self, node: ast.expr) -> TypedExpr:
-        """A condition."""
-        found: TypedExpr = self.visit(node)
-        return found if found.kind == types.boolean else self.call(bool, found)
-
-    def visit_Name(self, node: ast.Name) -> TypedExpr:
-        name = node.id
-        if name not in self.kinds:
-            return self.known(self.found(node))
-        self.blocks[name].add(self.place)
-        return TypedExpr(self.kinds[name], lambda w: w.get(name))
-
-    def visit_Constant(self, node: ast.Constant) -> TypedExpr:
-        return self.known(node.value)
-
-    def visit_Attribute(self, node: ast.Attribute) -> TypedExpr:
-        name = node.attr
-        if self.is_known(node):
-            return self.known(self.found(node))
-        base: TypedExpr = self.visit(node.value)
-        if isinstance(base.kind, types.BaseNamedTuple):
-            return part(base, base.kind.fields.index(name))
-        kind = self.context.resolve_getattr(typ=base.kind, attr=name)
-        if kind is None or isinstance(kind, types.Callable | types.Array) or base.owned:
-            raise UnreadError
-
-        def write(w: CodeWriter) -> Value:
-            return w.context.get_getattr(base.kind, name)(w.context, w.builder, base.kind, base.write(w), name)
-
-        return TypedExpr(kind, write)
-
-    def visit_Subscript(self, node: ast.Subscript) -> TypedExpr:
-        base: TypedExpr = self.visit(node.value)
-        if isinstance(base.kind, types.BaseTuple) and isinstance(node.slice, ast.Slice):
-            first, last = (
-                None if bound is None else int(ast.literal_eval(bound))
-                for bound in (node.slice.lower, node.slice.upper)
+        # Convert the operands to the types of the signature; a compiled Python function may add defaults and `*args`.
+        wanted, operands = signature.args, [borrowed(value) for value in values]
+        if signature.pysig is None:
+            converted = [value.cast(wanted_type) for value, wanted_type in zip(operands, wanted, strict=True)]
+        else:
+            converted = fold_arguments(
+                signature.pysig,
+                operands,
+                {},
+                lambda index, _, value: value.cast(wanted[index]),
+                lambda index, _, value: lambda e: e.context.get_constant_generic(e.builder, wanted[index], value),
+                lambda index, _, values: tuple_of(values).cast(wanted[index]),
             )
-            return gathered([part(base, k) for k in range(len(base.kind))[first:last]])
-        if isinstance(base.kind, types.BaseTuple) and isinstance(node.slice, ast.Constant):
-            return part(base, ast.literal_eval(node.slice))
-        return self.call(operator.getitem, base, self.visit(node.slice))
 
-    def visit_Slice(self, node: ast.Slice) -> TypedExpr:
-        bounds = [self.known(None) if bound is None else self.visit(bound) for bound in (node.lower, node.upper)]
-        return self.call(slice, *bounds, *([] if node.step is None else [self.visit(node.step)]))
+        def emit(e: Emitter, arguments: Sequence[Value]) -> Value:
+            value = e.context.get_function(function_type, signature)(e.builder, arguments)
+            return e.context.get_dummy_value() if value is None else value
 
-    def visit_Tuple(self, node: ast.Tuple) -> TypedExpr:
-        return gathered([self.visit(part) for part in node.elts])
+        return call_expr(signature.return_type, converted, emit)
+
+    def signature(self, function: Any, argument_types: tuple[types.Type, ...]) -> tuple[types.Type, Any]:
+        """Return the type of a function and its signature for given arguments, both resolved by Numba."""
+        # Cached: a step adds and multiplies thousands of times.
+        if (function, argument_types) not in self.signatures:
+            function_type = self.context.resolve_value_type(function)
+            resolved = argument_types
+            if isinstance(function_type, types.Dispatcher):
+                # A compiled function takes integers: it is not compiled again for each of the literals 3, 4 and 5.
+                resolved = tuple(map(types.unliteral, argument_types))
+            signature = self.context.resolve_function_type(function_type, resolved, {})
+            self.signatures[function, argument_types] = function_type, signature
+        return self.signatures[function, argument_types]
+
+    def call_address(self, function: TypedExpr, values: Sequence[TypedExpr]) -> TypedExpr:
+        """Call a first-class function (`types.FunctionType`) by the address of its machine code."""
+        if not isinstance(function.type, types.FunctionType) or len(values) != len(function.type.signature.args):
+            raise UnreadError
+        result, wanted = function.type.signature.return_type, function.type.signature.args
+        converted = [borrowed(value).cast(wanted_type) for value, wanted_type in zip(values, wanted, strict=True)]
+
+        def emit(e: Emitter, arguments: Sequence[Value]) -> Value:
+            convention, builder = e.context.call_conv, e.builder
+            address = cgutils.create_struct_proxy(function.type)(e.context, builder, value=function.emit(e)).jit_addr
+            pointer = builder.bitcast(address, convention.get_function_type(result, wanted).as_pointer())
+            status, value = convention.call_function(builder, pointer, result, wanted, arguments)
+            with cgutils.if_unlikely(builder, status.is_error):
+                convention.return_status_propagate(builder, status)
+            return value
+
+        return call_expr(result, converted, emit)
+
+    def visit_Call(self, node: ast.Call) -> TypedExpr:
+        if node.keywords:
+            raise UnreadError
+        if self.is_global(node.func):
+            function, values = self.global_value(node.func), [self.visit(value) for value in node.args]
+            if isinstance(function, type) and issubclass(function, tuple) and function is not tuple:
+                return tuple_of(values, function)  # a NamedTuple
+            return self.call(function, *values)
+        return self.call_address(self.visit(node.func), [self.visit(value) for value in node.args])
 
     def visit_BinOp(self, node: ast.BinOp) -> TypedExpr:
         return self.call(OPERATORS[type(node.op)], self.visit(node.left), self.visit(node.right))
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> TypedExpr:
         if isinstance(node.op, ast.USub) and isinstance(node.operand, ast.Constant):
-            return self.known(ast.literal_eval(node))
+            return self.constant(ast.literal_eval(node))
         return self.call(OPERATORS[type(node.op)], self.visit(node.operand))
 
     def visit_Compare(self, node: ast.Compare) -> TypedExpr:
-        if len(node.ops) > 1:
+        if len(node.ops) > 1:  # x < y < z is x < y and y < z
             pairs = zip(pairwise([node.left, *node.comparators]), node.ops, strict=True)
             return self.visit_BoolOp(ast.BoolOp(ast.And(), [ast.Compare(x, [op], [y]) for (x, y), op in pairs]))
         if type(node.ops[0]) not in OPERATORS:
             raise UnreadError
         return self.call(OPERATORS[type(node.ops[0])], self.visit(node.left), self.visit(node.comparators[0]))
 
+    # -- names, attributes, elements, tuples -----------------------------------------------------------------------
+
+    def visit_Name(self, node: ast.Name) -> TypedExpr:
+        name = node.id
+        if name not in self.types:
+            return self.constant(self.global_value(node))
+        self.blocks[name].add(self.block)
+        return TypedExpr(self.types[name], lambda e: e.get_variable(name))
+
+    def visit_Constant(self, node: ast.Constant) -> TypedExpr:
+        return self.constant(node.value)
+
+    def visit_Attribute(self, node: ast.Attribute) -> TypedExpr:
+        if self.is_global(node):
+            return self.constant(self.global_value(node))
+        base: TypedExpr = self.visit(node.value)
+        name, base_type = node.attr, base.type
+        if isinstance(base_type, types.BaseNamedTuple):
+            return tuple_item(base, base_type.fields.index(name))
+        attribute_type = self.context.resolve_getattr(typ=base_type, attr=name)
+        # Not read: methods, and arrays, whose references would have to be counted.
+        if attribute_type is None or isinstance(attribute_type, types.Callable | types.Array):
+            raise UnreadError
+        if base.returns_new_reference:
+            raise UnreadError
+
+        def emit(e: Emitter) -> Value:
+            return e.context.get_getattr(base_type, name)(e.context, e.builder, base_type, base.emit(e), name)
+
+        return TypedExpr(attribute_type, emit)
+
+    def visit_Subscript(self, node: ast.Subscript) -> TypedExpr:
+        base: TypedExpr = self.visit(node.value)
+        # Tuples by constant indices: each item has a type of its own.
+        if isinstance(base.type, types.BaseTuple) and isinstance(node.slice, ast.Slice):
+            first, last = (
+                None if bound is None else int(ast.literal_eval(bound))
+                for bound in (node.slice.lower, node.slice.upper)
+            )
+            return tuple_of([tuple_item(base, k) for k in range(len(base.type))[first:last]])
+        if isinstance(base.type, types.BaseTuple) and isinstance(node.slice, ast.Constant):
+            return tuple_item(base, ast.literal_eval(node.slice))
+        return self.call(operator.getitem, base, self.visit(node.slice))
+
+    def visit_Slice(self, node: ast.Slice) -> TypedExpr:
+        bounds = [self.constant(None) if bound is None else self.visit(bound) for bound in (node.lower, node.upper)]
+        return self.call(slice, *bounds, *([] if node.step is None else [self.visit(node.step)]))
+
+    def visit_Tuple(self, node: ast.Tuple) -> TypedExpr:
+        return tuple_of([self.visit(item) for item in node.elts])
+
+    # -- conditions ------------------------------------------------------------------------------------------------
+
+    def condition(self, node: ast.expr) -> TypedExpr:
+        """Read an expression as a truth value."""
+        value: TypedExpr = self.visit(node)
+        return value if value.type == types.boolean else self.call(bool, value)
+
+    def conditional(self, condition: TypedExpr, yes: TypedExpr, no: TypedExpr) -> TypedExpr:
+        """Evaluate one of two expressions."""
+        if yes.returns_new_reference or no.returns_new_reference:
+            raise UnreadError
+        result = self.common_type([yes, no])
+        first, second = yes.cast(result), no.cast(result)
+
+        def emit(e: Emitter) -> Value:
+            slot = cgutils.alloca_once(e.builder, e.context.get_value_type(result))
+            e.if_else(
+                condition.emit, lambda e: e.builder.store(first(e), slot), lambda e: e.builder.store(second(e), slot)
+            )
+            return e.builder.load(slot)
+
+        return TypedExpr(result, emit)
+
     def visit_BoolOp(self, node: ast.BoolOp) -> TypedExpr:
-        tests = []
-        for value in node.values:
-            tests.append(self.test(value))
-            self.turn()
-        found = tests.pop()
-        for test in reversed(tests):
-            yes, no = (found, self.known(False)) if isinstance(node.op, ast.And) else (self.known(True), found)
-            found = self.chosen(test, yes, no)
-        return found
+        operands = []
+        for value in node.values:  # each is evaluated in a basic block of its own
+            operands.append(self.condition(value))
+            self.next_block()
+        # a and b and c is `(b if a else False)` with b replaced by `(c if b else False)`; `or` is alike.
+        result = operands.pop()
+        for operand in reversed(operands):
+            if isinstance(node.op, ast.And):
+                result = self.conditional(operand, result, self.constant(False))
+            else:
+                result = self.conditional(operand, self.constant(True), result)
+        return result
 
     def visit_IfExp(self, node: ast.IfExp) -> TypedExpr:
-        parts = []
-        for read, piece in ((self.test, node.test), (self.visit, node.body), (self.visit, node.orelse)):
-            parts.append(read(piece))
-            self.turn()
-        return self.chosen(*parts)
+        operands = []
+        for read_operand, operand in ((self.condition, node.test), (self.visit, node.body), (self.visit, node.orelse)):
+            operands.append(read_operand(operand))
+            self.next_block()
+        return self.conditional(*operands)
 
-    def visit_Call(self, node: ast.Call) -> TypedExpr:
-        if node.keywords:
-            raise UnreadError
-        if self.is_known(node.func):
-            function, values = self.found(node.func), [self.visit(value) for value in node.args]
-            if isinstance(function, type) and issubclass(function, tuple) and function is not tuple:
-                return gathered(values, function)
-            return self.call(function, *values)
-        return self.pointed(self.visit(node.func), [self.visit(value) for value in node.args])
+    # -- statements ------------------------------------------------------------------------------------------------
 
-    def pointed(self, function: TypedExpr, values: Sequence[TypedExpr]) -> TypedExpr:
-        """The value of a function that is given by the address of its machine code."""
-        if not isinstance(function.kind, types.FunctionType) or len(values) != len(function.kind.signature.args):
-            raise UnreadError
-        result, kinds = function.kind.signature.return_type, function.kind.signature.args
-        given = [lent(value).cast(kind) for value, kind in zip(values, kinds, strict=True)]
-
-        def write(w: CodeWriter, arguments: Sequence[Value]) -> Value:
-            calls, builder = w.context.call_conv, w.builder
-            address = cgutils.create_struct_proxy(function.kind)(w.context, builder, value=function.write(w)).jit_addr
-            pointer = builder.bitcast(address, calls.get_function_type(result, kinds).as_pointer())
-            status, found = calls.call_function(builder, pointer, result, kinds, arguments)
-            with cgutils.if_unlikely(builder, status.is_error):
-                calls.return_status_propagate(builder, status)
-            return found
-
-        return called(result, given, write)
-
-    # -- statements -------------------------------------------------------------------------------------------
-
-    def body(self, statements: Sequence[ast.stmt]) -> list[Write]:
-        """What writes statements, up to one that leaves them; what stands behind it may have no type."""
-        found = []
+    def read_body(self, statements: Sequence[ast.stmt]) -> list[Emit]:
+        """Read statements up to one that ends the block; the unreachable ones behind it may have no type."""
+        emits = []
         for statement in statements:
-            found.append(self.visit(statement))
-            if self.leaves(statement):
+            emits.append(self.visit(statement))
+            if self.ends_block(statement):
                 break
-        return found
+        return emits
 
-    def leaves(self, statement: ast.stmt) -> bool:
-        """True for a statement behind which nothing is done."""
-        if isinstance(statement, ast.If) and (chosen := self.chosen_body(statement)):
-            return self.leaves(chosen[-1])
+    def ends_block(self, statement: ast.stmt) -> bool:
+        if isinstance(statement, ast.If) and (branch := self.constant_branch(statement)):
+            return self.ends_block(branch[-1])
         return isinstance(statement, ast.Return | ast.Break | ast.Continue)
 
-    def chosen_body(self, node: ast.If) -> list[ast.stmt] | None:
-        """The statements of a choice by a constant; None if it is another choice."""
-        if not self.is_known(node.test):
+    def constant_branch(self, node: ast.If) -> list[ast.stmt] | None:
+        """Return the branch that a global constant chooses; None if the condition is computed."""
+        if not self.is_global(node.test):
             return None
-        return node.body if self.found(node.test) else node.orelse
+        return node.body if self.global_value(node.test) else node.orelse
 
-    def block(self, statements: Sequence[ast.stmt]) -> Write:
-        """What writes statements in a block of their own; another one begins behind them."""
-        self.turn()
-        found = self.body(statements)
-        self.turn()
-        return in_turn(found)
+    def read_block(self, statements: Sequence[ast.stmt]) -> Emit:
+        """Read statements in basic blocks of their own."""
+        self.next_block()
+        emits = self.read_body(statements)
+        self.next_block()
+        return sequence(emits)
 
-    def visit_Assign(self, node: ast.Assign) -> Write:
-        target, many = node.targets[0], len(node.targets) > 1
-        if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple) and not many:
-            pairs = [(one, *held(self.visit(value))) for one, value in zip(target.elts, node.value.elts, strict=True)]
-            return in_turn(
-                [computed for _, computed, _ in pairs] + [self.assigned(one, value) for one, _, value in pairs]
-            )
+    def visit_Assign(self, node: ast.Assign) -> Emit:
+        target, several = node.targets[0], len(node.targets) > 1
+        # a, b = x, y: evaluate all values before the first assignment.
+        if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple) and not several:
+            pairs = [
+                (item, *evaluated_once(self.visit(value)))
+                for item, value in zip(target.elts, node.value.elts, strict=True)
+            ]
+            evaluations = [evaluation for _, evaluation, _ in pairs]
+            return sequence(evaluations + [self.assign(item, result) for item, _, result in pairs])
         value: TypedExpr = self.visit(node.value)
-        if not many:
-            return self.assigned(target, value)
-        if value.owned:
+        if not several:
+            return self.assign(target, value)
+        # a = b = x
+        if value.returns_new_reference:
             raise UnreadError
-        computed, whole = held(value)
-        return in_turn([computed, *(self.assigned(target, whole) for target in node.targets)])
+        evaluation, result = evaluated_once(value)
+        return sequence([evaluation, *(self.assign(target, result) for target in node.targets)])
 
-    def assigned(self, target: ast.expr, value: TypedExpr) -> Write:
-        """What gives a variable, an element, or several of them a value."""
+    def assign(self, target: ast.expr, value: TypedExpr) -> Emit:
+        """Assign a value to an element, to the names in a tuple, or to a name."""
         if isinstance(target, ast.Subscript):
-            return self.call(operator.setitem, self.visit(target.value), self.visit(target.slice), value).write
+            return self.call(operator.setitem, self.visit(target.value), self.visit(target.slice), value).emit
         if isinstance(target, ast.Tuple):
-            if not isinstance(value.kind, types.BaseTuple) or len(value.kind) != len(target.elts):
+            if not isinstance(value.type, types.BaseTuple) or len(value.type) != len(target.elts):
                 raise UnreadError
-            computed, whole = held(value)
-            return in_turn([computed, *(self.assigned(one, part(whole, k)) for k, one in enumerate(target.elts))])
+            evaluation, result = evaluated_once(value)
+            items = [self.assign(item, tuple_item(result, k)) for k, item in enumerate(target.elts)]
+            return sequence([evaluation, *items])
         if not isinstance(target, ast.Name):
             raise UnreadError
-        if target.id == "_" and not value.owned:
-            return value.write
-        name, kind = target.id, self.declare(target.id, value.kind)
-        found = value.cast(kind)
-        if isinstance(kind, types.Array):
-            self.arrays[name] = kind
-            found = value.write if value.owned else lambda w: w.keep(kind, value.write(w))
-        return lambda w: w.set(name, found(w))
+        name = target.id
+        if name == "_" and not value.returns_new_reference:  # evaluate only
+            return value.emit
+        variable_type = self.declare(name, value.type)
+        if not isinstance(variable_type, types.Array):
+            converted = value.cast(variable_type)
+            return lambda e: e.set_variable(name, converted(e))
 
-    def visit_AugAssign(self, node: ast.AugAssign) -> Write:
-        if isinstance(node.target, ast.Name) and self.visit(node.target).kind.mutable:
-            raise UnreadError
+        # An array variable takes over a new reference, and adds one to an array that another variable holds.
+        self.arrays[name] = variable_type
+
+        def emit(e: Emitter) -> None:
+            array = value.emit(e)
+            if not value.returns_new_reference:
+                e.add_reference(variable_type, array)
+            e.set_variable(name, array)
+
+        return emit
+
+    def visit_AugAssign(self, node: ast.AugAssign) -> Emit:
+        if isinstance(node.target, ast.Name) and self.visit(node.target).type.mutable:
+            raise UnreadError  # a += b of arrays works in place
         return self.visit_Assign(ast.Assign([node.target], ast.BinOp(node.target, node.op, node.value)))
 
-    def visit_Expr(self, node: ast.Expr) -> Write:
+    def visit_Expr(self, node: ast.Expr) -> Emit:
         if isinstance(node.value, ast.Constant):  # a docstring
-            return lambda w: None
-        found: TypedExpr = self.visit(node.value)
-        if found.owned:
+            return lambda e: None
+        value: TypedExpr = self.visit(node.value)
+        if value.returns_new_reference:
             raise UnreadError
-        return found.write
+        return value.emit
 
-    def visit_Return(self, node: ast.Return) -> Write:
-        value = self.known(None) if node.value is None else self.visit(node.value)
+    def visit_Return(self, node: ast.Return) -> Emit:
+        value = self.constant(None) if node.value is None else self.visit(node.value)
         self.results.append(value)
 
-        def write(w: CodeWriter) -> None:
-            kind = w.program.result
-            found = value.cast(kind)(w)
-            if not value.owned:
-                w.keep(kind, found)
-            for name in w.program.arrays:
-                w.release(name)
-            w.lower.call_conv.return_value(w.builder, w.context.get_return_value(w.builder, kind, found))
+        def emit(e: Emitter) -> None:
+            result_type = e.function.result  # known when all `return` are read
+            result = value.cast(result_type)(e)
+            # The caller gets a reference, then the variables release theirs.
+            if not value.returns_new_reference:
+                e.add_reference(result_type, result)
+            for name in e.function.arrays:
+                e.release_variable(name)
+            e.lower.call_conv.return_value(e.builder, e.context.get_return_value(e.builder, result_type, result))
 
-        return write
+        return emit
 
-    def visit_Break(self, node: ast.Break) -> Write:
-        return lambda w: w.builder.branch(w.ends[-1][1])
+    def visit_If(self, node: ast.If) -> Emit:
+        if (branch := self.constant_branch(node)) is not None:  # the other branch may have no type
+            return self.read_block(branch)
+        condition, yes, no = self.condition(node.test), self.read_block(node.body), self.read_block(node.orelse)
+        return lambda e: e.if_else(condition.emit, yes, no)
 
-    def visit_Continue(self, node: ast.Continue) -> Write:
-        return lambda w: w.builder.branch(w.ends[-1][0])
+    # -- loops -----------------------------------------------------------------------------------------------------
 
-    def visit_If(self, node: ast.If) -> Write:
-        if (chosen := self.chosen_body(node)) is not None:  # the others may have no type
-            return self.block(chosen)
-        test, yes, no = self.test(node.test), self.block(node.body), self.block(node.orelse)
-        return lambda w: w.choose(test.write, yes, no)
+    def visit_Break(self, node: ast.Break) -> Emit:
+        return lambda e: e.builder.branch(e.loops[-1][1])
 
-    def visit_While(self, node: ast.While) -> Write:
+    def visit_Continue(self, node: ast.Continue) -> Emit:
+        return lambda e: e.builder.branch(e.loops[-1][0])
+
+    def visit_While(self, node: ast.While) -> Emit:
         if node.orelse:
             raise UnreadError
-        self.turn()
+        self.next_block()
         endless = isinstance(node.test, ast.Constant) and node.test.value is True
-        test = None if endless else self.test(node.test).write
-        body = self.block(node.body)
-        return lambda w: w.loop(test, body)
+        condition = None if endless else self.condition(node.test).emit
+        body = self.read_block(node.body)
+        return lambda e: e.while_loop(condition, body)
 
-    def visit_For(self, node: ast.For) -> Write:
+    def visit_For(self, node: ast.For) -> Emit:
         if node.orelse:
             raise UnreadError
-        if (pieces := self.pieces(node.iter)) is not None:
-            return self.unrolled(node, pieces)
-        if not (isinstance(node.iter, ast.Call) and self.found(node.iter.func) is range):
+        # A loop over the items of a tuple, whose types may differ: read the body once for each item.
+        if (items := self.unrolled_items(node.iter)) is not None:
+            bodies = []
+            for item in items:
+                self.next_block()
+                bodies.append(sequence([self.assign(node.target, item), *self.read_body(node.body)]))
+            self.next_block()
+            return lambda e: e.unrolled_loop(bodies)
+        if not (isinstance(node.iter, ast.Call) and self.global_value(node.iter.func) is range):
             raise UnreadError
-        start, stop, step = self.bounds([self.visit(bound) for bound in node.iter.args])
-        self.turn()
-        numbers: list[Value] = []
-        now = TypedExpr(types.int64, lambda w: numbers[-1])
-        body = in_turn([self.assigned(node.target, now), *self.body(node.body)])
-        self.turn()
+        return self.range_loop(node, [self.visit(bound) for bound in node.iter.args])
 
-        def write(w: CodeWriter) -> None:
-            first, last = start(w), stop(w)
-            following = w.memory(first)
-
-            def count(w: CodeWriter) -> None:
-                """Count before the body, as Numba does: LLVM takes the first turn out of short loops then."""
-                numbers.append(w.builder.load(following))
-                w.builder.store(w.builder.add(numbers[-1], first.type(step)), following)
-                body(w)
-
-            more = "<" if step > 0 else ">"
-            w.loop(lambda w: w.builder.icmp_signed(more, w.builder.load(following), last), count)
-
-        return write
-
-    def bounds(self, given: Sequence[TypedExpr]) -> tuple[Write, Write, int]:
-        """What writes the first number of a range and the one behind it, and the step."""
-        if not all(isinstance(bound.kind, types.Integer) for bound in given):
-            raise UnreadError
-        start, stop = (self.known(0), *given) if len(given) == 1 else given[:2]
-        step = given[2].kind if len(given) == 3 else types.literal(1)
-        if not isinstance(step, types.IntegerLiteral) or step.literal_value == 0:
-            raise UnreadError
-        return start.cast(types.int64), stop.cast(types.int64), step.literal_value
-
-    def pieces(self, node: ast.expr) -> list[TypedExpr] | None:
-        """The values of a tuple that is written out or known, numbered by `enumerate` if that is asked for; else None."""
+    def unrolled_items(self, node: ast.expr) -> list[TypedExpr] | None:
+        """Return the items of a displayed or global tuple, or of `enumerate` of one; None for anything else."""
         if isinstance(node, ast.Tuple):
-            return [self.visit(piece) for piece in node.elts]
-        if self.is_known(node) and isinstance(values := self.found(node), tuple):
-            return [self.known(value) for value in values]
-        if isinstance(node, ast.Call) and self.found(node.func) is enumerate and len(node.args) == 1:
-            pieces = self.pieces(node.args[0])
-            return None if pieces is None else [gathered([self.known(k), piece]) for k, piece in enumerate(pieces)]
+            return [self.visit(item) for item in node.elts]
+        if self.is_global(node) and isinstance(values := self.global_value(node), tuple):
+            return [self.constant(value) for value in values]
+        if isinstance(node, ast.Call) and self.global_value(node.func) is enumerate and len(node.args) == 1:
+            items = self.unrolled_items(node.args[0])
+            return None if items is None else [tuple_of([self.constant(k), item]) for k, item in enumerate(items)]
         return None
 
-    def unrolled(self, node: ast.For, pieces: Sequence[TypedExpr]) -> Write:
-        """A loop whose statements stand there for each of some values."""
-        bodies = []
-        for piece in pieces:
-            self.turn()
-            bodies.append(in_turn([self.assigned(node.target, piece), *self.body(node.body)]))
-        self.turn()
-        return lambda w: w.each(bodies)
+    def range_loop(self, node: ast.For, bounds: Sequence[TypedExpr]) -> Emit:
+        """Read `for name in range(*bounds)`; the step must be an integer literal, so that its sign is known."""
+        if not all(isinstance(bound.type, types.Integer) for bound in bounds):
+            raise UnreadError
+        start, stop = (self.constant(0), *bounds) if len(bounds) == 1 else bounds[:2]
+        step_type = bounds[2].type if len(bounds) == 3 else types.literal(1)
+        if not isinstance(step_type, types.IntegerLiteral) or step_type.literal_value == 0:
+            raise UnreadError
+        emit_start, emit_stop, step = start.cast(types.int64), stop.cast(types.int64), step_type.literal_value
+        # Read the body in a basic block of its own; `counts` holds the value of the loop variable there.
+        self.next_block()
+        counts: list[Value] = []
+        count = TypedExpr(types.int64, lambda e: counts[-1])
+        body = sequence([self.assign(node.target, count), *self.read_body(node.body)])
+        self.next_block()
+
+        def emit(e: Emitter) -> None:
+            first, last = emit_start(e), emit_stop(e)
+            following = e.stack_slot(first)
+
+            def count_and_run(e: Emitter) -> None:
+                # Count before the body, as Numba does: LLVM then peels the first turn off short loops.
+                counts.append(e.builder.load(following))
+                e.builder.store(e.builder.add(counts[-1], first.type(step)), following)
+                body(e)
+
+            relation = "<" if step > 0 else ">"
+            e.while_loop(lambda e: e.builder.icmp_signed(relation, e.builder.load(following), last), count_and_run)
+
+        return emit

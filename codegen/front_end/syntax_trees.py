@@ -1,4 +1,4 @@
-"""The syntax trees of modules of kernels: kept in the module, where the front end finds them."""
+"""Parse modules of kernels; their syntax trees stay in the module, where the front end looks them up."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import ast
 from typing import Any
 
 TREES = "__syntax__"
-"""What a module calls the syntax trees of its functions, by the lines that they begin in."""
+"""Global variable of a module with the syntax trees of its functions, by first line (as `code.co_firstlineno` has it)."""
 
 
 def functions(tree: ast.Module) -> dict[int, ast.FunctionDef]:
-    """Return the functions of a module, by the lines that they begin in."""
-    found = (part for part in tree.body if isinstance(part, ast.FunctionDef))
-    return {min([part.lineno, *(one.lineno for one in part.decorator_list)]): part for part in found}
+    """Return the top-level functions of a module by the line of their first decorator, or of `def` without one."""
+    definitions = (node for node in tree.body if isinstance(node, ast.FunctionDef))
+    return {min([node.lineno, *(part.lineno for part in node.decorator_list)]): node for node in definitions}
 
 
-def execute(text: str, path: str, space: dict[str, Any]) -> None:
-    """Run the text of a module in a namespace, with the syntax from which its functions are compiled."""
+def execute(text: str, path: str, namespace: dict[str, Any]) -> None:
+    """Execute the text of a module in a namespace and keep its syntax trees there."""
     tree = ast.parse(text, path)
-    space[TREES] = functions(tree)
-    exec(compile(tree, path, "exec"), space)
+    namespace[TREES] = functions(tree)
+    exec(compile(tree, path, "exec"), namespace)

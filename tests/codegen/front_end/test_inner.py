@@ -85,7 +85,7 @@ def test_negation_of_a_lane_is_tried_first(function: Any) -> None:
     assert first(context).apply((Lane(4),), {}).return_type == Lane(4)
 
 
-def test_the_meaning_of_an_operator_is_found_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_signature_of_an_operator_is_resolved_once(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
     context = cpu_target.typing_context
     context.refresh()
@@ -93,8 +93,8 @@ def test_the_meaning_of_an_operator_is_found_once(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(
         context, "resolve_function_type", lambda *request: (asked.append(request[1]), found(*request))[1]
     )
-    made, four = syntax_reader._TreeReader(context, {}), Lane(4)
+    reader, four = syntax_reader._TreeReader(context, {}), Lane(4)
     pairs = [(four, four), (types.float64, four), (four, four)]
-    meanings = [made.meaning(operator.add, pair)[1] for pair in pairs]
-    assert [meaning.args for meaning in meanings] == pairs
+    signatures = [reader.signature(operator.add, pair)[1] for pair in pairs]
+    assert [signature.args for signature in signatures] == pairs
     assert asked == pairs[:2]

@@ -634,9 +634,9 @@ def shared_state() -> dict[tuple[str, ...], object]:
 def test_what_threads_share_is_left_alone_while_kernels_compile(folder, tmp_path, monkeypatch):
     elsewhere = tmp_path / "elsewhere"
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(elsewhere))
-    compile_extra, during = compiler.EntryCompiler.compile_extra, []
+    compile_extra, during = compiler.FrontEnd.compile_extra, []
     monkeypatch.setattr(
-        compiler.EntryCompiler,
+        compiler.FrontEnd,
         "compile_extra",
         lambda *given: (during.append(shared_state()), compile_extra(*given))[1],
     )
