@@ -22,6 +22,7 @@ extensions = [
     "checked_links",
     "families",
     "package_words",
+    "recipes",
 ]
 exclude_patterns = ["gallery/README.rst", "tutorial/README.rst", "sg_execution_times.rst"]
 
