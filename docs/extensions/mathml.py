@@ -21,7 +21,9 @@ def _spaced(formula: str) -> str:
     thin = '<mspace width="0.17em"/>'
     name = r"(<m[io]>[a-z]{2,}</m[io]>)"
     before = r"(</(?:mi|mn|mrow|msub|msup|mfrac)>|\)</mo>)"
-    return re.sub(f"{name}(?!<mo[^>]*>&#x00028;)", rf"\1{thin}", re.sub(before + name, rf"\1{thin}\2", formula))
+    base = "".join(f"(?<!<{tag}>)" for tag in ("msup", "msub", "msubsup", "munder", "munderover"))  # takes no further child
+    formula = re.sub(before + name, rf"\1{thin}\2", formula)
+    return re.sub(f"{base}{name}(?!<mo[^>]*>&#x00028;)", rf"\1{thin}", formula)
 
 
 def _write(translator: HTML5Translator, node: nodes.math | nodes.math_block, display: str) -> None:
