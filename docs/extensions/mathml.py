@@ -21,7 +21,8 @@ def _spaced(formula: str) -> str:
     thin = '<mspace width="0.17em"/>'
     name = r"(<m[io]>[a-z]{2,}</m[io]>)"
     before = r"(</(?:mi|mn|mrow|msub|msup|mfrac)>|\)</mo>)"
-    base = "".join(f"(?<!<{tag}>)" for tag in ("msup", "msub", "msubsup", "munder", "munderover"))  # takes no further child
+    # The base of a script takes no further child: no space there.
+    base = "".join(f"(?<!<{tag}>)" for tag in ("msup", "msub", "msubsup", "munder", "munderover"))
     formula = re.sub(before + name, rf"\1{thin}\2", formula)
     return re.sub(f"{base}{name}(?!<mo[^>]*>&#x00028;)", rf"\1{thin}", formula)
 
