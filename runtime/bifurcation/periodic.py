@@ -268,7 +268,11 @@ def _newton(scene: Scene, periods: int, start: np.ndarray) -> PeriodicOrbit:
         best, kept, monodromy, rest = residual, state, matrix, gap
         if residual == 0.0:
             break
-        state = state + _correction(matrix, gap)
+        if _sticks_throughout(image, matrix):
+            # The ground carries the body along, so that I - M is singular: follow the motion until the body slips.
+            best, state = np.inf, image[: len(state)]
+        else:
+            state = state + _correction(matrix, gap)
         steps += 1
         if not relative(state - start, extent) < ASTRAY:
             break
@@ -325,6 +329,11 @@ def _limit_cycle(scene: Scene, periods: int, start: Sequence[float] | np.ndarray
 def _nearly_sticks(image: np.ndarray, gap: np.ndarray, extent: np.ndarray) -> bool:
     """True if a state slips at a speed of rounding errors and its image sticks."""
     return len(image) > len(gap) and image[-1] == 0.0 and 0.0 < abs(gap[1]) < ROUNDING * extent[1]
+
+
+def _sticks_throughout(image: np.ndarray, matrix: np.ndarray) -> bool:
+    """True if a body sticks over all periods: the map shifts its place and forgets its velocity, M = [[1, 0], [0, 0]]."""
+    return len(image) > len(matrix) and image[-1] == 0.0 and np.array_equal(matrix, np.diag([1.0, 0.0]))
 
 
 def check_periods(periods: object) -> None:

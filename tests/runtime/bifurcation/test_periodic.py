@@ -75,6 +75,20 @@ def test_the_end_of_the_stable_range_to_rounding() -> None:
         stability_end(periodic_orbit(scene(), 2, omega=1.15), 0.6, 0.7)
 
 
+@pytest.mark.parametrize("ground", [0.1, 0.01])
+def test_an_orbit_is_found_from_a_start_that_sticks_for_a_whole_period(ground: float) -> None:
+    """The map of a period only shifts such a start by ground * period: Newton's method has no direction to go there."""
+    s = scene(parameters={"omega": 1.15, "theta_b": ground})
+    length = 2 * np.pi / 1.15
+    start = np.array([0.04373869 if ground == 0.1 else 0.4, ground])
+    image, matrix = strobe(s, start, 1)
+    np.testing.assert_allclose(image, [start[0] + ground * length, ground], rtol=1e-12)
+    np.testing.assert_array_equal(matrix, [[1.0, 0.0], [0.0, 0.0]])
+    orbit = periodic_orbit(s, 1, start)
+    assert orbit.residual < 1e-13
+    assert np.abs(strobe(s, orbit.state, 1)[0] - orbit.state).max() < 1e-13
+
+
 @pytest.mark.long
 def test_a_period_doubling_is_found_where_the_double_period_is_born() -> None:
     first = periodic_orbit(scene(), 2, omega=1.2)
