@@ -20,6 +20,8 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import brentq
 
+from synchain.models.dynamics.angles import periods_of_kinds
+from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.reduction import without_drive
 from synchain.models.inputs.checks import short_repr
 from synchain.models.inputs.keywords import warn
@@ -46,6 +48,7 @@ __all__ = [
     "relative",
     "stability_end",
     "strobe",
+    "whole_turns",
 ]
 
 TOLERANCE = 1e-12
@@ -178,8 +181,9 @@ class PeriodicOrbit(Labelled):
         return next((k for k in divisors if self.meets(points[k])), self.periods)
 
     def meets(self, state: np.ndarray) -> bool:
-        """Return whether a state is that of the orbit at the beginning of a period, to within SAME."""
-        return closed(state - self.state, SAME * self.extent, self.state)
+        """Return whether a state is that of the orbit at the beginning of a period, to within SAME and turns of angles."""
+        gap = state - self.state
+        return closed(gap - whole_turns(self.scene, gap), SAME * self.extent, self.state)
 
     def transversal_multipliers(self, alpha: float) -> np.ndarray:
         """Compute the multipliers of a transversal mode along the orbit.
@@ -293,6 +297,17 @@ def relative(distance: np.ndarray, extent: np.ndarray) -> float:
 def closed(gap: np.ndarray, allowed: np.ndarray, state: np.ndarray) -> bool:
     """Return whether no component of a gap at a state is larger than allowed, errors of the integration left out."""
     return bool(np.all(np.abs(gap) <= allowed + ROUNDING * np.abs(state)))
+
+
+def whole_turns(scene: Scene, differences: np.ndarray) -> np.ndarray:
+    """Return the whole turns in differences (..., components) of the states of one oscillator; 0 where it has no angle."""
+    # Links do not move an orbit of one oscillator, so its equations alone decide which components are angles.
+    (periods,) = periods_of_kinds(Equations.of_equal_nodes(scene.equations.node, None, 1))
+    turns = np.zeros_like(differences)
+    for component, period in enumerate(periods[: differences.shape[-1]]):
+        if period is not None:
+            turns[..., component] = period * np.round(differences[..., component] / period)
+    return turns
 
 
 def _extent(scene: Scene, state: np.ndarray, periods: int, known: np.ndarray | None = None) -> np.ndarray:

@@ -31,7 +31,7 @@ from ..support.execution import Execution
 from ..support.progress import Hook
 from .bifurcations import BifurcationKind
 from .branches import Branch, checked_values, others, traced, warn_of_lost
-from .periodic import NEWTON, TOLERANCE, PeriodicOrbit, check_periods, periodic_orbit, relative
+from .periodic import NEWTON, TOLERANCE, PeriodicOrbit, check_periods, periodic_orbit, relative, whole_turns
 
 Range = tuple[float, float]
 """Ends of an interval."""
@@ -238,7 +238,7 @@ def _box(scene: Scene, ranges: Mapping[str, Range]) -> np.ndarray:
 
 def starts_of(scene: Scene, seed: int, box: np.ndarray | None = None) -> np.ndarray:
     """Return the starts (STARTS, components) of a search: the scene's own, and random ones around its motion, or in a box."""
-    own = np.array([values[0] for name, values in scene.initial.items() if name != SLIP.name], dtype=float)
+    own = _own_start(scene)
     share = np.random.default_rng(seed).uniform(0.0, 1.0, (STARTS, len(own)))
     if box is None:
         problem, (state,) = _problem(scene, own[None])
@@ -262,7 +262,7 @@ def near_returns(
     path, extent = _paths(scene, transient, starts_of(scene, 0) if starts is None else starts)
     orbits: list[PeriodicOrbit] = []
     for count in periods:
-        for start in _returning(path, extent, count):
+        for start in _returning(scene, path, extent, count):
             try:
                 orbit = periodic_orbit(scene, count, start)
             except ArithmeticError:
@@ -310,18 +310,26 @@ def _problem(scene: Scene, starts: np.ndarray) -> tuple[OrbitProblem, np.ndarray
     return problem, problem.with_slip_states(states)
 
 
-def _returning(path: np.ndarray, extent: np.ndarray, periods: int) -> list[np.ndarray]:
+def _returning(scene: Scene, path: np.ndarray, extent: np.ndarray, periods: int) -> list[np.ndarray]:
     """States of paths with the closest returns after some periods, apart from each other."""
     size = np.where(extent > 0.0, extent, 1.0)
     gap = np.abs((path[periods:] - path[:-periods]) / size).max(axis=2)
+    # An angle is counted in the turn of the scene's own start: an orbit some turns away is the same orbit.
+    own = _own_start(scene)
     starts: list[tuple[np.ndarray, np.ndarray]] = []
     for flat in np.argsort(gap, axis=None, kind="stable"):
         k, motion = np.unravel_index(flat, gap.shape)
         if gap[k, motion] > CLOSE or len(starts) == TRIES:
             break
-        if all(relative(path[k, motion] - start, np.minimum(size[motion], its)) > APART for start, its in starts):
-            starts.append((path[k, motion], size[motion]))
+        state = path[k, motion] - whole_turns(scene, path[k, motion] - own)
+        if all(relative(state - start, np.minimum(size[motion], its)) > APART for start, its in starts):
+            starts.append((state, size[motion]))
     return [state for state, _ in starts]
+
+
+def _own_start(scene: Scene) -> np.ndarray:
+    """Initial state (components,) of the first oscillator."""
+    return np.array([values[0] for name, values in scene.initial.items() if name != SLIP.name], dtype=float)
 
 
 def _same(orbit: PeriodicOrbit, other: PeriodicOrbit) -> bool:

@@ -112,17 +112,7 @@ def test_two_copies_without_a_link_move_as_one_does(
     expect_equal(name, halves(found), expected)
 
 
-SAME_ORBIT = pytest.mark.xfail(strict=True, reason="orbits that differ by whole turns of an angle count as several")
-TURNED = [
-    pytest.param(
-        name,
-        marks=[
-            *([] if name in ("run", "equilibrium") else [pytest.mark.long]),
-            *([SAME_ORBIT] if name == "skeleton" else []),
-        ],
-    )
-    for name in ASKED
-]
+TURNED = [pytest.param(name, marks=[] if name in ("run", "equilibrium") else [pytest.mark.long]) for name in ASKED]
 
 
 @pytest.mark.parametrize("turns", [1, -1000])

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from synchain.models.definitions.inline import Field
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.bifurcation.branches import follow
@@ -87,6 +88,18 @@ def test_an_orbit_is_found_from_a_start_that_sticks_for_a_whole_period(ground: f
     orbit = periodic_orbit(s, 1, start)
     assert orbit.residual < 1e-13
     assert np.abs(strobe(s, orbit.state, 1)[0] - orbit.state).max() < 1e-13
+
+
+@pytest.mark.parametrize("turns", [1, -3])
+def test_an_orbit_of_an_angle_passes_through_its_states_some_turns_away(turns: int) -> None:
+    pendulum = Field({"x": "v", "v": "-sin(x) - v/5 + u*cos(w*t)"}, parameters={"u": 0.1, "w": 1.2})
+    orbit = periodic_orbit(Scene(pendulum, None, initial={"x": 0.5, "v": 0.1}, transient=20.0))
+    assert orbit.meets(orbit.state + np.array([2 * np.pi * turns, 0.0]))
+    assert not orbit.meets(orbit.state + np.array([2 * np.pi * turns + 1e-3, 0.0]))
+    assert not orbit.meets(orbit.state + np.array([0.0, 2 * np.pi * turns]))
+    spring = Field({"x": "v", "v": "-x - v/5 + u*cos(w*t)"}, parameters={"u": 0.1, "w": 1.2})
+    orbit = periodic_orbit(Scene(spring, None, initial={"x": 0.5, "v": 0.1}, transient=20.0))
+    assert not orbit.meets(orbit.state + np.array([2 * np.pi * turns, 0.0]))
 
 
 @pytest.mark.long
