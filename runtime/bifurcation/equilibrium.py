@@ -1,20 +1,20 @@
-"""Equilibria of undriven networks, and motions that an even shift of a coordinate makes them.
+"""Equilibria of undriven networks: states at rest, and rigid rotations, at rest in a frame that moves with them.
 
-Newton's method on the rates with the exact Jacobian, M d(state)/dt = r(state).  At rest M may depend on the state: what its
-derivative adds to the linearised equations is multiplied by rates that are zero.
+The equations are M(x) dx/dt = r(x), and r(x) = 0 is solved by Newton's method with the exact sparse Jacobian J = dr/dx.  The
+eigenvalues of M^-1 J decide stability: at rest the derivative of M is multiplied by rates that are zero.
 
-If a coordinate of all nodes can be shifted together (the phases of oscillators, the rotor angles of a power grid),
-equilibria are not isolated.  Unknown is then also the common speed of the shift, r(state) = speed * shift, and the correction is
-normal to the shift.  A speed other than zero makes a rigid rotation: an equilibrium in the frame that moves with it.
+1. Shifts.  If a coordinate of all nodes can be shifted together (phases of oscillators, rotor angles of a power grid),
+   equilibria are not isolated.  With e = (1 … 1) along the coordinate, the common speed s is unknown too, and the step is
+   normal to the shift: J dx - e ds = -(r - e s), e' dx = 0.  A speed other than zero is a rigid rotation.
+2. Singular Jacobians.  A conserved momentum makes a line of equilibria as well, free masses at any common speed: the step of
+   least squares and least norm leads to one of them near the start.
+3. Damping.  A step is halved until the weighted norm of the rates falls (Deuflhard, section 3.3).
+4. Pseudo-transient continuation.  Where Newton's method fails, implicit Euler steps (M/h - J) dx = r follow the motion from
+   the start; h grows as the rates fall, and Newton's method goes on from there (Kelley & Keyes).
+5. Rounding.  A rate counts as zero relative to the sizes of its terms, and a tail of rates that has no root is refused.
 
-A conserved momentum makes a line of equilibria too, free masses at any common speed: steps of least norm lead to one of
-them near the start.
-
-Where Newton's method fails, implicit Euler steps follow the motion from the same start, the longer the smaller the rates
-have become (pseudo-transient continuation), and Newton's method goes on from there.
-
-Sources: Kelley & Keyes, SIAM J. Numer. Anal. 35, 508 (1998); Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), section 1.2; Deuflhard, Newton Methods
-for Nonlinear Problems (Springer, 2004), section 3.3 (the monotonicity of the residual).
+Sources: Kelley & Keyes, SIAM J. Numer. Anal. 35, 508 (1998); Seydel, Practical Bifurcation and Stability Analysis, 3rd ed.
+(Springer, 2010), section 1.2; Deuflhard, Newton Methods for Nonlinear Problems (Springer, 2004), section 3.3.
 """
 
 from __future__ import annotations
@@ -40,53 +40,53 @@ from ..sweeps.continued_start import Start, started
 from .linearised import Linearised
 
 MOST_STEPS, HALVINGS = 100, 40
-"""Most steps of Newton's method, and how often one is halved until the residual falls."""
+"""Most steps of Newton's method, and most halvings of one until the residual falls: 2^-40 of a step is rounding (choices)."""
 
 CLOSED = 1e-11
-"""Largest rate at an equilibrium, relative to the sizes of its terms."""
+"""Largest rate at an equilibrium, relative to the sizes of its terms: 45 000 rounding errors (a choice)."""
 
 TAIL = 0.34
-"""Largest part of the rates that the closing step of Newton's method leaves.
+"""Largest factor by which the last step of Newton's method may lower the rates at a root.
 
-A root of multiplicity m leaves (1 - 1/m)^m, 1/4 of a fold; a tail x^-p of rates without a root leaves (1 + 1/p)^-p,
-more than 1/e.
+At a root of multiplicity m a step leaves (1 - 1/m)^m of the rates: 0 of a simple root, 1/4 at a fold.  Along a tail x^-p, which
+has no root, it leaves (1 + 1/p)^-p, more than 1/e = 0.37.  0.34 admits roots of a multiplicity up to 7.
 """
 
 MOST_RELAXED, FIRST_RATE = 500, 10.0
-"""Most steps along the motion, and the inverse length of the first, by the largest slope."""
+"""Most implicit Euler steps, and 1/h of the first in units of the largest slope of a rate (choices)."""
 
 WORSE, NEWTON = 1.5, 1e-6
-"""Growth of the rates over a step along the motion that is repeated with a shorter one, and rates that are small enough
-for Newton's method."""
+"""An Euler step by which the rates grow more than WORSE times is repeated with h/4; Newton's method takes over where they have
+fallen to NEWTON of the sizes of their terms (choices)."""
 
 SINGULAR, DAMPED = 1e-13, 1e-7
-"""Least pivot, relative to the largest, of equations that are not singular, and the damping of those that are, relative to
-their entries."""
+"""A scaled matrix whose least pivot is below SINGULAR of the largest counts as singular: some hundred rounding errors.  It is
+solved with the damping DAMPED, whose square, which is what acts on regular directions, is near rounding (choices)."""
 
 DENSE = 2000
-"""Most states of which all eigenvalues are computed."""
+"""Most states of which all eigenvalues are computed: their dense matrix has 32 MB (a choice)."""
 
 FEW = 12
-"""Eigenvalues of larger networks, unless more are asked for."""
+"""Number of eigenvalues of larger networks, unless `count` is given (a choice)."""
 
 ASIDE = 1e-6
-"""Distance from zero, relative to the largest entry of the Jacobian, of the place around which few eigenvalues are computed."""
+"""Place around which few eigenvalues are computed, relative to the largest entry of J: 0 itself is an eigenvalue of each shift."""
 
 EVEN = 1e-15
-"""Speed that is rounding, relative to the largest scale of a rate."""
+"""Speed of a shift that is rounding, relative to the largest size of a rate's terms."""
 
 ZERO = 1e-7
-"""Size of an eigenvalue that counts as zero, relative to the largest: at a fold two solutions merge, and rounding of
-1e-16 moves the eigenvalue by its root."""
+"""Size of an eigenvalue that counts as zero, relative to the largest: at a fold two solutions merge, and a rounding error of
+1e-16 moves the eigenvalue by its square root."""
 
 LEAST = 1e-12
-"""Size of an eigenvalue that is rounding, relative to the fastest."""
+"""Size of an eigenvalue that is a rounding error, relative to the fastest rate (a choice)."""
 
 BESIDE = 0.1
-"""How far aside, relative to the state, the slopes of rates are looked at: at a fold those at the state itself may be zero."""
+"""Relative distance at which slopes are measured beside a state: at a fold those at the state itself may vanish (a choice)."""
 
 SHIFTS = (7e-13, 7e-9, 7e-5, 0.7, 7e3, 7e7, 7e11)
-"""Distances of shifts that must not change the rates, whatever the unit of the state."""
+"""Distances by which a shift is tried: some of them are neither tiny nor huge, whatever the unit of the state."""
 
 REFUSED = {
     "rtol": "Newton's method ends at rounding",
@@ -94,7 +94,7 @@ REFUSED = {
     **{name: "each step of Newton's method needs the one before" for name in ("workers", "executor")},
     **{name: "a few steps of Newton's method are soon done" for name in ("show_progress", "progress")},
 }
-"""What the function does not take, and why."""
+"""Keywords that `equilibrium` refuses, with the reason."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -132,7 +132,7 @@ class Equilibrium(Labelled):
     def data(self) -> xr.Dataset:
         """State over components and nodes, eigenvalues over their number.
 
-        `run(scene, start=found.data.state)` starts from it.
+        `run(scene, start=rest.data.state)` starts from the equilibrium `rest`.
         """
         states = States.of(self.scene)
         values = {
@@ -150,7 +150,7 @@ class Equilibrium(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """State, eigenvalues, what can be shifted, residual."""
+        """Rows of state, eigenvalues, stability, shifts and residual."""
         names = self.scene.equations.state
         shown = [f"{name} = {x:.10g}" for name, x in zip(names[:8], self.state[:8], strict=True)]
         largest = [f"{value:.6g}" for value in self.eigenvalues[:6]]
@@ -166,12 +166,12 @@ class Equilibrium(Labelled):
 
     @property
     def complete(self) -> bool:
-        """True if all eigenvalues are known."""
+        """True if all eigenvalues were computed."""
         return len(self.eigenvalues) == len(self.state)
 
     @property
     def growing(self) -> int:
-        """Number of eigenvalues with a positive real part, among those that are known."""
+        """Number of eigenvalues with a positive real part, among those that were computed."""
         return int((self._others.real > self._zero).sum())
 
     @property
@@ -181,12 +181,12 @@ class Equilibrium(Labelled):
 
     @property
     def stable(self) -> bool:
-        """True if small deviations are known to decay, but for a shift of the whole: if all eigenvalues are known."""
+        """True if all eigenvalues were computed and have negative real parts, but for those of the shifts."""
         return self.complete and not self.growing and not self.neutral
 
     @property
     def verdict(self) -> str:
-        """The stability in words."""
+        """The stability as a phrase: stable, unstable with the number of growing eigenvalues, neutral, or not decided."""
         if self.growing:
             return f"unstable, {'' if self.complete else 'at least '}{self.growing} growing"
         if not self.complete:
@@ -195,7 +195,7 @@ class Equilibrium(Labelled):
 
     @property
     def _others(self) -> np.ndarray:
-        """The eigenvalues but those of the shifts."""
+        """The eigenvalues without those of the shifts, the nearest to zero."""
         return np.delete(self.eigenvalues, np.argsort(np.abs(self.eigenvalues), kind="stable")[: len(self.shifts)])
 
     @property
@@ -222,7 +222,7 @@ def equilibrium(
         Network, of any size.
     start : Result, DataArray, mapping, or sequence of numbers, optional
         A result of one cell, whose end is where the search begins, or states with the dimensions
-        component and node, as ``result.end`` and ``found.data.state``; a table as `initial` of `Scene` takes; or
+        component and node, as ``result.end`` and ``rest.data.state``; a table as `initial` of `Scene` takes; or
         all states in the order of the equations.  The scene's start by default.
     count : int, optional
         Number of eigenvalues nearest to zero, where stability is lost without oscillation; by default all up to
@@ -251,28 +251,26 @@ def equilibrium(
     >>> from synchain import Field, Rates, Scene, chain, equilibrium
     >>> machine = Field({"delta": "w", "w": "P - w/2"}, parameters={"P": 0})
     >>> line = Rates({"w": "K*W*sin(delta_j - delta_i)"}, {"K": 1})
-    >>> found = equilibrium(Scene(machine, line, chain(2), parameters={"P": [0.5, -0.5]}))
-    >>> found.stable, found.shifts
+    >>> rest = equilibrium(Scene(machine, line, chain(2), parameters={"P": [0.5, -0.5]}))
+    >>> rest.stable, rest.shifts
     (True, ('delta',))
     """
-    given = Given(equilibrium, parameters, more, REFUSED)
-    scene = given.scene(scene)
+    scene = Given(equilibrium, parameters, more, REFUSED).scene(scene)
     scene = scene if start is None else started(scene, start)[0]
-    network, state = Linearised.of(_at_rest(scene), scene.parameters), np.array(scene.y0)
-    size = len(state)
-    wanted = None if count is None else check_integer("count", count, 1)
-    if wanted is not None and wanted > size:
-        raise ValueError(f"count = {count}; expected at most {size}, the states of the network")
-    start, slopes = state, _slopes(network, state)
-    names, shifts = _shifts(scene, network, state, slopes)
-    state, speeds, residual, steps = _at_equilibrium(network, state, shifts)
-    found = _eigenvalues(network, state, wanted)
-    found[np.abs(found) <= LEAST * _fastest(network, start, state)] = 0.0
-    return Equilibrium(scene, state, _in_order(found), names, speeds, residual, steps)
+    network, first = Linearised.of(_at_rest(scene), scene.parameters), np.array(scene.y0)
+    count = None if count is None else check_integer("count", count, 1)
+    if count is not None and count > len(first):
+        raise ValueError(f"count = {count}; expected at most {len(first)}, the states of the network")
+    names, shifts = _shifts(scene, network, first)
+    state, speeds, residual, steps = _solve(network, first, shifts)
+    eigenvalues = _eigenvalues(network, state, count)
+    eigenvalues[np.abs(eigenvalues) <= LEAST * _fastest(network, first, state)] = 0.0
+    eigenvalues = eigenvalues[np.lexsort((-eigenvalues.imag, -eigenvalues.real))]
+    return Equilibrium(scene, state, eigenvalues, names, speeds, residual, steps)
 
 
 def _at_rest(scene: Scene) -> Equations:
-    """The equations without a drive whose strength is zero; ValueError if they have no equilibria, or none of Newton's."""
+    """Return the equations without drives of strength zero; ValueError for a drive, set-valued friction or jumps."""
     equations = without_drive(scene.equations, scene.parameters)
     if equations.forced:
         raise ValueError(
@@ -288,95 +286,95 @@ def _at_rest(scene: Scene) -> Equations:
 
 
 def _jacobian(network: Linearised, state: np.ndarray) -> sparse.csc_array:
-    """The Jacobian; ArithmeticError where it has an entry that is no number."""
-    found = network.jacobian(state)
-    if not np.isfinite(found.data).all():
+    """Return the Jacobian; ArithmeticError where an entry is no number."""
+    jacobian = network.jacobian(state)
+    if not np.isfinite(jacobian.data).all():
         raise ArithmeticError(
             "equilibrium: met a rate whose slope is infinite, or has no value, as that of sqrt(x) at 0; Newton's method and "
             "eigenvalues need slopes; start elsewhere"
         )
-    return found
-
-
-def _slopes(network: Linearised, state: np.ndarray) -> np.ndarray:
-    """The sums of the sizes of each row of the Jacobian, the larger of those at a state and beside it."""
-    here, beside = (
-        abs(found).sum(axis=1) for found in (_jacobian(network, state), network.jacobian((1.0 + BESIDE) * state))
-    )
-    return np.fmax(here, np.where(np.isfinite(beside), beside, 0.0))
+    return jacobian
 
 
 def _fastest(network: Linearised, *states: np.ndarray) -> float:
-    """The size of eigenvalues of M^-1 J at some states and beside them, in no unit but that of time: a, sqrt(b c) of [[a, b], [c, 0]]."""
+    """Return a size of the eigenvalues of M^-1 J near some states, in units of a rate: |a| and sqrt|b c| of [[a, b], [c, 0]].
+
+    Products of opposite entries do not depend on the units of the states, as the entries themselves do.
+    """
     sizes = [0.0]
     for state in (*states, *((1.0 + BESIDE) * state for state in states)):
         jacobian, mass = network.jacobian(state), network.mass(state)
         pairs = np.sqrt(abs(jacobian.multiply(jacobian.T)).data)
-        heavy = 1.0 if mass is None else float(abs(mass).max())
-        sizes.append(float(np.max(pairs[np.isfinite(pairs)], initial=0.0)) / heavy)
+        heaviest = 1.0 if mass is None else float(abs(mass).max())
+        sizes.append(float(np.max(pairs[np.isfinite(pairs)], initial=0.0)) / heaviest)
     return max(sizes)
 
 
-def _shifts(
-    scene: Scene, network: Linearised, state: np.ndarray, slopes: np.ndarray
-) -> tuple[tuple[str, ...], np.ndarray]:
-    """Components whose shift at all nodes changes no rate, and the vectors of ones (states, shifts) along them."""
+def _shifts(scene: Scene, network: Linearised, state: np.ndarray) -> tuple[tuple[str, ...], np.ndarray]:
+    """Find components that can be shifted at all nodes together, and the vectors of ones (states, shifts) along them."""
     equations, jacobian, rates = scene.equations, network.jacobian(state), network.rates(state)
-    names, rows = [], []
+    # Row sums of |J|, the larger of those at the state and beside it.
+    here, beside = abs(_jacobian(network, state)), abs(network.jacobian((1.0 + BESIDE) * state))
+    here, beside = here.sum(axis=1), beside.sum(axis=1)
+    slopes = np.fmax(here, np.where(np.isfinite(beside), beside, 0.0))
+
+    def keeps_rates(distance: float) -> bool:
+        """Return whether a shift along `ones` by a distance changes no rate by more than rounding."""
+        shifted = state + distance * ones
+        sizes = network.term_sizes(shifted) + network.term_sizes(state)
+        return bool(np.all(np.abs(network.rates(shifted) - rates) <= CLOSED * sizes))
+
+    names, vectors = [], []
     first = 0
     for name in equations.components:
-        nodes = len(equations.holders(name))
-        along = np.zeros(len(state))
-        along[first : first + nodes] = 1.0
-        first += nodes
-        moved = (state + distance * along for distance in SHIFTS)
-        if np.all(np.abs(jacobian @ along) <= 1e-12 * slopes) and all(
-            np.all(np.abs(network.rates(x) - rates) <= CLOSED * (network.term_sizes(x) + network.term_sizes(state)))
-            for x in moved
-        ):
+        last = first + len(equations.holders(name))
+        ones = np.zeros(len(state))
+        ones[first:last] = 1.0
+        first = last
+        # J e = 0 holds where rates are flat, too: try finite shifts as well.
+        if np.all(np.abs(jacobian @ ones) <= 1e-12 * slopes) and all(map(keeps_rates, SHIFTS)):
             names.append(name)
-            rows.append(along)
-    return tuple(names), np.array(rows).reshape(-1, len(state)).T
+            vectors.append(ones)
+    return tuple(names), np.array(vectors).reshape(-1, len(state)).T
 
 
 @dataclass(slots=True)
 class Search:
-    """A state on its way to rest, with the rates that are left: r(state) - shifts @ speeds.
-
-    shifts: vectors of ones (states, shifts); scales (states,): sizes of the rates, by which their squares are added.
-    """
+    """A state on its way to rest, with the rates that are left: r(x) - shifts @ speeds."""
 
     network: Linearised
-    shifts: np.ndarray
+    shifts: np.ndarray  # (states, shifts): vectors of ones
     state: np.ndarray
-    speeds: np.ndarray
-    scales: np.ndarray
+    speeds: np.ndarray  # (shifts,)
+    scales: np.ndarray  # (states,): sizes of the rates, by which their squares are weighted
     steps: int = 0
 
     @classmethod
     def begin(cls, network: Linearised, state: np.ndarray, shifts: np.ndarray) -> Search:
         """Return the search that begins at a state."""
         scales, slopes = network.term_sizes(state), abs(_jacobian(network, state)).tocoo()
-        # where all terms vanish: the slopes times the changes of the states that the other rates would notice
+        # The scale of a rate is the size of its terms.  Where all terms vanish, it is the change of the rate when each
+        # state moves by the least distance that changes another rate by its scale.
         with np.errstate(divide="ignore", invalid="ignore"):
             noticed = np.zeros(len(state))
             np.maximum.at(noticed, slopes.col, np.nan_to_num(scales[slopes.row] / slopes.data, posinf=0.0))
         scales = np.where(scales > 0.0, scales, slopes @ noticed)
         scales[scales == 0.0] = scales.max(initial=0.0) or 1.0
-        return cls(network, shifts, state, _speeds(network.rates(state), shifts), scales)
-
-    @property
-    def gap(self) -> np.ndarray:
-        """The rates that are left."""
-        return self.left(self.state, self.speeds)
+        # The speeds that leave the least rates: means over the nodes.
+        speeds = np.asarray(shifts.T @ network.rates(state) / np.maximum(shifts.sum(axis=0), 1.0))
+        return cls(network, shifts, state, speeds, scales)
 
     def left(self, state: np.ndarray, speeds: np.ndarray) -> np.ndarray:
-        """Return the rates that are left at a state."""
+        """Return the rates that are left at a state with some speeds."""
         return np.asarray(self.network.rates(state) - self.shifts @ speeds)
 
     def size(self, gap: np.ndarray) -> float:
-        """Return one number for rates that are left."""
+        """Return the weighted norm of rates that are left."""
         return float(np.linalg.norm(gap / self.scales))
+
+    def limits(self, state: np.ndarray) -> np.ndarray:
+        """Return the rates (states,) that may be left at an equilibrium."""
+        return np.asarray(CLOSED * (self.network.term_sizes(state) + np.abs(self.shifts @ self.speeds)))
 
     def correction(self, gap: np.ndarray, rate: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return a step (states,), (shifts,) of Newton's method, or of the implicit Euler method of length 1/rate."""
@@ -387,92 +385,90 @@ class Search:
         if count:
             border = sparse.csc_array(self.shifts)
             matrix = sparse.block_array([[matrix, -border], [border.T, None]], format="csc")
-        change = _solved(matrix, np.append(-gap, np.zeros(count)))
+        change = _solve_linear(matrix, np.append(-gap, np.zeros(count)))
         return change[: len(gap)], change[len(gap) :]
 
     def newton(self) -> bool:
-        """Advance by Newton's method to an equilibrium, and return whether there is one."""
-        gap = self.gap
-        gaps, limits = [np.abs(gap)], [self.closed(self.state)]
+        """Advance by Newton's method, and return whether it reached an equilibrium."""
+        gap = self.left(self.state, self.speeds)
+        gaps, limits = [np.abs(gap)], [self.limits(self.state)]
         for _ in range(MOST_STEPS):
             if not gap.any():
                 break
-            change, turn = self.correction(gap)
+            change, speed_change = self.correction(gap)
+            # Halve the step until the residual falls; a residual that no part of a step lowers has reached rounding.
             for part in 0.5 ** np.arange(HALVINGS):
-                tried = self.state + part * change, self.speeds + part * turn
-                left = self.left(*tried)
+                state, speeds = self.state + part * change, self.speeds + part * speed_change
+                left = self.left(state, speeds)
                 if self.size(left) < self.size(gap):
                     break
             else:
                 break
-            (self.state, self.speeds), gap, self.steps = tried, left, self.steps + 1
+            self.state, self.speeds, gap, self.steps = state, speeds, left, self.steps + 1
             gaps.append(np.abs(gap))
-            limits.append(self.closed(self.state))
+            limits.append(self.limits(state))
         return self._is_at_root(np.array(gaps), np.array(limits))
 
-    def closed(self, state: np.ndarray) -> np.ndarray:
-        """Return the rates that may be left at an equilibrium."""
-        return np.asarray(CLOSED * (self.network.term_sizes(state) + np.abs(self.shifts @ self.speeds)))
-
     def _is_at_root(self, gaps: np.ndarray, limits: np.ndarray) -> bool:
-        """Whether the search ended at a root; states that vanish to rounding become zero.
+        """Return whether Newton's method ended at a root; states that vanish to rounding become zero.
 
-        gaps, limits (steps, states): the rates that were left after each step, and that may be.
+        gaps, limits (steps, states): the rates that were left after each step, and those that may be left.
         """
-        closed = limits[-1]
-        still = gaps[-1] <= closed
-        if not still.all():
-            # rates whose terms all vanish, such as v at rest: states of a size that no other rate notices are zero
+        limit = limits[-1]
+        closed = gaps[-1] <= limit
+        if not closed.all():
+            # The terms of a rate such as x' = v all vanish with v, so that it is never small beside them.  A state whose
+            # size changes no closed rate by more than its limit is rounding: set it to zero and look again.
             change = abs(_jacobian(self.network, self.state)) @ sparse.diags_array(np.abs(self.state)).tocsc()
-            unnoticed = np.asarray((change[still] > closed[still][:, None]).sum(axis=0)).ravel() == 0
+            unnoticed = np.asarray((change[closed] > limit[closed][:, None]).sum(axis=0)).ravel() == 0
             rounded = np.where(unnoticed, 0.0, self.state)
-            if not np.all(np.abs(self.left(rounded, self.speeds)) <= self.closed(rounded)):
+            if not np.all(np.abs(self.left(rounded, self.speeds)) <= self.limits(rounded)):
                 return False
             self.state = rounded
-        # along a tail of the rates, which has no root, the step that closes them lowers them by less than e
-        last = int(np.argmax(np.all((gaps <= limits)[:, still], axis=1)))
-        levels = (gaps / np.where(closed > 0.0, closed, np.inf))[:, still].max(axis=1, initial=0.0)
+        # Refuse a tail of the rates that has no root: there the step that closes them lowers them by less than e (TAIL).
+        last = int(np.argmax(np.all((gaps <= limits)[:, closed], axis=1)))
+        levels = (gaps / np.where(limit > 0.0, limit, np.inf))[:, closed].max(axis=1, initial=0.0)
         return last == 0 or bool(levels[last] <= TAIL * levels[last - 1])
 
     def relax(self) -> None:
-        """Follow the motion towards rest: implicit Euler steps that grow as the rates fall."""
-        gap = self.gap
+        """Follow the motion towards rest by implicit Euler steps, whose length grows as the rates fall."""
+        gap = self.left(self.state, self.speeds)
         rate = FIRST_RATE * float(abs(_jacobian(self.network, self.state)).sum(axis=1).max())
         for _ in range(MOST_RELAXED):
             if self.size(gap) <= NEWTON:
                 return
-            change, turn = self.correction(gap, rate)
-            tried = self.state + change, self.speeds + turn
-            left = self.left(*tried)
+            change, speed_change = self.correction(gap, rate)
+            state, speeds = self.state + change, self.speeds + speed_change
+            left = self.left(state, speeds)
             ratio = self.size(left) / self.size(gap)
             if not ratio < WORSE:  # NaN too
                 rate *= 4.0
                 continue
-            (self.state, self.speeds), gap, self.steps = tried, left, self.steps + 1
-            rate *= ratio
+            self.state, self.speeds, gap, self.steps = state, speeds, left, self.steps + 1
+            rate *= ratio  # switched evolution relaxation: h grows as 1/|r| (Kelley & Keyes)
 
 
-def _at_equilibrium(
-    network: Linearised, state: np.ndarray, shifts: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, float, int]:
-    """State, speeds along the shifts, residual and number of steps."""
-    search = Search.begin(network, state, shifts)
+def _solve(network: Linearised, first: np.ndarray, shifts: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, int]:
+    """Return the state at equilibrium near a first one, its speeds along the shifts, the residual and the steps."""
+    search = Search.begin(network, first, shifts)
     if not search.newton():
-        failed, search = search, Search.begin(network, state, shifts)
+        failed, search = search, Search.begin(network, first, shifts)
         search.relax()
         if not search.newton():
+            by_newton, by_motion = (np.abs(each.left(each.state, each.speeds)).max() for each in (failed, search))
             raise ArithmeticError(
-                f"no equilibrium near the start: Newton's method left rates of {np.abs(failed.gap).max():.2g}, and steps "
-                f"along the motion {np.abs(search.gap).max():.2g}; start elsewhere, or there is none"
+                f"no equilibrium near the start: Newton's method left rates of {by_newton:.2g}, and steps "
+                f"along the motion {by_motion:.2g}; start elsewhere, or there is none"
             )
     terms = network.term_sizes(search.state) + np.abs(shifts @ search.speeds)
     speeds = np.where(np.abs(search.speeds) > EVEN * terms.max(), search.speeds, 0.0)
-    return search.state, speeds, float(np.abs(search.gap).max()), search.steps
+    residual = float(np.abs(search.left(search.state, search.speeds)).max())
+    return search.state, speeds, residual, search.steps
 
 
-def _solved(matrix: sparse.csc_array, right: np.ndarray) -> np.ndarray:
-    """The solution (k,) of linear equations; that of least squares and least norm if they are singular."""
-    # rows and columns whose largest entries are 1, whatever the units of states and rates
+def _solve_linear(matrix: sparse.csc_array, right: np.ndarray) -> np.ndarray:
+    """Return the solution (k,) of linear equations, that of least squares and least norm if they are singular."""
+    # Scale rows, then columns, to a largest entry of 1, so that pivots do not depend on the units of states and rates.
     with np.errstate(divide="ignore"):
         rows = 1.0 / abs(matrix).max(axis=1).toarray().ravel()
         rows = np.where(np.isfinite(rows), rows, 1.0)
@@ -486,40 +482,29 @@ def _solved(matrix: sparse.csc_array, right: np.ndarray) -> np.ndarray:
             return np.asarray(columns * solver.solve(rows * right))
     except RuntimeError:  # a pivot is 0
         pass
-    # |A y - b|^2 + DAMPED^2 |y|^2 is least where DAMPED r = b - A y and A' r = DAMPED y
+    # Minimise |A y - b|^2 + d^2 |y|^2: d s = b - A y and A' s = d y, sparse equations in (s, y).
     damping = DAMPED * sparse.eye_array(len(right), format="csc")
     augmented = sparse.block_array([[damping, scaled], [scaled.T, -damping]], format="csc")
-    found = splu(augmented).solve(np.append(rows * right, np.zeros(len(right))))
-    return np.asarray(columns * found[len(right) :])
-
-
-def _speeds(rates: np.ndarray, shifts: np.ndarray) -> np.ndarray:
-    """The part of the rates along the shifts."""
-    return np.asarray(shifts.T @ rates / np.maximum(shifts.sum(axis=0), 1.0))
+    both = splu(augmented).solve(np.append(rows * right, np.zeros(len(right))))
+    return np.asarray(columns * both[len(right) :])
 
 
 def _eigenvalues(network: Linearised, state: np.ndarray, count: int | None) -> np.ndarray:
-    """Eigenvalues of M^-1 J, in any order."""
+    """Return eigenvalues of M^-1 J, in any order: all, or the `count` nearest to zero."""
     jacobian, mass, size = network.jacobian(state), network.mass(state), len(state)
     if count is None and size > DENSE:
         count = FEW
-    if count is None or count >= size - 1:  # all that Arnoldi's method cannot give
-        found = linalg.eigvals(jacobian.toarray(), None if mass is None else mass.toarray())
-    else:
-        mass = sparse.eye_array(size, format="csc") if mass is None else mass
-        aside = ASIDE * float(abs(jacobian).max())  # where the matrix is singular only by chance
-        solver = splu(jacobian - aside * mass)
-        inverse = LinearOperator((size, size), matvec=lambda v: solver.solve(mass @ v), dtype=float)
-        try:
-            found = eigs(inverse, count, v0=1.0 + np.arange(size) % 7, return_eigenvectors=False)
-        except ArpackNoConvergence:
-            raise ArithmeticError(
-                f"eigenvalues: the {count} nearest to zero of {size} did not converge; ask for another count"
-            ) from None
-        found = aside + 1.0 / found
-    return np.asarray(found)
-
-
-def _in_order(eigenvalues: np.ndarray) -> np.ndarray:
-    """Eigenvalues, the largest real part first."""
-    return np.asarray(eigenvalues[np.lexsort((-eigenvalues.imag, -eigenvalues.real))])
+    if count is None or count >= size - 1:  # Arnoldi's method gives size - 2 at most
+        return np.asarray(linalg.eigvals(jacobian.toarray(), None if mass is None else mass.toarray()))
+    # Arnoldi's method on (J - a M)^-1 M: its largest eigenvalues 1/(lambda - a) belong to those nearest to a.
+    mass = sparse.eye_array(size, format="csc") if mass is None else mass
+    aside = ASIDE * float(abs(jacobian).max())
+    solver = splu(jacobian - aside * mass)
+    inverse = LinearOperator((size, size), matvec=lambda v: solver.solve(mass @ v), dtype=float)
+    try:
+        largest = eigs(inverse, count, v0=1.0 + np.arange(size) % 7, return_eigenvectors=False)
+    except ArpackNoConvergence:
+        raise ArithmeticError(
+            f"eigenvalues: the {count} nearest to zero of {size} did not converge; ask for another count"
+        ) from None
+    return np.asarray(aside + 1.0 / largest)
