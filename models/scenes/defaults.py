@@ -54,8 +54,8 @@ LIMITS: Mapping[str, tuple[Any, Any]] = {
 }
 """The range of each number that belongs to a keyword, both ends in it."""
 
-SAMPLES = (401, 40, 20_001)
-"""Points of a trajectory by default: the fewest, those of a unit of the window, the most; 40 a turn draw a smooth curve."""
+SAMPLES = (401, 100, 20_001)
+"""Points of a trajectory by default: the fewest, those of a unit of the window, the most; 40 a turn draw a smooth curve, and motions turn more than once in a unit."""
 
 
 def integrators() -> tuple[str, ...]:

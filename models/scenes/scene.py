@@ -91,7 +91,7 @@ class Scene(HasDrawing, HasLatex):
         "period" (of the drive; the default if the equations repeat themselves in time at all values of the parameters)
         or "time".
     samples : int, optional
-        Points of a trajectory, both ends of the window included; by default 40 a period or unit of time, between 401
+        Points of a trajectory, both ends of the window included; by default 100 a period or unit of time, between 401
         and 20 001.
     integrator : str
         The method; "auto" chooses one.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import singledispatch
 from html import escape
 from itertools import islice
@@ -127,7 +127,7 @@ def _(value: Scene) -> str:
 @body.register
 def _(value: Labelled) -> str:
     name = f"<p><b>{escape(type(value).__name__)}</b></p>"
-    return f"{name}{rows_table(value.summary)}{figure(value.plot(), type(value).__name__)}"
+    return f"{name}{rows_table(value.summary)}{figure(value.plot, type(value).__name__)}"
 
 
 def rows_table(rows: Iterable[tuple[str, str]]) -> str:
@@ -136,10 +136,16 @@ def rows_table(rows: Iterable[tuple[str, str]]) -> str:
     return f"<table>{listed}</table>"
 
 
-def figure(axes: Axes, description: str) -> str:
-    """Return a plot as an image that is part of the page."""
+def figure(plot: Callable[[Axes], Axes], description: str) -> str:
+    """Return a plot as an image that is part of the page; pyplot has no part in it."""
+    from ..plots.canvas import SIZE
+    from ..plots.style import context, new_figure
+
     buffer = io.BytesIO()
-    axes.figure.figure.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
+    with context():
+        canvas = new_figure(SIZE)
+        plot(canvas.add_subplot())
+        canvas.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
     text = base64.b64encode(buffer.getvalue()).decode()
     return f'<img alt="{escape(description, quote=True)}" src="data:image/png;base64,{text}"/>'
 

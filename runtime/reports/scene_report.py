@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import partial
 from html import escape
 
 import numpy as np
@@ -98,7 +99,7 @@ def _stability(scene: Scene, effort: Effort, workers: int | None, show_progress:
             workers=workers,
             show_progress=show_progress,
         )
-        picture = figure(function.plot(), "exponent over strength")
+        picture = figure(function.plot, "exponent over strength")
         return f"{rows_table(function.summary[1:])}{picture}{_ends(function)}{_fixed(scene)}"
     except (ValueError, FloatingPointError) as problem:
         return f"<p>This scene has none: {escape(str(problem))}</p>"
@@ -134,7 +135,7 @@ def _sweep(scene: Scene, effort: Effort, workers: int | None, show_progress: boo
     thinned = scene.replace(axes=tuple(_thinned(axis, effort.values) for axis in scene.axes))
     result = run(thinned, workers=workers, show_progress=show_progress)
     plain = [None] if not scene.observe or {"sync_error", "section"} & set(scene.record) else []
-    pictures = "".join(figure(result.plot(kind=kind), kind or "sweep") for kind in (*plain, *scene.observe))
+    pictures = "".join(figure(partial(result.plot, kind=kind), kind or "sweep") for kind in (*plain, *scene.observe))
     count = "" if thinned.cells == scene.cells else f"<p>{thinned.cells} of the scene's {scene.cells} cells.</p>"
     return f"{count}{rows_table(result.summary[1:3])}{pictures}"
 

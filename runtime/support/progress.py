@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -145,7 +146,9 @@ class Reporter:
             self.counts = self.counts + counts
             self.done = self.kept = int(counts.sum())
         if self.show or (self.show is None and _has_bars()):
-            from tqdm.auto import tqdm  # with widgets in a notebook that has them
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # that a notebook has no widgets, with which bars are prettier
+                from tqdm.auto import tqdm
 
             note = f"compiled in {duration(compiling)}" if compiling >= 1.0 else None
             self._bar = tqdm(total=self.total, initial=self.kept, desc=note, unit=self.unit, file=sys.stderr)
