@@ -18,7 +18,7 @@ from ..mechanics.components import Edge
 MOST_PRODUCTS = 32
 """Most products in the rate of one state, and highest power of a sum that is multiplied out (a choice)."""
 
-_THEOREMS: dict[type[sp.Expr], Callable[[sp.Expr, sp.Expr], tuple[tuple[sp.Expr, sp.Expr], ...]]] = {
+ADDITION_THEOREMS: dict[type[sp.Expr], Callable[[sp.Expr, sp.Expr], tuple[tuple[sp.Expr, sp.Expr], ...]]] = {
     sp.sin: lambda a, b: ((sp.sin(a), sp.cos(b)), (sp.cos(a), sp.sin(b))),
     sp.cos: lambda a, b: ((sp.cos(a), sp.cos(b)), (-sp.sin(a), sp.sin(b))),
     sp.sinh: lambda a, b: ((sp.sinh(a), sp.cosh(b)), (sp.cosh(a), sp.sinh(b))),
@@ -152,7 +152,7 @@ def _products(e: sp.Expr, target: Symbols, source: Symbols, bounded: bool = Fals
 
 def _by_theorem(e: sp.Expr, target: Symbols, source: Symbols) -> Products | None:
     """Return f(own + theirs + lag) by its addition theorem, with arguments of the target, the source and neither."""
-    theorem = _THEOREMS.get(e.func)
+    theorem = ADDITION_THEOREMS.get(e.func)
     if theorem is None:
         return None
     terms = sp.Add.make_args(sp.expand(e.args[0]))
@@ -166,7 +166,7 @@ def _by_theorem(e: sp.Expr, target: Symbols, source: Symbols) -> Products | None
     # cos(lag) and sin(lag) are coefficients, so that a lag costs nothing at the nodes.
     slope, sign = _SLOPES[e.func]
     turned = ((sp.cos(lag), e.func), (sign * sp.sin(lag), slope))
-    return _sum([_one(c, a, b) for c, wave in turned for a, b in _THEOREMS[wave](own, theirs)])
+    return _sum([_one(c, a, b) for c, wave in turned for a, b in ADDITION_THEOREMS[wave](own, theirs)])
 
 
 def _one(c: sp.Expr, a: sp.Expr, b: sp.Expr) -> Products:

@@ -111,7 +111,7 @@ def eigenspaces(matrix: Matrix) -> tuple[Eigenspace, ...]:
 
 def _basis(matrix: Matrix, polynomial: fmpq_poly) -> tuple[Vector, ...]:
     """Compute the eigenvectors that all roots of a monic irreducible polynomial share."""
-    rational, kernel = _rational(matrix), _kernel(value_at(matrix, polynomial))
+    rational, kernel = _rational(matrix), null_space(value_at(matrix, polynomial))
     degree, independent, basis = int(polynomial.degree()), list[list[fmpq]](), list[Vector]()
     for start in kernel:
         if degree > 1 and fmpq_mat([*independent, start]).rank() == len(independent):
@@ -134,7 +134,7 @@ def _rational(matrix: Matrix) -> fmpq_mat:
     return rows
 
 
-def _kernel(matrix: fmpz_mat) -> list[list[fmpq]]:
+def null_space(matrix: fmpz_mat) -> list[list[fmpq]]:
     """Return a basis of the null space: each vector is 1 at one column without a pivot, 0 at the others."""
     reduced, below, rank = matrix.rref()
     n, pivots = matrix.ncols(), list[int]()

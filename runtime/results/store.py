@@ -214,7 +214,7 @@ def _copy_to_netcdf4(data: xr.Dataset, path: Path, long: Collection[str]) -> Non
                 copy.attrs.update(attributes)
                 if not set(variable.dimensions) & set(long):
                     copy[...] = variable[...]
-            _copy(data, long, file.variables)
+            copy_in_pieces(data, long, file.variables)
 
 
 def _seal_netcdf4(path: Path) -> None:
@@ -255,7 +255,7 @@ def _copy_to_zarr(data: xr.Dataset, path: Path, long: Collection[str]) -> None:
     arrays = dict(zarr.open_group(path, mode="r+").arrays())
     for name in _with(data, long):
         arrays[name].resize(data[name].shape)
-    _copy(data, long, arrays)
+    copy_in_pieces(data, long, arrays)
 
 
 def _seal_zarr(path: Path) -> None:
@@ -296,7 +296,7 @@ def _first(data: xr.Dataset, long: Collection[str]) -> xr.Dataset:
     return data.isel({name: slice(1) for name in long}).load()
 
 
-def _copy(data: xr.Dataset, long: Collection[str], arrays: Mapping[str, Any]) -> None:
+def copy_in_pieces(data: xr.Dataset, long: Collection[str], arrays: Mapping[str, Any]) -> None:
     """Copy the variables that have a long dimension into arrays of their shapes."""
     for name in _with(data, long):
         variable, array = data.variables[name], arrays[name]

@@ -11,6 +11,7 @@ import pytest
 
 from benchmarks import families
 from synchain.models.graphs.families import topology
+from synchain.models.scenes.scene import Scene
 from synchain.runtime.prediction.synchronisability import verdict
 
 pytestmark = pytest.mark.long
@@ -19,7 +20,7 @@ pytestmark = pytest.mark.long
 def function(*ranges: tuple[float, float], error: float = 0.0) -> SimpleNamespace:
     """A stability function that is negative on these ranges."""
     return SimpleNamespace(
-        open_ranges=ranges, intervals=ranges, uncertainties=tuple((error, error) for _ in ranges), scene=None
+        open_ranges=ranges, intervals=ranges, uncertainties=tuple((error, error) for _ in ranges), scene=Scene()
     )
 
 
@@ -58,7 +59,9 @@ def test_largest_sizes_by_hand(monkeypatch) -> None:
 
 def test_large_networks_with_set_valued_friction_are_left_out_and_named(monkeypatch) -> None:
     monkeypatch.setattr(families, "function_of", lambda omega, contact: function((0.1, 0.6)))
-    monkeypatch.setattr(families, "_simulated", lambda scene, graph, sigma, quick: (graph.n, sigma))
+    monkeypatch.setattr(
+        families, "simulate", lambda network, sigma, *_, **options: SimpleNamespace(share=[network.n], error=sigma)
+    )
     rows = families.measure()
     assert all(len(row) == len(families.COLUMNS) for row in rows)
     for omega, contact in families.CASES:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from types import SimpleNamespace
+
 import pytest
 
 from benchmarks import start
@@ -28,16 +31,21 @@ def test_a_row_for_each_stage():
 
 
 def test_a_cache_that_is_not_what_it_should_be_is_no_measurement(tmp_path, monkeypatch):
-    monkeypatch.setattr(start, "_child", lambda code, folder, *arguments: ([1.0] * 6, True))
+    def answer(from_cache):
+        output = json.dumps([[1.0] * 6, from_cache])
+        monkeypatch.setattr(start.subprocess, "run", lambda *_, **options: SimpleNamespace(returncode=0, stdout=output))
+
+    answer(True)
     assert start.stages(2, str(tmp_path), cached=True) == [1.0] * 6
     with pytest.raises(RuntimeError, match="came from the cache: True; expected False"):
         start.stages(2, str(tmp_path), cached=False)
-    monkeypatch.setattr(start, "_child", lambda code, folder, *arguments: ([1.0] * 6, None))
+    answer(None)
     for cached in (False, True):
         with pytest.raises(RuntimeError, match="came from the cache: in part"):
             start.stages(2, str(tmp_path), cached=cached)
 
 
-def test_a_failing_process_is_an_error(tmp_path):
+def test_a_failing_process_is_an_error(tmp_path, monkeypatch):
+    monkeypatch.setattr(start, "CHILD", "1/0")
     with pytest.raises(RuntimeError, match=r"(?s)to be timed failed: .*ZeroDivisionError"):
-        start._child("1/0", str(tmp_path))
+        start.stages(2, str(tmp_path), cached=False)

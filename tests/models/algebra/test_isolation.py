@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 import random
+from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
@@ -98,23 +99,24 @@ def test_a_hundred_complex_roots_take_the_fast_route(monkeypatch: pytest.MonkeyP
     """Arb alone took minutes at degree 200."""
     stream = random.Random(5)
     f = fmpz_poly([stream.randint(-(10**9), 10**9) for _ in range(100)] + [1])
-    monkeypatch.setattr(algebraic, "_by_arb", None)
-    found, calls = effort(lambda: roots(tuple(int(c) for c in f.coeffs())))
-    assert len(found) == 100
+    monkeypatch.setattr(algebraic, "discs", lambda f: discs(f) or pytest.fail("Arb is slow"))
+    isolated, calls = effort(lambda: roots(tuple(int(c) for c in f.coeffs())))
+    assert len(isolated) == 100
     assert calls < 4_000_000
 
 
 @pytest.mark.parametrize("coefficients", [[-2, 0, 0, 1], [1, 1, 0, 0, 1], [-1, -1, 0, 0, 0, 1]])
-def test_the_second_way_to_isolate_roots_finds_the_same(coefficients: list[int]) -> None:
-    f = fmpz_poly(coefficients)
-    found = algebraic._by_arb(f)
-    real = [disc for disc in found if disc.y == 0]
-    assert found[: len(real)] == real
-    points = [complex(float(d.x.p) / float(d.x.q), float(d.y.p) / float(d.y.q)) for d in found]
-    expected = np.roots(coefficients[::-1])
-    assert len(points) == len(expected)
-    assert all(min(abs(z - points)) < 1e-12 for z in expected)
-    assert all(0 < d.radius < fmpq(1, 2**60) for d in found)
+def test_arb_isolates_the_roots_that_discs_cannot(coefficients: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
+    by_discs = roots(tuple(coefficients))
+    monkeypatch.setattr(algebraic, "discs", lambda f: None)
+    by_arb = roots(tuple(coefficients))
+    assert [(type(root), root.index) for root in by_arb] == [(type(root), root.index) for root in by_discs]
+    assert all(0 < root.high - root.low < Fraction(1, 2**59) for root in by_arb if isinstance(root, RealRoot))
+    balls = [(acb(a.enclosure(80)), acb(b.enclosure(80))) for a, b in zip(by_arb, by_discs, strict=True)]
+    assert all(abs(a - b) < arb(2) ** -60 for a, b in balls)
+    points = [complex(float(a.real.mid()), float(a.imag.mid())) for a, _ in balls]
+    assert len(points) == len(coefficients) - 1
+    assert all(min(abs(z - points)) < 1e-12 for z in np.roots(coefficients[::-1]))
 
 
 def test_a_real_root_beside_one_that_is_far_larger_is_seen_to_be_real() -> None:

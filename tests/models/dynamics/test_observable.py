@@ -160,7 +160,7 @@ def test_the_manuals_files_are_scenes(tmp_path: Path, words: str) -> None:
 
 @pytest.mark.parametrize("program", re.findall(r"```python\n(.*?)```", MANUAL, re.DOTALL))
 def test_the_manuals_programs_run(program: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("synchain.codegen.kernels.sweep_kernel._suited", lambda *_: 1)  # the drivers of other tests
+    monkeypatch.setattr("synchain.codegen.simd.lanes.native_width", lambda *_: 1)  # the drivers of other tests
     names: dict[str, object] = {}
     exec(program, names)
     assert isinstance(names["scene"], Scene)

@@ -8,7 +8,7 @@ import sympy as sp
 from samples import real
 
 from synchain.models.interactions import separation
-from synchain.models.interactions.separation import separated, summed
+from synchain.models.interactions.separation import ADDITION_THEOREMS, separated, summed
 from synchain.models.mechanics.components import TIME, Edge
 
 X, Y, X_J, Y_J, W, K, A, OMEGA, OMEGA_J = real("x_i", "y_i", "x_j", "y_j", "weight", "K", "a", "omega", "omega_j")
@@ -89,9 +89,9 @@ def test_a_parameter_that_all_share_may_stand_anywhere() -> None:
 def test_a_wrong_theorem_does_not_pass_the_proof(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     wrong = {
         f: lambda a, b, theorem=theorem: tuple((-g, h) for g, h in theorem(a, b))
-        for f, theorem in separation._THEOREMS.items()
+        for f, theorem in ADDITION_THEOREMS.items()
     }
-    monkeypatch.setattr(separation, "_THEOREMS", wrong)
+    monkeypatch.setattr(separation, "ADDITION_THEOREMS", wrong)
     assert separated.__wrapped__(SEPARATE[name][0]) is None
 
 

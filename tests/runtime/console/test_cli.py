@@ -270,6 +270,10 @@ def test_a_figure_that_fails_says_that_the_result_is_complete(
     (tmp_path / "short.png").rmdir()
     assert main(["run", scene, "--out", str(tmp_path), "--set", "sigma=0:0.5:3"]) == 0
     assert (tmp_path / "short.png").is_file()
+    (tmp_path / "short.png").write_text("not drawn again")
+    assert main(["run", scene, "--out", str(tmp_path), "--set", "sigma=0:0.5:3"]) == 0
+    assert (tmp_path / "short.png").read_text() == "not drawn again"
+    assert "nothing was run" in capsys.readouterr().out
 
 
 def test_a_numba_that_does_not_compile_is_no_bug(scene: str, tmp_path: Path) -> None:

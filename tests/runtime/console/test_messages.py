@@ -7,7 +7,6 @@ from __future__ import annotations
 import logging
 import math
 from argparse import ArgumentTypeError
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,7 +19,6 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime import cli
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.cli import main
-from synchain.runtime.commands.run import _nothing_to_do
 from synchain.runtime.console.arguments import spaced
 from synchain.runtime.engines import ladder_engine
 from synchain.runtime.engines.scene_kernels import warn_of_chords, write_kernel
@@ -166,18 +164,6 @@ def test_records_between_steps_of_straight_lines_are_warned_of():
         warn_of_chords(write_kernel(reduce_scene(scene, False)))
     for other in (scene.replace(integrator="rodas5p"), scene.replace(record=("sync_error",))):
         warn_of_chords(write_kernel(reduce_scene(other, False)))  # a warning would be an error
-
-
-def test_a_result_without_its_figure_is_drawn(tmp_path, monkeypatch, capsys):
-    target = tmp_path / "a.nc"
-    kept = SimpleNamespace(data=SimpleNamespace(attrs={"versions": "v"}), message="m", success=True)
-    monkeypatch.setattr("synchain.runtime.results.result.read_result", lambda path: kept)
-    monkeypatch.setattr("synchain.runtime.commands.run._drawn", lambda path: path.with_suffix(".png").write_text("x"))
-    assert _nothing_to_do(target) == 0
-    assert target.with_suffix(".png").exists()
-    monkeypatch.setattr("synchain.runtime.commands.run._drawn", lambda path: pytest.fail("drawn again"))
-    assert _nothing_to_do(target) == 0
-    assert "nothing was run" in capsys.readouterr().out
 
 
 def test_messages_about_files_name_the_keyword_and_the_option(tmp_path):

@@ -28,7 +28,7 @@ def narrow(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(skeleton_figure, "LOW", 1.2)
     monkeypatch.setattr(skeleton_figure, "HIGH", 1.24)
     monkeypatch.setattr(skeleton_figure, "PERIODS", (2,))
-    monkeypatch.setattr("synchain.codegen.kernels.sweep_kernel._suited", lambda *_: 1)
+    monkeypatch.setattr("synchain.codegen.simd.lanes.native_width", lambda *_: 1)
 
 
 @cache

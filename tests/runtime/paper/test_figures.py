@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -24,7 +25,6 @@ from synchain.runtime.paper.figure_runs import FULL, QUICK, FigureRuns, Quality,
 from synchain.runtime.paper.make import make
 from synchain.runtime.plots import style
 from synchain.runtime.plots.csv_table import as_csv
-from synchain.runtime.support import progress
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.run import run
 
@@ -80,7 +80,7 @@ def test_bars_of_figures_are_those_of_all_functions(
 ) -> None:
     monkeypatch.setattr(maker, "produce", lambda *given: [])
     for shown in (False, True):
-        monkeypatch.setattr(progress, "_has_bars", lambda shown=shown: shown)
+        monkeypatch.setattr(sys.stderr, "isatty", lambda shown=shown: shown)
         make(["figure_1b", "figure_4b"], tmp_path)
         assert ("2/2" in capsys.readouterr().err) == shown
 

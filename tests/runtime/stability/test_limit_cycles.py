@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 
 from synchain.models import Field, Scene, chain
 from synchain.runtime import exponents, follow, msf, open_result, periodic_orbit
-from synchain.runtime.stability import limit_cycle
+from synchain.runtime.stability.orbits import OrbitProblem
 
 VAN_DER_POL = Field({"x": "v", "v": "mu*(1 - x**2)*v - x"}, parameters={"mu": 1.0})
 
@@ -143,17 +143,17 @@ def test_relaxation_oscillations_have_their_least_period(mu: float, steps: str) 
 
 
 def test_a_return_that_fails_leads_to_the_next_and_to_the_least_period(monkeypatch: pytest.MonkeyPatch) -> None:
-    flow = limit_cycle._flow
+    propagators = OrbitProblem.propagators
     failed: list[float] = []
 
-    def fails_twice(orbit: Any, state: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
+    def fails_twice(orbit: OrbitProblem, integrator: Any, units: float) -> tuple[np.ndarray, np.ndarray]:
         if len(failed) < 2:
-            failed.append(period)
+            failed.append(units * orbit.unit)
             raise FloatingPointError("the state grew without bound")
-        return flow(orbit, state, period)
+        return propagators(orbit, integrator, units)
 
     expected = periodic_orbit(pair(1.0)).period
-    monkeypatch.setattr(limit_cycle, "_flow", fails_twice)
+    monkeypatch.setattr(OrbitProblem, "propagators", fails_twice)
     assert periodic_orbit(pair(1.0)).period == pytest.approx(expected, rel=1e-10)
     np.testing.assert_allclose(failed, [expected, 2.0 * expected], rtol=1e-6)
 

@@ -13,7 +13,8 @@ from effort import effort
 
 import synchain as sc
 from synchain.runtime import run
-from synchain.runtime.engines.choice import Ladder
+from synchain.runtime.engines import choice
+from synchain.runtime.engines.choice import at_start
 
 
 def one_pendulum() -> sc.Scene:
@@ -71,8 +72,12 @@ def test_results_do_not_follow_later_runs():
 
 
 def test_the_only_cell_of_a_scene_is_asked_once_how_it_begins(monkeypatch):
-    asked = []
-    own = Ladder._first
-    monkeypatch.setattr(Ladder, "_first", lambda ladder, rows: (asked.append(len(rows)), own(ladder, rows))[1])
+    cells = []
+
+    def counted(templates, rows):
+        cells.append(len(rows))
+        return at_start(templates, rows)
+
+    monkeypatch.setattr(choice, "at_start", counted)
     run(one_pendulum(), show_progress=False)
-    assert asked == [1]
+    assert cells == [1]

@@ -165,7 +165,7 @@ def test_a_disk_that_is_full_when_the_result_is_written(ending: str, tmp_path: P
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(store, "_copy", full)
+        patch.setattr(store, "copy_in_pieces", full)
         with pytest.raises(SweepFailed, match=rf"cannot write .*a\{ending}: No space left on device; 400 of 400 cells"):
             stream(MAP, path, show_progress=False)
     assert [part.name for part in tmp_path.iterdir()] == ["a.partial"]

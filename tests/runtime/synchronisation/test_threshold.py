@@ -437,7 +437,7 @@ def test_the_effort_of_the_exponents_can_be_chosen(monkeypatch):
     ],
 )
 def test_exponents_that_do_not_apply_say_why(scene, why, monkeypatch):
-    monkeypatch.setattr("synchain.codegen.kernels.sweep_kernel._suited", lambda *_: 1)  # the drivers of other tests
+    monkeypatch.setattr("synchain.codegen.simd.lanes.native_width", lambda *_: 1)  # the drivers of other tests
     found = thresholds(scene, sigma=[0.0, 0.1], **ASKED)
     assert found.exponents.intervals == ()
     assert why in found.exponents.absent
