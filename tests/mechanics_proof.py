@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import sympy as sp
+from catalogue import real
 from parts import coupling_of, oscillator_of
 from sympy.physics import mechanics
 
@@ -19,10 +20,6 @@ from synchain.models.mechanics.nondimensional import nondimensional
 
 T = mechanics.dynamicsymbols._t
 Q_I, Q_J, V_I, V_J, WEIGHT = sp.symbols("q_i q_j v_i v_j weight", real=True)
-
-
-def real(name: str) -> sp.Symbol:
-    return sp.Symbol(name, real=True)
 
 
 def vanishes(e: sp.Expr) -> bool:

@@ -5,12 +5,12 @@ Structures are few, so that kernels are; numbers, starts and lengths are drawn.
 
 from __future__ import annotations
 
-import os
 import time
 from typing import Any
 
 import numpy as np
 import pytest
+from catalogue import FUZZ_SECONDS
 from hypothesis import HealthCheck, given, note, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -21,7 +21,6 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.run import run
 
-SECONDS = float(os.environ.get("SYNCHAIN_FUZZ_SECONDS", "0"))
 EXAMPLES = 12
 """Scenes of each structure where no time is given."""
 
@@ -68,7 +67,7 @@ def reference(scene: Scene, method: str) -> np.ndarray:
 def check(name: str, examples: int) -> None:
     scene, method, numbers, longest = STRUCTURES[name]
 
-    @settings(max_examples=examples, deadline=None, derandomize=SECONDS == 0, database=None,
+    @settings(max_examples=examples, deadline=None, derandomize=FUZZ_SECONDS == 0, database=None,
               suppress_health_check=list(HealthCheck))  # fmt: skip
     @given(
         st.fixed_dictionaries(numbers), between(0.1, longest), st.sampled_from([1e-4, 1e-7, 1e-10]),
@@ -91,7 +90,7 @@ def check(name: str, examples: int) -> None:
 
 @pytest.mark.parametrize("name", STRUCTURES)
 def test_random_scenes_end_where_scipy_says(name: str) -> None:
-    end = time.monotonic() + SECONDS / len(STRUCTURES)
+    end = time.monotonic() + FUZZ_SECONDS / len(STRUCTURES)
     check(name, EXAMPLES)
     while time.monotonic() < end:
         check(name, 50)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 import sympy as sp
+from catalogue import FUZZ_SECONDS
 from effort import effort
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -26,9 +27,6 @@ from synchain.models.inputs import plugins
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cli import main
-
-SECONDS = float(os.environ.get("SYNCHAIN_FUZZ_SECONDS", "0"))
-"""How long to feed random scene files; 0 feeds a fixed number of them."""
 
 
 def law(folder: Path, body: str, name: str = "law.py") -> str:
@@ -270,7 +268,7 @@ def refusal(path: Path) -> str:
 def feed(folder: Path, examples: int) -> None:
     path = folder / "scene.toml"
 
-    @settings(max_examples=examples, deadline=None, derandomize=SECONDS == 0, database=None,
+    @settings(max_examples=examples, deadline=None, derandomize=FUZZ_SECONDS == 0, database=None,
               suppress_health_check=[HealthCheck.too_slow])  # fmt: skip
     @given(FILES)
     def check(content: bytes) -> None:
@@ -285,7 +283,7 @@ def feed(folder: Path, examples: int) -> None:
 
 
 def test_any_file_is_a_scene_or_one_line(tmp_path: Path) -> None:
-    end = time.monotonic() + SECONDS
+    end = time.monotonic() + FUZZ_SECONDS
     feed(tmp_path, 300)
     while time.monotonic() < end:
         feed(tmp_path, 1000)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from catalogue import PAIR
 
 from synchain import runtime
 from synchain.models import Field, Rates, Scene, chain
@@ -65,7 +66,6 @@ OTHER = {
 
 RTOL = {"exponents": 1e-6, "msf": 1e-6, "plane": 1e-6, "cluster_exponents": 1e-8, "lyapunov_spectrum": 1e-8}
 
-PAIR = Scene(oscillator="harmonic", topology=chain(2), transient=1, window=1)
 SHORT = Criterion(starts=1, transient=2, window=1)
 DRIVEN = Scene(oscillator="duffing", topology=chain(2), parameters={"omega": 1.3}, transient=20.0)
 

@@ -6,7 +6,6 @@ A model is the number that draws it: `check(1234)` repeats a finding.
 from __future__ import annotations
 
 import math
-import os
 import time
 import warnings
 from collections.abc import Callable, Sequence
@@ -15,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 import sympy as sp
+from catalogue import FUZZ_SECONDS
 from scipy.integrate import solve_ivp
 
 from synchain.models import Field, Lagrangian, Scene, chain
@@ -22,7 +22,6 @@ from synchain.models.mechanics.components import TIME
 from synchain.runtime import run
 from synchain.runtime.support.status import Status
 
-SECONDS = float(os.environ.get("SYNCHAIN_FUZZ_SECONDS", "0"))
 MODELS = 12
 """Models where no time is given."""
 
@@ -213,7 +212,7 @@ def check(seed: int, integrators: Sequence[str] = INTEGRATORS) -> list[str]:
 
 @pytest.mark.long
 def test_random_models_end_where_scipy_says() -> None:
-    end, seed = time.monotonic() + SECONDS, 0
+    end, seed = time.monotonic() + FUZZ_SECONDS, 0
     while seed < MODELS or time.monotonic() < end:
         assert not (wrong := check(seed)), "\n".join(wrong)
         seed += 1

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.sparse
+from catalogue import PAIR
 
 from synchain import models, runtime
 from synchain.models import chain, star
@@ -29,7 +30,6 @@ from synchain.runtime.synchronisation.agreement import agreement
 from synchain.runtime.synchronisation.criterion import Criterion
 
 ONE = Scene(oscillator="harmonic", transient=1, window=1)
-PAIR = Scene(oscillator="harmonic", topology=chain(2), transient=1, window=1)
 ENERGY = energy_function(PAIR)
 THREADS = ThreadPoolExecutor
 NAN = math.nan

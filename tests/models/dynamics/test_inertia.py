@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 import sympy as sp
+from catalogue import real
 from mechanics_proof import vanishes
 from parts import connectivity, node
 from samples import clocks
@@ -22,10 +23,6 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.sweeps.run import run
 
 T = mechanics.dynamicsymbols._t
-
-
-def real(name: str) -> sp.Symbol:
-    return sp.Symbol(name, real=True)
 
 
 def accelerations(equations: Equations) -> dict[str, sp.Expr]:

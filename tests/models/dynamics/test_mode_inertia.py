@@ -9,6 +9,7 @@ import pytest
 import scipy.linalg
 import sympy as sp
 from parts import edge
+from samples import real
 from variational_reference import ALPHA, transversal_equations
 
 from synchain.models import chain
@@ -24,10 +25,6 @@ from synchain.runtime.sweeps.certify import certify
 
 GRAPH = from_matrix([[-3, 1, 2], [1, -2, 1], [2, 1, -3]])
 """Its eigenvalues are 0, -3 and -5."""
-
-
-def real(*names: str) -> list[sp.Symbol]:
-    return [sp.Symbol(name, real=True) for name in names]
 
 
 def stiff_and_heavy() -> Equations:

@@ -7,30 +7,27 @@ from fractions import Fraction
 
 import pytest
 import sympy as sp
+from catalogue import FORCES, WEIGHTED
 from effort import effort
 from parts import connectivity, coupling_of, edge, is_lagrangian, law_of, node, oscillator_of, parameters
 from sympy.physics import mechanics
 
-from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
+from synchain.models.definitions.definition import FRICTION_LAW, OSCILLATOR
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.network import network
 from synchain.models.graphs.families import names as families
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology, from_matrix
-from synchain.models.inputs.plugins import load, names
+from synchain.models.inputs.plugins import names
 from synchain.models.interactions.coupling import Coupling
 from synchain.models.mechanics.components import TIME, Node
 from synchain.models.mechanics.contact import ContactModel
 from synchain.models.mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, static_coefficient
 from synchain.models.mechanics.oscillator import Oscillator
 
-FORCES = [c for c in names(COUPLING) if not load(COUPLING, c).kinetic]
-"""The couplings without inertia; tests/test_inertia.py has the others."""
-
 SPRING = coupling_of("spring")
 HARMONIC = oscillator_of("harmonic")
 Q_I, Q_J, V, V_I, V_J, WEIGHT, SIGMA = sp.symbols("q_i q_j v v_i v_j weight sigma", real=True)
-WEIGHTED = from_matrix([["-5/2", 2, "1/2"], [2, -2, 0], ["1/2", 0, "-1/2"]], "weighted")
 CUT = from_matrix([[-1, 1, 0], [1, -1, 0], [0, 0, 0]], "cut")
 ONE_WAY = from_matrix([[0, 0, 0], [3, -3, 0], [0, "1/2", "-1/2"]], "one-way")
 

@@ -8,38 +8,23 @@ from typing import Any
 
 import pytest
 import sympy as sp
+from catalogue import BODY, ROTOR, real
 
 from synchain.models import Potential, Rates, Scene, chain, complete, ends, ring, star
 from synchain.models.definitions.loader import load_oscillator
-from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.interactions.coupling import from_table
 from synchain.models.interactions.link import edge, strength
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.oscillator import Coordinate, FieldModel, LagrangianModel, Oscillator
 from synchain.models.mechanics.parameter import Parameter
 
 K, LAG, G = sp.symbols("K lag G")
-THETA, P, X, Y, U, V, M = sp.symbols("theta p x y u v m", real=True)
+V = real("v")
 
-PHASE = Oscillator("phase", FrozenDict({"p": Parameter(0.3, "1", "frequency")}), FieldModel(("theta",), (P,)))
-"""A phase that turns: a node of first order."""
-
-BODY = Oscillator(
-    "body",
-    FrozenDict({"m": Parameter(1.0, "1", "mass", positive=True)}),
-    LagrangianModel((Coordinate("x", "u"), Coordinate("y", "v")), M * (U**2 + V**2) / 2, sp.S.Zero, (sp.S.Zero,) * 2),
-)
-"""A free body in the plane, with a mass."""
-
-TARGET, SOURCE, W = ends(PHASE)
+TARGET, SOURCE, W = ends(ROTOR)
 KURAMOTO = Rates({TARGET.theta: K * W * sp.sin(SOURCE.theta - TARGET.theta - LAG)}, {K: 0, LAG: 0.1})
 
 A, B, _ = ends(BODY)
 GRAVITY = Potential(-G * W * A.m * B.m / sp.sqrt((A.x - B.x) ** 2 + (A.y - B.y) ** 2), {G: 1})
-
-
-def real(name: str) -> sp.Symbol:
-    return sp.Symbol(name, real=True)
 
 
 # -- values ---------------------------------------------------------------------------------------------------
@@ -249,7 +234,7 @@ def test_what_several_layers_have_not_is_said() -> None:
 
 
 def test_a_first_order_network() -> None:
-    equations = Scene(oscillator=PHASE, coupling=KURAMOTO, topology=chain(2), parameters={"p": [0.1, 0.2]}).equations
+    equations = Scene(oscillator=ROTOR, coupling=KURAMOTO, topology=chain(2), parameters={"p": [0.1, 0.2]}).equations
     p, k, lag = (real(name) for name in ("p_1", "K", "lag"))
     gap = real("theta_2") - real("theta_1")
     assert sp.simplify(equations.rhs()[0] - (p + k * sp.sin(gap - lag))) == 0
@@ -285,13 +270,13 @@ def test_a_potential_that_tells_its_ends_apart_has_a_direction() -> None:
 
 
 def test_the_strength_is_the_only_factor_of_the_whole_link() -> None:
-    node = Scene(oscillator=PHASE).equations.node
-    found = strength(edge(KURAMOTO, node, PHASE), node.parameters)
+    node = Scene(oscillator=ROTOR).equations.node
+    found = strength(edge(KURAMOTO, node, ROTOR), node.parameters)
     assert found == real("K")
     b = sp.Symbol("b")
     several = Rates({TARGET.theta: K * b * W * (SOURCE.theta - TARGET.theta)}, {K: 1, b: 1})
     with pytest.raises(ValueError, match="found the factors K, b; expected sigma, or exactly one parameter"):
-        strength(edge(several, node, PHASE), node.parameters)
+        strength(edge(several, node, ROTOR), node.parameters)
     none = Rates({TARGET.theta: W * sp.sin(K * (SOURCE.theta - TARGET.theta))}, {K: 1})
     with pytest.raises(ValueError, match="found K; expected sigma, or exactly one parameter"):
-        strength(edge(none, node, PHASE), node.parameters)
+        strength(edge(none, node, ROTOR), node.parameters)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import pytest
 import sympy as sp
+from catalogue import LAGRANGIAN
 from mechanics_proof import vanishes
-from parts import is_lagrangian, oscillator_of
+from parts import oscillator_of
 from sympy.physics import mechanics
 
-from synchain.models.definitions.definition import OSCILLATOR
-from synchain.models.inputs.plugins import names
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.lagrangian import Mechanics, total_derivative
 from synchain.models.mechanics.nondimensional import nondimensional, physical
@@ -22,9 +21,6 @@ def equations_of_motion(
     kinetic: sp.Expr, potential: sp.Expr, forces: list[sp.Expr], q: list[sp.Symbol], v: list[sp.Symbol]
 ) -> tuple[sp.Expr, ...]:
     return Mechanics(tuple(q), tuple(v), kinetic, potential, tuple(forces)).accelerations()
-
-
-LAGRANGIAN = [name for name in names(OSCILLATOR) if is_lagrangian(name)]
 
 
 def test_pendulum() -> None:

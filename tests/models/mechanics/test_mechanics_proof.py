@@ -7,24 +7,20 @@ from __future__ import annotations
 
 import pytest
 import sympy as sp
+from catalogue import FORCES, LAGRANGIAN, WEIGHTED
 from mechanics_proof import PARTICLES, T, by_kane, by_lagrange, residual, vanishes, whole
-from parts import edge, is_lagrangian, node, oscillator_of
+from parts import edge, node, oscillator_of
 from parts import law_of as friction_law
 
-from synchain.models.definitions.definition import COUPLING, OSCILLATOR
+from synchain.models.definitions.definition import OSCILLATOR
 from synchain.models.dynamics.network import network
 from synchain.models.graphs.families import topology
-from synchain.models.graphs.topology import Topology, from_matrix
-from synchain.models.inputs.plugins import load, names
+from synchain.models.graphs.topology import Topology
+from synchain.models.inputs.plugins import names
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional
 
-FORCES = [c for c in names(COUPLING) if not load(COUPLING, c).kinetic]
-"""The couplings without inertia; tests/test_inertia.py has the others."""
-
-LAGRANGIAN = [name for name in names(OSCILLATOR) if is_lagrangian(name)]
 PLAIN = [name for name in LAGRANGIAN if len(nondimensional(oscillator_of(name)).coordinates) == 1]
-WEIGHTED = from_matrix([["-5/2", 2, "1/2"], [2, -2, 0], ["1/2", 0, "-1/2"]], "weighted")
 METHODS = [by_lagrange, by_kane]
 
 

@@ -6,14 +6,13 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
+from catalogue import FORCES, LAGRANGIAN
 from mechanics_proof import vanishes
-from parts import is_lagrangian, oscillator_of
+from parts import oscillator_of
 
 from synchain.models import Parameter, Potential, Rates, chain, complete, ends, ring
-from synchain.models.definitions.definition import COUPLING, OSCILLATOR
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.frozen import FrozenDict
-from synchain.models.inputs.plugins import load, names
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.lagrangian import total_derivative
 from synchain.models.mechanics.oscillator import Coordinate, LagrangianModel, Oscillator
@@ -21,11 +20,6 @@ from synchain.models.scenes.energy import energy
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.results.energy_of_states import energy_function
-
-FORCES = [c for c in names(COUPLING) if not load(COUPLING, c).kinetic]
-"""The couplings without inertia: their accelerations are the right-hand side itself."""
-
-LAGRANGIAN = [name for name in names(OSCILLATOR) if is_lagrangian(name)]
 
 
 def scene_of(oscillator: str, coupling: str, n: int = 2, **more: object) -> Scene:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import sympy as sp
+from catalogue import paths
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -232,11 +233,6 @@ ANYTHING = st.recursive(
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(["x", "v", "p", "force"]), inner, max_size=3),
     max_leaves=5,
 )  # fmt: skip
-
-
-def paths(tree: object, at: tuple[object, ...] = ()) -> list[tuple[object, ...]]:
-    items = tree.items() if isinstance(tree, dict) else enumerate(tree) if isinstance(tree, list) else ()
-    return [at, *(path for key, value in items for path in paths(value, (*at, key)))]
 
 
 @settings(max_examples=150)

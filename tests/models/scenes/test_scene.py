@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import sympy as sp
 import xarray as xr
+from catalogue import paths
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -737,11 +738,6 @@ def outcome(tree: dict) -> tuple[Scene | None, str]:
 
 def is_one_clear_line(words: str) -> bool:
     return 10 < len(words) < 1000 and "\n" not in words
-
-
-def paths(tree: object, at: tuple[object, ...] = ()) -> list[tuple[object, ...]]:
-    items = tree.items() if isinstance(tree, dict) else enumerate(tree) if isinstance(tree, list) else ()
-    return [at, *(path for key, value in items for path in paths(value, (*at, key)))]
 
 
 @settings(max_examples=250)

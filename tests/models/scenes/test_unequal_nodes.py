@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 import sympy as sp
+from catalogue import real
 from scipy.integrate import solve_ivp
 from variational_reference import transversal_equations
 
@@ -28,10 +29,6 @@ from synchain.runtime.sweeps.run import run
 from synchain.runtime.synchronisation.probe import ring_of_three
 
 DUFFING = {"delta": [0.1, 0.2, 0.3], "omega": [1.0, 1.5, 2.0]}
-
-
-def real(name: str) -> sp.Symbol:
-    return sp.Symbol(name, real=True)
 
 
 def scene(**changes: object) -> Scene:

@@ -9,10 +9,11 @@ from math import lcm
 
 import pytest
 import sympy as sp
+from catalogue import CLOSED
 from family_sizes import size, sizes
 
 from synchain.models import chain, one_way_ring, ring, star
-from synchain.models.graphs.families import family, names, topology
+from synchain.models.graphs.families import family, topology
 from synchain.models.graphs.products import cartesian, complement, kronecker, union, weighted
 from synchain.models.graphs.topology import Topology
 from synchain.models.spectra.characteristic import characteristic
@@ -22,7 +23,6 @@ from synchain.models.spectra.solve import Proof, spectrum
 from synchain.models.spectra.spectrum import table
 from synchain.runtime.cli import main
 
-CLOSED = [name for name in names() if family(name).spectrum]
 COMPOSED = [
     cartesian(chain(4), ring(5)),
     kronecker(ring(5), ring(7)),

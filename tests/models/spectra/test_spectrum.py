@@ -16,6 +16,7 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
+from catalogue import floats, nameless_one_way_ring
 from effort import effort
 from family_sizes import size, sizes
 from hypothesis import given, settings
@@ -39,14 +40,6 @@ fresh: Callable[..., Spectrum] = spectrum.__wrapped__
 def anonymous(graph: Topology) -> Topology:
     """The same graph under a name that has no closed form."""
     return Topology("matrix", graph.n, graph.links)
-
-
-def one_way_ring(n: int) -> Topology:
-    return Topology("one-way ring", n, tuple((i, (i + 1) % n, ONE) for i in range(n)))
-
-
-def floats(graph: Topology) -> np.ndarray:
-    return np.array([[float(x) for x in row] for row in graph.rows])
 
 
 def expanded(found: Spectrum) -> np.ndarray:
@@ -257,7 +250,7 @@ def test_a_feed_forward_chain_counts_its_jordan_block() -> None:
 
 @pytest.mark.parametrize("n", [3, 5, 7, 8, 12, 30])
 def test_one_way_rings_have_the_textbook_spectrum(n: int) -> None:
-    found = one_way_ring(n).spectrum
+    found = nameless_one_way_ring(n).spectrum
     expected = np.exp(2j * np.pi * np.arange(n) / n) - 1
     assert found.verified
     assert np.sort_complex(np.round(expanded(found), 12)) == pytest.approx(
@@ -337,7 +330,7 @@ def integer_graph(n: int, share: float, seed: int) -> Topology:
     return Topology("random", n, tuple(links))
 
 
-@pytest.mark.parametrize("graph", [topology("chain", 13), integer_graph(12, 0.4, 1), one_way_ring(9)])
+@pytest.mark.parametrize("graph", [topology("chain", 13), integer_graph(12, 0.4, 1), nameless_one_way_ring(9)])
 def test_fifty_digits_agree_with_mpmath(graph: Topology) -> None:
     with mpmath.workdps(80):
         matrix = mpmath.matrix([[mpmath.mpf(x.numerator) / x.denominator for x in row] for row in graph.rows])
@@ -546,7 +539,7 @@ def test_as_dict_is_what_the_command_line_prints() -> None:
         "verified": True,
         "chance": None,
     }
-    spiral = one_way_ring(3).spectrum.as_dict()["eigenvalues"][1]
+    spiral = nameless_one_way_ring(3).spectrum.as_dict()["eigenvalues"][1]
     assert spiral["exact"] == "-3/2 - sqrt(3)*I/2"
     assert spiral["value"] == pytest.approx([-1.5, -(3**0.5) / 2])
 
@@ -643,8 +636,8 @@ def test_eigenvalues_are_compared_as_numbers() -> None:
     whole = integer_graph(12, 0.4, 1).spectrum
     assert all(b < a for a, b in pairwise(whole))
     with pytest.raises(TypeError, match=r"found a complex number; .* have no order"):
-        sorted(one_way_ring(3).spectrum)
-    assert complex(one_way_ring(3).spectrum[1]) == one_way_ring(3).spectrum[1].value
+        sorted(nameless_one_way_ring(3).spectrum)
+    assert complex(nameless_one_way_ring(3).spectrum[1]) == nameless_one_way_ring(3).spectrum[1].value
 
 
 def test_the_table() -> None:
@@ -666,7 +659,7 @@ def test_wrong_multiplicities_are_refused(count: int) -> None:
 
 
 def test_the_largest_of_equal_size_is_the_first() -> None:
-    assert one_way_ring(3).spectrum.largest == sp.Rational(-3, 2) - sp.sqrt(3) * sp.I / 2
+    assert nameless_one_way_ring(3).spectrum.largest == sp.Rational(-3, 2) - sp.sqrt(3) * sp.I / 2
     assert topology("chain", 1).spectrum.largest == 0
     mixed = from_matrix([[5, -5, 0], [-5, 5, 0], [0, 0, 0]])
     assert mixed.spectrum.largest == 10

@@ -9,16 +9,14 @@ from math import comb, prod
 import networkx as nx
 import numpy as np
 import pytest
+from catalogue import UNDIRECTED, UNEVEN
 from family_sizes import size
 
 from synchain.models import chain, complete, complete_bipartite, hypercube, kneser, one_way_ring, ring, star, wheel
-from synchain.models.graphs.families import family, names, topology
+from synchain.models.graphs.families import topology
 from synchain.models.graphs.products import union, weighted
 from synchain.models.graphs.readers import from_edges
 from synchain.models.graphs.topology import Topology
-
-UNDIRECTED = [name for name in names() if not family(name).directed]
-UNEVEN = from_edges([(0, 1, "1/2"), (1, 2, 3), (2, 3), (3, 0), (0, 2, "2/7")])
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 7, 20, 60])

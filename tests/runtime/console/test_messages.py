@@ -10,12 +10,11 @@ from argparse import ArgumentTypeError
 
 import numpy as np
 import pytest
+from catalogue import PAIR
 from test_load import SOURCE
 
 from synchain.codegen.machine_code import compile as loading
-from synchain.models import chain
 from synchain.models.presentation.writer import Latex
-from synchain.models.scenes.scene import Scene
 from synchain.runtime import cli
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.cli import main
@@ -28,7 +27,6 @@ from synchain.runtime.sweeps.certify import check_certifiable
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.sweeps.stream import claim
 
-PAIR = Scene(oscillator="harmonic", topology=chain(2), transient=1, window=1)
 LARGE = {"sigma": np.linspace(0, 1, 1000), "x_1": np.linspace(0, 1, 1000), "x_2": np.linspace(0, 1, 1000)}
 
 

@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from catalogue import nameless_one_way_ring
 
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
@@ -14,10 +15,6 @@ from synchain.runtime.prediction.synchronisability import windows, windows_compl
 
 ONE = Fraction(1)
 GRID = np.linspace(0.0, 3.0, 301)
-
-
-def one_way_ring(n: int) -> Topology:
-    return Topology("one-way ring", n, tuple((i, (i + 1) % n, ONE) for i in range(n)))
 
 
 def disc(alpha: np.ndarray) -> np.ndarray:
@@ -34,7 +31,7 @@ def test_a_disc_and_a_one_way_ring(n: int) -> None:
         root = b * b - a * (1 - 0.64)
         assert root > 0 or n == 5
         expected = intersect(expected, [((b - root**0.5) / a, (b + root**0.5) / a)] if root > 0 else [])
-    found = windows_complex(disc, one_way_ring(n), GRID, 1e-6).windows
+    found = windows_complex(disc, nameless_one_way_ring(n), GRID, 1e-6).windows
     assert [(w.low, w.high) for w in found] == [pytest.approx(pair, abs=1e-6) for pair in expected]
     assert len(found) == (n < 5)
     for w in found:
@@ -51,13 +48,13 @@ def test_the_modes_lost_first_are_named_and_only_upper_alpha_is_asked_for() -> N
         seen.append(alpha)
         return alpha.real <= 1.5
 
-    (found,) = windows_complex(wide, one_way_ring(4), GRID, 1e-7).windows
+    (found,) = windows_complex(wide, nameless_one_way_ring(4), GRID, 1e-7).windows
     assert (found.low, found.low_error, found.low_mode) == (0.0, 0.0, None)
     assert found.high == pytest.approx(0.75, abs=1e-7)
     assert found.high_mode is not None
     assert found.high_mode.eigenvalue.number == -2
     assert all(np.all(alpha.imag >= 0) for alpha in seen)
-    (narrow,) = windows_complex(lambda alpha: alpha.imag <= 0.5, one_way_ring(4), GRID, 1e-7).windows
+    (narrow,) = windows_complex(lambda alpha: alpha.imag <= 0.5, nameless_one_way_ring(4), GRID, 1e-7).windows
     assert narrow.high == pytest.approx(0.5, abs=1e-7)
     assert narrow.high_mode is not None
     assert narrow.high_mode.eigenvalue.value == pytest.approx(-1 - 1j)
@@ -68,7 +65,7 @@ def test_a_feed_forward_chain_keeps_the_condition_on_its_eigenvalue_and_is_calle
     found = windows_complex(lambda alpha: (alpha.real >= 0.3) & (alpha.real <= 1.7), chain, GRID, 1e-7)
     assert [(w.low, w.high) for w in found.windows] == [pytest.approx((0.3, 1.7), abs=1e-7)]
     assert [(m.eigenvalue.number, m.multiplicity) for m in found.defective] == [(-1, 4)]
-    assert windows_complex(disc, one_way_ring(4), GRID, 1e-3).defective == ()
+    assert windows_complex(disc, nameless_one_way_ring(4), GRID, 1e-3).defective == ()
 
 
 @pytest.mark.parametrize("graph", [topology("chain", 5), topology("star", 4), topology("grid", 6)])
@@ -92,7 +89,7 @@ def test_parts_that_nothing_couples_ask_for_stability_at_zero() -> None:
 
 
 def test_wrong_requests_are_refused() -> None:
-    ring = one_way_ring(3)
+    ring = nameless_one_way_ring(3)
     with pytest.raises(ValueError, match="stable: found shape"):
         windows_complex(lambda alpha: np.array(True), ring, GRID, 1e-3)
     with pytest.raises(ValueError, match="the grid must be one increasing row"):

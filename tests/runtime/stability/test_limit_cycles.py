@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from catalogue import VAN_DER_POL
 from scipy.integrate import solve_ivp
 
 from synchain.models import Field, Scene, chain
 from synchain.runtime import exponents, follow, msf, open_result, periodic_orbit
 from synchain.runtime.stability.orbits import OrbitProblem
-
-VAN_DER_POL = Field({"x": "v", "v": "mu*(1 - x**2)*v - x"}, parameters={"mu": 1.0})
 
 
 def pair(mu: float, **settings: object) -> Scene:

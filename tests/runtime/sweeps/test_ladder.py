@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from catalogue import VAN_DER_POL
 from scipy.integrate import solve_ivp
 
 from synchain.models import Field, Scene, chain
@@ -18,9 +19,9 @@ ROBER = Scene(
     Field({"x": "-x/25 + 10000*y*z", "y": "x/25 - 10000*y*z - 30000000*y**2", "z": "30000000*y**2"}), None, None,
     initial={"x": 1.0, "y": 0.0, "z": 0.0}, window=1e9, **SHORT,
 )  # fmt: skip
-VAN_DER_POL = Scene(
-    Field({"x": "v", "v": "mu*(1 - x**2)*v - x"}, parameters={"mu": 1.0}), None, None, initial={"x": 2.0, "v": 0.1},
-    transient=5.0, window=15.0, time_unit="time", observe={"mean": "mean(x)"}, record=("trajectory",), samples=7,
+RELAXING = Scene(
+    VAN_DER_POL, None, None, initial={"x": 2.0, "v": 0.1}, transient=5.0, window=15.0, time_unit="time",
+    observe={"mean": "mean(x)"}, record=("trajectory",), samples=7,
 )  # fmt: skip
 
 
@@ -42,7 +43,7 @@ def test_kinetics_over_nine_decades_come_to_their_end() -> None:
 
 def test_stiffness_that_comes_with_time_is_handed_on() -> None:
     """Van der Pol's oscillator grows from rest before it is stiff."""
-    scene = VAN_DER_POL.replace(parameters={"mu": 300.0}, initial={"x": 0.1, "v": 0.0}, window=600.0)
+    scene = RELAXING.replace(parameters={"mu": 300.0}, initial={"x": 0.1, "v": 0.0}, window=600.0)
     found, alone = run(scene, **QUIET), run(scene.replace(integrator="rodas5p"), **QUIET)
     taken = steps_of(found)
     assert list(taken) == ["taylor", "rodas5p"]
@@ -83,7 +84,7 @@ def test_a_series_without_a_next_term_is_handed_on(rates: dict[str, str], start:
 
 def test_records_go_on_over_a_hand_over() -> None:
     """Means and samples of a cell that changes its method within the window are those of a single method."""
-    scene = VAN_DER_POL.replace(
+    scene = RELAXING.replace(
         transient=0.0, parameters={"mu": 40.0}, rtol=1e-9, atol=1e-10, window=200.0, initial={"x": 0.1, "v": 0.0}
     )
     found, alone = run(scene, **QUIET), run(scene.replace(integrator="rodas5p"), **QUIET)
@@ -96,16 +97,16 @@ def test_records_go_on_over_a_hand_over() -> None:
 @pytest.mark.parametrize("order", [[0, 1, 2, 3], [3, 1, 0, 2]])
 def test_a_cell_of_a_sweep_is_its_own_run_to_the_last_bit(order: list[int]) -> None:
     values = np.array([0.1, 1.0, 20.0, 300.0])[order]
-    found = run(VAN_DER_POL, mu=values, width=4, **QUIET)
+    found = run(RELAXING, mu=values, width=4, **QUIET)
     assert len(np.unique(found.methods)) > 1
     for k, mu in enumerate(values):
-        alone = run(VAN_DER_POL, mu=float(mu), **QUIET)
+        alone = run(RELAXING, mu=float(mu), **QUIET)
         for name in ("end", "mean", "trajectory", "steps", "method_steps"):
             np.testing.assert_array_equal(found.data[name].isel(mu=k), alone.data[name], err_msg=f"{name}, mu = {mu}")
 
 
 def test_integrators_of_a_sweep_are_counted_by_cells() -> None:
-    found = run(VAN_DER_POL.replace(observe={}, record=()), mu=[1.0, 3.0, 1e3, 2e3], **QUIET)
+    found = run(RELAXING.replace(observe={}, record=()), mu=[1.0, 3.0, 1e3, 2e3], **QUIET)
     parts = [part.split(" in ") for part in found.integrators.split("; ")]
     assert sorted(cells for _, cells in parts) == ["2 cells", "2 cells"]
     assert dict(found.summary)["integrators"] == found.integrators

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
+from catalogue import LAGGING, PHASE
 from scipy.integrate import solve_ivp
 
 from synchain import erdos_renyi, one_way_ring
@@ -38,12 +39,9 @@ from synchain.runtime.sweeps.stream import stream
 
 LONG = pytest.mark.long
 DICE = np.random.default_rng(5)
-THETA, OMEGA, K, LAG, REST, C = sp.symbols("theta omega K lag rest c")
-PHASE = Field({THETA: OMEGA}, parameters={OMEGA: 0})
+K, REST, C = sp.symbols("K rest c")
 EXACT: dict[str, Any] = {"transient": 0, "window": 10, "time_unit": "time", "rtol": 1e-11, "record": []}
 
-i, j, W = ends(PHASE)
-LAGGING = Rates({i.theta: K * W * sp.sin(j.theta - i.theta - LAG)}, {K: 1, LAG: 0})
 i, j, W = ends(load_oscillator("harmonic"))
 RESTING = Potential(K * W * ((i.x - j.x) ** 2 / 2 + REST * sp.cos(i.x - j.x)), {K: 0.1, REST: 0})
 DAMPED = Rates({i.v: C * W * (j.v - i.v)}, {C: 0.1})

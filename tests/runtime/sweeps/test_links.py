@@ -8,16 +8,17 @@ from functools import cache
 import numpy as np
 import pytest
 import sympy as sp
+from catalogue import BODY, ROTOR
 from scipy.integrate import solve_ivp
 
 from synchain.models import Field, Potential, Rates, Scene, Topology, complete, ends, ring, star
 from synchain.models.inputs.frozen import FrozenDict
-from synchain.models.mechanics.oscillator import Coordinate, FieldModel, LagrangianModel, Oscillator
+from synchain.models.mechanics.oscillator import FieldModel, Oscillator
 from synchain.models.mechanics.parameter import Parameter
 from synchain.runtime import run
 
 K, LAG, OMEGA, G, VS, LAM, TH, GE = sp.symbols("K lag Omega g V_s lam Theta g_el")
-THETA, P, X, Y, Z, U, V, M = sp.symbols("theta p x y z u v m", real=True)
+P, X, Y, Z = sp.symbols("p x y z", real=True)
 
 Rhs = Callable[[float, np.ndarray], np.ndarray]
 
@@ -25,8 +26,6 @@ Rhs = Callable[[float, np.ndarray], np.ndarray]
 def number(default: float) -> Parameter:
     return Parameter(default, "1", "a number")
 
-
-PHASE = Oscillator("phase", FrozenDict({"p": number(0.3)}), FieldModel(("theta",), (P,)))
 
 NEURON = Oscillator(
     "hindmarsh_rose",
@@ -41,12 +40,6 @@ NEURON = Oscillator(
     ),
 )
 
-BODY = Oscillator(
-    "body",
-    FrozenDict({"m": Parameter(1.0, "1", "mass", positive=True)}),
-    LagrangianModel((Coordinate("x", "u"), Coordinate("y", "v")), M * (U**2 + V**2) / 2, sp.S.Zero, (sp.S.Zero,) * 2),
-)
-
 
 def weights(graph: Topology) -> np.ndarray:
     found = np.zeros((graph.n, graph.n))
@@ -57,7 +50,7 @@ def weights(graph: Topology) -> np.ndarray:
 
 def kuramoto(n: int) -> tuple[Scene, Rhs]:
     """Phases with a lag, whose coupling is pumped: rates of first order, not reciprocal, of time."""
-    i, j, w = ends(PHASE)
+    i, j, w = ends(ROTOR)
     pumped = (1 + 0.5 * sp.cos(OMEGA * sp.Symbol("t"))) * K * w * sp.sin(j.theta - i.theta - LAG)
     coupling = Rates({i.theta: pumped}, {K: 1.3, LAG: 0.2, OMEGA: 2})
     own, felt = np.linspace(-0.5, 0.5, n), weights(ring(n))
@@ -65,7 +58,7 @@ def kuramoto(n: int) -> tuple[Scene, Rhs]:
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
         return own + 1.3 * (1 + 0.5 * np.cos(2 * t)) * (felt * np.sin(y[None] - y[:, None] - 0.2)).sum(1)
 
-    return Scene(oscillator=PHASE, coupling=coupling, topology=ring(n), parameters={"p": list(own)}), rhs
+    return Scene(oscillator=ROTOR, coupling=coupling, topology=ring(n), parameters={"p": list(own)}), rhs
 
 
 def neurons(n: int) -> tuple[Scene, Rhs]:
@@ -144,7 +137,7 @@ def test_links_against_dop853(make: Callable[[int], tuple[Scene, Rhs]], n: int, 
 def test_time_in_links_costs_a_rosenbrock_method_no_steps(n: int) -> None:
     """With the exact derivative by time its steps are those of the same motion with time as a state."""
     scene, _ = case(kuramoto, n)
-    clock = Oscillator("clocked", PHASE.parameters, FieldModel(("theta", "s"), (P, sp.S.One)))
+    clock = Oscillator("clocked", ROTOR.parameters, FieldModel(("theta", "s"), (P, sp.S.One)))
     i, j, w = ends(clock)
     pumped = (1 + 0.5 * sp.cos(OMEGA * i.s)) * K * w * sp.sin(j.theta - i.theta - LAG)
     given = {"oscillator": clock, "coupling": Rates({i.theta: pumped}, {K: 1.3, LAG: 0.2, OMEGA: 2})}
@@ -156,13 +149,13 @@ def test_time_in_links_costs_a_rosenbrock_method_no_steps(n: int) -> None:
 
 def test_functions_of_the_weight_alone_run_in_loops() -> None:
     """Weights of a loop are numbers, what functions take are registers; a power of it and a sine, on unequal weights."""
-    i, j, weight = ends(PHASE)
+    i, j, weight = ends(ROTOR)
     link = Rates({i.theta: K * (sp.sin(weight) + weight**LAG) * sp.sin(j.theta - i.theta)}, {K: 0.3, LAG: 0.5})
     n = 10
     weights = np.diag(np.arange(1.0, n), 1) / n + np.diag(np.arange(1.0, n), -1) / 7
     start = np.linspace(0.0, 3.0, n)
     scene = Scene(
-        PHASE, link, weights - np.diag(weights.sum(axis=1)), record=(),
+        ROTOR, link, weights - np.diag(weights.sum(axis=1)), record=(),
         transient=0.0, window=2.0, time_unit="time", rtol=1e-10, initial={"theta": start},
     )  # fmt: skip
 
@@ -177,13 +170,13 @@ def test_functions_of_the_weight_alone_run_in_loops() -> None:
 @pytest.mark.parametrize("n", [3, 10])
 def test_choices_by_the_weight_run(n: int) -> None:
     """Links of weight 2 act on one phase's sine, those of weight 1 on its cosine; written out and in loops."""
-    i, j, weight = ends(PHASE)
+    i, j, weight = ends(ROTOR)
     gap = j.theta - i.theta
     link = Rates({i.theta: K * sp.Piecewise((sp.sin(gap), weight > 1), (sp.cos(gap) - 1, True))}, {K: 0.3})
     weights = np.diag(1.0 + np.arange(n - 1) % 2, 1) + np.diag(1.0 + np.arange(1, n) % 2, -1)
     start = np.linspace(0.0, 2.0, n)
     scene = Scene(
-        PHASE, link, weights - np.diag(weights.sum(axis=1)), record=(), transient=0.0, window=2.0, time_unit="time",
+        ROTOR, link, weights - np.diag(weights.sum(axis=1)), record=(), transient=0.0, window=2.0, time_unit="time",
         rtol=1e-10, integrator="taylor", initial={"theta": start},
     )  # fmt: skip
 

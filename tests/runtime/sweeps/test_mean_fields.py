@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sympy as sp
+from catalogue import LAGGING, PHASE
 from scipy.integrate import solve_ivp
 
 import synchain as sc
@@ -15,10 +16,8 @@ from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.engines.choice import Ladder
 from synchain.runtime.engines.scene_kernels import chosen_integrator, kernel_source, ladder_of
 
-THETA, OMEGA, K, LAG = sp.symbols("theta omega K lag")
-PHASE = sc.Field({THETA: OMEGA}, parameters={OMEGA: 0})
+THETA, K = sp.symbols("theta K")
 HERE, THERE, W = sc.ends(PHASE)
-SINE = sc.Rates({HERE.theta: K * W * sp.sin(THERE.theta - HERE.theta - LAG)}, {K: 1, LAG: 0})
 ORDER = sc.end(abs(sc.nodes.mean(sp.exp(sp.I * THETA))))
 LARGE = 2001
 """Nodes whose links are more than can be listed."""
@@ -28,7 +27,7 @@ def mean_field(n: int) -> sc.Topology:
     return sc.weighted(sc.complete(n), f"1/{n}")
 
 
-def scene(n: int, coupling: object = SINE, **changes: object) -> sc.Scene:
+def scene(n: int, coupling: object = LAGGING, **changes: object) -> sc.Scene:
     rng = np.random.default_rng(1)
     given = {
         "parameters": {"omega": rng.normal(size=n), "K": 1.5},
@@ -129,10 +128,10 @@ def test_layers_beside_a_mean_field_keep_their_links() -> None:
     ring = sc.Rates({HERE.theta: sp.Symbol("c") * W * sp.sin(THERE.theta - HERE.theta) ** 3}, {"c": 0.4})
     given = {"parameters": {"K": 1.5, "omega": np.linspace(-1, 1, n)}, "initial": {"theta": np.linspace(0, 5, n)}}
     more = {"transient": 0, "window": 1, "time_unit": "time", "integrator": "taylor", "rtol": 1e-11, "record": ()}
-    both = sc.Scene(PHASE, links=[(SINE, mean_field(n)), (ring, sc.ring(n))], **given, **more)
+    both = sc.Scene(PHASE, links=[(LAGGING, mean_field(n)), (ring, sc.ring(n))], **given, **more)
     assert (len(both.equations.fields), len(both.equations.listed)) == (1, 1)
     listed = sc.Topology("listed", n, tuple(AllPairs(n, mean_field(n).all_to_all)))
-    same = sc.Scene(PHASE, links=[(SINE, listed), (ring, sc.ring(n))], **given, **more)
+    same = sc.Scene(PHASE, links=[(LAGGING, listed), (ring, sc.ring(n))], **given, **more)
     assert same.equations.fields == ()
     assert both.topology.link_count == n * (n - 1)
     np.testing.assert_allclose(sc.run(both).states("end"), sc.run(same).states("end"), atol=1e-10)
