@@ -34,15 +34,15 @@ def made(graph: Topology, oscillator: str = "friction", friction: str | None = "
 
 def states(equations: Equations, seed: int, near: float | None = None) -> Values:
     """Time and states at random, parameters of TABLE; with `near`, sliding velocities 0.2 … 0.9 times near/kappa."""
-    numbers = random.Random(seed)
+    dice = random.Random(seed)
     values = {sp.Symbol(name, real=True): mpmath.mpf(TABLE[name]) for name in equations.parameters}
     for name in equations.state:
-        value = mpmath.mpf(numbers.uniform(-0.5, 0.5))
+        value = mpmath.mpf(dice.uniform(-0.5, 0.5))
         if near is not None and name.startswith("v"):
-            sliding = near * mpmath.mpf(numbers.uniform(0.2, 0.9)) / mpmath.mpf(TABLE["kappa"])
+            sliding = near * mpmath.mpf(dice.uniform(0.2, 0.9)) / mpmath.mpf(TABLE["kappa"])
             value = mpmath.mpf(TABLE["theta_b"]) - sliding
         values[sp.Symbol(name, real=True)] = value
-    return {**values, TIME: mpmath.mpf(numbers.uniform(0, 9))}
+    return {**values, TIME: mpmath.mpf(dice.uniform(0, 9))}
 
 
 def evaluate(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, mpmath.mpf]) -> list[mpmath.mpf]:

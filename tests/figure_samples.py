@@ -93,11 +93,11 @@ class Simulation:
     def simulate(self, scene: Scene, sigma: np.ndarray, **options: Any) -> Sweep:
         omega = scene.parameters["omega"]
         self.networks.append((scene.n, omega, len(sigma)))
-        found = project([RANGE[omega]], scene.spectrum, float(sigma[-1]))
-        good = np.array([any(a <= s <= b for a, b in found) for s in sigma])
+        windows = project([RANGE[omega]], scene.spectrum, float(sigma[-1]))
+        good = np.array([any(a <= s <= b for a, b in windows) for s in sigma])
         error = np.where(good, 0.0, 0.3)
         error[list(self.failed)] = np.inf
-        return Sweep(sigma, error, good.astype(float), tuple(found))
+        return Sweep(sigma, error, good.astype(float), tuple(windows))
 
     def exponents(self, scene: Scene, alpha: np.ndarray, omega: float | None = None, **options: Any) -> Exponents:
         omega = scene.parameters["omega"] if omega is None else omega

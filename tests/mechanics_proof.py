@@ -34,8 +34,8 @@ def vanishes(e: sp.Expr) -> bool:
     if not symbols:
         return bool(e == 0)
     top = sp.QQ.frac_field(*symbols).from_sympy(e).numer
-    known = dict(zip(symbols, top.ring.gens, strict=True))
-    squares = [known[s] ** 2 + known[c] ** 2 - 1 for s, c in letters.values() if s in known and c in known]
+    values = dict(zip(symbols, top.ring.gens, strict=True))
+    squares = [values[s] ** 2 + values[c] ** 2 - 1 for s, c in letters.values() if s in values and c in values]
     return not top.rem(squares)  # their leading terms are coprime, so that only multiples of them leave nothing
 
 
@@ -76,12 +76,12 @@ def whole(oscillator: str, coupling: str | None, graph: Topology, chosen: tuple[
         if i > j or coupling is None:
             continue
         law = coupling_of(coupling)
-        given = {WEIGHT: sp.Rational(str(weight))}
+        settings = {WEIGHT: sp.Rational(str(weight))}
         for k in range(len(names)):
             if chosen is not None and names[k] not in chosen:
                 continue
-            potential += law.potential.xreplace({Q_I: q[i][k], Q_J: q[j][k], **given})
-            lost = law.dissipation.xreplace({V_I: rates[i][k], V_J: rates[j][k], **given})
+            potential += law.potential.xreplace({Q_I: q[i][k], Q_J: q[j][k], **settings})
+            lost = law.dissipation.xreplace({V_I: rates[i][k], V_J: rates[j][k], **settings})
             forces = [force - lost.diff(r) for force, r in zip(forces, flat, strict=True)]
     masses = tuple(entry for values in at for entry in particles(oscillator, values))
     return Whole(tuple(x for row in q for x in row), tuple(flat), kinetic, potential, tuple(forces), masses)

@@ -377,9 +377,9 @@ class Interpreted:
 
     def section(self, theta: Any, t: Any, h: Any, p: list, step: Step) -> Any:
         """The section function at the fraction theta of a step."""
-        y, found = [*step.y, *p], [None, None]  # its value, and the size of its terms
-        self.names["section"](theta, t, h, y, step.y_new, step.dense, found, self.source.dimensions)
-        return found[0]
+        y, outputs = [*step.y, *p], [None, None]  # its value, and the size of its terms
+        self.names["section"](theta, t, h, y, step.y_new, step.dense, outputs, self.source.dimensions)
+        return outputs[0]
 
 
 def take_step(kernel: Interpreted, t: Any, h: Any, y: list, p: list, rtol: Any = 0, atol: Any = 1, *graph: Any) -> Step:

@@ -25,9 +25,9 @@ BODY = PAPER.split("---\n", 2)[2]
 
 def entries() -> dict[str, str]:
     """Key -> text of every entry of the bibliography."""
-    found = re.findall(r"^@\w+\{(\w+),\n(.*?)^\}", BIBLIOGRAPHY, re.MULTILINE | re.DOTALL)
-    assert len({key for key, _ in found}) == len(found) == BIBLIOGRAPHY.count("@")
-    return dict(found)
+    matches = re.findall(r"^@\w+\{(\w+),\n(.*?)^\}", BIBLIOGRAPHY, re.MULTILINE | re.DOTALL)
+    assert len({key for key, _ in matches}) == len(matches) == BIBLIOGRAPHY.count("@")
+    return dict(matches)
 
 
 def test_the_paper_cites_its_bibliography_and_nothing_else() -> None:

@@ -59,9 +59,9 @@ def sdist(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An sdist of the repository's files, unpacked."""
     folder = tmp_path_factory.mktemp("sdist")
     for name in tracked():
-        place = folder / "source" / name
-        place.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy2(ROOT / name, place)
+        path = folder / "source" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(ROOT / name, path)
     with tarfile.open(build("sdist", folder / "source", folder / "dist")) as archive:
         archive.extractall(folder / "unpacked", filter="data")
     return next((folder / "unpacked").iterdir())
@@ -78,14 +78,14 @@ def names_in(archive: zipfile.Path) -> set[str]:
 
 
 def test_the_sdist_holds_the_repository_and_nothing_else(sdist: Path) -> None:
-    found = {path.relative_to(sdist).as_posix() for path in sdist.rglob("*") if path.is_file()}
-    own = {name for name in found if name not in MADE and ".egg-info/" not in name}
+    names_found = {path.relative_to(sdist).as_posix() for path in sdist.rglob("*") if path.is_file()}
+    own = {name for name in names_found if name not in MADE and ".egg-info/" not in name}
     assert own == tracked()
 
 
 def test_the_wheel_holds_the_packages_and_nothing_else(wheel: zipfile.Path) -> None:
-    found = {name for name in names_in(wheel) if ".dist-info/" not in name}
-    assert found == {place for name in tracked() if (place := packaged(name)) is not None}
+    names_found = {name for name in names_in(wheel) if ".dist-info/" not in name}
+    assert names_found == {place for name in tracked() if (place := packaged(name)) is not None}
 
 
 @pytest.mark.parametrize(

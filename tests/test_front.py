@@ -176,12 +176,20 @@ def test_a_type_checker_sees_what_an_editor_completes(tmp_path: Path) -> None:
         (known / room).symlink_to(ROOT / room)
     for part in ("__init__.py", "__init__.pyi"):
         (known / part).symlink_to(ROOT / "runtime" / "front" / part)
-    words = [sys.executable, "-m", "mypy", "--follow-imports=silent", "--cache-dir", str(tmp_path / "mypy"), str(file)]
+    command = [
+        sys.executable,
+        "-m",
+        "mypy",
+        "--follow-imports=silent",
+        "--cache-dir",
+        str(tmp_path / "mypy"),
+        str(file),
+    ]
     paths = {**os.environ, "MYPYPATH": str(tmp_path / "known")}
-    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, env=paths, timeout=600)
-    found = {int(line.split(":")[1]) for line in done.stdout.splitlines() if ": error:" in line}
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=paths, timeout=600)
+    names_found = {int(line.split(":")[1]) for line in done.stdout.splitlines() if ": error:" in line}
     wrong = {k for k, line in enumerate(EDITED.splitlines(), 1) if line.endswith("# wrong")}
-    assert found == wrong, done.stdout
+    assert names_found == wrong, done.stdout
     assert 'Revealed type is "synchain.models.graphs.topology.Topology"' in done.stdout
 
 
@@ -219,9 +227,9 @@ from synchain import *; print(*[n for n in {CONTRACT!r} if n not in globals()]);
 
 @pytest.mark.parametrize("name", ["definitions.inline", "mechanics.oscillator"])
 def test_examples_of_docstrings_run(name: str) -> None:
-    found = doctest.testmod(importlib.import_module(f"synchain.models.{name}"))
-    assert found.attempted > 3
-    assert found.failed == 0
+    tested = doctest.testmod(importlib.import_module(f"synchain.models.{name}"))
+    assert tested.attempted > 3
+    assert tested.failed == 0
 
 
 @pytest.mark.parametrize(
@@ -235,9 +243,9 @@ def test_examples_of_docstrings_run(name: str) -> None:
     ],
 )
 def test_examples_of_scenes_and_runs(name: str) -> None:
-    found = doctest.testmod(importlib.import_module(f"synchain.{name}"))
-    assert found.attempted > 1
-    assert found.failed == 0
+    tested = doctest.testmod(importlib.import_module(f"synchain.{name}"))
+    assert tested.attempted > 1
+    assert tested.failed == 0
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/inline.md"])
@@ -245,13 +253,13 @@ def test_the_models_of_the_docs_can_be_made(page: str) -> None:
     """All but what runs them, which other tests do."""
     blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / page).read_text("utf-8"), re.MULTILINE | re.DOTALL)
     inline = [block for block in blocks if "sc." in block]
-    known: dict[str, object] = {}
+    namespace: dict[str, object] = {}
     for block in inline:
         lines = [
             line for line in block.splitlines() if "sc.run(" not in line and not line.startswith(("result", "plt"))
         ]
-        exec("\n".join(lines), known)
-    assert isinstance(known["scene"], synchain.Scene)
+        exec("\n".join(lines), namespace)
+    assert isinstance(namespace["scene"], synchain.Scene)
     assert len(inline) == (2 if page == "README.md" else 3)
 
 
@@ -271,9 +279,9 @@ def test_wheel_and_source_archive_hold_the_front(tmp_path: Path) -> None:
     assert front <= names
     assert not [name for name in names if "front/" in name]
     code = "import synchain; print(synchain.__file__); print(synchain.star(6).spectrum)"
-    place = tmp_path / "site"
-    zipfile.ZipFile(wheel).extractall(place)
-    run = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(place)!r}); {code}"]
+    path = tmp_path / "site"
+    zipfile.ZipFile(wheel).extractall(path)
+    run = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(path)!r}); {code}"]
     done = subprocess.run(run, capture_output=True, text=True, check=True, timeout=60, cwd=tmp_path)
-    assert str(place) in done.stdout
+    assert str(path) in done.stdout
     assert "{0: 1, -1: 4, -6: 1}" in done.stdout

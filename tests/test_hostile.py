@@ -89,8 +89,8 @@ PULL = """
 
 def test_a_coupling_that_does_not_vanish_between_equals_is_said(tmp_path: Path) -> None:
     pull = law(tmp_path, PULL, "pull.py")
-    found = Scene(topology=topology("chain", 4), coupling=pull).warnings
-    assert any("does not vanish between oscillators in equal states" in words for words in found)
+    messages = Scene(topology=topology("chain", 4), coupling=pull).warnings
+    assert any("does not vanish between oscillators in equal states" in words for words in messages)
     assert not any("does not vanish" in words for words in Scene(topology=topology("ring", 4), coupling=pull).warnings)
     assert not edge(pull, Scene().equations.node, "friction").diffusive
     assert Scene(topology=topology("ring", 4)).warnings == ()
@@ -170,20 +170,20 @@ def test_dots_in_strings_comments_and_numbers_are_no_keys(tmp_path: Path) -> Non
 def test_long_axes_of_the_command_line_are_counted_before_they_are_built(tmp_path: Path, capsys) -> None:
     path = tmp_path / "scene.toml"
     path.write_text("record = []\n")
-    words = ["run", str(path), "--out", str(tmp_path / "out"), "--set", "omega=1:2:10000000", "x_1=0:1:10000000"]
+    command = ["run", str(path), "--out", str(tmp_path / "out"), "--set", "omega=1:2:10000000", "x_1=0:1:10000000"]
     codes: list[int] = []
-    _, calls = effort(lambda: codes.append(main(words)))
+    _, calls = effort(lambda: codes.append(main(command)))
     assert codes == [2]
     assert "found 100000000000000 cells; expected at most 1000000000" in capsys.readouterr().err
     assert calls < 1_000_000
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("options", "message"),
     [("--edges", "expected at most 4000 links"), ("--matrix", "more than 2000 rows or columns; expected at most 2000")],
 )  # fmt: skip
 def test_large_files_of_graphs_are_refused_by_their_size(
-    options: str, words: str, tmp_path: Path, monkeypatch, capsys
+    options: str, message: str, tmp_path: Path, monkeypatch, capsys
 ) -> None:
     assert readers.LINK_LIMIT == 4_000_000
     monkeypatch.setattr(readers, "LINK_LIMIT", 4000)
@@ -191,7 +191,7 @@ def test_large_files_of_graphs_are_refused_by_their_size(
     path.write_text("1 2\n" * 2001 if options == "--edges" else ("0 " * 2001 + "\n") * 2001)
     assert main(["spectrum", options, str(path)]) == 2
     error = capsys.readouterr().err
-    assert words in error
+    assert message in error
     assert error.count("\n") == 1
 
 
@@ -294,16 +294,16 @@ def test_any_file_is_a_scene_or_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["C", pytest.param("tr_TR.UTF-8", marks=pytest.mark.long)])
 def test_locale_time_zone_and_odd_paths_change_nothing(name: str, tmp_path: Path) -> None:
-    place = tmp_path / "a place with ünïcode"
-    place.mkdir()
-    scene = place / "my scène.toml"
+    path = tmp_path / "a place with ünïcode"
+    path.mkdir()
+    scene = path / "my scène.toml"
     scene.write_text("title = 'ω'\nwindow = 0.5\ntransient = 0\nrecord = []\n", encoding="utf-8")
-    assert main(["run", str(scene), "--out", str(place / "here")]) == 0
+    assert main(["run", str(scene), "--out", str(path / "here")]) == 0
     environment = {**os.environ, "LC_ALL": name, "LANG": name, "TZ": "Asia/Kathmandu", "PYTHONUTF8": "0"}
-    words = [sys.executable, "-m", "synchain.runtime", "run", str(scene), "--out", str(place / "there")]
-    done = subprocess.run(words, env=environment, capture_output=True, timeout=240, check=False)
+    command = [sys.executable, "-m", "synchain.runtime", "run", str(scene), "--out", str(path / "there")]
+    done = subprocess.run(command, env=environment, capture_output=True, timeout=240, check=False)
     assert done.returncode == 0, done.stderr
-    (here,), (there,) = ((place / folder).glob("*.nc") for folder in ("here", "there"))
+    (here,), (there,) = ((path / folder).glob("*.nc") for folder in ("here", "there"))
     assert here.read_bytes() == there.read_bytes()
 
 

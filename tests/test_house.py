@@ -101,15 +101,15 @@ def imported(path: Path, text: str) -> tuple[tuple[int, str], ...]:
     checks too.
     """
     package = ("synchain", *path.relative_to(PROJECT).parts[:-1])
-    found: list[tuple[int, str]] = []
+    collected: list[tuple[int, str]] = []
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
-            found += ((node.lineno, alias.name) for alias in node.names)
+            collected += ((node.lineno, alias.name) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             base = list(package[: len(package) - node.level + 1]) if node.level else []
             name = ".".join([*base, *(node.module or "").split(".")]).strip(".")
-            found += ((node.lineno, f"{name}.{alias.name}") for alias in node.names)
-    return tuple(found)
+            collected += ((node.lineno, f"{name}.{alias.name}") for alias in node.names)
+    return tuple(collected)
 
 
 def room_of(name: str) -> str:
@@ -133,17 +133,17 @@ def allowed(room: str) -> set[str]:
 
 def wrong_imports(path: Path, text: str) -> list[str]:
     room = ".".join(path.relative_to(PROJECT).parts[:-1])
-    found = []
+    collected = []
     for line, name in imported(path, text):
         top = name.partition(".")[0]
         door = (path.relative_to(PROJECT).as_posix(), room_of(name)) in DOORS
         if top == "synchain" and room not in FRONT and room_of(name) not in allowed(room) and not door:
-            found.append(f"{path.relative_to(PROJECT)}:{line} imports {name} of {room_of(name) or 'synchain'}")
+            collected.append(f"{path.relative_to(PROJECT)}:{line} imports {name} of {room_of(name) or 'synchain'}")
         if top == "benchmarks":
-            found.append(f"{path.relative_to(PROJECT)}:{line} imports {name}")
+            collected.append(f"{path.relative_to(PROJECT)}:{line} imports {name}")
         if room.startswith("models") and top not in sys.stdlib_module_names | {"synchain", "sympy", "flint"}:
-            found.append(f"{path.relative_to(PROJECT)}:{line} imports {name}")
-    return found
+            collected.append(f"{path.relative_to(PROJECT)}:{line} imports {name}")
+    return collected
 
 
 def test_every_room_has_a_row_in_the_table_of_arrows() -> None:
@@ -235,25 +235,26 @@ def test_every_room_is_installed() -> None:
 
 
 def test_values_of_the_models_cannot_be_changed() -> None:
-    found = []
+    collected = []
     for path in sorted((PROJECT / "models").rglob("*.py")):
         dotted = ".".join(("synchain", *path.relative_to(PROJECT).with_suffix("").parts)).removesuffix(".__init__")
         module = importlib.import_module(dotted)
         kinds = [kind for kind in vars(module).values() if isinstance(kind, type) and is_dataclass(kind)]
-        found += [kind for kind in kinds if kind.__module__ == dotted]
-    assert len(found) > 20
-    own = [kind for kind in found if not kind.__name__.startswith("_")]
+        collected += [kind for kind in kinds if kind.__module__ == dotted]
+    assert len(collected) > 20
+    own = [kind for kind in collected if not kind.__name__.startswith("_")]
     assert [kind for kind in own if "__slots__" not in vars(kind)] == []
     assert [kind for kind in own if not kind.__dataclass_params__.frozen] == []  # type: ignore[attr-defined]
 
 
 def test_every_package_that_is_imported_is_declared() -> None:
     """The extras `dask`, `completion` and `files` aside, which may be missing."""
-    found = {name.partition(".")[0] for path in sources() for _, name in imported(path, path.read_text("utf-8"))}
+    names_found = {name.partition(".")[0] for path in sources() for _, name in imported(path, path.read_text("utf-8"))}
     project = tomllib.loads((PROJECT / "pyproject.toml").read_text("utf-8"))["project"]
     declared = {re.match("[a-z-]+", line).group().removeprefix("python-") for line in project["dependencies"]}
     assert (
-        found - sys.stdlib_module_names - {"synchain", "distributed", "shtab", "h5netcdf", "h5py", "zarr"} == declared
+        names_found - sys.stdlib_module_names - {"synchain", "distributed", "shtab", "h5netcdf", "h5py", "zarr"}
+        == declared
     )
 
 

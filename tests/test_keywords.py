@@ -72,12 +72,12 @@ DRIVEN = Scene(oscillator="duffing", topology=chain(2), parameters={"omega": 1.3
 
 @pytest.mark.parametrize("name", sorted(TAKEN))
 def test_the_shared_keywords_have_the_same_names_and_defaults(name: str) -> None:
-    own = inspect.signature(getattr(runtime, name)).parameters
-    assert {word for word in (*SHARED, "rtol") if word in own} == TAKEN[name]
+    parameters = inspect.signature(getattr(runtime, name)).parameters
+    assert {word for word in (*SHARED, "rtol") if word in parameters} == TAKEN[name]
     for word in TAKEN[name] - {"rtol"}:
-        assert own[word].default == OTHER.get((name, word), SHARED[word])
-    assert "rtol" not in own or own["rtol"].default == RTOL[name]
-    assert [p.name for p in own.values() if p.kind is p.VAR_KEYWORD] == [
+        assert parameters[word].default == OTHER.get((name, word), SHARED[word])
+    assert "rtol" not in parameters or parameters["rtol"].default == RTOL[name]
+    assert [p.name for p in parameters.values() if p.kind is p.VAR_KEYWORD] == [
         "axes" if name in ("run", "stream") else "more"
     ]
 
@@ -185,10 +185,10 @@ def test_a_parameter_fixes_an_axis() -> None:
     swept = DRIVEN.replace(axes={"omega": [1.2, 1.4], "delta": [0.3, 0.7]})
     with pytest.raises(ValueError, match="found axes of delta;"):
         runtime.msf(swept, [0.1, 0.2], omega=1.4)
-    found = runtime.msf(swept, [0.1, 0.2], omega=1.4, delta=0.7, **words)
+    result = runtime.msf(swept, [0.1, 0.2], omega=1.4, delta=0.7, **words)
     expected = runtime.msf(DRIVEN, [0.1, 0.2], omega=1.4, delta=0.7, **words)
-    assert found.scene == expected.scene
-    np.testing.assert_array_equal(found.exponent, expected.exponent)
+    assert result.scene == expected.scene
+    np.testing.assert_array_equal(result.exponent, expected.exponent)
 
 
 SHORT_ORBITS: dict[str, Any] = {"starts": 1, "transient": 5, "periods": 5, "show_progress": False}
@@ -265,8 +265,8 @@ def colliding() -> Scene:
 @pytest.mark.parametrize("name", COLLIDING)
 def test_parameters_with_the_names_of_keywords_go_into_the_mapping(name: str) -> None:
     scene = colliding()
-    found = runtime.exponents(scene, [0.0, 0.5], parameters={name: 3.0}, starts=1)
-    np.testing.assert_allclose(found.exponent, [-3.0, -3.5], rtol=1e-9)
+    result = runtime.exponents(scene, [0.0, 0.5], parameters={name: 3.0}, starts=1)
+    np.testing.assert_allclose(result.exponent, [-3.0, -3.5], rtol=1e-9)
     end = runtime.run(scene, parameters={name: [0.5, 2.0]}, show_progress=False).end
     np.testing.assert_allclose(end.sel(component="x", node=1), np.exp([-0.5, -2.0]), rtol=1e-7)
     assert Given(runtime.run, {name: 1.5}).sweep(scene).parameters[name] == 1.5
@@ -275,8 +275,8 @@ def test_parameters_with_the_names_of_keywords_go_into_the_mapping(name: str) ->
 
 def test_certificates_take_parameters_with_the_names_of_fields() -> None:
     scene = colliding().replace(record=("sync_error",))
-    found = runtime.run(scene, parameters={"seed": [1.0, 2.0]}, sigma=0.5, certified=True, show_progress=False)
-    np.testing.assert_allclose(found.data["transversal_exponent"], [-2.0, -3.0], rtol=1e-9)
+    result = runtime.run(scene, parameters={"seed": [1.0, 2.0]}, sigma=0.5, certified=True, show_progress=False)
+    np.testing.assert_allclose(result.data["transversal_exponent"], [-2.0, -3.0], rtol=1e-9)
 
 
 def test_branches_follow_parameters_with_the_names_of_keywords() -> None:
@@ -367,10 +367,10 @@ def test_simulations_obey_the_times_tolerance_and_seed_of_a_scene(name: str) -> 
     short = DRIVEN.replace(topology=chain(2), transient=5.0, window=2.0)
     plain = SIMULATIONS[name](short).criterion
     for field, value in FIELDS.items():
-        found = SIMULATIONS[name](short.replace(**{field: value})).criterion
-        assert getattr(found, field) == value != getattr(plain, field), field
+        criterion = SIMULATIONS[name](short.replace(**{field: value})).criterion
+        assert getattr(criterion, field) == value != getattr(plain, field), field
         for other in {"transient", "window"} - {field}:
-            assert getattr(found, other) == getattr(short, other)
+            assert getattr(criterion, other) == getattr(short, other)
 
 
 OBEYED: dict[str, Any] = {
@@ -424,7 +424,7 @@ def test_basins_end_where_a_scene_stops() -> None:
 
 def test_an_executor_runs_the_cells_of_the_probe_and_parameters_reach_it() -> None:
     with ThreadPoolExecutor(1) as pool:
-        found = runtime.universal_probe(
+        result = runtime.universal_probe(
             DRIVEN, [0.1], [0.0], criterion=SHORT, executor=pool, parameters={"delta": 0.7}, show_progress=False
         )
-    assert found.scene.parameters["delta"] == 0.7
+    assert result.scene.parameters["delta"] == 0.7

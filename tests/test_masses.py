@@ -25,7 +25,7 @@ from synchain.runtime.engines.scene_kernels import kernel_source
 def hanging(links: int, **more: Any) -> Scene:
     """A pendulum that starts from unequal angles and speeds."""
     start = {f"q{k + 1}": 0.5 + 0.1 * k for k in range(links)} | {f"w{k + 1}": 0.1 * k for k in range(links)}
-    known: dict[str, Any] = {
+    symbols: dict[str, Any] = {
         "coupling": None,
         "record": (),
         "transient": 0.0,
@@ -33,7 +33,7 @@ def hanging(links: int, **more: Any) -> Scene:
         "rtol": 1e-13,
         "atol": 1e-13,
     }
-    return Scene(oscillator=pendulum(links), initial=start, **(known | {"parameters": {"delta": 0.1}} | more))
+    return Scene(oscillator=pendulum(links), initial=start, **(symbols | {"parameters": {"delta": 0.1}} | more))
 
 
 def end_of(scene: Scene) -> np.ndarray:
@@ -45,8 +45,8 @@ def end_of(scene: Scene) -> np.ndarray:
 
 def by_hand(links: int, end: float, delta: float = 0.1) -> np.ndarray:
     start = np.array(hanging(links).y0)
-    found = solve_ivp(ByHand(links, 1.0, delta).rates, (0.0, end), start, "DOP853", rtol=3e-14, atol=1e-15)
-    return found.y[:, -1]
+    solution = solve_ivp(ByHand(links, 1.0, delta).rates, (0.0, end), start, "DOP853", rtol=3e-14, atol=1e-15)
+    return solution.y[:, -1]
 
 
 @pytest.mark.parametrize(
@@ -58,13 +58,13 @@ def by_hand(links: int, end: float, delta: float = 0.1) -> np.ndarray:
     ],
 )  # single steps: tests/codegen/steps/test_emit.py, tests/codegen/taylor/test_mass_series.py
 def test_a_pendulum_of_many_links_moves_as_its_matrices_say(links, integrator):
-    found = end_of(hanging(links, integrator=integrator))
-    assert np.abs(found - by_hand(links, 2.0)).max() < 1e-12
+    end = end_of(hanging(links, integrator=integrator))
+    assert np.abs(end - by_hand(links, 2.0)).max() < 1e-12
 
 
 def test_implicit_steps_of_a_mass_matrix_are_right_to_their_tolerance():
-    found = end_of(hanging(4, integrator="rodas5p", rtol=1e-10, atol=1e-10))
-    assert np.abs(found - by_hand(4, 2.0)).max() < 1e-9
+    end = end_of(hanging(4, integrator="rodas5p", rtol=1e-10, atol=1e-10))
+    assert np.abs(end - by_hand(4, 2.0)).max() < 1e-9
 
 
 def test_the_energy_of_a_pendulum_of_four_links_stays():
@@ -78,9 +78,9 @@ def test_the_energy_of_a_pendulum_of_four_links_stays():
 def test_long_pendula_are_derived_written_and_compiled_in_seconds(links, seconds, tmp_path, monkeypatch):
     monkeypatch.setenv("SYNCHAIN_CACHE", str(tmp_path))
     started = time.process_time()
-    found = end_of(hanging(links, window=0.5))
+    end = end_of(hanging(links, window=0.5))
     assert time.process_time() - started < seconds
-    assert np.abs(found - by_hand(links, 0.5)).max() < 1e-12
+    assert np.abs(end - by_hand(links, 0.5)).max() < 1e-12
 
 
 def test_the_equations_keep_the_mass_matrix_and_print_it():
@@ -108,11 +108,11 @@ def test_the_stiffness_of_a_node_is_that_of_its_rates():
     """The block of the Jacobian that "auto" looks at, against differences of the rates by hand."""
     equations, y = hanging(4).equations, np.array([0.3, 0.2, -0.1, 0.5, 0.1, 0.7, -0.2, 0.3])
     values = {"gravity": 1.0, "delta": 0.4}
-    numbers = np.array([[values[name] for name in equations.parameters]])
+    parameter_values = np.array([[values[name] for name in equations.parameters]])
     rates, steps = ByHand(4, 1.0, 0.4).rates, 1e-6 * np.eye(8)
     expected = np.array([(rates(0, y + e) - rates(0, y - e)) / 2e-6 for e in steps]).T
-    found = Templates(equations).blocks(y[None], numbers, np.zeros(1))
-    assert np.abs(found[0, 0] - expected).max() < 1e-8
+    blocks = Templates(equations).blocks(y[None], parameter_values, np.zeros(1))
+    assert np.abs(blocks[0, 0] - expected).max() < 1e-8
     assert ", 0 links, dop853." in kernel_source(hanging(4)).text
 
 

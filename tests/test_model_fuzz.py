@@ -196,16 +196,16 @@ def check(seed: int, integrators: Sequence[str] = INTEGRATORS) -> list[str]:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                found = run(case.scene.replace(integrator=name), show_progress=False)
+                result = run(case.scene.replace(integrator=name), show_progress=False)
         except (ValueError, TypeError) as refused:
             if "\n" in str(refused):
                 wrong.append(f"model {seed}, {name}: {refused}")
             continue
-        error = float(np.abs(found.states("end") - right).max())
-        if int(found.status) != Status.FINISHED or not error <= allowed:
+        error = float(np.abs(result.states("end") - right).max())
+        if int(result.status) != Status.FINISHED or not error <= allowed:
             wrong.append(
-                f"model {seed}, {name}, rtol = {case.scene.rtol:g}: {Status(int(found.status)).name}, "
-                f"{int(found.steps)} steps, error {error:.3g} of {allowed:.3g} allowed: {case.scene.equations.rhs()}"
+                f"model {seed}, {name}, rtol = {case.scene.rtol:g}: {Status(int(result.status)).name}, "
+                f"{int(result.steps)} steps, error {error:.3g} of {allowed:.3g} allowed: {case.scene.equations.rhs()}"
             )
     return wrong
 

@@ -22,15 +22,15 @@ Row = tuple[str, float, str]
 def table(title: str) -> dict[str, list[Row]]:
     """Name -> rows of (parameter, default, meaning) of the table below a title."""
     part = re.split(r"^#+ ", MANUAL.split(f"\n### {title}\n", 1)[1], maxsplit=1, flags=re.MULTILINE)[0]
-    found: dict[str, list[Row]] = {}
+    collected: dict[str, list[Row]] = {}
     last = ""
     for line in re.findall(r"^\| (.*) \|$", part, re.MULTILINE)[1:]:
         name, parameter, default, meaning = (cell.strip() for cell in re.split(r"(?:^|(?<= ))\| ", f"{line} "))
         last = name or last
-        rows = found.setdefault(last, [])
+        rows = collected.setdefault(last, [])
         if parameter:
             rows.append((parameter.strip("`"), constant(default), meaning.replace(r"\|", "|")))
-    return found
+    return collected
 
 
 @pytest.mark.parametrize("kind", TABLES)

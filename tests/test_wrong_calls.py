@@ -208,10 +208,10 @@ CALLS = [
 ]
 
 
-@pytest.mark.parametrize(("call", "words"), CALLS, ids=range(len(CALLS)))
-def test_a_wrong_argument_is_refused_in_one_line(call, words, monkeypatch, tmp_path):
+@pytest.mark.parametrize(("call", "message"), CALLS, ids=range(len(CALLS)))
+def test_a_wrong_argument_is_refused_in_one_line(call, message, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises((TypeError, ValueError, OSError), match=words) as caught:
+    with pytest.raises((TypeError, ValueError, OSError), match=message) as caught:
         call()
     assert "\n" not in str(caught.value)
     assert list(tmp_path.iterdir()) == []
@@ -238,10 +238,10 @@ OFFERED = [
 
 @pytest.mark.parametrize("value", OFFERED, ids=lambda value: value.__name__)
 def test_unknown_keywords_are_refused_with_those_that_are_known(value: Any) -> None:
-    given = inspect.signature(value).parameters.values()
-    if any(each.kind is each.VAR_KEYWORD for each in given):  # parameters of a scene; see tests/test_keywords.py
+    parameters = inspect.signature(value).parameters.values()
+    if any(each.kind is each.VAR_KEYWORD for each in parameters):  # parameters of a scene; see tests/test_keywords.py
         return
-    known = [each.name for each in given if each.kind is not each.VAR_POSITIONAL]
+    known = [each.name for each in parameters if each.kind is not each.VAR_POSITIONAL]
     with pytest.raises(TypeError) as caught:
         value(**{f"{known[-1]}_" if known else "wrong": 1})
     words = f"known: {', '.join(known)}; did you mean '{known[-1]}'?" if known else "known: none"
@@ -250,9 +250,9 @@ def test_unknown_keywords_are_refused_with_those_that_are_known(value: Any) -> N
 
 @pytest.mark.parametrize("value", OFFERED, ids=lambda value: value.__name__)
 def test_arguments_at_no_place_and_missing_ones_are_refused_in_words_of_ours(value: Any) -> None:
-    given = inspect.signature(value).parameters.values()
-    further = {each.kind for each in given} & {inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD}
-    own = [each for each in given if each.kind not in further]
+    parameters = inspect.signature(value).parameters.values()
+    further = {each.kind for each in parameters} & {inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD}
+    own = [each for each in parameters if each.kind not in further]
     if inspect.Parameter.VAR_POSITIONAL not in further:
         places = [each.name for each in own if each.kind is not inspect.Parameter.KEYWORD_ONLY]
         with pytest.raises(

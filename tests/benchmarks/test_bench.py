@@ -38,21 +38,21 @@ def test_csv_keeps_every_digit_and_leaves_missing_numbers_empty():
 
 def test_a_plain_benchmark_writes_a_table_in_two_forms(tmp_path):
     module = plain()
-    found = benchmarks.write("speed", module, module.measure(True), tmp_path)
-    assert [path.name for path in found] == ["speed.csv", "speed.md"]
-    assert sorted(tmp_path.iterdir()) == found
-    assert "| 1 | 0.3 |" in found[1].read_text()
+    paths = benchmarks.write("speed", module, module.measure(True), tmp_path)
+    assert [path.name for path in paths] == ["speed.csv", "speed.md"]
+    assert sorted(tmp_path.iterdir()) == paths
+    assert "| 1 | 0.3 |" in paths[1].read_text()
 
 
 def test_summary_notes_and_figure_are_written_where_there_are_some(tmp_path):
     module = plain(
         summary=lambda rows: f"{len(rows)} row", notes=lambda: ["skipped: x"], draw=lambda rows: new_figure((1, 1))
     )
-    found = benchmarks.write("speed", module, module.measure(True), tmp_path)
-    assert [path.name for path in found] == ["speed.csv", "speed.md", "speed.png", "speed.svg"]
-    page = found[1].read_text()
+    paths = benchmarks.write("speed", module, module.measure(True), tmp_path)
+    assert [path.name for path in paths] == ["speed.csv", "speed.md", "speed.png", "speed.svg"]
+    page = paths[1].read_text()
     assert page.index("| 1 |") < page.index("1 row") < page.index("skipped: x")
-    assert found[2].read_bytes().startswith(b"\x89PNG")
+    assert paths[2].read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_command_prints_a_table_of_each(monkeypatch, capsys):
@@ -67,16 +67,16 @@ def test_the_command_prints_a_table_of_each(monkeypatch, capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "expected"),
+    ("command", "expected"),
     [
         ("nope", "unknown benchmark 'nope'; known: agreement, "),
         ("precision --long", "benchmark 'precision' has no long form"),
         ("precision --out a.csv", "the name of a file; expected a folder"),
     ],
 )
-def test_wrong_use_is_code_2(words, expected, capsys):
+def test_wrong_use_is_code_2(command, expected, capsys):
     with pytest.raises(SystemExit, match=r"^2$"):
-        main(words.split())
+        main(command.split())
     assert expected in capsys.readouterr().err
 
 

@@ -110,8 +110,8 @@ def test_the_peers_average_ends_at_the_error_bar(bar: float) -> None:
 
 
 def row(program: str, alpha: str, count: int, seconds: float) -> tuple[object, ...]:
-    given = {"what": "to an error bar", "system": "s", "program": program, "alpha": alpha, "strengths": count}
-    return tuple({**given, "seconds": seconds}.get(name, math.nan) for name in msf.COLUMNS)
+    settings = {"what": "to an error bar", "system": "s", "program": program, "alpha": alpha, "strengths": count}
+    return tuple({**settings, "seconds": seconds}.get(name, math.nan) for name in msf.COLUMNS)
 
 
 def test_ratios_are_those_of_the_same_strength_and_of_a_share_of_the_thousand() -> None:

@@ -51,7 +51,7 @@ def test_operations_counted_by_hand():
 
 
 @pytest.mark.parametrize(
-    ("line", "words"),
+    ("line", "message"),
     [
         ("for i in range(t):\n        h = h*h", "For cannot be counted"),
         ("h = h**2", "operator Pow cannot be counted"),
@@ -60,8 +60,8 @@ def test_operations_counted_by_hand():
         ("if t:\n        h = h*h", "condition t is no constant"),
     ],
 )
-def test_what_cannot_be_counted_is_refused(line, words):
-    with pytest.raises(ValueError, match=words):
+def test_what_cannot_be_counted_is_refused(line, message):
+    with pytest.raises(ValueError, match=message):
         counter(f"def step(t, h):\n    {line}\n    return h\n").count("step")
 
 
@@ -71,20 +71,20 @@ def test_every_lane_function_has_a_number():
 
 def test_elementary_functions_count_their_multiply_adds():
     """An elementary function is at least two operations for each fma that it writes."""
-    made = counter(inspect.getsource(elementary))
+    counts = counter(inspect.getsource(elementary))
     for name in ("exp", "log", "atan", "cos"):
         written = len(re.findall(r"\b(?:fma|multiply_add)\(", inspect.getsource(getattr(elementary, name))))
-        assert made.count(name) >= 2 * written > 0
+        assert counts.count(name) >= 2 * written > 0
 
 
 def test_an_elementary_function_costs_what_its_text_does_in_both_benchmarks():
     """tanh by hand: 9 additions, 3 products, 1 quotient, 2 fused multiply-adds, and what
     `_expm1_parts` does.
     """
-    made = counter(inspect.getsource(elementary))
+    counts = counter(inspect.getsource(elementary))
     text = "def step(y, p):\n    return tanh(load(y, 0, 1))*load(y, 1, 1)\n"
-    assert operations(source_of(text)) == 1 + made.count("tanh")
-    assert made.count("tanh") == made.count("_expm1_parts") + 9 + 3 + 1 + 2 * 2
+    assert operations(source_of(text)) == 1 + counts.count("tanh")
+    assert counts.count("tanh") == counts.count("_expm1_parts") + 9 + 3 + 1 + 2 * 2
     assert skip.operations is operations
     assert roofline.operations is operations
 

@@ -68,10 +68,10 @@ def test_stiff_springs_are_said() -> None:
 def test_a_wrong_law_is_seen() -> None:
     """The reference of another steepness, 1 % away, is further off than what is allowed."""
     case = next(c for c in QUICK if c.name == "kappa = 1e5" and c.scene.rtol == 1e-8)
-    found = run(case.scene, reduce=False, show_progress=False).states("end")
+    states = run(case.scene, reduce=False, show_progress=False).states("end")
     right, wrong = (end_state(s, "radau") for s in (case.scene, case.scene.replace(kappa=1.01e5)))
     allowed = stability.row(case)[ALLOWED]
-    assert np.abs(found - right).max() < 0.1 * allowed < allowed < np.abs(found - wrong).max()
+    assert np.abs(states - right).max() < 0.1 * allowed < allowed < np.abs(states - wrong).max()
 
 
 def apart(sigma: float, length: float) -> Scene:
@@ -92,9 +92,9 @@ def apart(sigma: float, length: float) -> Scene:
 def test_growth_is_right_until_it_has_left_double_precision_behind() -> None:
     """A difference of 1e-2 that grows as cosh(sqrt(39) t): 1e8 at t = 4, beyond 2^53 at t = 7."""
     scene = apart(-20.0, 4.0)
-    found, expected = run(scene, reduce=False, show_progress=False), end_state(scene, "growth")
-    assert int(found.status) == Status.FINISHED
-    np.testing.assert_allclose(found.states("end"), expected, rtol=1e-6)
+    result, expected = run(scene, reduce=False, show_progress=False), end_state(scene, "growth")
+    assert int(result.status) == Status.FINISHED
+    np.testing.assert_allclose(result.states("end"), expected, rtol=1e-6)
     far = run(apart(-20.0, 7.0), reduce=False, show_progress=False)
     assert int(far.status) == Status.DIVERGED
     assert 4.0 < float(far.end_time) < 7.0
@@ -104,9 +104,9 @@ def test_growth_is_right_until_it_has_left_double_precision_behind() -> None:
 @pytest.mark.parametrize("periods", [100_000.0, 1_000_000.0])
 def test_the_phase_of_the_drive_after_a_million_periods(periods: float) -> None:
     scene = next(c.scene for c in QUICK if c.group == "long").replace(transient=periods, rtol=1e-10)
-    found = run(scene, show_progress=False)
-    assert int(found.status) == Status.FINISHED
-    assert np.abs(found.states("end") - end_state(scene, "steady")).max() < 1e-9
+    result = run(scene, show_progress=False)
+    assert int(result.status) == Status.FINISHED
+    assert np.abs(result.states("end") - end_state(scene, "steady")).max() < 1e-9
 
 
 @pytest.mark.parametrize("name", names())
@@ -124,11 +124,11 @@ def test_equal_starts_stay_equal_to_the_last_bit(name: str) -> None:
         parameters={"sigma": 2.0, "omega": 1.15},
     )
     for width in (1, 8):
-        found = run(scene, width=width, show_progress=False)
-        x, v = found.states("end").reshape(2, graph.n)
+        result = run(scene, width=width, show_progress=False)
+        x, v = result.states("end").reshape(2, graph.n)
         assert (x == x[0]).all(), "positions"
         assert (v == v[0]).all(), "velocities"
-        assert float(found.sync_error_max) == 0.0
+        assert float(result.sync_error_max) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -156,9 +156,9 @@ def test_a_small_difference_follows_the_transversal_exponent(
         integrator="rodas5p",
         initial={"x": [float(x), float(x) + gap], "v": [float(v), float(v)]},
     )
-    found = run(scene, reduce=False, show_progress=False)
-    assert int(found.status) == Status.FINISHED
-    states, times = found.states("trajectory"), found.time.values
+    result = run(scene, reduce=False, show_progress=False)
+    assert int(result.status) == Status.FINISHED
+    states, times = result.states("trajectory"), result.time.values
     distance = np.hypot(states[:, 0] - states[:, 1], states[:, 2] - states[:, 3])
     linear = (distance > least) & (distance < 2e-3)
     assert linear.sum() >= 3
@@ -181,10 +181,10 @@ def test_many_equal_oscillators_move_as_one_alone() -> None:
         "time_unit": "time",
         "record": (),
     }
-    numbers = {"kappa": 1e2}
-    many = Scene(topology=topology("chain", 100), parameters={**numbers, "sigma": 1.0}, **settings)
+    values = {"kappa": 1e2}
+    many = Scene(topology=topology("chain", 100), parameters={**values, "sigma": 1.0}, **settings)
     ends = [
-        run(s, reduce=False, show_progress=False).states("end") for s in (many, Scene(parameters=numbers, **settings))
+        run(s, reduce=False, show_progress=False).states("end") for s in (many, Scene(parameters=values, **settings))
     ]
     for place, alone in zip(ends[0].reshape(2, 100), ends[1], strict=True):
         assert (place == place[0]).all()

@@ -32,15 +32,15 @@ def test_every_root_of_arb_is_in_a_disc_of_its_own(coefficients: list[int]) -> N
     f = fmpz_poly(coefficients)
     if f.degree() < 2 or f.gcd(f.derivative()).degree() > 0:
         return
-    found = discs(f)
-    if found is None:
+    isolated = discs(f)
+    if isolated is None:
         return
-    assert len(found) == f.degree()
+    assert len(isolated) == f.degree()
     with precision(256):
         for root, count in f.complex_roots():
             assert count == 1
-            assert sum(inside(disc, root) for disc in found) == 1
-            assert any(inside(disc, root) and (disc.y == 0) == (root.imag == 0) for disc in found)
+            assert sum(inside(disc, root) for disc in isolated) == 1
+            assert any(inside(disc, root) and (disc.y == 0) == (root.imag == 0) for disc in isolated)
 
 
 def test_most_random_polynomials_are_isolated() -> None:
@@ -52,9 +52,9 @@ def test_most_random_polynomials_are_isolated() -> None:
 
 
 def test_the_roots_of_unity() -> None:
-    found = discs(fmpz_poly.cyclotomic(101))
-    assert found is not None
-    angles = sorted(cmath.phase(complex(disc.ball)) % (2 * math.pi) for disc in found)
+    isolated = discs(fmpz_poly.cyclotomic(101))
+    assert isolated is not None
+    angles = sorted(cmath.phase(complex(disc.ball)) % (2 * math.pi) for disc in isolated)
     assert angles == pytest.approx([2 * math.pi * k / 101 for k in range(1, 101)], abs=1e-14)
 
 
@@ -62,9 +62,9 @@ def test_the_roots_of_unity() -> None:
 def test_near_roots_are_told_apart_or_left(gap: int) -> None:
     """Mignotte's polynomials have two real roots a distance of about gap**-4 apart."""
     f = fmpz_poly([-2, 4 * gap, -2 * gap * gap, 0, 0, 0, 0, 1])
-    found = roots(tuple(int(c) for c in f.coeffs()))
-    reals = [root for root in found if isinstance(root, RealRoot)]
-    assert len(found) == 7
+    isolated = roots(tuple(int(c) for c in f.coeffs()))
+    reals = [root for root in isolated if isinstance(root, RealRoot)]
+    assert len(isolated) == 7
     assert len(reals) == 3
     assert all(first.high <= second.low for first, second in pairwise(reals))
 
@@ -130,17 +130,17 @@ def test_a_real_root_beside_one_that_is_far_larger_is_seen_to_be_real() -> None:
             108000000000000,
         ]
     )
-    found = discs(f)
-    assert found is not None
-    assert [disc.y == 0 for disc in found] == [True, True, False, False]
+    isolated = discs(f)
+    assert isolated is not None
+    assert [disc.y == 0 for disc in isolated] == [True, True, False, False]
     assert [type(root) for root in roots(tuple(int(c) for c in f.coeffs()))] == [RealRoot] * 2 + [ComplexRoot] * 2
 
 
 def test_roots_beyond_the_range_of_floats_are_left_to_arb() -> None:
     f = fmpz_poly([-(10**1000), 0, 1, 1])
     assert discs(f) is None
-    found = roots(tuple(int(c) for c in f.coeffs()))
-    assert [type(root) for root in found] == [RealRoot, ComplexRoot, ComplexRoot]
+    isolated = roots(tuple(int(c) for c in f.coeffs()))
+    assert [type(root) for root in isolated] == [RealRoot, ComplexRoot, ComplexRoot]
 
 
 def test_balls_are_disjoint_or_not_at_any_scale() -> None:

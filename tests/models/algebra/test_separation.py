@@ -46,7 +46,7 @@ def test_sizes_of_numerators_and_denominators(number: Number, up: float, low: fl
 
 
 @pytest.mark.parametrize(
-    ("numbers", "bits"),
+    ("values", "bits"),
     [
         ((sp.cos(sp.pi / 7), sp.cbrt(2)), 35 * 7 / 3 + 1),  # 12 times 3; u: 1/3 + 1 + 1, l: 1
         ((sp.cos(sp.pi / 7), sp.sin(sp.pi / 11)), 119 * 3 + 2),  # the 308th roots of unity
@@ -55,8 +55,8 @@ def test_sizes_of_numerators_and_denominators(number: Number, up: float, low: fl
         ((ROOTS[0], ROOTS[0]), 2 * (3 + LOG3 + 1) + 2 * LOG3),
     ],
 )
-def test_bits_that_tell_a_sum_from_zero(numbers: tuple[Number, ...], bits: float) -> None:
-    assert bits + 8 <= _bits(tuple((x,) for x in numbers)) <= bits + 9.01
+def test_bits_that_tell_a_sum_from_zero(values: tuple[Number, ...], bits: float) -> None:
+    assert bits + 8 <= _bits(tuple((x,) for x in values)) <= bits + 9.01
 
 
 @pytest.mark.parametrize("steps", [20, 150, 600])
@@ -88,7 +88,7 @@ def test_roots_of_polynomials_meet_their_equals_and_not_their_neighbours() -> No
 
 
 @pytest.mark.parametrize(
-    ("number", "error", "words"),
+    ("number", "error", "message"),
     [
         (sp.pi, TypeError, "pi is not an algebraic number"),
         (sp.cos(1), TypeError, "1/pi times pi is no rational multiple"),
@@ -97,10 +97,10 @@ def test_roots_of_polynomials_meet_their_equals_and_not_their_neighbours() -> No
         (sum(sp.cos(sp.pi / p) for p in (101, 103, 107, 109)), ValueError, r"needs .* bits .* at most 524288"),
     ],
 )
-def test_numbers_that_cannot_be_compared(number: sp.Expr, error: type[Exception], words: str) -> None:
-    with pytest.raises(error, match=words):
+def test_numbers_that_cannot_be_compared(number: sp.Expr, error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
         check_size(number)
-    with pytest.raises(error, match=words):
+    with pytest.raises(error, match=message):
         equal(number, sp.S.One)
 
 

@@ -52,16 +52,16 @@ def test_exits_of_clusters_are_those_of_the_network() -> None:
     """Two of three oscillators move as one: the exits of the quotient and of the difference, put together from the whole."""
     chain = topology("chain", 3)
     equations = jumping(chain).equations
-    found = clustered(equations, clusters(chain, (0, 1, 0)))
+    network = clustered(equations, clusters(chain, (0, 1, 0)))
     full = of_network(equations)
-    assert found.events is not None
+    assert network.events is not None
     assert full is not None
-    assert found.events.owners == (-1, -1, 0, 1, -1, 0)
+    assert network.events.owners == (-1, -1, 0, 1, -1, 0)
     x1, x2, x3, v1, v2, v3, a, b, c, d, s, m = symbols("x_1 x_2 x_3 v_1 v_2 v_3 a b c d sigma mode_sigma")
     on = {x1: a, x2: b, x3: a, v1: c, v2: d, v3: c}
-    own = {x1: a, x2: b, v1: c, v2: d, m: s}
+    values = {x1: a, x2: b, v1: c, v2: d, m: s}
     first = {column: e.xreplace(on) for (_, column), e in full.exits[0][0]}
-    made = {key: e.xreplace(own) for key, e in found.events.exits[0][0]}
+    made = {key: e.xreplace(values) for key, e in network.events.exits[0][0]}
     assert sp.simplify(made[5, 4] - first[0]) == 0  # the difference x_3 - x_1 of the two that move as one
     assert sp.simplify(made[2, 0] - first[0]) == 0
     assert sp.simplify(made[2, 1] - first[1]) == 0
@@ -76,8 +76,8 @@ def test_dampers_and_a_jump_have_no_tangent() -> None:
 
 def far(x: float, v: float, length: float) -> tuple[mpf, mpf]:
     """One block by the Taylor series, in the digits that are set."""
-    numbers = {**JUMP, "hold": JUMP["mu_s"], "mu_s": JUMP["mu_k"], "a": 1.0, "sigma": 0.0}
-    reference = Reference(numbers, [], [x], [v])  # type: ignore[list-item]
+    values = {**JUMP, "hold": JUMP["mu_s"], "mu_s": JUMP["mu_k"], "a": 1.0, "sigma": 0.0}
+    reference = Reference(values, [], [x], [v])  # type: ignore[list-item]
     reference.advance(mpf(length))
     assert {new for _, _, new in reference.events} == {0, 1}
     return reference.x[0], reference.v[0]
@@ -95,14 +95,14 @@ def propagator(scene: Scene, alpha: float) -> np.ndarray:
 def test_the_propagator_of_a_law_with_a_jump_against_fifty_digits() -> None:
     """A release, slip, a landing and another release: differences of the flow, 1e-15 apart, right to 15 digits."""
     scene = jumping().replace(rtol=1e-12)
-    found = propagator(scene, 0.0)
+    matrix = propagator(scene, 0.0)
     length = 4.0 * np.pi / JUMP["omega"]
     with mp.workdps(50):
         step = mpf(10) ** -15
         there, back = (far(mpf("0.1") + s * step, JUMP["theta_b"], length) for s in (1, -1))  # type: ignore[arg-type]
         by_x = [float((p - q) / (2 * step)) for p, q in zip(there, back, strict=True)]
-    np.testing.assert_allclose(found[:, 0], by_x, rtol=1e-8)
-    assert np.all(found[:, 1] == 0.0)  # a deviation of the velocity is lost in stick
+    np.testing.assert_allclose(matrix[:, 0], by_x, rtol=1e-8)
+    assert np.all(matrix[:, 1] == 0.0)  # a deviation of the velocity is lost in stick
 
 
 @pytest.mark.long
@@ -129,17 +129,17 @@ def test_the_spectrum_of_a_synchronous_pair_is_that_of_its_periodic_orbit() -> N
         topology=PAIR, contact="set-valued", parameters={"omega": 1.15, "sigma": 0.2}, initial={"x": [0.3] * 2}
     )
     expected = exponents_of(scene, 2, 0.0, 0.4)
-    found = lyapunov_spectrum(scene, transient=400, periods=64)
-    np.testing.assert_allclose(found.exponent[:2], np.sort(expected)[::-1], rtol=0, atol=1e-6)
-    assert found.exponent[2:].tolist() == [-np.inf, -np.inf]
-    assert found.resolved.tolist() == [True, True, False, False]
-    assert found.divergence == -np.inf
-    assert found.components == 4
+    result = lyapunov_spectrum(scene, transient=400, periods=64)
+    np.testing.assert_allclose(result.exponent[:2], np.sort(expected)[::-1], rtol=0, atol=1e-6)
+    assert result.exponent[2:].tolist() == [-np.inf, -np.inf]
+    assert result.resolved.tolist() == [True, True, False, False]
+    assert result.divergence == -np.inf
+    assert result.components == 4
 
 
 @pytest.mark.long
 def test_a_cluster_of_two_has_the_exponent_of_its_mode() -> None:
     scene = Scene(topology=PAIR, contact="set-valued", parameters={"omega": 1.15, "sigma": 0.2})
-    found = cluster_exponents(scene, (0, 0), transient=400, periods=64)
+    result = cluster_exponents(scene, (0, 0), transient=400, periods=64)
     expected = exponents_of(scene, 2, 0.0, 0.4)
-    np.testing.assert_allclose([found.motion, found.exponent[0]], expected, rtol=0, atol=1e-6)
+    np.testing.assert_allclose([result.motion, result.exponent[0]], expected, rtol=0, atol=1e-6)

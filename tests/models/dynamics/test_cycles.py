@@ -79,9 +79,9 @@ def test_chaos_never_repeats():
 def test_long_runs_keep_the_phase_of_the_drive():
     # a million periods of the drive after the orbit was reached: the state is that of the first ones
     spans = [[0.0, periods * PERIOD, PERIOD] for periods in (800, 1_000_800)]
-    found = integrate(1, (), [[0.3, 0.0]] * 2, spans, True)
-    assert found.counts[1, 4] > 1_000_000 - 100
-    np.testing.assert_allclose(found.end[1], found.end[0], rtol=0, atol=1e-8)
+    states = integrate(1, (), [[0.3, 0.0]] * 2, spans, True)
+    assert states.counts[1, 4] > 1_000_000 - 100
+    np.testing.assert_allclose(states.end[1], states.end[0], rtol=0, atol=1e-8)
 
 
 x, v = sp.symbols("x v", real=True)

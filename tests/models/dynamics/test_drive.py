@@ -125,7 +125,7 @@ def test_the_period_is_the_least_one_whatever_the_form_of_the_drive(drive: str, 
 
 
 @pytest.mark.parametrize(
-    ("drive", "numbers", "frequency"),
+    ("drive", "values", "frequency"),
     [
         ("cos(w*t) + cos(v*t)", {"w": 1.1, "v": 3.3}, 1.1), ("cos(t) + sin(n*t)", {"n": 15}, 1.0),
         ("cos(w*t)*cos(v*t)", {"w": 1.1, "v": 3.3}, 2.2), ("cos(w*t) + cos(v*t)", {"w": 1.0, "v": 1.2}, 0.2),
@@ -133,10 +133,10 @@ def test_the_period_is_the_least_one_whatever_the_form_of_the_drive(drive: str, 
     ],
 )  # fmt: skip
 def test_numbers_whose_ratio_is_rational_have_a_common_period(
-    drive: str, numbers: dict[str, float], frequency: float | None
+    drive: str, values: dict[str, float], frequency: float | None
 ) -> None:
     """In that scene alone: times are counted in periods if they are asked for."""
-    driven = Scene(Field({"x": f"-x + {drive}"}, parameters=numbers), None, ALONE, transient=2.0, window=3.0)
+    driven = Scene(Field({"x": f"-x + {drive}"}, parameters=values), None, ALONE, transient=2.0, window=3.0)
     assert driven.time_unit == "time"
     assert driven.angular_frequency == (None if frequency is None else pytest.approx(frequency, rel=1e-14))
     if frequency is None:
@@ -145,9 +145,9 @@ def test_numbers_whose_ratio_is_rational_have_a_common_period(
         return
     counted = driven.replace(time_unit="period")
     np.testing.assert_allclose(plan(counted).spans[0, :3] * frequency / (2 * np.pi), [2.0, 5.0, 1.0])
-    name = next(iter(numbers))
+    name = next(iter(values))
     with pytest.raises(ValueError, match=r"found a cell in which common\(.*\) is 0, or undefined"):
-        plan(counted.replace(axes={name: [numbers[name], np.sqrt(5)]}))
+        plan(counted.replace(axes={name: [values[name], np.sqrt(5)]}))
 
 
 def test_times_count_the_periods_of_each_cell(files: Path) -> None:
@@ -214,12 +214,12 @@ def test_each_cell_has_the_longest_step_of_its_own_pulses() -> None:
 
 def test_short_pulses_of_unequal_nodes_are_seen_by_sweeps_and_modes() -> None:
     node = Field({"x": "-x + sign(sin(t) - level)"}, parameters={"level": 0.0})
-    made = Scene(
+    network = Scene(
         node, "x->x", topology("chain", 2), parameters={"level": [0.0, 0.99], "sigma": 0.1}, transient=0.0, window=1.0
     )
-    assert longest_step(made) == pytest.approx(2 * np.arccos(0.99), rel=1e-3)
-    numbers = np.array([[made.parameters[name] for name in made.equations.parameters]])
-    assert half_swing(made.equations, by_place(made.equations, numbers)) == longest_step(made)
+    assert longest_step(network) == pytest.approx(2 * np.arccos(0.99), rel=1e-3)
+    values = np.array([[network.parameters[name] for name in network.equations.parameters]])
+    assert half_swing(network.equations, by_place(network.equations, values)) == longest_step(network)
 
 
 def test_the_fastest_drive_of_a_link_or_of_some_nodes_sets_the_longest_step() -> None:
@@ -234,8 +234,8 @@ def test_the_fastest_drive_of_a_link_or_of_some_nodes_sets_the_longest_step() ->
     )
     driven = Field({"x": "-x + cos(w*t)"}, parameters={"w": 1.0})
     kinds = [{"oscillator": still, "at": [1]}, {"oscillator": driven, "at": [2, 3]}]
-    own = {"w": [1.0, 40.0]}
-    nodes = Scene(nodes=kinds, coupling="x->x", topology=topology("chain", 3), parameters=own, time_unit="time")
+    values = {"w": [1.0, 40.0]}
+    nodes = Scene(nodes=kinds, coupling="x->x", topology=topology("chain", 3), parameters=values, time_unit="time")
     for scene in (links, nodes):
         np.testing.assert_allclose(plan(scene).spans[:, SpanColumn.LONGEST], np.pi / 40)
 
@@ -273,19 +273,19 @@ def test_a_drive_that_stands_still_in_a_cell_has_no_period(files: Path) -> None:
     [("two", "is driven at Omega and omega, which have no common period"), ("fading", "depends on time other than by")],
 )
 def test_what_needs_a_period_refuses_a_drive_without_one(files: Path, name: str, reason: str) -> None:
-    found = scene(files, name)
-    assert (found.time_unit, found.period, found.angular_frequency) == ("time", None, None)
+    network = scene(files, name)
+    assert (network.time_unit, network.period, network.angular_frequency) == ("time", None, None)
     with pytest.raises(ValueError, match=reason):
-        found.replace(time_unit="period")
+        network.replace(time_unit="period")
     refused = (
-        lambda: exponents(found, [0.1]),
-        lambda: msf(found, [0.1, 0.2]),
-        lambda: plane(found, [0.1, 0.2], [0.0, 0.1]),
-        lambda: lyapunov_spectrum(found),
-        lambda: periodic_orbit(found),
-        lambda: skeleton(found, "F", [0.05, 0.06]),
-        lambda: cluster_exponents(found, [0, 0]),
-        lambda: check_certifiable(found),
+        lambda: exponents(network, [0.1]),
+        lambda: msf(network, [0.1, 0.2]),
+        lambda: plane(network, [0.1, 0.2], [0.0, 0.1]),
+        lambda: lyapunov_spectrum(network),
+        lambda: periodic_orbit(network),
+        lambda: skeleton(network, "F", [0.05, 0.06]),
+        lambda: cluster_exponents(network, [0, 0]),
+        lambda: check_certifiable(network),
     )
     for call in refused:
         with pytest.raises(ValueError, match=reason):
@@ -293,8 +293,8 @@ def test_what_needs_a_period_refuses_a_drive_without_one(files: Path, name: str,
 
 
 def test_any_drive_runs_over_plain_times(files: Path) -> None:
-    found = scene(files, "two", topology=ALONE, transient=0.0, window=20.0, rtol=1e-10, initial={"x": 0.3, "v": 0.0})
-    end = run(found, show_progress=False).states("end")
+    network = scene(files, "two", topology=ALONE, transient=0.0, window=20.0, rtol=1e-10, initial={"x": 0.3, "v": 0.0})
+    end = run(network, show_progress=False).states("end")
 
     def rates(t: float, y: np.ndarray) -> list[float]:
         return [y[1], y[0] - y[0] ** 3 - 0.15 * y[1] + 0.3 * (np.cos(np.sqrt(2) * t) + np.cos(t))]
@@ -314,9 +314,9 @@ def test_orbits_repeat_themselves_after_the_period_of_the_drive(files: Path, nam
 
 
 def test_branches_follow_any_drive(files: Path) -> None:
-    found = scene(files)
-    orbit = periodic_orbit(found, F=0.05)
-    weak = found.replace(F=0.05)
+    network = scene(files)
+    orbit = periodic_orbit(network, F=0.05)
+    weak = network.replace(F=0.05)
     branch = follow(weak, "Omega", [1.2, 1.25], orbit)
     assert [abs(np.prod(o.multipliers)) for o in branch.orbits] == pytest.approx(
         [np.exp(-0.15 * 2 * np.pi / value) for value in (1.2, 1.25)], rel=1e-9
@@ -333,23 +333,23 @@ def _meets(one: object, other: object) -> bool:
 def test_exponents_count_the_periods_of_the_drive(files: Path, name: str) -> None:
     """Means of 300 motions over 450 periods by the classical Runge-Kutta method, their errors below 0.0007; with the
     period of the natural frequency they are 0.145, 0.109 and 0.021."""
-    found = exponents(scene(files, name), [0.0, 0.2, 0.5], precision=1e-3, periods=20000, starts=8)
-    np.testing.assert_allclose(found.exponent, [0.1567, 0.1169, 0.0117], atol=0.005)
+    result = exponents(scene(files, name), [0.0, 0.2, 0.5], precision=1e-3, periods=20000, starts=8)
+    np.testing.assert_allclose(result.exponent, [0.1567, 0.1169, 0.0117], atol=0.005)
     line = msf(scene(files, name), [0.0, 0.2, 0.5], precision=2e-3, periods=20000)
-    np.testing.assert_allclose(line.exponent, found.exponent, atol=0.008)
+    np.testing.assert_allclose(line.exponent, result.exponent, atol=0.008)
 
 
 def test_lyapunov_exponents_count_the_periods_of_the_drive(files: Path) -> None:
     """The sum of both is -d; with the period of the natural frequency both are -0.075."""
-    found = lyapunov_spectrum(scene(files, topology=ALONE), periods=2000)
-    np.testing.assert_allclose(found.exponent, [0.157, -0.307], atol=0.02)
-    assert found.time == pytest.approx(2000 * PERIOD)
+    result = lyapunov_spectrum(scene(files, topology=ALONE), periods=2000)
+    np.testing.assert_allclose(result.exponent, [0.157, -0.307], atol=0.02)
+    assert result.time == pytest.approx(2000 * PERIOD)
 
 
 @pytest.mark.long
 def test_planes_and_clusters_count_the_periods_of_the_drive(files: Path) -> None:
-    found = plane(scene(files), [0.0, 0.2], [0.0, 0.1], precision=2e-3, periods=20000)
-    np.testing.assert_allclose(found.exponent[:, 0], [0.158, 0.118], atol=0.01)
-    whole = cluster_exponents(scene(files, parameters={"sigma": 0.1}), [0, 0], precision=2e-3, periods=10000)
-    assert whole.motion == pytest.approx(0.158, abs=0.015)
-    assert whole.exponent[0] == pytest.approx(0.118, abs=0.015)  # sigma |gamma| = 0.2
+    result = plane(scene(files), [0.0, 0.2], [0.0, 0.1], precision=2e-3, periods=20000)
+    np.testing.assert_allclose(result.exponent[:, 0], [0.158, 0.118], atol=0.01)
+    full = cluster_exponents(scene(files, parameters={"sigma": 0.1}), [0, 0], precision=2e-3, periods=10000)
+    assert full.motion == pytest.approx(0.158, abs=0.015)
+    assert full.exponent[0] == pytest.approx(0.118, abs=0.015)  # sigma |gamma| = 0.2

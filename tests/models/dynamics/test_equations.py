@@ -55,9 +55,9 @@ def test_the_jacobian_is_the_derivative_of_the_right_hand_side(name: str, near: 
     equations = MODELS[name]
     values = states(equations, 1, near if equations.node.parameters else None)
     entries = equations.jacobian()
-    numbers = dict(zip(entries, evaluate(list(entries.values()), values), strict=True))
+    parameter_values = dict(zip(entries, evaluate(list(entries.values()), values), strict=True))
     for column, state in enumerate(equations.state):
-        found = [numbers.get((row, column), mpmath.mpf(0)) for row in range(equations.dimension)]
+        found = [parameter_values.get((row, column), mpmath.mpf(0)) for row in range(equations.dimension)]
         assert close(found, slopes(equations.rhs(), {sp.Symbol(state, real=True): mpmath.mpf(1)}, values))
 
 
@@ -65,9 +65,9 @@ def test_the_jacobian_is_the_derivative_of_the_right_hand_side(name: str, near: 
 def test_the_time_derivative_is_the_derivative_by_time_alone(name: str) -> None:
     equations = MODELS[name]
     values = states(equations, 2)
-    found = evaluate(equations.time_derivative(), values)
-    assert close(found, slopes(equations.rhs(), {TIME: mpmath.mpf(1)}, values))
-    assert any(found) == equations.node.forced
+    parameter_values = evaluate(equations.time_derivative(), values)
+    assert close(parameter_values, slopes(equations.rhs(), {TIME: mpmath.mpf(1)}, values))
+    assert any(parameter_values) == equations.node.forced
 
 
 def test_the_stick_slope_is_that_of_a_steep_arcus_tangent() -> None:
@@ -117,11 +117,11 @@ def test_without_links_there_is_no_link_jacobian() -> None:
     ],
 )
 def test_kinks_are_differentiated_on_either_side(expression: sp.Expr, expected: sp.Expr) -> None:
-    found = derivative(expression, W)
-    assert not found.has(sp.DiracDelta, sp.Derivative)
+    slope = derivative(expression, W)
+    assert not slope.has(sp.DiracDelta, sp.Derivative)
     for w in (sp.Rational(-3, 7), sp.Rational(2, 9), sp.Rational(5, 2)):
         at = {W: w, A: -sp.Rational(1, 3), B: sp.Rational(1, 5)}
-        assert sp.simplify((found - expected).xreplace(at)) == 0
+        assert sp.simplify((slope - expected).xreplace(at)) == 0
 
 
 # -- size ----------------------------------------------------------------------------------------------------
@@ -207,7 +207,7 @@ def network_of(edge: Edge | None, links: tuple[Link, ...] = ()) -> Equations:
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("keywords", "message"),
     [
         ({"rhs": (V, -X, X)}, "node: 3 equations for 2 states; expected one each"),
         ({"rhs": (V, -A * X)}, r"node: undeclared symbol 'a' in -a\*x; declare it as a state or parameter"),
@@ -218,13 +218,13 @@ def network_of(edge: Edge | None, links: tuple[Link, ...] = ()) -> Equations:
         ({"rhs": (V, -sp.Symbol("x"))}, "node: undeclared symbol 'x'"),  # complex x is not real x
     ],
 )
-def test_a_node_refuses(given: dict, message: str) -> None:
+def test_a_node_refuses(keywords: dict, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        Node(**{"state": (X, V), "rhs": (V, -X), "parameters": (), **given})
+        Node(**{"state": (X, V), "rhs": (V, -X), "parameters": (), **keywords})
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("keywords", "message"),
     [
         ({"there": (X_I, V_J)}, "edge: the name 'x_i' stands for two things"),
         ({"rhs": (sp.S.Zero,)}, "edge: 1 equations for 2 states"),
@@ -233,9 +233,9 @@ def test_a_node_refuses(given: dict, message: str) -> None:
         ({"parameters": (WEIGHT,)}, "edge: the name 'weight' stands for two things"),
     ],
 )
-def test_an_edge_refuses(given: dict, message: str) -> None:
+def test_an_edge_refuses(keywords: dict, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        replace(SPRING, **given)
+        replace(SPRING, **keywords)
 
 
 NAMED_LIKE_A_STATE = Node((X, V), (V, -sp.Symbol("x_2", real=True) * X), (sp.Symbol("x_2", real=True),))

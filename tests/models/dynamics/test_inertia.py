@@ -118,9 +118,9 @@ def test_inerters_by_lagranges_method() -> None:
     drive = real("u") * sp.cos(real("omega") * real("t"))
     forces = {f"x_{i + 1}": -delta * v[i] + drive for i in range(3)}
     expected = the_whole_at_once(kinetic - potential, forces, names)
-    found = accelerations(equations)
+    rates = accelerations(equations)
     for name, e in expected.items():
-        assert vanishes(found[name] - e)
+        assert vanishes(rates[name] - e)
 
 
 def test_the_matrix_of_inerters_is_that_of_springs() -> None:
@@ -141,9 +141,9 @@ def test_unequal_masses_move_in_the_modes_of_the_generalised_eigenproblem(integr
     scene = Scene(oscillator="harmonic", coupling="inerter", topology=graph, parameters={"sigma": sigma},
                   initial={"x": start, "v": 0}, transient=0, window=end, record=(), integrator=integrator,
                   rtol=1e-11)  # fmt: skip
-    found = run(scene)
-    assert found.success
-    np.testing.assert_allclose(found.states()[:3], shapes @ (share * np.cos(np.sqrt(squares) * end)), atol=1e-11)
+    result = run(scene)
+    assert result.success
+    np.testing.assert_allclose(result.states()[:3], shapes @ (share * np.cos(np.sqrt(squares) * end)), atol=1e-11)
 
 
 def one_way(name: str) -> Scene:
@@ -176,12 +176,12 @@ SHORT = (("static friction", "rodas5p"), ("clocks", "dop853"))
 )  # fmt: skip
 def test_nodes_may_feel_the_inertia_of_one_that_feels_nobody(name: str, integrator: str) -> None:
     scene = one_way(name).replace(integrator=integrator)
-    found = run(scene, reduce=False)
-    assert found.success
+    result = run(scene, reduce=False)
+    assert result.success
     space: dict = {}
     exec(to_python(scene.equations, {s: scene.parameters[s] for s in scene.equations.parameters}), space)
-    known = solve_ivp(space["rhs"], (0, 6), scene.y0, "Radau", jac=space["jac"], rtol=1e-10, atol=1e-12)
-    np.testing.assert_allclose(found.states(), known.y[:, -1], atol=1e-7)
+    solution = solve_ivp(space["rhs"], (0, 6), scene.y0, "Radau", jac=space["jac"], rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(result.states(), solution.y[:, -1], atol=1e-7)
 
 
 @pytest.mark.long

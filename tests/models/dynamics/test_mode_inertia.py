@@ -98,16 +98,18 @@ def test_exponents_of_heavy_links_follow_from_their_quadratic() -> None:
     alpha = np.array([0.0, 0.5, 3.0, 15.0, 40.0])
     exact = [max(np.roots([1 + a, 0.5, 1]).real) for a in alpha]
     for u in (0.0, 0.3):
-        found = exponents(scene(parameters={**linear, "u": u}), alpha, starts=1, rtol=1e-9)
-        np.testing.assert_allclose(found.exponent, exact, atol=2e-8)
-        np.testing.assert_array_equal(found.alpha, alpha)
+        result = exponents(scene(parameters={**linear, "u": u}), alpha, starts=1, rtol=1e-9)
+        np.testing.assert_allclose(result.exponent, exact, atol=2e-8)
+        np.testing.assert_array_equal(result.alpha, alpha)
     with pytest.raises(ValueError, match=re.escape("alpha = -1.5: the mass of this mode is not positive")):
         exponents(scene(parameters=linear), [-1.5, 0.0])
 
 
 def test_the_slowest_eigenvalue_of_a_linear_network_is_that_of_its_certificate() -> None:
-    made = scene(parameters={"beta": 0, "delta": 0.5, "u": 0, "sigma": 0.7}, time_unit="time", record=("sync_error",))
-    laplacian = -np.array(made.topology.rows, float)
+    network = scene(
+        parameters={"beta": 0, "delta": 0.5, "u": 0, "sigma": 0.7}, time_unit="time", record=("sync_error",)
+    )
+    laplacian = -np.array(network.topology.rows, float)
     heavy = np.eye(4) + 0.7 * laplacian
     free = scipy.linalg.block_diag(np.eye(4), heavy)
     push = np.block([[np.zeros((4, 4)), np.eye(4)], [-np.eye(4), -0.5 * np.eye(4)]])
@@ -115,7 +117,7 @@ def test_the_slowest_eigenvalue_of_a_linear_network_is_that_of_its_certificate()
     own = np.roots([1, 0.5, 1])  # the synchronous motion
     others = [z for z in values if np.abs(z - own).min() > 1e-9]
     assert len(others) == 6
-    assert certify(made).exponent[0] == pytest.approx(max(z.real for z in others), abs=1e-8)
+    assert certify(network).exponent[0] == pytest.approx(max(z.real for z in others), abs=1e-8)
 
 
 def test_what_has_no_modes() -> None:

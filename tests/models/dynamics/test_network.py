@@ -34,7 +34,7 @@ ONE_WAY = from_matrix([[0, 0, 0], [3, -3, 0], [0, "1/2", "-1/2"]], "one-way")
 
 def undirected() -> list[Topology]:
     """Every family at every size from 1 to 4 that it has, where links go both ways; and two other matrices."""
-    found = [WEIGHTED, CUT]
+    collected = [WEIGHTED, CUT]
     for family in families():
         for n in range(1, 5):
             try:
@@ -42,8 +42,8 @@ def undirected() -> list[Topology]:
             except ValueError:
                 continue
             if graph.symmetric and graph.n <= 4:
-                found.append(graph)
-    return found
+                collected.append(graph)
+    return collected
 
 
 def unlike() -> list[Topology]:
@@ -110,9 +110,9 @@ def test_template_equals_the_lagrangian_in_one_piece(
         law = friction_coefficient(law_of(friction), "atan")
         expected = [e.replace(FRICTION, law) for e in expected]
     equations = assemble(oscillator, friction, coupling, graph)
-    found = equations.rhs()
-    assert found[: graph.n] == sp.symbols(f"v_1:{graph.n + 1}", real=True)
-    for ours, theirs in zip(found[graph.n :], expected, strict=True):
+    rates = equations.rhs()
+    assert rates[: graph.n] == sp.symbols(f"v_1:{graph.n + 1}", real=True)
+    for ours, theirs in zip(rates[graph.n :], expected, strict=True):
         assert sp.expand(ours - theirs) == 0
 
 
@@ -127,9 +127,9 @@ def test_every_required_family_is_among_the_proved_ones() -> None:
 def test_the_proof_notices_a_wrong_weight() -> None:
     """The comparison above can fail: another weight of one edge is another network."""
     expected = in_one_piece("harmonic", "spring", from_matrix([[-2, 2], [2, -2]]))
-    found = assemble("harmonic", None, "spring", from_matrix([[-1, 1], [1, -1]])).rhs()
+    rates = assemble("harmonic", None, "spring", from_matrix([[-1, 1], [1, -1]])).rhs()
     sigma, x_1, x_2 = sp.symbols("sigma x_1 x_2", real=True)
-    assert sp.expand(expected[0] - found[2] - sigma * (x_2 - x_1)) == 0
+    assert sp.expand(expected[0] - rates[2] - sigma * (x_2 - x_1)) == 0
 
 
 @pytest.mark.parametrize("graph", undirected(), ids=identity)
@@ -137,11 +137,11 @@ def test_connectivity_is_the_hessian_of_the_whole_potential(graph: Topology) -> 
     q = sp.symbols(f"q_1:{graph.n + 1}", real=True)
     sigma = sp.Symbol("sigma", real=True)
     q_i, q_j = sp.symbols("q_i q_j", real=True)
-    whole = sp.Add(*(SPRING.potential.xreplace({q_i: q[i], q_j: q[j], WEIGHT: w}) for i, j, w in pairs(graph)))
-    expected = -sp.hessian(whole, q) / sigma
-    found = connectivity("spring", graph)
-    assert sp.Matrix(graph.n, graph.n, lambda i, j: sp.Rational(str(found[i][j]))) == expected
-    assert found == graph.rows
+    total = sp.Add(*(SPRING.potential.xreplace({q_i: q[i], q_j: q[j], WEIGHT: w}) for i, j, w in pairs(graph)))
+    expected = -sp.hessian(total, q) / sigma
+    rows = connectivity("spring", graph)
+    assert sp.Matrix(graph.n, graph.n, lambda i, j: sp.Rational(str(rows[i][j]))) == expected
+    assert rows == graph.rows
 
 
 def test_connectivity_of_the_papers_chain() -> None:
@@ -223,18 +223,18 @@ def test_a_nonlinear_link_keeps_the_difference_too() -> None:
 
 def test_a_link_that_is_no_difference_stays_as_it_is() -> None:
     x_j, weight, sigma = sp.symbols("x_j weight sigma", real=True)
-    found = edge(sprung(-SIGMA * WEIGHT * Q_I * Q_J), node("harmonic"))
-    assert found.rhs == (0, sigma * weight * x_j)
-    assert not found.diffusive
+    link = edge(sprung(-SIGMA * WEIGHT * Q_I * Q_J), node("harmonic"))
+    assert link.rhs == (0, sigma * weight * x_j)
+    assert not link.diffusive
 
 
 def test_heavy_oscillators_feel_their_links_less() -> None:
     x = sp.Symbol("x", real=True)
     x_i, x_j, weight, sigma = sp.symbols("x_i x_j weight sigma", real=True)
-    found = edge("spring", node("harmonic"), heavy(sp.Integer(3)))
-    assert sp.expand(found.rhs[1] - sigma * weight * (x_j - x_i) / 3) == 0
-    found = edge("spring", node("harmonic"), heavy(1 + x**2))
-    assert sp.expand(found.rhs[1] - sigma * weight * (x_j - x_i) / (1 + x_i**2)) == 0, "the mass of the target"
+    link = edge("spring", node("harmonic"), heavy(sp.Integer(3)))
+    assert sp.expand(link.rhs[1] - sigma * weight * (x_j - x_i) / 3) == 0
+    link = edge("spring", node("harmonic"), heavy(1 + x**2))
+    assert sp.expand(link.rhs[1] - sigma * weight * (x_j - x_i) / (1 + x_i**2)) == 0, "the mass of the target"
     with pytest.raises(ValueError, match="'harmonic': a coupling needs masses that do not depend on time"):
         edge("spring", node("harmonic"), heavy(1 + TIME**2))
 
@@ -252,12 +252,12 @@ def test_without_an_edge_or_links_nodes_stay_alone() -> None:
 
 def models() -> list[tuple[str, str | None]]:
     """Every oscillator with every friction law that it takes."""
-    found: list[tuple[str, str | None]] = []
+    collected: list[tuple[str, str | None]] = []
     for name in names(OSCILLATOR):
-        made = oscillator_of(name)
-        laws = names(FRICTION_LAW) if len(made.coordinates) == 1 else ("exponential",)
-        found += [(name, law) for law in laws] if made.takes_friction else [(name, None)]
-    return found
+        node = oscillator_of(name)
+        laws = names(FRICTION_LAW) if len(node.coordinates) == 1 else ("exponential",)
+        collected += [(name, law) for law in laws] if node.takes_friction else [(name, None)]
+    return collected
 
 
 @pytest.mark.parametrize(

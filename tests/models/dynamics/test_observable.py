@@ -42,7 +42,7 @@ def test_observables_and_their_texts(observable: object, text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ("x", "expected one of mean, maximum, minimum, end, variance of an expression outermost"),
         ("mean(x", "unreadable expression 'mean(x' with a ( that is not closed; expected such as 'mean(x_1 - x_2)'"),
@@ -71,10 +71,10 @@ def test_observables_and_their_texts(observable: object, text: str) -> None:
         ("mean(" + "x+" * 2500 + "x)", "characters"),
     ],
 )
-def test_other_texts_are_refused_in_one_line(text: str, words: str) -> None:
+def test_other_texts_are_refused_in_one_line(text: str, message: str) -> None:
     with pytest.raises(ValueError, match=r"observe r: ") as error:
         as_observable("observe r", text)
-    assert words in str(error.value)
+    assert message in str(error.value)
     assert "\n" not in str(error.value)
 
 
@@ -84,7 +84,7 @@ def test_complex_values_are_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("given", "message"),
     [
         ({"r": "mean(y)"}, "observe r: unknown name 'y'; known: x, v, x_1"),
         ({"r": "mean(nodes[5](x))"}, "observe r: found node 5; expected 1 to 4"),
@@ -96,10 +96,10 @@ def test_complex_values_are_refused() -> None:
         ({"a b": "mean(x)"}, "expected letters"),
     ],
 )
-def test_scenes_refuse_what_their_model_does_not_know(given: dict[str, str], words: str) -> None:
+def test_scenes_refuse_what_their_model_does_not_know(given: dict[str, str], message: str) -> None:
     with pytest.raises(ValueError, match=r"observe") as error:
         Scene(topology=ring(4), observe=given)
-    assert words in str(error.value)
+    assert message in str(error.value)
 
 
 def test_values_that_are_no_observables() -> None:
@@ -126,9 +126,9 @@ def test_states_that_some_nodes_lack() -> None:
     assert scene.replace(observe={"r": "mean(z_2)"}).observe
 
 
-@pytest.mark.parametrize(("oscillator", "words"), [("rossler", "z_1, a, b, c, t$"), ("duffing", "omega, t, energy$")])
-def test_the_energy_is_known_where_there_is_one(oscillator: str, words: str) -> None:
-    with pytest.raises(ValueError, match=f"unknown name 'q'; known: .*{words}"):
+@pytest.mark.parametrize(("oscillator", "message"), [("rossler", "z_1, a, b, c, t$"), ("duffing", "omega, t, energy$")])
+def test_the_energy_is_known_where_there_is_one(oscillator: str, message: str) -> None:
+    with pytest.raises(ValueError, match=f"unknown name 'q'; known: .*{message}"):
         Scene(oscillator, window=1, observe={"r": "mean(q)"})
 
 
@@ -150,9 +150,9 @@ def test_no_observable_takes_the_name_of_a_variable() -> None:
 MANUAL = (Path(__file__).parents[3] / "docs" / "observing.md").read_text("utf-8")
 
 
-@pytest.mark.parametrize("words", re.findall(r"```toml\n(.*?)```", MANUAL, re.DOTALL))
-def test_the_manuals_files_are_scenes(tmp_path: Path, words: str) -> None:
-    (tmp_path / "mine.toml").write_text(words, "utf-8")
+@pytest.mark.parametrize("text", re.findall(r"```toml\n(.*?)```", MANUAL, re.DOTALL))
+def test_the_manuals_files_are_scenes(tmp_path: Path, text: str) -> None:
+    (tmp_path / "mine.toml").write_text(text, "utf-8")
     scene = load_scene(tmp_path / "mine.toml")
     assert scene.n > 1
     assert scene.observe or scene.sections or scene.draws

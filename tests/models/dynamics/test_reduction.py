@@ -37,29 +37,29 @@ def linked(n: int, links) -> Equations:
 
 
 def test_no_forcing_takes_the_frequency_along():
-    made = substitute_constants(friction_chain(2), {"u": 0})
-    assert not made.node.forced
-    assert set(friction_chain(2).parameters) - set(made.parameters) == {"u", "omega"}
-    assert made.links == friction_chain(2).links
+    reduced = substitute_constants(friction_chain(2), {"u": 0})
+    assert not reduced.node.forced
+    assert set(friction_chain(2).parameters) - set(reduced.parameters) == {"u", "omega"}
+    assert reduced.links == friction_chain(2).links
 
 
 def test_no_coupling_leaves_no_edge():
-    made = substitute_constants(friction_chain(3), {"sigma": 0})
-    assert made.edge is None
-    assert made.links == ()
-    assert "sigma" not in made.parameters
-    assert made.n == 3
+    reduced = substitute_constants(friction_chain(3), {"sigma": 0})
+    assert reduced.edge is None
+    assert reduced.links == ()
+    assert "sigma" not in reduced.parameters
+    assert reduced.n == 3
 
 
 def test_folded_equations_are_the_substituted_ones():
     full = looped()
     values = {"mu": Fraction(3, 7), "sigma": Fraction(-2), "c": 0}
-    made = substitute_constants(full, values)
+    reduced = substitute_constants(full, values)
     swap = {sp.Symbol(name, real=True): sp.Rational(v.numerator, v.denominator) for name, v in values.items()}
-    for a, b in zip(made.rhs(), full.rhs(), strict=True):
+    for a, b in zip(reduced.rhs(), full.rhs(), strict=True):
         assert sp.simplify(a - b.xreplace(swap)) == 0
-    assert made.parameters == ("omega", "delta")
-    assert made.digest != full.digest
+    assert reduced.parameters == ("omega", "delta")
+    assert reduced.digest != full.digest
 
 
 def test_nothing_to_fold_changes_nothing():
@@ -148,28 +148,28 @@ def balanced(links, classes) -> bool:
 @pytest.mark.parametrize("seed", range(60))
 def test_the_partition_is_the_coarsest_of_all_balanced_ones(seed):
     """Every partition of up to six nodes is tried: the found one is balanced, and no balanced one has fewer classes."""
-    numbers = random.Random(seed)
-    n = numbers.randint(2, 6)
+    dice = random.Random(seed)
+    n = dice.randint(2, 6)
     if seed % 3:
-        links = random_links(numbers, n)
+        links = random_links(dice, n)
     else:
         pairs = nx.gnp_random_graph(n, 0.5, seed=seed).edges
         links = tuple((a, b, Fraction(1)) for i, j in pairs for a, b in ((i, j), (j, i)))
-    colours = [numbers.choice("ab") if seed % 2 else "a" for _ in range(n)]
+    colours = [dice.choice("ab") if seed % 2 else "a" for _ in range(n)]
     if seed % 5 == 0:
         colours[0] = "first"
-    found = coarsest_balanced(n, links, colours)
+    partition = coarsest_balanced(n, links, colours)
     one_colour = [p for p in partitions(n) if len(set(zip(p, colours, strict=True))) == max(p) + 1]
     all_balanced = [p for p in one_colour if balanced(links, p)]
-    assert found in all_balanced
-    assert [p for p in all_balanced if max(p) <= max(found)] == [found]
+    assert partition in all_balanced
+    assert [p for p in all_balanced if max(p) <= max(partition)] == [partition]
 
 
 def test_large_graphs_are_quick_work():
     """A ring of 30000 with one odd start: every distance from it is a class, which takes the most refinements."""
     n = 30_000
-    found = coarsest_balanced(n, ring(n).links, ["odd", *["even"] * (n - 1)])
-    assert found == tuple(min(i, n - i) for i in range(n))
+    partition = coarsest_balanced(n, ring(n).links, ["odd", *["even"] * (n - 1)])
+    assert partition == tuple(min(i, n - i) for i in range(n))
 
 
 def test_one_colour_for_each_node():
@@ -215,8 +215,8 @@ def test_the_quotient_moves_like_the_network(graph, colours, count, coupling):
 @pytest.mark.parametrize("seed", range(20))
 def test_random_quotients_move_like_their_networks(seed):
     """Two copies of a random graph of three nodes, each link shared between the copies of its source."""
-    numbers = random.Random(seed)
-    inner = [(i, j, numbers.choice([w / 2, w]), w) for i, j, w in random_links(numbers, 3)]
+    dice = random.Random(seed)
+    inner = [(i, j, dice.choice([w / 2, w]), w) for i, j, w in random_links(dice, 3)]
     links = []
     for i, j, share, w in inner:
         for copy in range(2):
@@ -231,13 +231,13 @@ def trajectory(equations: Equations, start: np.ndarray, values: dict[str, float]
     """States along 600 steps of the classical Runge-Kutta method."""
     names = [*equations.state, *equations.parameters]
     rate = sp.lambdify([TIME, *real(*names)], equations.rhs(), "math")
-    numbers, y, h = [values[name] for name in equations.parameters], start, 0.01
+    parameter_values, y, h = [values[name] for name in equations.parameters], start, 0.01
     made = []
     for k in range(600):
-        k1 = np.array(rate(k * h, *y, *numbers))
-        k2 = np.array(rate((k + 0.5) * h, *(y + h / 2 * k1), *numbers))
-        k3 = np.array(rate((k + 0.5) * h, *(y + h / 2 * k2), *numbers))
-        k4 = np.array(rate((k + 1) * h, *(y + h * k3), *numbers))
+        k1 = np.array(rate(k * h, *y, *parameter_values))
+        k2 = np.array(rate((k + 0.5) * h, *(y + h / 2 * k1), *parameter_values))
+        k3 = np.array(rate((k + 0.5) * h, *(y + h / 2 * k2), *parameter_values))
+        k4 = np.array(rate((k + 1) * h, *(y + h * k3), *parameter_values))
         y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         made.append(y)
     return np.array(made)
@@ -248,8 +248,8 @@ def test_trajectories_of_quotients_are_those_of_random_graphs(seed):
     """Random regular graphs; mirrored by construction, half of the nodes start as their twins do."""
     half = nx.random_regular_graph(2, 4, seed=seed)
     doubled = nx.disjoint_union(half, half)
-    numbers = random.Random(seed)
-    for i, j in numbers.sample(sorted(product(range(4), repeat=2)), 5):
+    dice = random.Random(seed)
+    for i, j in dice.sample(sorted(product(range(4), repeat=2)), 5):
         doubled.add_edge(i, 4 + j)
         doubled.add_edge(j, 4 + i)
     links = sorted((a, b, Fraction(1)) for i, j in doubled.edges for a, b in ((i, j), (j, i)))
@@ -257,7 +257,7 @@ def test_trajectories_of_quotients_are_those_of_random_graphs(seed):
     small, classes = quotient(full, [i % 4 for i in range(8)])
     assert small.n == 4
     values = {"delta": 0.1, "beta": 1.0, "u": 0.3, "omega": 1.0, "sigma": 0.3}
-    begin = np.array([numbers.uniform(-1, 1) for _ in range(8)])
+    begin = np.array([dice.uniform(-1, 1) for _ in range(8)])
     columns = [c * 4 + k for c in range(2) for k in classes]
     whole, fewer = trajectory(full, begin[columns], values), trajectory(small, begin, values)
     assert np.abs(whole - fewer[:, columns]).max() < 1e-12

@@ -40,23 +40,23 @@ def numeric(e: sp.Expr, values: dict[str, float]) -> complex:
 
 @pytest.mark.parametrize("graph", [ring(4), complete(4), ONE_WAY])
 def test_the_modes_are_those_of_the_whole_network(graph: Topology) -> None:
-    made = scene(graph)
-    equations, values = made.equations, dict(made.parameters)
+    network = scene(graph)
+    equations, values = network.equations, dict(network.parameters)
     state = {"x": 0.7, "y": -0.4, "z": 1.3}
     everywhere = {f"{name}_{i + 1}": value for name, value in state.items() for i in range(graph.n)}
-    whole = np.zeros((12, 12), complex)
+    matrix = np.zeros((12, 12), complex)
     for (r, c), e in equations.jacobian().items():
-        whole[r, c] = numeric(e, values | everywhere)
+        matrix[r, c] = numeric(e, values | everywhere)
     plane = mode(equations, plane=True)
-    found = []
+    collected = []
     for gamma in np.linalg.eigvals(np.array(graph.matrix, dtype=float)):
         alpha = {"mode_alpha": -values["g"] * gamma.real, "mode_beta": -values["g"] * gamma.imag}
         own = np.zeros((6, 6), complex)
         for (r, c), e in plane.matrix:
             own[r, c] = numeric(e, values | alpha | {f"{name}_1": value for name, value in state.items()})
-        found += list(np.linalg.eigvals(own[:3, :3] - 1j * own[:3, 3:]))
-    expected = np.linalg.eigvals(whole)
-    gaps = np.abs(expected[:, None] - np.array(found)[None])
+        collected += list(np.linalg.eigvals(own[:3, :3] - 1j * own[:3, 3:]))
+    expected = np.linalg.eigvals(matrix)
+    gaps = np.abs(expected[:, None] - np.array(collected)[None])
     assert gaps.min(axis=0).max() < 1e-9
     assert gaps.min(axis=1).max() < 1e-9
 

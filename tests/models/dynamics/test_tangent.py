@@ -50,10 +50,10 @@ def test_a_deviation_obeys_the_directional_derivative_of_the_node(model: tuple, 
     equations = tangent_equations(single)
     values = at_states(equations, 3, near)
     x, v, d_x, d_v = equations.symbols(0)
-    found = evaluate(equations.rhs(), values)
+    parameter_values = evaluate(equations.rhs(), values)
     orbit = Equations.of_equal_nodes(single, None, 1).rhs()
-    assert found[:2] == evaluate(orbit, values)
-    assert close(found[2:], slopes(orbit, {x: values[d_x], v: values[d_v]}, values))
+    assert parameter_values[:2] == evaluate(orbit, values)
+    assert close(parameter_values[2:], slopes(orbit, {x: values[d_x], v: values[d_v]}, values))
 
 
 @NEAR
@@ -82,9 +82,9 @@ def test_the_jacobian_of_the_extended_system_is_its_derivative(kind: str, model:
     equations = extended(kind, *model)
     values = at_states(equations, 5, near)
     entries = equations.jacobian()
-    numbers = dict(zip(entries, evaluate(list(entries.values()), values), strict=True))
+    parameter_values = dict(zip(entries, evaluate(list(entries.values()), values), strict=True))
     for column, state in enumerate(equations.symbols(0)):
-        found = [numbers.get((row, column), mpmath.mpf(0)) for row in range(equations.dimension)]
+        found = [parameter_values.get((row, column), mpmath.mpf(0)) for row in range(equations.dimension)]
         assert close(found, slopes(equations.rhs(), {state: mpmath.mpf(1)}, values), digits=20)
 
 
@@ -121,20 +121,20 @@ def test_modes_are_the_eigenvalues_of_the_whole_network(coupling: str, family: s
 def both_spectra(graph: Topology, coupling: str, near: float | None) -> tuple[list, list]:
     """Eigenvalues of the network's Jacobian on the synchronous state, and of all its modes; 80 digits."""
     with mpmath.workdps(80):
-        whole = made(graph, coupling=coupling)
-        mode = transversal_equations(whole)
+        equations = made(graph, coupling=coupling)
+        mode = transversal_equations(equations)
         values = at_states(mode, 6, near)
         x, v = mode.symbols(0)[:2]
         together = dict(values)
         for i in range(graph.n):
-            together |= dict(zip(whole.symbols(i), (values[x], values[v]), strict=True))
+            together |= dict(zip(equations.symbols(i), (values[x], values[v]), strict=True))
         together[sp.Symbol("sigma", real=True)] = sigma = mpmath.mpf(TABLE["sigma"])
         block = {(r - 2, c - 2): e for (r, c), e in mode.jacobian().items() if r >= 2 and c >= 2}
         modes = []
         for eigenvalue in graph.spectrum.eigenvalues:
             values[ALPHA] = -sigma * mpmath.mpmathify(sp.N(eigenvalue.exact, 90))
             modes += spectrum_of(block, 2, values) * eigenvalue.multiplicity
-        return spectrum_of(whole.jacobian(), whole.dimension, together), modes
+        return spectrum_of(equations.jacobian(), equations.dimension, together), modes
 
 
 @pytest.mark.parametrize("coupling", ["spring", "damper"])

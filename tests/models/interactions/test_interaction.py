@@ -156,7 +156,7 @@ def test_brackets_are_no_operations() -> None:
 
 
 def test_a_scene_with_a_table_goes_to_a_dictionary_and_back() -> None:
-    given = {
+    settings = {
         "oscillator": "rossler",
         "links": [
             {"coupling": {"rates": {"x": "K*W*tanh(x_j - x_i - lag)"}, "parameters": {"K": 0.1, "lag": 0}},
@@ -164,7 +164,7 @@ def test_a_scene_with_a_table_goes_to_a_dictionary_and_back() -> None:
             {"coupling": "y->y", "topology": {"name": "star", "n": 4}},
         ],
     }  # fmt: skip
-    scene = Scene.from_dict(given)
+    scene = Scene.from_dict(settings)
     again = Scene.from_dict(scene.as_dict())
     assert again == scene
     assert again.equations.digest == scene.equations.digest
@@ -202,7 +202,7 @@ def test_one_layer_is_a_coupling_and_a_graph() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("keywords", "message"),
     [
         ({"links": [("x->x", ring(3)), ("y->y", ring(4))]}, "found graphs of 3, 4 nodes; expected one number of nodes"),
         (
@@ -216,9 +216,9 @@ def test_one_layer_is_a_coupling_and_a_graph() -> None:
         ({"links": [("x->x", ring(3))], "coupling": "y->y"}, "found a coupling beside it"),
     ],
 )
-def test_wrong_layers_are_refused(given: dict[str, Any], message: str) -> None:
+def test_wrong_layers_are_refused(keywords: dict[str, Any], message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=message):
-        Scene(oscillator="rossler", **given)
+        Scene(oscillator="rossler", **keywords)
 
 
 def test_what_several_layers_have_not_is_said() -> None:
@@ -254,8 +254,8 @@ def test_masses_of_both_ends() -> None:
 def test_a_potential_of_one_coordinate_is_a_spring() -> None:
     i, j, w = ends(load_oscillator("duffing"))
     sigma = sp.Symbol("sigma")
-    own = Potential(sigma * w * (i.x - j.x) ** 2 / 2, {sigma: 0})
-    made, spring = (Scene(oscillator="duffing", coupling=c, topology=ring(4)).equations for c in (own, "spring"))
+    potential = Potential(sigma * w * (i.x - j.x) ** 2 / 2, {sigma: 0})
+    made, spring = (Scene(oscillator="duffing", coupling=c, topology=ring(4)).equations for c in (potential, "spring"))
     assert made.digest == spring.digest
 
 
@@ -263,16 +263,16 @@ def test_a_potential_that_tells_its_ends_apart_has_a_direction() -> None:
     i, j, w = ends(load_oscillator("mass"))
     r, sigma, alpha, beta = j.x - i.x, *sp.symbols("sigma fput_alpha fput_beta")
     energy = sigma * w * (r**2 / 2 + alpha * r**3 / 3 + beta * r**4 / 4)
-    own = Potential(energy, {sigma: 1, alpha: 0.25, beta: 0})
-    made, fput = (Scene(oscillator="mass", coupling=c, topology=chain(4)).equations for c in (own, "fput"))
+    potential = Potential(energy, {sigma: 1, alpha: 0.25, beta: 0})
+    made, fput = (Scene(oscillator="mass", coupling=c, topology=chain(4)).equations for c in (potential, "fput"))
     for a, b in zip(made.rhs(), fput.rhs(), strict=True):
         assert sp.expand(a - b) == 0
 
 
 def test_the_strength_is_the_only_factor_of_the_whole_link() -> None:
     node = Scene(oscillator=ROTOR).equations.node
-    found = strength(edge(KURAMOTO, node, ROTOR), node.parameters)
-    assert found == real("K")
+    symbol = strength(edge(KURAMOTO, node, ROTOR), node.parameters)
+    assert symbol == real("K")
     b = sp.Symbol("b")
     several = Rates({TARGET.theta: K * b * W * (SOURCE.theta - TARGET.theta)}, {K: 1, b: 1})
     with pytest.raises(ValueError, match="found the factors K, b; expected sigma, or exactly one parameter"):

@@ -54,12 +54,12 @@ TOGETHER = {
 @pytest.mark.parametrize("name", SEPARATE)
 def test_products_are_the_link(name: str) -> None:
     link, sources, shifted = SEPARATE[name]
-    found = separated(link, ("omega",))
-    assert found is not None
-    assert (len(found.sources), found.shifted) == (sources, shifted)
+    products = separated(link, ("omega",))
+    assert products is not None
+    assert (len(products.sources), products.shifted) == (sources, shifted)
     symbols = (X, Y, X_J, Y_J, W, K, A, OMEGA, OMEGA_J, TIME)
     values = dict(zip(symbols, np.random.default_rng(3).uniform(0.2, 1.0, len(symbols)), strict=True))
-    for rate, row in zip(link.rhs, found.products, strict=True):
+    for rate, row in zip(link.rhs, products.products, strict=True):
         assert float(sum(c * a * b for c, a, b in row).subs(values) if row else 0) == pytest.approx(
             float(rate.subs(values))
         )
@@ -70,9 +70,9 @@ def test_products_are_the_link(name: str) -> None:
 
 
 def test_a_node_would_feel_itself_by_the_lag_alone() -> None:
-    found = separated(SEPARATE["lag"][0])
-    assert found is not None
-    assert found.own[0] == -K * W * sp.sin(A)
+    products = separated(SEPARATE["lag"][0])
+    assert products is not None
+    assert products.own[0] == -K * W * sp.sin(A)
     assert separated(SEPARATE["sine"][0]).own == (0, 0)
 
 
@@ -117,10 +117,10 @@ UNSUMMED = {
 @pytest.mark.parametrize("name", SUMMED)
 def test_sums_over_links_and_the_rest_are_the_link(name: str) -> None:
     link, sources, remains = SUMMED[name]
-    found = summed(link, ("omega",))
-    assert found is not None
-    assert (len(found.sources), any(found.rest)) == (sources, remains)
-    for rate, row, rest in zip(link.rhs, found.products, found.rest, strict=True):
+    sums = summed(link, ("omega",))
+    assert sums is not None
+    assert (len(sums.sources), any(sums.rest)) == (sources, remains)
+    for rate, row, rest in zip(link.rhs, sums.products, sums.rest, strict=True):
         total = rest + sum(shared * own * target * source for shared, own, target, source in row)
         assert sp.expand(sp.expand_trig(rate - total)) == 0
         for shared, own, target, source in row:
@@ -136,8 +136,8 @@ def test_links_whose_products_lose_digits_stay_as_they_are(name: str) -> None:
 
 
 def test_numbers_of_a_link_stand_with_its_weight() -> None:
-    found = summed(edge(K * A * W * sp.sin(GAP)), (), ("a",))
-    assert {own for _, own, *_ in found.products[0]} == {A * W}
+    sums = summed(edge(K * A * W * sp.sin(GAP)), (), ("a",))
+    assert {own for _, own, *_ in sums.products[0]} == {A * W}
 
 
 @pytest.mark.parametrize("rate", [W * sp.tanh(A * X_J), sp.tanh(W * X_J), W * X_J * sp.exp(-A * X)])

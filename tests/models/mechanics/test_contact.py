@@ -42,7 +42,7 @@ def test_the_derived_node_is_the_smooth_one_away_from_the_jump() -> None:
 
 
 @pytest.mark.parametrize(
-    ("acceleration", "law", "words"),
+    ("acceleration", "law", "message"),
     [
         (-X, sp.sign(W), "friction acts 0 times"),
         (-X + FORCE(X), sp.sign(W), "must fall with v"),
@@ -70,8 +70,8 @@ def test_the_derived_node_is_the_smooth_one_away_from_the_jump() -> None:
         (-X + FORCE(-V), sp.sign(W) / sp.sqrt(sp.Abs(W)), "has no finite value at w = 0"),
     ],
 )
-def test_what_has_no_set_valued_form(acceleration: sp.Expr, law: sp.Expr, words: str) -> None:
-    with pytest.raises(ValueError, match=words):
+def test_what_has_no_set_valued_form(acceleration: sp.Expr, law: sp.Expr, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
         set_valued(acceleration, FORCE, law, W, None, X, V)
 
 
@@ -144,10 +144,10 @@ def test_results_converge_with_the_tolerance_and_stick_is_exact() -> None:
 
 
 def test_equal_oscillators_stay_equal_although_the_state_is_unstable() -> None:
-    whole = run(scene(3, initial={"x": [0.3, 0.3, 0.3]}, parameters={"sigma": 0.9, "omega": 1.4}, window=300.0),
+    full = run(scene(3, initial={"x": [0.3, 0.3, 0.3]}, parameters={"sigma": 0.9, "omega": 1.4}, window=300.0),
                 reduce=False, show_progress=False)  # fmt: skip
-    assert whole.sync_error.item() == 0.0
-    assert np.ptp(whole.states("end").reshape(3, 3), axis=1).max() == 0.0
+    assert full.sync_error.item() == 0.0
+    assert np.ptp(full.states("end").reshape(3, 3), axis=1).max() == 0.0
 
 
 @pytest.mark.parametrize("width", [1, *(pytest.param(width, marks=pytest.mark.long) for width in (2, 4))])
@@ -189,10 +189,10 @@ def test_slip_that_begins_slower_than_a_step_can_tell_does_not_chatter() -> None
 
 
 def test_a_static_coefficient_below_the_kinetic_one_is_refused() -> None:
-    words = "friction coulomb_static: found mu_s = 0.1 below mu_k = 0.2; expected mu_k <= mu_s"
-    with pytest.raises(ValueError, match=words):
+    message = "friction coulomb_static: found mu_s = 0.1 below mu_k = 0.2; expected mu_k <= mu_s"
+    with pytest.raises(ValueError, match=message):
         scene(friction="coulomb_static", parameters={"mu_s": 0.1})
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises(ValueError, match=message):
         scene(friction="coulomb_static", axes={"mu_s": [0.1, 0.5]})
     scene(friction="coulomb_static", axes={"mu_s": [0.1, 0.5], "mu_k": [0.05, 0.5]}, zipped=True)
     scene(friction="coulomb_static", contact="atan", parameters={"mu_s": 0.1})

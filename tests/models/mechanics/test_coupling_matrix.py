@@ -55,7 +55,7 @@ def canonical(words: str, state: tuple[str, ...]) -> str:
 
 
 @pytest.mark.parametrize(
-    ("words", "found"),
+    ("text", "found"),
     [
         ("x->x", {("x", "x"): 1}),
         (" y -> x ", {("y", "x"): 1}),
@@ -69,9 +69,9 @@ def canonical(words: str, state: tuple[str, ...]) -> str:
         ("x->x, y->y, z->z", {("x", "x"): 1, ("y", "y"): 1, ("z", "z"): 1}),
     ],
 )
-def test_entries(words: str, found: dict) -> None:
-    assert entries(words, STATE) == found
-    assert entries(canonical(words, STATE), STATE) == found
+def test_entries(text: str, found: dict) -> None:
+    assert entries(text, STATE) == found
+    assert entries(canonical(text, STATE), STATE) == found
 
 
 def test_a_component_that_looks_like_an_exponent_is_one() -> None:
@@ -107,10 +107,10 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("words", "part"), REFUSED)
-def test_refused(words: str, part: str) -> None:
-    for refuse in (lambda: entries(words, STATE), lambda: edge(words, node("rossler")),
-                   lambda: Scene(oscillator="rossler", topology=chain(2), coupling=words)):  # fmt: skip
+@pytest.mark.parametrize(("text", "part"), REFUSED)
+def test_refused(text: str, part: str) -> None:
+    for refuse in (lambda: entries(text, STATE), lambda: edge(text, node("rossler")),
+                   lambda: Scene(oscillator="rossler", topology=chain(2), coupling=text)):  # fmt: skip
         with pytest.raises(ValueError, match="coupling") as caught:
             refuse()
         assert part in str(caught.value)
@@ -176,12 +176,12 @@ def test_equal_states_feel_exactly_nothing() -> None:
 def test_a_network_by_hand() -> None:
     graph = from_matrix([[0, 0], ["2/3", "-2/3"]])
     single = node("rossler")
-    found = network(single, edge("x->x, 1/2 z->y", single), graph).rhs()
+    rates = network(single, edge("x->x, 1/2 z->y", single), graph).rhs()
     x_1, x_2, y_2, z_1, z_2, a = sp.symbols("x_1 x_2 y_2 z_1 z_2 a", real=True)
-    assert sp.expand(found[1] - (-y_2 - z_2 + SIGMA * sp.Rational(2, 3) * (x_1 - x_2))) == 0
-    assert sp.expand(found[3] - (x_2 + a * y_2 + SIGMA * (z_1 - z_2) / 3)) == 0
-    assert not found[0].has(SIGMA)
-    assert not found[2].has(SIGMA)
+    assert sp.expand(rates[1] - (-y_2 - z_2 + SIGMA * sp.Rational(2, 3) * (x_1 - x_2))) == 0
+    assert sp.expand(rates[3] - (x_2 + a * y_2 + SIGMA * (z_1 - z_2) / 3)) == 0
+    assert not rates[0].has(SIGMA)
+    assert not rates[2].has(SIGMA)
 
 
 def test_the_identity_shifts_every_mode_by_alpha() -> None:
@@ -243,10 +243,10 @@ def test_a_scene_refuses_springs_between_vector_fields() -> None:
 
 
 def test_a_coupling_that_is_too_long_to_be_written_back_is_refused() -> None:
-    words = ",".join(f"0.12345678{k}{s}->{t}" for k, (s, t) in enumerate((s, t) for s in STATE for t in STATE))
-    assert len(words) <= 200
+    text = ",".join(f"0.12345678{k}{s}->{t}" for k, (s, t) in enumerate((s, t) for s in STATE for t in STATE))
+    assert len(text) <= 200
     with pytest.raises(ValueError, match=r"coupling: found 2.. characters; expected at most 200"):
-        Scene(oscillator="rossler", coupling=words)
+        Scene(oscillator="rossler", coupling=text)
 
 
 def test_an_unknown_name_says_that_components_are_possible() -> None:

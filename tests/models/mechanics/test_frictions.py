@@ -48,8 +48,8 @@ def test_declarations(name: str) -> None:
 def test_parameters_have_no_name_of_an_oscillator_or_coupling(name: str) -> None:
     others: set[str] = {"kappa", "t", "x", "v", "weight"}
     for oscillator in names(OSCILLATOR):
-        made = oscillator_of(oscillator)
-        others |= set(made.parameters) if made.takes_friction else set()
+        node = oscillator_of(oscillator)
+        others |= set(node.parameters) if node.takes_friction else set()
     for coupling in names(COUPLING):
         others |= set(coupling_of(coupling).parameters)
     assert not others & set(law_of(name).parameters)
@@ -76,9 +76,9 @@ def test_drags_along_and_never_drives(name: str) -> None:
 @settings(max_examples=25, deadline=None)
 def test_never_drives_with_any_allowed_parameters(name: str, contact: str, seed: int, speed: float) -> None:
     """w f(w) >= 0 also where friction grows with speed, mu_s < mu_k, and f(0) = 0 exactly, smoothed or not."""
-    numbers, law = random.Random(seed), law_of(name)
+    dice, law = random.Random(seed), law_of(name)
     values = {
-        sp.Symbol(p, real=True): sp.Rational(allowed.check(p, numbers.choice([0.01, 0.3, 2.0, 50.0])))
+        sp.Symbol(p, real=True): sp.Rational(allowed.check(p, dice.choice([0.01, 0.3, 2.0, 50.0])))
         for p, allowed in {**law.parameters, "kappa": KAPPA}.items()
     }
     f = friction_coefficient(law_of(name), contact)(W).xreplace(values)

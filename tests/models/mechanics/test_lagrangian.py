@@ -24,23 +24,25 @@ def equations_of_motion(
 
 
 def test_pendulum() -> None:
-    found = equations_of_motion(m * length**2 * v**2 / 2, -m * g * length * sp.cos(x), [-b * v], [x], [v])
-    assert sp.simplify(found[0] + g / length * sp.sin(x) + b * v / (m * length**2)) == 0
+    accelerations = equations_of_motion(m * length**2 * v**2 / 2, -m * g * length * sp.cos(x), [-b * v], [x], [v])
+    assert sp.simplify(accelerations[0] + g / length * sp.sin(x) + b * v / (m * length**2)) == 0
 
 
 def test_soft_walls_push_without_steps() -> None:
-    found = equations_of_motion(v**2 / 2, sp.Max(0, sp.Abs(x) - b) ** 2 + sp.Min(0, x - 2 * b) ** 3, [0], [x], [v])
-    assert found == (-2 * sp.sign(x) * sp.Max(0, sp.Abs(x) - b) - 3 * sp.Min(0, x - 2 * b) ** 2,)
+    accelerations = equations_of_motion(
+        v**2 / 2, sp.Max(0, sp.Abs(x) - b) ** 2 + sp.Min(0, x - 2 * b) ** 3, [0], [x], [v]
+    )
+    assert accelerations == (-2 * sp.sign(x) * sp.Max(0, sp.Abs(x) - b) - 3 * sp.Min(0, x - 2 * b) ** 2,)
 
 
 def test_growing_mass_brakes() -> None:
-    found = equations_of_motion(sp.exp(TIME) * v**2 / 2, sp.S.Zero, [sp.S.Zero], [x], [v])
-    assert sp.simplify(found[0] + v) == 0
+    accelerations = equations_of_motion(sp.exp(TIME) * v**2 / 2, sp.S.Zero, [sp.S.Zero], [x], [v])
+    assert sp.simplify(accelerations[0] + v) == 0
 
 
 def test_gyroscopic_terms_turn_the_motion() -> None:
-    found = equations_of_motion((v**2 + w**2) / 2 + b * x * w, sp.S.Zero, [0, 0], [x, y], [v, w])
-    assert found == (b * w, -b * v)
+    accelerations = equations_of_motion((v**2 + w**2) / 2 + b * x * w, sp.S.Zero, [0, 0], [x, y], [v, w])
+    assert accelerations == (b * w, -b * v)
 
 
 def test_kink_in_the_potential_gives_a_sign_and_no_delta() -> None:

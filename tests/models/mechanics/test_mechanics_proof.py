@@ -32,14 +32,14 @@ def accelerations(oscillator: str, coupling: str | None, graph: Topology, orient
     """Ours, keyed by coordinate; velocities are called rate_ and their coordinate."""
     single = node(oscillator, law_of(oscillator))
     half = len(single.state) // 2
-    made = network(single, edge(coupling + oriented, single, oscillator) if coupling else None, graph)
+    equations = network(single, edge(coupling + oriented, single, oscillator) if coupling else None, graph)
     names_of = [s.name for s in single.state]
     rates = {
         sp.Symbol(f"{v}_{i + 1}", real=True): sp.Symbol(f"rate_{q}_{i + 1}", real=True)
         for q, v in zip(names_of[:half], names_of[half:], strict=True)
         for i in range(graph.n)
     }
-    found = made.rhs()[half * graph.n :]
+    found = equations.rhs()[half * graph.n :]
     keys = [f"{q}_{i + 1}" for q in names_of[:half] for i in range(graph.n)]
     return {key: e.xreplace(rates) for key, e in zip(keys, found, strict=True)}
 
@@ -131,6 +131,6 @@ PUBLISHED = {
 def test_vector_fields_are_the_published_ones(oscillator: str) -> None:
     single = node(oscillator)
     assert oscillator in PUBLISHED, f"write the published equations of {oscillator} into PUBLISHED"
-    known = {s.name: s for s in (*single.state, *single.parameters)}
+    symbols = {s.name: s for s in (*single.state, *single.parameters)}
     for ours, text in zip(single.rhs, PUBLISHED[oscillator], strict=True):
-        assert sp.expand(ours - sp.sympify(text, locals=known)) == 0
+        assert sp.expand(ours - sp.sympify(text, locals=symbols)) == 0

@@ -49,9 +49,9 @@ def test_eq_3_with_the_law_of_eqs_4_and_5() -> None:
     mu_s, mu_k, a, kappa = sp.symbols("mu_s mu_k a kappa", real=True)
     w = theta_b - v
     law = (mu_k + (mu_s - mu_k) * sp.exp(-a * sp.Abs(w))) * (2 / sp.pi * sp.atan(kappa * w))
-    found = node("friction", "exponential", "atan")
-    assert found.rhs == (v, -x + u * sp.cos(omega * TIME) + epsilon * law)
-    assert node("friction", "exponential", "sign").rhs[1] == found.rhs[1].xreplace(
+    single = node("friction", "exponential", "atan")
+    assert single.rhs == (v, -x + u * sp.cos(omega * TIME) + epsilon * law)
+    assert node("friction", "exponential", "sign").rhs[1] == single.rhs[1].xreplace(
         {sp.atan(kappa * w): sp.pi / 2 * sp.sign(w)}
     )
 
@@ -93,8 +93,8 @@ def test_physical_and_scaled_motion_agree_in_numbers(
     by_hand = (spring + 2.0 * m * g * f) / m / (x0 * omega0**2)
     derived = node("friction", "exponential", "atan")
     symbols = [TIME, *derived.state, *derived.parameters]
-    numbers = [t, at, rate, *(value[s.name] for s in derived.parameters)]
-    found = derived.rhs[1].subs(dict(zip(symbols, numbers, strict=True)))
+    values = [t, at, rate, *(value[s.name] for s in derived.parameters)]
+    found = derived.rhs[1].subs(dict(zip(symbols, values, strict=True)))
     assert float(found) == pytest.approx(by_hand, rel=1e-12, abs=1e-12)
 
 
@@ -190,11 +190,11 @@ def test_a_lagrangian_in_one_file(plug_in: Callable[[str, str], Oscillator]) -> 
 def test_a_vector_field_in_one_file(plug_in: Callable[[str, str], Oscillator]) -> None:
     plug_in("roessler_again", ROESSLER)
     y, z, a, b, c = sp.symbols("y z a b c", real=True)
-    found = node("roessler_again")
-    assert found.state == (x, y, z)
-    assert found.rhs == (-y - z, x + a * y, b + z * (x - c))
+    single = node("roessler_again")
+    assert single.state == (x, y, z)
+    assert single.rhs == (-y - z, x + a * y, b + z * (x - c))
     with pytest.raises(ValueError, match="coupling 'spring' joins coordinates with velocities"):
-        edge("spring", found, "roessler_again")
+        edge("spring", single, "roessler_again")
 
 
 def test_an_angle_scales_like_an_angle(plug_in: Callable[[str, str], Oscillator]) -> None:
@@ -217,9 +217,9 @@ def test_cancelling_changes_the_text_of_an_equation_alone(name: str) -> None:
     """The rates of a node against those that the Euler-Lagrange equations give, at random places."""
     system = nondimensional(oscillator_of(name))
     derived = system.accelerations()
-    found = cancelled(derived)
-    assert operations(found) <= operations(derived)
-    forms = (derived, found, tuple(map(sp.cancel, derived)) if len(derived) == 1 else found)
+    quotient = cancelled(derived)
+    assert operations(quotient) <= operations(derived)
+    forms = (derived, quotient, tuple(map(sp.cancel, derived)) if len(derived) == 1 else quotient)
     symbols = sorted(set().union(*(e.free_symbols for e in derived)), key=str)
     functions = [sp.lambdify(symbols, form, [{"f": math.tanh}, "math"]) for form in forms]
     random = Random(name)

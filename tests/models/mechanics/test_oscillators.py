@@ -43,8 +43,8 @@ def divergence(name: str) -> sp.Expr:
 def test_roessler() -> None:
     assert node("rossler").rhs == (-Y - Z, X + A * Y, B + Z * (X - C))
     assert divergence("rossler") == A + X - C
-    rest = {Z: X / A, Y: -X / A}
-    assert sp.expand(node("rossler").rhs[2].xreplace(rest) * A - (X**2 - C * X + A * B)) == 0
+    remaining = {Z: X / A, Y: -X / A}
+    assert sp.expand(node("rossler").rhs[2].xreplace(remaining) * A - (X**2 - C * X + A * B)) == 0
 
 
 def test_lorenz() -> None:
@@ -57,9 +57,9 @@ def test_lorenz_convection_loses_its_stability_at_470_19() -> None:
     """Lorenz, J. Atmos. Sci. 20, 130 (1963), eq. 33: steady convection is unstable above r = 470/19 = 24.74."""
     at = {PRANDTL: sp.Integer(10), B: sp.Rational(8, 3), RAYLEIGH: sp.Rational(470, 19)}
     corner = sp.sqrt((at[RAYLEIGH] - 1) * at[B])
-    rest = {**at, X: corner, Y: corner, Z: at[RAYLEIGH] - 1}
-    assert [sp.simplify(e.subs(rest)) for e in node("lorenz").rhs] == [0, 0, 0]
-    matrix = sp.Matrix(node("lorenz").jacobian()).subs(rest)
+    remaining = {**at, X: corner, Y: corner, Z: at[RAYLEIGH] - 1}
+    assert [sp.simplify(e.subs(remaining)) for e in node("lorenz").rhs] == [0, 0, 0]
+    matrix = sp.Matrix(node("lorenz").jacobian()).subs(remaining)
     real = [root for root in sp.Poly(matrix.charpoly().as_expr()).all_roots() if root.is_real]
     assert real == [-sp.Rational(41, 3)]  # the trace: the other two are imaginary
 
@@ -164,13 +164,13 @@ def test_initial_names_states(name: str) -> None:
 
 @pytest.mark.parametrize(("n", "x"), [(1, (2.0,)), (2, (2.01, 1.99)), (4, (2.03, 2.01, 1.99, 1.97)), (7, None)])
 def test_starts_lie_around_the_centre(n: int, x: tuple[float, ...] | None) -> None:
-    found = default_start(("x", "y"), n, {"x": 2.0, "y": 5.0})
-    assert found["y"] == (5.0,) * n
-    distances = np.diff(found["x"])
+    start = default_start(("x", "y"), n, {"x": 2.0, "y": 5.0})
+    assert start["y"] == (5.0,) * n
+    distances = np.diff(start["x"])
     without = np.diff(default_start(("x", "y"), n)["x"])
     assert np.allclose(distances, without, rtol=0, atol=1e-15)
-    assert math.isclose(sum(found["x"]), 2.0 * n)
-    assert x is None or found["x"] == x
+    assert math.isclose(sum(start["x"]), 2.0 * n)
+    assert x is None or start["x"] == x
 
 
 def test_an_unknown_state_in_initial_is_refused() -> None:
@@ -193,9 +193,9 @@ def test_the_default_section_is_crossed_by_the_first_state(name: str) -> None:
 def test_the_fermi_pasta_ulam_ring_is_that_of_the_report() -> None:
     """x_i'' = (x_{i+1} - 2 x_i + x_{i-1}) + alpha [(x_{i+1} - x_i)^2 - (x_i - x_{i-1})^2] + beta [cubes], sigma = 1."""
     n, alpha, beta = 5, *sp.symbols("fput_alpha fput_beta", real=True)
-    made = Scene(oscillator="mass", coupling="fput", topology=ring(n)).equations
+    equations = Scene(oscillator="mass", coupling="fput", topology=ring(n)).equations
     x = sp.symbols(f"x_1:{n + 1}", real=True)
-    for i, found in enumerate(made.rhs()[n:]):
+    for i, found in enumerate(equations.rhs()[n:]):
         right, left = x[(i + 1) % n] - x[i], x[i] - x[i - 1]
         written = right - left + alpha * (right**2 - left**2) + beta * (right**3 - left**3)
         assert sp.expand(found.subs(sp.Symbol("sigma", real=True), 1) - written) == 0
@@ -233,8 +233,8 @@ def test_a_coupling_on_one_coordinate_leaves_the_others_alone() -> None:
 
 def test_a_full_mass_matrix_reaches_the_master_stability_function() -> None:
     """H of a spring between double pendulums is the inverse mass matrix at the synchronous state."""
-    made = Scene(oscillator="double_pendulum", topology=chain(2)).equations
-    (slope,) = source_slopes(made)
+    equations = Scene(oscillator="double_pendulum", topology=chain(2)).equations
+    (slope,) = source_slopes(equations)
     ratio, rod, phi, psi = sp.symbols("mass_ratio length_ratio phi psi", real=True)
     off = ratio * rod * sp.cos(phi - psi)
     masses = sp.Matrix([[1 + ratio, off], [off, ratio * rod**2]])
@@ -243,9 +243,9 @@ def test_a_full_mass_matrix_reaches_the_master_stability_function() -> None:
 
 @pytest.mark.parametrize("coupling", ["cubic_spring", "fput", "torsion", "friction_damper"])
 def test_non_linear_couplings_are_linear_between_equal_states(coupling: str) -> None:
-    made = Scene(oscillator="duffing", coupling=coupling, topology=chain(2)).equations
+    equations = Scene(oscillator="duffing", coupling=coupling, topology=chain(2)).equations
     plain = Scene(oscillator="duffing", coupling="damper" if "damper" in coupling else "spring", topology=chain(2))
-    assert source_slopes(made) == source_slopes(plain.equations)
+    assert source_slopes(equations) == source_slopes(plain.equations)
 
 
 @pytest.mark.long
@@ -254,13 +254,13 @@ def test_two_double_pendulums_in_a_kernel_follow_scipy() -> None:
     scene = Scene(oscillator="double_pendulum", topology=chain(2), coupling="spring on phi", parameters={"sigma": 0.3},
                   initial={"phi": [0.6, 0.2], "psi": [-0.3, 0.5]}, transient=0, window=12, record=("sync_error",),
                   rtol=1e-11, integrator="dop853")  # fmt: skip
-    found = run(scene, workers=1, show_progress=False)
-    assert found.success
+    result = run(scene, workers=1, show_progress=False)
+    assert result.success
     values = [scene.parameters[name] for name in scene.equations.parameters]
     rate = sp.lambdify([sp.symbols(scene.equations.state, real=True),
                         sp.symbols(scene.equations.parameters, real=True)], scene.equations.rhs())  # fmt: skip
     there = solve_ivp(lambda _, y: rate(y, values), (0, 12), scene.y0, method="DOP853", rtol=1e-12, atol=1e-13)
-    assert np.abs(found.states("end") - there.y[:, -1]).max() < 1e-8
+    assert np.abs(result.states("end") - there.y[:, -1]).max() < 1e-8
     phi = there.y[:2]
     assert np.abs(phi[0] - phi[1]).max() > 0.1
 
@@ -276,9 +276,9 @@ WRITTEN = {
 
 @pytest.mark.parametrize(("oscillator", "friction"), WRITTEN)
 def test_equations_written_by_hand(oscillator: str, friction: str | None) -> None:
-    found = node(oscillator, friction, "sign")
-    known = {s.name: s for s in (*found.state, *found.parameters)}
-    assert sp.expand(found.rhs[1] - sp.sympify(WRITTEN[oscillator, friction], locals=known)) == 0
+    single = node(oscillator, friction, "sign")
+    symbols = {s.name: s for s in (*single.state, *single.parameters)}
+    assert sp.expand(single.rhs[1] - sp.sympify(WRITTEN[oscillator, friction], locals=symbols)) == 0
 
 
 def test_joints_of_double_pendulums_lose_energy() -> None:
@@ -293,9 +293,9 @@ def test_the_exponents_of_damped_double_pendulums_at_rest_are_eigenvalues() -> N
     scene = Scene(oscillator="double_pendulum", topology=chain(2), coupling="spring on phi",
                   initial={"phi": 0.3, "psi": 0.2}, parameters={"delta": 0.4})  # fmt: skip
     alpha = np.array([0.0, 0.5, 3.0])
-    found = exponents(scene, alpha, starts=1, transient=100, periods=2000, workers=1)
+    result = exponents(scene, alpha, starts=1, transient=100, periods=2000, workers=1)
     masses, damping = np.array([[2.0, 1.0], [1.0, 1.0]]), 0.4 * np.array([[2.0, -1.0], [-1.0, 1.0]])
-    for strength, exponent, error in zip(alpha, found.exponent, found.stderr, strict=True):
+    for strength, exponent, error in zip(alpha, result.exponent, result.stderr, strict=True):
         stiffness = np.diag([2.0 + strength, 1.0])
         lower = -np.linalg.solve(masses, np.hstack([stiffness, damping]))
         largest = np.linalg.eigvals(np.vstack([np.hstack([np.zeros((2, 2)), np.eye(2)]), lower])).real.max()

@@ -66,9 +66,9 @@ def unequal() -> dict[str, Scene]:
     """Networks with inertia, with nodes of several kinds, and with both; some with parameters of their own."""
     weights = from_matrix([["-1/2", "1/2", 0], ["1/2", "-5/2", 2], [0, 2, -2]])
     kinds = [{"oscillator": "pendulum", "at": [2]}, {"oscillator": "friction", "at": [3]}]
-    own = {"delta": [0.1, 0.2, 0.3]}
+    values = {"delta": [0.1, 0.2, 0.3]}
     return {
-        "inertial": Scene(oscillator="duffing", coupling="inerter", topology=weights, parameters=own),
+        "inertial": Scene(oscillator="duffing", coupling="inerter", topology=weights, parameters=values),
         "two coordinates": scene_of("double_pendulum", "inerter"),
         "three kinds": Scene(oscillator="duffing", nodes=kinds, coupling="damper", topology=weights),
         "oriented": scene_of("mass", "fput", 3),
@@ -130,10 +130,10 @@ def test_arrays_have_the_energy_of_the_exact_expression(scene: Scene) -> None:
     states = np.random.default_rng(1).normal(size=(2, 5, scene.equations.dimension))
     symbols = [TIME, *(real for names in (scene.equations.state, scene.equations.parameters)
                        for real in sp.symbols(names, real=True))]  # fmt: skip
-    numbers = [scene.parameters[name] for name in scene.equations.parameters]
+    values = [scene.parameters[name] for name in scene.equations.parameters]
     found_both = function(states, 0.7), function.power(states, 0.7)
     for found, exact in zip(found_both, function.exact.whole(), strict=True):
-        written = sp.lambdify(symbols, exact)(0.7, *np.moveaxis(states, -1, 0), *numbers)
+        written = sp.lambdify(symbols, exact)(0.7, *np.moveaxis(states, -1, 0), *values)
         assert found.shape == (2, 5)
         assert np.allclose(found, written, rtol=1e-13, atol=1e-13)
     name = scene.equations.edges[0].parameters[0].name
@@ -183,8 +183,8 @@ def test_bodies_of_different_masses_have_an_energy_and_rates_have_none() -> None
         found, power = energy(scene).whole()
         states = [sp.Symbol(name, real=True) for name in scene.equations.state]
         drift = sum(found.diff(s) * rate for s, rate in zip(states, scene.equations.rhs(), strict=True))
-        numbers = {s: sp.Rational(3 * k + 1, 7) for k, s in enumerate(sorted(drift.free_symbols, key=str))}
+        values = {s: sp.Rational(3 * k + 1, 7) for k, s in enumerate(sorted(drift.free_symbols, key=str))}
         assert power == 0
-        assert abs(sp.N(drift.xreplace(numbers), 30)) < 1e-25
+        assert abs(sp.N(drift.xreplace(values), 30)) < 1e-25
     with pytest.raises(ValueError, match="energy: the coupling 'rates of u' has none"):
         energy(scene.replace(coupling=Rates({i.u: w * j.x}), parameters=None))

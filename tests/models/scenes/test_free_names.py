@@ -17,10 +17,10 @@ def decay(name: str, **keywords: object) -> Scene:
 @pytest.mark.parametrize("name", sorted(TAKEN))
 def test_what_is_swept_or_drawn_has_a_name_of_its_own(name: str) -> None:
     assert decay(name).parameters[name] == 1.0
-    words = f"found the name '{name}', which results have for something else; rename it"
-    with pytest.raises(ValueError, match=f"axis {name}: {words}"):
+    message = f"found the name '{name}', which results have for something else; rename it"
+    with pytest.raises(ValueError, match=f"axis {name}: {message}"):
         decay(name, axes={name: [1, 5]})
-    with pytest.raises(ValueError, match=f"draw {name}: {words}"):
+    with pytest.raises(ValueError, match=f"draw {name}: {message}"):
         decay(name, realisations=2, draws={name: [1, 5]})
 
 

@@ -184,7 +184,7 @@ def test_energies_of_links_in_a_notebook_are_those_of_a_scene_file() -> None:
 
 
 @pytest.mark.parametrize(
-    ("table", "words"),
+    ("table", "message"),
     [
         (
             {"energies": {"V": "W*q_i*q_j"}},
@@ -196,8 +196,8 @@ def test_energies_of_links_in_a_notebook_are_those_of_a_scene_file() -> None:
         ({"energies": {"potential": "W*q_i*q_j"}, "rates": {}}, "coupling: unknown key 'rates'"),
     ],
 )
-def test_wrong_energies_of_links_are_refused(table: dict, words: str) -> None:
-    with pytest.raises((ValueError, TypeError), match=words):
+def test_wrong_energies_of_links_are_refused(table: dict, message: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=message):
         Scene("duffing", table, chain(2))
 
 
@@ -251,15 +251,15 @@ def test_any_mutated_table_is_an_oscillator_or_one_clear_line(data: st.DataObjec
     try:
         scene = Scene.from_dict({"oscillator": tree})
     except (ValueError, TypeError) as error:
-        words = str(error)
-        assert 10 < len(words) < 1500, words
-        assert words.isprintable(), words
+        message = str(error)
+        assert 10 < len(message) < 1500, message
+        assert message.isprintable(), message
         return
     assert Scene.from_dict(json.loads(json.dumps(scene.as_dict()))) == scene
 
 
 @pytest.mark.parametrize(
-    ("table", "words"),
+    ("table", "message"),
     [
         ({"kinetic": "v**2/2"}, "oscillator: 'coordinates' is missing"),
         ({"coordinates": ["x"]}, "oscillator: 'kinetic' is missing"),
@@ -274,8 +274,8 @@ def test_any_mutated_table_is_an_oscillator_or_one_clear_line(data: st.DataObjec
         ({**TABLE, "friction": "./law.py"}, "no such file"),
     ],
 )
-def test_a_wrong_table_is_refused(table: dict, words: str) -> None:
-    with pytest.raises((ValueError, TypeError), match=words):
+def test_a_wrong_table_is_refused(table: dict, message: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=message):
         Scene.from_dict({"oscillator": table})
 
 

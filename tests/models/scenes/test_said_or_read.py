@@ -62,7 +62,7 @@ def test_eigenvalues_are_floats() -> None:
 
 
 @pytest.mark.parametrize(
-    ("made", "words"),
+    ("made", "message"),
     [
         (lambda: Rates({"x": "lambda*W*(x_j - x_i)"}, {}), "'lambda' is a word of Python"),
         (
@@ -80,10 +80,10 @@ def test_eigenvalues_are_floats() -> None:
         (lambda: from_edges([(1, 1), (1, 2)]), "to the rates of the node"),
     ],
 )
-def test_refusals_say_what_to_do(made: Callable[[], Any], words: str) -> None:
+def test_refusals_say_what_to_do(made: Callable[[], Any], message: str) -> None:
     with pytest.raises((ValueError, TypeError)) as caught:
         made()
-    assert words in str(caught.value)
+    assert message in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -82,12 +82,12 @@ def test_two_oscillators_record_the_error_and_know_sigma() -> None:
     [(1, (0.3,)), (4, (0.3, 0.28, 0.26, 0.24)), (5, (0.3, 0.285, 0.27, 0.255, 0.24)), (7, None)],
 )
 def test_default_start(n: int, x: tuple[float, ...] | None) -> None:
-    found = Scene(topology=chain(n)).initial
-    assert found["v"] == (0.0,) * n
-    assert len(set(found["x"])) == n
-    assert (found["x"][0], found["x"][-1]) == (0.3, 0.3 if n == 1 else 0.24)
+    initial = Scene(topology=chain(n)).initial
+    assert initial["v"] == (0.0,) * n
+    assert len(set(initial["x"])) == n
+    assert (initial["x"][0], initial["x"][-1]) == (0.3, 0.3 if n == 1 else 0.24)
     if x is not None:
-        assert found["x"] == x
+        assert initial["x"] == x
 
 
 def test_parameters_are_completed_and_text_is_a_number() -> None:
@@ -384,8 +384,8 @@ def test_equal_starts_are_said() -> None:
 
 def test_equal_starts_of_unequal_nodes_are_not_said_to_stay_equal() -> None:
     """The synchronisation error of this ring becomes 0.113."""
-    given = {"topology": ring(3), "initial": {"x": 0.1, "v": 0.0}}
-    uneven = Scene(oscillator="rotor", coupling="torsion", parameters={"power": [0.1, -0.2, 0.1]}, **given)
+    settings = {"topology": ring(3), "initial": {"x": 0.1, "v": 0.0}}
+    uneven = Scene(oscillator="rotor", coupling="torsion", parameters={"power": [0.1, -0.2, 0.1]}, **settings)
     (sentence,) = uneven.warnings
     assert "stays above 0" in sentence
     even = uneven.replace(parameters={"power": 0.1})
@@ -464,8 +464,8 @@ def test_replace_the_model() -> None:
 @pytest.mark.parametrize("name", scene_names())
 def test_every_shipped_scene_is_whole_and_written_back(name: str) -> None:
     scene = load_scene(name)
-    words = json.dumps(scene.as_dict())
-    assert Scene.from_dict(json.loads(words)) == scene
+    text = json.dumps(scene.as_dict())
+    assert Scene.from_dict(json.loads(text)) == scene
     assert scene.title
     assert scene.warnings == ()
     assert len(repr(scene)) < 200
@@ -493,12 +493,12 @@ K3 = [[-2, 1, 1], [1, -2, 1], [1, 1, -2]]
     [("ring", [[-1, 1, 0], [1, -2, 1], [0, 1, -1]]), ("ring", [[0]]), ("cycle", [[-1, 1], [1, -1]]), ("ring(4)", K3)],
 )
 def test_a_matrix_under_the_name_of_another_graph_is_refused(name: str, rows: list[list[int]]) -> None:
-    words = re.escape(f"topology: found the name {name!r} and links other than those of {name.split('(')[0]}(")
-    with pytest.raises(ValueError, match=words):
+    message = re.escape(f"topology: found the name {name!r} and links other than those of {name.split('(')[0]}(")
+    with pytest.raises(ValueError, match=message):
         Scene.from_dict({"topology": {"name": name, "matrix": rows, "n": 3}})
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises(ValueError, match=message):
         Scene(topology=from_matrix(rows, name=name))
-    with pytest.raises(ValueError, match=words.replace("topology", "draw topology")):
+    with pytest.raises(ValueError, match=message.replace("topology", "draw topology")):
         Scene(topology=from_matrix(rows), realisations=1, draws={"topology": [from_matrix(rows, name=name)]})
 
 
@@ -567,7 +567,7 @@ def write(folder: Path, words: str | bytes, name: str = "mine.toml") -> Path:
 
 def test_a_file_says_the_same_as_python(tmp_path: Path) -> None:
     write(tmp_path, "-2 1 1\n1 -2 1\n1 1 -2\n", "G.txt")
-    words = """
+    text = """
         record = ["section"]
         section = "x_2 rising 0.1"
         transient = 10
@@ -592,13 +592,13 @@ def test_a_file_says_the_same_as_python(tmp_path: Path) -> None:
         axes=[Axis("sigma", [0.1, 0.2]), Axis("x_1", [0, 0.5])],
         zipped=True,
     )
-    path = write(tmp_path, words)
+    path = write(tmp_path, text)
     assert load_scene(path) == load_scene(str(path)) == expected
-    assert load_scene(write(tmp_path, b"\xef\xbb\xbf" + words.encode(), "marked.toml")) == expected
+    assert load_scene(write(tmp_path, b"\xef\xbb\xbf" + text.encode(), "marked.toml")) == expected
 
 
 @pytest.mark.parametrize(
-    ("words", "part"),
+    ("text", "part"),
     [
         ("oscillator = friction", "mine.toml: not TOML"),
         ("a = 1\nb = =", "line 2, column 5"),
@@ -629,9 +629,9 @@ def test_a_file_says_the_same_as_python(tmp_path: Path) -> None:
         ("#" * 1_000_001, "more than 1000000 bytes"),
     ],
 )
-def test_bad_files(tmp_path: Path, words: str | bytes, part: str) -> None:
+def test_bad_files(tmp_path: Path, text: str | bytes, part: str) -> None:
     with pytest.raises((ValueError, TypeError)) as caught:
-        load_scene(write(tmp_path, words))
+        load_scene(write(tmp_path, text))
     assert part in str(caught.value)
     assert "\n" not in str(caught.value)
     assert "mine.toml" in str(caught.value)
@@ -682,15 +682,15 @@ def test_the_manuals_python_and_file_say_the_same(tmp_path: Path) -> None:
     assert names["scene"] == load_scene(path)
 
 
-@pytest.mark.parametrize("words", blocks("toml"))
-def test_the_manuals_files_are_scenes(tmp_path: Path, words: str) -> None:
-    assert load_scene(write(tmp_path, words)).n > 1
+@pytest.mark.parametrize("text", blocks("toml"))
+def test_the_manuals_files_are_scenes(tmp_path: Path, text: str) -> None:
+    assert load_scene(write(tmp_path, text)).n > 1
 
 
 def test_the_manuals_message_is_the_real_one(tmp_path: Path) -> None:
-    words = '[topology]\nname = "chain"\nn = 2\n[parameters]\nomga = 1'
+    text = '[topology]\nname = "chain"\nn = 2\n[parameters]\nomga = 1'
     with pytest.raises(ValueError, match="omga") as caught:
-        load_scene(write(tmp_path, words))
+        load_scene(write(tmp_path, text))
     assert f"```\n{caught.value}\n```" in MANUAL
 
 

@@ -32,14 +32,14 @@ DUFFING = {"delta": [0.1, 0.2, 0.3], "omega": [1.0, 1.5, 2.0]}
 
 
 def scene(**changes: object) -> Scene:
-    given = {"oscillator": "duffing", "topology": chain(3), "parameters": {"sigma": 0.1, **DUFFING}, "transient": 0,
+    settings = {"oscillator": "duffing", "topology": chain(3), "parameters": {"sigma": 0.1, **DUFFING}, "transient": 0,
              "window": 20, "record": (), "rtol": 1e-10}  # fmt: skip
-    return Scene(**{**given, **changes})
+    return Scene(**{**settings, **changes})
 
 
 def mixed(**changes: object) -> Scene:
-    given = {"nodes": [{"oscillator": "van_der_pol", "at": [2]}], "parameters": {"sigma": 0.1}, "time_unit": "time"}
-    return scene(**{**given, **changes})
+    settings = {"nodes": [{"oscillator": "van_der_pol", "at": [2]}], "parameters": {"sigma": 0.1}, "time_unit": "time"}
+    return scene(**{**settings, **changes})
 
 
 def by_scipy(found: Scene, end: float) -> np.ndarray:
@@ -53,14 +53,14 @@ def by_scipy(found: Scene, end: float) -> np.ndarray:
 
 
 def test_a_list_is_one_parameter_for_each_node() -> None:
-    made = scene()
-    assert made.varied == ("delta", "omega")
-    assert made.equations.parameters == (
+    network = scene()
+    assert network.varied == ("delta", "omega")
+    assert network.equations.parameters == (
         "delta_1", "delta_2", "delta_3", "beta", "u", "omega_1", "omega_2", "omega_3", "sigma")  # fmt: skip
-    assert made.time_unit == "time"
-    assert made.period is None
-    assert made.as_dict()["parameters"]["delta"] == [0.1, 0.2, 0.3]
-    assert Scene.from_dict(made.as_dict()) == made == made.replace(title="")
+    assert network.time_unit == "time"
+    assert network.period is None
+    assert network.as_dict()["parameters"]["delta"] == [0.1, 0.2, 0.3]
+    assert Scene.from_dict(network.as_dict()) == network == network.replace(title="")
 
 
 def test_equations_of_nodes_with_their_own_parameters() -> None:
@@ -128,9 +128,9 @@ def test_numbers_of_nodes_named_as_another_parameter_are_refused_by_the_scene() 
 
 
 def test_a_swept_parameter_of_one_node() -> None:
-    made = scene(parameters={"sigma": 0.1}, axes={"delta_2": [0.1, 0.2]}, time_unit="time")
-    assert made.varied == ("delta",)
-    assert made.replace(axes={}).varied == ()
+    network = scene(parameters={"sigma": 0.1}, axes={"delta_2": [0.1, 0.2]}, time_unit="time")
+    assert network.varied == ("delta",)
+    assert network.replace(axes={}).varied == ()
     with pytest.raises(ValueError, match="axis 'delta': nodes or links have different values"):
         scene(axes={"delta": [0.1, 0.2]})
     with pytest.raises(ValueError, match="delta has values for 3 nodes"):
@@ -143,38 +143,38 @@ def test_a_swept_parameter_of_one_node() -> None:
 
 
 def test_a_sweep_over_one_node_and_what_it_resumes(tmp_path) -> None:
-    made = scene(axes={"delta_2": [0.1, 0.4]})
-    found = run(made)
+    network = scene(axes={"delta_2": [0.1, 0.4]})
+    result = run(network)
     for k, value in enumerate((0.1, 0.4)):
-        np.testing.assert_allclose(found.states()[k], by_scipy(made.replace(axes={}, delta_2=value), 20), atol=2e-8)
-    found.save(tmp_path / "made.nc")
+        np.testing.assert_allclose(result.states()[k], by_scipy(network.replace(axes={}, delta_2=value), 20), atol=2e-8)
+    result.save(tmp_path / "made.nc")
     again = open_result(tmp_path / "made.nc")
-    assert again.scene == made
-    assert run(made, resume=again).states("end").tolist() == found.states("end").tolist()
+    assert again.scene == network
+    assert run(network, resume=again).states("end").tolist() == result.states("end").tolist()
 
 
 def test_nodes_merge_where_their_parameters_agree() -> None:
     """A ring of four with dampings a, b, a, b: opposite nodes start equal, and only with equal dampings they stay so."""
-    given = {"topology": ring(4), "initial": {"x": [0.3, 0.1, 0.3, 0.1], "v": 0}, "time_unit": "time"}
-    pairs = scene(parameters={"sigma": 0.1, "delta": [0.1, 0.2, 0.1, 0.2]}, **given)
+    settings = {"topology": ring(4), "initial": {"x": [0.3, 0.1, 0.3, 0.1], "v": 0}, "time_unit": "time"}
+    pairs = scene(parameters={"sigma": 0.1, "delta": [0.1, 0.2, 0.1, 0.2]}, **settings)
     chosen = reduce_scene(pairs)
     assert chosen.equations.n == 2
     assert [pairs.equations.parameters[k] for k in chosen.numbers][:2] == ["delta_1", "delta_2"]
-    assert reduce_scene(scene(parameters={"sigma": 0.1, "delta": [0.1, 0.2, 0.3, 0.2]}, **given)).equations.n == 3
-    swept = scene(parameters={"sigma": 0.1}, axes={"delta_3": [0.1, 0.2]}, **given)
+    assert reduce_scene(scene(parameters={"sigma": 0.1, "delta": [0.1, 0.2, 0.3, 0.2]}, **settings)).equations.n == 3
+    swept = scene(parameters={"sigma": 0.1}, axes={"delta_3": [0.1, 0.2]}, **settings)
     assert reduce_scene(swept).equations.n == 3
     np.testing.assert_allclose(run(pairs).states(), by_scipy(pairs, 20), atol=2e-8)
 
 
 def test_what_needs_equal_nodes_says_so() -> None:
-    made = scene(parameters={"sigma": 0.1, "delta": [0.1, 0.2, 0.3]})
-    for refuse in (lambda: transversal_equations(made.equations), lambda: ring_of_three(made.equations), lambda: certify(made),
-                   lambda: exponents(made, [0.1])):  # fmt: skip
+    network = scene(parameters={"sigma": 0.1, "delta": [0.1, 0.2, 0.3]})
+    for refuse in (lambda: transversal_equations(network.equations), lambda: ring_of_three(network.equations), lambda: certify(network),
+                   lambda: exponents(network, [0.1])):  # fmt: skip
         with pytest.raises(ValueError, match="nodes that differ in delta; expected equal nodes"):
             refuse()
     with pytest.raises(ValueError, match="nodes of several kinds; expected equal nodes"):
         transversal_equations(mixed().equations)
-    assert any("differ in delta" in words and "no complete synchronisation" in words for words in made.warnings)
+    assert any("differ in delta" in words and "no complete synchronisation" in words for words in network.warnings)
 
 
 # -- nodes of several kinds ------------------------------------------------------------------------------------
@@ -183,22 +183,22 @@ def test_what_needs_equal_nodes_says_so() -> None:
 def test_nodes_of_two_kinds_move_as_their_own_equations_say() -> None:
     x, v = ([real(f"{c}_{i}") for i in (1, 2, 3)] for c in "xv")
     beta, delta, mu, omega, sigma = (real(name) for name in ("beta", "delta", "mu", "omega", "sigma"))
-    made = mixed(record=("sync_error",))
+    network = mixed(record=("sync_error",))
     drive = [real(f"u_{i + 1}") * sp.cos(omega * TIME) for i in range(3)]
     rows = [-x[i] - beta * x[i] ** 3 - delta * v[i] + drive[i] + sigma * (x[1] - x[i]) for i in range(3)]
     rows[1] = -x[1] + mu * (1 - x[1] ** 2) * v[1] + drive[1] + sigma * (x[0] + x[2] - 2 * x[1])
-    assert [sp.expand(a - b) for a, b in zip(made.equations.rhs(), [*v, *rows], strict=True)] == [0] * 6
-    assert made.parameters["u_1"] == 0.3  # each node has the default of its kind
-    assert made.parameters["u_2"] == 0.0
-    found = run(made)
-    np.testing.assert_allclose(found.states(), by_scipy(made, 20), atol=2e-8)
-    assert found.sync_error > 0
+    assert [sp.expand(a - b) for a, b in zip(network.equations.rhs(), [*v, *rows], strict=True)] == [0] * 6
+    assert network.parameters["u_1"] == 0.3  # each node has the default of its kind
+    assert network.parameters["u_2"] == 0.0
+    result = run(network)
+    np.testing.assert_allclose(result.states(), by_scipy(network, 20), atol=2e-8)
+    assert result.sync_error > 0
 
 
 def test_scenes_with_groups_are_read_and_written() -> None:
-    made = mixed()
-    assert Scene.from_dict(made.as_dict()) == made == made.replace(title="")
-    assert made.replace(nodes=None).equations == scene(parameters={"sigma": 0.1}).equations
+    network = mixed()
+    assert Scene.from_dict(network.as_dict()) == network == network.replace(title="")
+    assert network.replace(nodes=None).equations == scene(parameters={"sigma": 0.1}).equations
     everywhere = scene(nodes=[{"oscillator": "van_der_pol", "at": [1, 2, 3]}], parameters={"sigma": 0.1})
     assert everywhere.equations == scene(oscillator="van_der_pol", parameters={"sigma": 0.1}).equations
 
@@ -223,19 +223,19 @@ def test_groups_that_fit_no_network(nodes: object, message: str) -> None:
 
 
 def test_components_of_one_name_are_joined_and_compared() -> None:
-    made = scene(oscillator="lorenz", nodes=[{"oscillator": "van_der_pol", "at": [2]}], coupling="x->x, y->y",
+    network = scene(oscillator="lorenz", nodes=[{"oscillator": "van_der_pol", "at": [2]}], coupling="x->x, y->y",
                  parameters={"sigma": 1}, record=("sync_error",))  # fmt: skip
-    assert made.equations.state == ("x_1", "x_2", "x_3", "y_1", "y_3", "z_1", "z_3", "v_2")
-    assert made.initial["y"] == made.initial["z"] == (0.0, 0.0) or len(made.initial["y"]) == 2
+    assert network.equations.state == ("x_1", "x_2", "x_3", "y_1", "y_3", "z_1", "z_3", "v_2")
+    assert network.initial["y"] == network.initial["z"] == (0.0, 0.0) or len(network.initial["y"]) == 2
     sigma, x, y = real("sigma"), real("x_1"), real("y_1")
-    forces = dict(zip(made.equations.state, made.equations.rhs(), strict=True))
+    forces = dict(zip(network.equations.state, network.equations.rhs(), strict=True))
     assert sp.diff(forces["x_1"], real("x_2")) == sigma
     assert not forces["y_1"].has(sigma)  # the neighbour has no y
     assert forces["x_1"].has(x, y)
     with pytest.raises(ValueError, match="coupling 'y->y' joins nothing between nodes of"):
-        made.replace(coupling="y->y")
+        network.replace(coupling="y->y")
     with pytest.raises(ValueError, match="unknown section variable 'y_2'"):
-        made.replace(section="y_2 falling")
+        network.replace(section="y_2 falling")
 
 
 def test_a_coupling_between_other_kinds_is_refused() -> None:
@@ -255,12 +255,12 @@ def test_an_energy_of_a_state_that_both_oscillators_have_is_refused() -> None:
 
 
 def test_friction_laws_of_two_kinds() -> None:
-    made = Scene(topology=chain(2), nodes=[{"oscillator": "friction", "friction": "coulomb", "at": [2]}])
-    words = text(made.equations)
+    network = Scene(topology=chain(2), nodes=[{"oscillator": "friction", "friction": "coulomb", "at": [2]}])
+    words = text(network.equations)
     assert "of node 1" in words
     assert "of node 2" in words
     with pytest.raises(ValueError, match="nodes of several kinds: found set-valued friction"):
-        Scene(topology=chain(2), contact="set-valued", nodes=made.nodes).equations  # noqa: B018
+        Scene(topology=chain(2), contact="set-valued", nodes=network.nodes).equations  # noqa: B018
 
 
 def test_the_equations_of_ten_thousand_nodes_cost_no_algebra(monkeypatch) -> None:
@@ -272,24 +272,24 @@ def test_the_equations_of_ten_thousand_nodes_cost_no_algebra(monkeypatch) -> Non
         return plain(self, rule)
 
     monkeypatch.setattr(sp.Basic, "xreplace", counted)
-    made = scene(topology=chain(10_000), parameters={"delta": np.linspace(0.1, 0.2, 10_000), "sigma": 0.1})
-    assert made.equations.dimension == 20_000
+    network = scene(topology=chain(10_000), parameters={"delta": np.linspace(0.1, 0.2, 10_000), "sigma": 0.1})
+    assert network.equations.dimension == 20_000
     assert len(calls) < 100
 
 
 def test_the_text_of_a_kernel_does_not_grow_with_the_network() -> None:
     texts = []
     for n in (30, 300):
-        made = scene(topology=chain(n), parameters={"sigma": 0.1, "delta": np.linspace(0.1, 0.2, n)})
-        texts.append(emit(made.equations, "rodas5p", Recording(()), width=2).text)
+        network = scene(topology=chain(n), parameters={"sigma": 0.1, "delta": np.linspace(0.1, 0.2, n)})
+        texts.append(emit(network.equations, "rodas5p", Recording(()), width=2).text)
     assert abs(len(texts[1]) - len(texts[0])) < 300  # numbers of three digits in place of two
 
 
 def test_a_star_of_two_kinds_may_be_one_way() -> None:
     graph = from_matrix([[0, 0, 0], [1, -1, 0], [1, 0, -1]])
-    made = mixed(topology=graph, nodes=[{"oscillator": "van_der_pol", "at": [1]}])
-    assert [ends for ends, _ in made.equations.edge_of] == [(1, 0)]
-    assert star(3).n == made.n
+    network = mixed(topology=graph, nodes=[{"oscillator": "van_der_pol", "at": [1]}])
+    assert [ends for ends, _ in network.equations.edge_of] == [(1, 0)]
+    assert star(3).n == network.n
 
 
 # -- oscillators and laws that `nodes` gives alone -------------------------------------------------------------------

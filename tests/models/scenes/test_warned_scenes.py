@@ -27,12 +27,12 @@ def told(made: Callable[[], Scene]) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("coupling", "graph", "words"),
+    ("coupling", "graph", "message"),
     [(VANISHING, PAIRS, "is not connected (2 parts)"), (ACTING, chain(4), "does not vanish between oscillators")],
 )
-def test_a_scene_without_a_synchronous_state_warns_once(coupling: Rates, graph: object, words: str) -> None:
+def test_a_scene_without_a_synchronous_state_warns_once(coupling: Rates, graph: object, message: str) -> None:
     (sentence,) = told(lambda: Scene(NODE, coupling, graph))  # type: ignore[arg-type]
-    assert words in sentence
+    assert message in sentence
     assert told(lambda: Scene(NODE, VANISHING, ring(4)).replace(coupling=coupling, topology=graph)) == [sentence]
 
 

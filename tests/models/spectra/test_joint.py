@@ -33,13 +33,13 @@ def by_vectors(*graphs: Topology) -> Counter[tuple[complex, ...]]:
     ],
 )
 def test_pairs_are_those_of_common_eigenvectors(graphs: tuple[Topology, ...]) -> None:
-    found = Counter()
+    counts = Counter()
     for mode in joint_spectrum(graphs):
-        found[
+        counts[
             tuple(complex(round(complex(v).real, 6) + 0.0, round(complex(v).imag, 6) + 0.0) for v in mode.values)
         ] += mode.multiplicity
-    assert found == by_vectors(*graphs)
-    assert sum(found.values()) == graphs[0].n
+    assert counts == by_vectors(*graphs)
+    assert sum(counts.values()) == graphs[0].n
 
 
 def test_eigenvalues_are_exact_and_told_apart_where_one_combination_is_not() -> None:
@@ -56,8 +56,8 @@ def test_eigenvalues_are_exact_and_told_apart_where_one_combination_is_not() -> 
 
 
 def test_matrices_beside_those_of_graphs_have_joint_eigenvalues_too() -> None:
-    found = joint_spectrum((ring(4).adjacency, complete(4).laplacian))
-    assert {str(mode): mode.multiplicity for mode in found} == {"(2, 0)": 1, "(0, 4)": 2, "(-2, 4)": 1}
+    pairs = joint_spectrum((ring(4).adjacency, complete(4).laplacian))
+    assert {str(mode): mode.multiplicity for mode in pairs} == {"(2, 0)": 1, "(0, 4)": 2, "(-2, 4)": 1}
 
 
 def test_matrices_that_do_not_commute_are_refused() -> None:

@@ -51,22 +51,22 @@ def stacked(graph: Topology, layers: int) -> Topology:
 @pytest.mark.parametrize("lengths", [(1,), (4,), (3, 1, 1), (2, 2), (5, 3, 3, 1), (1, 1, 1), (30, 28)])
 def test_chains_from_one_root_are_blocks_of_their_lengths(lengths: tuple[int, ...]) -> None:
     """A chain that hangs on the root is a block; the root's own eigenvalue is 0."""
-    found = structure(driven(lengths).spectrum)
+    blocks = structure(driven(lengths).spectrum)
     expected = tuple((size, lengths.count(size)) for size in sorted(set(lengths), reverse=True))
-    assert found == {sp.S(0): ((1, 1),), sp.S(-1): expected}
+    assert blocks == {sp.S(0): ((1, 1),), sp.S(-1): expected}
 
 
 @pytest.mark.parametrize(("graph", "layers"), [(chain(4), 2), (ring(5), 3), (chain(7), 2), (complete(3), 4)])
 def test_blocks_of_irrational_eigenvalues(graph: Topology, layers: int) -> None:
     """Square roots, cosines and a complete graph's multiple eigenvalue, each in as many blocks as it occurs."""
-    found = stacked(graph, layers).spectrum
+    spectrum = stacked(graph, layers).spectrum
     times = {sp.expand(e.exact - 1): e.multiplicity for e in graph.spectrum.eigenvalues}
-    others = [e for e in found.eigenvalues if e.exact != 0]
+    others = [e for e in spectrum.eigenvalues if e.exact != 0]
     assert len(others) == len(times)
     assert sorted(e.multiplicity for e in others) == sorted(layers * count for count in times.values())
     assert all(e.blocks == ((layers, e.multiplicity // layers),) for e in others)
     assert all(geometric_multiplicity(stacked(graph, layers), e) == e.geometric for e in others)
-    assert found.defective == tuple(others)
+    assert spectrum.defective == tuple(others)
 
 
 @settings(max_examples=25)
@@ -76,7 +76,7 @@ def test_random_one_way_graphs_have_the_blocks_of_sympy(data: st.DataObject) -> 
     rows = [[data.draw(st.sampled_from([0, 0, 1, 1, 2])) if j < i else 0 for j in range(n)] for i in range(n)]
     for i in range(n):
         rows[i][i] -= sum(rows[i])
-    found = structure(from_matrix(rows).spectrum)
+    blocks = structure(from_matrix(rows).spectrum)
     _, jordan = sp.Matrix(rows).jordan_form()
     sizes: dict[sp.Expr, list[int]] = {}
     start = 0
@@ -85,13 +85,13 @@ def test_random_one_way_graphs_have_the_blocks_of_sympy(data: st.DataObject) -> 
             sizes.setdefault(jordan[k, k], []).append(k + 1 - start)
             start = k + 1
     expected = {g: tuple((s, sizes[g].count(s)) for s in sorted(set(sizes[g]), reverse=True)) for g in sizes}
-    assert found == expected
+    assert blocks == expected
 
 
 def test_products_of_defective_graphs() -> None:
     """Blocks a and b of a Cartesian product make blocks a + b - 1, a + b - 3, … (A. C. Aitken, 1935)."""
-    found = structure(cartesian(feed_forward(3), feed_forward(3)).spectrum)
-    assert found == {sp.S(0): ((1, 1),), sp.S(-1): ((2, 2),), sp.S(-2): ((3, 1), (1, 1))}
+    blocks = structure(cartesian(feed_forward(3), feed_forward(3)).spectrum)
+    assert blocks == {sp.S(0): ((1, 1),), sp.S(-1): ((2, 2),), sp.S(-2): ((3, 1), (1, 1))}
     both = structure(union(feed_forward(3), feed_forward(5)).spectrum)
     assert both == {sp.S(0): ((1, 2),), sp.S(-1): ((4, 1), (2, 1))}
 

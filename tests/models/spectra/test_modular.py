@@ -33,9 +33,9 @@ COMPOSED = [
 
 
 def listed(graph: Topology) -> list[tuple[sp.Expr, int]]:
-    found = graph.closed_form()
-    assert found is not None
-    return list(found)
+    pairs = graph.closed_form()
+    assert pairs is not None
+    return list(pairs)
 
 
 @pytest.mark.parametrize(
@@ -77,15 +77,15 @@ def test_an_angle_of_another_ring_shows() -> None:
 def test_the_polynomial_modulo_a_prime_is_that_of_the_whole_numbers() -> None:
     for graph in (chain(9), star(7), topology("wheel", 8), one_way_ring(6), weighted(topology("grid", 9), "2/3")):
         (p,) = islice(_primes(8, "a"), 1)
-        whole = characteristic(graph)
-        expected = [int(c.p) * pow(int(c.q), -1, p) % p for c in whole.coeffs()]
+        polynomial = characteristic(graph)
+        expected = [int(c.p) * pow(int(c.q), -1, p) % p for c in polynomial.coeffs()]
         assert [int(c) for c in _characteristic(graph, p).coeffs()] == expected
 
 
 def test_a_claim_modulo_a_prime_is_that_of_the_whole_numbers() -> None:
     """-2 ± sqrt(2), -2 and -1 ± I: z^5 + 8 z^4 + 24 z^3 + 36 z^2 + 28 z + 8, multiplied by hand."""
-    numbers = [-2 + sp.sqrt(2), -2 - sp.sqrt(2), sp.Integer(-2), -1 + sp.I, -1 - sp.I]
-    found = [_powers(number) for number in numbers]
+    values = [-2 + sp.sqrt(2), -2 - sp.sqrt(2), sp.Integer(-2), -1 + sp.I, -1 - sp.I]
+    found = [_powers(number) for number in values]
     known = [(powers, 1) for powers in found if powers is not None]
     m = lcm(*(t.denominator for (_, terms), _ in known for t, _ in terms))
     (p,) = islice(_primes(m, "b"), 1)

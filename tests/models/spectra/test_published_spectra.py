@@ -19,10 +19,10 @@ R2, R3, R5, R13, R17 = (sp.sqrt(x) for x in (2, 3, 5, 13, 17))
 
 def from_rule(nodes: list, joined) -> nx.Graph:
     """The graph on these nodes that joins the pairs for which the rule holds."""
-    found = nx.Graph()
-    found.add_nodes_from(nodes)
-    found.add_edges_from((a, b) for a, b in combinations(nodes, 2) if joined(a, b))
-    return found
+    graph = nx.Graph()
+    graph.add_nodes_from(nodes)
+    graph.add_edges_from((a, b) for a, b in combinations(nodes, 2) if joined(a, b))
+    return graph
 
 
 def paley(q: int) -> nx.Graph:
@@ -33,8 +33,8 @@ def paley(q: int) -> nx.Graph:
 
 def clebsch() -> nx.Graph:
     """The folded 5-cube: 4-digit words that differ in one digit or in all four."""
-    words = list(product((0, 1), repeat=4))
-    return from_rule(words, lambda a, b: sum(x != y for x, y in zip(a, b, strict=True)) in (1, 4))
+    entries = list(product((0, 1), repeat=4))
+    return from_rule(entries, lambda a, b: sum(x != y for x, y in zip(a, b, strict=True)) in (1, 4))
 
 
 def shrikhande() -> nx.Graph:
@@ -56,8 +56,8 @@ def kneser(n: int, k: int) -> nx.Graph:
 
 def hamming(d: int, q: int) -> nx.Graph:
     """Words of d letters out of q that differ in one."""
-    words = list(product(range(q), repeat=d))
-    return from_rule(words, lambda a, b: sum(x != y for x, y in zip(a, b, strict=True)) == 1)
+    entries = list(product(range(q), repeat=d))
+    return from_rule(entries, lambda a, b: sum(x != y for x, y in zip(a, b, strict=True)) == 1)
 
 
 TABLE = [
@@ -93,9 +93,9 @@ TABLE = [
 def test_the_spectrum_is_the_published_one(name: str, graph: nx.Graph, adjacency: dict) -> None:
     degree = max(sp.S(theta) for theta in adjacency)
     expected = {sp.expand(theta - degree): count for theta, count in adjacency.items()}
-    found = spectrum.__wrapped__(from_graph(graph))
-    assert found.verified
-    assert {sp.expand(e.exact): e.multiplicity for e in found.eigenvalues} == expected
+    eigenvalues = spectrum.__wrapped__(from_graph(graph))
+    assert eigenvalues.verified
+    assert {sp.expand(e.exact): e.multiplicity for e in eigenvalues.eigenvalues} == expected
     assert sum(expected.values()) == graph.number_of_nodes()
 
 

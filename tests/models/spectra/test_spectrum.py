@@ -52,10 +52,10 @@ PUBLISHED = {2: "0, -2", 3: "0, -1, -3", 4: "0, -2 + sqrt(2), -2, -2 - sqrt(2)"}
 @pytest.mark.parametrize("disguise", [lambda graph: graph, anonymous])
 @pytest.mark.parametrize("n", PUBLISHED)
 def test_the_published_chains(n: int, disguise: Callable[[Topology], Topology]) -> None:
-    found = disguise(topology("chain", n)).spectrum
-    assert found.exact == tuple(sp.sympify(f"[{PUBLISHED[n]}]"))
-    assert found.multiplicities == (1,) * n
-    assert found.verified
+    spectrum = disguise(topology("chain", n)).spectrum
+    assert spectrum.exact == tuple(sp.sympify(f"[{PUBLISHED[n]}]"))
+    assert spectrum.multiplicities == (1,) * n
+    assert spectrum.verified
 
 
 def test_the_first_lines_a_user_types() -> None:
@@ -83,9 +83,9 @@ def test_closed_forms_agree_with_the_characteristic_polynomial_route(name: str) 
 def test_closed_forms_agree_with_numpy(name: str) -> None:
     for n in (size(name, 5), size(name, 40)):
         graph = topology(name, n)
-        numbers = np.linalg.eigvalsh(floats(graph)) if graph.symmetric else np.linalg.eigvals(floats(graph))
+        values = np.linalg.eigvalsh(floats(graph)) if graph.symmetric else np.linalg.eigvals(floats(graph))
         found = np.array(expanded(graph.spectrum), complex)
-        gap = np.abs(found[:, None] - numbers[None, :])
+        gap = np.abs(found[:, None] - values[None, :])
         assert gap.min(axis=0).max() < 1e-11
         assert np.sum(found) == pytest.approx(np.trace(floats(graph)))
         assert np.sum(found**2) == pytest.approx(np.trace(floats(graph) @ floats(graph)))
@@ -96,12 +96,12 @@ def test_closed_forms_agree_with_numpy(name: str) -> None:
 def test_seven_and_nine_oscillators_are_written_without_complex_radicals(
     n: int, disguise: Callable[[Topology], Topology]
 ) -> None:
-    found = disguise(topology("chain", n)).spectrum
-    for eigenvalue in found.eigenvalues:
+    spectrum = disguise(topology("chain", n)).spectrum
+    for eigenvalue in spectrum.eigenvalues:
         again = sp.sympify(eigenvalue.text)
         assert not again.has(sp.I)
         assert abs(sp.N(again, 30) - eigenvalue.evaluate(30)) < sp.Float("1e-28")
-    assert found.eigenvalues[1].text == f"-4*sin(pi/{2 * n})**2"
+    assert spectrum.eigenvalues[1].text == f"-4*sin(pi/{2 * n})**2"
 
 
 @pytest.mark.parametrize("n", range(2, 26))
@@ -113,9 +113,9 @@ def test_every_text_is_read_back_by_sympy(n: int) -> None:
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_algebraic_numbers_are_read_back_by_sympy(seed: int) -> None:
-    found = integer_graph(12, 0.4, seed).spectrum
-    assert any(isinstance(e.number, RealRoot) for e in found.eigenvalues)
-    for eigenvalue in found.eigenvalues:
+    spectrum = integer_graph(12, 0.4, seed).spectrum
+    assert any(isinstance(e.number, RealRoot) for e in spectrum.eigenvalues)
+    for eigenvalue in spectrum.eigenvalues:
         again = sp.sympify(eigenvalue.text)
         assert again == eigenvalue.exact
         assert abs(sp.N(again, 30) - eigenvalue.evaluate(30)) < sp.Float("1e-27")
@@ -172,8 +172,8 @@ def test_large_closed_forms_say_that_they_are_not_proved() -> None:
 
 
 def test_a_matrix_called_chain_gets_no_closed_form_of_the_chain() -> None:
-    found = Topology("chain", 3, topology("complete", 3).links).spectrum
-    assert repr(found) == "{0: 1, -3: 2}"
+    spectrum = Topology("chain", 3, topology("complete", 3).links).spectrum
+    assert repr(spectrum) == "{0: 1, -3: 2}"
     assert repr(Topology("ring", 2, topology("chain", 2).links).spectrum) == "{0: 1, -2: 1}"
 
 
@@ -196,8 +196,8 @@ def test_all_connected_graphs_of_few_nodes_against_numpy(largest: int) -> None:
         if not 0 < n <= largest or not networkx.is_connected(graph):
             continue
         counts[n] += 1
-        found = from_graph(graph, name="atlas")
-        exact = fresh(found)
+        network = from_graph(graph, name="atlas")
+        exact = fresh(network)
         assert exact.verified
         assert exact.n == n
         assert exact.eigenvalues[0] == Eigenvalue(sp.S.Zero, 1)
@@ -217,10 +217,10 @@ def test_random_rational_symmetric_matrices(n: int, data: st.DataObject) -> None
         if i < j and (weight := data.draw(weights)):
             links += [(i, j, weight), (j, i, weight)]
     graph = Topology("random", n, tuple(sorted(links)))
-    found = graph.spectrum
-    assert found.verified
-    assert list(found.values) == sorted(found.values, reverse=True)
-    assert np.sort(expanded(found)) == pytest.approx(np.linalg.eigvalsh(floats(graph)), rel=1e-9, abs=1e-9)
+    spectrum = graph.spectrum
+    assert spectrum.verified
+    assert list(spectrum.values) == sorted(spectrum.values, reverse=True)
+    assert np.sort(expanded(spectrum)) == pytest.approx(np.linalg.eigvalsh(floats(graph)), rel=1e-9, abs=1e-9)
 
 
 @settings(max_examples=30)
@@ -229,10 +229,10 @@ def test_random_one_way_graphs(n: int, data: st.DataObject) -> None:
     pairs = [(i, j) for i, j in product(range(n), repeat=2) if i != j]
     chosen = data.draw(st.lists(st.sampled_from(pairs), unique=True))
     graph = Topology("random", n, tuple((i, j, ONE) for i, j in sorted(chosen)))
-    found = graph.spectrum
-    assert found.verified
-    assert found.n == n
-    power = np.array([np.sum(expanded(found) ** k) for k in range(1, n + 1)])  # safe for Jordan blocks
+    spectrum = graph.spectrum
+    assert spectrum.verified
+    assert spectrum.n == n
+    power = np.array([np.sum(expanded(spectrum) ** k) for k in range(1, n + 1)])  # safe for Jordan blocks
     traces = [np.trace(np.linalg.matrix_power(floats(graph), k)) for k in range(1, n + 1)]
     assert power == pytest.approx(np.array(traces), rel=1e-10, abs=1e-10)
 
@@ -250,26 +250,26 @@ def test_a_feed_forward_chain_counts_its_jordan_block() -> None:
 
 @pytest.mark.parametrize("n", [3, 5, 7, 8, 12, 30])
 def test_one_way_rings_have_the_textbook_spectrum(n: int) -> None:
-    found = nameless_one_way_ring(n).spectrum
+    spectrum = nameless_one_way_ring(n).spectrum
     expected = np.exp(2j * np.pi * np.arange(n) / n) - 1
-    assert found.verified
-    assert np.sort_complex(np.round(expanded(found), 12)) == pytest.approx(
+    assert spectrum.verified
+    assert np.sort_complex(np.round(expanded(spectrum), 12)) == pytest.approx(
         np.sort_complex(np.round(expected, 12)), abs=1e-11
     )
-    pairs = [e.value for e in found.eigenvalues if isinstance(e.value, complex)]
+    pairs = [e.value for e in spectrum.eigenvalues if isinstance(e.value, complex)]
     assert all(a == b.conjugate() for a, b in zip(pairs[::2], pairs[1::2], strict=True))
-    for eigenvalue in found.eigenvalues:
+    for eigenvalue in spectrum.eigenvalues:
         again = complex(sp.sympify(eigenvalue.text).evalf())
         assert again == pytest.approx(complex(eigenvalue.value), abs=1e-14)
 
 
 def test_complex_eigenvalues_without_a_closed_form() -> None:
     rows = [[-2, 1, 0, 1, 0], [0, -1, 1, 0, 0], [0, 0, -1, 0, 1], [1, 0, 1, -2, 0], [1, 1, 0, 0, -2]]
-    found = from_matrix(rows).spectrum
-    assert any(isinstance(e.number, ComplexRoot) for e in found.eigenvalues)
+    spectrum = from_matrix(rows).spectrum
+    assert any(isinstance(e.number, ComplexRoot) for e in spectrum.eigenvalues)
     expected = np.sort_complex(np.linalg.eigvals(np.array(rows, float)))
-    assert np.sort_complex(np.array(found.values, complex)) == pytest.approx(expected, abs=1e-12)
-    for eigenvalue in found.eigenvalues:
+    assert np.sort_complex(np.array(spectrum.values, complex)) == pytest.approx(expected, abs=1e-12)
+    for eigenvalue in spectrum.eigenvalues:
         assert complex(sp.sympify(eigenvalue.text).evalf(15)) == pytest.approx(complex(eigenvalue.value))
         distance = abs(complex(eigenvalue.evaluate(30)) - complex(eigenvalue.value))
         assert distance < 1e-14
@@ -284,9 +284,9 @@ def test_complex_eigenvalues_without_a_closed_form() -> None:
     ],
 )
 def test_the_index_of_a_complex_root_is_that_of_sympy(coefficients: tuple[int, ...]) -> None:
-    found = roots(coefficients)
-    assert sorted(root.index for root in found) == list(range(len(coefficients) - 1))
-    for root in found:
+    isolated = roots(coefficients)
+    assert sorted(root.index for root in isolated) == list(range(len(coefficients) - 1))
+    for root in isolated:
         ball = root.enclosure(60)
         here = complex(float(ball.real.mid()), float(ball.imag.mid()))
         assert complex(root.expression.evalf(15)) == pytest.approx(here, rel=1e-12)
@@ -316,8 +316,8 @@ def test_short_nested_radicals_are_found() -> None:
     ],
 )
 def test_biquadratics(coefficients: tuple[int, ...], roots: set[sp.Expr] | None) -> None:
-    found = biquadratic(flint.fmpq_poly(list(coefficients)))
-    assert (None if found is None else set(found)) == roots
+    roots_of_it = biquadratic(flint.fmpq_poly(list(coefficients)))
+    assert (None if roots_of_it is None else set(roots_of_it)) == roots
 
 
 # ---- values ----
@@ -387,10 +387,12 @@ def test_roots_that_nearly_coincide_are_isolated() -> None:
     """(x² - 2)² (x² - 3) shifted by 10**-60: pairs of roots 10**-30 apart."""
     polynomial = flint.fmpz_poly([-2, 0, 1]) ** 2 * flint.fmpz_poly([-3, 0, 1]) * 10**60 + 1
     assert [f.degree() for f, _ in polynomial.factor()[1]] == [6]
-    found = roots(tuple(int(c) for c in polynomial.coeffs()))
-    assert len(found) == 6
-    assert all(a.high < b.low for a, b in pairwise(found))
-    assert all(abs(float(a.low) - x) < 1e-12 for a, x in zip(found[::2], (-(3**0.5), -(2**0.5), 2**0.5), strict=True))
+    isolated = roots(tuple(int(c) for c in polynomial.coeffs()))
+    assert len(isolated) == 6
+    assert all(a.high < b.low for a, b in pairwise(isolated))
+    assert all(
+        abs(float(a.low) - x) < 1e-12 for a, x in zip(isolated[::2], (-(3**0.5), -(2**0.5), 2**0.5), strict=True)
+    )
 
 
 @pytest.mark.parametrize(
@@ -400,10 +402,10 @@ def test_roots_that_nearly_coincide_are_isolated() -> None:
 def test_an_iteration_that_rounding_carries_past_a_root_comes_back(coefficients: list[int]) -> None:
     """Steps end on a root as near as numbers go: a step to the next root from there would leave roots out."""
     f = flint.fmpz_poly(coefficients)
-    found = discs(f)
-    assert found is not None
+    isolated = discs(f)
+    assert isolated is not None
     expected = sorted(float(root.real.mid()) for root, _ in f.complex_roots())
-    assert [float(flint.arb(disc.x)) for disc in found] == pytest.approx(expected, rel=1e-12)
+    assert [float(flint.arb(disc.x)) for disc in isolated] == pytest.approx(expected, rel=1e-12)
 
 
 def test_every_factor_of_an_undirected_graph_is_isolated_on_the_real_axis() -> None:
@@ -430,10 +432,10 @@ def test_roots_far_from_zero_and_near_one_another_are_isolated() -> None:
     f = flint.fmpz_mat(rows).charpoly().factor()[1][-1][0]
     assert f.degree() == 39
     assert f.height_bits() > 1200
-    found = discs(f)
-    assert found is not None
-    assert [disc.y for disc in found] == [0] * 39
-    assert all(sign(f, disc.x - disc.radius) * sign(f, disc.x + disc.radius) < 0 for disc in found)
+    isolated = discs(f)
+    assert isolated is not None
+    assert [disc.y for disc in isolated] == [0] * 39
+    assert all(sign(f, disc.x - disc.radius) * sign(f, disc.x + disc.radius) < 0 for disc in isolated)
 
 
 def test_largest_and_slowest_of_long_chains_and_of_small_graphs() -> None:
@@ -448,9 +450,9 @@ def test_largest_and_slowest_of_long_chains_and_of_small_graphs() -> None:
 
 
 def test_many_eigenvalues_are_shown_in_part() -> None:
-    numbers = [Eigenvalue(sp.Integer(-k), k + 1, None) for k in range(5)]
-    assert Spectrum(numbers).text(4) == "{0: 1, -1: 2, -2: 3, … (1 more), -4: 5}"
-    assert Spectrum(numbers[:4]).text(4) == repr(Spectrum(numbers[:4])) == "{0: 1, -1: 2, -2: 3, -3: 4}"
+    values = [Eigenvalue(sp.Integer(-k), k + 1, None) for k in range(5)]
+    assert Spectrum(values).text(4) == "{0: 1, -1: 2, -2: 3, … (1 more), -4: 5}"
+    assert Spectrum(values[:4]).text(4) == repr(Spectrum(values[:4])) == "{0: 1, -1: 2, -2: 3, -3: 4}"
 
 
 def test_the_characteristic_polynomial_of_fractions_is_monic() -> None:
@@ -463,8 +465,8 @@ def test_the_characteristic_polynomial_of_fractions_is_monic() -> None:
 @pytest.mark.parametrize(("name", "n"), [("chain", 7), ("ring", 5), ("star", 4), ("complete", 9)])
 def test_a_graph_by_the_name_and_links_of_a_family_has_its_closed_form(name: str, n: int) -> None:
     family = topology(name, n)
-    found = family.spectrum
-    assert spectrum(Topology(name, n, family.links)) is found
+    eigenvalues = family.spectrum
+    assert spectrum(Topology(name, n, family.links)) is eigenvalues
 
 
 @pytest.mark.parametrize(("name", "n"), [("chain", 7), ("ring", 2), ("hypercube", 6)])
@@ -491,17 +493,17 @@ def test_cancellation_costs_no_digits() -> None:
 
 
 def test_conjugates_stay_together_where_real_parts_agree() -> None:
-    numbers = [-1 + 2 * sp.I, sp.S(-3), -1 - sp.I, sp.S.Zero, -1 - 2 * sp.I, -1 + sp.I]
-    found = ordered([Eigenvalue(number, 1) for number in numbers])
+    values = [-1 + 2 * sp.I, sp.S(-3), -1 - sp.I, sp.S.Zero, -1 - 2 * sp.I, -1 + sp.I]
+    found = ordered([Eigenvalue(number, 1) for number in values])
     assert [e.value for e in found] == [0, -1 - 1j, -1 + 1j, -1 - 2j, -1 + 2j, -3]
 
 
 def test_numbers_closer_than_floats_are_ordered_and_told_apart() -> None:
     tiny = sp.Rational(1, 10**40)
-    numbers = [-sp.sqrt(2) - tiny, -sp.sqrt(2) + tiny, -sp.sqrt(2)]
-    found = ordered([Eigenvalue(number, 1) for number in numbers])
-    assert [e.number for e in found] == [numbers[1], numbers[2], numbers[0]]
-    assert Spectrum(found).largest == numbers[0]
+    values = [-sp.sqrt(2) - tiny, -sp.sqrt(2) + tiny, -sp.sqrt(2)]
+    found = ordered([Eigenvalue(number, 1) for number in values])
+    assert [e.number for e in found] == [values[1], values[2], values[0]]
+    assert Spectrum(found).largest == values[0]
     with pytest.raises(ProofError, match="two of 2 eigenvalues coincide"):
         ordered([Eigenvalue(sp.S(-2), 1), Eigenvalue(sp.S(-2), 1)])
 
@@ -525,9 +527,9 @@ def test_cosines_are_recognised_in_every_spelling() -> None:
 
 
 def test_as_dict_is_what_the_command_line_prints() -> None:
-    found = topology("chain", 4).spectrum.as_dict()
+    answer = topology("chain", 4).spectrum.as_dict()
     once = {"geometric_multiplicity": 1, "jordan_blocks": [[1, 1]], "polynomial": None, "index": None}
-    assert json.loads(json.dumps(found)) == {
+    assert json.loads(json.dumps(answer)) == {
         "n": 4,
         "polynomials": [],
         "eigenvalues": [
@@ -562,20 +564,20 @@ def test_an_ill_scaled_one_way_graph_is_proved() -> None:
         "1 1 1 -1 -2",
         "1e-12 1/3 -2 -2 10999999999997/3000000000000",
     ]
-    found = from_matrix([row.split() for row in rows]).spectrum
-    assert found.verified
-    assert [e.value for e in found if not isinstance(e.value, complex)] == pytest.approx(
+    spectrum = from_matrix([row.split() for row in rows]).spectrum
+    assert spectrum.verified
+    assert [e.value for e in spectrum if not isinstance(e.value, complex)] == pytest.approx(
         [0, -2.215330009687225, -999999999996.3334], rel=1e-14
     )
 
 
 def test_polynomials_are_written_once_and_roots_refer_to_them() -> None:
     graph = integer_graph(12, 0.4, 1)
-    found = json.loads(json.dumps(graph.spectrum.as_dict()))
-    assert len(found["polynomials"]) == 1
-    coefficients = [int(text, 0) for text in found["polynomials"][0]]
+    answer = json.loads(json.dumps(graph.spectrum.as_dict()))
+    assert len(answer["polynomials"]) == 1
+    coefficients = [int(text, 0) for text in answer["polynomials"][0]]
     p0 = sp.Poly(coefficients[::-1], sp.Symbol("x"))
-    of_roots = [e for e in found["eigenvalues"] if e["polynomial"] is not None]
+    of_roots = [e for e in answer["eigenvalues"] if e["polynomial"] is not None]
     assert len(of_roots) == 11
     for e in of_roots:
         root = sp.sympify(e["exact"], locals={"p0": p0})
@@ -588,22 +590,22 @@ def test_coefficients_that_python_refuses_to_write_are_abbreviated() -> None:
     weights = {(i, i + 1): Fraction(1, 10**1500 + i) for i in range(4)}
     links = sorted((*pair, w) for (i, j), w in weights.items() for pair in ((i, j), (j, i)))
     graph = Topology("long", 5, tuple(links))
-    found = fresh(graph)
-    assert found.verified
-    assert "(degree 4)" in repr(found)
-    assert "root 0 of a polynomial of degree 4" in table(found)
-    assert found[1].text.startswith("CRootOf(polynomial of degree 4 with coefficients of up to ")
-    assert len(found[1].text) < 100
-    assert float(str(found.largest)) == float(found.largest) == found[-1].value
-    listed = json.loads(json.dumps(found.as_dict()))
+    spectrum = fresh(graph)
+    assert spectrum.verified
+    assert "(degree 4)" in repr(spectrum)
+    assert "root 0 of a polynomial of degree 4" in table(spectrum)
+    assert spectrum[1].text.startswith("CRootOf(polynomial of degree 4 with coefficients of up to ")
+    assert len(spectrum[1].text) < 100
+    assert float(str(spectrum.largest)) == float(spectrum.largest) == spectrum[-1].value
+    listed = json.loads(json.dumps(spectrum.as_dict()))
     coefficients = [int(text, 0) for text in listed["polynomials"][0]]
-    assert coefficients == list(found[1].number.polynomial)
+    assert coefficients == list(spectrum[1].number.polynomial)
     assert max(coefficients) > 10**4300
 
 
 def test_roots_print_decimals_and_are_those_of_sympy() -> None:
-    found = integer_graph(12, 0.4, 1).spectrum
-    root = next(e for e in found if isinstance(e.number, RealRoot))
+    spectrum = integer_graph(12, 0.4, 1).spectrum
+    root = next(e for e in spectrum if isinstance(e.number, RealRoot))
     plain = sp.CRootOf(root.exact.poly, root.exact.index)
     assert str(root.exact) == f"{root.value:.16g}" == repr(root.exact) == sp.latex(root.exact) == sp.pretty(root.exact)
     assert root.exact == plain
@@ -617,14 +619,14 @@ def test_roots_print_decimals_and_are_those_of_sympy() -> None:
 
 
 def test_eigenvalues_are_compared_as_numbers() -> None:
-    found = topology("star", 4).spectrum  # 0, -1 twice, -4
-    assert found[0] == 0 == found[0]
-    assert found[1] == -1.0 != found[2]
-    assert found[2] < found[1] < found[0] <= 0 < 1
-    assert found[1] >= sp.Rational(-3, 2) >= -1.5 > found[2]
-    assert hash(found[1]) == hash(-1)
-    assert sorted(found) == list(found)[::-1]
-    assert max(found) == 0
+    spectrum = topology("star", 4).spectrum  # 0, -1 twice, -4
+    assert spectrum[0] == 0 == spectrum[0]
+    assert spectrum[1] == -1.0 != spectrum[2]
+    assert spectrum[2] < spectrum[1] < spectrum[0] <= 0 < 1
+    assert spectrum[1] >= sp.Rational(-3, 2) >= -1.5 > spectrum[2]
+    assert hash(spectrum[1]) == hash(-1)
+    assert sorted(spectrum) == list(spectrum)[::-1]
+    assert max(spectrum) == 0
     tiny = sp.Rational(1, 10**40)
     a, b = Eigenvalue(-sp.sqrt(2), 1), Eigenvalue(-sp.sqrt(2) + tiny, 1)
     assert a < b
@@ -632,9 +634,9 @@ def test_eigenvalues_are_compared_as_numbers() -> None:
     assert a != -(2.0**0.5)
     assert a == -sp.sqrt(2)
     assert Eigenvalue(-sp.sqrt(2), 2) != a
-    assert found[0] != "0"
-    whole = integer_graph(12, 0.4, 1).spectrum
-    assert all(b < a for a, b in pairwise(whole))
+    assert spectrum[0] != "0"
+    eigenvalues = integer_graph(12, 0.4, 1).spectrum
+    assert all(b < a for a, b in pairwise(eigenvalues))
     with pytest.raises(TypeError, match=r"found a complex number; .* have no order"):
         sorted(nameless_one_way_ring(3).spectrum)
     assert complex(nameless_one_way_ring(3).spectrum[1]) == nameless_one_way_ring(3).spectrum[1].value

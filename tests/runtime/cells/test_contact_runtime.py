@@ -66,9 +66,9 @@ def is_saved(result, folder: Path) -> None:
 
 
 def is_explained(result, folder: Path) -> None:
-    words = explain(reduce_scene(SCENE))
-    assert "coupling: 1 link" in words or "coupling: 2 links" in words
-    assert "quotient" in words
+    text = explain(reduce_scene(SCENE))
+    assert "coupling: 1 link" in text or "coupling: 2 links" in text
+    assert "quotient" in text
 
 
 def is_continued(result, folder: Path) -> None:
@@ -95,9 +95,9 @@ def test_thresholds() -> None:
     """Two oscillators at omega = 1.15: the exact end of the range is alpha = 0.4650, sigma = 0.2325; the probe's resolution
     is 5e-3 here."""
     criterion = Criterion(transient=600.0, window=20.0)
-    found = thresholds(SCENE.replace(axes=()), sigma=np.linspace(0.0, 0.3, 7), resolution=5e-3, criterion=criterion,
+    result = thresholds(SCENE.replace(axes=()), sigma=np.linspace(0.0, 0.3, 7), resolution=5e-3, criterion=criterion,
                        show_progress=False)  # fmt: skip
-    ((low, high),) = found.direct.intervals
+    ((low, high),) = result.direct.intervals
     assert low == 0.0
     assert high == pytest.approx(0.2325, abs=0.02)
 
@@ -105,8 +105,8 @@ def test_thresholds() -> None:
 @pytest.mark.parametrize("start", [-0.1, 0.1])
 def test_the_mode_of_a_body_that_sticks_is_zero_without_a_sign(start: float) -> None:
     still = {"theta_b": 0.0, "u": 0.0}
-    given = {"parameters": still, "initial": {"v": start}, "record": (), "transient": 0.0, "window": 3.0}
-    scene = Scene(contact="set-valued", integrator="taylor", **given)
+    settings = {"parameters": still, "initial": {"v": start}, "record": (), "transient": 0.0, "window": 3.0}
+    scene = Scene(contact="set-valued", integrator="taylor", **settings)
     end = run(scene, show_progress=False).end.sel(component="slip").values
     assert not end.any()
     assert not np.signbit(end).any()

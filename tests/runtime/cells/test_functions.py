@@ -32,22 +32,22 @@ def test_all_functions_of_models_run(text: str) -> None:
     field = sc.Field({"x": "v", "v": f"-x - v/5 + ({text})/9"}, initial={"x": 0.5, "v": 0.1})
     integrator = "rodas5p" if text == SMOOTH else "auto"
     settings = {"transient": 0.0, "window": 2.0, "time_unit": "time", "rtol": 1e-10, "integrator": integrator}
-    found = sc.run(sc.Scene(field, **settings), show_progress=False)
+    result = sc.run(sc.Scene(field, **settings), show_progress=False)
 
     def rates(t: float, y: np.ndarray) -> list[float]:
         x, v = y
         return [v, -x - v / 5 + eval(text, {**OTHERWISE, "x": x, "v": v}) / 9]
 
     exact = solve_ivp(rates, (0.0, 2.0), [0.5, 0.1], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
-    np.testing.assert_allclose(found.end.values.ravel(), exact, rtol=0.0, atol=1e-8)
+    np.testing.assert_allclose(result.end.values.ravel(), exact, rtol=0.0, atol=1e-8)
 
 
 def test_angles_of_numbers_run() -> None:
     field = sc.Field({"x": "atan2(1, x) + atan2(0, x) + atan2(x, 0)"}, initial={"x": 0.4})
     settings = {"transient": 0.0, "window": 1.0, "time_unit": "time", "rtol": 1e-10, "integrator": "dop853"}
-    found = sc.run(sc.Scene(field, **settings), show_progress=False)
+    result = sc.run(sc.Scene(field, **settings), show_progress=False)
     exact = solve_ivp(lambda _, x: np.arctan2(1, x) + np.pi / 2, (0.0, 1.0), [0.4], rtol=1e-12, atol=1e-13).y[:, -1]
-    np.testing.assert_allclose(found.end.values.ravel(), exact, rtol=0.0, atol=1e-8)
+    np.testing.assert_allclose(result.end.values.ravel(), exact, rtol=0.0, atol=1e-8)
 
 
 @pytest.mark.parametrize("integrator", ["taylor", "dop853", "rodas5p"])
@@ -57,14 +57,14 @@ def test_functions_without_a_value_by_their_formula_run_from_there(integrator: s
     link = sc.Rates({"x": "W*(1/exprel(x_i) - log1p(x_j**2) + mod(k, 2))"}, {"k": 3.5})
     settings = {"transient": 0.0, "window": 6.0, "time_unit": "time", "rtol": 1e-10, "integrator": integrator}
     settings["initial"] = {"x": 0.0}
-    found = sc.run(sc.Scene(node, link, sc.chain(2), **settings), show_progress=False)
+    result = sc.run(sc.Scene(node, link, sc.chain(2), **settings), show_progress=False)
 
     def rate(t: float, x: np.ndarray) -> np.ndarray:
         return -np.expm1(x) / 2 + 9 * np.cos(t) - 3 + 1 / exprel(x) - np.log1p(x[::-1] ** 2) + 1.5
 
     solution = solve_ivp(rate, (0.0, 6.0), [0.0, 0.0], method="DOP853", rtol=1e-12, atol=1e-13)
     assert solution.y.min() < -1.0 < 1.0 < solution.y.max()
-    np.testing.assert_allclose(found.end.values.ravel(), solution.y[:, -1], rtol=0.0, atol=1e-8)
+    np.testing.assert_allclose(result.end.values.ravel(), solution.y[:, -1], rtol=0.0, atol=1e-8)
 
 
 def test_no_function_is_left_out() -> None:
@@ -78,13 +78,13 @@ def test_powers_of_sizes_are_numbers_at_rest(text: str) -> None:
     q = {"q": 1.5} if "q" in text else {}
     node = sc.Lagrangian("v**2/2", "x**2/2", Q={"x": f"-0.6*{text}"}, coordinates=["x"], parameters=q)
     settings = {"transient": 0.0, "window": 2.0, "time_unit": "time", "rtol": 1e-9, "integrator": "rodas5p"}
-    found = sc.run(sc.Scene(node, initial={"x": 0.3, "v": 0.0}, **settings), show_progress=False)
+    result = sc.run(sc.Scene(node, initial={"x": 0.3, "v": 0.0}, **settings), show_progress=False)
 
     def rates(t: float, y: np.ndarray) -> list[float]:
         return [y[1], -y[0] - 0.6 * eval(text, {**OTHERWISE, "v": y[1], **q})]
 
     exact = solve_ivp(rates, (0.0, 2.0), [0.3, 0.0], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
-    np.testing.assert_allclose(found.end.values.ravel(), exact, rtol=0.0, atol=1e-8)
+    np.testing.assert_allclose(result.end.values.ravel(), exact, rtol=0.0, atol=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -94,10 +94,10 @@ def test_quotients_with_a_limit_have_it(text: str) -> None:
     """x/sqrt(|x|) is 0/0 at rest, where sqrt(|x|) sign(x) is 0."""
     node = sc.Lagrangian("v**2/2", "x**2/2", Q={"x": f"-0.6*{text}"}, coordinates=["x"])
     settings = {"transient": 0.0, "window": 2.0, "time_unit": "time", "rtol": 1e-10, "integrator": "dop853"}
-    found = sc.run(sc.Scene(node, initial={"x": 0.3, "v": 0.0}, **settings), show_progress=False)
+    result = sc.run(sc.Scene(node, initial={"x": 0.3, "v": 0.0}, **settings), show_progress=False)
 
     def rates(t: float, y: np.ndarray) -> list[float]:
         return [y[1], -y[0] - 0.6 * np.sign(y[1]) * abs(y[1]) ** 0.5]
 
     exact = solve_ivp(rates, (0.0, 2.0), [0.3, 0.0], method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
-    np.testing.assert_allclose(found.end.values.ravel(), exact, rtol=0.0, atol=1e-7)
+    np.testing.assert_allclose(result.end.values.ravel(), exact, rtol=0.0, atol=1e-7)

@@ -102,12 +102,12 @@ def test_an_inline_model_has_the_bits_of_the_plug_in_file(name: str) -> None:
 def test_a_result_carries_its_expressions(tmp_path: Path) -> None:
     scene = PAIRS["duffing"][0].replace(axes={"sigma": [0.1, 0.2]})  # the kernel of the test above
     sc.run(scene).save(tmp_path / "a.nc")
-    found = sc.open_result(tmp_path / "a.nc")
-    assert found.scene == scene
-    assert found.scene.oscillator.model == scene.oscillator.model
-    assert found.belongs_to(scene)
+    result = sc.open_result(tmp_path / "a.nc")
+    assert result.scene == scene
+    assert result.scene.oscillator.model == scene.oscillator.model
+    assert result.belongs_to(scene)
     other = sc.Lagrangian(v**2 / 2, x**2 / 2 + x**4, parameters={}, name="oscillator")
-    assert not found.belongs_to(scene.replace(oscillator=other, parameters={}))
+    assert not result.belongs_to(scene.replace(oscillator=other, parameters={}))
 
 
 def test_a_cell_that_is_run_again_after_an_edit_does_what_it_says() -> None:

@@ -218,11 +218,11 @@ def unfinished(result: Result) -> Result:
 
 def test_finished_cells_of_the_whole_network_are_resumed():
     scene = MIRRORED.replace(axes={"sigma": [0.1, 0.2, 0.3]})
-    whole = run(scene, width=1)
-    again = run(scene, width=1, resume=unfinished(whole))
+    full = run(scene, width=1)
+    again = run(scene, width=1, resume=unfinished(full))
     assert float(again.sync_error[0]) == 42.0
-    xr.testing.assert_identical(again.data.isel(sigma=[1, 2]), whole.data.isel(sigma=[1, 2]))
-    np.testing.assert_array_equal(again.section[0], whole.section[0])
+    xr.testing.assert_identical(again.data.isel(sigma=[1, 2]), full.data.isel(sigma=[1, 2]))
+    np.testing.assert_array_equal(again.section[0], full.section[0])
 
 
 def test_resuming_with_another_skip_is_refused():
@@ -233,11 +233,11 @@ def test_resuming_with_another_skip_is_refused():
 
 def test_a_run_goes_on_with_another_skip_where_nothing_was_left_out():
     scene = DUFFING.replace(axes={"sigma": [0.1, 0.2, 0.3]})
-    whole = run(scene, width=1)
-    assert whole.data.attrs["skipped"] == "nothing"
-    again = run(scene, width=1, resume=unfinished(whole), reduce=False)
+    full = run(scene, width=1)
+    assert full.data.attrs["skipped"] == "nothing"
+    again = run(scene, width=1, resume=unfinished(full), reduce=False)
     assert float(again.sync_error[0]) == 42.0
-    np.testing.assert_array_equal(again.states("end"), whole.states("end"))
+    np.testing.assert_array_equal(again.states("end"), full.states("end"))
 
 
 def test_cells_that_did_not_run_have_no_synchronisation_error():
@@ -267,10 +267,10 @@ def test_cells_that_did_not_run_have_no_synchronisation_error():
 )
 def test_the_kernel_of_a_scene_is_the_one_that_runs(scene):
     """By default with all skips; `reduce=False` shows and runs the whole network."""
-    found = run(scene)
-    assert found.success
+    result = run(scene)
+    assert result.success
     shown = kernel(scene)
-    assert (shown.digest, shown.equations.digest) == (found.data.attrs["kernel"], found.data.attrs["equations"])
+    assert (shown.digest, shown.equations.digest) == (result.data.attrs["kernel"], result.data.attrs["equations"])
     assert kernel_source(scene).text == shown.source
     whole = kernel_source(scene, reduce=False)
     assert whole.equations == scene.equations
@@ -322,24 +322,24 @@ def test_explain_prints_and_does_not_run(tmp_path, capsys):
 def test_explain_runs_where_there_is_a_folder_and_no_skip_runs_everything(tmp_path, capsys):
     path = tmp_path / "mirror.toml"
     path.write_text(SCENE)
-    words = ["run", str(path), "--out", str(tmp_path / "out")]
-    assert main([*words, "--explain"]) == 0
+    command = ["run", str(path), "--out", str(tmp_path / "out")]
+    assert main([*command, "--explain"]) == 0
     assert "stepped as 2" in capsys.readouterr().out
     with xr.open_dataset(tmp_path / "out" / "mirror.nc") as data:
         assert "stepped as 2" in data.attrs["skipped"]
         assert data.sizes["component"] * data.sizes["node"] == 6
-    assert main([*words, "--no-skip", "--resume"]) == 2
+    assert main([*command, "--no-skip", "--resume"]) == 2
     assert "left out other parts of its scene: forcing: u = 0" in capsys.readouterr().err
-    assert main([*words, "--no-skip", "--overwrite"]) == 0
+    assert main([*command, "--no-skip", "--overwrite"]) == 0
     with xr.open_dataset(tmp_path / "out" / "mirror.nc") as data:
         assert data.attrs["skipped"] == "nothing"
 
 
 def test_a_scene_without_anything_has_everything_left_out():
     scene = Scene(oscillator="harmonic", topology=chain(1))
-    words = explain(reduce_scene(scene))
+    text = explain(reduce_scene(scene))
     for part in ("forcing", "coupling", "synchronisation error", "section", "trajectory", "dense output"):
-        assert f"\n  {part}: " in words
+        assert f"\n  {part}: " in text
 
 
 def test_operations_are_counted_with_the_functions_they_call():
@@ -365,8 +365,8 @@ def test_every_case_of_the_benchmark_skips_something(case):
 
 @pytest.mark.long
 def test_benchmark_rows_have_what_the_columns_say(monkeypatch):
-    given = {"oscillator": "duffing", "parameters": {"sigma": 0.3}, "record": (), "initial": {"x": [0.5, 0.1, 0.5]}}
-    monkeypatch.setattr(bench, "CASES", (bench.Case("mirror", 3, given),))
+    settings = {"oscillator": "duffing", "parameters": {"sigma": 0.3}, "record": (), "initial": {"x": [0.5, 0.1, 0.5]}}
+    monkeypatch.setattr(bench, "CASES", (bench.Case("mirror", 3, settings),))
     (row,) = bench.measure(quick=True)
     assert len(row) == len(bench.COLUMNS)
     assert row[:2] == ("mirror", 3)

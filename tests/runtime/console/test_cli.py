@@ -120,22 +120,22 @@ def loaded_after() -> dict[str, set[str]]:
     return dict(zip(["--help", *LOADS], map(set, map(str.split, done.stderr.splitlines())), strict=True))
 
 
-@pytest.mark.parametrize("words", LOADS)
-def test_a_command_loads_only_what_it_needs(words: str) -> None:
-    loaded = loaded_after()[words]
+@pytest.mark.parametrize("text", LOADS)
+def test_a_command_loads_only_what_it_needs(text: str) -> None:
+    loaded = loaded_after()[text]
     assert "argparse" in loaded
-    assert not loaded & LOADS[words]
+    assert not loaded & LOADS[text]
 
 
 def test_spectrum_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["spectrum", "--json", "chain", "4"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["n"] == 4
-    assert found["verified"] is True
-    exact = [sp.sympify(e["exact"]) for e in found["eigenvalues"]]
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["n"] == 4
+    assert answer["verified"] is True
+    exact = [sp.sympify(e["exact"]) for e in answer["eigenvalues"]]
     assert exact == [0, -2 + sp.sqrt(2), -2, -2 - sp.sqrt(2)]
-    assert [e["value"] for e in found["eigenvalues"]] == [float(e) for e in exact]
-    assert [e["multiplicity"] for e in found["eigenvalues"]] == [1, 1, 1, 1]
+    assert [e["value"] for e in answer["eigenvalues"]] == [float(e) for e in exact]
+    assert [e["multiplicity"] for e in answer["eigenvalues"]] == [1, 1, 1, 1]
 
 
 def test_spectrum_of_one_way_links_is_complex(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -277,9 +277,9 @@ def test_a_figure_that_fails_says_that_the_result_is_complete(
 
 
 def test_a_numba_that_does_not_compile_is_no_bug(scene: str, tmp_path: Path) -> None:
-    words = [sys.executable, "-m", "synchain.runtime", "run", scene, "--out", str(tmp_path)]
+    command = [sys.executable, "-m", "synchain.runtime", "run", scene, "--out", str(tmp_path)]
     surroundings = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
-    done = subprocess.run(words, capture_output=True, text=True, check=False, env=surroundings)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=surroundings)
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1].endswith("unset NUMBA_DISABLE_JIT")
     assert "bug" not in done.stderr
@@ -322,17 +322,17 @@ def interrupt_after(monkeypatch: pytest.MonkeyPatch, chunks: int) -> list[int]:
 def test_an_interrupted_run_is_kept_and_resumed(
     scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    words = ["run", scene, "--out", str(tmp_path / "cut"), "--workers", "1"]
+    command = ["run", scene, "--out", str(tmp_path / "cut"), "--workers", "1"]
     with monkeypatch.context() as patch:
         driven = interrupt_after(patch, 1)
-        assert main(words) == 1
+        assert main(command) == 1
     err = capsys.readouterr().err
     done = driven[0]
     assert 0 < done < 20
     assert f"interrupted with {done} of 20 cells finished" in err
     assert [path.name for path in (tmp_path / "cut").iterdir()] == ["short.partial"]
     again = err.rpartition("continue with: synchain ")[2].split()
-    assert again == [*words, "--resume"]
+    assert again == [*command, "--resume"]
     with monkeypatch.context() as patch:
         driven = interrupt_after(patch, -1)
         assert main(again) == 0
@@ -356,15 +356,15 @@ def test_an_interrupt_before_the_first_cell_writes_nothing(
 def test_resume_refuses_another_scene_and_a_missing_file(
     scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["run", scene, "--out", str(tmp_path / "out")]
-    assert main([*words, "--resume"]) == 2
+    command = ["run", scene, "--out", str(tmp_path / "out")]
+    assert main([*command, "--resume"]) == 2
     assert "nothing to resume" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
-    assert main(words) == 0
-    assert main([*words, "--resume", "--rtol", "1e-7"]) == 2
+    assert main(command) == 0
+    assert main([*command, "--resume", "--rtol", "1e-7"]) == 2
     assert "another scene" in capsys.readouterr().err
     (tmp_path / "out" / "short.nc").write_bytes(b"no netCDF")
-    assert main([*words, "--resume"]) == 2
+    assert main([*command, "--resume"]) == 2
     assert "short.nc" in capsys.readouterr().err
 
 
@@ -399,8 +399,8 @@ def test_thresholds_below_zero_end_with_the_grid_at_zero() -> None:
     below = [np.array([low, 0.0]) for low in (-0.4, -1.2)]
     pair, direct = (threshold.Sweep(x, nothing, nothing, ((x[0], -0.1), (-0.05, 0.0))) for x in below)
     windows = ExponentWindows(((-0.2, 0.0),), ((0.001, 0.0),))
-    found = threshold.Thresholds(Scene(topology=chain(3)), pair, ((-0.02, 0.0),), direct, PAPER, windows)
-    rows = dict(found.summary)
+    result = threshold.Thresholds(Scene(topology=chain(3)), pair, ((-0.02, 0.0),), direct, PAPER, windows)
+    rows = dict(result.summary)
     assert rows["sigma, negative exponents"] == "-0.2000 ± 0.0010 … 0.0000..."
     assert rows["sigma, simulated"] == "-1.2000... … -0.1000; -0.0500 … 0.0000..."
     assert rows["sigma, predicted by the probe"] == "-0.0200 … 0.0000..."
@@ -410,8 +410,8 @@ def test_thresholds_below_zero_end_with_the_grid_at_zero() -> None:
 def test_thresholds_as_json_and_as_a_table(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     asked: list[dict[str, Any]] = []
     monkeypatch.setattr(threshold, "thresholds", fake_thresholds(asked))
-    words = ["thresholds", "--n", "3", "--omega", "1.15", "--sigma", "0:0.4:5", "--workers", "2"]
-    assert main([*words, "--json"]) == 0
+    command = ["thresholds", "--n", "3", "--omega", "1.15", "--sigma", "0:0.4:5", "--workers", "2"]
+    assert main([*command, "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {
         "intervals": [[0.0, 0.15], [0.3, 0.6]],
         "probe": [[0.0, 0.466], [0.9, 1.2]],
@@ -421,19 +421,19 @@ def test_thresholds_as_json_and_as_a_table(monkeypatch: pytest.MonkeyPatch, caps
         "no_exponents": None,
         "warnings": ["a warning"],
     }
-    assert main(words) == 0
-    found = printed(capsys)
-    assert found["scene"] == "Scene(friction/exponential/spring, chain(3)), omega = 1.15"
-    assert found["sigma, negative exponents"] == "0.0000 … 0.15510 ± 0.00020; 0.3000 ± unknown … 0.4000..."
-    assert found["sigma, simulated"] == "0.0000 … 0.1500; 0.3000 … 0.6000..."
-    assert found["sigma, predicted by the probe"] == "0.0000 … 0.1550; 0.3000 … 0.4000..."  # it ends at 1.2 / 3
-    assert found["sigma, Wu-Chua conjecture"] == "0.0000 … 0.1553"  # 0.466 / 3
-    assert found["alpha = sigma |gamma|, probe"] == "0.0000 … 0.4660; 0.9000 … 1.2000..."
-    assert "over 100 drive periods after 1000" in found["simulated and probe"]
-    assert found["simulated and probe"].endswith("at least half of 8 starts")
-    assert found["..."] == "the grid ends here, the range may go on"
-    assert found["warning"] == "a warning"
-    assert main([*words, "--topology", "ring"]) == 0
+    assert main(command) == 0
+    output = printed(capsys)
+    assert output["scene"] == "Scene(friction/exponential/spring, chain(3)), omega = 1.15"
+    assert output["sigma, negative exponents"] == "0.0000 … 0.15510 ± 0.00020; 0.3000 ± unknown … 0.4000..."
+    assert output["sigma, simulated"] == "0.0000 … 0.1500; 0.3000 … 0.6000..."
+    assert output["sigma, predicted by the probe"] == "0.0000 … 0.1550; 0.3000 … 0.4000..."  # it ends at 1.2 / 3
+    assert output["sigma, Wu-Chua conjecture"] == "0.0000 … 0.1553"  # 0.466 / 3
+    assert output["alpha = sigma |gamma|, probe"] == "0.0000 … 0.4660; 0.9000 … 1.2000..."
+    assert "over 100 drive periods after 1000" in output["simulated and probe"]
+    assert output["simulated and probe"].endswith("at least half of 8 starts")
+    assert output["..."] == "the grid ends here, the range may go on"
+    assert output["warning"] == "a warning"
+    assert main([*command, "--topology", "ring"]) == 0
     assert printed(capsys)["sigma, negative exponents"] == "not computed: a contact without a jump"
     assert asked[0]["sigma"] == (0.0, 0.1, 0.2, 0.3, 0.4)
     assert asked[0]["workers"] == 2
@@ -446,12 +446,12 @@ def test_thresholds_of_a_scene_of_a_matrix_and_of_other_graphs(
 ) -> None:
     asked: list[dict[str, Any]] = []
     monkeypatch.setattr(threshold, "thresholds", fake_thresholds(asked))
-    own = matrix(tmp_path, "-2 2\n2 -2")
+    path = matrix(tmp_path, "-2 2\n2 -2")
     (tmp_path / "ring.toml").write_text('topology = {name = "ring", n = 3}')
     for words in (
         "figure_6 --transient 50 --starts 3",
         "figure_6 --n 4 --topology ring --omega 1.2",
-        f"--matrix {own} --omega 1.15",
+        f"--matrix {path} --omega 1.15",
         "harmonic_chain",
         f"{tmp_path}/ring.toml --n 5",
         "figure_6 --topology ring",
@@ -484,13 +484,13 @@ def test_thresholds_in_a_hurry(monkeypatch: pytest.MonkeyPatch, capsys: pytest.C
 
 
 def test_thresholds_really_simulates(capsys: pytest.CaptureFixture[str]) -> None:
-    words = "thresholds --n 2 --omega 1.15 --sigma 0.1:0.15:2 --transient 5 --starts 1 --workers 1 --json"
-    assert main(words.split()) == 0
-    found = json.loads(capsys.readouterr().out)
+    text = "thresholds --n 2 --omega 1.15 --sigma 0.1:0.15:2 --transient 5 --starts 1 --workers 1 --json"
+    assert main(text.split()) == 0
+    answer = json.loads(capsys.readouterr().out)
     kinds = {"intervals", "probe", "predicted", "exponents", "exponent_errors", "no_exponents", "warnings"}
-    assert set(found) == kinds
-    assert found["exponents"] == [[0.1, 0.15]]  # the exponent at rest is negative all over this grid
-    assert all(0.2 <= low <= high <= 0.3 for low, high in found["probe"])
+    assert set(answer) == kinds
+    assert answer["exponents"] == [[0.1, 0.15]]  # the exponent at rest is negative all over this grid
+    assert all(0.2 <= low <= high <= 0.3 for low, high in answer["probe"])
 
 
 def test_figures_are_made_by_their_names(
@@ -596,13 +596,13 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("words", "expected"), WRONG)
+@pytest.mark.parametrize(("text", "expected"), WRONG)
 def test_wrong_use_is_one_or_two_lines_on_stderr_and_code_2(
-    words: str, expected: str, scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    text: str, expected: str, scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    own = matrix(tmp_path, "-1 1\n1 -1\n")
+    path = matrix(tmp_path, "-1 1\n1 -1\n")
     before = sorted(tmp_path.rglob("*"))
-    assert main(words.format(scene=scene, folder=tmp_path, own=own).split()) == 2
+    assert main(text.format(scene=scene, folder=tmp_path, own=path).split()) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
     assert expected in captured.err
@@ -723,16 +723,16 @@ def test_warnings_are_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.C
 
 
 @pytest.mark.parametrize(
-    "words",
+    "text",
     [
-        *(pytest.param(words, marks=pytest.mark.long) for words in
+        *(pytest.param(text, marks=pytest.mark.long) for text in
           ("topologies", "kernel two_oscillators", "equations figure_4a")),
         "spectrum chain 40", "spectrum chain 200",
     ],
 )  # fmt: skip
-def test_a_reader_that_leaves_early_ends_it_quietly(words: str) -> None:
+def test_a_reader_that_leaves_early_ends_it_quietly(text: str) -> None:
     """Output that is written at the end, and more than a buffer holds."""
-    command = f"'{sys.executable}' -m synchain.runtime {words} | true; exit ${{PIPESTATUS[0]}}"
+    command = f"'{sys.executable}' -m synchain.runtime {text} | true; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60, env=BUFFERED)
     assert (done.returncode, done.stderr) == (0, "")
 

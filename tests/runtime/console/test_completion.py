@@ -83,9 +83,9 @@ def test_a_line_is_completed(script: tuple[str, Path], line: str, offered: set[s
     shell, _ = script
     if shutil.which(shell) is None:
         pytest.skip(f"{shell} is not installed")
-    found = completed(script, line)
-    assert offered - found == set()
-    assert found & absent == set()
+    matches = completed(script, line)
+    assert offered - matches == set()
+    assert matches & absent == set()
 
 
 def test_an_unknown_shell_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

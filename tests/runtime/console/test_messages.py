@@ -113,15 +113,15 @@ def test_names_have_one_subscript(name, written, indexed):
 
 
 @pytest.mark.parametrize(
-    ("words", "expected"),
+    ("text", "expected"),
     [
         ("--symbolic --matrix {file} --value a", "--value: found 'a'; expected NAME=NUMBER, e.g. a=1/2"),
         ("circulant 9 --option a", "--option: found 'a'; expected NAME=VALUE, e.g. offsets=1,3"),
     ],
 )
-def test_a_hint_shows_the_option_that_was_used(words, expected, tmp_path, capsys):
+def test_a_hint_shows_the_option_that_was_used(text, expected, tmp_path, capsys):
     (tmp_path / "S.txt").write_text("a -a\n-b b\n")
-    assert main(["spectrum", *words.format(file=tmp_path / "S.txt").split()]) == 2
+    assert main(["spectrum", *text.format(file=tmp_path / "S.txt").split()]) == 2
     assert expected in capsys.readouterr().err
 
 

@@ -63,23 +63,23 @@ def mapped(scene: Scene, alpha: Any, parameters: dict[str, tuple[float, ...]]) -
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
     """What the stand-ins for msf and plane were asked for."""
-    found: list[dict[str, Any]] = []
+    collected: list[dict[str, Any]] = []
     module = importlib.import_module("synchain.runtime.stability.msf")
 
     def msf(scene: Scene, alpha: np.ndarray, **options: Any) -> MSF:
-        found.append({"scene": scene, "alpha": alpha, **options})
+        collected.append({"scene": scene, "alpha": alpha, **options})
         return MSF(scene, alpha, line(alpha))
 
     def plane(scene: Scene, alpha: Any = None, beta: Any = None, parameters: Any = None, **options: Any) -> Plane:
         given = {"alpha": alpha, "beta": beta, "parameters": parameters, **options}
-        found.append({"scene": scene, **{name: value for name, value in given.items() if value is not None}})
+        collected.append({"scene": scene, **{name: value for name, value in given.items() if value is not None}})
         return (
             disc(scene, np.asarray(alpha), np.asarray(beta)) if parameters is None else mapped(scene, alpha, parameters)
         )
 
     monkeypatch.setattr(module, "msf", msf)
     monkeypatch.setattr(module, "plane", plane)
-    return found
+    return collected
 
 
 def matrix(folder: Path, text: str = ONE_WAY) -> str:
@@ -125,15 +125,15 @@ def test_json_of_a_star_and_what_was_asked_for(
     effort = f"--precision {precision} --periods 99 --starts 2 --workers 1"
     assert main(f"msf --omega 1.4 --topology star --n 5 --json --alpha 0:1.2:25 {effort}".split()) == 0
     captured = capsys.readouterr()
-    found = json.loads(captured.out)
+    answer = json.loads(captured.out)
     assert captured.err == ""
-    assert len(found["alpha"]) == len(found["exponent"]) == len(found["stderr"]) == 25
-    assert found["class"] == "bounded interval"
-    np.testing.assert_allclose(found["intervals"], [[LOW, HIGH]], atol=1e-12)
-    (window,) = found["windows"]
+    assert len(answer["alpha"]) == len(answer["exponent"]) == len(answer["stderr"]) == 25
+    assert answer["class"] == "bounded interval"
+    np.testing.assert_allclose(answer["intervals"], [[LOW, HIGH]], atol=1e-12)
+    (window,) = answer["windows"]
     assert (window["low"], window["high"]) == pytest.approx((0.1, 0.12))
     assert (window["low_mode"], window["high_mode"]) == ("-1", "-5")
-    assert found["verdict"] == {
+    assert answer["verdict"] == {
         "answer": "yes",
         "ratio": "5",
         "ratio_value": 5.0,
@@ -151,7 +151,7 @@ def test_json_of_a_star_and_what_was_asked_for(
 
 
 @pytest.mark.parametrize(
-    ("words", "network", "omega"),
+    ("command", "network", "omega"),
     [
         ("figure_8", chain(4), 1.4),
         ("figure_8 --omega 1.2 --n 3", chain(3), 1.2),
@@ -164,18 +164,18 @@ def test_json_of_a_star_and_what_was_asked_for(
     ],
 )
 def test_oscillator_and_network_are_those_asked_for(
-    words: str,
+    command: str,
     network: Topology | None,
     omega: float | None,
     asked: list[dict[str, Any]],
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert main(["msf", *words.split(), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    assert main(["msf", *command.split(), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
     assert asked[0]["scene"].angular_frequency == omega
     assert asked[0]["scene"].axes == ()
-    assert (found["windows"] is None) == (network is None)
-    assert (found["verdict"] is None) == (network is None)
+    assert (answer["windows"] is None) == (network is None)
+    assert (answer["verdict"] is None) == (network is None)
     if network is not None:
         assert asked[0]["scene"].topology == network
 
@@ -213,7 +213,7 @@ def test_the_option_omega_sets_the_frequency_of_the_drive_whatever_its_name(
 
 
 @pytest.mark.parametrize(
-    ("wave", "words", "drive"),
+    ("wave", "message", "drive"),
     [
         ("cos(2 * Omega*t)", "2*Omega", ", 2*Omega = 2"),
         ("cos(2*t)", "the frequency 2;", ", drive frequency 2"),
@@ -221,7 +221,7 @@ def test_the_option_omega_sets_the_frequency_of_the_drive_whatever_its_name(
 )
 def test_a_frequency_that_is_no_parameter_is_told_but_cannot_be_set(
     wave: str,
-    words: str,
+    message: str,
     drive: str,
     asked: list[dict[str, Any]],
     tmp_path: Path,
@@ -230,7 +230,7 @@ def test_a_frequency_that_is_no_parameter_is_told_but_cannot_be_set(
     file = own_drive(tmp_path, wave)
     assert main(["msf", str(file), "--omega", "1.4"]) == 2
     error = capsys.readouterr().err
-    assert words in error
+    assert message in error
     assert "expected one that is a parameter" in error
     assert main(["msf", str(file)]) == 0
     assert value(capsys.readouterr().out, "scene").endswith(drive)
@@ -273,12 +273,12 @@ def test_a_ratio_within_the_error_is_undecided() -> None:
 def test_numbers_that_are_not_finite_are_null_in_json() -> None:
     result = function(Scene(topology=chain(3)), error=math.inf)
     result.fine.exponent[60] = -math.inf
-    found = result.as_dict()
-    assert found["exponent"][60] is None
-    assert set(found["stderr"]) == {None}
-    json.dumps(found, allow_nan=False)
+    answer = result.as_dict()
+    assert answer["exponent"][60] is None
+    assert set(answer["stderr"]) == {None}
+    json.dumps(answer, allow_nan=False)
     assert "too short for an error: raise periods" in dict(result.summary)["average"]
-    assert len(found["windows"]) == 1
+    assert len(answer["windows"]) == 1
 
 
 def test_a_network_without_stable_range_is_said_to_have_none() -> None:
@@ -293,9 +293,9 @@ def test_complex_eigenvalues_need_beta(
 ) -> None:
     assert main(["msf", "--omega", "1.4", "--matrix", matrix(tmp_path), "--json"]) == 0
     captured = capsys.readouterr()
-    found = json.loads(captured.out)
-    assert found["windows"] is None
-    assert found["verdict"] is None
+    answer = json.loads(captured.out)
+    assert answer["windows"] is None
+    assert answer["verdict"] is None
     assert captured.err.startswith("warning: ")
     assert "complex eigenvalues" in captured.err
     assert "add --beta, e.g. --beta 0:0.69:61" in captured.err  # 1.2 / sqrt(3)
@@ -306,8 +306,8 @@ def test_complex_eigenvalues_need_beta(
 
 
 def test_report_of_a_plane(asked: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["msf", "--omega", "1.4", "--matrix", matrix(tmp_path), "--alpha", "0:1.2:241", "--beta", "0:0.7:141"]
-    assert main(words) == 0
+    command = ["msf", "--omega", "1.4", "--matrix", matrix(tmp_path), "--alpha", "0:1.2:241", "--beta", "0:0.7:141"]
+    assert main(command) == 0
     captured = capsys.readouterr()
     assert captured.err == ""
     assert value(captured.out, "zero contour") == "alpha 0.1000 … 0.6000, beta 0.0000 … 0.2500"
@@ -320,11 +320,11 @@ def test_report_of_a_plane(asked: list[dict[str, Any]], tmp_path: Path, capsys: 
     assert value(captured.out, "sigma").startswith(
         f"{ends[0]:.4f} … {ends[1]:.4f}; lost below: gamma = -3/2 - sqrt(3)*I/2"
     )
-    assert main([*words, "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert (len(found["exponent"]), len(found["exponent"][0])) == (241, 141)
-    assert (found["windows"][0]["low"], found["windows"][0]["high"]) == pytest.approx(ends, abs=2e-4)
-    assert found["contours"]
+    assert main([*command, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert (len(answer["exponent"]), len(answer["exponent"][0])) == (241, 141)
+    assert (answer["windows"][0]["low"], answer["windows"][0]["high"]) == pytest.approx(ends, abs=2e-4)
+    assert answer["contours"]
     assert asked[1]["beta"][-1] == 0.7
 
 
@@ -359,8 +359,8 @@ def test_a_mode_that_leaves_the_plane_ends_the_search_and_not_the_window(tmp_pat
 def test_report_of_a_map_over_alpha_and_a_parameter(
     asked: list[dict[str, Any]], capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    words = f"msf figure_8 --alpha 0:2:5 --set omega=0.5:1.5:3 kappa=1e4 --starts 1 --out {tmp_path}"
-    assert main(words.split()) == 0
+    content = f"msf figure_8 --alpha 0:2:5 --set omega=0.5:1.5:3 kappa=1e4 --starts 1 --out {tmp_path}"
+    assert main(content.split()) == 0
     text = capsys.readouterr().out
     assert value(text, "exponents") == "alpha = -sigma gamma (coupling: spring)"
     assert value(text, "grid") == "5 alpha from 0 to 2, 3 omega from 0.5 to 1.5"
@@ -381,8 +381,8 @@ def test_report_of_a_map_over_alpha_and_a_parameter(
 
 
 def test_report_of_a_map_over_two_parameters(asked: list[dict[str, Any]], capsys: pytest.CaptureFixture[str]) -> None:
-    words = "msf figure_8 --set sigma=0:2:5 kappa=0.5,1,1.5 --set a=2 --topology star --n 5"
-    assert main(words.split()) == 0
+    content = "msf figure_8 --set sigma=0:2:5 kappa=0.5,1,1.5 --set a=2 --topology star --n 5"
+    assert main(content.split()) == 0
     text, said = capsys.readouterr()
     assert "figure_8 lists initial x of 4 oscillators; 5 start by default" in said
     assert value(text, "scene") == "Scene(friction/exponential/spring, star(5)), omega = 1.4"
@@ -397,11 +397,11 @@ def test_report_of_a_map_over_two_parameters(asked: list[dict[str, Any]], capsys
     assert given["parameters"] == {"sigma": (0.0, 0.5, 1.0, 1.5, 2.0), "kappa": (0.5, 1.0, 1.5)}
     assert given["scene"].parameters["a"] == 2.0
     assert given["scene"].topology.name == "star"
-    assert main([*words.split(), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["modes"] == ["(-1)", "(-3)"]
-    assert np.shape(found["mode"]) == np.shape(found["exponent"]) == (5, 3)
-    assert found["windows"] is None
+    assert main([*content.split(), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["modes"] == ["(-1)", "(-3)"]
+    assert np.shape(answer["mode"]) == np.shape(answer["exponent"]) == (5, 3)
+    assert answer["windows"] is None
 
 
 def test_a_number_is_set_and_an_axis_of_the_scene_with_it(
@@ -428,10 +428,10 @@ def test_the_real_map_over_the_strengths_of_two_layers(tmp_path: Path, capsys: p
         '{coupling = {rates = {x = "g*W*(x_j - x_i)"}, parameters = {g = 1}}, topology = {name = "complete", n = 4}}]\n'
     )
     assert main(f"msf {scene} --set k=0,1 g=0,0.5,1 --starts 1 --json".split()) == 0
-    found = json.loads(capsys.readouterr().out)
-    k, g = np.meshgrid(found["k"], found["g"], indexing="ij")
-    np.testing.assert_allclose(found["exponent"], -1 - 2 * k - 4 * g, atol=1e-6)
-    assert found["modes"] == ["(-2, -4)", "(-4, -4)"]
+    answer = json.loads(capsys.readouterr().out)
+    k, g = np.meshgrid(answer["k"], answer["g"], indexing="ij")
+    np.testing.assert_allclose(answer["exponent"], -1 - 2 * k - 4 * g, atol=1e-6)
+    assert answer["modes"] == ["(-2, -4)", "(-4, -4)"]
 
 
 # -- files, errors, names
@@ -444,10 +444,10 @@ def test_files_are_written_and_said(
     out = tmp_path / "new" / "folder"
     assert main(["msf", "figure_8", "--alpha", "0:1:5", "--out", str(out)]) == 0
     assert capsys.readouterr().out.splitlines()[-2:] == [f"  {out / 'msf.csv'}", f"  {out / 'msf.png'}"]
-    found = rows(out / "msf.csv")
-    assert list(found[0]) == ["alpha", "exponent", "stderr"]
-    assert [row["alpha"] for row in found] == ["0", "0.25", "0.5", "0.75", "1"]
-    assert float(found[2]["exponent"]) == pytest.approx(0.4 * -0.1)
+    table = rows(out / "msf.csv")
+    assert list(table[0]) == ["alpha", "exponent", "stderr"]
+    assert [row["alpha"] for row in table] == ["0", "0.25", "0.5", "0.75", "1"]
+    assert float(table[2]["exponent"]) == pytest.approx(0.4 * -0.1)
     assert main(["msf", "figure_8", "--alpha", "0:1:5", "--beta", "0:1:3", "--out", str(out), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["files"] == [str(out / "plane.csv"), str(out / "plane.png")]
     assert len(rows(out / "plane.csv")) == 15
@@ -496,11 +496,11 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("words", "expected"), WRONG)
+@pytest.mark.parametrize(("text", "expected"), WRONG)
 def test_wrong_use_is_said_before_anything_is_computed(
-    words: str, expected: str, asked: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    text: str, expected: str, asked: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    own = matrix(tmp_path)
+    path = matrix(tmp_path)
     (tmp_path / "laplacian.txt").write_text("1 -1\n-1 1\n")
     (tmp_path / "alone.toml").write_text(
         'coupling = "none"\ntopology = {name = "chain", n = 1}\nparameters = {omega = 1.4}\n'
@@ -513,8 +513,8 @@ def test_wrong_use_is_said_before_anything_is_computed(
         '{coupling = {rates = {v = "g*W*v_j"}, parameters = {g = 1}}, topology = {name = "star", n = 4}}]\n'
     )
     places = {name: tmp_path / f"{name}.toml" for name in ("alone", "swept", "layers")}
-    places |= {"own": own, "laplacian": tmp_path / "laplacian.txt"}
-    assert main(["msf", *words.format(**places).split()]) == 2
+    places |= {"own": path, "laplacian": tmp_path / "laplacian.txt"}
+    assert main(["msf", *text.format(**places).split()]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err.startswith("synchain msf: ")
@@ -565,18 +565,18 @@ def test_the_real_function_of_linear_oscillators(tmp_path: Path, capsys: pytest.
     scene = tmp_path / "damped.toml"
     scene.write_text('oscillator = "harmonic"\ncoupling = "damper"\ntopology = {name = "ring", n = 4}\n')
     assert main(["msf", str(scene), "--alpha", "0.5:1.5:3", "--periods", "8", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    np.testing.assert_allclose(found["exponent"], [-0.25, -0.5, -0.75], atol=1e-9)
-    assert found["windows"][0]["high_mode"] is None  # the grid ends at sigma = 1.5 / 4
-    assert found["windows"][0]["high"] == pytest.approx(1.5 / 4)
+    answer = json.loads(capsys.readouterr().out)
+    np.testing.assert_allclose(answer["exponent"], [-0.25, -0.5, -0.75], atol=1e-9)
+    assert answer["windows"][0]["high_mode"] is None  # the grid ends at sigma = 1.5 / 4
+    assert answer["windows"][0]["high"] == pytest.approx(1.5 / 4)
 
 
 def test_the_real_function_of_the_friction_oscillator(capsys: pytest.CaptureFixture[str]) -> None:
-    words = "msf --omega 1.15 --alpha 0.4:0.5:3 --starts 1 --workers 1 --n 4 --json"
-    assert main(words.split()) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["attractors"] == ["periodic, 2 drive periods"]
-    assert found["exponent"][0] < found["exponent"][1] < 0 < found["exponent"][2]
-    assert found["intervals"][0][1] == pytest.approx(
+    text = "msf --omega 1.15 --alpha 0.4:0.5:3 --starts 1 --workers 1 --n 4 --json"
+    assert main(text.split()) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["attractors"] == ["periodic, 2 drive periods"]
+    assert answer["exponent"][0] < answer["exponent"][1] < 0 < answer["exponent"][2]
+    assert answer["intervals"][0][1] == pytest.approx(
         2 * 0.233, abs=2e-3
     )  # Marszal et al. 2016: sigma = 0.233 of a pair

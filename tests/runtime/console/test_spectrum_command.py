@@ -16,9 +16,9 @@ from synchain.runtime.cli import main
 
 def printed(capsys: pytest.CaptureFixture[str], *words: str) -> dict[float, int]:
     assert main(["spectrum", "--json", *words]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["verified"] is True
-    return {e["exact"]: e["multiplicity"] for e in found["eigenvalues"]}
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["verified"] is True
+    return {e["exact"]: e["multiplicity"] for e in answer["eigenvalues"]}
 
 
 def test_options_of_a_family(capsys: pytest.CaptureFixture[str]) -> None:
@@ -79,10 +79,10 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("words", "message"), WRONG)
-def test_wrong_words(words: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(("text", "message"), WRONG)
+def test_wrong_words(text: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "g.txt").write_text("a b c d\n")
-    with_paths = words.format(file=tmp_path / "g.txt", folder=tmp_path).split()
+    with_paths = text.format(file=tmp_path / "g.txt", folder=tmp_path).split()
     try:
         code = main(["spectrum", *with_paths])
     except SystemExit as end:

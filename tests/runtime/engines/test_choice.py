@@ -199,10 +199,10 @@ def test_stiffness_that_comes_with_time_is_left_to_rosenbrock_steps(rates, start
     scene = Scene(
         Field(rates), None, chain(1), record=(), transient=0, window=window, time_unit="time", initial=start, atol=1e-12
     )
-    found = run(scene, show_progress=False)
-    assert found.states()[0] == pytest.approx(end, abs=1e-6)
-    assert found.steps < most
-    assert found.methods.item() >> 2 == (window > 10.0)  # few steps are not worth a second kernel
+    result = run(scene, show_progress=False)
+    assert result.states()[0] == pytest.approx(end, abs=1e-6)
+    assert result.steps < most
+    assert result.methods.item() >> 2 == (window > 10.0)  # few steps are not worth a second kernel
 
 
 def test_slow_motion_of_few_derivatives_is_not_called_stiff():
@@ -211,9 +211,9 @@ def test_slow_motion_of_few_derivatives_is_not_called_stiff():
     )  # fmt: skip
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = run(damped, show_progress=False)
-    assert found.steps > 20_000
-    assert found.methods.item() >> 2 == 0
+        result = run(damped, show_progress=False)
+    assert result.steps > 20_000
+    assert result.methods.item() >> 2 == 0
 
 
 def test_a_slope_without_bound_at_the_start_ends_no_run():
@@ -222,13 +222,13 @@ def test_a_slope_without_bound_at_the_start_ends_no_run():
         Field({"x": "v", "v": "cos(t) - x/2 - sign(v)*abs(v)**0.5"}), record=(), transient=0, window=5, time_unit="time",
         initial={"x": 0.0, "v": 0.0}, rtol=1e-9,
     )  # fmt: skip
-    found = run(scene, show_progress=False)
+    result = run(scene, show_progress=False)
 
     def rates(t: float, y: np.ndarray) -> list[float]:
         return [y[1], np.cos(t) - y[0] / 2 - np.sign(y[1]) * np.sqrt(abs(y[1]))]
 
     expected = solve_ivp(rates, (0, 5), [0, 0], "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
-    np.testing.assert_allclose(found.states(), expected, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(result.states(), expected, rtol=0, atol=1e-7)
 
 
 ROOT = Scene(
@@ -241,18 +241,18 @@ ROOT_AT_3 = brentq(lambda s: 3 + 2 * s + 2 * math.log(1 - s), 0.5, 0.99) ** 2
 
 @pytest.mark.parametrize("name", ["rodas4", "rodas5p", "rodas6p", "ros34pw2", "taylor"])
 def test_an_infinite_slope_is_never_passed_by_methods_that_take_slopes(name):
-    found = run(ROOT.replace(integrator=name), show_progress=False)
-    assert found.status == Status.STEP_UNDERFLOW
-    assert "slopes are not, as at sqrt(0) or acos(1), runs need integrator = 'dop853'" in found.message
+    result = run(ROOT.replace(integrator=name), show_progress=False)
+    assert result.status == Status.STEP_UNDERFLOW
+    assert "slopes are not, as at sqrt(0) or acos(1), runs need integrator = 'dop853'" in result.message
 
 
 @pytest.mark.parametrize("n", [2, 10])
 def test_an_infinite_slope_of_one_node_is_seen_in_networks(n):
     net = ROOT.replace(coupling="x->x", topology=chain(n), initial={"x": [0.0] + [0.5] * (n - 1)})
     net = net.replace(parameters={"sigma": 0.2})
-    found = run(net, show_progress=False)
-    assert found.status == Status.FINISHED
-    assert found.states().min() > 0.75
+    result = run(net, show_progress=False)
+    assert result.status == Status.FINISHED
+    assert result.states().min() > 0.75
     assert run(net.replace(integrator="rodas5p"), show_progress=False).status == Status.STEP_UNDERFLOW
 
 
@@ -281,10 +281,10 @@ def test_auto_steps_from_an_infinite_slope_are_right():
 @pytest.mark.filterwarnings("error")
 def test_an_infinite_slope_is_not_called_stiff():
     node = Field({"x": "y*sqrt(x)", "y": "cos(50*t)"})
-    found = run(
+    result = run(
         ROOT.replace(oscillator=node, parameters={}, window=10, initial={"x": 0.0, "y": 1.0}), show_progress=False
     )
-    assert found.steps > 100
+    assert result.steps > 100
 
 
 @pytest.mark.parametrize(
@@ -337,8 +337,8 @@ def test_a_singularity_is_not_called_stiff():
     )  # fmt: skip
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = run(blowing, c=[0.0, 2.0], show_progress=False)
-    assert found.status.values.tolist() == [Status.DIVERGED, Status.FINISHED]
+        result = run(blowing, c=[0.0, 2.0], show_progress=False)
+    assert result.status.values.tolist() == [Status.DIVERGED, Status.FINISHED]
     with pytest.warns(RuntimeWarning, match=r"^a state grew to .* in 60 steps of a cell; expected a bounded"):
         run(blowing.replace(max_steps=60), show_progress=False)
 
@@ -368,5 +368,5 @@ def test_rosenbrock_steps_leave_an_equilibrium_that_repels():
         Field({"x": "4*q*(1 - q)*1e8*x*(1 - x**2) + (1 - x)*(2*q - 1)**2"}, parameters={"q": 1}), None, chain(1), initial={"x": 1e-3}, record=(), transient=0,
         window=5, time_unit="time", integrator="rodas5p", rtol=1e-3,
     )  # fmt: skip
-    found = run(scene, q=[0.0, 0.25, 0.5, 1.0], show_progress=False)
-    assert found.end.values.ravel() == pytest.approx([1.0] * 4, abs=1e-2)
+    result = run(scene, q=[0.0, 0.25, 0.5, 1.0], show_progress=False)
+    assert result.end.values.ravel() == pytest.approx([1.0] * 4, abs=1e-2)

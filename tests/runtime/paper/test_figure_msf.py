@@ -70,10 +70,10 @@ def test_few_strengths_are_marked_on_the_line_of_all(asked: int, marked: bool) -
 
 def test_numbers_of_the_exponents_are_written(simulation: Simulation, tmp_path: Path) -> None:
     make(["msf"], tmp_path)
-    found = rows(tmp_path / "msf.csv")
-    assert list(found[0]) == ["omega", "alpha", "exponent", "stderr"]
-    assert len(found) == 3 * 9
-    assert float(found[9]["exponent"]) == pytest.approx(0.09 * 0.6)
+    table = rows(tmp_path / "msf.csv")
+    assert list(table[0]) == ["omega", "alpha", "exponent", "stderr"]
+    assert len(table) == 3 * 9
+    assert float(table[9]["exponent"]) == pytest.approx(0.09 * 0.6)
     ranges = rows(tmp_path / "msf_ranges.csv")
     assert [(row["omega"], row["motion"]) for row in ranges] == [(w, "aperiodic") for w in ("1.15", "1.4", "1.55")]
     assert float(ranges[2]["low"]) == pytest.approx(0.176, abs=1e-4)
@@ -128,9 +128,9 @@ def test_the_plane_shows_contour_rays_and_dots(simulation: Simulation, tmp_path:
     np.testing.assert_allclose(slopes, [-1 / 3, 0.0, 1 / 3], atol=1e-12)
     assert axes.get_xlim() == (0.0, 1.2)
     make(["msf_plane"], tmp_path)
-    found = rows(tmp_path / "msf_plane.csv")
-    assert len(found) == 7 * 4
-    last = found[-1]
+    table = rows(tmp_path / "msf_plane.csv")
+    assert len(table) == 7 * 4
+    last = table[-1]
     assert float(last["exponent"]) == pytest.approx((1.2 - 0.09) * (1.2 - 0.6) + 0.6**2)
     assert {"line", "alpha", "beta"} == set(rows(tmp_path / "msf_plane_ranges.csv")[0])
 
@@ -199,9 +199,9 @@ def test_the_map_is_that_of_most_starts() -> None:
 
 def test_the_map_is_written_with_a_column_for_each_network(simulation: Simulation, tmp_path: Path) -> None:
     make(["synchronisability_map"], tmp_path)
-    found = rows(tmp_path / "synchronisability_map.csv")
-    assert len(found) == 7 * 13
-    assert list(found[0]) == [
+    table = rows(tmp_path / "synchronisability_map.csv")
+    assert len(table) == 7 * 13
+    assert list(table[0]) == [
         "omega",
         "sigma",
         "chain_2",
@@ -212,7 +212,7 @@ def test_the_map_is_written_with_a_column_for_each_network(simulation: Simulatio
         "complete_5",
         "motion",
     ]
-    row = next(row for row in found if row["omega"] == "1.4" and row["sigma"] == "0.1")
+    row = next(row for row in table if row["omega"] == "1.4" and row["sigma"] == "0.1")
     assert float(row["chain_2"]) == pytest.approx((0.2 - 0.09) * (0.2 - 0.6), abs=0.01)
     assert float(row["star_5"]) == pytest.approx((0.1 - 0.09) * (0.1 - 0.6), abs=0.01)  # gamma = -1 and -5
     assert row["motion"] == "aperiodic"

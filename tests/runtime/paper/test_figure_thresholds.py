@@ -49,11 +49,11 @@ def test_projection_shows_probe_lines_and_network(simulation: Simulation, tmp_pa
 def test_projection_writes_curves_and_ranges(simulation: Simulation, tmp_path: Path) -> None:
     simulation.failed = (3,)
     make(["figure_6"], tmp_path)
-    found = rows(tmp_path / "figure_6.csv")
-    assert list(found[0]) == ["curve", "alpha", "sigma", "e_avg", "share", "status", "exponent", "stderr"]
-    assert [row["curve"] for row in found] == ["probe"] * 13 + ["network"] * 13 + ["exponent"] * 9
-    assert float(found[-1]["exponent"]) == pytest.approx((1.2 - 0.176) * (1.2 - 0.594))
-    assert [k for k, row in enumerate(found) if row["status"] != "finished"] == [13 + 3]
+    table = rows(tmp_path / "figure_6.csv")
+    assert list(table[0]) == ["curve", "alpha", "sigma", "e_avg", "share", "status", "exponent", "stderr"]
+    assert [row["curve"] for row in table] == ["probe"] * 13 + ["network"] * 13 + ["exponent"] * 9
+    assert float(table[-1]["exponent"]) == pytest.approx((1.2 - 0.176) * (1.2 - 0.594))
+    assert [k for k, row in enumerate(table) if row["status"] != "finished"] == [13 + 3]
     ranges = rows(tmp_path / "figure_6_ranges.csv")
     assert [row["range"] for row in ranges] == ["probe", "exponent", "predicted", "measured", "published"]
     assert (ranges[-1]["low"], ranges[-1]["high"]) == ("0.176", "0.196")
@@ -96,8 +96,8 @@ def test_published_rows_are_found_by_their_chain() -> None:
 
 def test_table_of_thresholds(simulation: Simulation, tmp_path: Path) -> None:
     make(["thresholds"], tmp_path)
-    found = rows(tmp_path / "thresholds.csv")
-    assert [(row["n"], row["omega"]) for row in found] == [
+    table = rows(tmp_path / "thresholds.csv")
+    assert [(row["n"], row["omega"]) for row in table] == [
         ("2", "1.15"),
         ("2", "1.4"),
         ("2", "1.55"),
@@ -108,7 +108,7 @@ def test_table_of_thresholds(simulation: Simulation, tmp_path: Path) -> None:
         ("5", "1.4"),
         ("5", "1.55"),
     ]
-    first, three, five = found[1], found[4], found[-1]
+    first, three, five = table[1], table[4], table[-1]
     assert float(first["measured_high"]) == pytest.approx(0.3)
     assert float(first["measured_minus_published_low"]) == pytest.approx(0.0)
     assert float(three["predicted_minus_published_high"]) == pytest.approx(0.594 / 3 - 0.196, abs=1e-9)
@@ -136,14 +136,14 @@ def test_exponents_are_right_where_the_quick_probe_is_not() -> None:
 
 def test_the_table_has_the_windows_of_the_exponents(simulation: Simulation, tmp_path: Path) -> None:
     make(["thresholds"], tmp_path)
-    found = rows(tmp_path / "thresholds.csv")
-    three = found[4]
+    table = rows(tmp_path / "thresholds.csv")
+    three = table[4]
     assert (float(three["exponents_low"]), float(three["exponents_high"])) == pytest.approx((0.176, 0.198), abs=1e-4)
     slope = 0.594 - 0.176  # of the parabola that stands in for the exponents
     assert float(three["exponents_low_error"]) == pytest.approx(1e-3 / slope, rel=0.05)
     assert float(three["exponents_high_error"]) == pytest.approx(1e-3 / slope / 3, rel=0.05)
     assert float(three["exponents_minus_published_high"]) == pytest.approx(0.198 - 0.196, abs=1e-4)
-    assert found[-1]["exponents_low"] == found[-1]["exponents_low_error"] == ""
+    assert table[-1]["exponents_low"] == table[-1]["exponents_low_error"] == ""
     assert three["all_exponents"].startswith("[0.1760")
     (axes, _) = drawn("thresholds", FigureRuns(TINY))
     assert [text.get_text() for text in axes.get_legend().get_texts()] == list(
@@ -178,9 +178,9 @@ def test_ragged_ranges_are_joined_over_narrow_gaps_only() -> None:
 def test_failed_values_of_sigma_are_said_in_the_table(simulation: Simulation, tmp_path: Path) -> None:
     simulation.failed = (1, 2)
     make(["thresholds"], tmp_path)
-    found = rows(tmp_path / "thresholds.csv")
-    assert [row["status"] for row in found[2:5]] == ["finished", "2 of 13 failed", "2 of 13 failed"]
-    assert "2 of 13 cells failed" in found[4]["remark"]
+    table = rows(tmp_path / "thresholds.csv")
+    assert [row["status"] for row in table[2:5]] == ["finished", "2 of 13 failed", "2 of 13 failed"]
+    assert "2 of 13 cells failed" in table[4]["remark"]
 
 
 def test_the_probe_of_a_pair_is_its_own_network(simulation: Simulation) -> None:
@@ -194,10 +194,10 @@ def test_the_probe_of_a_pair_is_its_own_network(simulation: Simulation) -> None:
 def test_longer_and_shorter_transients_are_compared(simulation: Simulation, tmp_path: Path) -> None:
     simulation.failed = (0,)
     make(["transient"], tmp_path)
-    found = rows(tmp_path / "transient.csv")
-    assert sorted({float(row["transient"]) for row in found}) == [100.0, 300.0, 1000.0, 3000.0]
-    assert {(row["n"], row["omega"]) for row in found} == {("2", "1.4"), ("2", "1.55"), ("3", "1.55"), ("4", "1.4")}
-    assert sum(row["status"] == "failed" for row in found) == 4 * 4
-    ends = [float(row["sigma"]) for row in found if row["n"] == "3" and row["transient"] == "100"]
+    table = rows(tmp_path / "transient.csv")
+    assert sorted({float(row["transient"]) for row in table}) == [100.0, 300.0, 1000.0, 3000.0]
+    assert {(row["n"], row["omega"]) for row in table} == {("2", "1.4"), ("2", "1.55"), ("3", "1.55"), ("4", "1.4")}
+    assert sum(row["status"] == "failed" for row in table) == 4 * 4
+    ends = [float(row["sigma"]) for row in table if row["n"] == "3" and row["transient"] == "100"]
     assert (ends[0], ends[-1]) == pytest.approx((0.156, 0.216))
     assert {0.176, 0.196} <= set(ends)

@@ -324,9 +324,9 @@ def test_the_friction_law_is_that_of_the_equations() -> None:
 def test_error_curve_and_its_numbers(simulation: Simulation, tmp_path: Path) -> None:
     simulation.failed = (4,)
     make(["figure_4b"], tmp_path)
-    found = rows(tmp_path / "figure_4b.csv")
-    assert list(found[0]) == ["sigma", "e_avg", "e_max", "e_end", "status"]
-    assert [row["status"] for row in found] == ["finished"] * 4 + ["diverged"] + ["finished"] * 4
+    table = rows(tmp_path / "figure_4b.csv")
+    assert list(table[0]) == ["sigma", "e_avg", "e_max", "e_end", "status"]
+    assert [row["status"] for row in table] == ["finished"] * 4 + ["diverged"] + ["finished"] * 4
     axes, _ = drawn("figure_4b", FigureRuns(TINY))
     (curve,) = (line for line in axes.lines if len(line.get_xdata()) == 9)
     assert np.isnan(curve.get_ydata()).tolist() == [k == 4 for k in range(9)]
@@ -350,11 +350,11 @@ def test_bifurcation_diagram_and_its_numbers(
 ) -> None:
     simulation.failed = (5,)
     make([name], tmp_path)
-    found = rows(tmp_path / f"{name}.csv")
+    table = rows(tmp_path / f"{name}.csv")
     axis = load_scene(name).axes[0].name
-    assert list(found[0]) == [axis, "time", *states, "status"]
-    assert len(found) == 1 + 1 + 2 + 1 + 1 + 1 + 1 + 1 + 2  # cells have 0, 1, 2, 0 … points; a row of its own for none
-    assert [row["x_1"] for row in found if row["status"] == "diverged"] == [""]
+    assert list(table[0]) == [axis, "time", *states, "status"]
+    assert len(table) == 1 + 1 + 2 + 1 + 1 + 1 + 1 + 1 + 2  # cells have 0, 1, 2, 0 … points; a row of its own for none
+    assert [row["x_1"] for row in table if row["status"] == "diverged"] == [""]
     axes, _ = drawn(name, FigureRuns(TINY))
     (dots,) = (line for line in axes.lines if line.get_marker() == ".")
     np.testing.assert_allclose(dots.get_ydata(), [0.1, 0.2, 0.2, 0.4, 0.7, 0.8, 0.8])
@@ -376,10 +376,10 @@ def test_diagrams_can_be_continued(direction: str, simulation: Simulation) -> No
 def test_a_tiny_figure_from_a_real_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(maker, "QUICK", Quality(points=4))
     make(["figure_4a", "figure_4d"], tmp_path, quick=True, workers=1)
-    found = rows(tmp_path / "figure_4a.csv")
-    assert [row["sigma"] for row in found] == ["0", "0.2", "0.4", "0.6"]
-    assert all(row["status"] == "finished" for row in found)
-    errors = [float(row["e_avg"]) for row in found]
+    table = rows(tmp_path / "figure_4a.csv")
+    assert [row["sigma"] for row in table] == ["0", "0.2", "0.4", "0.6"]
+    assert all(row["status"] == "finished" for row in table)
+    errors = [float(row["e_avg"]) for row in table]
     assert max(errors[:2]) < 1e-3 < 0.02 < min(errors[2:])
     points = rows(tmp_path / "figure_4d.csv")
     assert max(abs(float(row["v_1"])) for row in points) < 1e-6

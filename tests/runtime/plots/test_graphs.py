@@ -42,10 +42,10 @@ def closest(place: np.ndarray) -> float:
 
 @pytest.mark.parametrize(("name", "n"), cases(6, 12))
 def test_no_two_nodes_of_a_family_meet(name: str, n: int) -> None:
-    place = positions(topology(name, n))
-    assert place.shape == (n, 2)
-    assert np.abs(place).max() <= 1.0 + 1e-12
-    assert closest(place) > 0.1
+    points = positions(topology(name, n))
+    assert points.shape == (n, 2)
+    assert np.abs(points).max() <= 1.0 + 1e-12
+    assert closest(points) > 0.1
 
 
 @pytest.mark.parametrize(
@@ -71,8 +71,8 @@ def test_layouts_of_families() -> None:
 
 def test_joined_nodes_are_nearer_than_others() -> None:
     graph = union(topology("ring", 6), topology("ring", 6))
-    place = positions(graph)
-    first, second = place[:6], place[6:]
+    points = positions(graph)
+    first, second = points[:6], points[6:]
     assert first[:, 0].max() < second[:, 0].min(), "the parts stand side by side"
 
 

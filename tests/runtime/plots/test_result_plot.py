@@ -163,26 +163,26 @@ def test_rounding_is_drawn_as_zero(pair: Callable[..., Result]) -> None:
 def test_observables_are_drawn_by_name_and_where_nothing_else_is_recorded() -> None:
     scene = Scene("harmonic", "spring", chain(2), record=(), integrator="cash_karp", transient=0, window=1, observe={
         "error": "end(nodes.mean(x))", "own": "end(x)"}, axes={"sigma": (0.3, 0.1, 0.2)})  # fmt: skip
-    given = {"show_progress": False, "width": 1}  # the drivers of other tests
-    found = run(scene, **given)
-    axes = plot(found)
+    settings = {"show_progress": False, "width": 1}  # the drivers of other tests
+    result = run(scene, **settings)
+    axes = plot(result)
     assert (axes.get_xlabel(), axes.get_ylabel()) == (r"$\sigma$", "error")
     x, y = axes.lines[0].get_data()
     assert list(x) == [0.1, 0.2, 0.3]
-    assert list(y) == list(found.data["error"].values[[1, 2, 0]])
-    assert len(plot(found, "own").lines) == 2
+    assert list(y) == list(result.data["error"].values[[1, 2, 0]])
+    assert len(plot(result, "own").lines) == 2
     with pytest.raises(ValueError, match=r"unknown kind of plot 'owm'; known: .*did you mean 'own'"):
-        plot(found, "owm")
-    several = run(scene, realisations=4, draws={"x": "uniform(-1, 1)"}, **given)
+        plot(result, "owm")
+    several = run(scene, realisations=4, draws={"x": "uniform(-1, 1)"}, **settings)
     lines = plot(several).lines
     assert len(lines) == 5
     np.testing.assert_allclose(lines[-1].get_ydata(), several.data["error"].values[[1, 2, 0]].mean(axis=1))
     assert {line.get_linestyle() for line in lines} == {"-"}
-    alone = {"realisations": 4, "draws": {"x": "uniform(-1, 1)"}, **given}
+    alone = {"realisations": 4, "draws": {"x": "uniform(-1, 1)"}, **settings}
     for drawn in (scene.replace(axes=()), scene.replace(axes=(), record=("sync_error",), observe=None)):
         (dots,) = plot(run(drawn, **alone)).lines
         assert (dots.get_linestyle(), dots.get_marker()) == ("None", "."), drawn
-    with_error = run(scene.replace(record=("sync_error",), observe={"own": "end(x)"}), **given)
+    with_error = run(scene.replace(record=("sync_error",), observe={"own": "end(x)"}), **settings)
     assert plot(with_error).get_ylabel() == "average synchronisation error"
 
 

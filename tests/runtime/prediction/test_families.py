@@ -46,9 +46,9 @@ def test_rational_eigenratios_are_whole_numbers_and_only_those(family: str) -> N
 @pytest.mark.parametrize("family", sorted(set(CLOSED) - {"complete"}))
 @pytest.mark.parametrize("high", [1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 5.9, 6.0])
 def test_bisection_agrees_with_every_size_tried(family: str, high: float) -> None:
-    found = largest_network(family, [(1.0, high)])
-    assert (found.how, found.limit) == ("closed form", None)
-    assert found.n == found.certain == found.possible == brute(family, [(1.0, high)], 9)
+    largest = largest_network(family, [(1.0, high)])
+    assert (largest.how, largest.limit) == ("closed form", None)
+    assert largest.n == largest.certain == largest.possible == brute(family, [(1.0, high)], 9)
 
 
 @pytest.mark.parametrize(
@@ -83,8 +83,8 @@ def test_the_two_rossler_zeros_give_the_sizes_of_each_family() -> None:
     ranges = [(0.186, 4.614)]
     assert largest_network("chain", ranges).n == math.floor(math.pi / 2 / math.atan(math.sqrt(0.186 / 4.614)))
     assert largest_network("star", ranges).n == 24
-    found = largest_network("hypercube", ranges)
-    assert (found.n, found.counts) == (24, "dimension")
+    largest = largest_network("hypercube", ranges)
+    assert (largest.n, largest.counts) == (24, "dimension")
     ratio = 4.614 / 0.186
     odd = [n for n in range(3, 99, 2) if 1 / (4 * math.sin(math.pi / 2 / n) ** 2) <= ratio]
     even = [n for n in range(4, 99, 2) if 1 / math.sin(math.pi / n) ** 2 <= ratio]
@@ -92,8 +92,8 @@ def test_the_two_rossler_zeros_give_the_sizes_of_each_family() -> None:
 
 
 def test_errors_give_a_certain_and_a_possible_size() -> None:
-    found = largest_network("star", [(1.0, 10.5)], [(0.1, 0.5)])
-    assert (found.n, found.certain, found.possible) == (10, math.floor(10.0 / 1.1), math.floor(11.0 / 0.9))
+    largest = largest_network("star", [(1.0, 10.5)], [(0.1, 0.5)])
+    assert (largest.n, largest.certain, largest.possible) == (10, math.floor(10.0 / 1.1), math.floor(11.0 / 0.9))
     assert largest_network("star", [(1.0, 1.1)], [(0.2, 0.2)]).certain == 0
     assert largest_network("star", [(0.1, 1.0)], [(0.1, 0.0)]).possible is None
 
@@ -108,26 +108,26 @@ def test_errors_give_a_certain_and_a_possible_size() -> None:
     ],
 )
 def test_every_size_is_none(family: str, ranges, how: str) -> None:
-    found = largest_network(family, ranges)
-    assert (found.n, found.certain, found.possible, found.how) == (None, None, None, how)
+    largest = largest_network(family, ranges)
+    assert (largest.n, largest.certain, largest.possible, largest.how) == (None, None, None, how)
 
 
 def test_other_families_are_searched_to_the_limit_beyond_gaps() -> None:
     """Sums of two chains: 2x2 has the ratio 2, 2x3 5, 3x3 6, 2x4 9.2, 2x5 14.1; 5 and 7 nodes make a chain."""
-    found = largest_network("grid", [(1.0, 6.0)], limit=10)
-    assert (found.n, found.how, found.limit) == (9, "search", 10)
+    largest = largest_network("grid", [(1.0, 6.0)], limit=10)
+    assert (largest.n, largest.how, largest.limit) == (9, "search", 10)
     assert verdict([(1.0, 6.0)], topology("grid", 8)).answer == "no"
 
 
 def test_several_ranges_are_searched() -> None:
     """Star: sigma in [1, 2] and n sigma <= 7, so n <= 7; cubes: 2, 4, 6 sigma are 1, 2, 3 at 0.5, and 8 sigma is lost."""
-    found = largest_network("star", [(1.0, 2.0), (6.0, 7.0)], limit=12)
-    assert (found.n, found.how) == (7, "search")
+    largest = largest_network("star", [(1.0, 2.0), (6.0, 7.0)], limit=12)
+    assert (largest.n, largest.how) == (7, "search")
     assert largest_network("hypercube", [(1.0, 2.1), (2.9, 3.1)], limit=16).n == 3
 
 
 @pytest.mark.parametrize(
-    ("call", "words"),
+    ("call", "message"),
     [
         (lambda: largest_network("rnig", [(1.0, 2.0)]), "unknown topology 'rnig'"),
         (lambda: largest_network("chain", [(1.0, 2.0)], limit=1), "limit = 1; expected at least 2 nodes"),
@@ -136,6 +136,6 @@ def test_several_ranges_are_searched() -> None:
         (lambda: eigenratio("star", 2), "size 2; expected at least 3"),
     ],
 )
-def test_wrong_requests_are_refused(call, words: str) -> None:
-    with pytest.raises(ValueError, match=words):
+def test_wrong_requests_are_refused(call, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
         call()

@@ -31,10 +31,10 @@ def test_a_disc_and_a_one_way_ring(n: int) -> None:
         root = b * b - a * (1 - 0.64)
         assert root > 0 or n == 5
         expected = intersect(expected, [((b - root**0.5) / a, (b + root**0.5) / a)] if root > 0 else [])
-    found = windows_complex(disc, nameless_one_way_ring(n), GRID, 1e-6).windows
-    assert [(w.low, w.high) for w in found] == [pytest.approx(pair, abs=1e-6) for pair in expected]
-    assert len(found) == (n < 5)
-    for w in found:
+    windows = windows_complex(disc, nameless_one_way_ring(n), GRID, 1e-6).windows
+    assert [(w.low, w.high) for w in windows] == [pytest.approx(pair, abs=1e-6) for pair in expected]
+    assert len(windows) == (n < 5)
+    for w in windows:
         assert (w.low_error, w.high_error) == (5e-7, 5e-7)
         assert w.low_mode is not None
         assert w.high_mode is not None
@@ -62,9 +62,9 @@ def test_the_modes_lost_first_are_named_and_only_upper_alpha_is_asked_for() -> N
 
 def test_a_feed_forward_chain_keeps_the_condition_on_its_eigenvalue_and_is_called_defective() -> None:
     chain = Topology("feed-forward", 5, tuple((i, i - 1, ONE) for i in range(1, 5)))
-    found = windows_complex(lambda alpha: (alpha.real >= 0.3) & (alpha.real <= 1.7), chain, GRID, 1e-7)
-    assert [(w.low, w.high) for w in found.windows] == [pytest.approx((0.3, 1.7), abs=1e-7)]
-    assert [(m.eigenvalue.number, m.multiplicity) for m in found.defective] == [(-1, 4)]
+    result = windows_complex(lambda alpha: (alpha.real >= 0.3) & (alpha.real <= 1.7), chain, GRID, 1e-7)
+    assert [(w.low, w.high) for w in result.windows] == [pytest.approx((0.3, 1.7), abs=1e-7)]
+    assert [(m.eigenvalue.number, m.multiplicity) for m in result.defective] == [(-1, 4)]
     assert windows_complex(disc, nameless_one_way_ring(4), GRID, 1e-3).defective == ()
 
 

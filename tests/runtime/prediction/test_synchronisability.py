@@ -78,9 +78,9 @@ def test_every_sigma_is_inside_exactly_where_all_modes_are_stable(seed: int, end
 
 def test_modes_straddle_ranges_and_the_modes_lost_first_are_named() -> None:
     """Star of 3: sigma and 3 sigma each in [1, 2], [4.5, 5] or from 5.4 on: windows worked out by hand."""
-    found = windows([(1.0, 2.0), (4.5, 5.0), (5.4, math.inf)], topology("star", 3))
-    assert pieces(found) == [(1.5, 5 / 3), (5.4 / 3, 2.0), (4.5, 5.0), (5.4, math.inf)]
-    lost = [tuple(m and int(m.eigenvalue.number) for m in (w.low_mode, w.high_mode)) for w in found]
+    ranges = windows([(1.0, 2.0), (4.5, 5.0), (5.4, math.inf)], topology("star", 3))
+    assert pieces(ranges) == [(1.5, 5 / 3), (5.4 / 3, 2.0), (4.5, 5.0), (5.4, math.inf)]
+    lost = [tuple(m and int(m.eigenvalue.number) for m in (w.low_mode, w.high_mode)) for w in ranges]
     assert lost == [(-3, -3), (-3, -1), (-1, -1), (-1, None)]
 
 
@@ -199,13 +199,13 @@ def test_strengths_of_no_meaning_are_refused(alpha: Fraction, gamma: sp.Expr) ->
 
 
 def test_the_verdict_states_the_exact_eigenratio() -> None:
-    found = verdict([(0.1, 0.6)], topology("chain", 4))
-    assert found.answer == "yes"
-    assert found.ratio == 3 + 2 * sp.sqrt(2)  # cot²(π/8)
-    assert found.ratio_value == pytest.approx(1 / math.tan(math.pi / 8) ** 2, rel=1e-14)
-    assert found.allowed == pytest.approx(6.0)
-    assert found.slowest is not None
-    assert found.slowest.number == 1
+    answer = verdict([(0.1, 0.6)], topology("chain", 4))
+    assert answer.answer == "yes"
+    assert answer.ratio == 3 + 2 * sp.sqrt(2)  # cot²(π/8)
+    assert answer.ratio_value == pytest.approx(1 / math.tan(math.pi / 8) ** 2, rel=1e-14)
+    assert answer.allowed == pytest.approx(6.0)
+    assert answer.slowest is not None
+    assert answer.slowest.number == 1
     assert verdict([(0.1, 0.6)], weighted(6, 3)).ratio is None
 
 
@@ -288,7 +288,7 @@ def test_a_range_that_is_stable_at_zero_only_does_not_synchronise() -> None:
 
 
 @pytest.mark.parametrize(
-    ("ranges", "errors", "words"),
+    ("ranges", "errors", "message"),
     [
         ([(2.0, 1.0)], None, "stable range 1 is"),
         ([(0.0, 1.0), (0.9, 2.0)], None, "stable range 2 is .* after 1.0; expected disjoint"),
@@ -299,8 +299,8 @@ def test_a_range_that_is_stable_at_zero_only_does_not_synchronise() -> None:
         ([(0.0, 1.0)], [], "found 0 pairs for 1 ranges"),
     ],
 )
-def test_wrong_ranges_are_refused(ranges, errors, words: str) -> None:
-    with pytest.raises(ValueError, match=words):
+def test_wrong_ranges_are_refused(ranges, errors, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
         windows(ranges, topology("chain", 3), errors)
 
 

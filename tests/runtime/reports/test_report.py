@@ -138,13 +138,13 @@ def test_strengths_are_those_of_the_sweep(changes: dict[str, object], ends: tupl
 
 def test_the_function_of_a_swept_scene_is_that_of_its_own_values() -> None:
     scene = Scene("harmonic", "spring", topology("chain", 2), record=(), transient=1, window=1)
-    words = "The sweep moves x_1, v_1; this function"
-    assert words in report(scene.replace(axes={"sigma": [0.2], "x_1": [0.1, 0.2], "v_1": [0.0, 0.1]}), FAST)
+    text = "The sweep moves x_1, v_1; this function"
+    assert text in report(scene.replace(axes={"sigma": [0.2], "x_1": [0.1, 0.2], "v_1": [0.0, 0.1]}), FAST)
     assert "The sweep moves" not in report(scene.replace(axes={"sigma": [0.2, 0.4]}), FAST)
 
 
 @pytest.mark.parametrize(
-    ("strengths", "words"),
+    ("strengths", "message"),
     [
         ([0, 1], "alpha = 1 ends"),
         ([-0.5, 1], "= -0.5 and at 1 "),
@@ -152,10 +152,10 @@ def test_the_function_of_a_swept_scene_is_that_of_its_own_values() -> None:
         ([-0.5, 0], "= -0.5 and at 0 "),
     ],
 )
-def test_ranges_that_end_with_the_grid_are_said_to_do_so(strengths: list[float], words: str) -> None:
+def test_ranges_that_end_with_the_grid_are_said_to_do_so(strengths: list[float], message: str) -> None:
     """x' = -x: the exponent -1 - alpha is negative above -1; a grid of strengths from 0 up begins by itself."""
-    found = msf(Scene(Field({"x": "-x"}), "x->x", topology("chain", 2)), strengths, starts=1, show_progress=False)
-    assert words in _ends(found)
+    result = msf(Scene(Field({"x": "-x"}), "x->x", topology("chain", 2)), strengths, starts=1, show_progress=False)
+    assert message in _ends(result)
 
 
 @pytest.mark.parametrize(("record", "pictures"), [(("sync_error",), 3), ((), 2)])
@@ -199,15 +199,15 @@ def test_the_browser_has_no_complaint_and_asks_for_nothing(folder: Path) -> None
 @needs_browser
 @pytest.mark.parametrize("options", [pytest.param((), marks=pytest.mark.long), (DARK,)], ids=["light", "dark"])
 def test_formulas_axes_and_graph_are_seen(folder: Path, options: tuple[str, ...]) -> None:
-    whole = seen(folder, "page", *options)
-    ground = whole[5, 5]
+    picture = seen(folder, "page", *options)
+    ground = picture[5, 5]
     assert (ground.mean() < 0.3) == bool(options)
     for name, least in (("no_math", 1000), ("no_img", 5000), ("no_svg", 1000)):
         other = seen(folder, name, *options)
-        assert int(np.any(np.abs(whole - other) > 0.2, axis=2).sum()) > least, name
-    curve = np.all(np.abs(whole - np.array([0x00, 0x72, 0xB2]) / 255) < 0.1, axis=2)
+        assert int(np.any(np.abs(picture - other) > 0.2, axis=2).sum()) > least, name
+    curve = np.all(np.abs(picture - np.array([0x00, 0x72, 0xB2]) / 255) < 0.1, axis=2)
     assert int(curve.sum()) > 500
-    words = np.abs(whole[: SIZE[1] // 12, 60:] - ground).max(axis=2)
+    words = np.abs(picture[: SIZE[1] // 12, 60:] - ground).max(axis=2)
     assert words.max() > 0.7, "the heading stands out of the ground"
 
 

@@ -60,29 +60,29 @@ def test_verdicts_and_exponents_of_cells(both: tuple) -> None:
 
 
 def test_equal_starts_on_an_unstable_state_are_called_what_they_are() -> None:
-    found = run(scene(initial={"x": [0.3, 0.3]}), sigma=[0.4], certified=True, show_progress=False)
-    assert found.sync_error.item() == 0.0
-    assert VERDICTS[found.data.verdict.item()] == "synchronous by round-off only: the state is unstable"
+    result = run(scene(initial={"x": [0.3, 0.3]}), sigma=[0.4], certified=True, show_progress=False)
+    assert result.sync_error.item() == 0.0
+    assert VERDICTS[result.data.verdict.item()] == "synchronous by round-off only: the state is unstable"
 
 
 @pytest.mark.long
 def test_a_record_of_sections_is_not_cut_short() -> None:
     s = scene(record=("sync_error", "section"))
-    found = run(s, sigma=[0.12], certified=True, show_progress=False)
-    whole = run(s, sigma=[0.12], show_progress=False)
-    assert found.data.section_count.item() == whole.data.section_count.item() > 20
-    assert found.data.end_time.item() == whole.data.end_time.item()
+    result = run(s, sigma=[0.12], certified=True, show_progress=False)
+    full = run(s, sigma=[0.12], show_progress=False)
+    assert result.data.section_count.item() == full.data.section_count.item() > 20
+    assert result.data.end_time.item() == full.data.end_time.item()
 
 
 def test_every_mode_and_every_attractor_must_be_stable() -> None:
     """Three oscillators: the mode gamma = -3 is lost first; a grid of two parameters has an orbit for each frequency."""
     s = scene(topology=topology("chain", 3), axes={"omega": [1.15, 1.4], "sigma": [0.1, 0.2]})
-    found = certify(s, periods=200)
+    certificate = certify(s, periods=200)
     one = s.replace(axes=())
     lines = [exponents(one, [0.1, 0.2, 0.3, 0.6], omega=w, precision=2e-3, periods=200).exponent for w in (1.15, 1.4)]
     expected = [max(line[0], line[2]) for line in lines], [max(line[1], line[3]) for line in lines]
-    np.testing.assert_allclose(found.exponent.reshape(2, 2), np.transpose(expected), atol=0.03)
-    np.testing.assert_allclose(found.exponent[:2], np.transpose(expected)[0], atol=1e-5)
+    np.testing.assert_allclose(certificate.exponent.reshape(2, 2), np.transpose(expected), atol=0.03)
+    np.testing.assert_allclose(certificate.exponent[:2], np.transpose(expected)[0], atol=1e-5)
 
 
 def test_when_an_early_end_is_safe() -> None:
@@ -104,15 +104,15 @@ def test_when_an_early_end_is_safe() -> None:
 def test_a_cell_is_certified_along_the_motion_that_it_ends_on(s: float) -> None:
     """Wells at -0.975 s and 1.025 s: all nodes end in the upper one, wherever the first begins; slope 1 - 3 x² + x/10 there."""
     well = Field({"x": "s*(x/s - (x/s)**3 + (x/s)**2/20)"}, parameters={"s": 1.0})
-    found = []
+    collected = []
     for start in ([-0.5, 0.9, 0.9, 0.9], [0.9, 0.9, 0.9, -0.5]):
         begun = Scene(well, "x->x", topology("chain", 4), initial={"x": [s * x for x in start]}, parameters={"s": s})
         ended = run(begun, sigma=[0.5, 1.0], certified=True, show_progress=False)
         assert set(ended.data.verdict.values) == {1}
-        found.append(ended.data.transversal_exponent.values)
+        collected.append(ended.data.transversal_exponent.values)
     x = (0.05 + np.sqrt(0.05**2 + 4.0)) / 2.0
     expected = 1.0 - 3.0 * x**2 + x / 10.0 - (2.0 - np.sqrt(2.0)) * np.array([0.5, 1.0])
-    np.testing.assert_allclose(found, [expected, expected], atol=1e-7)
+    np.testing.assert_allclose(collected, [expected, expected], atol=1e-7)
 
 
 def test_cells_of_one_sweep_that_end_apart_have_exponents_of_their_own() -> None:
@@ -151,8 +151,8 @@ def test_an_interrupted_run_is_resumed_with_its_certificate(tmp_path: Path, monk
     part = open_result(tmp_path / "part.nc")
     assert 0 < (part.status.values == 1).sum() < 40
     done = run(part.scene, resume=part, certified=True, show_progress=False)
-    whole = run(scene(transient=60.0, window=5.0), sigma=grid, certified=True, show_progress=False)
-    assert done.data.identical(whole.data)
+    full = run(scene(transient=60.0, window=5.0), sigma=grid, certified=True, show_progress=False)
+    assert done.data.identical(full.data)
 
 
 def test_what_has_no_certificate() -> None:
@@ -163,21 +163,21 @@ def test_what_has_no_certificate() -> None:
 
 
 @pytest.mark.parametrize(
-    ("problem", "error", "words"),
+    ("problem", "error", "message"),
     [
         (KeyboardInterrupt(), SweepInterrupted, "interrupted with 0 of 2 cells finished"),
         (BrokenProcessPool("gone"), SweepFailed, r"the workers are lost \(gone\); 0 of 2 cells had finished"),
     ],
 )
 @pytest.mark.parametrize("step", ["BlockScheduler", "certify"])
-def test_an_interrupted_certification_says_what_is_done(monkeypatch, tmp_path, step, problem, error, words):
+def test_an_interrupted_certification_says_what_is_done(monkeypatch, tmp_path, step, problem, error, message):
     def fail(*_, **__):
         raise problem
 
     monkeypatch.setattr(certification, step, fail)
     asked = {"sigma": [0.1, 0.2], "certified": True, "show_progress": False}
     for call in (lambda: run(scene(), **asked), lambda: stream(scene(), tmp_path / "a.nc", **asked)):
-        with pytest.raises(error, match=f"^{words}$") as caught:
+        with pytest.raises(error, match=f"^{message}$") as caught:
             call()
         assert set(caught.value.result.status.values.tolist()) == {Status.NOT_RUN}
         assert list(tmp_path.iterdir()) == []

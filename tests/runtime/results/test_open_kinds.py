@@ -176,7 +176,7 @@ def test_damage_is_seen(ending: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "message"),
     [
         (lambda tree: tree["root"].update(value="Popen"), "Popen"),
         (lambda tree: tree["root"]["fields"].pop("across"), "across"),
@@ -185,7 +185,7 @@ def test_damage_is_seen(ending: str, tmp_path: Path) -> None:
         (lambda tree: tree["root"]["fields"].update(scene={"scene": 7}), "index"),
     ],
 )
-def test_a_forged_file_is_refused_in_one_line(change: Callable[[Any], Any], words: str, tmp_path: Path) -> None:
+def test_a_forged_file_is_refused_in_one_line(change: Callable[[Any], Any], message: str, tmp_path: Path) -> None:
     from synchain.runtime.results.store import read_data, write_data
 
     KINDS["Plane"].save(tmp_path / "a.nc")
@@ -193,7 +193,7 @@ def test_a_forged_file_is_refused_in_one_line(change: Callable[[Any], Any], word
     tree = json.loads(data.attrs["value"])
     change(tree)
     write_data(data.assign_attrs(value=json.dumps(tree)), tmp_path / "b.nc")
-    with pytest.raises(ValueError, match=words) as caught:
+    with pytest.raises(ValueError, match=message) as caught:
         open_result(tmp_path / "b.nc")
     assert "\n" not in str(caught.value)
 
@@ -227,8 +227,8 @@ def test_an_absent_package_is_named_in_one_line_before_anything_runs(tmp_path: P
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=Path(__file__).parents[2])
     lines = done.stdout.splitlines()
     assert len(lines) == 3 * len(packages), done.stderr
-    words = 'needs the package {}; install it: python -m pip install "synchain[files]", or end the name in .nc'
-    expected = [words.format(package) for package in packages.values() for _ in range(3)]
+    text = 'needs the package {}; install it: python -m pip install "synchain[files]", or end the name in .nc'
+    expected = [text.format(package) for package in packages.values() for _ in range(3)]
     assert all(line.endswith(end) for line, end in zip(lines, expected, strict=True))
     assert sorted(part.name for part in tmp_path.iterdir()) == sorted(f"there{ending}" for ending in packages)
 
@@ -238,9 +238,9 @@ def test_a_damaged_file_leaves_no_traceback(monkeypatch: pytest.MonkeyPatch, tmp
     path, ignored = tmp_path / "a.nc4", []
     monkeypatch.setattr(sys, "unraisablehook", lambda found: ignored.append(found.exc_value))
     KINDS["Plane"].save(path)
-    whole = path.read_bytes()
-    place = whole.index(b"OHDR") + 20  # the object header of the root group, which has a checksum
-    for damaged in (whole[:300], whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :]):
+    contents = path.read_bytes()
+    place = contents.index(b"OHDR") + 20  # the object header of the root group, which has a checksum
+    for damaged in (contents[:300], contents[:place] + bytes([contents[place] ^ 1]) + contents[place + 1 :]):
         path.write_bytes(damaged)
         with pytest.raises(OSError, match="the file is damaged"):
             open_result(path)
@@ -251,9 +251,9 @@ def test_a_damaged_file_leaves_no_traceback(monkeypatch: pytest.MonkeyPatch, tmp
 def test_a_truncated_file_is_called_that(tmp_path: Path) -> None:
     path = tmp_path / "a.nc"
     KINDS["Plane"].save(path)
-    whole = path.read_bytes()
+    contents = path.read_bytes()
     for length in (65, 130):
-        path.write_bytes(whole[:length])
+        path.write_bytes(contents[:length])
         with pytest.raises(
             OSError, match=r"a\.nc.* damaged.*(ends before its data|do not fit their digest).*restore it"
         ):

@@ -50,13 +50,13 @@ def leapfrog(scene: Scene, step: float, count: int, every: int) -> tuple[np.ndar
     equations, n = scene.equations, scene.n
     symbols = sp.symbols((*equations.state[:n], *equations.parameters), real=True)
     force = sp.lambdify([symbols], equations.rhs()[n:], cse=True)
-    numbers = [scene.parameters[name] for name in equations.parameters]
+    values = [scene.parameters[name] for name in equations.parameters]
     x, v = np.array(scene.y0[:n]), np.array(scene.y0[n:])
-    kept, pull = [np.concatenate([x, v])], np.array(force([*x, *numbers]))
+    kept, pull = [np.concatenate([x, v])], np.array(force([*x, *values]))
     for k in range(count):
         v = v + step / 2 * pull
         x = x + step * v
-        pull = np.array(force([*x, *numbers]))
+        pull = np.array(force([*x, *values]))
         v = v + step / 2 * pull
         if (k + 1) % every == 0:
             kept.append(np.concatenate([x, v]))

@@ -155,13 +155,13 @@ def test_averages_are_as_long_as_asked(scene, unit, periods):
 
 
 def test_spectra_and_clusters_are_averaged_as_long_as_asked():
-    given = {"periods": 3, "transient": 10, "precision": 0.0, "show_progress": False}
+    settings = {"periods": 3, "transient": 10, "precision": 0.0, "show_progress": False}
     pair = ROSSLER.replace(initial={"x": [1.0, 1.1]}, parameters={**ROSSLER.parameters, "sigma": 0.1})
     for average_of in (
         lambda **more: cluster_exponents(pair, [0, 0], **more),
         lambda **more: lyapunov_spectrum(ROSSLER, **more),
     ):
-        one, three = (average_of(**{**given, "periods": periods}).time for periods in (1, 3))
+        one, three = (average_of(**{**settings, "periods": periods}).time for periods in (1, 3))
         assert three == pytest.approx(3 * one, rel=1e-12)
 
 

@@ -36,11 +36,11 @@ def damped(graph: Topology, sigma: float) -> Scene:
 @pytest.mark.parametrize("sigma", [0.1, 0.2, 0.3])
 def test_a_pair_that_moves_as_one_has_the_exponent_of_its_mode(sigma: float) -> None:
     scene = friction(PAIR, sigma)
-    found = cluster_exponents(scene, (0, 0), periods=200)
+    result = cluster_exponents(scene, (0, 0), periods=200)
     expected = exponents(scene, [0.0, 2 * sigma], starts=1).exponent
-    assert found.motion == pytest.approx(expected[0], abs=1e-5)
-    assert found.exponent[0] == pytest.approx(expected[1], abs=1e-5)
-    assert found.verdicts == ("stable" if expected[1] < 0 else "unstable",)
+    assert result.motion == pytest.approx(expected[0], abs=1e-5)
+    assert result.exponent[0] == pytest.approx(expected[1], abs=1e-5)
+    assert result.verdicts == ("stable" if expected[1] < 0 else "unstable",)
 
 
 def test_linear_nodes_have_the_eigenvalues_of_each_block() -> None:
@@ -50,9 +50,9 @@ def test_linear_nodes_have_the_eigenvalues_of_each_block() -> None:
         (RING, (0, 0, 0, 0), (2,)),
         (topology("complete", 4), (0, 0, 1, 1), (4, 4)),
     ):
-        found = cluster_exponents(damped(graph, 0.2), classes, transient=40, periods=200, precision=1e-9)
-        np.testing.assert_allclose(found.exponent, [-0.2 * size / 2 for size in slowest], atol=3e-3)
-        assert set(found.verdicts) == {"stable"}
+        result = cluster_exponents(damped(graph, 0.2), classes, transient=40, periods=200, precision=1e-9)
+        np.testing.assert_allclose(result.exponent, [-0.2 * size / 2 for size in slowest], atol=3e-3)
+        assert set(result.verdicts) == {"stable"}
 
 
 @pytest.fixture(scope="module")
@@ -94,9 +94,9 @@ def test_an_unstable_block_breaks_alone(ring: dict[float, ClusterExponents]) -> 
 
 def test_clusters_that_merge_are_said() -> None:
     """sigma = 0.05: all of the ring synchronises (4 sigma < 0.466), the two clusters with it."""
-    found = cluster_exponents(friction(RING, 0.05), (0, 1, 0, 1), transient=3000, periods=64)
-    assert found.merged == ((0, 1),)
-    assert found.exponent == pytest.approx(exponents(friction(PAIR, 0.0), [0.1], starts=1).exponent[[0, 0]], abs=1e-4)
+    result = cluster_exponents(friction(RING, 0.05), (0, 1, 0, 1), transient=3000, periods=64)
+    assert result.merged == ((0, 1),)
+    assert result.exponent == pytest.approx(exponents(friction(PAIR, 0.0), [0.1], starts=1).exponent[[0, 0]], abs=1e-4)
 
 
 # -- the variational equation --------------------------------------------------------------------------------
@@ -128,20 +128,20 @@ def test_quotient_and_blocks_are_together_the_jacobian_of_the_network(graph: Top
     states = [clusters(graph, GRAPHS[graph])] if GRAPHS[graph] else orbital_partitions(graph)
     fixed = {sp.Symbol(name, real=True): sp.Rational(3 + i, 2) for i, name in enumerate(equations.parameters)}
     for state in states:
-        found = clustered(equations, state)
+        network = clustered(equations, state)
         values = {**fixed, STRENGTH: fixed[sp.Symbol("sigma", real=True)]}
         together = dict(fixed)
         for k, members in enumerate(state.members):
-            for s in found.orbit.symbols(k):
+            for s in network.orbit.symbols(k):
                 values[s] = sp.Rational(int(random.integers(-9, 9)), 4)
             for i in members:
-                together |= {a: values[b] for a, b in zip(equations.symbols(i), found.orbit.symbols(k), strict=True)}
+                together |= {a: values[b] for a, b in zip(equations.symbols(i), network.orbit.symbols(k), strict=True)}
         with mpmath.workdps(40):
-            part = numbers(dict(found.matrix), values, found.size)
+            part = numbers(dict(network.matrix), values, network.size)
             full = numbers(equations.jacobian(), together, equations.dimension)
-            assert found.size == equations.dimension
+            assert network.size == equations.dimension
             for shift in (mpmath.mpf("0.3"), mpmath.mpf("-1.7"), mpmath.mpf("2.9")):
-                a, b = (mpmath.det(matrix - shift * mpmath.eye(found.size)) for matrix in (part, full))
+                a, b = (mpmath.det(matrix - shift * mpmath.eye(network.size)) for matrix in (part, full))
                 assert abs(a - b) < mpmath.mpf("1e-30") * abs(b)
 
 
@@ -168,10 +168,10 @@ def test_what_is_refused() -> None:
 
 
 def test_the_table_of_a_state_is_plain() -> None:
-    found = cluster_exponents(friction(PAIR, 0.1), [0, 0], transient=10, periods=64).as_dict()
-    assert found["classes"] == [0, 0]
-    assert found["merged"] == []
-    (block,) = found["blocks"]
+    answer = cluster_exponents(friction(PAIR, 0.1), [0, 0], transient=10, periods=64).as_dict()
+    assert answer["classes"] == [0, 0]
+    assert answer["merged"] == []
+    (block,) = answer["blocks"]
     assert (block["clusters"], block["nodes"], block["verdict"]) == ([0], [0, 1], "stable")
 
 
@@ -183,11 +183,11 @@ def test_clusters_that_still_approach_each_other_are_said() -> None:
     """Coupling that repels for sigma > 0 brings all neurons together for sigma < 0, at 0.0044 per unit of time."""
     pairs = tuple((a, b) for a in range(4) for b in range(a + 1, 4))
     with pytest.warns(RuntimeWarning, match=r"clusters that approach each other, 1 and 2; .*; raise transient = 168$"):
-        found = cluster_exponents(neurons(-0.05), (0, 1, 0, 2, 3, 2), transient=168, periods=56)
-    assert 1e-6 < found.separation.max() < 1e-4
-    assert (found.merged, found.approaching) == ((), pairs)
-    assert "approaching  1 and 2; 1 and 3" in repr(found)
-    assert found.as_dict()["approaching"] == [list(pair) for pair in pairs]
+        result = cluster_exponents(neurons(-0.05), (0, 1, 0, 2, 3, 2), transient=168, periods=56)
+    assert 1e-6 < result.separation.max() < 1e-4
+    assert (result.merged, result.approaching) == ((), pairs)
+    assert "approaching  1 and 2; 1 and 3" in repr(result)
+    assert result.as_dict()["approaching"] == [list(pair) for pair in pairs]
 
 
 def test_clusters_that_have_merged_or_stay_apart_do_not_approach_each_other() -> None:
@@ -207,7 +207,7 @@ def test_the_first_half_of_the_transient_may_bring_clusters_nearer() -> None:
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = cluster_exponents(scene, (0, 1, 0, 1), transient=60, periods=30)
-    assert found.separation.max() == pytest.approx(4.0, rel=0.02)
+        result = cluster_exponents(scene, (0, 1, 0, 1), transient=60, periods=30)
+    assert result.separation.max() == pytest.approx(4.0, rel=0.02)
     with pytest.warns(RuntimeWarning, match="clusters that approach each other, 1 and 2; expected"):
         cluster_exponents(scene, (0, 1, 0, 1), transient=0, periods=30)

@@ -66,16 +66,16 @@ def test_arcs_on_a_belt() -> None:
     slip, stick = 2.0 * (math.pi - math.atan((hold - drag) / belt)), 2.0 * (hold - drag) / belt
     starts = np.array([-0.5, 0.0, 0.1, 0.2, 0.9])
     scene = block("coulomb_static", 0.0, belt, theta_b=belt, mu_s=hold, mu_k=drag, window=end)
-    found = finished(scene, x_1=starts).states("end")
+    states = finished(scene, x_1=starts).states("end")
     phase = (end - (hold - starts) / belt) % (slip + stick)
     sliding, circle = phase < slip, math.hypot(hold - drag, belt)
     angle = math.atan2(belt, hold - drag) - phase
     x = np.where(sliding, drag + circle * np.cos(angle), hold + belt * (phase - slip - stick))
     v = np.where(sliding, circle * np.sin(angle), belt)
     assert set(sliding) == {True, False}
-    np.testing.assert_array_equal(found[:, 2], sliding)
-    np.testing.assert_allclose(found[:, 0], x, rtol=0, atol=3e-12)
-    np.testing.assert_allclose(found[:, 1], v, rtol=0, atol=3e-12)
+    np.testing.assert_array_equal(states[:, 2], sliding)
+    np.testing.assert_allclose(states[:, 0], x, rtol=0, atol=3e-12)
+    np.testing.assert_allclose(states[:, 1], v, rtol=0, atol=3e-12)
 
 
 def test_cycle_of_leine() -> None:
@@ -215,7 +215,7 @@ def flow(scene: Scene, x: float, v: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("numbers", "x", "v", "kinds"),
+    ("values", "x", "v", "kinds"),
     [
         ({"theta_b": 0.0, "u": 1.0, "omega": 1.15}, 1.3, 0.1, {1.0, -1.0}),
         ({"theta_b": 0.1, "u": 1.0, "omega": 0.9}, 0.4, 0.7, {1.0, -1.0}),
@@ -224,11 +224,11 @@ def flow(scene: Scene, x: float, v: float) -> np.ndarray:
     ],
 )
 def test_propagator_against_differences_of_the_flow(
-    numbers: dict[str, float], x: float, v: float, kinds: set[float]
+    values: dict[str, float], x: float, v: float, kinds: set[float]
 ) -> None:
     """Turns multiply the deviation of the velocity by a ratio, landings by 0: seen in neighbouring orbits."""
     scene = Scene(
-        topology=ONE, contact="set-valued", parameters={"epsilon": 1.0, **numbers}, initial={"x": [x], "v": [v]},
+        topology=ONE, contact="set-valued", parameters={"epsilon": 1.0, **values}, initial={"x": [x], "v": [v]},
         transient=0, window=1.0, rtol=1e-12, record=("trajectory",), samples=400,
     )  # fmt: skip
     modes = finished(scene).states("trajectory")[:, 2]
@@ -246,9 +246,9 @@ def test_propagator_against_differences_of_the_flow(
 def lost(contact: str, **numbers: float) -> float:
     """Where the exponent of the period-two orbit at omega = 1.15 changes sign above alpha = 0.46."""
     scene = Scene(topology=topology("chain", 2), contact=contact, parameters={"omega": 1.15, **numbers})
-    found = exponents(scene, np.linspace(0.455, 0.475, 21), starts=1, rtol=1e-10, workers=1)
-    assert {attractor.kind for attractor in found.attractors} == {"periodic, 2 drive periods"}
-    changes = [end for interval in found.ranges for end, _ in interval if 0.4551 < end < 0.4749]
+    result = exponents(scene, np.linspace(0.455, 0.475, 21), starts=1, rtol=1e-10, workers=1)
+    assert {attractor.kind for attractor in result.attractors} == {"periodic, 2 drive periods"}
+    changes = [end for interval in result.ranges for end, _ in interval if 0.4551 < end < 0.4749]
     assert len(changes) == 1
     return changes[0]
 

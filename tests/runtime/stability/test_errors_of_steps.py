@@ -23,24 +23,24 @@ def test_a_loose_tolerance_is_in_the_error(what: str) -> None:
     options = {"periods": 3000, "precision": 0.0, "starts": 1, "parameters": values}
     exact = sc.exponents(scene, ALPHA, rtol=1e-11, **options)
     for rtol in (1e-2, 1e-4):
-        found = sc.exponents(scene, ALPHA, rtol=rtol, **options)
-        apart = np.abs(found.exponent - exact.exponent)
-        assert np.all(apart <= 2.0 * found.stderr), rtol
-        assert np.all(found.stderr <= 1e-3 + 30.0 * rtol), rtol
+        result = sc.exponents(scene, ALPHA, rtol=rtol, **options)
+        apart = np.abs(result.exponent - exact.exponent)
+        assert np.all(apart <= 2.0 * result.stderr), rtol
+        assert np.all(result.stderr <= 1e-3 + 30.0 * rtol), rtol
 
 
 def test_a_whole_spectrum_knows_the_error_of_its_steps() -> None:
     """All exponents of an oscillator without damping are zero."""
     scene = sc.Scene("harmonic", topology=sc.chain(2), integrator="taylor")
-    found = sc.lyapunov_spectrum(scene, rtol=1e-5, periods=50, precision=0.0)
-    assert np.abs(found.exponent).max() > 1e-9
-    assert np.all(np.abs(found.exponent) <= 2.0 * found.stderr)
+    result = sc.lyapunov_spectrum(scene, rtol=1e-5, periods=50, precision=0.0)
+    assert np.abs(result.exponent).max() > 1e-9
+    assert np.all(np.abs(result.exponent) <= 2.0 * result.stderr)
 
 
 def test_cluster_exponents_know_the_error_of_their_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = sc.Scene("harmonic", topology=sc.chain(3), parameters={"sigma": 0.1})
     options = {"periods": 64, "transient": 0, "precision": 0.0}
-    found, errors = [], []
+    collected, errors = [], []
     measured = VariationalIntegrator.error_of_steps
 
     def error_of_steps(self: VariationalIntegrator, length: float) -> np.ndarray:
@@ -49,13 +49,13 @@ def test_cluster_exponents_know_the_error_of_their_steps(monkeypatch: pytest.Mon
 
     monkeypatch.setattr(VariationalIntegrator, "error_of_steps", error_of_steps)
     for rtol in (1e-9, 1e-3):
-        found.append(sc.cluster_exponents(scene, (0, 1, 0), rtol=rtol, **options))
+        collected.append(sc.cluster_exponents(scene, (0, 1, 0), rtol=rtol, **options))
     assert np.all(errors[1] > 100.0 * errors[0])
-    assert np.all(found[0].stderr > 1.0)
-    assert np.all(found[1].stderr > 2.0)
+    assert np.all(collected[0].stderr > 1.0)
+    assert np.all(collected[1].stderr > 2.0)
 
 
 def test_the_error_is_that_of_the_mean_change() -> None:
     """Changes 1 and 3 over blocks of length 2: mean 2, whose standard error is 1/sqrt(2)."""
-    found = error_of_steps([np.array([0.0, -np.inf])] * 2, [np.array([1.0, 0.0]), np.array([3.0, 0.0])], 2.0)
-    np.testing.assert_allclose(found, [np.sqrt(4.0 + 0.5) / 2.0, 0.0])
+    error = error_of_steps([np.array([0.0, -np.inf])] * 2, [np.array([1.0, 0.0]), np.array([3.0, 0.0])], 2.0)
+    np.testing.assert_allclose(error, [np.sqrt(4.0 + 0.5) / 2.0, 0.0])

@@ -33,19 +33,19 @@ def scene(name: str, coupling: str, **parameters: float) -> Scene:
 def test_linear_nodes_in_closed_form() -> None:
     """x'' = -x - alpha v: exponent -alpha/2, above alpha = 2 the slower of two real roots."""
     alpha = np.linspace(0.0, 6.0, 61)
-    found = exponents(scene("harmonic", "damper"), alpha)
+    result = exponents(scene("harmonic", "damper"), alpha)
     root = np.sqrt(np.maximum(alpha**2 / 4 - 1, 0.0))
-    np.testing.assert_allclose(found.exponent, -alpha / 2 + root, atol=1e-8)
-    assert {a.kind for a in found.attractors} == {"linear"}
+    np.testing.assert_allclose(result.exponent, -alpha / 2 + root, atol=1e-8)
+    assert {a.kind for a in result.attractors} == {"linear"}
 
 
 def test_linear_nodes_may_grow_without_bound() -> None:
     """x'' = -x + v/2 + cos(6t/5), each state coupled to its rate: (1/4) - alpha, whatever the motion and its start."""
     node = Field({"x": "v", "v": "-x + v/2 + cos(6*t/5)"})
     alpha = np.array([0.0, 0.1, 1.0])
-    found = exponents(Scene(node, "x->x, v->v", PAIR, initial={"x": 1e12}), alpha, show_progress=False)
-    np.testing.assert_allclose(found.exponent, 0.25 - alpha, rtol=0, atol=1e-14)
-    assert {a.kind for a in found.attractors} == {"linear"}
+    result = exponents(Scene(node, "x->x, v->v", PAIR, initial={"x": 1e12}), alpha, show_progress=False)
+    np.testing.assert_allclose(result.exponent, 0.25 - alpha, rtol=0, atol=1e-14)
+    assert {a.kind for a in result.attractors} == {"linear"}
 
 
 @pytest.mark.parametrize(("damping", "size"), [(0.05, 0.4), (0.4, 0.1)])
@@ -59,25 +59,25 @@ def test_linear_nodes_with_periodic_coefficients_have_their_multipliers(damping:
 
     columns = [solve_ivp(rates, (0, math.pi), e, rtol=1e-12, atol=1e-14).y[:, -1] for e in np.eye(2)]
     largest = np.log(np.abs(np.linalg.eigvals(np.array(columns).T)).max()) / math.pi
-    found = exponents(Scene(node, "x->x, v->v", PAIR), alpha, rtol=1e-10, show_progress=False)
-    np.testing.assert_allclose(found.exponent, largest - alpha, rtol=0, atol=1e-10)
+    result = exponents(Scene(node, "x->x, v->v", PAIR), alpha, rtol=1e-10, show_progress=False)
+    np.testing.assert_allclose(result.exponent, largest - alpha, rtol=0, atol=1e-10)
     assert (largest > 0) == (damping < 0.1)
-    assert {a.kind for a in found.attractors} == {"linear"}
+    assert {a.kind for a in result.attractors} == {"linear"}
 
 
 def test_a_motion_without_bound_is_refused_with_a_remedy() -> None:
     growing = Scene(Field({"x": "x/2"}), "x->x", PAIR)
     with pytest.raises(FloatingPointError, match=r"grew without bound, .*begin on a bounded motion, such as an equil"):
         lyapunov_spectrum(growing, show_progress=False)
-    found = lyapunov_spectrum(growing.replace(initial={"x": 0.0}), periods=50, transient=0, show_progress=False)
-    np.testing.assert_allclose(found.exponent, 0.5, rtol=0, atol=1e-9)
+    result = lyapunov_spectrum(growing.replace(initial={"x": 0.0}), periods=50, transient=0, show_progress=False)
+    np.testing.assert_allclose(result.exponent, 0.5, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize(("strengths", "words"), [([0.0, 1e300], "1e+300"), ([-2e16 + 1e16j], "2.23607e+16")])
-def test_strengths_that_no_step_resolves_are_named(strengths: list[complex], words: str) -> None:
+@pytest.mark.parametrize(("strengths", "message"), [([0.0, 1e300], "1e+300"), ([-2e16 + 1e16j], "2.23607e+16")])
+def test_strengths_that_no_step_resolves_are_named(strengths: list[complex], message: str) -> None:
     """Modes of Duffing's oscillator with frequencies of 1e8 and more: the mode, and not the orbit, is what fails."""
     stiff = scene("duffing", "spring").replace(max_steps=1000)
-    with pytest.raises(FloatingPointError, match=re.escape(f"deviations of strengths up to {words} cannot be")):
+    with pytest.raises(FloatingPointError, match=re.escape(f"deviations of strengths up to {message} cannot be")):
         exponents(stiff, strengths, starts=1, transient=1, show_progress=False)
 
 
@@ -85,27 +85,27 @@ def test_a_fixed_point_has_the_eigenvalues_of_its_jacobian() -> None:
     """Lorenz at rest, Rayleigh number below one: z decays by itself, x and y by a 2 x 2 matrix."""
     s = scene("lorenz", "x->x", rayleigh=0.5)
     alpha = np.array([0.0, 0.5, 20.0])
-    found = exponents(s, alpha, transient=100, starts=2)
+    result = exponents(s, alpha, transient=100, starts=2)
     p, b = s.parameters["prandtl"], s.parameters["b"]
     expected = [max(*np.linalg.eigvals([[-p - a, p], [0.5, -1.0]]).real, -b) for a in alpha]
-    np.testing.assert_allclose(found.exponent, expected, atol=1e-8)
-    assert {a.kind for a in found.attractors} == {"fixed point"}
+    np.testing.assert_allclose(result.exponent, expected, atol=1e-8)
+    assert {a.kind for a in result.attractors} == {"fixed point"}
 
 
 def test_a_driven_linear_oscillator_through_its_floquet_multipliers() -> None:
     """Duffing without cubic term: the variational equation of a linear damped oscillator, integrated over a cycle."""
     s = scene("duffing", "spring", beta=1e-9, delta=0.2)
     alpha = np.array([0.0, 0.4, 3.0])
-    found = exponents(s, alpha, rtol=1e-9, starts=1, transient=200)
-    np.testing.assert_allclose(found.exponent, -0.1, atol=1e-8)
-    assert [a.kind for a in found.attractors] == ["periodic"]
+    result = exponents(s, alpha, rtol=1e-9, starts=1, transient=200)
+    np.testing.assert_allclose(result.exponent, -0.1, atol=1e-8)
+    assert [a.kind for a in result.attractors] == ["periodic"]
 
 
 def test_coupling_by_the_identity_lowers_every_exponent_by_alpha() -> None:
     alpha = np.linspace(0.0, 4.0, 41)
-    found = exponents(scene("lorenz", "x->x, y->y, z->z"), alpha, periods=64, precision=1.0, starts=2)
-    np.testing.assert_allclose(found.exponent, found.exponent[0] - alpha, atol=1e-6)
-    assert found.exponent[0] > 0.8
+    result = exponents(scene("lorenz", "x->x, y->y, z->z"), alpha, periods=64, precision=1.0, starts=2)
+    np.testing.assert_allclose(result.exponent, result.exponent[0] - alpha, atol=1e-6)
+    assert result.exponent[0] > 0.8
 
 
 def test_interpolated_strengths_agree_with_integrated_ones() -> None:
@@ -128,10 +128,10 @@ def test_an_interpolation_is_as_good_as_its_check_says() -> None:
     for strengths in (np.linspace(0.0, 30.0, 500), square):
         errors = []
         for nodes, parts in ((6, 1), (10, 1), (20, 1), (40, 1)):
-            made = strength_interpolation(strengths, nodes, parts)
-            assert not made.is_exact
+            interpolation = strength_interpolation(strengths, nodes, parts)
+            assert not interpolation.is_exact
             worst, seen = 0.0, 0.0
-            for panel in made.panels:
+            for panel in interpolation.panels:
                 of = propagators(panel.points)[0]
                 for x, weights in ((strengths[panel.rows], panel.weights), (panel.extras, panel.checks)):
                     exact = propagators(x)[0]
@@ -189,31 +189,31 @@ def test_an_exponent_that_is_zero_to_its_error_begins_no_interval(error: float, 
 @pytest.mark.long
 def test_published_zeros_of_the_rossler_function() -> None:
     """a = b = 0.2, c = 9, x -> x: 0.186 and 4.614 (Huang, Chen, Lai & Pecora, Phys. Rev. E 80, 036204 (2009))."""
-    found = msf(scene("rossler", "x->x"), np.linspace(0.0, 6.0, 61), periods=400, precision=5e-3, starts=4)
-    ((low, high),) = found.intervals
-    ((low_error, high_error),) = found.uncertainties
+    result = msf(scene("rossler", "x->x"), np.linspace(0.0, 6.0, 61), periods=400, precision=5e-3, starts=4)
+    ((low, high),) = result.intervals
+    ((low_error, high_error),) = result.uncertainties
     assert abs(low - 0.186) < 4 * low_error < 0.06
     assert abs(high - 4.614) < 4 * high_error < 0.08
-    assert found.kind == "bounded interval"
+    assert result.kind == "bounded interval"
 
 
 def test_published_zero_of_the_lorenz_function() -> None:
     """10, 28, 2, x -> x: one zero, at 7.3 (same source), a half-line above it."""
-    found = msf(scene("lorenz", "x->x", b=2.0), np.linspace(0.0, 20.0, 41), periods=1000, precision=5e-3, starts=4)
-    ((low, high),) = found.intervals
-    assert abs(low - 7.3) < 4 * found.uncertainties[0][0] < 0.5
+    result = msf(scene("lorenz", "x->x", b=2.0), np.linspace(0.0, 20.0, 41), periods=1000, precision=5e-3, starts=4)
+    ((low, high),) = result.intervals
+    assert abs(low - 7.3) < 4 * result.uncertainties[0][0] < 0.5
     assert high == 20.0
-    assert found.kind == "half-line"
+    assert result.kind == "half-line"
 
 
 def test_the_friction_oscillator_at_the_published_end() -> None:
     """omega = 1.15: two oscillators synchronise up to sigma = 0.233, alpha = 0.466 (Marszal et al. (2016), fig. 4)."""
-    found = msf(scene("friction", "spring", omega=1.15), np.linspace(0.0, 1.0, 11), starts=2)
-    ((low, high),) = found.intervals
+    result = msf(scene("friction", "spring", omega=1.15), np.linspace(0.0, 1.0, 11), starts=2)
+    ((low, high),) = result.intervals
     assert low == 0.0
     assert abs(high - 0.466) < 0.002
-    assert found.attractors == ("periodic, 2 drive periods",) * 2
-    assert found.kind == "bounded interval"
+    assert result.attractors == ("periodic, 2 drive periods",) * 2
+    assert result.kind == "bounded interval"
 
 
 def test_the_plane_agrees_with_the_line_and_is_symmetric() -> None:
@@ -296,22 +296,22 @@ def test_a_large_constant_beside_a_motion_does_not_hide_it(force: str, kind: str
 def test_two_fixed_points_with_small_exponents_are_not_averaged() -> None:
     """x = 1 has the exponent -6e-5, x = -1 has 2e-5."""
     node = Field({"x": "x - x**3", "z": "-2e-5*z*(1 + 2*x)"}, initial={"x": 0.05, "z": 0.0})
-    found = exponents(Scene(node, "x->x", PAIR), [0.0, 0.5], transient=20, seed=3)
-    assert {a.kind for a in found.attractors} == {"fixed point"}
-    assert sorted(set(found.by_start[:, 0].round(9))) == [-6e-5, 2e-5]
-    assert len(found.groups) == 2
-    assert abs(found.exponent[0]) == pytest.approx(6e-5 if found.exponent[0] < 0 else 2e-5)
+    result = exponents(Scene(node, "x->x", PAIR), [0.0, 0.5], transient=20, seed=3)
+    assert {a.kind for a in result.attractors} == {"fixed point"}
+    assert sorted(set(result.by_start[:, 0].round(9))) == [-6e-5, 2e-5]
+    assert len(result.groups) == 2
+    assert abs(result.exponent[0]) == pytest.approx(6e-5 if result.exponent[0] < 0 else 2e-5)
 
 
 def test_two_periodic_attractors_are_not_averaged() -> None:
     """omega = 1.07: two motions of period two, one transversally stable at alpha = 0.1, the other not."""
-    found = exponents(scene("friction", "spring", omega=1.07), [0.1], starts=8)
-    assert len(found.groups) > 1
-    for rows in found.groups:
-        assert np.ptp(found.by_start[list(rows)]) < 1e-3
-    own = next(rows for rows in found.groups if 0 in rows)
-    assert found.exponent[0] == found.by_start[list(own)].mean()
-    assert np.ptp(found.by_start) > 0.3
+    result = exponents(scene("friction", "spring", omega=1.07), [0.1], starts=8)
+    assert len(result.groups) > 1
+    for rows in result.groups:
+        assert np.ptp(result.by_start[list(rows)]) < 1e-3
+    own = next(rows for rows in result.groups if 0 in rows)
+    assert result.exponent[0] == result.by_start[list(own)].mean()
+    assert np.ptp(result.by_start) > 0.3
 
 
 def test_what_is_refused() -> None:
@@ -329,7 +329,7 @@ def test_what_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("strengths", "words"),
+    ("strengths", "message"),
     [
         ([0.0, np.nan, 1.0], "found nan; expected finite numbers"),
         ([[0.0, 1.0]], r"found an array of shape \(1, 2\); expected a row"),
@@ -337,8 +337,8 @@ def test_what_is_refused() -> None:
         (0.5, "at least 2 numbers"),
     ],
 )
-def test_a_line_of_strengths_that_is_none_is_named(strengths: object, words: str) -> None:
-    with pytest.raises(ValueError, match=f"alpha: .*{words}"):
+def test_a_line_of_strengths_that_is_none_is_named(strengths: object, message: str) -> None:
+    with pytest.raises(ValueError, match=f"alpha: .*{message}"):
         msf(scene("harmonic", "spring"), strengths)  # type: ignore[arg-type]
 
 
@@ -352,7 +352,7 @@ def test_functions_of_strength_take_the_keywords_of_exponents(function: Callable
 
 
 @pytest.mark.parametrize(
-    ("given", "strengths"),
+    ("keywords", "strengths"),
     [
         (
             {"oscillator": Field({"x": "x - x**3 + 0.2*cos(w*t)"}, parameters={"w": 0.01}), "coupling": "x->x"},
@@ -363,14 +363,14 @@ def test_functions_of_strength_take_the_keywords_of_exponents(function: Callable
     ids=["slow drive", "large strengths"],
 )
 def test_deviations_may_grow_and_decay_beyond_the_range_of_numbers(
-    given: dict[str, object], strengths: list[float]
+    keywords: dict[str, object], strengths: list[float]
 ) -> None:
     """All components are coupled alike, so that a mode's exponent is that of the orbit less the strength."""
-    found = exponents(
-        Scene(**given, topology=topology("chain", 2), initial={"x": 1.0}, transient=5), strengths, starts=1
+    result = exponents(
+        Scene(**keywords, topology=topology("chain", 2), initial={"x": 1.0}, transient=5), strengths, starts=1
     )
-    assert [a.kind for a in found.attractors] == ["periodic"]
-    np.testing.assert_allclose(found.exponent - found.exponent[0], np.negative(strengths), rtol=0, atol=2e-5)
+    assert [a.kind for a in result.attractors] == ["periodic"]
+    np.testing.assert_allclose(result.exponent - result.exponent[0], np.negative(strengths), rtol=0, atol=2e-5)
 
 
 def test_draws_of_a_scene_are_refused() -> None:
@@ -381,27 +381,29 @@ def test_draws_of_a_scene_are_refused() -> None:
 
 def test_windows_of_complex_eigenvalues_are_said_to_be_unknown() -> None:
     """Not "none": a line of real strengths says nothing about them."""
-    found = msf(scene("harmonic", "damper").replace(topology=topology("one_way_ring", 3)), [0.0, 1.0])
-    assert dict(found.summary)["sigma"] == "not known: one_way_ring(3) has complex eigenvalues, which need `plane`"
-    assert found.data.sizes["window_number"] == 0
+    result = msf(scene("harmonic", "damper").replace(topology=topology("one_way_ring", 3)), [0.0, 1.0])
+    assert dict(result.summary)["sigma"] == "not known: one_way_ring(3) has complex eigenvalues, which need `plane`"
+    assert result.data.sizes["window_number"] == 0
 
 
 def test_ranges_that_end_with_the_grid_are_marked() -> None:
-    found = msf(scene("harmonic", "damper"), [0.0, 1.0])
-    said = dict(found.summary)
+    result = msf(scene("harmonic", "damper"), [0.0, 1.0])
+    said = dict(result.summary)
     assert (said["negative for alpha"], said["sigma"]) == ("0.0000 … 1.0000...", "0.0000 … 0.5000...")
     assert said["..."] == "the grid of alpha ends here, the range may go on"
-    assert dict(found.fine.summary)["negative for alpha"] == "0.0000 … 1.0000..."
+    assert dict(result.fine.summary)["negative for alpha"] == "0.0000 … 1.0000..."
     alpha = np.linspace(0.0, 1.0, 5)
-    inside = replace(found, alpha=alpha, fine=replace(found.fine, alpha=alpha, exponent=alpha - 0.6, stderr=0 * alpha))
+    inside = replace(
+        result, alpha=alpha, fine=replace(result.fine, alpha=alpha, exponent=alpha - 0.6, stderr=0 * alpha)
+    )
     assert "..." not in "".join(dict(inside.summary).values())
 
 
 def test_steps_follow_the_errors_of_all_modes() -> None:
     """One that grows between one that does not and many that shrink fast: the largest and the smallest strengths are no measure."""
     alpha = [0.0] * 8 + [-200.0] + [5000.0] * 15
-    found = exponents(scene("duffing", "x->x"), alpha, rtol=1e-3, periods=64, transient=20, starts=1)
-    assert found.exponent[8] == pytest.approx(200.0, abs=0.1)
+    result = exponents(scene("duffing", "x->x"), alpha, rtol=1e-3, periods=64, transient=20, starts=1)
+    assert result.exponent[8] == pytest.approx(200.0, abs=0.1)
 
 
 def test_deviations_that_are_no_numbers_are_refused() -> None:

@@ -41,21 +41,21 @@ def floquet(mu: float, alphas: tuple[float, ...] = (0.0, 0.1, 0.5)) -> tuple[flo
     tight = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
     turns = solve_ivp(rates, (0.0, 400.0 if mu < 1 else 60.0), [2.0, 0.0], events=turn, **tight)
     (*_, before, last), state = turns.t_events[0], turns.y_events[0][-1]
-    found = []
+    collected = []
     for alpha in alphas:
         end = solve_ivp(both, (0.0, last - before), [*state, 1.0, 0.0, 0.0, 1.0], args=(alpha,), **tight).y[2:, -1]
-        found.append(float(np.log(np.abs(np.linalg.eigvals(end.reshape(2, 2))).max()) / (last - before)))
-    return float(last - before), found
+        collected.append(float(np.log(np.abs(np.linalg.eigvals(end.reshape(2, 2))).max()) / (last - before)))
+    return float(last - before), collected
 
 
 @pytest.mark.parametrize("mu", [0.1, 1.0, 10.0])
 def test_exponents_along_a_cycle_are_eigenvalues(mu: float) -> None:
-    found = exponents(pair(mu), [0.0, 0.1, 0.5], starts=3, rtol=1e-9)
-    assert [attractor.kind for attractor in found.attractors] == ["periodic"] * 3
+    result = exponents(pair(mu), [0.0, 0.1, 0.5], starts=3, rtol=1e-9)
+    assert [attractor.kind for attractor in result.attractors] == ["periodic"] * 3
     period, expected = floquet(mu)
-    np.testing.assert_allclose([attractor.cycle for attractor in found.attractors], period, rtol=1e-8)
-    np.testing.assert_allclose(found.exponent, expected, atol=1e-8)
-    assert found.stderr.max() < 1e-7
+    np.testing.assert_allclose([attractor.cycle for attractor in result.attractors], period, rtol=1e-8)
+    np.testing.assert_allclose(result.exponent, expected, atol=1e-8)
+    assert result.stderr.max() < 1e-7
 
 
 def test_a_drive_of_amplitude_zero_is_none() -> None:
@@ -64,8 +64,8 @@ def test_a_drive_of_amplitude_zero_is_none() -> None:
     period, expected = floquet(1.0)
     cycle = periodic_orbit(shipped)
     assert cycle.period == pytest.approx(period, rel=1e-9)
-    found = exponents(shipped, [0.0, 0.1, 0.5], starts=1, rtol=1e-9)
-    np.testing.assert_allclose(found.exponent, expected, atol=1e-8)
+    result = exponents(shipped, [0.0, 0.1, 0.5], starts=1, rtol=1e-9)
+    np.testing.assert_allclose(result.exponent, expected, atol=1e-8)
     with pytest.raises(ArithmeticError, match="no orbit of 1 drive period"):
         periodic_orbit(shipped, u=0.01)
 
@@ -79,18 +79,18 @@ def test_any_unit_of_time_and_any_place(omega: float, centre: float) -> None:
         parameters={"o": omega, "c": centre},
     )
     scene = Scene(node, "x->x, y->y", chain(2), initial={"x": centre + 0.5, "y": 0.1})
-    found = exponents(scene, np.array([0.0, 0.3]) * omega, transient=round(max(20.0, 10.0 / omega)), starts=2)
-    np.testing.assert_allclose(found.attractors[0].cycle, np.pi / omega, rtol=1e-6)
-    np.testing.assert_allclose(found.exponent, [0.0, -0.3 * omega], atol=2e-6 * omega)
+    result = exponents(scene, np.array([0.0, 0.3]) * omega, transient=round(max(20.0, 10.0 / omega)), starts=2)
+    np.testing.assert_allclose(result.attractors[0].cycle, np.pi / omega, rtol=1e-6)
+    np.testing.assert_allclose(result.exponent, [0.0, -0.3 * omega], atol=2e-6 * omega)
 
 
 @pytest.mark.parametrize(("c", "turns"), [(2.5, 1), (3.5, 2), (4.0, 4)])
 def test_doubled_periods_of_rossler(c: float, turns: int) -> None:
     scene = Scene("rossler", "x->x", chain(2), parameters={"a": 0.2, "b": 0.2, "c": c})
-    found = exponents(scene, [0.0, 0.3], transient=2000, starts=1, rtol=1e-8)
-    assert found.attractors[0].kind == "periodic"
-    assert round(found.attractors[0].cycle / 5.8) == turns
-    assert abs(found.exponent[0]) < 1e-6
+    result = exponents(scene, [0.0, 0.3], transient=2000, starts=1, rtol=1e-8)
+    assert result.attractors[0].kind == "periodic"
+    assert round(result.attractors[0].cycle / 5.8) == turns
+    assert abs(result.exponent[0]) < 1e-6
 
 
 @pytest.mark.parametrize(
@@ -103,8 +103,8 @@ def test_doubled_periods_of_rossler(c: float, turns: int) -> None:
 )
 def test_chaos_and_conservative_orbits_are_averaged(scene: Callable[[], Scene]) -> None:
     """Chaos comes near its unstable cycles, and every orbit of a pendulum is a cycle; neither attracts."""
-    found = exponents(scene(), [0.0, 0.2], periods=64, starts=4)
-    assert {attractor.kind for attractor in found.attractors} == {"aperiodic"}
+    result = exponents(scene(), [0.0, 0.2], periods=64, starts=4)
+    assert {attractor.kind for attractor in result.attractors} == {"aperiodic"}
 
 
 def test_windows_of_a_cycle_begin_at_zero() -> None:
@@ -158,7 +158,7 @@ def test_a_return_that_fails_leads_to_the_next_and_to_the_least_period(monkeypat
 
 
 @pytest.mark.parametrize(
-    ("scene", "more", "error", "words"),
+    ("scene", "more", "error", "message"),
     [
         (pair(1.0), {"periods": 2}, ValueError, "periods = 2; expected 1 for an oscillator without a drive"),
         (pair(1.0), {"start": [1.0]}, ValueError, "expected a number for each of x, v"),
@@ -167,7 +167,7 @@ def test_a_return_that_fails_leads_to_the_next_and_to_the_least_period(monkeypat
         (pair(-1.0), {}, ArithmeticError, "no cycle: the motion comes to rest at x = 0, v = "),
     ],
 )
-def test_what_has_no_attracting_cycle(scene: Scene, more: dict[str, Any], error: type, words: str) -> None:
-    with pytest.raises(error, match=words) as caught:
+def test_what_has_no_attracting_cycle(scene: Scene, more: dict[str, Any], error: type, message: str) -> None:
+    with pytest.raises(error, match=message) as caught:
         periodic_orbit(scene, **more)
     assert "\n" not in str(caught.value)

@@ -13,9 +13,9 @@ LONE, PAIR = sc.Scene("fitzhugh_nagumo"), sc.Scene("fitzhugh_nagumo", "x->x", sc
 
 
 def test_strength_zero_needs_no_link() -> None:
-    found = sc.exponents(LONE, [0.0])
-    assert found.attractors[0].kind == "periodic"
-    np.testing.assert_allclose(found.exponent, sc.exponents(PAIR, [0.0]).exponent, atol=1e-7)
+    result = sc.exponents(LONE, [0.0])
+    assert result.attractors[0].kind == "periodic"
+    np.testing.assert_allclose(result.exponent, sc.exponents(PAIR, [0.0]).exponent, atol=1e-7)
 
 
 def test_a_periodic_orbit_needs_no_link() -> None:

@@ -70,10 +70,10 @@ def test_the_divergence_is_that_of_a_separate_trajectory(rossler: Lyapunov) -> N
 
 def test_damping_is_the_sum_of_a_driven_oscillator() -> None:
     """Duffing: divergence -delta everywhere, both exponents -delta/2 on a small periodic motion."""
-    found = lyapunov_spectrum(lone("duffing", delta=0.2), transient=60, periods=200)
-    assert found.exponent.sum() == pytest.approx(-0.2, abs=1e-7)
-    assert found.divergence == pytest.approx(-0.2, abs=1e-10)
-    np.testing.assert_allclose(found.exponent, -0.1, atol=4e-3)
+    result = lyapunov_spectrum(lone("duffing", delta=0.2), transient=60, periods=200)
+    assert result.exponent.sum() == pytest.approx(-0.2, abs=1e-7)
+    assert result.divergence == pytest.approx(-0.2, abs=1e-10)
+    np.testing.assert_allclose(result.exponent, -0.1, atol=4e-3)
 
 
 def test_blocks_of_a_part_of_a_period_see_the_drive_at_its_phase() -> None:
@@ -91,31 +91,31 @@ def test_blocks_of_a_part_of_a_period_see_the_drive_at_its_phase() -> None:
 def test_hamiltonian_exponents_come_in_pairs() -> None:
     """x'' = -x and, at sigma = 1, y'' = -y + 2 y for the difference: 1, 0, 0, -1, sum 0."""
     scene = Scene(oscillator="harmonic", topology=APART, initial={"x": 0.0}, parameters={"sigma": 1.0})
-    found = lyapunov_spectrum(scene, transient=20, periods=64)
-    np.testing.assert_allclose(found.exponent, [1.0, 0.0, 0.0, -1.0], atol=1e-9)
-    np.testing.assert_allclose(found.exponent + found.exponent[::-1], 0.0, atol=1e-9)
-    assert found.divergence == 0.0
+    result = lyapunov_spectrum(scene, transient=20, periods=64)
+    np.testing.assert_allclose(result.exponent, [1.0, 0.0, 0.0, -1.0], atol=1e-9)
+    np.testing.assert_allclose(result.exponent + result.exponent[::-1], 0.0, atol=1e-9)
+    assert result.divergence == 0.0
 
 
 def test_modes_of_the_synchronous_state_make_up_the_whole_spectrum() -> None:
     """Two Lorenz systems coupled by H = I: every exponent once as it is and once lowered by 2 sigma."""
     scene = Scene(oscillator="lorenz", coupling="x->x, y->y, z->z", topology=PAIR, parameters={"sigma": 1.5})
-    found = lyapunov_spectrum(scene, transient=20, periods=64)
-    np.testing.assert_allclose(found.exponent[[2, 3, 5]], found.exponent[[0, 1, 4]] - 3.0, atol=0.02)
-    assert found.exponent.sum() == pytest.approx(-2 * 41 / 3 - 9, abs=1e-6)
-    assert found.exponent[0] == pytest.approx(0.9056, abs=4 * found.stderr[0])
+    result = lyapunov_spectrum(scene, transient=20, periods=64)
+    np.testing.assert_allclose(result.exponent[[2, 3, 5]], result.exponent[[0, 1, 4]] - 3.0, atol=0.02)
+    assert result.exponent.sum() == pytest.approx(-2 * 41 / 3 - 9, abs=1e-6)
+    assert result.exponent[0] == pytest.approx(0.9056, abs=4 * result.stderr[0])
 
 
 def test_friction_leaves_as_many_exponents_as_oscillators_and_says_what_the_rest_sums_to() -> None:
     """omega = 1.15, sigma = 0.2: the modes alpha = 0 and 0.4 of a periodic motion; velocities die in stick."""
     scene = Scene(topology=PAIR, parameters={"omega": 1.15, "sigma": 0.2})
-    found = lyapunov_spectrum(scene, transient=2000, periods=64)  # 0.002 apart: the two part slowly
+    result = lyapunov_spectrum(scene, transient=2000, periods=64)  # 0.002 apart: the two part slowly
     expected = exponents(scene, [0.0, 0.4], starts=1).exponent
-    np.testing.assert_allclose(found.exponent[:2], np.sort(expected)[::-1], atol=1e-5)
-    assert found.resolved.tolist() == [True, True, False, False]
-    assert found.exponent[2:].tolist() == [-np.inf, -np.inf]
-    assert np.isfinite(found.rest)
-    assert -4e4 < found.rest / 2 < -1e3  # part of the time in stick, at -epsilon mu_s (2/pi) kappa = -3.8e4 there
+    np.testing.assert_allclose(result.exponent[:2], np.sort(expected)[::-1], atol=1e-5)
+    assert result.resolved.tolist() == [True, True, False, False]
+    assert result.exponent[2:].tolist() == [-np.inf, -np.inf]
+    assert np.isfinite(result.rest)
+    assert -4e4 < result.rest / 2 < -1e3  # part of the time in stick, at -epsilon mu_s (2/pi) kappa = -3.8e4 there
     first = lyapunov_spectrum(scene, periods=64, count=1, precision=1.0)
     assert first.exponent.shape == (1,)
     assert first.exponent[0] == pytest.approx(expected.max(), abs=2e-3)
@@ -168,10 +168,10 @@ def test_the_errors_of_exponents_are_those_of_the_dimension(
     exponents: tuple[float, ...], errors: tuple[float, ...], dimension: float, span: tuple[float, float]
 ) -> None:
     values = np.array(exponents), np.array(errors), np.ones(len(errors), dtype=bool)
-    found = Lyapunov(*values, 0.0, 0.0, 1.0, 1.0, len(errors))
-    assert found.dimension == pytest.approx(dimension, rel=1e-12)
-    assert found.dimension_range == pytest.approx(span, rel=1e-12)
-    assert dict(found.summary)["Kaplan-Yorke dimension"].startswith(f"{dimension:.4g}, from {span[0]:.4g} to ")
+    result = Lyapunov(*values, 0.0, 0.0, 1.0, 1.0, len(errors))
+    assert result.dimension == pytest.approx(dimension, rel=1e-12)
+    assert result.dimension_range == pytest.approx(span, rel=1e-12)
+    assert dict(result.summary)["Kaplan-Yorke dimension"].startswith(f"{dimension:.4g}, from {span[0]:.4g} to ")
 
 
 def test_what_is_refused() -> None:
@@ -197,13 +197,13 @@ UNITS = Field(
 )
 def test_units_of_time_and_of_a_component_change_nothing(k: float, s: float, c: float) -> None:
     scene = Scene(UNITS, None, initial={"x": s + c, "y": 1.0, "z": 20.0}, parameters={"k": k, "s": s, "c": c})
-    found = lyapunov_spectrum(scene, periods=128, transient=20, precision=0.0)
-    assert found.resolved.all()
-    assert np.all(np.abs(found.exponent / k - [0.9056, 0.0, -14.5723]) < 4 * found.stderr / k + 1e-3)
-    assert found.stderr.max() < 0.3 * k
-    assert found.exponent.sum() / k == pytest.approx(-41 / 3, abs=1e-6)
-    assert found.unit.startswith("mean return time")
-    assert found.time * k == pytest.approx(128 * 0.75, rel=0.05)
+    result = lyapunov_spectrum(scene, periods=128, transient=20, precision=0.0)
+    assert result.resolved.all()
+    assert np.all(np.abs(result.exponent / k - [0.9056, 0.0, -14.5723]) < 4 * result.stderr / k + 1e-3)
+    assert result.stderr.max() < 0.3 * k
+    assert result.exponent.sum() / k == pytest.approx(-41 / 3, abs=1e-6)
+    assert result.unit.startswith("mean return time")
+    assert result.time * k == pytest.approx(128 * 0.75, rel=0.05)
 
 
 @pytest.mark.parametrize("rate", ["-x**3 + v/2", "-k*x**3 + v/3"])

@@ -100,13 +100,13 @@ def test_growth_beyond_the_range_of_numbers_is_counted() -> None:
 
 def test_coarse_nodes_are_seen_by_the_strengths_for_comparison() -> None:
     orbit = settled(LINE, contact="set-valued", parameters={"omega": 1.4})
-    found = {}
+    collected = {}
     for nodes in (8, 13):
         march = march_of(*orbit, strength_interpolation(LINE, nodes), 4.0)
         march.growths(np.array([8]))
-        found[nodes] = march.deviations.error
-    assert found[8] > 1e-3
-    assert 1e-9 < found[13] < 1e-5
+        collected[nodes] = march.deviations.error
+    assert collected[8] > 1e-3
+    assert 1e-9 < collected[13] < 1e-5
 
 
 STICKS = {
@@ -150,13 +150,13 @@ def test_stick_intervals_multiply_modes_of_very_different_growth() -> None:
 def test_a_stick_interval_on_too_few_nodes_is_seen_by_the_strengths_for_comparison() -> None:
     orbit = settled(LINE, contact="set-valued", parameters={"omega": 1.4})
     nodes = strength_interpolation(LINE, 29)
-    found = {}
+    collected = {}
     for few in (5, 13):
         march = march_of(*orbit, nodes, 4.0, 1.0, strength_interpolation(nodes.nodes, few))
         march.growths(np.array([4]))
-        found[few] = march.deviations.error
-    assert found[5] > 1e-3
-    assert found[13] < 1e-9
+        collected[few] = march.deviations.error
+    assert collected[5] > 1e-3
+    assert collected[13] < 1e-9
 
 
 def test_bodies_that_stick_have_few_nodes_integrated() -> None:
@@ -178,12 +178,14 @@ def test_a_number_that_is_none_is_seen_in_the_error(place: int) -> None:
 
 def test_growth_does_not_depend_on_the_number_of_workers_or_on_batches() -> None:
     alone, shared = (settled(LINE, 3, 1e-6, w, contact="set-valued", parameters={"omega": 1.4}) for w in (1, 2))
-    found = []
+    collected = []
     for orbit in (alone, shared):
-        found.append(chosen_march(*orbit).growths(np.array([1, 3, 2])))
-    np.testing.assert_array_equal(*found)
-    assert found[0].shape == (3, 3, len(LINE))
-    np.testing.assert_allclose(chosen_march(*alone).growths(np.array([6]))[0], found[0].sum(axis=0), rtol=0, atol=1e-11)
+        collected.append(chosen_march(*orbit).growths(np.array([1, 3, 2])))
+    np.testing.assert_array_equal(*collected)
+    assert collected[0].shape == (3, 3, len(LINE))
+    np.testing.assert_allclose(
+        chosen_march(*alone).growths(np.array([6]))[0], collected[0].sum(axis=0), rtol=0, atol=1e-11
+    )
 
 
 def test_strengths_in_other_company_grow_as_much() -> None:

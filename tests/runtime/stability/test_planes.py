@@ -44,14 +44,14 @@ def roots(k: float, c: float) -> float:
 def test_two_layers_in_closed_form(second: Topology, modes: list[tuple[int, int]]) -> None:
     """The largest exponent of all modes, along an orbit that is integrated."""
     k, c = np.array([0.0, 0.3, 2.0]), np.array([0.0, 0.2, 0.7])
-    found = plane(layered(ring(6), second, **ALMOST_LINEAR), k=k, c=c, rtol=1e-9, starts=1, transient=200)
+    result = plane(layered(ring(6), second, **ALMOST_LINEAR), k=k, c=c, rtol=1e-9, starts=1, transient=200)
     each = np.array([[[roots(-x * a, -y * b) for a, b in modes] for y in c] for x in k])
-    np.testing.assert_allclose(found.exponent, each.max(axis=-1), atol=1e-8)
-    assert found.attractors.tolist() == [[["periodic"]]]
-    assert found.names == ("k", "c")
-    assert sorted(found.modes) == sorted(map(str, modes))
+    np.testing.assert_allclose(result.exponent, each.max(axis=-1), atol=1e-8)
+    assert result.attractors.tolist() == [[["periodic"]]]
+    assert result.names == ("k", "c")
+    assert sorted(result.modes) == sorted(map(str, modes))
     if second.name == "circulant":  # the mode whose damping does not rise with c decides
-        assert found.modes[found.mode[0, 2]] == "(-4, 0)"
+        assert result.modes[result.mode[0, 2]] == "(-4, 0)"
 
 
 @pytest.mark.parametrize("name", ["duffing", "harmonic"])
@@ -60,7 +60,7 @@ def test_complex_strengths_of_two_layers_in_closed_form(name: str) -> None:
     one_way, given = topology("one_way_ring", 5), ALMOST_LINEAR if name == "duffing" else {}
     scene = Scene(name, links=[(SPRING, one_way), (DAMPER, from_matrix(one_way.matrix.T))], parameters=given)
     k, c = np.array([0.1, 0.4]), np.array([0.0, 0.3])
-    found = plane(scene, k=k, c=c, rtol=1e-9, starts=1, transient=200)
+    result = plane(scene, k=k, c=c, rtol=1e-9, starts=1, transient=200)
     turn = np.exp(2j * np.pi * np.arange(1, 5) / 5)
     pairs, delta = np.stack([turn - 1, turn.conj() - 1], axis=1), 0.2 if name == "duffing" else 0.0
 
@@ -68,7 +68,7 @@ def test_complex_strengths_of_two_layers_in_closed_form(name: str) -> None:
         matrices = [[[0.0, 1.0], [-1.0 + x * a, -delta + y * b]] for a, b in pairs]
         return float(np.linalg.eigvals(np.array(matrices)).real.max())
 
-    np.testing.assert_allclose(found.exponent, [[exponent(x, y) for y in c] for x in k], atol=1e-8)
+    np.testing.assert_allclose(result.exponent, [[exponent(x, y) for y in c] for x in k], atol=1e-8)
 
 
 def transversal(scene: Scene) -> float:
@@ -76,7 +76,7 @@ def transversal(scene: Scene) -> float:
     equations, n, period = scene.equations, scene.n, scene.period
     assert period is not None
     symbols = [sp.Symbol(name, real=True) for name in (*equations.state, *equations.parameters, "t")]
-    numbers = [scene.parameters[name] for name in equations.parameters]
+    parameter_values = [scene.parameters[name] for name in equations.parameters]
     jacobian = sp.zeros(2 * n, 2 * n)
     for at, e in equations.jacobian().items():
         jacobian[at] = e
@@ -85,15 +85,15 @@ def transversal(scene: Scene) -> float:
 
     def of_all(t: float, y: np.ndarray) -> np.ndarray:
         state, basis = y[: 2 * n], y[2 * n :].reshape(2 * n, 2 * n)
-        values = (*state, *numbers, t)
+        values = (*state, *parameter_values, t)
         return np.concatenate([rates(*values), (np.asarray(slopes(*values)) @ basis).ravel()])
 
     def of_one(t: float, y: np.ndarray) -> np.ndarray:
-        return np.asarray(of_first(*np.repeat(y, n), *numbers, t))
+        return np.asarray(of_first(*np.repeat(y, n), *parameter_values, t))
 
     start = solve_ivp(of_one, (0, 100 * period), [0.3, 0.0], method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
-    whole = np.concatenate([np.repeat(start, n), np.eye(2 * n).ravel()])
-    end = solve_ivp(of_all, (0, period), whole, method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+    joined = np.concatenate([np.repeat(start, n), np.eye(2 * n).ravel()])
+    end = solve_ivp(of_all, (0, period), joined, method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
     monodromy = end[2 * n :].reshape(2 * n, 2 * n)
     differences = np.kron(np.eye(2), np.eye(n) - np.ones((n, n)) / n)
     return float(np.log(np.abs(np.linalg.eigvals(differences @ monodromy @ differences)).max()) / period)
@@ -103,23 +103,23 @@ def test_whole_networks_by_scipy() -> None:
     """Springs on a ring and a link between equal states on a complete graph: an orbit for each g, all k along it."""
     scene = layered(ring(4), complete(4), PULL, omega=1.3)
     k, g = np.array([0.1, 0.5]), np.array([0.02, 0.1])
-    found = plane(scene, k=k, g=g, rtol=1e-10, starts=1, transient=100)
+    result = plane(scene, k=k, g=g, rtol=1e-10, starts=1, transient=100)
     for x, y in ((0, 1), (1, 0)):
-        assert found.exponent[x, y] == pytest.approx(transversal(scene.replace(k=k[x], g=g[y])), abs=2e-8)
-    assert found.attractors.shape == (1, 2, 1)
-    assert found.data.attractor.dims == ("g", "start")
+        assert result.exponent[x, y] == pytest.approx(transversal(scene.replace(k=k[x], g=g[y])), abs=2e-8)
+    assert result.attractors.shape == (1, 2, 1)
+    assert result.data.attractor.dims == ("g", "start")
 
 
 def test_a_parameter_of_the_orbit_beside_alpha() -> None:
     """The two strengths of links between equal states: columns are those of `exponents`."""
     scene = Scene("duffing", PULL, ring(4), parameters={"omega": 1.3})
     alpha, g = np.array([-0.2, 0.1, 0.6]), np.array([0.05, 0.1])
-    found = plane(scene, alpha, g=g, starts=2, transient=100)
+    result = plane(scene, alpha, g=g, starts=2, transient=100)
     for j, value in enumerate(g):
-        own = exponents(scene, alpha, g=value, starts=2, transient=100)
-        np.testing.assert_array_equal(found.exponent[:, j], own.exponent)
-    assert found.data.exponent.dims == ("alpha", "g")
-    assert found.mode is None
+        alone = exponents(scene, alpha, g=value, starts=2, transient=100)
+        np.testing.assert_array_equal(result.exponent[:, j], alone.exponent)
+    assert result.data.exponent.dims == ("alpha", "g")
+    assert result.mode is None
     network = plane(scene, g=g, omega=[1.25, 1.3], starts=2, transient=100)
     assert network.exponent[1, 1] == pytest.approx(transversal(scene.replace(g=0.1)), abs=1e-6)
     assert network.attractors.shape == (2, 2, 2)
@@ -128,10 +128,10 @@ def test_a_parameter_of_the_orbit_beside_alpha() -> None:
 def test_axes_are_single_layers() -> None:
     """Where one strength is zero, the exponents are those of the other layer alone."""
     k = np.array([0.0, 0.2, 0.9])
-    found = plane(layered(ring(4), complete(4), omega=1.3), k=k, c=k, starts=1, transient=100, rtol=1e-9)
+    result = plane(layered(ring(4), complete(4), omega=1.3), k=k, c=k, starts=1, transient=100, rtol=1e-9)
     for name, coupling, graph, table in (
-        ("k", SPRING, ring(4), found.exponent[:, 0]),
-        ("c", DAMPER, complete(4), found.exponent[0]),
+        ("k", SPRING, ring(4), result.exponent[:, 0]),
+        ("c", DAMPER, complete(4), result.exponent[0]),
     ):
         alone = Scene("duffing", coupling, graph, parameters={"omega": 1.3})
         sizes = np.array([-complex(v).real for v in graph.spectrum.values[1:]])
@@ -144,8 +144,8 @@ def test_certified_runs_of_two_layers_have_the_same_exponents() -> None:
     scene = layered(ring(4), complete(4), omega=1.3).replace(transient=5, window=5)
     axes = {"k": [0.1, 0.5], "c": [0.05, 0.2]}
     certified = run(scene, certified=True, show_progress=False, width=1, **axes)
-    found = plane(scene, starts=4, transient=300, **axes)
-    np.testing.assert_allclose(certified.data.transversal_exponent.values, found.exponent, atol=1e-9)
+    result = plane(scene, starts=4, transient=300, **axes)
+    np.testing.assert_allclose(certified.data.transversal_exponent.values, result.exponent, atol=1e-9)
     apart = scene.replace(links=[(SPRING, ring(4)), (DAMPER, star(4))])
     with pytest.raises(ValueError, match="do not commute"):
         run(apart, certified=True, show_progress=False, width=1, **axes)
@@ -175,8 +175,8 @@ def test_propagators_of_two_strengths_by_scipy_and_by_interpolation() -> None:
             flow = [-v - z, x + 0.2 * v + 0.1 * 2 * z / 9, 0.2 + z * (x - 9.0)]
             return np.concatenate([flow, (jacobian @ columns).ravel()])
 
-        whole = np.concatenate([state[0], np.eye(3).ravel()])
-        end = solve_ivp(rates, (0, 0.4 * problem.unit), whole, method="DOP853", rtol=1e-12, atol=1e-13).y[3:, -1]
+        joined = np.concatenate([state[0], np.eye(3).ravel()])
+        end = solve_ivp(rates, (0, 0.4 * problem.unit), joined, method="DOP853", rtol=1e-12, atol=1e-13).y[3:, -1]
         np.testing.assert_allclose(exact[0, which], end.reshape(3, 3), atol=1e-8 * np.abs(end).max())
     growths = []
     for interpolation in (exact_interpolation(strengths), strength_interpolation(strengths, 13)):
@@ -193,10 +193,10 @@ def test_strengths_of_layers_are_interpolated_along_lines(turn: complex, moving:
     sides = np.linspace(0.0, 1.0, 90), np.linspace(0.2, 0.4, 3), np.linspace(1.0, 2.0, 2)
     strengths = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3) * turn
     strengths = np.roll(np.concatenate([strengths, [[0.5, 7.0, 7.0]]]), moving, axis=1)
-    made = strength_interpolation(strengths, 13)
-    assert sorted({len(panel.points) for panel in made.panels}) == ([1, 13] if turn == 1.0 else [1, 26])
-    assert sorted(np.concatenate([panel.rows for panel in made.panels])) == list(range(len(strengths)))
-    for panel in made.panels:
+    interpolation = strength_interpolation(strengths, 13)
+    assert sorted({len(panel.points) for panel in interpolation.panels}) == ([1, 13] if turn == 1.0 else [1, 26])
+    assert sorted(np.concatenate([panel.rows for panel in interpolation.panels])) == list(range(len(strengths)))
+    for panel in interpolation.panels:
         for x, weights in ((strengths[panel.rows], panel.weights), (panel.extras, panel.checks)):
             values = (np.exp(each @ np.array([1.0, 0.3, -0.5])) for each in (panel.points, x))
             np.testing.assert_allclose(weights @ next(values), next(values), rtol=1e-9)
@@ -205,48 +205,48 @@ def test_strengths_of_layers_are_interpolated_along_lines(turn: complex, moving:
 def test_a_parameter_may_be_named_as_a_strength(tmp_path: Path) -> None:
     """Duffing's cubic spring is called `beta`, as the imaginary part of a strength is."""
     few = {"starts": 1, "transient": 5, "periods": 50}
-    found = plane(ALONE, [0, 0.5], parameters={"beta": [0.5, 2]}, **few)
-    for j, value in enumerate(found.up):
-        own = exponents(ALONE, [0, 0.5], parameters={"beta": value}, **few)
-        np.testing.assert_array_equal(found.exponent[:, j], own.exponent)
-    assert found.attractors.shape == (1, 2, 1)
-    assert found.plot().get_ylabel() == r"$\beta$"
-    assert dict(found.summary)["exponents"] == "alpha = -sigma gamma (coupling: rates of v)"
-    found.save(tmp_path / "map.nc")
+    result = plane(ALONE, [0, 0.5], parameters={"beta": [0.5, 2]}, **few)
+    for j, value in enumerate(result.up):
+        alone = exponents(ALONE, [0, 0.5], parameters={"beta": value}, **few)
+        np.testing.assert_array_equal(result.exponent[:, j], alone.exponent)
+    assert result.attractors.shape == (1, 2, 1)
+    assert result.plot().get_ylabel() == r"$\beta$"
+    assert dict(result.summary)["exponents"] == "alpha = -sigma gamma (coupling: rates of v)"
+    result.save(tmp_path / "map.nc")
     assert open_result(tmp_path / "map.nc").parameters == ("beta",)
     both = plane(ALONE, parameters={"beta": [0.5, 2], "delta": [0.1, 0.2]}, **few)
     assert both.parameters == ("beta", "delta")
     assert len(both.modes) == 2
     fixed = plane(ALONE, [0, 0.5], [0, 0.1], parameters={"beta": 2}, **few)
-    np.testing.assert_allclose(fixed.exponent[:, 0], found.exponent[:, 1], atol=1e-6)
+    np.testing.assert_allclose(fixed.exponent[:, 0], result.exponent[:, 1], atol=1e-6)
     assert fixed.plot().get_ylabel() == r"$\beta=-\sigma\,\mathrm{Im}\,\gamma$"
 
 
 def test_the_imaginary_part_is_not_the_parameter_of_that_name() -> None:
     scene = Scene("duffing", "spring", topology=chain(2))
     with pytest.warns(UserWarning, match="imaginary part of strengths, and a parameter of that name"):
-        found = plane(scene, [0.0, 1.0], beta=[0.0, 1.0], periods=4, transient=2, starts=1, rtol=1e-4)
-    assert "2 beta (imaginary part) from 0 to 1" in dict(found.summary)["grid"]
+        result = plane(scene, [0.0, 1.0], beta=[0.0, 1.0], periods=4, transient=2, starts=1, rtol=1e-4)
+    assert "2 beta (imaginary part) from 0 to 1" in dict(result.summary)["grid"]
 
 
 def test_files_figures_and_threads(tmp_path: Path) -> None:
     told: list[float] = []
     scene = layered(ring(4), complete(4), PULL, omega=1.3)
     axes = {"k": np.linspace(0.0, 0.5, 3), "g": np.linspace(0.0, 0.1, 4)}
-    found = plane(scene, starts=2, transient=50, workers=1, progress=lambda p: told.append(p.done), **axes)
+    result = plane(scene, starts=2, transient=50, workers=1, progress=lambda p: told.append(p.done), **axes)
     other = plane(scene, starts=2, transient=50, workers=2, parameters=axes)
-    np.testing.assert_array_equal(found.exponent, other.exponent)
+    np.testing.assert_array_equal(result.exponent, other.exponent)
     assert told == sorted(told)
     assert told[-1] == 4 * (50 + 5000)
-    found.save(tmp_path / "map.nc")
+    result.save(tmp_path / "map.nc")
     opened = open_result(tmp_path / "map.nc")
-    assert (opened.names, opened.modes, opened.scene) == (found.names, found.modes, found.scene)
-    np.testing.assert_array_equal(opened.mode, found.mode)
-    assert opened.attractors.tolist() == found.attractors.tolist()
-    axes_of = found.plot()
+    assert (opened.names, opened.modes, opened.scene) == (result.names, result.modes, result.scene)
+    np.testing.assert_array_equal(opened.mode, result.mode)
+    assert opened.attractors.tolist() == result.attractors.tolist()
+    axes_of = result.plot()
     assert (axes_of.get_xlabel(), axes_of.get_ylabel()) == ("$k$", "$g$")
-    assert "12 k" not in repr(found)
-    assert "3 k from 0 to 0.5, 4 g from 0 to 0.1" in repr(found)
+    assert "12 k" not in repr(result)
+    assert "3 k from 0 to 0.5, 4 g from 0 to 0.1" in repr(result)
 
 
 SCENE = layered(ring(4), complete(4))
@@ -254,7 +254,7 @@ ALONE = Scene("duffing", SPRING, ring(4))
 
 
 @pytest.mark.parametrize(
-    ("call", "words"),
+    ("call", "message"),
     [
         (lambda: plane(SCENE), "found the axes none; expected alpha and beta"),
         (lambda: plane(SCENE, k=[0, 1]), "found the axes k; expected alpha and beta"),
@@ -278,22 +278,22 @@ ALONE = Scene("duffing", SPRING, ring(4))
         (lambda: plane(Scene("friction", "spring", ring(4), contact="set-valued"), sigma=[0, 1], kappa=[1, 2]), "kappa"),
     ],
 )  # fmt: skip
-def test_what_is_refused(call: Callable[[], object], words: str) -> None:
+def test_what_is_refused(call: Callable[[], object], message: str) -> None:
     with pytest.raises(ValueError, match=r"[a-z]") as error:
         call()
-    assert words in str(error.value)
+    assert message in str(error.value)
     assert "\n" not in str(error.value)
 
 
 def test_exponents_take_the_strengths_of_layers() -> None:
     """A row for each mode; ranges need a line."""
-    found = exponents(layered(ring(6), ring(6), **ALMOST_LINEAR), [[0.0, 0.3], [2.0, 0.1]], rtol=1e-9, starts=1)
-    np.testing.assert_allclose(found.exponent, [roots(0.0, 0.3), roots(2.0, 0.1)], atol=1e-8)
-    assert found.data.alpha.dims == ("mode", "layer")
-    assert "negative for alpha" not in repr(found)
-    drawn = found.plot()
+    result = exponents(layered(ring(6), ring(6), **ALMOST_LINEAR), [[0.0, 0.3], [2.0, 0.1]], rtol=1e-9, starts=1)
+    np.testing.assert_allclose(result.exponent, [roots(0.0, 0.3), roots(2.0, 0.1)], atol=1e-8)
+    assert result.data.alpha.dims == ("mode", "layer")
+    assert "negative for alpha" not in repr(result)
+    drawn = result.plot()
     assert (drawn.get_xlabel(), drawn.get_ylabel()) == (r"$\alpha_1$", r"$\alpha_2$")
     turned = exponents(layered(ring(6), ring(6), **ALMOST_LINEAR), [[0.0, 0.3j], [2.0, 0.1]], rtol=1e-9, starts=1)
     assert turned.plot().get_xlabel() == "number of the mode"
     with pytest.raises(ValueError, match="those of 2 layers"):
-        found.intervals  # noqa: B018
+        result.intervals  # noqa: B018

@@ -38,14 +38,14 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 def test_two_ranges_with_a_gap(pair: Scene) -> None:
     alpha = np.linspace(0.0, 6.0, 121)
-    found = exponents(pair, alpha, precision=0.01)
-    (low, high), (again, end) = found.intervals
+    result = exponents(pair, alpha, precision=0.01)
+    (low, high), (again, end) = result.intervals
     assert low == pytest.approx(0.98, abs=0.06)
     assert high == pytest.approx(2.88, abs=0.06)
     assert again == pytest.approx(3.60, abs=0.06)
     assert end == 6.0
-    assert classify(found.intervals, 6.0) == "several intervals"
-    assert found.exponent[0] > 0.05, "the oscillator is chaotic"
+    assert classify(result.intervals, 6.0) == "several intervals"
+    assert result.exponent[0] > 0.05, "the oscillator is chaotic"
 
 
 @pytest.mark.parametrize(("alpha", "synchronous"), [(0.6, False), (2.0, True), (3.2, False), (4.5, True)])

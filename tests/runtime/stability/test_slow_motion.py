@@ -20,23 +20,23 @@ def test_a_spectrum_counts_turns_of_the_motion(slow: float) -> None:
     """The second exponent of the limit cycle is its mean divergence, by quadrature along it."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = lyapunov_spectrum(PAIR.replace(topology=None), T0=slow, periods=64, transient=20)
-    np.testing.assert_allclose(found.exponent * slow, [0.0, -1.0594], atol=1e-3)
+        result = lyapunov_spectrum(PAIR.replace(topology=None), T0=slow, periods=64, transient=20)
+    np.testing.assert_allclose(result.exponent * slow, [0.0, -1.0594], atol=1e-3)
 
 
 def test_a_slow_orbit_is_followed_for_as_many_turns_as_a_fast_one() -> None:
-    found = exponents(PAIR, [0.0, 0.3e-10], starts=2, T0=1e10)
-    assert [a.kind for a in found.attractors] == ["periodic"] * 2
-    assert found.exponent * 1e10 == pytest.approx([0.0, 6.502e-3], abs=1e-5)
+    result = exponents(PAIR, [0.0, 0.3e-10], starts=2, T0=1e10)
+    assert [a.kind for a in result.attractors] == ["periodic"] * 2
+    assert result.exponent * 1e10 == pytest.approx([0.0, 6.502e-3], abs=1e-5)
 
 
 @pytest.mark.parametrize("slow", [1e-3, 1.0, 1e2])
 def test_sane_units_of_time_raise_no_alarm(slow: float) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = exponents(PAIR, [0.0, 0.3 / slow], starts=1, transient=max(1, round(3 * slow)), T0=slow)
+        result = exponents(PAIR, [0.0, 0.3 / slow], starts=1, transient=max(1, round(3 * slow)), T0=slow)
         lyapunov_spectrum(PAIR.replace(topology=None), transient=1, periods=max(10, 10 * slow), precision=0, T0=slow)
-    assert found.exponent * slow == pytest.approx([0.0, 6.502e-3], abs=1e-5)
+    assert result.exponent * slow == pytest.approx([0.0, 6.502e-3], abs=1e-5)
 
 
 @pytest.mark.parametrize("unit", [1e-12, 1.0, 1e12])

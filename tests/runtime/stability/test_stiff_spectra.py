@@ -14,9 +14,9 @@ SHORT = {"periods": 50, "transient": 10}
 @pytest.mark.parametrize("k", [100, 10**4, 10**6, 10**9])
 def test_a_fast_direction_has_its_exponent(k: int) -> None:
     scene = sc.Scene(sc.Field({"x": "-x", "y": "-k*y"}, parameters={"k": k}, initial={"x": 1, "y": 1}), "x->x")
-    found = sc.lyapunov_spectrum(scene, periods=10, transient=10)  # the rates are constant
-    assert found.resolved.all()
-    np.testing.assert_allclose(found.exponent, [-1.0, -k], rtol=1e-8)
+    result = sc.lyapunov_spectrum(scene, periods=10, transient=10)  # the rates are constant
+    assert result.resolved.all()
+    np.testing.assert_allclose(result.exponent, [-1.0, -k], rtol=1e-8)
 
 
 def test_fast_and_slow_directions_that_are_mixed() -> None:
@@ -25,26 +25,26 @@ def test_fast_and_slow_directions_that_are_mixed() -> None:
     matrix = basis @ np.diag([-1.0, -2.0, -30000.0]) @ np.linalg.inv(basis)
     names = ("x", "y", "z")
     rates = {a: f"({p:.6f})*x + ({q:.6f})*y + ({r:.6f})*z" for a, (p, q, r) in zip(names, matrix, strict=True)}
-    found = sc.lyapunov_spectrum(sc.Scene(sc.Field(rates, initial={"x": 1}), "x->x"), **SHORT)
-    np.testing.assert_allclose(found.exponent[:2], [-1.0, -2.0], atol=0.02)  # of the order 1/time
-    assert found.exponent.sum() == pytest.approx(-30003.0, rel=1e-9)
+    result = sc.lyapunov_spectrum(sc.Scene(sc.Field(rates, initial={"x": 1}), "x->x"), **SHORT)
+    np.testing.assert_allclose(result.exponent[:2], [-1.0, -2.0], atol=0.02)  # of the order 1/time
+    assert result.exponent.sum() == pytest.approx(-30003.0, rel=1e-9)
 
 
 def test_several_fast_directions_are_lost_and_their_sum_is_said() -> None:
     rates = {"x": "-x + z", "y": "x - 30000*y", "z": "y - 50000*z"}
-    found = sc.lyapunov_spectrum(sc.Scene(sc.Field(rates, initial={"x": 1}), "x->x"), **SHORT)
-    assert found.exponent[1:].tolist() == [-np.inf, -np.inf]
-    assert found.resolved.tolist() == [True, False, False]
-    assert found.exponent[0] == pytest.approx(-1.0, abs=1e-6)
-    assert found.rest == pytest.approx(-80000.0, rel=1e-8)
-    assert dict(found.summary)["not followed"] == "2 directions, which decay too fast; their exponents sum to -80000"
+    result = sc.lyapunov_spectrum(sc.Scene(sc.Field(rates, initial={"x": 1}), "x->x"), **SHORT)
+    assert result.exponent[1:].tolist() == [-np.inf, -np.inf]
+    assert result.resolved.tolist() == [True, False, False]
+    assert result.exponent[0] == pytest.approx(-1.0, abs=1e-6)
+    assert result.rest == pytest.approx(-80000.0, rel=1e-8)
+    assert dict(result.summary)["not followed"] == "2 directions, which decay too fast; their exponents sum to -80000"
 
 
 def test_the_relaxation_oscillator_of_van_der_pol() -> None:
     """The second exponent is the mean divergence along the cycle, here by SciPy's LSODA."""
     mu = 20.0
     oscillator = sc.Field({"x": "v", "v": "20*(1 - x**2)*v - x"}, initial={"x": 2})
-    found = sc.lyapunov_spectrum(sc.Scene(oscillator, "x->x"), periods=64, transient=10)
+    result = sc.lyapunov_spectrum(sc.Scene(oscillator, "x->x"), periods=64, transient=10)
 
     def rates(_: float, s: np.ndarray) -> list[float]:
         return [s[1], mu * (1 - s[0] ** 2) * s[1] - s[0], mu * (1 - s[0] ** 2)]
@@ -53,11 +53,11 @@ def test_the_relaxation_oscillator_of_van_der_pol() -> None:
         return float(s[1])
 
     section.direction = -1  # type: ignore[attr-defined]
-    whole = solve_ivp(rates, (0, 200), [2.0, 0.0, 0.0], "LSODA", events=section, rtol=1e-9, atol=1e-12)
-    (a, b), (first, last) = whole.t_events[0][-2:], whole.y_events[0][-2:, 2]
-    assert found.exponent[1] == pytest.approx((last - first) / (b - a), rel=0.02)  # the window holds no whole cycles
-    assert abs(found.exponent[0]) < 2 * found.stderr[0] + 0.01
-    assert found.exponent.sum() == pytest.approx(found.divergence, rel=1e-9)
+    solution = solve_ivp(rates, (0, 200), [2.0, 0.0, 0.0], "LSODA", events=section, rtol=1e-9, atol=1e-12)
+    (a, b), (first, last) = solution.t_events[0][-2:], solution.y_events[0][-2:, 2]
+    assert result.exponent[1] == pytest.approx((last - first) / (b - a), rel=0.02)  # the window holds no whole cycles
+    assert abs(result.exponent[0]) < 2 * result.stderr[0] + 0.01
+    assert result.exponent.sum() == pytest.approx(result.divergence, rel=1e-9)
 
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-2])

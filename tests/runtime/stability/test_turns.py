@@ -66,6 +66,6 @@ def test_locked_phases_that_turn_evenly_are_at_rest(k: float) -> None:
         parameters={"om": [0.0, 0.1 * k, -0.2 * k, 0.3 * k], "K": 2.0 * k},
     )  # fmt: skip
     expected = equilibrium(scene).eigenvalues.real
-    found = lyapunov_spectrum(scene, periods=50)
-    np.testing.assert_allclose(found.exponent / k, expected / k, atol=2e-3)
-    assert "turn of the slowest rate" in str(found)
+    result = lyapunov_spectrum(scene, periods=50)
+    np.testing.assert_allclose(result.exponent / k, expected / k, atol=2e-3)
+    assert "turn of the slowest rate" in str(result)

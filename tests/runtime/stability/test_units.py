@@ -32,31 +32,31 @@ def pair(s: float = 1.0, c: float = 0.0, k: float = 1.0, w: float = 1.0) -> Scen
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("s", [1e-9, 1e-4, 1e9])
 def test_exponents_in_any_unit_of_state(s: float) -> None:
-    found = exponents(pair(s), [0.0, 0.3, 1.0])
-    np.testing.assert_allclose(found.exponent, KNOWN, atol=2e-6)
-    assert {attractor.kind for attractor in found.attractors} == {"periodic"}
+    result = exponents(pair(s), [0.0, 0.3, 1.0])
+    np.testing.assert_allclose(result.exponent, KNOWN, atol=2e-6)
+    assert {attractor.kind for attractor in result.attractors} == {"periodic"}
 
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(("s", "c", "k", "w"), [(1e-4, 1.0, 1.0, 1.0), (1e-6, -1e-3, 1e3, 1e-6)])
 def test_exponents_beside_an_offset_and_in_other_units_of_a_component(s: float, c: float, k: float, w: float) -> None:
-    found = exponents(pair(s, c, k, w), k * np.array([0.0, 0.3, 1.0]))
-    np.testing.assert_allclose(found.exponent / k, KNOWN, atol=1e-5)
+    result = exponents(pair(s, c, k, w), k * np.array([0.0, 0.3, 1.0]))
+    np.testing.assert_allclose(result.exponent / k, KNOWN, atol=1e-5)
 
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("k", [1e-6, 1e6])
 def test_exponents_in_any_unit_of_time(k: float) -> None:
-    found = exponents(pair(k=k), k * np.array([0.0, 0.3, 1.0]))
-    np.testing.assert_allclose(found.exponent / k, KNOWN, atol=2e-6)
-    assert found.unit.startswith("mean return time, ")
-    assert found.time * k == pytest.approx(6.66328686, rel=1e-7)
+    result = exponents(pair(k=k), k * np.array([0.0, 0.3, 1.0]))
+    np.testing.assert_allclose(result.exponent / k, KNOWN, atol=2e-6)
+    assert result.unit.startswith("mean return time, ")
+    assert result.time * k == pytest.approx(6.66328686, rel=1e-7)
 
 
 @pytest.mark.parametrize(("s", "k"), [(1e-6, 1.0), (1.0, 1e-4)])
 def test_the_function_of_a_cycle_is_stable_above_zero(s: float, k: float) -> None:
-    found = msf(pair(s, k=k), k * np.linspace(-1.0, 1.0, 3))
-    ((low, high),) = found.intervals
+    result = msf(pair(s, k=k), k * np.linspace(-1.0, 1.0, 3))
+    ((low, high),) = result.intervals
     assert (abs(low) < 1e-5 * k, high) == (True, k)
     table = plane(pair(s, k=k), k * np.array([0.3, 1.0]), k * np.array([0.0, 0.5]), starts=1)
     np.testing.assert_allclose(table.exponent[:, 0] / k, KNOWN[1:], atol=2e-6)
@@ -66,12 +66,12 @@ def test_the_function_of_a_cycle_is_stable_above_zero(s: float, k: float) -> Non
 def test_the_scene_s_own_start_is_the_headline_and_others_warn(s: float) -> None:
     """A start at the top of the barrier: displaced ones reach both wells, and none outvotes its own."""
     scene = Scene(BISTABLE, "x->x", chain(2), initial={"x": -0.05 * s, "v": 0.0}, parameters={"s": s})
-    own = exponents(scene, [0.0, 0.5], starts=1)
+    alone = exponents(scene, [0.0, 0.5], starts=1)
     with pytest.warns(RuntimeWarning, match="on another motion than the scene's own start"):
-        found = exponents(scene, [0.0, 0.5], starts=6)
-    np.testing.assert_allclose(found.exponent, own.exponent, rtol=1e-6)
-    assert 0 in found.groups[0]
-    assert len(found.groups) == 2
+        result = exponents(scene, [0.0, 0.5], starts=6)
+    np.testing.assert_allclose(result.exponent, alone.exponent, rtol=1e-6)
+    assert 0 in result.groups[0]
+    assert len(result.groups) == 2
 
 
 def line(exponent: list[float], error: float) -> Exponents:
@@ -94,8 +94,8 @@ def test_a_gap_or_an_island_counts_if_it_is_deeper_than_two_errors(
     exponent: list[float], kind: str, gamma: str, undecided: int
 ) -> None:
     fine = line(exponent, 0.01)
-    found = MSF(Scene(topology=chain(2)), fine.alpha, fine)
-    assert (found.kind, found.gamma, len(found.undecided)) == (kind, gamma, undecided)
+    function = MSF(Scene(topology=chain(2)), fine.alpha, fine)
+    assert (function.kind, function.gamma, len(function.undecided)) == (kind, gamma, undecided)
 
 
 def test_the_end_beside_an_undecided_stretch_may_lie_anywhere_within() -> None:
@@ -106,8 +106,8 @@ def test_the_end_beside_an_undecided_stretch_may_lie_anywhere_within() -> None:
 
 def test_an_average_that_ends_short_of_its_precision_says_so() -> None:
     alpha = np.linspace(0.0, 1.0, 3)
-    found = Exponents(alpha, alpha - 0.5, np.full(3, 1.7e-3), 1.0, 1, (alpha - 0.5)[None], precision=1e-3)
-    assert dict(found.summary)["errors"] == "up to 0.0017; precision = 0.001 was not reached; raise periods"
+    function = Exponents(alpha, alpha - 0.5, np.full(3, 1.7e-3), 1.0, 1, (alpha - 0.5)[None], precision=1e-3)
+    assert dict(function.summary)["errors"] == "up to 0.0017; precision = 0.001 was not reached; raise periods"
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert "errors" not in dict(Exponents(alpha, alpha, alpha, 1.0, 1, alpha[None], precision=2.0).summary)

@@ -25,11 +25,11 @@ def pair(**more: object) -> Scene:
 
 def test_a_short_run_moves_a_threshold_that_the_exponent_does_not() -> None:
     """Just below sigma = 0.233 the error decays with 0.003 a unit of time: 100 periods are too few to see that."""
-    found = run(pair(initial={"x": [0.3, 0.2]}), sigma=[0.1, 0.228], certified=True, show_progress=False)
-    assert found.sync_error[0] < SYNCHRONOUS < found.sync_error[1]
-    assert (found.transversal_exponent.values < 0.0).all()
-    assert found.transversal_exponent.values[1] > -0.01
-    assert [VERDICTS[k] for k in found.verdict.values] == [STABLE, APART]
+    result = run(pair(initial={"x": [0.3, 0.2]}), sigma=[0.1, 0.228], certified=True, show_progress=False)
+    assert result.sync_error[0] < SYNCHRONOUS < result.sync_error[1]
+    assert (result.transversal_exponent.values < 0.0).all()
+    assert result.transversal_exponent.values[1] > -0.01
+    assert [VERDICTS[k] for k in result.verdict.values] == [STABLE, APART]
 
 
 @pytest.fixture(scope="module")
@@ -46,9 +46,9 @@ def test_two_copies_of_one_cycle_are_not_synchronous_though_the_state_is_stable(
     verdicts = []
     for states in (copies, near):
         start = {"x": [s[0] for s in states], "v": [s[1] for s in states]}
-        found = run(pair(initial=start), sigma=[0.02], certified=True, show_progress=False)
-        assert float(found.transversal_exponent[0]) < 0.0
-        verdicts.append(VERDICTS[int(found.verdict[0])])
+        result = run(pair(initial=start), sigma=[0.02], certified=True, show_progress=False)
+        assert float(result.transversal_exponent[0]) < 0.0
+        verdicts.append(VERDICTS[int(result.verdict[0])])
     assert verdicts == [APART, STABLE]
 
 
@@ -82,11 +82,11 @@ def test_a_mismatch_bursts_near_the_loss_of_stability() -> None:
     strengths, starts = [0.15, 0.25, 0.295], np.linspace(0.25, 0.299, 8)
     unequal = pair(parameters={"omega": 1.4, "mu_k": [0.15, 0.15 + 1e-6]}, transient=300.0, window=400.0)
     assert any("the nodes differ in mu_k" in words for words in unequal.warnings)
-    found = run(unequal, sigma=strengths, x_2=starts, show_progress=False)
-    largest = found.sync_error_max.values
+    result = run(unequal, sigma=strengths, x_2=starts, show_progress=False)
+    largest = result.sync_error_max.values
     assert largest[0].max() < 1e-5
     assert largest[2].max() > 500 * largest[0].max()
-    assert (largest[2] > 8 * found.sync_error.values[2]).all(), "long quiet stretches between the bursts"
+    assert (largest[2] > 8 * result.sync_error.values[2]).all(), "long quiet stretches between the bursts"
     sure = certify(pair(parameters={"omega": 1.4}, axes={"sigma": strengths}))
     assert (sure.exponent + 2 * sure.stderr < 0.0).all()
     assert list(sure.near > 0.0) == [False, True, False]
@@ -96,12 +96,12 @@ def test_equal_oscillators_that_burst_within_the_window_are_told_apart() -> None
     """Bubbling without a mismatch: starts whose mean error is below the limit and whose largest is a hundred times above."""
     near = pair(parameters={"omega": 1.4}, transient=100.0, window=400.0)
     starts = np.linspace(0.25, 0.299, 24)
-    found = run(near, sigma=[0.25, 0.293], x_2=starts, certified=True, show_progress=False)
-    assert (found.transversal_exponent + 2 * found.transversal_stderr < 0.0).all()
-    inside, edge = ([VERDICTS[k] for k in row] for row in found.verdict.values)
+    result = run(near, sigma=[0.25, 0.293], x_2=starts, certified=True, show_progress=False)
+    assert (result.transversal_exponent + 2 * result.transversal_stderr < 0.0).all()
+    inside, edge = ([VERDICTS[k] for k in row] for row in result.verdict.values)
     assert set(inside) == {STABLE}
     assert BURSTS in edge
-    bursts = found.verdict.values == VERDICTS.index(BURSTS)
-    assert (found.sync_error.values[bursts] < SYNCHRONOUS).all()
-    assert (found.sync_error_max.values[bursts] > SYNCHRONOUS).all()
-    assert found.sync_error_max.values[bursts].max() > 10 * SYNCHRONOUS
+    bursts = result.verdict.values == VERDICTS.index(BURSTS)
+    assert (result.sync_error.values[bursts] < SYNCHRONOUS).all()
+    assert (result.sync_error_max.values[bursts] > SYNCHRONOUS).all()
+    assert result.sync_error_max.values[bursts].max() > 10 * SYNCHRONOUS

@@ -52,8 +52,8 @@ def test_looped_events_are_those_of_the_kernel_that_is_written_out(coupling: str
 
 def test_nodes_with_contacts_of_their_own_move_as_each_alone() -> None:
     """Each begins to stick or slip by its own ground and its own static friction."""
-    own = {"epsilon": [0.3, 0.4], "theta_b": [0.2, 0.25], "mu_s": [0.3, 0.35]}
-    given: dict[str, Any] = {
+    parameter_values = {"epsilon": [0.3, 0.4], "theta_b": [0.2, 0.25], "mu_s": [0.3, 0.35]}
+    settings: dict[str, Any] = {
         "contact": "set-valued",
         "transient": 0,
         "window": 2,
@@ -61,20 +61,22 @@ def test_nodes_with_contacts_of_their_own_move_as_each_alone() -> None:
         "rtol": 1e-10,
     }
     start = {"x": [0.3, 0.1], "v": [0.2, 0.25]}
-    both = run(Scene(topology=topology("chain", 2), parameters={"sigma": 0.0, **own}, initial=start, **given))
+    both = run(
+        Scene(topology=topology("chain", 2), parameters={"sigma": 0.0, **parameter_values}, initial=start, **settings)
+    )
     for k in range(2):
-        alone = {name: values[k] for name, values in own.items()}
+        alone = {name: values[k] for name, values in parameter_values.items()}
         begin = {name: values[k : k + 1] for name, values in start.items()}
-        one = run(Scene(topology=topology("chain", 1), coupling="none", parameters=alone, initial=begin, **given))
+        one = run(Scene(topology=topology("chain", 1), coupling="none", parameters=alone, initial=begin, **settings))
         np.testing.assert_allclose(both.data.end.values[:, k], one.data.end.values[:, 0], atol=1e-8)
     assert both.success
 
 
 def test_each_node_begins_on_its_own_ground() -> None:
     scene = Scene(topology=topology("chain", 2), contact="set-valued", parameters={"theta_b": [0.2, 0.25]})
-    numbers = np.array([[scene.parameters[name] for name in scene.equations.parameters]])
+    values = np.array([[scene.parameters[name] for name in scene.equations.parameters]])
     for v, modes in (([0.2, 0.25], [0.0, 0.0]), ([0.25, 0.2], [-1.0, 1.0])):
-        state = with_modes(scene.equations, np.array([[0.0, 0.0, *v, 0.5, 0.5]]), numbers)
+        state = with_modes(scene.equations, np.array([[0.0, 0.0, *v, 0.5, 0.5]]), values)
         assert state[0, 4:].tolist() == modes
 
 
@@ -115,7 +117,7 @@ def test_modes_of_ten_oscillators_from_the_command_line(
                      "[parameters]\nomega = 1.15\n")  # fmt: skip
     assert main(f"msf {scene} --alpha 0:1.2:25 --periods 100 --starts 1 --workers 1".split()) == 0
     said = capsys.readouterr().out
-    found = re.search(r"sigma +0.0000 … (\S+) ± \S+; lost above: gamma = -10\n", said)
-    assert found is not None, said
-    assert float(found[1]) == pytest.approx(end, abs=1e-6 if friction == "exponential" else 1e-5)
+    match = re.search(r"sigma +0.0000 … (\S+) ± \S+; lost above: gamma = -10\n", said)
+    assert match is not None, said
+    assert float(match[1]) == pytest.approx(end, abs=1e-6 if friction == "exponential" else 1e-5)
     assert re.search(r"possible +yes", said)

@@ -33,9 +33,9 @@ def pushed() -> sc.Scene:
 @pytest.mark.parametrize("scene", [one_pendulum, pushed])
 def test_a_warm_call_takes_few_calls_of_functions(scene):
     """2 400 and 2 900 calls take 1.5 and 2 ms; labels of the data alone would take as many more."""
-    whole = scene()
-    run(whole, show_progress=False)
-    result, calls = effort(lambda: run(whole, show_progress=False))
+    network = scene()
+    run(network, show_progress=False)
+    result, calls = effort(lambda: run(network, show_progress=False))
     assert calls < 3_500
     assert result.success
 

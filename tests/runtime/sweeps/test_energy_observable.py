@@ -62,31 +62,38 @@ def test_a_conservative_network_keeps_the_energy_of_its_nodes_and_links(name: st
     """To the tolerance of the steps, where the nodes' own energy moves by more than a tenth of what the links hold."""
     own = nodes.sum(sp.Symbol("v") ** 2 / 2)
     scene = CONSERVATIVE[name].replace(observe={**EXTREMES, "e": maximum(own), "f": minimum(own)})
-    found = run(scene, show_progress=False)
+    result = run(scene, show_progress=False)
     start = float(energy_function(scene)(np.array(scene.y0)))
-    assert float(found.high - found.low) < 1e-8 * abs(start)
-    assert float(found.last) == pytest.approx(start, rel=1e-8)
-    assert float(found.e - found.f) > 1e-2 * abs(start)
+    assert float(result.high - result.low) < 1e-8 * abs(start)
+    assert float(result.last) == pytest.approx(start, rel=1e-8)
+    assert float(result.e - result.f) > 1e-2 * abs(start)
 
 
 def test_it_is_the_energy_of_the_state() -> None:
     """Nodes of several kinds and with parameters of their own, drives and drawn weights against the energy of end states."""
     kinds = [{"oscillator": "pendulum", "at": [2]}, {"oscillator": "duffing", "at": [3]}]
-    own = {"delta": [0.1, 0.2, 0.3], "sigma": [0.1, 0.2, 0.3]}
+    parameter_values = {"delta": [0.1, 0.2, 0.3], "sigma": [0.1, 0.2, 0.3]}
     mixed = Scene(
-        "duffing", "spring", ring(3), nodes=kinds, parameters=own, observe=EXTREMES, integrator="dop853", **EXACT
+        "duffing",
+        "spring",
+        ring(3),
+        nodes=kinds,
+        parameters=parameter_values,
+        observe=EXTREMES,
+        integrator="dop853",
+        **EXACT,
     )
     drawn = Scene(
         "duffing", "damper", ring(10), observe=EXTREMES, realisations=2, draws={"W": uniform(0.5, 1)}, **EXACT
     )
     drawn = drawn.replace(coupling="spring", parameters={"sigma": 0.5})
     for scene in (mixed, drawn):
-        found = run(scene, show_progress=False, width=1)
-        states = np.atleast_2d(found.states("end"))
+        result = run(scene, show_progress=False, width=1)
+        states = np.atleast_2d(result.states("end"))
         for k, state in enumerate(states):
-            numbers = {axis.name: axis.values[k] for axis in scene.drawn}
-            exact = energy_function(scene)(state, 20.0, numbers)
-            assert np.atleast_1d(found.last)[k] == pytest.approx(float(exact), rel=1e-9)
+            values = {axis.name: axis.values[k] for axis in scene.drawn}
+            exact = energy_function(scene)(state, 20.0, values)
+            assert np.atleast_1d(result.last)[k] == pytest.approx(float(exact), rel=1e-9)
 
 
 def test_a_stop_and_a_section_at_an_energy() -> None:
@@ -97,14 +104,14 @@ def test_a_stop_and_a_section_at_an_energy() -> None:
     )  # fmt: skip
     of = energy_function(scene)
     level = float(of(np.array(scene.y0))) / 2
-    found = run(
+    result = run(
         scene.replace(sections={"passed": {"function": f"energy - {level!r}"}}, stop=f"energy - {level / 2!r}"),
         show_progress=False,
     )
-    assert int(found.status) == 7
-    assert float(of(np.array(found.states("end")))) == pytest.approx(level / 2, rel=1e-9)
-    assert float(of(found.passed.values[0])) == pytest.approx(level, rel=1e-9)
-    assert int(found.passed_count) == 1
+    assert int(result.status) == 7
+    assert float(of(np.array(result.states("end")))) == pytest.approx(level / 2, rel=1e-9)
+    assert float(of(result.passed.values[0])) == pytest.approx(level, rel=1e-9)
+    assert int(result.passed_count) == 1
 
 
 i, j, W = ends(load_oscillator("harmonic"))
@@ -119,7 +126,7 @@ def test_the_sums_of_the_energy_are_made_once(monkeypatch: pytest.MonkeyPatch) -
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("keywords", "message"),
     [
         ({"oscillator": "rossler", "coupling": "x->x"}, "observe e: energy: oscillator 'rossler' is a vector field"),
         ({"coupling": Rates({i.v: W * (j.x - i.x)})}, "observe e: energy: the coupling 'rates of v' has none"),
@@ -129,18 +136,18 @@ def test_the_sums_of_the_energy_are_made_once(monkeypatch: pytest.MonkeyPatch) -
         ({"observe": {"e": "mean(rate(energy))"}}, "expected the rate of a state"),
     ],
 )
-def test_networks_without_an_energy(given: dict[str, Any], words: str) -> None:
+def test_networks_without_an_energy(keywords: dict[str, Any], message: str) -> None:
     common = {"oscillator": "harmonic", "coupling": "spring", "topology": ring(3), "observe": {"e": "mean(energy)"}}
     with pytest.raises(ValueError, match="energy") as error:
-        Scene(**{**common, **given})
-    assert words in str(error.value)
+        Scene(**{**common, **keywords})
+    assert message in str(error.value)
     assert "\n" not in str(error.value)
 
 
 def test_a_parameter_of_that_name_is_meant() -> None:
     node = Lagrangian(V**2 / 2, sp.Symbol("energy") * X**2 / 2, coordinates={X: V}, parameters={"energy": 3})
-    found = run(Scene(node, observe={"e": "mean(energy + 0*x_1)"}, **EXACT), show_progress=False)
-    assert float(found.e) == 3.0
+    result = run(Scene(node, observe={"e": "mean(energy + 0*x_1)"}, **EXACT), show_progress=False)
+    assert float(result.e) == 3.0
 
 
 def test_the_work_of_a_force_that_jumps_is_exact_as_an_observable_and_a_quadrature_on_samples() -> None:
@@ -149,9 +156,9 @@ def test_the_work_of_a_force_that_jumps_is_exact_as_an_observable_and_a_quadratu
     scene = alone.replace(observe={"power": mean(energy_of(alone).whole()[1])})
     function, errors = energy_function(scene), []
     for samples in (301, 3001, 30001):
-        found = run(scene.replace(samples=samples), show_progress=False)
-        states, time = found.states("trajectory"), found.time.values
+        result = run(scene.replace(samples=samples), show_progress=False)
+        states, time = result.states("trajectory"), result.time.values
         gained = np.diff(function(states)[[0, -1]])[0]
-        assert gained == pytest.approx(60 * float(found.power), abs=1e-10)
+        assert gained == pytest.approx(60 * float(result.power), abs=1e-10)
         errors.append(np.abs(function.imbalance(time, states)).max())
     assert 1e-4 < errors[2] / errors[0] < 0.1  # the first power of the distance; the third would be 1e-6

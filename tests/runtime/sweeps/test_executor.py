@@ -122,8 +122,8 @@ class Foreign(Executor):
 
 def test_workers_that_forget_are_told_again(alone):
     executor = Foreign()
-    found = run(MAP, executor=executor, workers=2, show_progress=False)
-    assert found.data.identical(alone[MAP].data)
+    result = run(MAP, executor=executor, workers=2, show_progress=False)
+    assert result.data.identical(alone[MAP].data)
     assert executor.asked[:4] == [True] * 4
     assert not all(executor.asked)
 
@@ -248,8 +248,8 @@ def test_a_scheduler_that_does_not_answer_is_one_line(tmp_path, capsys, monkeypa
     from synchain.runtime.cli import main
 
     monkeypatch.setattr("synchain.runtime.commands.run.PATIENCE", 0.5)
-    words = ["run", "two_oscillators", "--out", str(tmp_path / "out"), "--set", "sigma=0.1,0.2", "transient=1"]
-    assert main([*words, "--dask", "tcp://127.0.0.1:9"]) == 1
+    command = ["run", "two_oscillators", "--out", str(tmp_path / "out"), "--set", "sigma=0.1,0.2", "transient=1"]
+    assert main([*command, "--dask", "tcp://127.0.0.1:9"]) == 1
     err = capsys.readouterr().err
     assert err.startswith("synchain run: no Dask scheduler answers at tcp://127.0.0.1:9")
     assert err.count("\n") == 1
@@ -274,7 +274,7 @@ def test_mpi(alone, tmp_path):
         pytest.skip("mpi4py or mpiexec is not installed")
     script = tmp_path / "sweep.py"
     script.write_text(MPI)
-    words = [
+    command = [
         launcher,
         "-n",
         "3",
@@ -285,7 +285,7 @@ def test_mpi(alone, tmp_path):
         str(tmp_path / "a.nc"),
     ]
     done = subprocess.run(
-        words,
+        command,
         capture_output=True,
         text=True,
         timeout=300,

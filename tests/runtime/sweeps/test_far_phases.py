@@ -25,8 +25,8 @@ def test_a_phase_keeps_its_mean_speed_wherever_it_starts(start: float, method: s
     scene = sc.Scene(field, None, initial={"th": start}, window=100 * math.pi / SPEED, integrator=method, **FREE)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = sc.run(scene)
-    assert abs((found.end.item() - start) / (100 * math.pi) - 1) < 1e-6
+        result = sc.run(scene)
+    assert abs((result.end.item() - start) / (100 * math.pi) - 1) < 1e-6
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -47,14 +47,14 @@ def test_times_are_those_of_scipy(found: Result) -> None:
     symbols = [sp.Symbol(name, real=True) for name in (*equations.state, *equations.parameters)]
     rates = sp.lambdify([TIME, *symbols], equations.rhs())
     for cell, sigma in enumerate((0.1, 0.2)):
-        numbers = [{**SCENE.parameters, "sigma": sigma}[name] for name in equations.parameters]
+        values = [{**SCENE.parameters, "sigma": sigma}[name] for name in equations.parameters]
         events = [lambda t, y: y[0] - y[1], lambda t, y: y[2]]
         events[1].direction = -1.0
-        known = solve_ivp(
-            lambda t, y, p=tuple(numbers): rates(t, *y, *p), (0.0, 22.0), SCENE.y0, "DOP853", events=events,
+        solution = solve_ivp(
+            lambda t, y, p=tuple(values): rates(t, *y, *p), (0.0, 22.0), SCENE.y0, "DOP853", events=events,
             rtol=1e-12, atol=1e-13,
         )  # fmt: skip
-        for name, times, states in zip(("gap", "turn"), known.t_events, known.y_events, strict=True):
+        for name, times, states in zip(("gap", "turn"), solution.t_events, solution.y_events, strict=True):
             inside = times > 2.0
             assert inside.sum() >= 3
             np.testing.assert_allclose(points(found, name, cell), times[inside], rtol=0, atol=1e-9)
@@ -92,12 +92,12 @@ def test_large_networks_have_sections() -> None:
         time_unit="time", initial={"x": [1.0 + 0.1 * i for i in range(20)], "v": [0.3] * 20}, axes={"sigma": [0.1]},
         sections={"top": Section("nodes.mean(v)", "falling", keep="nodes.mean(x)")},
     )  # fmt: skip
-    found = run(scene, show_progress=False)
+    result = run(scene, show_progress=False)
     start = 1.95 + 0.3j  # x + i v rotates backwards
-    assert points(found, "top", 0).tolist() == pytest.approx(
+    assert points(result, "top", 0).tolist() == pytest.approx(
         [np.angle(start) + 2 * np.pi * k for k in range(3)], abs=1e-8
     )
-    assert found.top.values[0, :3, 0] == pytest.approx([abs(start)] * 3, abs=1e-8)
+    assert result.top.values[0, :3, 0] == pytest.approx([abs(start)] * 3, abs=1e-8)
 
 
 def test_files_and_resumed_runs_keep_points(found: Result, tmp_path: Path) -> None:
@@ -112,7 +112,7 @@ def test_files_and_resumed_runs_keep_points(found: Result, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("given", "message"),
     [
         ({"gap": Section("x")}, "section gap: found x, which each node has"),
         ({"gap": Section("y_1")}, "section gap: unknown name 'y_1'"),
@@ -124,10 +124,10 @@ def test_files_and_resumed_runs_keep_points(found: Result, tmp_path: Path) -> No
         ({"status": Section("x_1")}, "found the name 'status'"),
     ],
 )
-def test_wrong_sections_are_refused(given: dict[str, object], words: str) -> None:
+def test_wrong_sections_are_refused(given: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=r"section") as error:
         Scene(topology=ring(3), record=(), sections=given)
-    assert words in str(error.value)
+    assert message in str(error.value)
     assert "\n" not in str(error.value)
 
 

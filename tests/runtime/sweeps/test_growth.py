@@ -20,18 +20,18 @@ TAYLOR = FREE | {"integrator": "taylor"}
 )
 def test_networks_that_drive_each_other_apart_end_long_before_their_budget(n: int, sigma: float, most: int) -> None:
     scene = sc.Scene("rossler", "x->x", sc.chain(n), window=1000, **TAYLOR)
-    found = sc.run(scene, sigma=sigma)
-    assert found.status == Status.DIVERGED
-    assert found.steps < most
-    assert abs(found.end).max() < 2**53 / 1000
-    assert np.isfinite(found.end).all()
+    result = sc.run(scene, sigma=sigma)
+    assert result.status == Status.DIVERGED
+    assert result.steps < most
+    assert abs(result.end).max() < 2**53 / 1000
+    assert np.isfinite(result.end).all()
 
 
 def test_a_window_that_the_budget_reaches_is_integrated_to_its_end() -> None:
     scene = sc.Scene("rossler", "x->x", sc.chain(2), window=40, **TAYLOR)
-    found = sc.run(scene, sigma=-1.0)
-    assert found.status == Status.FINISHED
-    assert abs(found.end).max() > 1e4
+    result = sc.run(scene, sigma=-1.0)
+    assert result.status == Status.FINISHED
+    assert abs(result.end).max() > 1e4
 
 
 PHASE = {"x": "v", "v": "1 + sin(x)/10"}
@@ -50,15 +50,15 @@ SOUND = {
 def test_sound_motions_that_run_out_of_steps_are_not_called_diverged(what: str) -> None:
     """Each has a window that 20 000 steps cannot reach, so that the growth alone is judged."""
     scene = sc.Scene(SOUND[what], window=1e6, max_steps=20_000, **TAYLOR)
-    found = sc.run(scene)
-    assert found.steps + found.rejected == 20_000
-    assert found.status == Status.STEP_BUDGET
+    result = sc.run(scene)
+    assert result.steps + result.rejected == 20_000
+    assert result.status == Status.STEP_BUDGET
 
 
 def test_linear_growth_has_its_exponent() -> None:
     scene = sc.Scene(sc.Field({"x": "x/2 - y", "y": "x + y/2"}, initial={"x": 1}), "x->x")
-    found = sc.exponents(scene, [0.0, 0.25], periods=50)
-    np.testing.assert_allclose(found.exponent, [0.5, 0.375], atol=1e-8)
+    result = sc.exponents(scene, [0.0, 0.25], periods=50)
+    np.testing.assert_allclose(result.exponent, [0.5, 0.375], atol=1e-8)
 
 
 def clock(**values: float) -> np.ndarray:

@@ -25,11 +25,11 @@ def test_a_load_that_jumps_beyond_the_limit_sets_a_body_free(integrator: str) ->
         BOX, None, chain(1), initial={"x": [places[0]], "v": [0.0]}, record=(), transient=0.0, window=12.0,
         time_unit="time", integrator=integrator, rtol=1e-9, max_steps=2000,
     )  # fmt: skip
-    found = run(scene, x_1=places, show_progress=False, width=4)
-    ends = found.states("end")
+    result = run(scene, x_1=places, show_progress=False, width=4)
+    ends = result.states("end")
     np.testing.assert_allclose(ends[:, 0], 2 * (LIMIT - LOAD) - places, rtol=0, atol=1e-11)
     np.testing.assert_array_equal(ends[:, 1:], 0.0)
-    assert found.steps.max() < 100
+    assert result.steps.max() < 100
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "rodas5p"])
@@ -47,8 +47,8 @@ def test_no_pulse_on_a_body_at_rest_is_stepped_over(integrator: str) -> None:
     speed = (pulse - limit) * length
     way = 10 * (0.5 * speed * length + 0.5 * speed**2 / limit)
     for rtol, error in ((1e-4, 1e-2), (1e-9, 1e-7)):
-        found = run(scene.replace(rtol=rtol), show_progress=False, width=4)
-        np.testing.assert_allclose(found.states("end"), [way, 0.0, 0.0], rtol=error, atol=0)
+        result = run(scene.replace(rtol=rtol), show_progress=False, width=4)
+        np.testing.assert_allclose(result.states("end"), [way, 0.0, 0.0], rtol=error, atol=0)
 
 
 BELT, OMEGA = 0.1, 1.15
@@ -101,6 +101,6 @@ def test_square_waves_of_load_and_force(text: str, load: float, force: float, in
         node, None, chain(1), initial={"x": [0.2], "v": [BELT]}, record=(), transient=0.0, window=30.0,
         time_unit="time", integrator=integrator, rtol=1e-9, max_steps=5000,
     )  # fmt: skip
-    found = run(scene, x_1=starts, show_progress=False, width=4).states("end")
+    states = run(scene, x_1=starts, show_progress=False, width=4).states("end")
     wanted = [exact(x, 30.0, (LIMIT, load), force) for x in starts]
-    np.testing.assert_allclose(found[:, :2], wanted, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(states[:, :2], wanted, rtol=0, atol=1e-7)

@@ -13,11 +13,11 @@ SLOW: dict[str, object] = {"kappa": 10.0, "sigma": 0.1, "theta_b": 0.02}
 
 
 def pair(**more: object) -> Scene:
-    given: dict[str, object] = {
+    settings: dict[str, object] = {
         "topology": chain(2), "parameters": SLOW, "initial": {"x": (0.3, 0.4), "v": (0.0, 0.05)}, "transient": 2, "window": 8,
         "rtol": 1e-12, "atol": 1e-13, "record": ("sync_error", "section", "trajectory"),
     }  # fmt: skip
-    return Scene(**{**given, **more})  # type: ignore[arg-type]
+    return Scene(**{**settings, **more})  # type: ignore[arg-type]
 
 
 def test_records_are_those_of_another_method():
@@ -29,8 +29,8 @@ def test_records_are_those_of_another_method():
 
 
 def test_a_cell_does_not_depend_on_its_neighbours():
-    given = {"topology": chain(1), "parameters": {"kappa": 10.0}, "initial": {"x": 0.3, "v": 0.0}, "record": ()}
-    scene = pair(**given, integrator="taylor")
+    settings = {"topology": chain(1), "parameters": {"kappa": 10.0}, "initial": {"x": 0.3, "v": 0.0}, "record": ()}
+    scene = pair(**settings, integrator="taylor")
     speeds = np.linspace(0.005, 0.08, 11)
     together = run(scene, theta_b=speeds, show_progress=False).data.end.values
     alone = [run(scene, theta_b=[speed], show_progress=False).data.end.values[0] for speed in speeds[[0, 5, 10]]]
@@ -39,9 +39,9 @@ def test_a_cell_does_not_depend_on_its_neighbours():
 
 @pytest.mark.long
 def test_loops_and_lines_agree_in_a_large_network():
-    given = {"record": (), "transient": 0, "window": 2, "initial": {"x": 0.3, "v": 0.0}}
+    settings = {"record": (), "transient": 0, "window": 2, "initial": {"x": 0.3, "v": 0.0}}
     starts = {"x": tuple(0.3 + 0.02 * i for i in range(12)), "v": 0.0}
-    scene = pair(topology=ring(12), **{**given, "initial": starts})
+    scene = pair(topology=ring(12), **{**settings, "initial": starts})
     series, stages = (run(scene.replace(integrator=name), show_progress=False).data for name in ("taylor", "dop853"))
     assert np.abs(series.end.values - stages.end.values).max() < 2e-11
 
@@ -56,7 +56,7 @@ def test_equal_oscillators_stay_equal_with_and_without_the_quotient():
 
 
 def test_circuits_with_kinks_are_those_of_another_method():
-    given = {"oscillator": "chua", "coupling": "x->x", "parameters": {"sigma": 1.0}, "initial": {"x": (0.1, -0.2)}}
-    scene = pair(**given, window=20, transient=0, time_unit="time", record=())
+    settings = {"oscillator": "chua", "coupling": "x->x", "parameters": {"sigma": 1.0}, "initial": {"x": (0.1, -0.2)}}
+    scene = pair(**settings, window=20, transient=0, time_unit="time", record=())
     series, stages = (run(scene.replace(integrator=name), show_progress=False).data for name in ("taylor", "dop853"))
     assert np.abs(series.end.values - stages.end.values).max() < 1e-7 * np.abs(stages.end.values).max()

@@ -35,23 +35,23 @@ def steps_of(result: Result) -> dict[str, int]:
 
 def test_kinetics_over_nine_decades_come_to_their_end() -> None:
     """Robertson's reactions (Hairer & Wanner, Solving ODEs II, 2nd ed. 1996, section IV.10), which 10^7 series did not end."""
-    found, alone = run(ROBER, **QUIET), run(ROBER.replace(integrator="rodas5p"), **QUIET)
-    assert found.status == Status.FINISHED
-    assert int(found.steps + found.rejected) < 1.5 * int(alone.steps + alone.rejected)
-    np.testing.assert_allclose(found.states(), alone.states(), rtol=1e-6)
+    result, alone = run(ROBER, **QUIET), run(ROBER.replace(integrator="rodas5p"), **QUIET)
+    assert result.status == Status.FINISHED
+    assert int(result.steps + result.rejected) < 1.5 * int(alone.steps + alone.rejected)
+    np.testing.assert_allclose(result.states(), alone.states(), rtol=1e-6)
 
 
 def test_stiffness_that_comes_with_time_is_handed_on() -> None:
     """Van der Pol's oscillator grows from rest before it is stiff."""
     scene = RELAXING.replace(parameters={"mu": 300.0}, initial={"x": 0.1, "v": 0.0}, window=600.0)
-    found, alone = run(scene, **QUIET), run(scene.replace(integrator="rodas5p"), **QUIET)
-    taken = steps_of(found)
+    result, alone = run(scene, **QUIET), run(scene.replace(integrator="rodas5p"), **QUIET)
+    taken = steps_of(result)
     assert list(taken) == ["taylor", "rodas5p"]
     assert sum(taken.values()) < 1.5 * int(alone.steps + alone.rejected)
-    np.testing.assert_allclose(found.states(), alone.states(), rtol=1e-4)
-    assert found.integrators == f"taylor ({taken['taylor']} steps), then rodas5p ({taken['rodas5p']} steps)"
-    assert found.methods.attrs["flag_meanings"] == "taylor dop853 rodas5p"
-    assert int(found.methods) == 0b101
+    np.testing.assert_allclose(result.states(), alone.states(), rtol=1e-4)
+    assert result.integrators == f"taylor ({taken['taylor']} steps), then rodas5p ({taken['rodas5p']} steps)"
+    assert result.methods.attrs["flag_meanings"] == "taylor dop853 rodas5p"
+    assert int(result.methods) == 0b101
 
 
 @pytest.mark.parametrize(
@@ -69,9 +69,9 @@ def test_a_series_without_a_next_term_is_handed_on(rates: dict[str, str], start:
         with pytest.warns(RuntimeWarning, match="no cell came to its end"):
             assert run(scene, **QUIET).status != Status.FINISHED
         return
-    found = run(scene, **QUIET)
-    assert found.status == Status.FINISHED
-    assert list(steps_of(found))[-1] == "dop853"
+    result = run(scene, **QUIET)
+    assert result.status == Status.FINISHED
+    assert list(steps_of(result))[-1] == "dop853"
 
     def right(t: float, y: np.ndarray) -> list[float]:
         if "**a" in rates["x"]:
@@ -79,7 +79,7 @@ def test_a_series_without_a_next_term_is_handed_on(rates: dict[str, str], start:
         return [1 + y[0] ** 1.5 - y[0] ** 2, -y[1]]
 
     expected = solve_ivp(right, (0, 4), list(start.values()), "DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
-    np.testing.assert_allclose(found.states(), expected, rtol=0, atol=2e-6)
+    np.testing.assert_allclose(result.states(), expected, rtol=0, atol=2e-6)
 
 
 def test_records_go_on_over_a_hand_over() -> None:
@@ -87,46 +87,46 @@ def test_records_go_on_over_a_hand_over() -> None:
     scene = RELAXING.replace(
         transient=0.0, parameters={"mu": 40.0}, rtol=1e-9, atol=1e-10, window=200.0, initial={"x": 0.1, "v": 0.0}
     )
-    found, alone = run(scene, **QUIET), run(scene.replace(integrator="rodas5p"), **QUIET)
-    assert len(steps_of(found)) == 2
-    np.testing.assert_allclose(found.mean, alone.mean, atol=1e-6)
-    np.testing.assert_allclose(found.trajectory, alone.trajectory, atol=1e-5)
-    np.testing.assert_array_equal(found.time, alone.time)
+    result, alone = run(scene, **QUIET), run(scene.replace(integrator="rodas5p"), **QUIET)
+    assert len(steps_of(result)) == 2
+    np.testing.assert_allclose(result.mean, alone.mean, atol=1e-6)
+    np.testing.assert_allclose(result.trajectory, alone.trajectory, atol=1e-5)
+    np.testing.assert_array_equal(result.time, alone.time)
 
 
 @pytest.mark.parametrize("order", [[0, 1, 2, 3], [3, 1, 0, 2]])
 def test_a_cell_of_a_sweep_is_its_own_run_to_the_last_bit(order: list[int]) -> None:
     values = np.array([0.1, 1.0, 20.0, 300.0])[order]
-    found = run(RELAXING, mu=values, width=4, **QUIET)
-    assert len(np.unique(found.methods)) > 1
+    result = run(RELAXING, mu=values, width=4, **QUIET)
+    assert len(np.unique(result.methods)) > 1
     for k, mu in enumerate(values):
         alone = run(RELAXING, mu=float(mu), **QUIET)
         for name in ("end", "mean", "trajectory", "steps", "method_steps"):
-            np.testing.assert_array_equal(found.data[name].isel(mu=k), alone.data[name], err_msg=f"{name}, mu = {mu}")
+            np.testing.assert_array_equal(result.data[name].isel(mu=k), alone.data[name], err_msg=f"{name}, mu = {mu}")
 
 
 def test_integrators_of_a_sweep_are_counted_by_cells() -> None:
-    found = run(RELAXING.replace(observe={}, record=()), mu=[1.0, 3.0, 1e3, 2e3], **QUIET)
-    parts = [part.split(" in ") for part in found.integrators.split("; ")]
+    result = run(RELAXING.replace(observe={}, record=()), mu=[1.0, 3.0, 1e3, 2e3], **QUIET)
+    parts = [part.split(" in ") for part in result.integrators.split("; ")]
     assert sorted(cells for _, cells in parts) == ["2 cells", "2 cells"]
-    assert dict(found.summary)["integrators"] == found.integrators
-    assert found.integrators in str(found).replace("\n", " ")
+    assert dict(result.summary)["integrators"] == result.integrators
+    assert result.integrators in str(result).replace("\n", " ")
 
 
 def test_the_longest_step_is_that_of_the_cell() -> None:
     """Beside a drive of 400 a slow one takes the steps that it takes alone."""
     node = Field({"x": "v", "v": "-x/10 - v/10 - x**3 + cos(w*t)"}, parameters={"w": 400.0})
     scene = Scene(node, None, None, initial={"x": 1.0, "v": 0.0}, transient=0.0, window=2.0)
-    found, alone = run(scene, w=[0.7, 400.0], **QUIET), run(scene, w=0.7, **QUIET)
-    assert found.steps.values[0] == alone.steps < 100
-    np.testing.assert_array_equal(found.end.isel(w=0), alone.end)
+    result, alone = run(scene, w=[0.7, 400.0], **QUIET), run(scene, w=0.7, **QUIET)
+    assert result.steps.values[0] == alone.steps < 100
+    np.testing.assert_array_equal(result.end.isel(w=0), alone.end)
 
 
 def test_a_steep_law_in_one_cell_does_not_tighten_the_others() -> None:
     scene = Scene(topology=chain(1), transient=0.0, window=2.0, record=())
-    found, alone = run(scene, kappa=[1e2, 1e9], **QUIET), run(scene, kappa=1e2, **QUIET)
-    np.testing.assert_array_equal(found.end.isel(kappa=0), alone.end)
-    assert found.steps.values[0] == alone.steps
+    result, alone = run(scene, kappa=[1e2, 1e9], **QUIET), run(scene, kappa=1e2, **QUIET)
+    np.testing.assert_array_equal(result.end.isel(kappa=0), alone.end)
+    assert result.steps.values[0] == alone.steps
 
 
 @pytest.mark.parametrize(

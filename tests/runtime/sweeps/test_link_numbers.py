@@ -62,8 +62,8 @@ def lagging(n: int) -> tuple[Scene, Callable[[float, np.ndarray], np.ndarray]]:
             rates[a] += np.sin(y[b] - y[a] - lag)
         return rates
 
-    numbers = {"omega": own, "lag": lags}
-    return Scene(PHASE, LAGGING, graph, parameters=numbers, initial={"theta": start}, **EXACT), rhs
+    values = {"omega": own, "lag": lags}
+    return Scene(PHASE, LAGGING, graph, parameters=values, initial={"theta": start}, **EXACT), rhs
 
 
 def springs(n: int) -> tuple[Scene, Callable[[float, np.ndarray], np.ndarray]]:
@@ -85,9 +85,9 @@ def springs(n: int) -> tuple[Scene, Callable[[float, np.ndarray], np.ndarray]]:
         return np.concatenate([v, rates])
 
     start = {"x": DICE.normal(size=n), "v": DICE.normal(size=n)}
-    numbers = {"K": k, "rest": rest, "c": c}
+    values = {"K": k, "rest": rest, "c": c}
     layers = [(RESTING, first), (DAMPED, second)]
-    return Scene("harmonic", links=layers, parameters=numbers, initial=start, **EXACT), rhs
+    return Scene("harmonic", links=layers, parameters=values, initial=start, **EXACT), rhs
 
 
 @pytest.mark.parametrize(
@@ -99,8 +99,8 @@ def test_each_link_has_its_number(make: Callable[[int], tuple[Scene, Any]], n: i
     scene, rhs = make(n)
     exact = solve_ivp(rhs, (0, 10), scene.y0, method="DOP853", rtol=2.3e-14, atol=1e-14).y[:, -1]
     for method in ("dop853", "taylor", "rodas5p"):
-        found = run(scene.replace(integrator=method), show_progress=False)
-        np.testing.assert_allclose(found.end.values.ravel(), exact, rtol=0, atol=2e-10)
+        result = run(scene.replace(integrator=method), show_progress=False)
+        np.testing.assert_allclose(result.end.values.ravel(), exact, rtol=0, atol=2e-10)
 
 
 CASES: dict[str, dict[str, Any]] = {
@@ -128,9 +128,11 @@ def test_numbers_of_links_are_weights_of_the_graph(name: str, n: int) -> None:
     pairs = edges_of(ring(n))
     sizes = [0.5 + 0.125 * k for k in range(n)]
     weighted = from_edges([(*pair, size) for pair, size in zip(pairs, sizes, strict=True)])
-    given = {**EXACT, "window": 5, "rtol": 1e-10, **CASES[name]}
-    first = run(Scene(topology=weighted, parameters={"sigma": 0.5}, **given), show_progress=False)
-    second = run(Scene(topology=ring(n), parameters={"sigma": [0.5 * s for s in sizes]}, **given), show_progress=False)
+    settings = {**EXACT, "window": 5, "rtol": 1e-10, **CASES[name]}
+    first = run(Scene(topology=weighted, parameters={"sigma": 0.5}, **settings), show_progress=False)
+    second = run(
+        Scene(topology=ring(n), parameters={"sigma": [0.5 * s for s in sizes]}, **settings), show_progress=False
+    )
     np.testing.assert_allclose(second.end.values, first.end.values, rtol=0, atol=1e-9)
     turned = run(second.scene.replace(parameters={"sigma": [0.5 * s for s in reversed(sizes)]}), show_progress=False)
     assert np.nanmax(np.abs(turned.end.values - first.end.values)) > 1e-5
@@ -138,11 +140,11 @@ def test_numbers_of_links_are_weights_of_the_graph(name: str, n: int) -> None:
 
 def test_numbers_are_given_in_several_forms(tmp_path: Path) -> None:
     """A list by edges or by links, a matrix, a graph and single names are one scene, which files keep."""
-    graph, numbers = chain(4), [0.1, 0.2, 0.3]
-    scene = Scene("harmonic", "spring", graph, parameters={"sigma": numbers}, integrator="dop853", **EXACT)
-    assert [scene.parameters[f"sigma_{k}_{k + 1}"] for k in (1, 2, 3)] == numbers
-    matrix = np.diag(numbers, 1) + np.diag(numbers, -1)
-    weighted = from_edges([(k, k + 1, number) for k, number in enumerate(numbers)])
+    graph, values = chain(4), [0.1, 0.2, 0.3]
+    scene = Scene("harmonic", "spring", graph, parameters={"sigma": values}, integrator="dop853", **EXACT)
+    assert [scene.parameters[f"sigma_{k}_{k + 1}"] for k in (1, 2, 3)] == values
+    matrix = np.diag(values, 1) + np.diag(values, -1)
+    weighted = from_edges([(k, k + 1, number) for k, number in enumerate(values)])
     single = {"sigma": 0.1, "sigma_2_3": 0.2, "sigma_3_4": 0.3}
     for given in ([0.1, 0.1, 0.2, 0.2, 0.3, 0.3], matrix, matrix.tolist(), weighted):
         assert scene.replace(parameters={"sigma": given}) == scene
@@ -151,11 +153,11 @@ def test_numbers_are_given_in_several_forms(tmp_path: Path) -> None:
     assert scene.replace(sigma_2_3=0.7).parameters["sigma_2_3"] == 0.7
     scene.save(tmp_path / "links.toml")
     assert load_scene(tmp_path / "links.toml") == scene
-    found = run(scene, show_progress=False, width=1, sigma_1_2=[0.1, 0.5])
-    found.save(tmp_path / "found.nc")
-    assert open_result(tmp_path / "found.nc").scene == found.scene
+    result = run(scene, show_progress=False, width=1, sigma_1_2=[0.1, 0.5])
+    result.save(tmp_path / "found.nc")
+    assert open_result(tmp_path / "found.nc").scene == result.scene
     one = run(scene.replace(sigma_1_2=0.5), show_progress=False, width=1)
-    np.testing.assert_array_equal(found.end.values[1], one.end.values)
+    np.testing.assert_array_equal(result.end.values[1], one.end.values)
 
 
 def test_lags_there_and_back_differ() -> None:
@@ -182,27 +184,27 @@ def test_weights_are_drawn(tmp_path: Path) -> None:
     graph = erdos_renyi(10, p=0.5, seed=2)
     scene = RANDOM.replace(topology=graph)
     draws = {"W": uniform(0.5, 1.5)}
-    found = run(scene, draws=draws, width=4, **DRAWN)
+    result = run(scene, draws=draws, width=4, **DRAWN)
     names = [f"{a + 1}_{b + 1}" for a, b in edges_of(graph)]
-    assert found.data.W.dims == ("realisation", "W_link")
-    assert found.data.W_link.values.tolist() == names
+    assert result.data.W.dims == ("realisation", "W_link")
+    assert result.data.W_link.values.tolist() == names
     for k in (0, 7):
         listed = [
-            (*pair, float(found.data.W.sel(W_link=name)[k])) for pair, name in zip(edges_of(graph), names, strict=True)
+            (*pair, float(result.data.W.sel(W_link=name)[k])) for pair, name in zip(edges_of(graph), names, strict=True)
         ]
         one = run(scene.replace(topology=from_edges(listed, n=10)), show_progress=False, width=4)
-        np.testing.assert_allclose(found.end.values[k], one.end.values, rtol=0, atol=1e-9)
-    assert len(set(found.data.W.values.ravel().tolist())) == 20 * len(names)
+        np.testing.assert_allclose(result.end.values[k], one.end.values, rtol=0, atol=1e-9)
+    assert len(set(result.data.W.values.ravel().tolist())) == 20 * len(names)
     other = scene.replace(draws={"x_1": normal(0.0, 1.0), **draws}, realisations=20, rng=3)
     values = {axis.name: axis.values for axis in other.drawn}
     for name in names:
-        assert values[f"W_{name}"] == tuple(found.data.W.sel(W_link=name).values.tolist())
+        assert values[f"W_{name}"] == tuple(result.data.W.sel(W_link=name).values.tolist())
     alone = run(scene, draws=draws, width=4, workers=1, **DRAWN)
-    np.testing.assert_array_equal(alone.end, found.end)
-    assert Scene.from_dict(found.scene.as_dict()) == found.scene
-    assert run(found.scene, show_progress=False, width=4).end.identical(found.end)
-    found.save(tmp_path / "whole.nc")
-    assert open_result(tmp_path / "whole.nc").data.identical(found.data)
+    np.testing.assert_array_equal(alone.end, result.end)
+    assert Scene.from_dict(result.scene.as_dict()) == result.scene
+    assert run(result.scene, show_progress=False, width=4).end.identical(result.end)
+    result.save(tmp_path / "whole.nc")
+    assert open_result(tmp_path / "whole.nc").data.identical(result.data)
     assert stream(scene, tmp_path / "streamed.nc", draws=draws, width=4, **DRAWN).success
     assert (tmp_path / "streamed.nc").read_bytes() == (tmp_path / "whole.nc").read_bytes()
 
@@ -235,19 +237,19 @@ def test_graphs_are_realisations(oscillator: str, coupling: str, tmp_path: Path)
     """Each realisation is the run on its graph to the last bit, links that it has not add nothing; files keep the graphs."""
     scene = RANDOM.replace(oscillator=oscillator, coupling=coupling)
     one_width = {"show_progress": False, "width": 4}
-    found = run(scene, realisations=4, draws={"topology": GRAPHS}, sigma=[0.2, 0.4], **one_width)
-    assert found.end.dims == ("sigma", "realisation", "component", "node")
+    result = run(scene, realisations=4, draws={"topology": GRAPHS}, sigma=[0.2, 0.4], **one_width)
+    assert result.end.dims == ("sigma", "realisation", "component", "node")
     for k, graph in enumerate(GRAPHS):
         one = run(scene.replace(topology=graph), **one_width)
-        np.testing.assert_array_equal(one.end.values, found.end.values[1, k])
-        assert float(one.sync_error) == float(found.sync_error[1, k])
-    assert len({float(error) for error in found.sync_error[1]}) == 4
-    assert Scene.from_dict(found.scene.as_dict()) == found.scene
-    assert found.scene.replace(draws=None, realisations=0, axes={}) == scene
-    found.scene.save(tmp_path / "graphs.toml")
-    assert load_scene(tmp_path / "graphs.toml") == found.scene
-    found.save(tmp_path / "graphs.nc")
-    assert open_result(tmp_path / "graphs.nc").scene == found.scene
+        np.testing.assert_array_equal(one.end.values, result.end.values[1, k])
+        assert float(one.sync_error) == float(result.sync_error[1, k])
+    assert len({float(error) for error in result.sync_error[1]}) == 4
+    assert Scene.from_dict(result.scene.as_dict()) == result.scene
+    assert result.scene.replace(draws=None, realisations=0, axes={}) == scene
+    result.scene.save(tmp_path / "graphs.toml")
+    assert load_scene(tmp_path / "graphs.toml") == result.scene
+    result.save(tmp_path / "graphs.nc")
+    assert open_result(tmp_path / "graphs.nc").scene == result.scene
 
 
 def drawn(text: str, count: int = 4, rng: int = 3, **given: Any) -> Scene:
@@ -288,28 +290,28 @@ def test_members_of_random_families_are_drawn(text: str, edges: int | None) -> N
 
 def test_the_number_of_edges_is_that_of_the_family() -> None:
     """Mean over 500 members of 45 pairs with p = 0.3, within four standard errors; no two members are alike."""
-    found = members(drawn("erdos_renyi(10, p=0.3)", 500))
-    assert np.mean([len(links) for links in found]) == pytest.approx(13.5, abs=4 * (45 * 0.21 / 500) ** 0.5)
-    assert len({tuple(sorted(links)) for links in found}) == 500
+    graphs = members(drawn("erdos_renyi(10, p=0.3)", 500))
+    assert np.mean([len(links) for links in graphs]) == pytest.approx(13.5, abs=4 * (45 * 0.21 / 500) ** 0.5)
+    assert len({tuple(sorted(links)) for links in graphs}) == 500
 
 
 def test_runs_on_random_graphs_are_those_on_their_members(tmp_path: Path) -> None:
     scene = drawn("erdos_renyi(10, p=0.3)")
     one_width = {"show_progress": False, "width": 4}
-    found = run(scene, **one_width)
+    result = run(scene, **one_width)
     graphs = scene.draws["topology"].graphs(4, 3).graphs
     listed = run(RANDOM, realisations=4, draws={"topology": graphs}, **one_width)
-    np.testing.assert_array_equal(found.end.values, listed.end.values)
+    np.testing.assert_array_equal(result.end.values, listed.end.values)
     one = run(RANDOM.replace(topology=graphs[2]), **one_width)
-    np.testing.assert_array_equal(one.end.values, found.end.values[2])
-    assert found.scene.as_dict()["draws"] == {"topology": "erdos_renyi(10, p=0.3)"}
-    assert Scene.from_dict(found.scene.as_dict()) == found.scene
-    found.scene.save(tmp_path / "random.toml")
-    assert load_scene(tmp_path / "random.toml") == found.scene
-    found.save(tmp_path / "random.nc")
+    np.testing.assert_array_equal(one.end.values, result.end.values[2])
+    assert result.scene.as_dict()["draws"] == {"topology": "erdos_renyi(10, p=0.3)"}
+    assert Scene.from_dict(result.scene.as_dict()) == result.scene
+    result.scene.save(tmp_path / "random.toml")
+    assert load_scene(tmp_path / "random.toml") == result.scene
+    result.save(tmp_path / "random.nc")
     opened = open_result(tmp_path / "random.nc")
-    assert opened.scene == found.scene
-    np.testing.assert_array_equal(opened.data.W.values, found.data.W.values)
+    assert opened.scene == result.scene
+    np.testing.assert_array_equal(opened.data.W.values, result.data.W.values)
 
 
 @pytest.mark.parametrize("graphs", [GRAPHS, "erdos_renyi(10, p=0.3)"])
@@ -320,7 +322,7 @@ def test_scenes_with_drawn_graphs_can_be_changed(graphs: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("keywords", "message"),
     [
         (
             {"realisations": 2, "draws": {"topology": [chain(3), chain(4)]}},
@@ -382,9 +384,9 @@ def test_scenes_with_drawn_graphs_can_be_changed(graphs: Any) -> None:
         ),
     ],
 )
-def test_wrong_graphs_are_refused(given: dict[str, Any], words: str) -> None:
-    with pytest.raises((ValueError, TypeError), match=re.escape(words)) as error:
-        Scene(**{"oscillator": "harmonic", "coupling": "spring", "topology": ring(10), **given})
+def test_wrong_graphs_are_refused(keywords: dict[str, Any], message: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=re.escape(message)) as error:
+        Scene(**{"oscillator": "harmonic", "coupling": "spring", "topology": ring(10), **keywords})
     assert "\n" not in str(error.value)
 
 
@@ -392,7 +394,7 @@ CHAIN = Scene("rossler", "x->x", chain(3))
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("keywords", "message"),
     [
         ({"parameters": {"sigma": [1, 2, 3]}}, "parameter 'sigma' on chain(3): found 3 values for 4 links; expected 2 values, one for each edge, or one for"),
         ({"parameters": {"sigma": iter(range(9))}}, "found more than 4 values for 4 links"),
@@ -419,9 +421,9 @@ CHAIN = Scene("rossler", "x->x", chain(3))
         ({"oscillator": "mass", "coupling": "fput", "realisations": 2, "draws": {"W": normal(0, 1)}}, "tells the two ends"),
     ],
 )  # fmt: skip
-def test_wrong_numbers_are_refused(given: dict[str, Any], words: str) -> None:
-    with pytest.raises((ValueError, TypeError), match=re.escape(words)) as error:
-        CHAIN.replace(**given)
+def test_wrong_numbers_are_refused(keywords: dict[str, Any], message: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=re.escape(message)) as error:
+        CHAIN.replace(**keywords)
     assert "\n" not in str(error.value)
 
 
@@ -441,8 +443,8 @@ def test_graphs_of_networkx_are_numbers_of_links() -> None:
     networkx = pytest.importorskip("networkx")
     graph = networkx.cycle_graph(4)
     networkx.set_edge_attributes(graph, {(0, 1): 5, (1, 2): 6, (2, 3): 7, (0, 3): 8}, "weight")
-    found = Scene("harmonic", "spring", ring(4), parameters={"sigma": graph}).parameters
-    assert found == {"sigma_1_2": 5, "sigma_2_3": 6, "sigma_3_4": 7, "sigma_1_4": 8}
+    parameters = Scene("harmonic", "spring", ring(4), parameters={"sigma": graph}).parameters
+    assert parameters == {"sigma_1_2": 5, "sigma_2_3": 6, "sigma_3_4": 7, "sigma_1_4": 8}
     with pytest.raises(TypeError, match=r"mu_s: found .*Graph.*; expected a number"):
         Scene(topology=ring(4), parameters={"mu_s": graph})
 
@@ -461,13 +463,13 @@ def test_a_scene_with_drawn_graphs_is_changed() -> None:
 
 
 @pytest.mark.parametrize(
-    "given",
+    "keywords",
     [{"parameters": {"K_1_2": 3}}, {"axes": {"K_1_2": [1.0]}}, {"draws": {"K_1_2": normal(0, 1)}, "realisations": 1}],
 )
-def test_a_name_of_a_node_and_of_a_link_is_refused(given: dict[str, Any]) -> None:
+def test_a_name_of_a_node_and_of_a_link_is_refused(keywords: dict[str, Any]) -> None:
     node, link = Field({"x": "-K_1*x"}, parameters={"K_1": 1}), Rates({"x": "K*W*(x_j - x_i)"}, {"K": 0.1})
     with pytest.raises(ValueError, match="found 'K_1' of a node and 'K' of a link by this name"):
-        Scene(node, link, chain(3), **given)
+        Scene(node, link, chain(3), **keywords)
 
 
 def test_weights_of_layers_are_not_drawn() -> None:
@@ -476,7 +478,7 @@ def test_weights_of_layers_are_not_drawn() -> None:
         Scene("harmonic", links=layers, realisations=2, draws={"W": normal(0, 1)})
 
 
-@pytest.mark.parametrize("given", [{"parameters": {"sigma": [0.1, 0.2]}}, {"axes": {"W_1_2": [1.0]}}])
+@pytest.mark.parametrize("keywords", [{"parameters": {"sigma": [0.1, 0.2]}}, {"axes": {"W_1_2": [1.0]}}])
 @pytest.mark.parametrize(
     ("function", "more"),
     [
@@ -485,11 +487,11 @@ def test_weights_of_layers_are_not_drawn() -> None:
     ],
 )  # fmt: skip
 def test_stability_refuses_links_that_differ(
-    function: Callable[..., Any], more: dict[str, Any], given: dict[str, Any]
+    function: Callable[..., Any], more: dict[str, Any], keywords: dict[str, Any]
 ) -> None:
     """Modes of the graph are none of the network if its links differ in more than their exact weights."""
     with pytest.raises(ValueError, match=r"links that differ in (sigma|W); expected") as error:
-        function(CHAIN.replace(**given), show_progress=False, **more)
+        function(CHAIN.replace(**keywords), show_progress=False, **more)
     assert "\n" not in str(error.value)
 
 
@@ -508,7 +510,7 @@ def test_modes_of_one_strength_refuse_links_that_differ(function: Callable[..., 
 def test_lyapunov_exponents_take_them() -> None:
     """Two phases with lags of their own: the exponents of an equilibrium that rotates are 0 and -K (cos a + cos b)."""
     scene = Scene(PHASE, LAGGING, chain(2), parameters={"lag": [0.3, -0.2], "K": 0.4}, rtol=1e-9, window=50)
-    found = lyapunov_spectrum(scene, show_progress=False)
+    result = lyapunov_spectrum(scene, show_progress=False)
     # the gap g between them obeys g' = K (sin(0.2 - g) - sin(g - 0.3)), which rests at g = 0.25
-    assert found.exponent[0] == pytest.approx(0.0, abs=1e-6)
-    assert found.exponent[1] == pytest.approx(-0.8 * np.cos(0.05), abs=1e-6)
+    assert result.exponent[0] == pytest.approx(0.0, abs=1e-6)
+    assert result.exponent[1] == pytest.approx(-0.8 * np.cos(0.05), abs=1e-6)

@@ -94,8 +94,8 @@ def bodies(n: int) -> tuple[Scene, Rhs]:
         return np.concatenate([u, v, (mass * dx / cube).sum(1), (mass * dy / cube).sum(1)])
 
     initial = {name: list(values) for name, values in start.items()}
-    given = {"oscillator": BODY, "coupling": gravity, "topology": complete(n), "initial": initial}
-    return Scene(**given, parameters={"m": list(mass)}), rhs
+    settings = {"oscillator": BODY, "coupling": gravity, "topology": complete(n), "initial": initial}
+    return Scene(**settings, parameters={"m": list(mass)}), rhs
 
 
 @cache
@@ -129,8 +129,8 @@ LONG = pytest.mark.long
 )
 def test_links_against_dop853(make: Callable[[int], tuple[Scene, Rhs]], n: int, integrator: str) -> None:
     scene, end = case(make, n)
-    found = run(scene.replace(integrator=integrator)).states()
-    assert np.abs(found - end).max() < 2e-11 * np.abs(end).max()
+    states = run(scene.replace(integrator=integrator)).states()
+    assert np.abs(states - end).max() < 2e-11 * np.abs(end).max()
 
 
 @pytest.mark.parametrize("n", [3, pytest.param(9, marks=LONG)])
@@ -140,10 +140,10 @@ def test_time_in_links_costs_a_rosenbrock_method_no_steps(n: int) -> None:
     clock = Oscillator("clocked", ROTOR.parameters, FieldModel(("theta", "s"), (P, sp.S.One)))
     i, j, w = ends(clock)
     pumped = (1 + 0.5 * sp.cos(OMEGA * i.s)) * K * w * sp.sin(j.theta - i.theta - LAG)
-    given = {"oscillator": clock, "coupling": Rates({i.theta: pumped}, {K: 1.3, LAG: 0.2, OMEGA: 2})}
+    settings = {"oscillator": clock, "coupling": Rates({i.theta: pumped}, {K: 1.3, LAG: 0.2, OMEGA: 2})}
     start = {"theta": scene.initial["theta"], "s": 0.0}
-    told = scene.replace(**given, initial=start, parameters={"p": list(np.linspace(-0.5, 0.5, n))})
-    steps = [int(run(made.replace(integrator="rodas5p", rtol=1e-9)).data.steps) for made in (scene, told)]
+    changed = scene.replace(**settings, initial=start, parameters={"p": list(np.linspace(-0.5, 0.5, n))})
+    steps = [int(run(made.replace(integrator="rodas5p", rtol=1e-9)).data.steps) for made in (scene, changed)]
     assert abs(steps[0] - steps[1]) <= 1
 
 

@@ -38,8 +38,8 @@ def test_sections_near_an_extremum_have_all_their_points(integrator: str, width:
 @pytest.mark.parametrize(("integrator", "width"), METHODS)
 def test_a_stop_near_an_extremum_ends_its_cell_the_first_time(integrator: str, width: int) -> None:
     circle = CIRCLE.replace(integrator=integrator, sections=NEARBY, stop=x_1 - NEAR)
-    found = sc.run(circle, show_progress=False, width=width)
-    np.testing.assert_allclose(found.states(), [NEAR, math.sqrt(1 - NEAR**2)], rtol=0, atol=1e-9)
+    result = sc.run(circle, show_progress=False, width=width)
+    np.testing.assert_allclose(result.states(), [NEAR, math.sqrt(1 - NEAR**2)], rtol=0, atol=1e-9)
 
 
 PASSAGES = {
@@ -74,8 +74,8 @@ def test_no_passage_is_missed_inside_a_step(integrator: str, width: int) -> None
 @pytest.mark.parametrize("name", ["half", "kink", "touch"])
 def test_a_stop_is_the_first_passage(integrator: str, width: int, name: str) -> None:
     circle = CIRCLE.replace(integrator=integrator, stop=PASSAGES[name])
-    found = sc.run(circle, show_progress=False, width=width)
-    assert float(found.end_time) == pytest.approx(passages(PASSAGES[name], 5)[0], abs=2e-6)
+    result = sc.run(circle, show_progress=False, width=width)
+    assert float(result.end_time) == pytest.approx(passages(PASSAGES[name], 5)[0], abs=2e-6)
 
 
 @pytest.mark.parametrize(("integrator", "width"), METHODS)
@@ -123,10 +123,10 @@ def test_a_layer_that_is_saturated_now_is_not_stepped_over(steepness: int) -> No
         node, initial={"x": 0.5, "v": 0.0}, transient=0, window=20, time_unit="time", record=(), rtol=1e-9,
         integrator="taylor", parameters={"s": steepness},
     )  # fmt: skip
-    found = sc.run(scene, show_progress=False).states()
+    states = sc.run(scene, show_progress=False).states()
 
     def rates(t: float, state: np.ndarray) -> list[float]:
         return [state[1], -state[0] - 0.3 * math.tanh(steepness * state[1]) - 0.1 * state[1] + math.cos(t)]
 
     expected = solve_ivp(rates, (0, 20), [0.5, 0.0], "DOP853", rtol=1e-12, atol=1e-13, max_step=0.01).y[:, -1]
-    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-7)
+    np.testing.assert_allclose(states, expected, rtol=0, atol=2e-7)

@@ -29,12 +29,12 @@ def mean_field(n: int) -> sc.Topology:
 
 def scene(n: int, coupling: object = LAGGING, **changes: object) -> sc.Scene:
     rng = np.random.default_rng(1)
-    given = {
+    settings = {
         "parameters": {"omega": rng.normal(size=n), "K": 1.5},
         "initial": {"theta": rng.uniform(0.0, 6.0, n)},
         "transient": 0, "window": 2, "time_unit": "time", "record": (), "rtol": 1e-10,
     }  # fmt: skip
-    return sc.Scene(PHASE, coupling, mean_field(n), **{**given, **changes})
+    return sc.Scene(PHASE, coupling, mean_field(n), **{**settings, **changes})
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "taylor"])
@@ -126,12 +126,12 @@ def test_equal_starts_of_many_are_stepped_one_by_one() -> None:
 def test_layers_beside_a_mean_field_keep_their_links() -> None:
     n = 12
     ring = sc.Rates({HERE.theta: sp.Symbol("c") * W * sp.sin(THERE.theta - HERE.theta) ** 3}, {"c": 0.4})
-    given = {"parameters": {"K": 1.5, "omega": np.linspace(-1, 1, n)}, "initial": {"theta": np.linspace(0, 5, n)}}
+    settings = {"parameters": {"K": 1.5, "omega": np.linspace(-1, 1, n)}, "initial": {"theta": np.linspace(0, 5, n)}}
     more = {"transient": 0, "window": 1, "time_unit": "time", "integrator": "taylor", "rtol": 1e-11, "record": ()}
-    both = sc.Scene(PHASE, links=[(LAGGING, mean_field(n)), (ring, sc.ring(n))], **given, **more)
+    both = sc.Scene(PHASE, links=[(LAGGING, mean_field(n)), (ring, sc.ring(n))], **settings, **more)
     assert (len(both.equations.fields), len(both.equations.listed)) == (1, 1)
     listed = sc.Topology("listed", n, tuple(AllPairs(n, mean_field(n).all_to_all)))
-    same = sc.Scene(PHASE, links=[(LAGGING, listed), (ring, sc.ring(n))], **given, **more)
+    same = sc.Scene(PHASE, links=[(LAGGING, listed), (ring, sc.ring(n))], **settings, **more)
     assert same.equations.fields == ()
     assert both.topology.link_count == n * (n - 1)
     np.testing.assert_allclose(sc.run(both).states("end"), sc.run(same).states("end"), atol=1e-10)

@@ -35,22 +35,22 @@ def integrals(scene: Scene, values: list[sp.Expr]) -> np.ndarray:
     rates = sp.lambdify([TIME, *symbols], equations.rhs(), "numpy", cse=True)
     own = sp.lambdify([TIME, *symbols], [e.xreplace({s: sp.Symbol(s.name, real=True) for s in e.free_symbols})
                                          for e in values], "numpy", cse=True)  # fmt: skip
-    numbers = [scene.parameters[name] for name in equations.parameters]
+    parameter_values = [scene.parameters[name] for name in equations.parameters]
     size = len(equations.state)
 
     def before(time, y):
-        return np.array(rates(time, *y, *numbers), float)
+        return np.array(rates(time, *y, *parameter_values), float)
 
     def inside(time, y):
-        return np.concatenate([before(time, y[:size]), np.array(own(time, *y[:size], *numbers), float)])
+        return np.concatenate([before(time, y[:size]), np.array(own(time, *y[:size], *parameter_values), float)])
 
     unit = scene.period if scene.time_unit == "period" else 1.0
     begin, finish = scene.transient * unit, (scene.transient + scene.window) * unit
     start = solve_ivp(before, (0.0, begin), scene.y0, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
-    whole = solve_ivp(
+    solution = solve_ivp(
         inside, (begin, finish), np.concatenate([start, np.zeros(len(values))]), "DOP853", rtol=1e-13, atol=1e-14
     )
-    return whole.y[size:, -1] / (finish - begin)
+    return solution.y[size:, -1] / (finish - begin)
 
 
 def names(component: str, n: int) -> list[sp.Symbol]:
@@ -94,10 +94,10 @@ def of_duffing(n: int) -> np.ndarray:
 )  # fmt: skip
 def test_means_are_the_integrals_that_scipy_finds(integrator: str, n: int) -> None:
     """Of a driven network, written out and in loops; the near kink of the spread needs panels that are halved."""
-    found = run(duffing(n, integrator=integrator), show_progress=False)
-    assert found.own.dims == ("node",)
-    assert found.node.values.tolist() == list(range(1, n + 1))
-    values = np.concatenate([[found.energy, found.power, found.spread], found.own])
+    result = run(duffing(n, integrator=integrator), show_progress=False)
+    assert result.own.dims == ("node",)
+    assert result.node.values.tolist() == list(range(1, n + 1))
+    values = np.concatenate([[result.energy, result.power, result.spread], result.own])
     np.testing.assert_allclose(values, of_duffing(n), rtol=0, atol=1e-10)
 
 
@@ -109,11 +109,11 @@ def test_kinks_are_found(integrator: str) -> None:
         time_unit="time", initial={"x": [1.0], "v": [0.0]},
         observe={"size": mean(abs(x)), "square": "mean(x**2)", "swing": variance(x), "top": maximum(v)},
     )  # fmt: skip
-    found = run(scene, show_progress=False)
-    assert float(found.data["size"][0]) == pytest.approx(2 / math.pi, abs=1e-8)
-    assert float(found.square[0]) == pytest.approx(0.5, abs=1e-10)
-    assert float(found.swing[0]) == pytest.approx(0.5, abs=1e-10)
-    assert float(found.top[0]) == pytest.approx(1.0, abs=1e-11)
+    result = run(scene, show_progress=False)
+    assert float(result.data["size"][0]) == pytest.approx(2 / math.pi, abs=1e-8)
+    assert float(result.square[0]) == pytest.approx(0.5, abs=1e-10)
+    assert float(result.swing[0]) == pytest.approx(0.5, abs=1e-10)
+    assert float(result.top[0]) == pytest.approx(1.0, abs=1e-11)
 
 
 @pytest.mark.parametrize("integrator", ["taylor", "dop853"])
@@ -128,9 +128,9 @@ def test_jumps_and_singular_places_are_integrated_or_said(integrator: str) -> No
         "harmonic", initial={"x": 1.0, "v": 0.0}, transient=0, window=last, time_unit="time", record=(), rtol=1e-10,
         integrator=integrator, observe={f"o{k}": text for k, text in enumerate(expected)},
     )  # fmt: skip
-    found = run(scene, show_progress=False)
+    result = run(scene, show_progress=False)
     for k, (text, value) in enumerate(expected.items()):
-        np.testing.assert_allclose(float(found.data[f"o{k}"].squeeze()), value, rtol=0, atol=1e-9, err_msg=text)
+        np.testing.assert_allclose(float(result.data[f"o{k}"].squeeze()), value, rtol=0, atol=1e-9, err_msg=text)
     loose = run(scene.replace(rtol=1e-6), show_progress=False)
     exact = math.gamma(0.25) / (math.gamma(0.75) * math.sqrt(math.pi))
     assert float(loose.o5.squeeze()) == pytest.approx(exact, rel=1e-4)
@@ -199,8 +199,8 @@ def test_short_pulses_of_a_phase_are_seen(text: str) -> None:
         Field({"a": "om"}, parameters={"om": 1.0}), initial={"a": 0.3}, transient=0, window=32 * math.pi,
         time_unit="time", record=(), observe={"pulse": f"mean({text})"},
     )  # fmt: skip
-    found = run(scene, show_progress=False)
-    assert float(found.pulse.squeeze()) == pytest.approx(PULSES[text], rel=1e-6)
+    result = run(scene, show_progress=False)
+    assert float(result.pulse.squeeze()) == pytest.approx(PULSES[text], rel=1e-6)
 
 
 @pytest.mark.parametrize("integrator", ["taylor", "rodas5p", pytest.param("dop853", marks=pytest.mark.long)])
@@ -217,10 +217,10 @@ def test_extremes_between_the_points_of_the_rule_are_found(integrator: str) -> N
         time_unit="time", initial={"x": [1.0, 1.0], "v": [0.0, 0.0]}, topology=chain(2),
         observe={name: words for name, (words, _) in closed.items()} | {"all": "maximum(nodes.sum(v))"},
     )  # fmt: skip
-    found = run(scene, show_progress=False)
+    result = run(scene, show_progress=False)
     for name, (_, value) in closed.items():
-        np.testing.assert_allclose(found.data[name], value, rtol=0, atol=1e-6 if name == "kink" else 2e-9)
-    assert float(found.data["all"]) == pytest.approx(2.0, abs=2e-9)
+        np.testing.assert_allclose(result.data[name], value, rtol=0, atol=1e-6 if name == "kink" else 2e-9)
+    assert float(result.data["all"]) == pytest.approx(2.0, abs=2e-9)
 
 
 ROTORS = Scene(
@@ -260,10 +260,10 @@ def test_order_parameter_and_frequencies_of_rotors(rotors: Result) -> None:
 def test_values_at_the_end(rotors: Result) -> None:
     state = [sp.Symbol(name, real=True) for name in (*ROTORS.equations.state, *ROTORS.equations.parameters)]
     field = sp.lambdify(state, ROTORS.equations.rhs()[10:], "numpy", cse=True)
-    numbers = [ROTORS.parameters[name] for name in ROTORS.equations.parameters[:-1]]
+    values = [ROTORS.parameters[name] for name in ROTORS.equations.parameters[:-1]]
     np.testing.assert_array_equal(rotors.last, rotors.states()[:, :10])
     for cell, sigma in enumerate((0.05, 0.1, 0.3)):
-        force = field(*rotors.states()[cell], *numbers, sigma)
+        force = field(*rotors.states()[cell], *values, sigma)
         np.testing.assert_allclose(rotors.force[cell], force, rtol=0, atol=1e-6)  # the slope of the dense output
 
 
@@ -273,10 +273,10 @@ def test_the_synchronisation_error_is_an_observable() -> None:
         topology=chain(2), integrator="rodas5p", rtol=1e-13, record=("sync_error",), parameters={"kappa": 50}, **NUMBERS,
         observe={"error": mean(nodes.sum(ERROR)), "worst": maximum(nodes.sum(ERROR)), "last": end(nodes.sum(ERROR))},
     )  # fmt: skip
-    found = run(scene, show_progress=False, width=1, sigma=[0.1, 0.2])
-    np.testing.assert_allclose(found.error, found.sync_error, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(found.worst, found.sync_error_max, rtol=1e-5)
-    np.testing.assert_allclose(found.data["last"], found.sync_error_end, rtol=1e-13)
+    result = run(scene, show_progress=False, width=1, sigma=[0.1, 0.2])
+    np.testing.assert_allclose(result.error, result.sync_error, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(result.worst, result.sync_error_max, rtol=1e-5)
+    np.testing.assert_allclose(result.data["last"], result.sync_error_end, rtol=1e-13)
 
 
 def test_observables_do_not_depend_on_lanes_workers_and_other_records(rotors: Result) -> None:
@@ -301,9 +301,9 @@ def test_a_resumed_run_keeps_what_was_observed(rotors: Result) -> None:
     data["status"][1] = Status.NOT_RUN
     data["frequency"][1] = np.nan
     data["r"][0] += 1.0
-    found = run(ROTORS, resume=Result(data, ROTORS), show_progress=False, width=4)
-    assert float(found.r[0]) == float(rotors.r[0]) + 1.0
-    np.testing.assert_array_equal(found.frequency, rotors.frequency)
+    result = run(ROTORS, resume=Result(data, ROTORS), show_progress=False, width=4)
+    assert float(result.r[0]) == float(rotors.r[0]) + 1.0
+    np.testing.assert_array_equal(result.frequency, rotors.frequency)
 
 
 @pytest.mark.parametrize(
@@ -321,12 +321,12 @@ def test_the_mean_speed_is_the_distance_over_the_time(contact: str, integrator: 
         parameters={"kappa": 1e3} if contact == "atan" else {}, initial={"x": [0.3, 0.5], "v": [0.0, 0.1]},
         observe={"speed": mean(v), "square": mean((x - nodes[1](x)) ** 2)},
     )  # fmt: skip
-    found = run(scene, show_progress=False, width=4, sigma=[0.1, 0.2])
+    result = run(scene, show_progress=False, width=4, sigma=[0.1, 0.2])
     span = 20.0 * scene.period
-    moved = found.states()[:, :2] - np.array(scene.y0[:2])
-    np.testing.assert_allclose(found.speed, moved / span, rtol=0, atol=2e-9)
-    assert (found.square.values[:, 0] == 0.0).all()
-    assert (found.square.values[:, 1] > 0.0).all()
+    moved = result.states()[:, :2] - np.array(scene.y0[:2])
+    np.testing.assert_allclose(result.speed, moved / span, rtol=0, atol=2e-9)
+    assert (result.square.values[:, 0] == 0.0).all()
+    assert (result.square.values[:, 1] > 0.0).all()
 
 
 def test_a_periodic_cell_leaves_out_no_cycle_of_the_window() -> None:
@@ -336,14 +336,14 @@ def test_a_periodic_cell_leaves_out_no_cycle_of_the_window() -> None:
         parameters={"kappa": 100.0}, observe={"speed": mean(v), "square": mean(x**2), "top": maximum(v)},
     )  # fmt: skip
     options = {"show_progress": False, "width": 1, "omega": [0.5, 2.0]}
-    found = run(scene, **options)
+    result = run(scene, **options)
     plain = run(scene, **options, reduce=False)
     early = run(scene.replace(transient=200.0, window=1.0), **options)
     assert (early.periods_skipped > 100).all()
-    assert (found.periods_skipped == 0).all()
+    assert (result.periods_skipped == 0).all()
     assert (plain.periods_skipped == 0).all()
     for name in scene.observe:
-        np.testing.assert_allclose(found.data[name], plain.data[name], rtol=1e-11, atol=1e-12)
+        np.testing.assert_allclose(result.data[name], plain.data[name], rtol=1e-11, atol=1e-12)
 
 
 def test_observed_parameters_and_equal_oscillators_are_kept() -> None:
@@ -356,9 +356,9 @@ def test_observed_parameters_and_equal_oscillators_are_kept() -> None:
     reduction = as_reduction(scene, True)
     assert {"u", "omega"} < set(reduction.equations.parameters)
     assert any("observed" in sentence for sentence in reduction.kept)
-    found = run(scene, show_progress=False, width=1)
-    np.testing.assert_allclose(found.force, found.speed * np.array([[0.5], [2.0]]), rtol=1e-9)
-    assert found.speed.shape == (2, 2)
+    result = run(scene, show_progress=False, width=1)
+    np.testing.assert_allclose(result.force, result.speed * np.array([[0.5], [2.0]]), rtol=1e-9)
+    assert result.speed.shape == (2, 2)
 
 
 def test_a_cell_that_ends_early_says_what_it_saw() -> None:

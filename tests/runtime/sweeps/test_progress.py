@@ -47,10 +47,10 @@ def test_rate_and_time_left_count_this_sitting_alone():
 
 
 @pytest.mark.parametrize(
-    ("seconds", "words"), [(12.3, "12 s"), (600, "10 min"), (9000, "2.5 h"), (float("inf"), "unknown time")]
+    ("seconds", "text"), [(12.3, "12 s"), (600, "10 min"), (9000, "2.5 h"), (float("inf"), "unknown time")]
 )
-def test_durations(seconds, words):
-    assert duration(seconds) == words
+def test_durations(seconds, text):
+    assert duration(seconds) == text
 
 
 def test_the_hook_hears_of_every_block_and_of_kept_cells():

@@ -33,34 +33,34 @@ DRAWS = {
 
 def test_cells_are_those_of_the_drawn_numbers() -> None:
     """Each realisation on a grid is the cell that a scene with its numbers runs."""
-    found = run(FEW, show_progress=False, width=4, sigma=[0.1, 0.4], realisations=6, draws=DRAWS, rng=7)
-    assert found.frequency.dims == ("sigma", "realisation", "node")
-    assert found.scene.shape == (2, 6)
-    numbers = {name: found.data[name].values for name in ("delta", *(f"power_{i}" for i in (1, 2)))}
-    assert numbers["delta"].tolist() == DRAWS["delta"]
+    result = run(FEW, show_progress=False, width=4, sigma=[0.1, 0.4], realisations=6, draws=DRAWS, rng=7)
+    assert result.frequency.dims == ("sigma", "realisation", "node")
+    assert result.scene.shape == (2, 6)
+    values = {name: result.data[name].values for name in ("delta", *(f"power_{i}" for i in (1, 2)))}
+    assert values["delta"].tolist() == DRAWS["delta"]
     for k in (0, 5):
-        start = {c: [float(found.data[f"{c}_{i}"][k]) for i in (1, 2)] for c in ("x", "v")}
-        own = {
-            "power": [float(numbers[f"power_{i}"][k]) for i in (1, 2)],
+        start = {c: [float(result.data[f"{c}_{i}"][k]) for i in (1, 2)] for c in ("x", "v")}
+        parameter_values = {
+            "power": [float(values[f"power_{i}"][k]) for i in (1, 2)],
             "delta": DRAWS["delta"][k],
             "sigma": 0.4,
         }
-        one = run(FEW.replace(parameters=own, initial=start), show_progress=False, width=4)
-        np.testing.assert_array_equal(found.end.values[1, k], one.end.values)
-        np.testing.assert_array_equal(found.frequency.values[1, k], one.frequency.values)
-        assert float(found.sync_error[1, k]) == float(one.sync_error)
+        one = run(FEW.replace(parameters=parameter_values, initial=start), show_progress=False, width=4)
+        np.testing.assert_array_equal(result.end.values[1, k], one.end.values)
+        np.testing.assert_array_equal(result.frequency.values[1, k], one.frequency.values)
+        assert float(result.sync_error[1, k]) == float(one.sync_error)
 
 
 def test_what_is_drawn_depends_on_the_seed_and_the_name_alone() -> None:
     """Neither workers, lanes and blocks nor other draws change it; another seed does."""
     axes = {"realisations": 40, "rng": 3, "show_progress": False}
-    found = run(FEW, draws={"power": normal(0, 1), "x_2": uniform(0, 1)}, width=4, **axes)
-    assert found.data.power_1.dims == ("realisation",)
+    result = run(FEW, draws={"power": normal(0, 1), "x_2": uniform(0, 1)}, width=4, **axes)
+    assert result.data.power_1.dims == ("realisation",)
     other = run(FEW, draws={"x_2": uniform(0, 1), "power": normal(0, 1)}, width=1, workers=1, **axes)
     for name in ("end", "frequency", "sync_error", "power_1", "x_2"):
-        np.testing.assert_array_equal(other.data[name], found.data[name])
+        np.testing.assert_array_equal(other.data[name], result.data[name])
     alone = FEW.replace(realisations=40, draws={"power_2": normal(0, 1)}, rng=3)
-    assert {axis.name: axis.values for axis in alone.drawn}["power_2"] == tuple(found.data.power_2.values.tolist())
+    assert {axis.name: axis.values for axis in alone.drawn}["power_2"] == tuple(result.data.power_2.values.tolist())
     assert alone.replace(rng=4).drawn != alone.drawn
     assert [axis.name for axis in alone.drawn] == ["power_2"]
 
@@ -89,11 +89,11 @@ def test_numbers_have_their_distribution() -> None:
 def test_files_keep_what_was_drawn(tmp_path: Path) -> None:
     scene = FEW.replace(realisations=3, draws={"power": "normal(0, 1/2)", "sigma": [0.1, 0.2, 0.3]}, rng=1)
     assert Scene.from_dict(scene.as_dict()) == scene
-    found = run(scene, show_progress=False, width=4)
-    found.save(tmp_path / "whole.nc")
+    result = run(scene, show_progress=False, width=4)
+    result.save(tmp_path / "whole.nc")
     opened = open_result(tmp_path / "whole.nc")
     assert opened.scene == scene
-    np.testing.assert_array_equal(opened.data.power_2, found.data.power_2)
+    np.testing.assert_array_equal(opened.data.power_2, result.data.power_2)
     assert stream(scene, tmp_path / "streamed.nc", show_progress=False, width=4).success
     assert (tmp_path / "streamed.nc").read_bytes() == (tmp_path / "whole.nc").read_bytes()
 
@@ -101,14 +101,14 @@ def test_files_keep_what_was_drawn(tmp_path: Path) -> None:
 def test_one_realisation_of_a_zipped_sweep() -> None:
     """Zipped axes are one dimension, realisations another."""
     scene = FEW.replace(axes={"sigma": [0.1, 0.2], "x_1": [0.5, 0.6]}, zipped=True)
-    found = run(scene, show_progress=False, width=1, realisations=3, draws={"x_2": [0.1, 0.2, 0.3]})
-    assert found.middle.dims == ("cell", "realisation")
+    result = run(scene, show_progress=False, width=1, realisations=3, draws={"x_2": [0.1, 0.2, 0.3]})
+    assert result.middle.dims == ("cell", "realisation")
     one = run(FEW.replace(sigma=0.2), show_progress=False, width=1, x_1=0.6, x_2=0.3)
-    assert float(found.middle[1, 2]) == float(one.middle)
+    assert float(result.middle[1, 2]) == float(one.middle)
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("keywords", "message"),
     [
         ({"realisations": 3}, "found 3 realisations and 0 names to draw"),
         ({"draws": {"x": normal(0, 1)}}, "found 0 realisations and 1 names"),
@@ -126,10 +126,10 @@ def test_one_realisation_of_a_zipped_sweep() -> None:
         ({"realisations": 10**6, "draws": {"sigma": normal(1, 0.01)}, "axes": {"x_1": range(2000)}}, "cells; expected"),
     ],
 )  # fmt: skip
-def test_wrong_draws_are_refused(given: dict[str, object], words: str) -> None:
+def test_wrong_draws_are_refused(keywords: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=r"[a-z]") as error:
-        SCENE.replace(**given)
-    assert words in str(error.value)
+        SCENE.replace(**keywords)
+    assert message in str(error.value)
     assert "\n" not in str(error.value)
 
 
@@ -151,9 +151,9 @@ def test_certified_runs_take_no_realisations() -> None:
 
 
 def test_graphs_without_any_link_are_realisations_too() -> None:
-    given = {"transient": 0, "window": 1, "record": (), "integrator": "dop853"}
-    scene = Scene("harmonic", "spring", ring(3), **given)
-    found = run(scene, realisations=2, draws={"topology": "erdos_renyi(3, p=0)"}, show_progress=False, width=1)
-    alone = run(Scene("harmonic", topology=chain(1), **given), show_progress=False)
-    assert found.end.shape[0] == 2
-    np.testing.assert_allclose(found.end.values[:, 0, 0], alone.end.values[0, 0], rtol=0, atol=1e-8)
+    settings = {"transient": 0, "window": 1, "record": (), "integrator": "dop853"}
+    scene = Scene("harmonic", "spring", ring(3), **settings)
+    result = run(scene, realisations=2, draws={"topology": "erdos_renyi(3, p=0)"}, show_progress=False, width=1)
+    alone = run(Scene("harmonic", topology=chain(1), **settings), show_progress=False)
+    assert result.end.shape[0] == 2
+    np.testing.assert_allclose(result.end.values[:, 0, 0], alone.end.values[0, 0], rtol=0, atol=1e-8)

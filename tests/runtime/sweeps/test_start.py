@@ -65,8 +65,8 @@ def test_modes_of_contacts_follow_from_the_other_states() -> None:
     scene = Scene(topology=topology("chain", 2), contact="set-valued", transient=5.0, window=5.0)
     first = ran(scene)
     again = ran(scene.replace(transient=0.0, window=1.0), start=first)
-    whole = ran(scene.replace(transient=5.0, window=6.0))
-    np.testing.assert_allclose(again.end, whole.end, rtol=0, atol=1e-7)
+    full = ran(scene.replace(transient=5.0, window=6.0))
+    np.testing.assert_allclose(again.end, full.end, rtol=0, atol=1e-7)
 
 
 def test_kinds_of_nodes_have_their_own_components() -> None:
@@ -78,10 +78,10 @@ def test_kinds_of_nodes_have_their_own_components() -> None:
 
 
 def test_states_in_a_row_and_tables_are_starts(first: Result) -> None:
-    whole = ran(DRIVEN, start=first)
-    for start in (first.states(), first.states().tolist(), whole.scene.initial):
+    full = ran(DRIVEN, start=first)
+    for start in (first.states(), first.states().tolist(), full.scene.initial):
         again = ran(DRIVEN, start=start)
-        np.testing.assert_array_equal(again.end, whole.end)
+        np.testing.assert_array_equal(again.end, full.end)
         assert again.data.attrs["start_time"] == 0.0
 
 
@@ -135,7 +135,7 @@ def test_modes_of_contacts_of_each_cell_follow_from_the_other_states() -> None:
 
 
 @pytest.mark.parametrize(
-    ("more", "words"),
+    ("more", "message"),
     [
         ({"sigma": [0.05, 0.2]}, r"found cells of sigma = 0\.05, 0\.1; expected those of the sweep, 0\.05, 0\.2"),
         ({"delta": [0.1, 0.2]}, r"several cells, along sigma \(2\)"),
@@ -143,9 +143,9 @@ def test_modes_of_contacts_of_each_cell_follow_from_the_other_states() -> None:
         ({"sigma": [0.05, 0.1], "reduce": reduce_scene(DRIVEN)}, "a Reduction beside a start of several cells"),
     ],
 )
-def test_cells_of_another_sweep_are_refused(more: dict[str, Any], words: str) -> None:
+def test_cells_of_another_sweep_are_refused(more: dict[str, Any], message: str) -> None:
     first = ran(DRIVEN, sigma=[0.05, 0.1])
-    with pytest.raises(ValueError, match=words) as caught:
+    with pytest.raises(ValueError, match=message) as caught:
         ran(DRIVEN, start=first, **more)
     assert "\n" not in str(caught.value)
     with pytest.raises(ValueError, match="set continuation = 'none'"):
@@ -153,7 +153,7 @@ def test_cells_of_another_sweep_are_refused(more: dict[str, Any], words: str) ->
 
 
 @pytest.mark.parametrize(
-    ("start", "error", "words"),
+    ("start", "error", "message"),
     [
         (lambda: ran(DRIVEN, sigma=[0.05, 0.1]), ValueError, r"several cells, along sigma \(2\); .*\.isel\(sigma=-1\)"),
         (lambda: ran(FREE), ValueError, "nodes 1, 2; expected 1, 2, 3"),
@@ -170,8 +170,8 @@ def test_cells_of_another_sweep_are_refused(more: dict[str, Any], words: str) ->
         (lambda: xr.DataArray([1.0, 2.0]), ValueError, r"along dim_0 \(2\)"),
     ],
 )
-def test_what_is_refused(start: Any, error: type[Exception], words: str) -> None:
-    with pytest.raises(error, match=words) as caught:
+def test_what_is_refused(start: Any, error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message) as caught:
         ran(DRIVEN, start=start())
     assert "\n" not in str(caught.value)
 

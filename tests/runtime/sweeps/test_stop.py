@@ -31,20 +31,20 @@ def test_the_end_is_where_the_function_is_zero(integrator: str, width: int) -> N
     )  # fmt: skip
     last = 2 * np.pi / 3
     near = 1e-9 if integrator == "cash_karp" else 1e-11  # its dense output is of order 3
-    found = run(scene, show_progress=False, width=width)
-    assert int(found.status) == Status.STOPPED
-    assert found.message == "1 cell: met the stop condition of the scene before the end of the window"
-    assert float(found.end_time) == pytest.approx(last, abs=near)
-    np.testing.assert_allclose(found.states(), [-0.5, -np.sin(last)], rtol=0, atol=near)
-    assert float(found.place[0]) == pytest.approx(np.sin(last) / last, abs=near)
-    assert float(found.square[0]) == pytest.approx((last / 2 - np.sin(2 * last) / 4) / last, abs=near)
-    assert float(found.data["speed"][0]) == float(found.states()[1])
-    assert float(found.slope[0]) == pytest.approx(float(found.states()[1]), abs=1e-6)
-    kept = np.isfinite(found.states("trajectory")[:, 0])
+    result = run(scene, show_progress=False, width=width)
+    assert int(result.status) == Status.STOPPED
+    assert result.message == "1 cell: met the stop condition of the scene before the end of the window"
+    assert float(result.end_time) == pytest.approx(last, abs=near)
+    np.testing.assert_allclose(result.states(), [-0.5, -np.sin(last)], rtol=0, atol=near)
+    assert float(result.place[0]) == pytest.approx(np.sin(last) / last, abs=near)
+    assert float(result.square[0]) == pytest.approx((last / 2 - np.sin(2 * last) / 4) / last, abs=near)
+    assert float(result.data["speed"][0]) == float(result.states()[1])
+    assert float(result.slope[0]) == pytest.approx(float(result.states()[1]), abs=1e-6)
+    kept = np.isfinite(result.states("trajectory")[:, 0])
     assert kept.sum() == 21  # samples 0.1 apart: the last one is at 2.0
-    times = found.time.values[kept]
-    np.testing.assert_allclose(found.states("trajectory")[kept, 0], np.cos(times), rtol=0, atol=1e-8)
-    assert int(found.turn_count) == 0  # cos t = -sin t at 3 pi/4, which is later
+    times = result.time.values[kept]
+    np.testing.assert_allclose(result.states("trajectory")[kept, 0], np.cos(times), rtol=0, atol=1e-8)
+    assert int(result.turn_count) == 0  # cos t = -sin t at 3 pi/4, which is later
 
 
 def test_cells_stop_each_for_itself_in_any_lanes() -> None:
@@ -53,22 +53,22 @@ def test_cells_stop_each_for_itself_in_any_lanes() -> None:
         oscillator="harmonic", integrator="dop853", rtol=1e-11, record=("trajectory",), samples=2, sections=TURN,
         transient=1.0, window=5.0, time_unit="time", stop="x_1 - 1/2", observe={"speed": mean(v)}, axes={"x_1": [0.4, 0.6, 1.0, -2.0]}, initial={"v": [0.0]},
     )  # fmt: skip
-    found = run(scene, show_progress=False, width=4)
+    result = run(scene, show_progress=False, width=4)
     stops = [np.nan, np.arccos(0.5 / 0.6), np.arccos(0.5), np.arccos(-0.25)]
-    assert found.status.values.tolist() == [Status.FINISHED, *[Status.STOPPED] * 3]
-    np.testing.assert_allclose(found.end_time[1:], stops[1:], rtol=0, atol=1e-9)
-    np.testing.assert_allclose(found.end_time[0], 6.0)
-    assert np.isnan(found.speed.values[1, 0])
-    assert np.isfinite(found.speed.values[[0, 2, 3], 0]).all()
-    assert not found.success
-    assert int(found.turn_count[0]) >= 1
+    assert result.status.values.tolist() == [Status.FINISHED, *[Status.STOPPED] * 3]
+    np.testing.assert_allclose(result.end_time[1:], stops[1:], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(result.end_time[0], 6.0)
+    assert np.isnan(result.speed.values[1, 0])
+    assert np.isfinite(result.speed.values[[0, 2, 3], 0]).all()
+    assert not result.success
+    assert int(result.turn_count[0]) >= 1
     for k, start in enumerate(scene.axes[0].values):
         alone = run(scene.replace(axes={}), show_progress=False, width=4, x_1=start)
         for name in ("end_time", "speed", "turn_count"):
-            np.testing.assert_array_equal(alone.data[name], found.data[name][k])
+            np.testing.assert_array_equal(alone.data[name], result.data[name][k])
         count = int(alone.turn_count)
         for name in ("turn", "turn_time"):
-            np.testing.assert_array_equal(alone.data[name][:count], found.data[name][k, :count])
+            np.testing.assert_array_equal(alone.data[name][:count], result.data[name][k, :count])
 
 
 @pytest.mark.parametrize(
@@ -96,17 +96,17 @@ def test_the_synchronisation_error_is_that_of_the_time_before_the_stop(tmp_path:
         observe={"error": mean(nodes.sum(abs(x - x_1) ** 2) ** sp.Rational(1, 2))},
         axes={"sigma": [0.0]},
     )  # fmt: skip
-    found = run(scene, show_progress=False)
-    assert float(found.end_time[0]) == pytest.approx(np.pi / 2, abs=1e-10)
+    result = run(scene, show_progress=False)
+    assert float(result.end_time[0]) == pytest.approx(np.pi / 2, abs=1e-10)
     gaps = 0.1 * np.arange(n)
-    assert float(found.error[0]) == pytest.approx(np.sqrt((gaps**2).sum()) * 2 / np.pi, abs=1e-9)
-    assert float(found.sync_error[0]) == pytest.approx(gaps.sum(), abs=1e-9)  # x and v turn on a circle
-    found.save(tmp_path / "stopped.nc")
+    assert float(result.error[0]) == pytest.approx(np.sqrt((gaps**2).sum()) * 2 / np.pi, abs=1e-9)
+    assert float(result.sync_error[0]) == pytest.approx(gaps.sum(), abs=1e-9)  # x and v turn on a circle
+    result.save(tmp_path / "stopped.nc")
     assert open_result(tmp_path / "stopped.nc").scene == scene
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("keywords", "message"),
     [
         ({"stop": "x"}, "stop: found x, which each node has"),
         ({"stop": "y_1"}, "stop: unknown name 'y_1'"),
@@ -115,9 +115,9 @@ def test_the_synchronisation_error_is_that_of_the_time_before_the_stop(tmp_path:
         ({"stop": 1}, "stop: found the constant 1"),
     ],
 )
-def test_wrong_stops_are_refused(given: dict[str, object], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        Scene(topology=ring(3), **given)
+def test_wrong_stops_are_refused(keywords: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Scene(topology=ring(3), **keywords)
 
 
 def test_scene_files_hold_the_stop() -> None:

@@ -45,11 +45,11 @@ def _kernel():
 def files(tmp_path_factory):
     """Bytes of the finished file of each scene."""
     folder = tmp_path_factory.mktemp("whole")
-    found = {}
+    collected = {}
     for name, scene in (("map", MAP), ("up", UP)):
         run(scene, workers=1, show_progress=False).save(folder / f"{name}.nc")
-        found[scene] = (folder / f"{name}.nc").read_bytes()
-    return found
+        collected[scene] = (folder / f"{name}.nc").read_bytes()
+    return collected
 
 
 @pytest.fixture
@@ -138,52 +138,52 @@ ABOUT = {"blocks": 4, "dimension": 2, "samples": 1, "observed": 0, "kept": 2}
 def store(tmp_path):
     path = tmp_path / "x.partial"
     BlockLog.create(path, ABOUT)
-    made = BlockLog.open(path, writing=True)
+    log = BlockLog.open(path, writing=True)
     for number in range(3):
-        made.append(number, block(5, number + 0.5))
-    made.close()
+        log.append(number, block(5, number + 0.5))
+    log.close()
     return path
 
 
 def test_blocks_come_back_as_they_went(store):
-    found = BlockLog.open(store)
-    assert found.done.tolist() == [True, True, True, False]
-    assert (found.counts[1], found.most) == (15, 3)
+    log = BlockLog.open(store)
+    assert log.done.tolist() == [True, True, True, False]
+    assert (log.counts[1], log.most) == (15, 3)
     for number in range(3):
-        for a, b in zip(found.read(number).arrays(), block(5, number + 0.5).arrays(), strict=True):
+        for a, b in zip(log.read(number).arrays(), block(5, number + 0.5).arrays(), strict=True):
             np.testing.assert_array_equal(a, b)
 
 
 def test_a_torn_end_loses_the_last_block_wherever_it_is_torn(store):
-    whole = store.read_bytes()
-    size = (len(whole) - store.read_bytes().index(b"blk\0")) // 3
+    contents = store.read_bytes()
+    size = (len(contents) - store.read_bytes().index(b"blk\0")) // 3
     for missing in (1, 7, size - 20, size - 1):
-        store.write_bytes(whole[:-missing])
-        found = BlockLog.open(store, writing=True)
-        assert found.done.tolist() == [True, True, False, False]
-        found.append(2, block(5, 2.5))
-        found.close()
-        assert store.read_bytes() == whole
+        store.write_bytes(contents[:-missing])
+        log = BlockLog.open(store, writing=True)
+        assert log.done.tolist() == [True, True, False, False]
+        log.append(2, block(5, 2.5))
+        log.close()
+        assert store.read_bytes() == contents
 
 
 def test_a_damaged_block_is_none(store):
-    whole = bytearray(store.read_bytes())
-    whole[whole.index(b"blk\0") + 400] ^= 1
-    store.write_bytes(whole)
-    found = BlockLog.open(store, writing=True)
-    assert found.done.tolist() == [False, True, True, False]
-    assert found.counts[1] == 10
-    found.append(0, block(5, 0.5))
-    found.close()
+    contents = bytearray(store.read_bytes())
+    contents[contents.index(b"blk\0") + 400] ^= 1
+    store.write_bytes(contents)
+    log = BlockLog.open(store, writing=True)
+    assert log.done.tolist() == [False, True, True, False]
+    assert log.counts[1] == 10
+    log.append(0, block(5, 0.5))
+    log.close()
     assert BlockLog.open(store).done.tolist() == [True, True, True, False]
 
 
 def test_each_copy_of_the_first_line_stands_in_for_the_other(store):
-    whole = store.read_bytes()
+    contents = store.read_bytes()
     for place in (0, 4096):
         for damage in (lambda old: b"\0" * len(old), lambda old: bytes([old[0] ^ 1]) + old[1:]):
             for begin in (place, place + 17, place + 40):
-                store.write_bytes(whole[:begin] + damage(whole[begin : begin + 20]) + whole[begin + 20 :])
+                store.write_bytes(contents[:begin] + damage(contents[begin : begin + 20]) + contents[begin + 20 :])
                 assert open_result_or_refusal(store) != "no store"
                 assert BlockLog.open(store).done.tolist() == [True, True, True, False]
                 assert BlockLog.describe(store) == ABOUT
@@ -201,11 +201,11 @@ def open_result_or_refusal(path: Path) -> str:
 
 
 def test_a_damaged_first_line_is_an_error_that_says_so(store):
-    whole = bytearray(store.read_bytes())
+    contents = bytearray(store.read_bytes())
     for place in (40, 4096 + 40):
-        whole[place] ^= 1
+        contents[place] ^= 1
     for content, words in (
-        (bytes(whole), "both copies of its first line are damaged"),
+        (bytes(contents), "both copies of its first line are damaged"),
         (b"something else", "no unfinished run"),
         (b"", "is empty"),
         (b"synchain blocks 1\n" + bytes(200), "another version"),
@@ -217,15 +217,15 @@ def test_a_damaged_first_line_is_an_error_that_says_so(store):
 
 
 def test_a_bit_in_the_head_of_a_record_costs_that_record_alone(store):
-    whole = store.read_bytes()
-    first = whole.index(b"blk\0")
+    contents = store.read_bytes()
+    first = contents.index(b"blk\0")
     for bit in range(8 * HEAD.size):
-        damaged = bytearray(whole)
+        damaged = bytearray(contents)
         damaged[first + bit // 8] ^= 1 << bit % 8
         store.write_bytes(damaged)
-        found = BlockLog.open(store, writing=True)
-        assert found.done.tolist() == [False, True, True, False], bit
-        found.close()
+        log = BlockLog.open(store, writing=True)
+        assert log.done.tolist() == [False, True, True, False], bit
+        log.close()
         assert store.read_bytes() == damaged
 
 
@@ -237,15 +237,15 @@ def test_a_page_of_zeros_costs_the_records_that_lie_on_it(tmp_path):
         made.append(number, block(5, number + 0.5))
     places = made.places.copy()
     made.close()
-    whole = path.read_bytes()
-    ends = np.append(places[1:], len(whole))
-    for page in range(0, len(whole), 4096):
-        path.write_bytes(whole[:page] + bytes(len(whole[page : page + 4096])) + whole[page + 4096 :])
-        found = BlockLog.open(path, writing=True)
-        np.testing.assert_array_equal(found.done, (ends <= page) | (places >= page + 4096))
-        for lost in np.flatnonzero(~found.done):
-            found.append(int(lost), block(5, lost + 0.5))
-        found.close()
+    contents = path.read_bytes()
+    ends = np.append(places[1:], len(contents))
+    for page in range(0, len(contents), 4096):
+        path.write_bytes(contents[:page] + bytes(len(contents[page : page + 4096])) + contents[page + 4096 :])
+        log = BlockLog.open(path, writing=True)
+        np.testing.assert_array_equal(log.done, (ends <= page) | (places >= page + 4096))
+        for lost in np.flatnonzero(~log.done):
+            log.append(int(lost), block(5, lost + 0.5))
+        log.close()
         again = BlockLog.open(path)
         assert again.done.all()
         assert again.counts[1] == 300
@@ -268,8 +268,8 @@ def test_a_second_writer_is_told_of_the_first(tmp_path):
     code = "import sys\nfrom streams import MAP\nfrom synchain.runtime.sweeps.stream import stream\n"
     here = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     for more in ("", "resume=True", "overwrite=True"):
-        words = [sys.executable, "-c", f"{code}stream(MAP, sys.argv[1], {more})", str(path)]
-        done = subprocess.run(words, env=here, capture_output=True, text=True, timeout=120)
+        command = [sys.executable, "-c", f"{code}stream(MAP, sys.argv[1], {more})", str(path)]
+        done = subprocess.run(command, env=here, capture_output=True, text=True, timeout=120)
         last = done.stderr.splitlines()[-1]
         assert "is being written by another run; wait for it" in last
         assert "overwrite" not in last
@@ -434,8 +434,8 @@ def test_signals_stop_like_ctrl_c_unless_they_are_ignored(sign):
 def test_the_real_program_is_stopped_and_goes_on(sign, tmp_path):
     scene = tmp_path / "slow.toml"
     scene.write_text(SLOW)
-    words = [sys.executable, "-m", "synchain.runtime", "run", str(scene), "--out", str(tmp_path), "--workers", "1"]
-    process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, preexec_fn=restore_interrupt)
+    command = [sys.executable, "-m", "synchain.runtime", "run", str(scene), "--out", str(tmp_path), "--workers", "1"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=restore_interrupt)
     store = tmp_path / "slow.partial"
     give_up = time.monotonic() + 120
     while process.poll() is None and not (store.exists() and BlockLog.open(store).done.sum() >= 2):
@@ -459,8 +459,8 @@ def test_the_real_program_is_stopped_and_goes_on(sign, tmp_path):
 def test_ctrl_c_pressed_again_and_again_ends_the_program_with_its_words(tmp_path):
     scene = tmp_path / "slow.toml"
     scene.write_text(SLOW)
-    words = [sys.executable, "-m", "synchain.runtime", "run", str(scene), "--out", str(tmp_path), "--workers", "1"]
-    process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, preexec_fn=restore_interrupt)
+    command = [sys.executable, "-m", "synchain.runtime", "run", str(scene), "--out", str(tmp_path), "--workers", "1"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=restore_interrupt)
     give_up = time.monotonic() + 120
     while process.poll() is None and not (tmp_path / "slow.partial").exists():
         assert time.monotonic() < give_up
@@ -533,12 +533,12 @@ def test_an_unfinished_run_is_not_begun_again_silently(tmp_path, interruptible):
     path = tmp_path / "a.nc"
     with pytest.raises(SweepInterrupted):
         stream(MAP, path, show_progress=False, progress=interrupt_at(1))
-    kept = partial(path).read_bytes()
+    contents = partial(path).read_bytes()
     with pytest.raises(FileExistsError, match="continue it with resume"):
         stream(MAP, path, show_progress=False)
     with pytest.raises(ValueError, match="belongs to another scene"):
         stream(MAP.replace(rtol=1e-6), path, resume=True, show_progress=False)
-    assert partial(path).read_bytes() == kept
+    assert partial(path).read_bytes() == contents
 
 
 def test_other_versions_do_not_go_on_with_a_run(tmp_path, monkeypatch, interruptible):
@@ -598,13 +598,13 @@ def test_an_unfinished_run_of_an_edited_model_does_not_go_on(own, tmp_path, inte
     path = tmp_path / "a.nc"
     with pytest.raises(SweepInterrupted):
         stream(falling(own), path, show_progress=False, workers=1, progress=interrupt_at(1))
-    kept = partial(path).read_bytes()
+    contents = partial(path).read_bytes()
     own.write_text(FALLING.replace("-rate*x", "-rate*x**3"))
     with pytest.warns(UserWarning, match="the code of its model has changed"):
         open_result(partial(path))
     with pytest.raises(ValueError, match=r"a\.partial comes of another model: the code"):
         stream(falling(own), path, resume=True, show_progress=False)
-    assert partial(path).read_bytes() == kept
+    assert partial(path).read_bytes() == contents
 
 
 def test_a_file_that_is_edited_during_a_run_leaves_the_run_as_it_is(own, tmp_path):
@@ -622,16 +622,16 @@ def test_another_kind_of_processor_does_not_go_on_with_a_run(tmp_path, interrupt
     path = tmp_path / "a.nc"
     with pytest.raises(SweepInterrupted):
         stream(MAP, path, show_progress=False, progress=interrupt_at(1))
-    told = BlockLog.describe(partial(path))
-    name, _, features = told["attributes"]["processor"].partition(": ")
+    header = BlockLog.describe(partial(path))
+    name, _, features = header["attributes"]["processor"].partition(": ")
     assert features
     kinds = {
         f"abacus: {features}": "processor abacus; found ",
         f"{name}: {features} beads": f"{name} with beads; found ",
     }
     for forged, words in kinds.items():
-        told["attributes"]["processor"] = forged
-        BlockLog.create(partial(path), told)
+        header["attributes"]["processor"] = forged
+        BlockLog.create(partial(path), header)
         with pytest.raises(ValueError, match=words) as caught:
             stream(MAP, path, resume=True, show_progress=False)
         assert "go on there, or replace it with overwrite (--overwrite)" in str(caught.value)
@@ -644,9 +644,9 @@ def test_every_flipped_byte_of_a_result_is_noticed(tmp_path):
     small, path = PAIR.replace(axes={"sigma": [0.05, 0.1]}), tmp_path / "a.nc"
     stream(small, path, width=8, show_progress=False)
     assert open_result(path).success
-    whole = path.read_bytes()
-    for place in [*range(0, 400), *range(400, len(whole), 37)]:
-        damaged = bytearray(whole)
+    contents = path.read_bytes()
+    for place in [*range(0, 400), *range(400, len(contents), 37)]:
+        damaged = bytearray(contents)
         damaged[place] ^= 1 << place % 8
         path.write_bytes(damaged)
         noticed = 0
@@ -690,9 +690,9 @@ def test_a_forged_scene_is_one_sentence(forged, tmp_path, interruptible):
     path = tmp_path / "b.nc"
     with pytest.raises(SweepInterrupted):
         stream(MAP, path, show_progress=False, progress=interrupt_at(1))
-    told = BlockLog.describe(partial(path))
-    told["attributes"] = {k: v for k, v in {**told["attributes"], **forged}.items() if v is not None}
-    BlockLog.create(partial(path), told)
+    header = BlockLog.describe(partial(path))
+    header["attributes"] = {k: v for k, v in {**header["attributes"], **forged}.items() if v is not None}
+    BlockLog.create(partial(path), header)
     looks = (
         lambda: open_result(tmp_path / "a.nc"),
         lambda: stream(PAIR, tmp_path / "a.nc", show_progress=False),
@@ -768,14 +768,14 @@ def test_a_result_is_not_saved_over_a_device(tmp_path):
 def test_the_command_says_that_there_is_nothing_to_do(tmp_path, capsys):
     from synchain.runtime.cli import main
 
-    words = ["run", "two_oscillators", "--out", str(tmp_path), "--set", "sigma=0.1,0.2", "transient=1", "window=2"]
-    assert main(words) == 0
+    command = ["run", "two_oscillators", "--out", str(tmp_path), "--set", "sigma=0.1,0.2", "transient=1", "window=2"]
+    assert main(command) == 0
     first = (tmp_path / "two_oscillators.nc").stat()
     capsys.readouterr()
-    assert main(words) == 0
+    assert main(command) == 0
     assert "nothing was run (--overwrite runs it again)" in capsys.readouterr().out
     assert (tmp_path / "two_oscillators.nc").stat().st_mtime_ns == first.st_mtime_ns
-    assert main([*words, "omega=1.3"]) == 2
+    assert main([*command, "omega=1.3"]) == 2
     assert "belongs to another scene" in capsys.readouterr().err
-    assert main([*words, "omega=1.3", "--overwrite"]) == 0
+    assert main([*command, "omega=1.3", "--overwrite"]) == 0
     assert Path(tmp_path, "two_oscillators.nc").stat().st_mtime_ns > first.st_mtime_ns

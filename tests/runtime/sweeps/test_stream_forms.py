@@ -72,11 +72,11 @@ def ctrl_c(progress: Any) -> None:
     ids=["map", "up", "one cell", "chunks"],
 )
 def test_a_file_that_is_filled_holds_what_one_that_is_saved_holds(scene: Scene, ending: str, tmp_path: Path) -> None:
-    whole = run(scene, workers=1, show_progress=False)
-    whole.save(tmp_path / f"saved{ending}")
+    full = run(scene, workers=1, show_progress=False)
+    full.save(tmp_path / f"saved{ending}")
     done = stream(scene, tmp_path / f"a{ending}", workers=2, show_progress=False)
     assert done.success
-    assert done.data.identical(whole.data)
+    assert done.data.identical(full.data)
     assert digest(tmp_path / f"a{ending}") == digest(tmp_path / f"saved{ending}")
     if ending == ".zarr":
         with warnings.catch_warnings():
@@ -181,12 +181,12 @@ def test_memory_does_not_grow_with_the_file(ending: str, tmp_path: Path) -> None
         path = tmp_path / f"a{cells}{ending}"
         if cells > 20:
             tracemalloc.start()
-        found = stream(scene, path, width=8, workers=1, show_progress=False)
+        result = stream(scene, path, width=8, workers=1, show_progress=False)
         if cells > 20:
-            found = stream(scene, path, width=8, workers=1, resume=True, show_progress=False)
+            result = stream(scene, path, width=8, workers=1, resume=True, show_progress=False)
             peaks.append(tracemalloc.get_traced_memory()[1])
             tracemalloc.stop()
-        assert found.data.trajectory.nbytes == 8000 * cells
+        assert result.data.trajectory.nbytes == 8000 * cells
     assert peaks[1] < peaks[0] + 1e6
 
 
@@ -228,10 +228,10 @@ def test_pieces_cover_an_array_once_and_in_order(shape: tuple[int, ...]) -> None
 @pytest.mark.parametrize("ending", EVERY)
 def test_the_command_writes_every_form_and_its_figure(ending: str, tmp_path: Path, capsys: Any) -> None:
     PAIR.save(tmp_path / "pair.toml")
-    words = ["run", str(tmp_path / "pair.toml"), "--out", str(tmp_path), "--format", ending[1:]]
-    words += ["--set", "sigma=0.1,0.2", "transient=1", "window=2"]
-    assert main(words) == 0
-    assert main(words) == 0
+    command = ["run", str(tmp_path / "pair.toml"), "--out", str(tmp_path), "--format", ending[1:]]
+    command += ["--set", "sigma=0.1,0.2", "transient=1", "window=2"]
+    assert main(command) == 0
+    assert main(command) == 0
     assert "nothing was run (--overwrite runs it again)" in capsys.readouterr().out
     assert sorted(part.name for part in tmp_path.iterdir()) == sorted([f"pair{ending}", "pair.png", "pair.toml"])
     assert open_result(tmp_path / f"pair{ending}").success

@@ -44,20 +44,20 @@ def by_hand(delta: float) -> float:
             return s * (BELT - y[1])
 
         rest.terminal, rest.direction = True, -1.0  # type: ignore[attr-defined]
-        found = solve_ivp(rates, (t, TIME), [x, v], method="DOP853", rtol=1e-11, atol=1e-13, events=rest)
-        t, (x, v) = found.t[-1], found.y[:, -1]
+        solution = solve_ivp(rates, (t, TIME), [x, v], method="DOP853", rtol=1e-11, atol=1e-13, events=rest)
+        t, (x, v) = solution.t[-1], solution.y[:, -1]
         sign = 0.0 if abs(x) < MU_S else -sign
     return float(x)
 
 
 def test_exponents_as_a_parameter() -> None:
-    found = sc.run(scene("delta", delta=2.0), delta=EXPONENTS, show_progress=False)
-    assert found.success
-    np.testing.assert_allclose(found.end.sel(component="x").values.ravel(), [*map(by_hand, EXPONENTS)], atol=2e-7)
+    result = sc.run(scene("delta", delta=2.0), delta=EXPONENTS, show_progress=False)
+    assert result.success
+    np.testing.assert_allclose(result.end.sel(component="x").values.ravel(), [*map(by_hand, EXPONENTS)], atol=2e-7)
 
 
 @pytest.mark.parametrize("integrator", ["auto", "dop853"])
 def test_an_exponent_as_a_number(integrator: str) -> None:
-    found = sc.run(scene("(3/2)").replace(integrator=integrator), show_progress=False)
-    assert found.success
-    np.testing.assert_allclose(found.end.sel(component="x").values.ravel(), [by_hand(1.5)], atol=2e-7)
+    result = sc.run(scene("(3/2)").replace(integrator=integrator), show_progress=False)
+    assert result.success
+    np.testing.assert_allclose(result.end.sel(component="x").values.ravel(), [by_hand(1.5)], atol=2e-7)

@@ -102,10 +102,10 @@ def run_with_room(scene, room):
 
 def test_section_room_grows_to_what_a_cell_needs():
     scene = SECTIONS.replace(axes={"sigma": [0.0, 0.1, 0.2]})
-    whole = run(scene)
-    assert int(whole.section_count.min()) > 3
+    full = run(scene)
+    assert int(full.section_count.min()) > 3
     grown = run_with_room(scene, 2)
-    assert grown.data.identical(whole.data)
+    assert grown.data.identical(full.data)
 
 
 @pytest.mark.parametrize("direction", ["up", "down"])
@@ -134,8 +134,8 @@ def test_a_run_may_sweep_what_a_continued_scene_does_not():
 
 def test_continuation_keeps_its_states_where_room_grows():
     scene = SECTIONS.replace(axes={"sigma": [0.02, 0.05, 0.08]}, continuation="up")
-    whole = run(scene)
-    assert run_with_room(scene, 2).data.identical(whole.data)
+    full = run(scene)
+    assert run_with_room(scene, 2).data.identical(full.data)
 
 
 def test_result_survives_its_file(tmp_path):
@@ -205,9 +205,9 @@ def test_interrupt_keeps_finished_cells_and_resume_completes_them(interruptible)
     finished = partial.status.values == Status.FINISHED
     assert 0 < finished.sum() < 200
     assert np.isnan(partial.sync_error.values[partial.status.values == Status.NOT_RUN]).all()
-    whole = run(scene)
-    np.testing.assert_array_equal(partial.sync_error.values[finished], whole.sync_error.values[finished])
-    assert run(scene, resume=partial).data.identical(whole.data)
+    full = run(scene)
+    np.testing.assert_array_equal(partial.sync_error.values[finished], full.sync_error.values[finished])
+    assert run(scene, resume=partial).data.identical(full.data)
 
 
 def test_resuming_another_scene_is_refused():
@@ -238,8 +238,8 @@ def test_the_jump_is_looked_up_in_the_equations_that_the_numbers_belong_to(off):
     scene = PAIR.replace(rtol=1e-3, kappa=1e6, **off)
     calm = without_drive(scene.equations, scene.parameters)
     assert len(calm.parameters) < len(scene.equations.parameters)
-    numbers = np.array([[scene.parameters[name] for name in calm.parameters]])
-    assert tolerances(scene, calm, numbers) == pytest.approx((1e-6, 1e-7))
+    values = np.array([[scene.parameters[name] for name in calm.parameters]])
+    assert tolerances(scene, calm, values) == pytest.approx((1e-6, 1e-7))
 
 
 def test_loose_tolerance_is_not_silently_wrong():
@@ -266,7 +266,7 @@ def test_a_window_of_whole_periods_has_its_last_sample(periods: int) -> None:
 @pytest.mark.parametrize("size", [1e-280, 1e-160, 1.0])
 def test_errors_of_tiny_states_are_not_lost_in_their_squares(size: float, n: int) -> None:
     """Two estimates of dop853 are made one: their squares, 1e-320 and less, were zero beside a tolerance of 1e-176."""
-    given = {"transient": 0, "window": 10, "time_unit": "time", "rtol": 1e-8, "atol": 1e-16 * size}
+    settings = {"transient": 0, "window": 10, "time_unit": "time", "rtol": 1e-8, "atol": 1e-16 * size}
     start = {"x": size, "v": 0.0}
     scene = Scene(
         oscillator="harmonic",
@@ -274,7 +274,7 @@ def test_errors_of_tiny_states_are_not_lost_in_their_squares(size: float, n: int
         topology=chain(n),
         initial=start,
         integrator="dop853",
-        **given,
+        **settings,
     )
     ends = run(scene, show_progress=False).states("end") / size
     expected = np.repeat([np.cos(10.0), -np.sin(10.0)], n).reshape(ends.shape)
@@ -285,16 +285,16 @@ def test_a_result_holds_the_tolerances_of_each_cell(tmp_path):
     """A default atol is a tenth of rtol, less by powers of ten for starts below 0.1; a jump of friction 1/kappa wide is resolved."""
     oscillator = Scene("harmonic", None, record=(), transient=0, window=1, time_unit="time", initial={"v": 0.0})
     starts = [2e-9, 0.02, 0.2, 2.0, 2e9]
-    found = run(oscillator, x_1=starts, show_progress=False).data
-    np.testing.assert_allclose(found["atol_used"], [1e-17, 1e-10, 1e-9, 1e-9, 1e-9], rtol=1e-12)
-    assert set(found["rtol_used"].values) == {1e-8}
-    assert not {"rtol_used", "atol_used"} & set(found.attrs)
+    data = run(oscillator, x_1=starts, show_progress=False).data
+    np.testing.assert_allclose(data["atol_used"], [1e-17, 1e-10, 1e-9, 1e-9, 1e-9], rtol=1e-12)
+    assert set(data["rtol_used"].values) == {1e-8}
+    assert not {"rtol_used", "atol_used"} & set(data.attrs)
     for start in starts:
         alone = run(oscillator, x_1=start, show_progress=False).data
-        assert alone["atol_used"] == found["atol_used"].sel(x_1=start)
+        assert alone["atol_used"] == data["atol_used"].sel(x_1=start)
     assert set(run(oscillator.replace(atol=1e-7), x_1=starts, show_progress=False).data["atol_used"].values) == {1e-7}
     streamed = stream(oscillator, tmp_path / "a.nc", x_1=starts, show_progress=False).data
-    np.testing.assert_array_equal(streamed["atol_used"], found["atol_used"])
+    np.testing.assert_array_equal(streamed["atol_used"], data["atol_used"])
     rubbing = run(SECTIONS.replace(rtol=1e-4, window=1, transient=0), kappa=[1e3, 1e5], show_progress=False).data
     np.testing.assert_allclose(rubbing["rtol_used"], [1e-4, 1e-5])
     np.testing.assert_allclose(rubbing["atol_used"], [1e-5, 1e-6])

@@ -38,18 +38,18 @@ def line(*alpha: float) -> Exponents:
 
 def test_both_change_their_minds_at_the_published_end() -> None:
     """omega = 1.15: synchronous up to alpha = 0.466, sigma = 0.233 of two oscillators (Marszal et al. (2016))."""
-    found = agreement(friction(), [0.05, 0.15, 0.22, 0.25, 0.3], line=line(0.5, 0.1, 0.3, 0.44, 0.6), criterion=SHORT)
-    assert [cell.outcome for cell in found.cells] == ["both yes"] * 3 + ["both no"] * 2
-    assert found.counts == {"both yes": 3, "both no": 2, **dict.fromkeys(OUTCOMES[2:], 0)}
-    assert found.causes == {}
-    assert found.as_dict()["cells"][0]["share"] == 1.0
+    result = agreement(friction(), [0.05, 0.15, 0.22, 0.25, 0.3], line=line(0.5, 0.1, 0.3, 0.44, 0.6), criterion=SHORT)
+    assert [cell.outcome for cell in result.cells] == ["both yes"] * 3 + ["both no"] * 2
+    assert result.counts == {"both yes": 3, "both no": 2, **dict.fromkeys(OUTCOMES[2:], 0)}
+    assert result.causes == {}
+    assert result.as_dict()["cells"][0]["share"] == 1.0
 
 
 def test_the_fastest_growing_mode_decides() -> None:
     """Three in a chain see alpha = sigma and 3 sigma; at sigma = 0.2 only the second is unstable."""
     scene = friction().replace(topology=topology("chain", 3))
-    found = agreement(scene, [0.2], criterion=Criterion(transient=100, window=20, starts=1))
-    (cell,) = found.cells
+    result = agreement(scene, [0.2], criterion=Criterion(transient=100, window=20, starts=1))
+    (cell,) = result.cells
     assert cell.outcome == "both no"
     assert cell.exponent == pytest.approx(line(0.6).exponent[0], abs=1e-6)
 

@@ -64,25 +64,25 @@ def test_parameters_override_those_of_the_scene():
 
 def test_cells_that_do_not_finish_are_counted_and_reported():
     """x'' = -x + x^3 - delta x' escapes to infinity from beyond its saddles at x = ±1."""
-    given = {"beta": -1.0, "delta": 0.2, "u": 0.0, "sigma": 0.2}
-    found = basin(
-        Scene(oscillator="duffing", topology=chain(2), parameters=given), samples=200, ranges={"x": (-2.0, 2.0)},
+    settings = {"beta": -1.0, "delta": 0.2, "u": 0.0, "sigma": 0.2}
+    result = basin(
+        Scene(oscillator="duffing", topology=chain(2), parameters=settings), samples=200, ranges={"x": (-2.0, 2.0)},
         transient=30.0, window=1.0,
     )  # fmt: skip
-    lost = found.statuses[Status.DIVERGED]
+    lost = result.statuses[Status.DIVERGED]
     assert 0 < lost < 200
-    assert found.statuses == {Status.FINISHED: 200 - lost, Status.DIVERGED: lost}
-    assert np.array_equal(np.isinf(found.error), found.status == Status.DIVERGED)
-    assert found.count == 200 - lost
-    assert found.share == (200 - lost) / 200
-    assert f"{lost} cells: the state grew without bound" in found.message
-    assert "confidence 0.95" in found.message
+    assert result.statuses == {Status.FINISHED: 200 - lost, Status.DIVERGED: lost}
+    assert np.array_equal(np.isinf(result.error), result.status == Status.DIVERGED)
+    assert result.count == 200 - lost
+    assert result.share == (200 - lost) / 200
+    assert f"{lost} cells: the state grew without bound" in result.message
+    assert "confidence 0.95" in result.message
 
 
 def test_a_spent_budget_is_no_synchronisation():
-    found = basin(DAMPED.replace(max_steps=3), samples=10, **SHORT)
-    assert found.share == 0.0
-    assert found.statuses == {Status.STEP_BUDGET: 10}
+    result = basin(DAMPED.replace(max_steps=3), samples=10, **SHORT)
+    assert result.share == 0.0
+    assert result.statuses == {Status.STEP_BUDGET: 10}
 
 
 def test_a_seed_gives_one_result_whatever_the_workers(free):
@@ -100,11 +100,11 @@ def test_a_smaller_sample_is_the_beginning_of_a_larger_one(free):
 
 
 def test_starts_fill_their_ranges_and_the_rest_stays():
-    found = basin(
+    result = basin(
         DAMPED.replace(initial={"x": [0.7, 0.8, 0.9]}), samples=300, ranges={"v": (2.0, 5.0)}, transient=0.0, window=0.1
     )
-    assert (found.start[:, :3] == [0.7, 0.8, 0.9]).all()
-    v = found.start[:, 3:]
+    assert (result.start[:, :3] == [0.7, 0.8, 0.9]).all()
+    v = result.start[:, 3:]
     assert len(np.unique(v)) == v.size
     assert v.min() >= 2.0
     assert v.max() < 5.0
@@ -121,7 +121,7 @@ def test_the_order_of_the_ranges_does_not_matter():
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
+    ("keywords", "message"),
     [
         ({"ranges": {"y": (0, 1)}}, "unknown component 'y'; known: x, v"),
         ({"ranges": {"x": (1, 1)}}, r"range of x is 1 … 1; expected two numbers, the lower one first"),
@@ -134,9 +134,9 @@ def test_the_order_of_the_ranges_does_not_matter():
         ({"window": 0.0}, "window: found 0"),
     ],
 )
-def test_what_makes_no_sense_is_refused(given, words):
-    with pytest.raises(ValueError, match=words):
-        basin(FREE, **given)
+def test_what_makes_no_sense_is_refused(keywords, message):
+    with pytest.raises(ValueError, match=message):
+        basin(FREE, **keywords)
 
 
 def test_one_oscillator_and_half_a_sample_are_refused():
@@ -167,18 +167,18 @@ def test_starts_that_need_more_time_are_undecided():
 def test_another_attractor_is_no_approach():
     """Starts in two wells stay apart, those in one come together: each well has a probability of one half."""
     wells = Scene(Field({"x": "x - x**3"}), "x->x", chain(2), parameters={"sigma": 0.01})
-    found = basin(wells, samples=64, show_progress=False)
-    low, high = found.interval
+    result = basin(wells, samples=64, show_progress=False)
+    low, high = result.interval
     assert low < 0.5 < high
-    assert found.shares[Fate.OTHER] == pytest.approx(1.0 - found.share)
-    assert found.exponent == pytest.approx(-2.02, abs=1e-3)
-    clear = np.abs(found.start).min(axis=1) > 0.1
-    assert np.array_equal(found.synchronous[clear], np.prod(found.start[clear], axis=1) > 0.0)
+    assert result.shares[Fate.OTHER] == pytest.approx(1.0 - result.share)
+    assert result.exponent == pytest.approx(-2.02, abs=1e-3)
+    clear = np.abs(result.start).min(axis=1) > 0.1
+    assert np.array_equal(result.synchronous[clear], np.prod(result.start[clear], axis=1) > 0.0)
 
 
 def test_escape_is_a_share_of_its_own_and_bounded_in_work():
     """What takes a hundred times the steps of the synchronous motion is ended."""
-    found = basin(
+    result = basin(
         ROSSLER,
         samples=8,
         ranges={"x": (-100.0, 100.0), "z": (-50.0, 50.0)},
@@ -186,19 +186,19 @@ def test_escape_is_a_share_of_its_own_and_bounded_in_work():
         window=50.0,
         show_progress=False,
     )
-    assert found.shares[Fate.ESCAPED] >= 0.25
-    assert found.shares[Fate.OTHER] == 0.0
-    assert found.criterion.max_steps < 10**6
-    assert set(found.statuses) <= {Status.DIVERGED, Status.FINISHED}
+    assert result.shares[Fate.ESCAPED] >= 0.25
+    assert result.shares[Fate.OTHER] == 0.0
+    assert result.criterion.max_steps < 10**6
+    assert set(result.statuses) <= {Status.DIVERGED, Status.FINISHED}
 
 
 def test_a_stop_ends_starts():
     """x'' = -x from a circle of radius above 1/2 meets x = 1/2 within a turn."""
-    found = basin(FREE.replace(stop="x_1 - 1/2"), samples=50, tolerance=1e-3, show_progress=False, **SHORT)
-    x, v = found.start[:, 0], found.start[:, 2]
-    assert np.array_equal(found.fate == list(Fate).index(Fate.STOPPED), np.hypot(x, v) > 0.5)
-    assert found.shares[Fate.STOPPED] == (found.status == Status.STOPPED).mean()
-    assert found.scene.stop == "x_1 - 1/2"
+    result = basin(FREE.replace(stop="x_1 - 1/2"), samples=50, tolerance=1e-3, show_progress=False, **SHORT)
+    x, v = result.start[:, 0], result.start[:, 2]
+    assert np.array_equal(result.fate == list(Fate).index(Fate.STOPPED), np.hypot(x, v) > 0.5)
+    assert result.shares[Fate.STOPPED] == (result.status == Status.STOPPED).mean()
+    assert result.scene.stop == "x_1 - 1/2"
 
 
 class Elsewhere(Executor):

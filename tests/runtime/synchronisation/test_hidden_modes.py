@@ -27,8 +27,8 @@ PAIR = Field({"x": "-x", "y": "-y"})
     ],
 )
 def test_modes_without_a_part_in_the_default_start_are_named(graph, hidden):
-    found = hidden_modes(Scene(PAIR, "x->y, y->x", graph, time_unit="time"))
-    assert [hidden in words for words in found] == [True] * bool(hidden)
+    modes = hidden_modes(Scene(PAIR, "x->y, y->x", graph, time_unit="time"))
+    assert [hidden in words for words in modes] == [True] * bool(hidden)
 
 
 @pytest.mark.parametrize(
@@ -53,8 +53,8 @@ def test_thresholds_warn_where_the_start_hides_the_mode_that_grows_first():
     ends = []
     for initial in (None, {"x": [0.3, 0.28, 0.25]}):
         scene = Scene(PAIR, "x->y, y->x", chain(3), time_unit="time", initial=initial)
-        found = thresholds(scene, resolution=0.01, workers=1, show_progress=False, **asked)
-        ends.append(found.direct.intervals[0][1])
-        assert ("no part in the modes of gamma = -3" in " ".join(found.warnings)) == (initial is None)
+        result = thresholds(scene, resolution=0.01, workers=1, show_progress=False, **asked)
+        ends.append(result.direct.intervals[0][1])
+        assert ("no part in the modes of gamma = -3" in " ".join(result.warnings)) == (initial is None)
     assert ends[0] > 0.5
     assert ends[1] == pytest.approx(1 / 3, abs=0.02)

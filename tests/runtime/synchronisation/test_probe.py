@@ -59,22 +59,22 @@ def test_linear_nodes_with_springs_synchronise_inside_a_parabola():
     rate = growth(np.full(alpha.shape, delta), 1 + alpha + 1j * beta)
     inside = alpha > beta**2 / delta**2 - 1
     assert np.array_equal(rate < 0, inside)
-    found = universal_probe(SPRINGS, alpha, beta, criterion=Criterion(transient=50, window=5, starts=1))
+    result = universal_probe(SPRINGS, alpha, beta, criterion=Criterion(transient=50, window=5, starts=1))
     clear = np.abs(rate) > 0.05  # exp(-0.05 * 50 * 2 pi) = 2e-7
     assert clear.sum() > 100
     assert inside[clear].any()
-    assert np.array_equal(found.synchronous[clear], inside[clear])
-    assert np.array_equal(found.share[clear], inside[clear].astype(float))
-    assert found.alpha.shape == found.error.shape == (11, 13)
+    assert np.array_equal(result.synchronous[clear], inside[clear])
+    assert np.array_equal(result.share[clear], inside[clear].astype(float))
+    assert result.alpha.shape == result.error.shape == (11, 13)
 
 
 def test_linear_nodes_with_dampers_synchronise_in_the_right_half_plane():
     """d'' = -(alpha + i beta) d' - d: both roots have negative real parts where alpha > 0, whatever beta."""
     alpha, beta = np.array([-0.5, -0.1, 0.1, 0.5, 1.0]), np.array([[-2.0], [-0.5], [0.0], [0.5], [2.0]])
     assert np.array_equal(growth(alpha + 1j * beta, np.ones((5, 5))) < 0, np.broadcast_to(alpha > 0, (5, 5)))
-    found = universal_probe(DAMPERS, alpha, beta, criterion=Criterion(transient=1500, window=20, starts=1))
-    assert np.array_equal(found.synchronous, np.broadcast_to(alpha > 0, (5, 5)))
-    assert np.array_equal(found.beta[:, 0], beta[:, 0])
+    result = universal_probe(DAMPERS, alpha, beta, criterion=Criterion(transient=1500, window=20, starts=1))
+    assert np.array_equal(result.synchronous, np.broadcast_to(alpha > 0, (5, 5)))
+    assert np.array_equal(result.beta[:, 0], beta[:, 0])
 
 
 @pytest.mark.long
@@ -82,10 +82,10 @@ def test_without_an_imaginary_part_it_says_what_two_oscillators_say():
     """Friction, omega = 1.15: synchronous up to alpha = 2 * 0.233 (Marszal et al., Eur. Phys. J. Special Topics, 2016)."""
     criterion = Criterion(transient=150, window=20, starts=2)
     alpha = [0.1, 0.3, 0.7, 0.8]
-    found = universal_probe(FRICTION, alpha, 0.0, criterion=criterion)
+    result = universal_probe(FRICTION, alpha, 0.0, criterion=criterion)
     two = probe(FRICTION, alpha, criterion=criterion, resolution=1.0)
-    assert found.share.tolist() == two.share.tolist() == [1.0, 1.0, 0.0, 0.0]
-    assert found.synchronous.tolist() == [True, True, False, False]
+    assert result.share.tolist() == two.share.tolist() == [1.0, 1.0, 0.0, 0.0]
+    assert result.synchronous.tolist() == [True, True, False, False]
 
 
 @pytest.mark.long
@@ -99,12 +99,12 @@ def test_a_one_way_ring_is_one_point_of_the_plane():
     direct = float(run(ring).sync_error)
     criterion = Criterion(transient=1.0, window=2.0, starts=1, rtol=1e-10)
     for sign in (1.0, -1.0):
-        found = universal_probe(FRICTION, 1.5 * sigma, sign * np.sqrt(3) / 2 * sigma, criterion=criterion)
-        assert found.error.shape == ()
+        result = universal_probe(FRICTION, 1.5 * sigma, sign * np.sqrt(3) / 2 * sigma, criterion=criterion)
+        assert result.error.shape == ()
         if sign > 0:
-            assert float(found.error) == pytest.approx(direct, rel=1e-6)
+            assert float(result.error) == pytest.approx(direct, rel=1e-6)
         else:  # the other way round the start is another one
-            assert abs(float(found.error) - direct) > 1e-4 * direct
+            assert abs(float(result.error) - direct) > 1e-4 * direct
 
 
 class Spy(ThreadPoolExecutor):
@@ -154,10 +154,10 @@ def test_every_strength_has_all_starts_and_its_own_numbers():
 
 
 def test_cells_that_do_not_finish_are_not_synchronous():
-    found = universal_probe(SPRINGS.replace(max_steps=3), [0.5], [0.0], criterion=Criterion(transient=5, window=2))
-    assert found.share.tolist() == [0.0]
-    assert np.isinf(found.error).all()
-    assert (found.status == Status.STEP_BUDGET).all()
+    result = universal_probe(SPRINGS.replace(max_steps=3), [0.5], [0.0], criterion=Criterion(transient=5, window=2))
+    assert result.share.tolist() == [0.0]
+    assert np.isinf(result.error).all()
+    assert (result.status == Status.STEP_BUDGET).all()
 
 
 def model(edge_rhs="sigma*weight*(x_j - x_i)", node_parameters=("c",)) -> Equations:
@@ -182,7 +182,7 @@ def test_nonlinear_couplings_keep_their_form():
 
 
 @pytest.mark.parametrize(
-    ("equations", "words"),
+    ("equations", "message"),
     [
         (model("sigma**2*weight*(x_j - x_i)"), "not proportional to sigma"),
         (model("sigma*weight**2*(x_j - x_i)"), "not proportional to sigma"),
@@ -192,17 +192,17 @@ def test_nonlinear_couplings_keep_their_form():
         (Scene(oscillator="harmonic").equations, "no coupling"),
     ],
 )
-def test_models_that_the_probe_cannot_take_are_refused(equations, words):
-    with pytest.raises(ValueError, match=words):
+def test_models_that_the_probe_cannot_take_are_refused(equations, message):
+    with pytest.raises(ValueError, match=message):
         ring_of_three(equations)
 
 
 @pytest.mark.parametrize(
-    ("alpha", "beta", "words"),
+    ("alpha", "beta", "message"),
     [([], 0.0, "no values"), (np.nan, 0.0, "not finite"), ([0.0, np.inf], 0.0, "not finite")],
 )
-def test_strengths_must_be_numbers(alpha, beta, words):
-    with pytest.raises(ValueError, match=words):
+def test_strengths_must_be_numbers(alpha, beta, message):
+    with pytest.raises(ValueError, match=message):
         universal_probe(SPRINGS, alpha, beta)
 
 

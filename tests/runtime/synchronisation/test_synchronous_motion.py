@@ -33,8 +33,8 @@ def pair(s: float = 1.0, r: float = 1.0, c: float = 0.0, pace: float = 1.0, grap
     graph = chain(2) if graph is None else graph
     n = graph.n
     start = {"x": (c + s * np.linspace(1.0, -1.0, n)).tolist(), "v": [0.1 * r] * n}
-    numbers = {"s": s, "r": r, "c": c, "pace": pace}
-    return Scene(VDP, DAMPER, graph, parameters=numbers, initial=start, **more)
+    values = {"s": s, "r": r, "c": c, "pace": pace}
+    return Scene(VDP, DAMPER, graph, parameters=values, initial=start, **more)
 
 
 def used(scene: Scene, criterion: Criterion | None = None) -> AppliedCriterion:
@@ -43,20 +43,20 @@ def used(scene: Scene, criterion: Criterion | None = None) -> AppliedCriterion:
 
 def test_the_motion_of_van_der_pol_is_measured() -> None:
     """A limit cycle of the amplitudes 2.009 and 2.672 with the period 6.663 (mu = 1)."""
-    found = used(pair())
-    np.testing.assert_allclose(found.extent, [2 * 2.009, 2 * 2.672], rtol=0.06)
-    assert found.transient == pytest.approx(1000 * 6.663 / (2 * np.pi), rel=0.15)
-    assert found.tolerance == pytest.approx(1e-3 * np.hypot(*found.extent))
-    assert found.reach == pytest.approx(0.5 * found.extent[0])
+    criterion = used(pair())
+    np.testing.assert_allclose(criterion.extent, [2 * 2.009, 2 * 2.672], rtol=0.06)
+    assert criterion.transient == pytest.approx(1000 * 6.663 / (2 * np.pi), rel=0.15)
+    assert criterion.tolerance == pytest.approx(1e-3 * np.hypot(*criterion.extent))
+    assert criterion.reach == pytest.approx(0.5 * criterion.extent[0])
 
 
 @pytest.mark.parametrize("units", UNITS)
 def test_a_criterion_follows_the_units(units: tuple[float, float, float, float]) -> None:
     s, r, _, pace = units
-    plain, found = used(pair()), used(pair(*units))
-    np.testing.assert_allclose(np.array(found.extent) / [s, r], plain.extent, rtol=1e-3)
-    assert found.transient * pace == pytest.approx(plain.transient, rel=1e-3)
-    assert found.window * pace == pytest.approx(plain.window, rel=1e-3)
+    plain, criterion = used(pair()), used(pair(*units))
+    np.testing.assert_allclose(np.array(criterion.extent) / [s, r], plain.extent, rtol=1e-3)
+    assert criterion.transient * pace == pytest.approx(plain.transient, rel=1e-3)
+    assert criterion.window * pace == pytest.approx(plain.window, rel=1e-3)
 
 
 @pytest.mark.parametrize("units", UNITS)
@@ -64,10 +64,10 @@ def test_verdicts_do_not_depend_on_units(units: tuple[float, float, float, float
     few = Criterion(starts=3)
     s, r, c, pace = units
     assert simulate(pair(*units), pace * np.array([-0.05, 0.1, 0.5]), few, 1.0, QUIET).share.tolist() == [0.0, 1.0, 1.0]
-    found = universal_probe(
+    result = universal_probe(
         pair(*units), [-0.1 * pace, 0.4 * pace], [0.0, 0.1 * pace], criterion=few, show_progress=False
     )
-    assert found.share.tolist() == [0.0, 1.0]
+    assert result.share.tolist() == [0.0, 1.0]
     box = {"x": (c - s, c + s), "v": (-r, r)}
     quick = basin(pair(*units), samples=8, ranges=box, show_progress=False, k=0.2 * pace)
     assert quick.shares[Fate.SYNCHRONOUS] == 1.0
@@ -79,16 +79,16 @@ def test_an_invisible_component_is_seen() -> None:
     node = Field({"x": "(x/s - (x/s)**3)*s", "v": "w", "w": "(1 - v**2)*w - v"}, parameters={"s": 1e-9})
     start = {"x": [1e-9, -1e-9], "v": [1, 0.5], "w": 0}
     scene = Scene(node, "w->w", chain(2), parameters={"s": 1e-9}, initial=start)
-    found = simulate(scene, [0.3], Criterion(starts=1), 1.0, QUIET)
-    assert found.share.tolist() == [0.0]
+    sweep = simulate(scene, [0.3], Criterion(starts=1), 1.0, QUIET)
+    assert sweep.share.tolist() == [0.0]
     given = simulate(scene, [0.3], Criterion(starts=1, tolerance=1e-3), 1.0, QUIET)
     assert given.share.tolist() == [1.0]  # a tolerance that was given is that of the mean error
 
 
 def test_a_tolerance_that_was_given_stays() -> None:
-    found = used(pair(1e-3, 1e-3), Criterion(tolerance=0.5, reach=0.1, transient=20.0, window=10.0))
-    assert (found.tolerance, found.reach, found.transient, found.window) == (0.5, 0.1, 20.0, 10.0)
-    assert found.relative is False
+    criterion = used(pair(1e-3, 1e-3), Criterion(tolerance=0.5, reach=0.1, transient=20.0, window=10.0))
+    assert (criterion.tolerance, criterion.reach, criterion.transient, criterion.window) == (0.5, 0.1, 20.0, 10.0)
+    assert criterion.relative is False
 
 
 def test_the_sign_of_a_matrix_and_the_numbers_of_nodes_are_conventions() -> None:
@@ -114,17 +114,17 @@ def test_copies_that_nothing_joins_synchronise_where_lone_oscillators_do() -> No
         [1.0],
         [0.0],
     )  # a limit cycle has the exponent 0 at alpha = 0
-    found = thresholds(
+    result = thresholds(
         pair(graph=copies), sigma=[0.1, 0.3], criterion=few, resolution=0.1, periods=50, show_progress=False
     )
-    assert found.direct.intervals == found.predicted == ()
+    assert result.direct.intervals == result.predicted == ()
 
 
 def test_a_start_near_rest_is_no_extent() -> None:
     """Two damped oscillators come to rest: errors are compared with where they came from."""
     scene = Scene(Field({"x": "v", "v": "-x - v/2"}), "v->v", chain(2), initial={"x": [3e-6, 1e-6], "v": 0})
-    found = used(scene)
-    np.testing.assert_allclose(found.extent[0], 3e-6, rtol=0.3)
+    criterion = used(scene)
+    np.testing.assert_allclose(criterion.extent[0], 3e-6, rtol=0.3)
     assert simulate(scene, [0.0, 0.5], Criterion(starts=1), 1.0, QUIET).share.tolist() == [1.0, 1.0]
 
 

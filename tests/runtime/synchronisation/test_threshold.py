@@ -50,9 +50,9 @@ def test_projection_is_the_intersection_over_all_modes():
         ([(0.0, 0.9)], [(0.0, 0.3)]),
         ([(0.0, 0.1), (0.33, 1.2)], [(0.0, 0.1 / 3), (0.33, 0.4)]),
     ):
-        found = project(ranges, spectrum)
-        assert np.shape(found) == np.shape(expected)
-        np.testing.assert_allclose(np.ravel(found), np.ravel(expected), rtol=1e-14)
+        windows = project(ranges, spectrum)
+        assert np.shape(windows) == np.shape(expected)
+        np.testing.assert_allclose(np.ravel(windows), np.ravel(expected), rtol=1e-14)
     assert critical_ratio(spectrum) == pytest.approx(3)
     assert critical_ratio(star(6).spectrum) == 6
     assert critical_ratio(complete(7).spectrum) == 1.0
@@ -66,10 +66,10 @@ def test_parts_of_a_network_synchronise_only_where_uncoupled_oscillators_do():
 
 def test_network_in_parts_is_allowed_and_said():
     parts = from_matrix([[-1, 1, 0], [1, -1, 0], [0, 0, 0]])
-    found = thresholds(
+    result = thresholds(
         Scene(topology=parts), omega=1.15, sigma=np.linspace(0, 0.3, 7), criterion=SHORT, resolution=0.05
     )
-    assert any("no complete synchronisation" in words for words in found.warnings)
+    assert any("no complete synchronisation" in words for words in result.warnings)
 
 
 @pytest.mark.parametrize(
@@ -105,17 +105,17 @@ def swept(monkeypatch):
 
 
 def test_the_probe_covers_every_mode_and_the_network_is_swept_as_asked(swept):
-    found = thresholds(Scene(topology=chain(3)), sigma=[0.1, 0.2, 0.3], resolution=1e-3, criterion=SHORT, workers=1)
+    result = thresholds(Scene(topology=chain(3)), sigma=[0.1, 0.2, 0.3], resolution=1e-3, criterion=SHORT, workers=1)
     (pair, half, options), (network, sigma, direct) = swept
     assert (pair.topology.n, network.topology.n) == (2, 3)
     assert (2 * half[0], 2 * half[-1]) == (pytest.approx(0.1), pytest.approx(0.9))
     assert 2 * PROBES / 3 < len(half) < 4 * PROBES / 3
     assert sigma.tolist() == [0.1, 0.2, 0.3]
     assert options == direct == (SHORT, 1e-3, Execution(workers=1))
-    assert found.probe.intervals == ((0.2, 0.4),)
-    np.testing.assert_array_equal(found.probe.x, 2 * half)
-    assert found.predicted == ()  # 0.2 … 0.4 holds no number and its triple
-    assert found.as_dict()["probe"] == [[0.2, 0.4]]
+    assert result.probe.intervals == ((0.2, 0.4),)
+    np.testing.assert_array_equal(result.probe.x, 2 * half)
+    assert result.predicted == ()  # 0.2 … 0.4 holds no number and its triple
+    assert result.as_dict()["probe"] == [[0.2, 0.4]]
 
 
 @pytest.mark.parametrize(
@@ -164,14 +164,14 @@ def test_ends_are_refined_as_far_as_the_grid_is_wide(swept):
 
 
 @pytest.mark.parametrize(
-    ("sigma", "options", "words"),
+    ("sigma", "options", "message"),
     [
         ([0.0, 1e99], {}, r"a step of 1e\+99, from 0 to 1e\+99, and ends refined to 0\.0005; .*give more values"),
         ([0.0, 0.1, 0.2], {"resolution": 1e-12}, r"a step of 0\.1, from 0 to 0\.1, and ends refined to 1e-12"),
     ],
 )
-def test_steps_that_cannot_be_refined_are_refused_before_the_work(swept, sigma, options, words):
-    with pytest.raises(ValueError, match=f"^sigma: found {words}") as caught:
+def test_steps_that_cannot_be_refined_are_refused_before_the_work(swept, sigma, options, message):
+    with pytest.raises(ValueError, match=f"^sigma: found {message}") as caught:
         thresholds(Scene(topology=chain(2)), sigma=sigma, **options)
     assert swept == []
     assert "\n" not in str(caught.value)
@@ -189,8 +189,8 @@ def test_what_a_scene_observes_is_not_used(swept):
 
 
 def test_negative_sigma_is_predicted_as_it_is_simulated(swept, monkeypatch):
-    found = Sweep(np.array([-0.3, 0.3]), np.zeros(2), np.ones(2), ((-0.15, 0.3),))
-    monkeypatch.setattr(threshold, "simulate", lambda *_: found)
+    sweep = Sweep(np.array([-0.3, 0.3]), np.zeros(2), np.ones(2), ((-0.15, 0.3),))
+    monkeypatch.setattr(threshold, "simulate", lambda *_: sweep)
     assert thresholds(Scene(topology=chain(2)), sigma=[-0.3, 0.3]).predicted == ((-0.15, 0.3),)
     assert thresholds(Scene(topology=chain(3)), sigma=[-0.3, 0.3]).predicted == (
         (pytest.approx(-0.1), pytest.approx(0.2)),
@@ -209,11 +209,11 @@ def test_at_least_half_of_the_starts_must_fall_below_the_tolerance():
         other = np.where(points < 0.5, 0.0, SHORT.tolerance)  # an error of the tolerance itself is not below it
         return np.stack([np.where(points < 0.25, 0.0, 1.0), other], axis=1)
 
-    found = judge(errors, np.array([0.0, 0.3, 0.6]), 1e-3, SHORT)
-    assert found.share.tolist() == [1.0, 0.5, 0.0]
-    assert found.error.tolist() == [0.0, 0.5, 0.5 * (1 + SHORT.tolerance)]
-    assert found.x.tolist() == [0.0, 0.3, 0.6]
-    ((low, high),) = found.intervals
+    sweep = judge(errors, np.array([0.0, 0.3, 0.6]), 1e-3, SHORT)
+    assert sweep.share.tolist() == [1.0, 0.5, 0.0]
+    assert sweep.error.tolist() == [0.0, 0.5, 0.5 * (1 + SHORT.tolerance)]
+    assert sweep.x.tolist() == [0.0, 0.3, 0.6]
+    ((low, high),) = sweep.intervals
     assert (low, high) == (0.0, pytest.approx(0.5, abs=1e-3))
 
 
@@ -252,15 +252,15 @@ class Spy(ThreadPoolExecutor):
 def test_the_grid_and_the_rounds_that_refine_its_ends_run_one_kernel():
     dampers = Scene(oscillator="harmonic", topology=chain(2), coupling="damper")
     with Spy() as executor:
-        found = simulate(
+        sweep = simulate(
             dampers,
             [0.0, 0.5],
             criterion=Criterion(transient=50, window=5, starts=1),
             resolution=1e-2,
             execution=Execution(executor=executor, show_progress=False),
         )
-    assert found.share.tolist() == [0.0, 1.0]
-    assert 0.0 < found.intervals[0][0] < 0.5
+    assert sweep.share.tolist() == [0.0, 1.0]
+    assert 0.0 < sweep.intervals[0][0] < 0.5
     jobs = list(dict.fromkeys(map(id, executor.jobs)))
     assert len(jobs) == 2  # that of the motion, and that of the grid and all rounds
     assert sum(job is executor.jobs[-1] for job in executor.jobs) > 2
@@ -282,30 +282,30 @@ def test_wu_chua_keeps_the_product_of_coupling_and_eigenvalue():
 
 
 def test_probe_of_the_periodic_case_meets_the_published_range():
-    found = probe(
+    sweep = probe(
         Scene(topology=chain(2)), np.linspace(0, 0.8, 9), criterion=Criterion(transient=400, window=20, starts=1)
     )
-    ((low, high),) = found.intervals
+    ((low, high),) = sweep.intervals
     assert low == 0.0
     assert high == pytest.approx(2 * 0.233, abs=0.015)  # 400 periods leave about 0.01 in alpha undecided
-    assert found.share.min() == 0.0
-    assert found.error[0] < 1e-3 < found.error[-1]
+    assert sweep.share.min() == 0.0
+    assert sweep.error[0] < 1e-3 < sweep.error[-1]
 
 
 def test_direct_range_of_a_star_lies_where_the_probe_says():
-    found = thresholds(
+    result = thresholds(
         Scene(topology=star(4)), omega=1.15, sigma=np.linspace(0, 0.3, 13), criterion=SHORT, resolution=2e-3
     )
-    assert found.predicted[0][1] == pytest.approx(found.probe.intervals[0][1] / 4, abs=1e-9)
-    assert found.direct.intervals[0][1] == pytest.approx(found.predicted[0][1], abs=0.01)
-    ((_, high),), ((low_error, high_error),) = found.exponents.intervals, found.exponents.errors
+    assert result.predicted[0][1] == pytest.approx(result.probe.intervals[0][1] / 4, abs=1e-9)
+    assert result.direct.intervals[0][1] == pytest.approx(result.predicted[0][1], abs=0.01)
+    ((_, high),), ((low_error, high_error),) = result.exponents.intervals, result.exponents.errors
     assert high == pytest.approx(0.4653 / 4, abs=1e-4)
     assert 0.0 == low_error < high_error < 1e-6  # the motion is periodic
-    assert found.direct.intervals[0][1] == pytest.approx(high, abs=0.01)
-    numbers = found.as_dict()
+    assert result.direct.intervals[0][1] == pytest.approx(high, abs=0.01)
+    numbers = result.as_dict()
     kinds = {"intervals", "probe", "predicted", "exponents", "exponent_errors", "no_exponents", "warnings"}
     assert set(numbers) == kinds
-    assert numbers["intervals"][0][1] == found.direct.intervals[0][1]
+    assert numbers["intervals"][0][1] == result.direct.intervals[0][1]
 
 
 def test_failed_cells_never_count_as_synchronous():
@@ -314,15 +314,15 @@ def test_failed_cells_never_count_as_synchronous():
 
 
 @pytest.mark.parametrize(
-    ("graph", "words"),
+    ("graph", "message"),
     [
         (chain(1), "at least two"),
         (from_matrix([[-1, 1, 0], [0, -1, 1], [1, 0, -1]]), "complex"),
         (from_matrix([[2, -1, -1], [-1, 2, -1], [-1, -1, 2]]), "negate it"),
     ],
 )
-def test_networks_that_the_probe_cannot_judge_are_refused(graph, words):
-    with pytest.raises(ValueError, match=words):
+def test_networks_that_the_probe_cannot_judge_are_refused(graph, message):
+    with pytest.raises(ValueError, match=message):
         thresholds(Scene(topology=graph), omega=1.15)
 
 
@@ -341,10 +341,10 @@ def test_senseless_criteria_are_refused(bad):
 
 
 def test_exponent_changes_sign_where_the_probe_does():
-    found = exponents(Scene(topology=chain(2)), np.linspace(0.40, 0.54, 8), starts=1)
-    assert found.intervals[0][1] == pytest.approx(0.4653, abs=2e-3)
-    assert np.all(np.diff(found.exponent) > 0)
-    assert np.all(found.stderr < 2e-3)
+    result = exponents(Scene(topology=chain(2)), np.linspace(0.40, 0.54, 8), starts=1)
+    assert result.intervals[0][1] == pytest.approx(0.4653, abs=2e-3)
+    assert np.all(np.diff(result.exponent) > 0)
+    assert np.all(result.stderr < 2e-3)
 
 
 INSTANT = Criterion(starts=1, transient=0.01, window=0.01)
@@ -354,15 +354,15 @@ ASKED = {"criterion": INSTANT, "resolution": 0.1, "workers": 1, "show_progress":
 def test_windows_of_exponents_are_those_of_the_network():
     """Of x' = -x, y' = -y with links across, a mode grows at alpha - 1: chain(3) has the eigenvalues -1 and -3."""
     scene = Scene(Field({"x": "-x", "y": "-y"}), "x->y, y->x", chain(3), time_unit="time")
-    found = thresholds(scene, sigma=[0.0, 1.0, 2.0], **ASKED)
-    assert found.exponents.absent == ""
-    np.testing.assert_allclose(found.exponents.intervals, [(0.0, 1 / 3)], rtol=1e-9)
-    np.testing.assert_allclose(found.exponents.errors, [(0.0, 0.0)], atol=1e-9)
-    np.testing.assert_allclose(found.data["window"], [(0.0, 1 / 3)], rtol=1e-9)
-    assert found.data["window_error"].dims == found.data["window"].dims == ("window_number", "end")
-    assert dict(found.summary)["sigma, negative exponents"] == "0.0000 … 0.3333"
-    assert found.as_dict()["no_exponents"] is None
-    axes = found.plot()
+    result = thresholds(scene, sigma=[0.0, 1.0, 2.0], **ASKED)
+    assert result.exponents.absent == ""
+    np.testing.assert_allclose(result.exponents.intervals, [(0.0, 1 / 3)], rtol=1e-9)
+    np.testing.assert_allclose(result.exponents.errors, [(0.0, 0.0)], atol=1e-9)
+    np.testing.assert_allclose(result.data["window"], [(0.0, 1 / 3)], rtol=1e-9)
+    assert result.data["window_error"].dims == result.data["window"].dims == ("window_number", "end")
+    assert dict(result.summary)["sigma, negative exponents"] == "0.0000 … 0.3333"
+    assert result.as_dict()["no_exponents"] is None
+    axes = result.plot()
     assert "negative exponents" in [text.get_text() for text in axes.get_legend().get_texts()]
     ends = next(line.get_xdata(orig=False) for line in axes.lines if line.get_color() == GREEN)
     np.testing.assert_allclose(ends, [0.0, 1 / 3], rtol=1e-9)
@@ -374,9 +374,9 @@ def test_ranges_that_end_with_the_grid_may_go_on():
     rows = dict(thresholds(scene, sigma=[0.0, 0.1, 0.2], **ASKED).summary)
     assert rows["sigma, negative exponents"] == "0.0000 … 0.2000..."
     assert rows["..."] == "the grid ends here, the range may go on"
-    found = Sweep(np.array([0.1, 0.2]), np.zeros(2), np.ones(2), ((0.1, 0.15), (0.18, 0.2)))
-    whole = thresholds(scene, sigma=[0.0, 0.1, 0.2], **ASKED)
-    rows = dict(replace(whole, direct=found, probe=found, predicted=found.intervals).summary)
+    sweep = Sweep(np.array([0.1, 0.2]), np.zeros(2), np.ones(2), ((0.1, 0.15), (0.18, 0.2)))
+    full = thresholds(scene, sigma=[0.0, 0.1, 0.2], **ASKED)
+    rows = dict(replace(full, direct=sweep, probe=sweep, predicted=sweep.intervals).summary)
     for name in ("sigma, simulated", "sigma, predicted by the probe", "alpha = sigma |gamma|, probe"):
         assert rows[name] == "0.1000... … 0.1500; 0.1800 … 0.2000..."
 
@@ -390,15 +390,15 @@ def test_ends_that_come_of_the_transient_are_named(drive, unit):
     )  # fmt: skip
     criterion = Criterion(starts=1, transient=20.0 / unit, window=0.1 / unit)
     asked = {"sigma": np.linspace(0.0, 0.6, 13), "show_progress": False}
-    found = thresholds(scene, criterion=criterion, **asked)
-    ((_, high),) = found.direct.intervals
-    assert 0.3 < high < 0.45 < found.exponents.intervals[0][1] == pytest.approx(0.5)
-    assert [words[: words.index(" come of")] for words in found.warnings] == [
+    result = thresholds(scene, criterion=criterion, **asked)
+    ((_, high),) = result.direct.intervals
+    assert 0.3 < high < 0.45 < result.exponents.intervals[0][1] == pytest.approx(0.5)
+    assert [words[: words.index(" come of")] for words in result.warnings] == [
         f"the ends of what is {what} at sigma = {end:.4f} (exponent {2 * end - 1:.2g})"
-        for what, end in (("simulated", high), ("predicted by the probe", found.predicted[0][1]))
+        for what, end in (("simulated", high), ("predicted by the probe", result.predicted[0][1]))
     ]
-    assert all("20 units of time are given; trust the exponents" in words for words in found.warnings)
-    assert set(found.warnings) <= {words for name, words in found.summary if name == "warning"}
+    assert all("20 units of time are given; trust the exponents" in words for words in result.warnings)
+    assert set(result.warnings) <= {words for name, words in result.summary if name == "warning"}
     # an end of the grid is none of the transient
     assert thresholds(scene, criterion=criterion, **{**asked, "sigma": [0.0, 0.1, 0.2]}).warnings == ()
 
@@ -438,13 +438,13 @@ def test_the_effort_of_the_exponents_can_be_chosen(monkeypatch):
 )
 def test_exponents_that_do_not_apply_say_why(scene, why, monkeypatch):
     monkeypatch.setattr("synchain.codegen.simd.lanes.native_width", lambda *_: 1)  # the drivers of other tests
-    found = thresholds(scene, sigma=[0.0, 0.1], **ASKED)
-    assert found.exponents.intervals == ()
-    assert why in found.exponents.absent
-    assert why in found.data["window"].attrs["long_name"]
-    assert dict(found.summary)["sigma, negative exponents"] == f"not computed: {found.exponents.absent}"
-    assert found.as_dict()["no_exponents"] == found.exponents.absent
-    assert "exponents: not computed" in [text.get_text() for text in found.plot().texts]
+    result = thresholds(scene, sigma=[0.0, 0.1], **ASKED)
+    assert result.exponents.intervals == ()
+    assert why in result.exponents.absent
+    assert why in result.data["window"].attrs["long_name"]
+    assert dict(result.summary)["sigma, negative exponents"] == f"not computed: {result.exponents.absent}"
+    assert result.as_dict()["no_exponents"] == result.exponents.absent
+    assert "exponents: not computed" in [text.get_text() for text in result.plot().texts]
 
 
 def test_an_error_of_the_callers_hook_is_no_reason():
@@ -461,9 +461,9 @@ def test_windows_without_an_estimate_of_their_error_say_so():
     alpha = np.linspace(0.0, 1.0, 11)
     one = np.full(11, np.inf)
     function = MSF(Scene(topology=chain(2)), alpha, Exponents(alpha, 0.25 - alpha, one, 1.0, 1, (0.25 - alpha)[None]))
-    found = ExponentWindows.of(function)
-    np.testing.assert_allclose(found.intervals, [(0.125, 0.5)])
-    assert found.errors == ((np.inf, np.inf),)  # the upper end is that of the grid
+    windows = ExponentWindows.of(function)
+    np.testing.assert_allclose(windows.intervals, [(0.125, 0.5)])
+    assert windows.errors == ((np.inf, np.inf),)  # the upper end is that of the grid
     with pytest.raises(ValueError, match="0 pairs of errors; expected one for each of 1 windows"):
         ExponentWindows(((0.0, 1.0),), ())
     with pytest.raises(ValueError, match="expected one of the two"):
