@@ -21,6 +21,7 @@ PRIMITIVE = {"fma": 2, "multiply_add": 2, "sqrt": 1} | dict.fromkeys(
         "any_lane",
         "broadcast",
         "copysign",
+        "flip_if_odd",
         "floor",
         "lane_bits",
         "load",

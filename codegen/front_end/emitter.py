@@ -1,14 +1,15 @@
 """Emit LLVM: the values of variables, basic blocks, loops, and the reference counts of arrays.
 
-`syntax_reader` translates an expression into a `TypedExpr` and a statement into an `Emit`, functions that take the `Emitter` of
-the function under construction.  They run after the whole function was read, when the types of all variables are final.
+`syntax_reader` translates an expression into a `TypedExpr` and a statement into an `Emit`, functions that take the
+`Emitter` of the function under construction.  They run after the whole function was read, when the types of all
+variables are final.
 
-Variables.  One that lives in a single basic block is an LLVM register, as in Numba.  The others are stack slots (`alloca`),
-which LLVM turns into registers.
+Variables.  One that lives in a single basic block is an LLVM register, as in Numba.  The others are stack slots
+(`alloca`), which LLVM turns into registers.
 
-Arrays are counted by Numba's runtime (NRT).  An array variable holds one reference, which an assignment or `return` releases.
-An expression either refers to an array that a variable holds, or returns a new reference (`returns_new_reference`): a variable
-takes this over, and a call borrows it and releases it afterwards.
+Arrays are counted by Numba's runtime (NRT).  An array variable holds one reference, which an assignment or `return`
+releases. An expression either refers to an array that a variable holds, or returns a new reference
+(`returns_new_reference`): a variable takes this over, and a call borrows it and releases it afterwards.
 """
 
 from __future__ import annotations

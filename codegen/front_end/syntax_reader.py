@@ -1,14 +1,15 @@
 """Type the syntax tree of a function: expressions become `TypedExpr`, statements become `Emit` (see `emitter`).
 
-Types are resolved in the order of the text, without inference backwards: a variable of several basic blocks has one type.
-Numba's typing context returns the types of operators, attributes and calls.  The basic blocks are numbered as in Numba,
-because a sum is fused with a product that stands in a register (codegen/simd/lanes.py): the same variables must be registers.
-Exception: a product assigned to a variable of several basic blocks, and added to something in its own block.  Numba renames
-such a variable in each block (SSA form) and fuses the sum; here the product is loaded from a stack slot and not fused.
+Types are resolved in the order of the text, without inference backwards: a variable of several basic blocks has one
+type. Numba's typing context returns the types of operators, attributes and calls.  The basic blocks are numbered as
+in Numba, because a sum is fused with a product that stands in a register (codegen/simd/lanes.py): the same variables
+must be registers. Exception: a product assigned to a variable of several basic blocks, and added to something in its
+own block.  Numba renames such a variable in each block (SSA form) and fuses the sum; here the product is loaded from
+a stack slot and not fused.
 
-The subset of Python: assignments to names, elements and tuples; `if`, `while`, `for` over `range`, tuples and `enumerate` of
-tuples; arithmetic, comparisons, `and`, `or`, conditional expressions; NamedTuples; calls without keywords.  Anything else
-raises `UnreadError`.
+The subset of Python: assignments to names, elements and tuples; `if`, `while`, `for` over `range`, tuples and
+`enumerate` of tuples; arithmetic, comparisons, `and`, `or`, conditional expressions; NamedTuples; calls without
+keywords.  Anything else raises `UnreadError`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Memory of a kernel by its address: one machine word, without the bookkeeping of arrays and of who refers to them.
+"""Memory by its address: one machine word, without the shape and the reference count of an array.
 
-An address belongs to an array that must outlive it; a kernel keeps all of its memory in one array to its end.
+The array that an address points into must outlive it: a kernel holds all of its memory in one array to its end.
 """
 
 from __future__ import annotations
@@ -16,10 +16,14 @@ from numba.extending import intrinsic, lower_builtin, models, register_model
 from .lane_types import DOUBLE
 
 FIRST = {"target": "cpu"}
+"""Metadata of operators: Numba tries those for the CPU before its own ones, which are for any target.
+
+Otherwise Numba would try some dozen operators of arrays, texts and dates first for each sum of two lanes.
+"""
 
 
 class Address(types.Type):
-    """Numba type of the address of doubles; `p[k]` reads and `p[k] = x` writes one of them."""
+    """Numba type of an address of doubles: `p[k]` reads and `p[k] = x` writes number k behind it."""
 
     def __init__(self) -> None:
         super().__init__(name="Address")
@@ -35,13 +39,13 @@ class _AddressModel(models.PrimitiveModel):
 
 
 def data_of(context: Any, builder: ir.IRBuilder, value: ir.Value, fe_type: types.Type) -> ir.Value:
-    """The address of the first double of an array, or an address itself."""
+    """Return the pointer to the first double of an array; of an address, itself."""
     return value if isinstance(fe_type, Address) else context.make_array(fe_type)(context, builder, value).data
 
 
 @intrinsic
 def address(typingctx: Any, array: Any, first: Any) -> Any:
-    """The address of entry `first` of a flat array of doubles."""
+    """Return the address of entry `first` of a flat array of doubles."""
     if not isinstance(first, types.Integer):
         return None
 

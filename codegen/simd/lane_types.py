@@ -1,4 +1,4 @@
-"""The Numba types behind lanes: `Lane(width)` for doubles, `Mask(width)` for truth values, and their LLVM vectors."""
+"""Numba types of lanes: `Lane(width)` for doubles, `Mask(width)` for truth values, and their LLVM vectors."""
 
 from __future__ import annotations
 
@@ -14,9 +14,13 @@ from numba.extending import models, register_model
 
 DOUBLE, INT32, INT64, BOOL = ir.DoubleType(), ir.IntType(32), ir.IntType(64), ir.IntType(1)
 WIDTHS = (1, 2, 4, 8, 16)
+"""Widths of lanes: scalars, one register of SSE2, AVX and AVX-512, two registers of AVX-512."""
 
 HOST_NAME, HOST_FEATURES = llvm.get_host_cpu_name(), dict(llvm.get_host_cpu_features())
-"""The processor.  Read once: LLVM is locked meanwhile, and a process that forks in another thread then would have a child that hangs."""
+"""Name and features of the processor.
+
+Read once, at import: LLVM holds a lock during the call, and the child of a fork in another thread would wait for it forever.
+"""
 
 
 class Lane(types.Type):
@@ -36,13 +40,14 @@ class Mask(types.Type):
 
 
 def vector(element: ir.Type, width: int) -> ir.Type:
-    """The LLVM type of that many elements; a single one is a scalar (LLVM 20 aborts on some vectors of one truth value)."""
+    """Return the LLVM vector of `width` elements; a single one is a scalar (LLVM 20 aborts on some vectors of one bit)."""
     return element if width == 1 else ir.VectorType(element, width)
 
 
-def constant(element: ir.Type, width: int, value: int) -> ir.Constant:
-    """The same number in every lane."""
-    return ir.Constant(vector(element, width), value if width == 1 else [value] * width)
+def constant_like(value: ir.Value, number: float) -> ir.Constant:
+    """Return the constant with the same number in every lane of the type of a value."""
+    kind = value.type
+    return ir.Constant(kind, [number] * kind.count if isinstance(kind, ir.VectorType) else number)
 
 
 @register_model(Lane)
@@ -82,16 +87,17 @@ def has_fma() -> bool:
 
 
 def splat(builder: ir.IRBuilder, value: ir.Value, width: int) -> ir.Value:
-    """The same value in every lane."""
+    """Return the vector with the same value in every lane."""
     if width == 1:
         return value
     undefined = ir.Constant(vector(DOUBLE, width), ir.Undefined)
     first = builder.insert_element(undefined, value, ir.Constant(INT32, 0))
-    return builder.shuffle_vector(first, undefined, constant(INT32, width, 0))
+    return builder.shuffle_vector(first, undefined, ir.Constant(vector(INT32, width), [0] * width))
 
 
 def as_lane(context: Any, builder: ir.IRBuilder, value: ir.Value, fe_type: types.Type, width: int) -> ir.Value:
-    if isinstance(fe_type, Lane):
+    """Return an operand of a lane function as a vector: broadcast a number, leave a lane or a mask as it is."""
+    if isinstance(fe_type, Lane | Mask):
         return value
     if fe_type != types.float64:
         value = context.cast(builder, value, fe_type, types.float64)
@@ -99,7 +105,7 @@ def as_lane(context: Any, builder: ir.IRBuilder, value: ir.Value, fe_type: types
 
 
 def common_width(arguments: Any) -> int | None:
-    """The width shared by the lanes among the arguments, None where they are not lanes and numbers."""
+    """Return the width of the lanes among lanes and numbers; None for other arguments or lanes of several widths."""
     widths = {a.width for a in arguments if isinstance(a, Lane)}
-    numbers = all(isinstance(a, Lane | types.Float | types.Integer) for a in arguments)
-    return widths.pop() if len(widths) == 1 and numbers else None
+    all_fit = all(isinstance(a, Lane | types.Float | types.Integer) for a in arguments)
+    return widths.pop() if len(widths) == 1 and all_fit else None

@@ -1,18 +1,20 @@
 """A SIMD value for Numba: `Lane(width)` holds one double for each of `width` cells, `Mask(width)` one truth value.
 
 Kernels are written once on lane values.  Width 1 is the scalar kernel, wider ones run several cells of a sweep in
-step with each other in one vector register.  Operators and the functions below are branch-free: both sides of a
-`select` are computed.  A sum or a difference of which one side is a product of lanes is one fused multiply-add; the first
-product is taken if both sides are.  The text alone decides it, so that every width has the same bits; LLVM, which may choose
-otherwise from one width to the next, is allowed nothing, and infinities and NaN mean what they mean in IEEE 754.
-Without an instruction for it, on old processors, a multiply-add is a product and a sum, which rounds twice; a function of the
-C library, which LLVM would call, takes 30 times as long.
+step with each other in one vector register.  Operators and functions are branch-free: both sides of a `select` are
+computed.
+
+Rounding.  A sum or difference with a product of lanes on one side is one fused multiply-add; with products on both
+sides, the first is fused.  The text alone decides this, so that all widths have the same bits: LLVM could choose
+otherwise from one width to the next, and gets no fast-math flags.  Infinities and NaN are those of IEEE 754.  On old
+processors without the instruction a multiply-add is a product and a sum, which rounds twice; the function of the C
+library, which LLVM would call, takes 30 times as long.
 """
 
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from llvmlite import ir
@@ -21,7 +23,7 @@ from numba.core import cgutils
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin
 
-from .addresses import data_of
+from .addresses import FIRST, data_of
 from .lane_types import (
     BOOL,
     DOUBLE,
@@ -30,7 +32,7 @@ from .lane_types import (
     Mask,
     as_lane,
     common_width,
-    constant,
+    constant_like,
     has_fma,
     native_width,
     splat,
@@ -43,69 +45,38 @@ __all__ = [
     "scale_binary", "select", "split_binary", "sqrt", "store", "truncated",
 ]  # fmt: skip
 
-FIRST = {"target": "cpu"}
-"""Metadata of the operators of lanes: Numba tries what is made for the CPU before its own, which are for any target.
-
-The other way round it asks some dozen operators of arrays, texts and dates first, every time two lanes are added.
-"""
-
-PAIRS = [(Lane, Lane), (Lane, types.Float), (types.Float, Lane), (Lane, types.Integer), (types.Integer, Lane)]
-
-
-def _define_operator(function: Callable[..., Any], emit: Callable[..., Any], result: type) -> None:
-    """Give a binary operator its meaning on lanes; numbers are broadcast."""
-
-    @infer_global(function)
-    class _Typing(AbstractTemplate):
-        metadata = FIRST
-
-        def generic(self, args: Any, kws: Any) -> Any:
-            width = common_width(args) if len(args) == 2 else None
-            return signature(result(width), *args) if width else None
-
-    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        width = sig.return_type.width
-        left, right = (as_lane(context, builder, v, t, width) for v, t in zip(args, sig.args, strict=True))
-        return emit(builder, left, right)
-
-    for left, right in PAIRS:
-        lower_builtin(function, left, right)(lower)
-
+# -- operators ---------------------------------------------------------------------------------------------------
 
 PRODUCT = "product"
-"""What products of lanes are called in LLVM's text, where a lane of one cell and a number are of one type."""
+"""LLVM name of products of lanes: at width 1 a lane has the type of a number, whose products are not fused."""
 
 
-def _factors(value: Any) -> tuple[Any, Any] | None:
-    """The factors of lanes that this block has multiplied."""
+def _factors(value: ir.Value) -> tuple[ir.Value, ir.Value] | None:
+    """Return the factors of a product of lanes; None for another value, also for a product that was loaded from memory."""
     of_lanes = getattr(value, "opname", None) == "fmul" and value.name.startswith(PRODUCT)
     return tuple(value.operands) if of_lanes else None
 
 
-def _call(builder: Any, name: str, *values: Any) -> Any:
-    """llvm.<name> of values of one type."""
+def _call(builder: ir.IRBuilder, name: str, *values: ir.Value) -> ir.Value:
+    """Call the function llvm.<name> for the common type of the values."""
     kind = values[0].type
     suffix = f"v{kind.count}f64" if isinstance(kind, ir.VectorType) else "f64"
-    signed = ir.FunctionType(kind, [kind] * len(values))
-    return builder.call(cgutils.get_or_insert_function(builder.module, signed, f"llvm.{name}.{suffix}"), values)
+    function_type = ir.FunctionType(kind, [kind] * len(values))
+    return builder.call(cgutils.get_or_insert_function(builder.module, function_type, f"llvm.{name}.{suffix}"), values)
 
 
-def _multiply_add(builder: Any, x: Any, y: Any, z: Any) -> Any:
-    """x * y + z, with one rounding where the processor has an instruction for it."""
+def _multiply_add(builder: ir.IRBuilder, x: ir.Value, y: ir.Value, z: ir.Value) -> ir.Value:
+    """x * y + z, rounded once if the processor has the instruction."""
     return _call(builder, "fma", x, y, z) if has_fma() else builder.fadd(builder.fmul(x, y), z)
 
 
-def _exact_multiply_add(builder: Any, x: Any, y: Any, z: Any) -> Any:
-    """x * y + z with one rounding, or, without an instruction for it, with an error of about one.
-
-    The product is split into its rounded value and its error (Dekker, Numer. Math. 18, 224, 1971), the sum as well (Knuth).
-    """
+def _exact_multiply_add(builder: ir.IRBuilder, x: ir.Value, y: ir.Value, z: ir.Value) -> ir.Value:
+    """x * y + z, rounded once; without the instruction, with an error of about one rounding."""
     if has_fma():
         return _call(builder, "fma", x, y, z)
     add, sub, mul = builder.fadd, builder.fsub, builder.fmul
-    splitter = splat(
-        builder, ir.Constant(DOUBLE, 134217729.0), x.type.count if isinstance(x.type, ir.VectorType) else 1
-    )
+    # Dekker, Numer. Math. 18, 224, 1971: split the factors into halves of 26 bits by 2**27 + 1, whose products are exact.
+    splitter = constant_like(x, 134217729.0)
     halves = []
     for value in (x, y):
         scaled = mul(value, splitter)
@@ -113,18 +84,19 @@ def _exact_multiply_add(builder: Any, x: Any, y: Any, z: Any) -> Any:
         halves.append((high, sub(value, high)))
     (x_high, x_low), (y_high, y_low) = halves
     product = mul(x, y)
-    error = sub(mul(x_high, y_high), product)
+    product_error = sub(mul(x_high, y_high), product)
     for pair in ((x_high, y_low), (x_low, y_high), (x_low, y_low)):
-        error = add(error, mul(*pair))
-    whole = add(product, z)
-    part = sub(whole, product)
-    rest = add(sub(product, sub(whole, part)), sub(z, part))
-    exact = add(whole, add(rest, error))
-    return builder.select(builder.fcmp_ordered("ord", exact, exact), exact, whole)  # large factors have no halves
+        product_error = add(product_error, mul(*pair))
+    # Knuth's sum of two numbers and its error.
+    total = add(product, z)
+    added = sub(total, product)
+    total_error = add(sub(product, sub(total, added)), sub(z, added))
+    exact = add(total, add(total_error, product_error))
+    # The halves of large factors overflow.
+    return builder.select(builder.fcmp_ordered("ord", exact, exact), exact, total)
 
 
-def _sum(builder: Any, x: Any, y: Any) -> Any:
-    """x + y; the first product of the two is fused."""
+def _sum(builder: ir.IRBuilder, x: ir.Value, y: ir.Value) -> ir.Value:
     if product := _factors(x):
         return _multiply_add(builder, *product, y)
     if product := _factors(y):
@@ -132,8 +104,7 @@ def _sum(builder: Any, x: Any, y: Any) -> Any:
     return builder.fadd(x, y)
 
 
-def _difference(builder: Any, x: Any, y: Any) -> Any:
-    """x - y; the first product of the two is fused."""
+def _difference(builder: ir.IRBuilder, x: ir.Value, y: ir.Value) -> ir.Value:
     if product := _factors(x):
         return _multiply_add(builder, *product, builder.fneg(y))
     if product := _factors(y):
@@ -141,65 +112,48 @@ def _difference(builder: Any, x: Any, y: Any) -> Any:
     return builder.fsub(x, y)
 
 
-for _function, _emit in (
-    (operator.add, _sum),
-    (operator.sub, _difference),
-    (operator.mul, lambda b, x, y: b.fmul(x, y, PRODUCT)),
-    (operator.truediv, lambda b, x, y: b.fdiv(x, y)),
-):
-    _define_operator(_function, _emit, Lane)
-for _function, _name in (
-    (operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">="), (operator.eq, "=="),
-):  # fmt: skip
-    _define_operator(_function, lambda b, x, y, _n=_name: b.fcmp_ordered(_n, x, y), Mask)
+def _define_operator(
+    function: Callable[..., Any], operands: Sequence[tuple[type, ...]], result: type, emit: Callable[..., ir.Value]
+) -> None:
+    """Define an operator for operands of these Numba types; numbers are broadcast to the lanes beside them."""
 
-
-@infer_global(operator.neg)
-class _NegTyping(AbstractTemplate):
-    metadata = FIRST
-
-    def generic(self, args: Any, kws: Any) -> Any:
-        return signature(args[0], *args) if isinstance(args[0], Lane) else None
-
-
-@lower_builtin(operator.neg, Lane)
-def _lower_neg(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.fneg(args[0])
-
-
-def _define_logic(function: Callable[..., Any], name: str) -> None:
     @infer_global(function)
     class _Typing(AbstractTemplate):
         metadata = FIRST
 
         def generic(self, args: Any, kws: Any) -> Any:
-            same = len(args) == 2 and isinstance(args[0], Mask) and args[0] == args[1]
-            return signature(args[0], *args) if same else None
+            widths = {a.width for a in args if isinstance(a, Lane | Mask)}
+            fits = any(len(args) == len(kinds) and all(map(isinstance, args, kinds)) for kinds in operands)
+            return signature(result(*widths), *args) if fits and len(widths) == 1 else None
 
-    @lower_builtin(function, Mask, Mask)
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return getattr(builder, name)(*args)
+        width = sig.return_type.width
+        return emit(builder, *(as_lane(context, builder, v, t, width) for v, t in zip(args, sig.args, strict=True)))
+
+    for kinds in operands:
+        lower_builtin(function, *kinds)(lower)
 
 
-_define_logic(operator.and_, "and_")
-_define_logic(operator.or_, "or_")
+_PAIRS = [(Lane, Lane), (Lane, types.Float), (types.Float, Lane), (Lane, types.Integer), (types.Integer, Lane)]
+_define_operator(operator.add, _PAIRS, Lane, _sum)
+_define_operator(operator.sub, _PAIRS, Lane, _difference)
+_define_operator(operator.mul, _PAIRS, Lane, lambda b, x, y: b.fmul(x, y, PRODUCT))
+_define_operator(operator.truediv, _PAIRS, Lane, lambda b, x, y: b.fdiv(x, y))
+_define_operator(operator.neg, [(Lane,)], Lane, lambda b, x: b.fneg(x))
+for _function, _relation in (
+    (operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">="), (operator.eq, "=="),
+):  # fmt: skip
+    _define_operator(_function, _PAIRS, Mask, lambda b, x, y, _r=_relation: b.fcmp_ordered(_r, x, y))
+_define_operator(operator.and_, [(Mask, Mask)], Mask, lambda b, x, y: b.and_(x, y))
+_define_operator(operator.or_, [(Mask, Mask)], Mask, lambda b, x, y: b.or_(x, y))
+_define_operator(operator.invert, [(Mask,)], Mask, lambda b, x: b.not_(x))
 
 
-@infer_global(operator.invert)
-class _InvertTyping(AbstractTemplate):
-    metadata = FIRST
-
-    def generic(self, args: Any, kws: Any) -> Any:
-        return signature(args[0], *args) if isinstance(args[0], Mask) else None
+# -- functions of lanes ------------------------------------------------------------------------------------------
 
 
-@lower_builtin(operator.invert, Mask)
-def _lower_invert(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    return builder.not_(args[0])
-
-
-def _on_lanes(emit: Callable[..., Any], arity: int) -> Any:
-    """An intrinsic on lanes that `emit` builds; numbers among the arguments are broadcast."""
+def _on_lanes(emit: Callable[..., ir.Value], arity: int) -> Any:
+    """Return an intrinsic on lanes that `emit(builder, *lanes)` emits; numbers among its arguments are broadcast."""
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         width = sig.return_type.width
@@ -209,6 +163,7 @@ def _on_lanes(emit: Callable[..., Any], arity: int) -> Any:
         width = common_width(arguments)
         return (Lane(width)(*arguments), lower) if width else None
 
+    # Numba reads the number of arguments from the signature.
     if arity == 1:
         return intrinsic(lambda typingctx, x: typed(x))
     if arity == 2:
@@ -216,20 +171,30 @@ def _on_lanes(emit: Callable[..., Any], arity: int) -> Any:
     return intrinsic(lambda typingctx, x, y, z: typed(x, y, z))
 
 
+def on_bits(emit: Callable[..., ir.Value], arity: int) -> Any:
+    """Return an intrinsic on lanes whose bits `emit(builder, *integers)` takes and returns as 64-bit integers."""
+
+    def on_doubles(builder: ir.IRBuilder, *values: ir.Value) -> ir.Value:
+        doubles = values[0].type
+        integers = ir.VectorType(INT64, doubles.count) if isinstance(doubles, ir.VectorType) else INT64
+        return builder.bitcast(emit(builder, *(builder.bitcast(value, integers) for value in values)), doubles)
+
+    return _on_lanes(on_doubles, arity)
+
+
 def _llvm_function(name: str, arity: int) -> Any:
-    """An intrinsic that calls llvm.<name> on lanes."""
     return _on_lanes(lambda builder, *values: _call(builder, name, *values), arity)
 
 
 def _extreme(relation: str) -> Any:
-    """The one of two numbers that stands in a relation to the other; of a number and a NaN, the number.
+    """Return the intrinsic for the smaller or larger of two numbers, and for the number if the other one is NaN.
 
-    Not maxnum and minnum of LLVM, whose version 22 vectorises loops over nodes that take maxima by them, and loses some.
+    LLVM's maxnum and minnum are not used: version 22 vectorises loops over nodes that take maxima by them, and loses some.
     """
 
     def emit(builder: Any, x: Any, y: Any) -> Any:
-        second = builder.fcmp_ordered(relation, y, x)
-        return builder.select(builder.fcmp_unordered("uno", x, x), y, builder.select(second, y, x))
+        y_wins = builder.fcmp_ordered(relation, y, x)
+        return builder.select(builder.fcmp_unordered("uno", x, x), y, builder.select(y_wins, y, x))
 
     return _on_lanes(emit, 2)
 
@@ -243,10 +208,19 @@ maximum = _extreme(">")
 fma = _on_lanes(_exact_multiply_add, 3)
 multiply_add = _on_lanes(_multiply_add, 3)
 
+# A double has 1 bit of sign, 11 of exponent and 52 of significand.  `shifted` is k + 1.5 * 2**52 for an integer k, whose
+# lowest bits are those of k.
+scale_binary = on_bits(lambda b, x, shifted: b.add(x, b.shl(shifted, constant_like(x, 52))), 2)
+"""value * 2**k for k in -1023 … 1023, by one addition to the exponent."""
+flip_if_odd = on_bits(lambda b, x, shifted: b.xor(x, b.shl(shifted, constant_like(x, 63))), 2)
+"""-value for odd k, else value."""
+truncated = on_bits(lambda b, x: b.and_(x, constant_like(x, -1 << 44)), 1)
+"""The number cut to the first 9 bits of its significand, towards zero."""
+
 
 @intrinsic
 def select(typingctx: Any, mask: Any, yes: Any, no: Any) -> Any:
-    """Per lane: `yes` where the mask holds, else `no`."""
+    """Per lane: `yes` where the mask holds, else `no`; both are evaluated."""
     if not isinstance(mask, Mask):
         return None
     width = mask.width
@@ -259,8 +233,33 @@ def select(typingctx: Any, mask: Any, yes: Any, no: Any) -> Any:
 
 
 @intrinsic
+def split_binary(typingctx: Any, value: Any, pivot: Any) -> Any:
+    """Split a positive normal `value` = m * 2**k with m in [pivot, 2 pivot) into the lanes (m, k)."""
+    if not isinstance(value, Lane) or not isinstance(pivot, types.Float):
+        return None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        integers = vector(INT64, value.width)
+        bits, start = (
+            builder.bitcast(args[0], integers),
+            builder.bitcast(splat(builder, args[1], value.width), integers),
+        )
+        # Bits of positive doubles are ordered as the doubles are, and 2**52 of them lie between x and 2 x.
+        shift = constant_like(bits, 52)
+        exponent = builder.ashr(builder.sub(bits, start), shift)
+        mantissa = builder.sub(bits, builder.shl(exponent, shift))
+        parts = [builder.bitcast(mantissa, args[0].type), builder.sitofp(exponent, args[0].type)]
+        return context.make_tuple(builder, sig.return_type, parts)
+
+    return types.UniTuple(value, 2)(value, pivot), lower
+
+
+# -- masks -------------------------------------------------------------------------------------------------------
+
+
+@intrinsic
 def lane_bits(typingctx: Any, mask: Any) -> Any:
-    """The mask as an integer: bit l is lane l."""
+    """Return the mask as an integer: bit l is lane l."""
     if not isinstance(mask, Mask):
         return None
 
@@ -272,21 +271,15 @@ def lane_bits(typingctx: Any, mask: Any) -> Any:
 
 @intrinsic
 def any_lane(typingctx: Any, mask: Any) -> Any:
-    """True where at least one lane of the mask holds."""
+    """Return True if at least one lane of the mask holds."""
     if not isinstance(mask, Mask):
         return None
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        small = ir.IntType(mask.width)
-        return builder.icmp_unsigned("!=", builder.bitcast(args[0], small), ir.Constant(small, 0))
+        bits = builder.bitcast(args[0], ir.IntType(mask.width))
+        return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
 
     return types.boolean(mask), lower
-
-
-def _slot(context: Any, builder: Any, array: Any, array_type: Any, index: Any, width: int) -> Any:
-    data = data_of(context, builder, array, array_type)
-    offset = builder.mul(index, ir.Constant(index.type, width))
-    return builder.bitcast(builder.gep(data, [offset]), vector(DOUBLE, width).as_pointer())
 
 
 def _width_of(literal: Any) -> int | None:
@@ -294,29 +287,53 @@ def _width_of(literal: Any) -> int | None:
 
 
 @intrinsic(prefer_literal=True)
+def one_lane(typingctx: Any, lane: Any, width: Any) -> Any:
+    """Return the mask that holds in one lane alone."""
+    size = _width_of(width)
+    if size is None or not isinstance(lane, types.Integer):
+        return None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        index = context.cast(builder, args[0], sig.args[0], types.int64)
+        bits = builder.trunc(builder.shl(ir.Constant(INT64, 1), index), ir.IntType(size))
+        return builder.bitcast(bits, vector(BOOL, size))
+
+    return Mask(size)(lane, width), lower
+
+
+# -- memory ------------------------------------------------------------------------------------------------------
+
+
+def _pointer(context: Any, builder: Any, sig: Any, args: Any, width: int) -> Any:
+    """Return the pointer to lane number `args[1]` of an array or address `args[0]`."""
+    slot = context.cast(builder, args[1], sig.args[1], types.intp)
+    first = builder.gep(
+        data_of(context, builder, args[0], sig.args[0]), [builder.mul(slot, ir.Constant(slot.type, width))]
+    )
+    return builder.bitcast(first, vector(DOUBLE, width).as_pointer())
+
+
+@intrinsic(prefer_literal=True)
 def load(typingctx: Any, array: Any, slot: Any, width: Any) -> Any:
-    """Lane number `slot` of a flat float64 array, or an address, whose entries stand in groups of `width`."""
+    """Read lane number `slot` of a flat float64 array, or of memory by its address, in groups of `width` entries."""
     size = _width_of(width)
     if size is None or not isinstance(slot, types.Integer):
         return None
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        index = context.cast(builder, args[1], sig.args[1], types.intp)
-        return builder.load(_slot(context, builder, args[0], sig.args[0], index, size), align=8)
+        return builder.load(_pointer(context, builder, sig, args, size), align=8)  # entries are aligned, lanes not
 
     return Lane(size)(array, slot, width), lower
 
 
 @intrinsic
 def store(typingctx: Any, array: Any, slot: Any, value: Any) -> Any:
-    """Write a lane to a flat float64 array, or an address, at group number `slot`."""
+    """Write a lane to a flat float64 array, or to memory by its address, as group number `slot`."""
     if not isinstance(value, Lane) or not isinstance(slot, types.Integer):
         return None
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        index = context.cast(builder, args[1], sig.args[1], types.intp)
-        place = _slot(context, builder, args[0], sig.args[0], index, sig.args[2].width)
-        builder.store(args[2], place, align=8)
+        builder.store(args[2], _pointer(context, builder, sig, args, sig.args[2].width), align=8)
         return context.get_dummy_value()
 
     return types.void(array, slot, value), lower
@@ -324,7 +341,7 @@ def store(typingctx: Any, array: Any, slot: Any, value: Any) -> Any:
 
 @intrinsic(prefer_literal=True)
 def broadcast(typingctx: Any, number: Any, width: Any) -> Any:
-    """A lane that holds the same number everywhere."""
+    """Return a lane that holds the same number everywhere."""
     size = _width_of(width)
     if size is None or not isinstance(number, types.Float | types.Integer):
         return None
@@ -333,65 +350,3 @@ def broadcast(typingctx: Any, number: Any, width: Any) -> Any:
         return as_lane(context, builder, args[0], sig.args[0], size)
 
     return Lane(size)(number, width), lower
-
-
-@intrinsic
-def scale_binary(typingctx: Any, value: Any, shifted: Any) -> Any:
-    """value * 2**k for k = shifted - 1.5 * 2**52, an integer in -1023 … 1023; one integer addition."""
-    if not isinstance(value, Lane):
-        return None
-
-    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        whole, shift = vector(INT64, value.width), constant(INT64, value.width, 52)
-        exponent = builder.shl(builder.bitcast(args[1], whole), shift)
-        return builder.bitcast(builder.add(builder.bitcast(args[0], whole), exponent), args[0].type)
-
-    return value(value, shifted), lower
-
-
-@intrinsic
-def split_binary(typingctx: Any, value: Any, pivot: Any) -> Any:
-    """For positive normal `value` = m * 2**k with m in [pivot, 2 pivot): the pair (m, k), both lanes."""
-    if not isinstance(value, Lane) or not isinstance(pivot, types.Float):
-        return None
-
-    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        width = value.width
-        whole, shift = vector(INT64, width), constant(INT64, width, 52)
-        start = builder.bitcast(splat(builder, args[1], width), whole)
-        distance = builder.sub(builder.bitcast(args[0], whole), start)
-        exponent = builder.ashr(distance, shift)
-        back = builder.shl(exponent, shift)
-        mantissa = builder.bitcast(builder.sub(builder.bitcast(args[0], whole), back), args[0].type)
-        number = builder.sitofp(exponent, args[0].type)
-        return context.make_tuple(builder, sig.return_type, [mantissa, number])
-
-    return types.UniTuple(value, 2)(value, pivot), lower
-
-
-@intrinsic
-def truncated(typingctx: Any, value: Any) -> Any:
-    """The number cut to the first 9 bits of its significand, towards zero."""
-    if not isinstance(value, Lane):
-        return None
-
-    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        whole, mask = vector(INT64, value.width), constant(INT64, value.width, -(1 << 44))
-        return builder.bitcast(builder.and_(builder.bitcast(args[0], whole), mask), args[0].type)
-
-    return value(value), lower
-
-
-@intrinsic(prefer_literal=True)
-def one_lane(typingctx: Any, which: Any, width: Any) -> Any:
-    """The mask that holds in one lane alone."""
-    size = _width_of(width)
-    if size is None or not isinstance(which, types.Integer):
-        return None
-
-    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        index = context.cast(builder, args[0], sig.args[0], types.int64)
-        small = builder.trunc(builder.shl(ir.Constant(INT64, 1), index), ir.IntType(size))
-        return builder.bitcast(small, vector(BOOL, size))
-
-    return Mask(size)(which, width), lower

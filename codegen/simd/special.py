@@ -1,19 +1,15 @@
-"""Further elementary functions of lanes.
+"""Further elementary functions of lanes, composed of those in codegen/simd/elementary.py.
 
-They are made of those in codegen/simd/elementary.py.  `ERF` and `ERFCX` are our own Chebyshev fits in 40-digit arithmetic;
-beside each stands its error.
+`ERF` and `ERFCX` are our own Chebyshev fits in 40-digit arithmetic; beside each stands its error.
 """
 
 from __future__ import annotations
 
 from math import inf, nan
-from typing import Any
 
-from numba.extending import intrinsic
-
-from .elementary import atan, cos, exp, expm1, lane_function, log, sin
-from .lane_types import INT64, Lane, constant, vector
-from .lanes import absolute, copysign, floor, maximum, minimum, multiply_add, select, sqrt
+from .elementary import HALF_PI, LN2_HIGH, PI, atan, cos, exp, expm1, lane_function, log, sin
+from .lane_types import constant_like
+from .lanes import absolute, copysign, floor, maximum, minimum, multiply_add, on_bits, select, sqrt
 
 __all__ = [
     "acos",
@@ -48,13 +44,13 @@ ERFCX = (
 
 @lane_function
 def tan(x):
-    """Tangent; accurate like sine and cosine."""
+    """Return the tangent, as accurate as sine and cosine."""
     return sin(x) / cos(x)
 
 
 @lane_function
 def sinh(x):
-    """Hyperbolic sine; infinite above 709.8."""
+    """Return the hyperbolic sine; infinite above 709.8."""
     size = absolute(x)
     e = expm1(select(size < 1.0, size, 0.0))
     large = exp(size)
@@ -63,54 +59,55 @@ def sinh(x):
 
 @lane_function
 def cosh(x):
-    """Hyperbolic cosine; infinite above 709.8."""
+    """Return the hyperbolic cosine; infinite above 709.8."""
     large = exp(absolute(x))
     return 0.5 * large + 0.5 / large
 
 
 @lane_function
 def asin(x):
-    """Inverse sine; NaN beyond [-1, 1]."""
+    """Return the inverse sine; NaN beyond [-1, 1]."""
     return atan(x / sqrt((1.0 - x) * (1.0 + x)))
 
 
 @lane_function
 def acos(x):
-    """Inverse cosine; NaN beyond [-1, 1]."""
+    """Return the inverse cosine; NaN beyond [-1, 1]."""
     return 2.0 * atan(sqrt((1.0 - x) / (1.0 + x)))
 
 
 @lane_function
 def _log_of_more(x):
-    """log(1 + x) for x >= 0; what 1 + x was rounded by counts to first order."""
+    """log(1 + x) for x >= 0, corrected to first order by the rounding error of 1 + x."""
     more = 1.0 + x
     return select(more < 1e300, log(more) - ((more - 1.0) - x) / more, log(x))
 
 
 @lane_function
 def asinh(x):
-    """Inverse hyperbolic sine."""
+    """Return the inverse hyperbolic sine."""
+    # log(|x| + sqrt(1 + x**2)); beyond 1e9, where x**2 could overflow, it is log(2 |x|) to rounding
     size = absolute(x)
     low = minimum(size, 1e9)
     square = low * low
     value = _log_of_more(low + square / (1.0 + sqrt(1.0 + square)))
-    value = select(size > 1e9, log(size) + 0.6931471805599453, value)
+    value = select(size > 1e9, log(size) + LN2_HIGH, value)
     return select(x == x, copysign(value, x), x)
 
 
 @lane_function
 def acosh(x):
-    """Inverse hyperbolic cosine; NaN below 1."""
+    """Return the inverse hyperbolic cosine; NaN below 1."""
     over = x - 1.0
     low = minimum(over, 1e9)
     value = _log_of_more(low + sqrt(low * (low + 2.0)))
-    value = select(over > 1e9, log(x) + 0.6931471805599453, value)
+    value = select(over > 1e9, log(x) + LN2_HIGH, value)
     return select(over >= 0.0, value, nan)
 
 
 @lane_function
 def atanh(x):
-    """Inverse hyperbolic tangent; infinite at -1 and 1, NaN beyond."""
+    """Return the inverse hyperbolic tangent; infinite at -1 and 1, NaN beyond."""
     size = absolute(x)
     value = 0.5 * _log_of_more(2.0 * size / (1.0 - size))
     value = select(size == 1.0, inf, value)
@@ -119,31 +116,34 @@ def atanh(x):
 
 @lane_function
 def atan2(y, x):
-    """The angle of the point (x, y), from -pi to pi."""
+    """Return the angle of the point (x, y), from -pi to pi."""
+    # the angle to the nearer axis, at most pi/4, then reflected at the diagonal, the y axis and the x axis
     high, wide = absolute(y), absolute(x)
     steep = high > wide
     large = maximum(high, wide)
     ratio = minimum(high, wide) / select(large > 0.0, large, 1.0)
-    angle = atan(select(high == wide, select(large > 0.0, 1.0, 0.0), ratio))  # of infinite ones too
-    angle = select(steep, 1.5707963267948966 - angle, angle)
-    angle = select(copysign(1.0 + 0.0 * angle, x) < 0.0, 3.141592653589793 - angle, angle)
+    angle = atan(select(high == wide, select(large > 0.0, 1.0, 0.0), ratio))  # also if both are infinite
+    angle = select(steep, HALF_PI - angle, angle)
+    angle = select(copysign(1.0 + 0.0 * angle, x) < 0.0, PI - angle, angle)
     return select((x == x) & (y == y), copysign(angle, y), x + y)
 
 
 @lane_function
 def ceiling(x):
-    """The next whole number above."""
+    """Return the smallest integer that is not smaller."""
     return -floor(-x)
 
 
 @lane_function
 def erf(x):
-    """Error function."""
+    """Return the error function."""
     size = absolute(x)
+    # |x| < 1: its own series
     z = x * x
     small = z * 0.0 + ERF[11]
     for k in range(10, -1, -1):
         small = multiply_add(small, z, ERF[k])
+    # |x| >= 1: 1 - exp(-x**2) ERFCX(x); at 6 it is 1 to rounding
     far = minimum(size, 6.0)
     t = (far - 2.0) / (far + 2.0)
     large = t * 0.0 + ERFCX[17]
@@ -155,18 +155,9 @@ def erf(x):
 
 @lane_function
 def power(x, y):
-    """x**y for x > 0, as exp(y log x): the relative error is that of y log x times |y log x|; NaN for x < 0."""
+    """Return x**y for x > 0 as exp(y log x); the relative error is that of y log x times |y log x|; NaN for x < 0."""
     return exp(y * log(x))
 
 
-@intrinsic
-def power_of_two(typingctx: Any, value: Any) -> Any:
-    """The largest power of two up to a positive number: its significand cut to 1; NaN becomes infinite."""
-    if not isinstance(value, Lane):
-        return None
-
-    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        whole, mask = vector(INT64, value.width), constant(INT64, value.width, 0x7FF << 52)
-        return builder.bitcast(builder.and_(builder.bitcast(args[0], whole), mask), args[0].type)
-
-    return value(value), lower
+power_of_two = on_bits(lambda b, x: b.and_(x, constant_like(x, 0x7FF << 52)), 1)
+"""The largest power of two up to a positive number, which is its exponent bits alone; NaN becomes infinite."""
