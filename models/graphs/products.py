@@ -8,22 +8,24 @@ spectra come from the matrix itself.  A product costs no algebra: only `eigenval
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
+from math import prod
 from typing import TYPE_CHECKING, TypeAlias
 
 from ..inputs.rational_text import rational
 from .links import LINK_LIMIT, Link, one_degree
 from .readers import as_topology
-from .topology import Rule, Topology
+from .topology import Topology
 
 if TYPE_CHECKING:
     import sympy as sp
 
     from ..algebra.cosine_sums import AngleSum
 
-Listed: TypeAlias = "list[tuple[AngleSum, int]]"
+Sums: TypeAlias = "list[tuple[AngleSum, int]]"
 Closed: TypeAlias = "list[tuple[sp.Expr, int]] | None"
 
 
@@ -38,7 +40,7 @@ def cartesian(first: Topology, second: Topology) -> Topology:
     ValueError
         On more than LINK_LIMIT links.
     """
-    return _of_two("cartesian", Cartesian, first, second)
+    return _of_two(Cartesian, first, second)
 
 
 def kronecker(first: Topology, second: Topology) -> Topology:
@@ -52,7 +54,7 @@ def kronecker(first: Topology, second: Topology) -> Topology:
     ValueError
         On more than LINK_LIMIT links.
     """
-    return _of_two("kronecker", Kronecker, first, second)
+    return _of_two(Kronecker, first, second)
 
 
 def union(first: Topology, second: Topology) -> Topology:
@@ -63,7 +65,7 @@ def union(first: Topology, second: Topology) -> Topology:
     ValueError
         On more than LINK_LIMIT links.
     """
-    return _of_two("union", Union, first, second)
+    return _of_two(Union, first, second)
 
 
 def complement(graph: Topology) -> Topology:
@@ -75,13 +77,14 @@ def complement(graph: Topology) -> Topology:
         If a link is one-way or has a weight other than 1, or on more than LINK_LIMIT links.
     """
     graph = as_topology("complement", graph)
-    name, rule = f"complement({_named(graph)})", Complement(graph)
-    _small(name, rule.link_count)
+    rule = Complement((graph,))
+    name = f"complement({_call(graph)})"
+    _check_link_count(name, rule.link_count)
     odd = next((link for link in graph.links if link[2] != 1), None)
-    found = graph.asymmetry if odd is None else f"a link of weight {odd[2]}"
-    if found:
-        raise ValueError(f"{name}: found {found}; expected undirected links of weight 1")
-    return _made(name, graph.n, rule)
+    obstacle = graph.asymmetry if odd is None else f"a link of weight {odd[2]}"
+    if obstacle:
+        raise ValueError(f"{name}: found {obstacle}; expected undirected links of weight 1")
+    return _graph(name, rule)
 
 
 def weighted(graph: Topology, factor: object) -> Topology:
@@ -93,217 +96,202 @@ def weighted(graph: Topology, factor: object) -> Topology:
         If the factor is 0.
     """
     graph = as_topology("weighted", graph)
-    by = rational(factor, "factor")
-    if not by:
-        raise ValueError(f"weighted({_named(graph)}): factor = 0; expected another number: no link would be left")
-    return _made(f"weighted({_named(graph)}, {by})", graph.n, Weighted(graph, by))
+    exact = rational(factor, "factor")
+    if not exact:
+        raise ValueError(f"weighted({_call(graph)}): factor = 0; expected another number: no link would be left")
+    return _graph(f"weighted({_call(graph)}, {exact})", Weighted((graph,), exact))
 
 
 def factors(graph: Topology) -> tuple[Topology, Topology] | None:
     """Return the two graphs of which `cartesian` made a graph; None for any other."""
-    rule = graph.rule
-    return (rule.first, rule.second) if isinstance(rule, Cartesian) else None
+    if not isinstance(graph.rule, Cartesian):
+        return None
+    first, second = graph.rule.graphs
+    return first, second
 
 
 @dataclass(frozen=True, slots=True)
-class _OfTwo:
-    """The common part of the rules of graphs from two graphs."""
+class _Operation:
+    """The rule of a graph made of others; a subclass counts and lists its links, and its eigenvalues."""
 
-    first: Topology
-    second: Topology
+    graphs: tuple[Topology, ...]
+
+    @property
+    def n(self) -> int:
+        """The number of nodes: one for each pair of nodes of two graphs."""
+        return prod(graph.n for graph in self.graphs)
+
+    @property
+    def link_count(self) -> int:
+        raise NotImplementedError
 
     @property
     def undirected(self) -> bool:
-        """True if both graphs are known to be symmetric."""
-        return self.first.undirected and self.second.undirected
+        """True if all graphs are known to be symmetric."""
+        return all(graph.undirected for graph in self.graphs)
 
     @property
     def all_to_all(self) -> Fraction | None:
-        """None: pairs of nodes are not joined alike."""
+        """None unless a subclass joins all pairs of nodes alike."""
         return None
 
-    @property
-    def n(self) -> int:
-        """The number of nodes: one for each pair of nodes of the graphs."""
-        return self.first.n * self.second.n
+    def links(self) -> tuple[Link, ...]:
+        raise NotImplementedError
 
-    def spectra(self) -> tuple[Listed, Listed] | None:
-        """The closed spectra of both graphs; None if one of them has none."""
-        from ..spectra.angle_sums import angle_sums
-
-        a, b = angle_sums(self.first), angle_sums(self.second)
-        return None if a is None or b is None else (a, b)
+    def eigenvalues(self) -> Closed:
+        raise NotImplementedError
 
 
-@dataclass(frozen=True, slots=True)
-class Cartesian(_OfTwo):
-    """The rule of a Cartesian product: eigenvalues are sums."""
+def _eigenvalues(graphs: tuple[Topology, ...], combine: Callable[..., Sums]) -> Closed:
+    """List the eigenvalues that `combine` makes of those of the graphs; None if some are no sums of cosines."""
+    from ..algebra.cosine_sums import expressions
+    from ..spectra.angle_sums import angle_sums
+
+    spectra = [angle_sums(graph) for graph in graphs]
+    return None if None in spectra else expressions(combine(*spectra))
+
+
+class Cartesian(_Operation):
+    """The rule of a Cartesian product (Brouwer & Haemers 1.4.6): eigenvalues a + b."""
 
     @property
     def link_count(self) -> int:
-        """The number of links."""
-        return self.first.n * self.second.link_count + self.second.n * self.first.link_count
+        first, second = self.graphs
+        return first.n * second.link_count + second.n * first.link_count
 
     def links(self) -> tuple[Link, ...]:
-        """Build the sorted links."""
-        n = self.second.n
-        links = [(i * n + k, j * n + k, w) for i, j, w in self.first.links for k in range(n)]
-        links += [(i * n + k, i * n + m, w) for i in range(self.first.n) for k, m, w in self.second.links]
+        first, second = self.graphs
+        n = second.n
+        links = [(i * n + k, j * n + k, w) for i, j, w in first.links for k in range(n)]
+        links += [(i * n + k, i * n + m, w) for i in range(first.n) for k, m, w in second.links]
         return tuple(sorted(links))
 
     def eigenvalues(self) -> Closed:
-        """List the sums of the eigenvalues."""
-        from ..algebra.cosine_sums import expressions
-
-        known = self.spectra()
-        return None if known is None else expressions([(x + y, m * k) for (x, m), (y, k) in product(*known)])
+        return _eigenvalues(self.graphs, lambda a, b: [(x + y, m * k) for (x, m), (y, k) in product(a, b)])
 
 
-@dataclass(frozen=True, slots=True)
-class Kronecker(_OfTwo):
-    """The rule of a tensor product: eigenvalues are known if each graph has one in-degree."""
+class Kronecker(_Operation):
+    """The rule of a tensor product (1.4.7): eigenvalues (a + d)(b + e) - d e if d and e are all in-degrees."""
 
     @property
     def link_count(self) -> int:
-        """The number of links."""
-        return self.first.link_count * self.second.link_count
+        return prod(graph.link_count for graph in self.graphs)
 
     def links(self) -> tuple[Link, ...]:
-        """Build the sorted links."""
-        n = self.second.n
-        links = [(i * n + k, j * n + m, v * w) for i, j, v in self.first.links for k, m, w in self.second.links]
+        first, second = self.graphs
+        n = second.n
+        links = [(i * n + k, j * n + m, v * w) for i, j, v in first.links for k, m, w in second.links]
         return tuple(sorted(links))
 
     def eigenvalues(self) -> Closed:
-        """List (a + d)(b + e) - d e, d and e the in-degrees."""
-        from ..algebra.cosine_sums import AngleSum, expressions
+        from ..algebra.cosine_sums import AngleSum
 
-        first, second = (one_degree(graph.n, graph.links) for graph in (self.first, self.second))
-        if first is None or second is None or (known := self.spectra()) is None:
+        first, second = (one_degree(graph.n, graph.links) for graph in self.graphs)
+        if first is None or second is None:
             return None
+        # weights W = G + degree have the eigenvalues a + d and b + e, and those of the product multiply
         d, e = AngleSum.rational(first), AngleSum.rational(second)
-        return expressions([((x + d) * (y + e) + -(d * e), m * k) for (x, m), (y, k) in product(*known)])
+        return _eigenvalues(
+            self.graphs, lambda a, b: [((x + d) * (y + e) + -(d * e), m * k) for (x, m), (y, k) in product(a, b)]
+        )
 
 
-@dataclass(frozen=True, slots=True)
-class Union(_OfTwo):
-    """The rule of two graphs side by side."""
+class Union(_Operation):
+    """The rule of two graphs side by side (1.3.6): the eigenvalues of both."""
 
     @property
     def n(self) -> int:
-        """The number of nodes."""
-        return self.first.n + self.second.n
+        return sum(graph.n for graph in self.graphs)
 
     @property
     def link_count(self) -> int:
-        """The number of links."""
-        return self.first.link_count + self.second.link_count
+        return sum(graph.link_count for graph in self.graphs)
 
     def links(self) -> tuple[Link, ...]:
-        """Build the sorted links."""
-        n = self.first.n
-        return (*self.first.links, *((i + n, j + n, w) for i, j, w in self.second.links))
+        first, second = self.graphs
+        return (*first.links, *((i + first.n, j + first.n, w) for i, j, w in second.links))
 
     def eigenvalues(self) -> Closed:
-        """List the eigenvalues of both."""
-        from ..algebra.cosine_sums import expressions
-
-        known = self.spectra()
-        return None if known is None else expressions([*known[0], *known[1]])
+        return _eigenvalues(self.graphs, lambda a, b: [*a, *b])
 
 
-@dataclass(frozen=True, slots=True)
-class Complement:
-    """The rule of a complement: one eigenvalue 0 stays, all others become -(n + γ)."""
-
-    graph: Topology
+class Complement(_Operation):
+    """The rule of a complement (1.3.8): the 0 of the vector of ones stays, each other γ becomes -(n + γ)."""
 
     @property
     def link_count(self) -> int:
-        """The number of links."""
-        return self.graph.n * (self.graph.n - 1) - self.graph.link_count
+        return self.n * (self.n - 1) - self.graphs[0].link_count
 
     @property
     def undirected(self) -> bool:
-        """True: only undirected graphs have a complement here."""
+        """True: `complement` refuses one-way links."""
         return True
 
     @property
     def all_to_all(self) -> Fraction | None:
         """1 for the complement of a graph without links."""
-        return None if self.graph.link_count else Fraction(1)
+        return None if self.graphs[0].link_count else Fraction(1)
 
     def links(self) -> tuple[Link, ...]:
-        """Build the sorted links."""
-        n, present = self.graph.n, {(i, j) for i, j, _ in self.graph.links}
+        n, present = self.n, {(i, j) for i, j, _ in self.graphs[0].links}
         return tuple((i, j, Fraction(1)) for i in range(n) for j in range(n) if i != j and (i, j) not in present)
 
     def eigenvalues(self) -> Closed:
-        """List 0 and the numbers -(n + γ)."""
-        from ..algebra.cosine_sums import AngleSum, expressions
-        from ..spectra.angle_sums import angle_sums
+        from ..algebra.cosine_sums import AngleSum
 
-        known = angle_sums(self.graph)
-        if known is None:
-            return None
-        whole = AngleSum.rational(-self.graph.n)
-        others = [(whole + -a, times - a.vanishes()) for a, times in known]
-        return expressions([(AngleSum.rational(0), 1), *((a, times) for a, times in others if times)])
+        n = AngleSum.rational(self.n)
+
+        def combine(pairs: Sums) -> Sums:
+            others = [(-(n + a), times - a.vanishes()) for a, times in pairs]
+            return [(AngleSum.rational(0), 1), *((a, times) for a, times in others if times)]
+
+        return _eigenvalues(self.graphs, combine)
 
 
 @dataclass(frozen=True, slots=True)
-class Weighted:
-    """The rule of a graph with all weights times one number."""
+class Weighted(_Operation):
+    """The rule of a graph with all weights times one number, and so all eigenvalues."""
 
-    graph: Topology
     factor: Fraction
 
     @property
     def link_count(self) -> int:
-        """The number of links."""
-        return self.graph.link_count
-
-    @property
-    def undirected(self) -> bool:
-        """True if the graph is known to be symmetric."""
-        return self.graph.undirected
+        return self.graphs[0].link_count
 
     @property
     def all_to_all(self) -> Fraction | None:
         """The weight of the graph's links times the factor, if it joins all pairs alike."""
-        weight = self.graph.all_to_all
+        weight = self.graphs[0].all_to_all
         return None if weight is None else weight * self.factor
 
     def links(self) -> tuple[Link, ...]:
-        """Build the sorted links."""
-        return tuple((i, j, w * self.factor) for i, j, w in self.graph.links)
+        return tuple((i, j, w * self.factor) for i, j, w in self.graphs[0].links)
 
     def eigenvalues(self) -> Closed:
-        """List the eigenvalues times the factor."""
-        from ..algebra.cosine_sums import AngleSum, expressions
-        from ..spectra.angle_sums import angle_sums
+        from ..algebra.cosine_sums import AngleSum
 
-        known, by = angle_sums(self.graph), AngleSum.rational(self.factor)
-        return None if known is None else expressions([(by * a, times) for a, times in known])
+        factor = AngleSum.rational(self.factor)
+        return _eigenvalues(self.graphs, lambda pairs: [(factor * a, times) for a, times in pairs])
 
 
-def _named(graph: Topology) -> str:
-    more = "".join(f", {key}={value}" for key, value in graph.options)
-    return graph.name if "(" in graph.name else f"{graph.name}({graph.n}{more})"
+def _of_two(operation: type[_Operation], first: object, second: object) -> Topology:
+    name = operation.__name__.lower()
+    graphs = as_topology(f"{name}: first", first), as_topology(f"{name}: second", second)
+    return _graph(f"{name}({', '.join(map(_call, graphs))})", operation(graphs))
 
 
-def _of_two(name: str, operation: type[Cartesian | Kronecker | Union], first: object, second: object) -> Topology:
-    """The graph that an operation makes of two."""
-    rule = operation(as_topology(f"{name}: first", first), as_topology(f"{name}: second", second))
-    return _made(f"{name}({_named(rule.first)}, {_named(rule.second)})", rule.n, rule)
+def _call(graph: Topology) -> str:
+    """Return the text that `graph_text` reads as the graph: ring(5), torus(12, shape=(3, 4)), or a text that is one."""
+    options = "".join(f", {key}={value}" for key, value in graph.options)
+    return graph.name if "(" in graph.name else f"{graph.name}({graph.n}{options})"
 
 
-def _small(name: str, links: int) -> None:
+def _graph(name: str, rule: _Operation) -> Topology:
+    if rule.all_to_all is None:  # links of all pairs are not listed
+        _check_link_count(name, rule.link_count)
+    return Topology(name, rule.n, rule=rule)
+
+
+def _check_link_count(name: str, links: int) -> None:
     if links > LINK_LIMIT:
         raise ValueError(f"{name}: {links} links; expected at most {LINK_LIMIT}: take smaller graphs")
-
-
-def _made(name: str, n: int, rule: Rule) -> Topology:
-    if rule.all_to_all is None:
-        _small(name, rule.link_count or 0)
-    return Topology(name, n, rule=rule)
