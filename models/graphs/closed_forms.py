@@ -31,7 +31,7 @@ _ENTRY = re.compile(r"[0-9]{1,9}|[a-hj-wyz][0-9]?")
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """Eigenvalues of one form."""
+    """Eigenvalues of one form: one for each value of the indices, e.g. -4 sin²(kπ/n), k = 0 … n - 1."""
 
     value: sp.Expr  # the eigenvalue
     times: sp.Expr = sp.S.One  # its multiplicity
@@ -42,39 +42,34 @@ class Term:
 
     @property
     def text(self) -> str:
-        """The term in words: value (times) for k = low … high."""
-        often = "" if self.times == 1 else f", {sp.sstr(self.times)} times"
-        return f"{sp.sstr(self.value)}{often}{_ranges(self.indices)}"
+        """The term as text: value, multiplicity times for k = low … high."""
+        times = "" if self.times == 1 else f", {sp.sstr(self.times)} times"
+        return f"{sp.sstr(self.value)}{times}{_ranges(self.indices)}"
 
     def vector_text(self, size: sp.Expr) -> str:
-        """Return the eigenvectors of a graph with `size` nodes in words."""
-        on = "" if self.where == sp.true else f", {sp.sstr(self.where)}"
-        return f"{sp.sstr(self.vector)} at node i = 0 … {sp.sstr(size - 1)}{_ranges(self.numbered)}{on}"
+        """Return the eigenvectors of a graph with `size` nodes as text."""
+        condition = "" if self.where == sp.true else f", {sp.sstr(self.where)}"
+        return f"{sp.sstr(self.vector)} at node i = 0 … {sp.sstr(size - 1)}{_ranges(self.numbered)}{condition}"
 
     @property
     def symbols(self) -> set[sp.Symbol]:
         """All symbols but that of the node."""
-        parts = [
-            self.value,
-            self.times,
-            self.where,
-            *(end for index in (*self.indices, *self.numbered) for end in index),
-        ]
-        return set().union(*(sp.S(part).free_symbols for part in parts))
+        ends = [end for index in (*self.indices, *self.numbered) for end in index]
+        return set().union(*(sp.S(part).free_symbols for part in (self.value, self.times, self.where, *ends)))
 
-    def at(self, numbers: Mapping[sp.Symbol, int]) -> Iterator[tuple[sp.Expr, int, dict[sp.Symbol, int]]]:
-        """Yield (eigenvalue, multiplicity > 0, all numbers) for numbers in place of the sizes."""
-        for all_numbers in _with_indices(self.indices, dict(numbers)):
-            count = int(self.times.subs(all_numbers))
+    def at(self, sizes: Mapping[sp.Symbol, int]) -> Iterator[tuple[sp.Expr, int, dict[sp.Symbol, int]]]:
+        """Yield (eigenvalue, multiplicity > 0, sizes and indices) for numbers in place of the sizes."""
+        for values in _with_indices(self.indices, dict(sizes)):
+            count = int(self.times.subs(values))
             if count:
-                yield self.value.xreplace({s: sp.Integer(k) for s, k in all_numbers.items()}), count, all_numbers
+                yield self.value.xreplace({s: sp.Integer(k) for s, k in values.items()}), count, values
 
-    def vectors(self, numbers: Mapping[sp.Symbol, int]) -> Iterator[sp.Expr]:
-        """Yield the eigenvectors of an eigenvalue as expressions in NODE; `numbers` as of `at`."""
+    def vectors(self, values: Mapping[sp.Symbol, int]) -> Iterator[sp.Expr]:
+        """Yield the eigenvectors of an eigenvalue as expressions in NODE; `values` are sizes and indices."""
         if self.vector is not None:
-            for all_numbers in _with_indices(self.numbered, dict(numbers)):
-                if self.where.subs(all_numbers).doit() == sp.true:
-                    yield self.vector.subs(all_numbers).doit()
+            for all_values in _with_indices(self.numbered, dict(values)):
+                if self.where.subs(all_values).doit() == sp.true:
+                    yield self.vector.subs(all_values).doit()
 
     def replaced(self, new: Mapping[sp.Symbol, sp.Expr]) -> Term:
         """Return the term with other expressions for some of its symbols, all at once."""
@@ -90,15 +85,15 @@ class Term:
 
 
 def _ranges(indices: tuple[Index, ...]) -> str:
-    many = ", ".join(f"{s} = {sp.sstr(low)} … {sp.sstr(high)}" for s, low, high in indices)
-    return f" for {many}" if many else ""
+    ranges = ", ".join(f"{s} = {sp.sstr(low)} … {sp.sstr(high)}" for s, low, high in indices)
+    return f" for {ranges}" if ranges else ""
 
 
-def _with_indices(indices: tuple[Index, ...], numbers: dict[sp.Symbol, int]) -> Iterator[dict[sp.Symbol, int]]:
-    """The numbers with all values of the indices."""
-    ends = [[int(end.subs(numbers)) for end in index[1:]] for index in indices]
-    for place in product(*(range(low, high + 1) for low, high in ends)):
-        yield numbers | {index[0]: k for index, k in zip(indices, place, strict=True)}
+def _with_indices(indices: tuple[Index, ...], values: dict[sp.Symbol, int]) -> Iterator[dict[sp.Symbol, int]]:
+    """Yield the values of the symbols with all values of the indices, whose ends depend on them."""
+    ranges = [range(int(low.subs(values)), int(high.subs(values)) + 1) for _, low, high in indices]
+    for numbers in product(*ranges):
+        yield values | {index[0]: k for index, k in zip(indices, numbers, strict=True)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,8 +110,7 @@ class ClosedForm:
     where: sp.Basic = sp.true  # what the numbers must obey
     lowest: Mapping[sp.Symbol, int] = field(default_factory=dict)  # smallest numbers of single symbols
     name: str = ""  # name of the family with its options
-    # makes the graph for numbers by symbols
-    build: Callable[[Mapping[sp.Symbol, int]], Topology] | None = field(default=None, compare=False)
+    build: Callable[[Mapping[sp.Symbol, int]], Topology] | None = field(default=None, compare=False)  # makes a graph
 
     @property
     def symbols(self) -> tuple[sp.Symbol, ...]:
@@ -132,8 +126,8 @@ class ClosedForm:
 
         Equal eigenvalues are not merged.
         """
-        by_symbol = self.by_symbol(numbers)
-        return [(value, count) for term in self.terms for value, count, _ in term.at(by_symbol)]
+        sizes = self.by_symbol(numbers)
+        return [(value, count) for term in self.terms for value, count, _ in term.at(sizes)]
 
     def graph(self, **numbers: int) -> Topology:
         """Return the graph for numbers as of `at`."""
@@ -147,7 +141,22 @@ class ClosedForm:
 
     def as_dict(self) -> dict[str, object]:
         """Return what `synchain spectrum FAMILY --symbolic --json` prints."""
-        return {"n": sp.sstr(self.size), "terms": [_term_dict(term) for term in self.terms], "note": self.words}
+
+        def ranges(indices: tuple[Index, ...]) -> list[list[str]]:
+            return [[str(s), sp.sstr(low), sp.sstr(high)] for s, low, high in indices]
+
+        terms = [
+            {
+                "value": sp.sstr(term.value),
+                "multiplicity": sp.sstr(term.times),
+                "indices": ranges(term.indices),
+                "vector": None if term.vector is None else sp.sstr(term.vector),
+                "numbered": ranges(term.numbered),
+                "where": None if term.where == sp.true else sp.sstr(term.where),
+            }
+            for term in self.terms
+        ]
+        return {"n": sp.sstr(self.size), "terms": terms, "note": self.words}
 
     @property
     def words(self) -> str:
@@ -166,45 +175,24 @@ class ClosedForm:
 
     def by_symbol(self, numbers: Mapping[str, int]) -> dict[sp.Symbol, int]:
         """Return numbers by symbols instead of names; ValueError as `at`."""
-        known = {str(symbol): symbol for symbol in self.symbols}
-        if set(numbers) != set(known):
-            raise ValueError(f"found numbers for {sorted(numbers)}; expected them for {sorted(known)}")
+        symbols = {str(symbol): symbol for symbol in self.symbols}
+        if set(numbers) != set(symbols):
+            raise ValueError(f"found numbers for {sorted(numbers)}; expected them for {sorted(symbols)}")
         for key, value in numbers.items():
-            if value < self.least_of(known[key]):
-                raise ValueError(f"found {key} = {value}; expected at least {self.least_of(known[key])}")
-        by_symbol = {known[key]: value for key, value in numbers.items()}
+            if value < self.least_of(symbols[key]):
+                raise ValueError(f"found {key} = {value}; expected at least {self.least_of(symbols[key])}")
+        by_symbol = {symbols[key]: value for key, value in numbers.items()}
         if self.where.subs(by_symbol) != sp.true:
             raise ValueError(f"found {numbers}; expected {sp.sstr(self.where)}")
         return by_symbol
 
 
-def _term_dict(term: Term) -> dict[str, object]:
-    def listed(indices: tuple[Index, ...]) -> list[list[str]]:
-        return [[str(s), sp.sstr(low), sp.sstr(high)] for s, low, high in indices]
-
-    return {
-        "value": sp.sstr(term.value),
-        "multiplicity": sp.sstr(term.times),
-        "indices": listed(term.indices),
-        "vector": None if term.vector is None else sp.sstr(term.vector),
-        "numbered": listed(term.numbered),
-        "where": None if term.where == sp.true else sp.sstr(term.where),
-    }
-
-
-def _filled(value: object, numbers: Mapping[sp.Symbol, int]) -> object:
-    """An option with numbers in place of symbols."""
-    if isinstance(value, tuple):
-        return tuple(_filled(part, numbers) for part in value)
-    return int(sp.S(value).subs(numbers))
-
-
-def entries(what: str, given: str | Iterable[object]) -> tuple[sp.Expr, ...]:
+def entries(what: str, sizes: str | Iterable[object]) -> tuple[sp.Expr, ...]:
     """Return the whole numbers and symbols of a list or a text such as "pxq"; else ValueError."""
-    parts = re.split("[,x]", given.replace(" ", "")) if isinstance(given, str) else list(given)
+    parts = re.split("[,x]", sizes.replace(" ", "")) if isinstance(sizes, str) else list(sizes)
     wrong = next((part for part in parts if not _ENTRY.fullmatch(str(part))), None)
     if wrong is not None or not parts:
-        raise ValueError(f"{what} = {given!r}; expected whole numbers or letters other than i and x, e.g. pxq or 1,3,s")
+        raise ValueError(f"{what} = {sizes!r}; expected whole numbers or letters other than i and x, e.g. pxq or 1,3,s")
     return tuple(
         sp.Integer(str(part)) if str(part).isdigit() else sp.Symbol(str(part), integer=True, nonnegative=True)
         for part in parts
@@ -218,27 +206,29 @@ def formulas() -> tuple[str, ...]:
 
 def closed_form(name: str, **options: object) -> ClosedForm:
     """Return the spectrum of a family with symbols for its size."""
-    made = family(name)
-    name, formula = made.name, made.formula
+    name, formula = family(name).name, family(name).formula
     if formula is None:
         raise ValueError(f"topology {name}: no closed form with symbols; known for {', '.join(formulas())}")
-    known = tuple(inspect.signature(formula).parameters)
-    unknown = sorted(set(options) - set(known))
+    valid_options = tuple(inspect.signature(formula).parameters)
+    unknown = sorted(set(options) - set(valid_options))
     if unknown:
-        raise ValueError(f"topology {name}: option {unknown[0]!r} with symbols; known: {', '.join(known) or 'none'}")
+        valid = ", ".join(valid_options) or "none"
+        raise ValueError(f"topology {name}: option {unknown[0]!r} with symbols; known: {valid}")
     try:
         form: ClosedForm = formula(**options)
     except ValueError as error:
         raise ValueError(f"topology {name}: {error}") from None
-    more = ", ".join(f"{key}={_shown(value)}" for key, value in form.options.items() if key in options)
+    shown = ", ".join(
+        f"{key}=({', '.join(map(str, value))})" if isinstance(value, tuple) else f"{key}={value}"
+        for key, value in form.options.items()
+        if key in options
+    )
 
     def build(numbers: Mapping[sp.Symbol, int]) -> Topology:
-        filled = {key: _filled(value, numbers) for key, value in form.options.items()}
-        return topology(name, int(form.size.subs(numbers)), **filled)
+        def put(value: object) -> object:
+            return tuple(map(put, value)) if isinstance(value, tuple) else int(sp.S(value).subs(numbers))
 
-    return replace(form, name=f"{name}({more})" if more else name, build=build)
+        sized = {key: put(value) for key, value in form.options.items()}
+        return topology(name, int(form.size.subs(numbers)), **sized)
 
-
-def _shown(value: object) -> str:
-    """An option as text."""
-    return f"({', '.join(map(str, value))})" if isinstance(value, tuple) else str(value)
+    return replace(form, name=f"{name}({shown})" if shown else name, build=build)

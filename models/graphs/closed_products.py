@@ -22,35 +22,36 @@ Joined = Callable[[Topology, Topology], Topology]
 
 def cartesian(first: ClosedForm, second: ClosedForm) -> ClosedForm:
     """Return all sums of an eigenvalue of each; common symbols get a number in the second form."""
-    both = None if first.degree is None else second.degree
-    first, second = _apart(first, second)
-    degree = None if both is None or second.degree is None else first.degree + second.degree
-    terms = _pairs(first, second, lambda a, b: a + b)
-    return _joined("cartesian", products.cartesian, first, second, terms, degree)
+    second = _apart(first, second)
+    degree = None if first.degree is None or second.degree is None else first.degree + second.degree
+    return _joined(products.cartesian, first, second, _pairs(first, second, lambda a, b: a + b), degree)
 
 
 def kronecker(first: ClosedForm, second: ClosedForm) -> ClosedForm:
     """Return (a + d)(b + e) - d e for eigenvalues a, b and in-degrees d, e."""
-    first, second = _apart(first, second)
+    second = _apart(first, second)
     d, e = first.degree, second.degree
     if d is None or e is None:
         odd = first if d is None else second
         raise ValueError(f"kronecker: nodes of {odd.name} differ in their in-degrees; no closed form is known")
     terms = _pairs(first, second, lambda a, b: (a + d) * (b + e) - d * e)
-    return _joined("kronecker", products.kronecker, first, second, terms, d * e)
+    return _joined(products.kronecker, first, second, terms, d * e)
 
 
 def union(first: ClosedForm, second: ClosedForm) -> ClosedForm:
     """Return the eigenvalues of both; eigenvectors are zero on the nodes of the other graph."""
-    first, second = _apart(first, second)
+    second = _apart(first, second)
     n = first.size
-    terms = [
-        *(_held(term, sp.Piecewise((term.vector, n > NODE), (0, True))) for term in first.terms),
-        *(_held(term, sp.Piecewise((0, n > NODE), (_at(term, NODE - n), True))) for term in second.terms),
-    ]
+    terms: list[Term] = []
+    for term in (*first.terms, *second.terms):
+        vector = term.vector
+        if vector is not None and len(terms) < len(first.terms):
+            vector = sp.Piecewise((vector, n > NODE), (0, True))
+        elif vector is not None:
+            vector = sp.Piecewise((0, n > NODE), (_at(term, NODE - n), True))
+        terms.append(replace(term, vector=vector))
     degree = first.degree if first.degree == second.degree else None
-    found = _joined("union", products.union, first, second, tuple(terms), degree)
-    return replace(found, size=n + second.size)
+    return replace(_joined(products.union, first, second, tuple(terms), degree), size=n + second.size)
 
 
 def box(part: ClosedForm, sizes: Sequence[sp.Expr], indices: Sequence[sp.Symbol]) -> ClosedForm:
@@ -58,7 +59,7 @@ def box(part: ClosedForm, sizes: Sequence[sp.Expr], indices: Sequence[sp.Symbol]
     (n,) = part.symbols
     ((old, _, _),) = part.terms[0].indices
     parts = [renamed(part, {n: size, old: k}) for size, k in zip(sizes, indices, strict=True)]
-    return reduce(lambda found, one: cartesian(one, found), reversed(parts[:-1]), parts[-1])
+    return reduce(lambda later, earlier: cartesian(earlier, later), reversed(parts[:-1]), parts[-1])
 
 
 def counters(sizes: Sequence[sp.Expr]) -> tuple[sp.Symbol, ...]:
@@ -78,11 +79,9 @@ def renamed(form: ClosedForm, new: Mapping[sp.Symbol, sp.Expr]) -> ClosedForm:
     def build(numbers: Mapping[sp.Symbol, int]) -> Topology:
         return form.graph_of({old: int(new.get(old, old).subs(numbers)) for old in form.symbols})
 
-    small = next(
-        (f"{old} = {value}" for old, value in new.items() if value.is_Integer and value < form.least_of(old)), ""
-    )
-    if small:
-        raise ValueError(f"{form.name}: found {small}; expected a larger number")
+    for old, value in new.items():
+        if value.is_Integer and value < form.least_of(old):
+            raise ValueError(f"{form.name}: found {old} = {value}; expected a larger number")
     lowest = {new.get(old, old): form.least_of(old) for old in form.symbols if not new.get(old, old).is_Integer}
     return replace(
         form,
@@ -95,8 +94,8 @@ def renamed(form: ClosedForm, new: Mapping[sp.Symbol, sp.Expr]) -> ClosedForm:
     )
 
 
-def _apart(first: ClosedForm, second: ClosedForm) -> tuple[ClosedForm, ClosedForm]:
-    """Both forms; the second with other letters for those of the first."""
+def _apart(first: ClosedForm, second: ClosedForm) -> ClosedForm:
+    """Return the second form with other letters for those of the first."""
     taken = {str(s) for s in _letters(first)} | {str(NODE)}
     new = {}
     for symbol in sorted(_letters(second), key=str):
@@ -106,43 +105,44 @@ def _apart(first: ClosedForm, second: ClosedForm) -> tuple[ClosedForm, ClosedFor
         if name != str(symbol):
             new[symbol] = sp.Symbol(name, integer=True, nonnegative=True)
         taken.add(name)
-    return first, renamed(second, new)
+    return renamed(second, new)
 
 
 def _letters(form: ClosedForm) -> set[sp.Symbol]:
-    """All symbols of a form but that of the node."""
+    """Return all symbols of a form but that of the node."""
     indices = {s for term in form.terms for s, _, _ in (*term.indices, *term.numbered)}
     return set(form.symbols).union(indices, *(term.symbols for term in form.terms))
 
 
 def _pairs(first: ClosedForm, second: ClosedForm, combine: Callable[[sp.Expr, sp.Expr], sp.Expr]) -> tuple[Term, ...]:
-    """A term for each pair; node i is i // n of the first graph and i mod n of the second."""
-    n, found = second.size, []
+    """Return a term for each pair; node i is i // n of the first graph and i mod n of the second."""
+    n, terms = second.size, []
     for a, b in product(first.terms, second.terms):
         vector = None
         if a.vector is not None and b.vector is not None:
             vector = _at(a, sp.floor(NODE / n)) * _at(b, sp.Mod(NODE, n))
-        indices, numbered = a.indices + b.indices, a.numbered + b.numbered
-        found.append(
-            Term(combine(a.value, b.value), a.times * b.times, indices, vector, numbered, sp.And(a.where, b.where))
+        terms.append(
+            Term(
+                combine(a.value, b.value),
+                a.times * b.times,
+                a.indices + b.indices,
+                vector,
+                a.numbered + b.numbered,
+                sp.And(a.where, b.where),
+            )
         )
-    return tuple(found)
+    return tuple(terms)
 
 
 def _at(term: Term, node: sp.Expr) -> sp.Expr:
-    """Another entry of the eigenvector of a term."""
+    """Return the entry of the eigenvector of a term at another node."""
     return sp.S(term.vector).xreplace({NODE: node})
 
 
-def _held(term: Term, vector: sp.Expr) -> Term:
-    """The term with another eigenvector, if it has one."""
-    return replace(term, vector=None if term.vector is None else vector)
-
-
 def _joined(
-    name: str, operation: Joined, first: ClosedForm, second: ClosedForm, terms: tuple[Term, ...], degree: sp.Expr | None
+    operation: Joined, first: ClosedForm, second: ClosedForm, terms: tuple[Term, ...], degree: sp.Expr | None
 ) -> ClosedForm:
-    lowest = {s: form.least_of(s) for form in (first, second) for s in form.symbols}
+    """Return the form of an operation of `products` with these terms, of first.size * second.size nodes."""
     defective = " and ".join(dict.fromkeys(form.name for form in (first, second) if form.blocks))
     return ClosedForm(
         terms,
@@ -151,7 +151,7 @@ def _joined(
         blocks=f"defective, as {defective} is; Jordan blocks are found for given sizes" if defective else "",
         degree=degree,
         where=sp.And(first.where, second.where),
-        lowest=lowest,
-        name=f"{name}({first.name}, {second.name})",
+        lowest={s: form.least_of(s) for form in (first, second) for s in form.symbols},
+        name=f"{operation.__name__}({first.name}, {second.name})",
         build=lambda numbers: operation(first.graph_of(numbers), second.graph_of(numbers)),
     )

@@ -62,7 +62,7 @@ class _Signature:
     """The signature of a call of a family: n, and the options with their defaults."""
 
     def __get__(self, instance: Family | None, owner: type[Family]) -> inspect.Signature:
-        if instance is None:
+        if instance is None:  # `inspect.signature(Family)` is that of the constructor
             raise AttributeError("__signature__")
         kind = inspect.Parameter
         options = (kind(name, kind.KEYWORD_ONLY, default=value) for name, value in instance.options.items())
@@ -71,7 +71,7 @@ class _Signature:
 
 @lru_cache(maxsize=256)
 def _options(edges: Edges) -> Mapping[str, object]:
-    """The keyword-only parameters of a function with their defaults."""
+    """Return the keyword-only parameters of a function with their defaults."""
     parameters = inspect.signature(edges).parameters.values()
     return {p.name: p.default for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY}
 
@@ -158,16 +158,16 @@ class Family:
             raise ValueError(
                 f"found no settle for the options {', '.join(self.options)}; expected one that checks them"
             )
-        for function in ("settle", "count", "expected", "spectrum"):
-            if getattr(self, function) is None:
-                continue
-            taken = dict(list(inspect.signature(getattr(self, function)).parameters.items())[1:])
-            for name, parameter in taken.items():
-                if name not in self.options and parameter.default is inspect.Parameter.empty:
-                    raise ValueError(f"{function} has the argument {name!r}, which is no option of edges")
-            for name in self.options:
-                if name not in taken:
-                    raise ValueError(f"{function} lacks the option {name!r} of edges; expected the same ones")
+        # all functions take n and the same options
+        for name in ("settle", "count", "expected", "spectrum"):
+            if (function := getattr(self, name)) is not None:
+                parameters = list(inspect.signature(function).parameters)[1:]
+                for option in parameters:
+                    if option not in self.options:
+                        raise ValueError(f"{name} has the argument {option!r}, which is no option of edges")
+                for option in self.options:
+                    if option not in parameters:
+                        raise ValueError(f"{name} lacks the option {option!r} of edges; expected the same ones")
 
     @property
     def options(self) -> Mapping[str, object]:
@@ -181,11 +181,18 @@ class Family:
             raise TypeError(
                 f"topology {self.name}: found {len(sizes)} arguments for n; expected {self.name}{inspect.signature(self)}"
             )
-        size = self._size(sizes[0])
+        if isinstance(sizes[0], bool) or not hasattr(sizes[0], "__index__"):
+            raise TypeError(
+                f"topology {self.name}: n = {sizes[0]!r} is a {type(sizes[0]).__name__}; expected an integer"
+            )
+        size = operator.index(sizes[0])
+        if size < self.minimum:
+            raise ValueError(f"topology {self.name}: n = {size}; expected at least {self.minimum}: {self.too_small}")
         settled = self._settled(size, options)
-        number = self.count if self.expected is None and "seed" in self.options else self.expected
-        if number is not None:  # of graphs by chance, which are drawn to be used at once
-            self.limit_links(size, self.links_of_edge * number(size, **dict(settled)))
+        # Graphs by chance are drawn to be used at once: refuse too many links now, others when links are listed.
+        edge_count = self.count if self.expected is None and "seed" in self.options else self.expected
+        if edge_count is not None:
+            self.limit_links(size, self.links_of_edge * edge_count(size, **dict(settled)))
         return Topology(self.name, size, None, settled, FamilyRule(self, size, settled))
 
     def __eq__(self, other: object) -> bool:
@@ -213,15 +220,6 @@ class Family:
                 f"expected at most {self.link_limit}: reduce n"
             )
 
-    def _size(self, n: object) -> int:
-        """Return the number of nodes; TypeError for no integer, ValueError below the minimum."""
-        if isinstance(n, bool) or not hasattr(n, "__index__"):
-            raise TypeError(f"topology {self.name}: n = {n!r} is a {type(n).__name__}; expected an integer")
-        size = operator.index(n)
-        if size < self.minimum:
-            raise ValueError(f"topology {self.name}: n = {size}; expected at least {self.minimum}: {self.too_small}")
-        return size
-
     def _settled(self, n: int, options: Mapping[str, object]) -> Options:
         """Return the options as a graph stores them, checked by `settle`."""
         for key in options:
@@ -245,7 +243,7 @@ class Family:
 
 @dataclass(frozen=True, slots=True)
 class FamilyRule:
-    """The rule of a graph that a family made: the family, the number of nodes and the options."""
+    """The rule of a graph that a family made."""
 
     family: Family
     n: int
@@ -331,39 +329,30 @@ def family(name: str) -> Family:
     loaded: Family = plugins.load(TOPOLOGY, canonical)
     if plugins.is_shipped(TOPOLOGY, canonical):
         return loaded
-    # Errors in the functions of a file from outside name file and line.
-    guarded: dict[str, Any] = {"edges": _guarded_edges(loaded.edges)}
-    for key in ("count", "expected"):
-        if (function := getattr(loaded, key)) is not None:
-            guarded[key] = plugins.blamed(function)(function)
-    if loaded.spectrum is not None:
-        guarded["spectrum"] = _guarded_spectrum(loaded.spectrum, getattr(canonical, "path", name))
-    return replace(loaded, **guarded)
 
+    # Of a file from outside, errors in functions name file and line, and what the functions return is checked.
+    def blamed(function: Callable[..., Any] | None) -> Callable[..., Any] | None:
+        return None if function is None else plugins.blamed(function)(function)
 
-def _guarded_edges(edges: Edges) -> Edges:
-    """Edges whose errors name file and line, wrong weights too."""
+    @wraps(loaded.edges)
+    def edges(n: int, **options: object) -> Iterator[tuple[int, int, Fraction]]:
+        with plugins.blamed(loaded.edges):
+            yield from ((i, j, Fraction(weight)) for i, j, weight in loaded.edges(n, **options))
 
-    @wraps(edges)
-    def guarded(n: int, **options: object) -> Iterator[tuple[int, int, Fraction]]:
-        with plugins.blamed(edges):
-            yield from ((i, j, Fraction(weight)) for i, j, weight in edges(n, **options))
-
-    return guarded
-
-
-def _guarded_spectrum(spectrum: Callable[..., Eigenvalues], path: str) -> Callable[..., Eigenvalues]:
-    """A closed form whose errors name file and line; ValueError if it returns no list of (eigenvalue, multiplicity)."""
+    guarded = replace(loaded, edges=edges, count=blamed(loaded.count), expected=blamed(loaded.expected))
+    if (spectrum := loaded.spectrum) is None:
+        return guarded
 
     @wraps(spectrum)
-    def guarded(n: int, **options: object) -> Eigenvalues:
+    def checked(n: int, **options: object) -> Eigenvalues:
         with plugins.blamed(spectrum):
             pairs: Eigenvalues = spectrum(n, **options)
         for pair in () if pairs is None else pairs if isinstance(pairs, Sequence) else (pairs,):
             if not (isinstance(pair, tuple) and len(pair) == 2 and isinstance(pair[1], int) and pair[1] > 0):
                 raise ValueError(
-                    f"{path}: spectrum({n}) has {pair!r}; expected a list of (eigenvalue, multiplicity) or None"
+                    f"{getattr(canonical, 'path', name)}: spectrum({n}) has {pair!r}; expected a list of "
+                    "(eigenvalue, multiplicity) or None"
                 )
         return pairs
 
-    return guarded
+    return replace(guarded, spectrum=checked)

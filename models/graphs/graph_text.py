@@ -6,7 +6,7 @@ Such texts are the names that `products` gives its graphs.
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, NoReturn, TypeVar
 
@@ -22,14 +22,20 @@ if TYPE_CHECKING:
 V = TypeVar("V")
 
 LENGTH, DEPTH = 300, 8
+"""Most characters of a text and most nested operations, a choice."""
+
 LARGEST = 1_000_000
-"""Most nodes of a graph whose name is read."""
-PAIRS, SIZED = ("cartesian", "kronecker", "union"), ("complement", "weighted")
-"""Operations of two graphs, and of one: these have no closed form without sizes."""
+"""Most nodes of a graph whose name `checked_name` reads, a choice."""
+
+PAIRS = ("cartesian", "kronecker", "union")
+"""Operations on two graphs; they act on closed forms too."""
+
+SIZED = ("complement", "weighted")
+"""Operations on one graph, which have no closed form without sizes."""
 
 
 def is_composed(text: str) -> bool:
-    """True where a text is one of an operation on graphs, not the name of a family."""
+    """Return whether a text is an operation on graphs, not the name of a family."""
     return "(" in text
 
 
@@ -39,7 +45,7 @@ def read_graph(text: str, largest: int | None = None, seeds: Iterator[int] | Non
 
 
 def checked_name(what: str, graph: Topology) -> Topology:
-    """Return a graph; ValueError if it has the name of a family or of an operation on graphs, and not its links."""
+    """Return a graph; ValueError if its name means a graph of a family or operation that has other links."""
     composed = is_composed(graph.name)
     if graph.rule is not None or not (composed or graph.name in (*names(), *TOPOLOGY.also)):
         return graph
@@ -48,7 +54,7 @@ def checked_name(what: str, graph: Topology) -> Topology:
         named = read_graph(text, LARGEST)
         same = named.n == graph.n and named.links == graph.links
     except (ValueError, TypeError):
-        same = composed  # a name of its own that has parentheses
+        same = composed  # parentheses in a name that means no graph
     if not same:
         raise ValueError(
             f"{what}: found the name {short_repr(graph.name)} and links other than those of {text}; expected a graph by "
@@ -64,7 +70,7 @@ def read_form(text: str) -> ClosedForm:
 
 @dataclass(frozen=True, slots=True)
 class _Composed(Algebra[V]):
-    """What texts of operations stand for; a text that stands for nothing is refused as a whole."""
+    """Values of texts of operations; a text without a value is refused as a whole."""
 
     text: str
     deepest = DEPTH
@@ -86,7 +92,7 @@ class _Composed(Algebra[V]):
 
 
 def _value(composed: _Composed[V]) -> V:
-    """What the text stands for; ValueError if it is too long, or stands for nothing."""
+    """Return the value of the text; ValueError if it is too long or has none."""
     expression = parse(composed.text) if len(composed.text) <= LENGTH else None
     if expression is None:
         raise composed.unreadable
@@ -95,10 +101,10 @@ def _value(composed: _Composed[V]) -> V:
 
 @dataclass(frozen=True, slots=True)
 class _Graphs(_Composed[Topology]):
-    """Graphs: families with their sizes, and the operations on them."""
+    """Graphs: families with their sizes, and operations on them."""
 
     largest: int | None
-    seeds: Iterator[int] | None = None
+    seeds: Iterator[int] | None = None  # one for each graph of a random family
     what = "graph"
     expected = f"{', '.join((*PAIRS, *SIZED))}, e.g. cartesian(chain(4), ring(5))"
 
@@ -117,12 +123,8 @@ class _Graphs(_Composed[Topology]):
         match function, arguments:
             case "cartesian" | "kronecker" | "union", [Topology() as first, Topology() as second]:
                 self._check_size(first.n + second.n if function == "union" else first.n * second.n)
-                operations = {
-                    "cartesian": products.cartesian,
-                    "kronecker": products.kronecker,
-                    "union": products.union,
-                }
-                return operations[function](first, second)
+                operation: Callable[[Topology, Topology], Topology] = getattr(products, function)
+                return operation(first, second)
             case "complement", [Topology() as graph]:
                 return products.complement(graph)
             case "weighted", [Topology() as graph, str() as factor]:
@@ -133,16 +135,12 @@ class _Graphs(_Composed[Topology]):
                 except ValueError:
                     raise NoMeaning from None
                 self._check_size(n)
-                return topology(function, n, **options, **self._seed(function, options))
+                if self.seeds is None or "seed" not in family(function).options:
+                    return topology(function, n, **options)
+                if "seed" in options:
+                    raise ValueError(f"{self.text[:60]}: found a seed; expected none where seeds are drawn")
+                return topology(function, n, **options, seed=next(self.seeds))
         raise NoMeaning
-
-    def _seed(self, function: str, options: Mapping[str, str]) -> dict[str, int]:
-        """The next seed for a random family, if there are seeds."""
-        if self.seeds is None or "seed" not in family(function).options:
-            return {}
-        if "seed" in options:
-            raise ValueError(f"{self.text[:60]}: found a seed; expected none where seeds are drawn")
-        return {"seed": next(self.seeds)}
 
     def _check_size(self, n: int) -> None:
         if self.largest is not None and n > self.largest:
@@ -179,9 +177,5 @@ class _Forms(_Composed["ClosedForm"]):
 
         if not arguments:
             return closed_form(function, **options)
-        operations = {
-            "cartesian": closed_products.cartesian,
-            "kronecker": closed_products.kronecker,
-            "union": closed_products.union,
-        }
-        return operations[function](*arguments)
+        operation: Callable[..., ClosedForm] = getattr(closed_products, function)
+        return operation(*arguments)

@@ -1,6 +1,4 @@
-"""The links of a graph: their type, their greatest number, their sums, the parts that they join,
-and the links of all pairs, which are not listed.
-"""
+"""Links of a graph, listed or between all pairs; sums of their weights, and the parts that they join."""
 
 from __future__ import annotations
 
@@ -11,7 +9,7 @@ from itertools import islice
 from typing import TypeAlias
 
 LINK_LIMIT = 4_000_000
-"""Greatest number of links of a graph: more take above 600 MB."""
+"""Greatest number of links of a graph, a choice: these take about 600 MB as tuples of Python."""
 
 Link: TypeAlias = tuple[int, int, Fraction]
 """(target, source, weight): node `target` feels node `source`; indices start at 0."""
@@ -48,7 +46,7 @@ Links: TypeAlias = tuple[Link, ...] | AllPairs
 
 
 def one_degree(n: int, links: Iterable[Link]) -> Fraction | None:
-    """Return the sum of weights that every one of n nodes feels; None if it is not one for all."""
+    """Return the in-degree of n nodes, the sum of the weights that each feels; None if they differ."""
     sums = [Fraction(0)] * n
     for target, _, weight in links:
         sums[target] += weight
@@ -66,7 +64,7 @@ def join(n: int, pairs: Iterable[tuple[int, int]]) -> tuple[int, ...]:
 
     def root(i: int) -> int:
         while parent[i] != i:
-            parent[i] = parent[parent[i]]
+            parent[i] = parent[parent[i]]  # halve the path
             i = parent[i]
         return i
 
@@ -79,4 +77,4 @@ def join(n: int, pairs: Iterable[tuple[int, int]]) -> tuple[int, ...]:
 def numbered(classes: Iterable[Hashable]) -> tuple[int, ...]:
     """Return the class of each node as a number from 0, in the order of the first members."""
     order: dict[Hashable, int] = {}
-    return tuple(order.setdefault(own, len(order)) for own in classes)
+    return tuple(order.setdefault(label, len(order)) for label in classes)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Exact:
-    """A matrix of a graph that says what its entries are: its rows, its exact spectrum and eigenvectors."""
+    """Rows, exact spectrum and eigenvectors of a matrix by its entries; a mixin of `Topology` and `GraphMatrix`."""
 
     __slots__ = ()
 
@@ -36,8 +36,8 @@ class Exact:
         """The matrix as n rows of n fractions."""
         zero = Fraction(0)
         table = [[zero] * self.n for _ in range(self.n)]
-        for i, j, number in self.entries:
-            table[i][j] = number
+        for i, j, entry in self.entries:
+            table[i][j] = entry
         return tuple(map(tuple, table))
 
     @property
@@ -46,8 +46,8 @@ class Exact:
         import sympy as sp
 
         table = sp.zeros(self.n)
-        for i, j, number in self.entries:
-            table[i, j] = sp.Rational(number.numerator, number.denominator)
+        for i, j, entry in self.entries:
+            table[i, j] = sp.Rational(entry.numerator, entry.denominator)
         return table.as_immutable()
 
     @property
@@ -82,7 +82,7 @@ class MatrixKind(StrEnum):
 
 
 class GraphMatrices(Matrix, Protocol):
-    """What its other matrices know of a graph, which is the matrix G itself; a `Topology` is one."""
+    """A graph, which is its matrix G, with the links of its other matrices; a `Topology` is one."""
 
     @property
     def links(self) -> tuple[Link, ...]:
@@ -94,7 +94,7 @@ class GraphMatrices(Matrix, Protocol):
 
     @property
     def asymmetry(self) -> str:
-        """In words, the first links that do not act both ways with one weight; "" if all do."""
+        """Text on the first links that do not act both ways with one weight; "" if all do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,9 +110,9 @@ class GraphMatrix(Exact):
         if self.graph.asymmetry:
             raise ValueError(f"{self.name}: found {self.graph.asymmetry}; expected an undirected graph")
         if self.kind is MatrixKind.RANDOM_WALK:
-            wrong = next(((i, d) for i, d in self._degrees.items() if d <= 0), None)
-            if wrong is not None:
-                raise ValueError(f"{self.name}: node {wrong[0]} has the degree {wrong[1]}; expected a positive one")
+            for i, degree in self._degrees.items():
+                if degree <= 0:
+                    raise ValueError(f"{self.name}: node {i} has the degree {degree}; expected a positive one")
 
     @property
     def name(self) -> str:
@@ -161,24 +161,18 @@ class GraphMatrix(Exact):
         from ..algebra.cosine_sums import AngleSum, expressions
         from ..spectra.angle_sums import angle_sums
 
-        map_of_gamma = self._map
-        known = None if map_of_gamma is None or self.graph.closed_form() is None else angle_sums(self.graph)
-        if map_of_gamma is None or known is None:
+        # The matrix is a G + b if it is the Laplacian, or if all nodes have one in-degree d.
+        d = one_degree(self.n, self.graph.links) if self.kind is not MatrixKind.LAPLACIAN else Fraction(0)
+        if d is None or self.graph.closed_form() is None or (gammas := angle_sums(self.graph)) is None:
             return None
-        factor, shift = (AngleSum.rational(x) for x in map_of_gamma)
-        return expressions([(factor * gamma + shift, times) for gamma, times in known])
-
-    @property
-    def _map(self) -> tuple[Fraction, Fraction] | None:
-        """(a, b) if the matrix is a G + b; None of any other."""
-        if self.kind is MatrixKind.LAPLACIAN:
-            return Fraction(-1), Fraction(0)
-        d = one_degree(self.n, self.graph.links)
-        if d is None:
-            return None
-        if self.kind is MatrixKind.RANDOM_WALK:
-            return (-1 / d if d else Fraction(0)), Fraction(0)
-        return Fraction(1), d if self.kind is MatrixKind.ADJACENCY else 2 * d
+        a, b = {
+            MatrixKind.LAPLACIAN: (Fraction(-1), Fraction(0)),
+            MatrixKind.ADJACENCY: (Fraction(1), d),
+            MatrixKind.SIGNLESS: (Fraction(1), 2 * d),
+            MatrixKind.RANDOM_WALK: (-1 / d if d else Fraction(0), Fraction(0)),
+        }[self.kind]
+        factor, shift = AngleSum.rational(a), AngleSum.rational(b)
+        return expressions([(factor * gamma + shift, times) for gamma, times in gammas])
 
     def __repr__(self) -> str:
         return f"GraphMatrix({self.graph!r}, {str(self.kind)!r})"

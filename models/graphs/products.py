@@ -151,6 +151,7 @@ def _eigenvalues(graphs: tuple[Topology, ...], combine: Callable[..., Sums]) -> 
     return None if None in spectra else expressions(combine(*spectra))
 
 
+@dataclass(frozen=True, slots=True)
 class Cartesian(_Operation):
     """The rule of a Cartesian product (Brouwer & Haemers 1.4.6): eigenvalues a + b."""
 
@@ -170,6 +171,7 @@ class Cartesian(_Operation):
         return _eigenvalues(self.graphs, lambda a, b: [(x + y, m * k) for (x, m), (y, k) in product(a, b)])
 
 
+@dataclass(frozen=True, slots=True)
 class Kronecker(_Operation):
     """The rule of a tensor product (1.4.7): eigenvalues (a + d)(b + e) - d e if d and e are all in-degrees."""
 
@@ -196,6 +198,7 @@ class Kronecker(_Operation):
         )
 
 
+@dataclass(frozen=True, slots=True)
 class Union(_Operation):
     """The rule of two graphs side by side (1.3.6): the eigenvalues of both."""
 
@@ -215,6 +218,7 @@ class Union(_Operation):
         return _eigenvalues(self.graphs, lambda a, b: [*a, *b])
 
 
+@dataclass(frozen=True, slots=True)
 class Complement(_Operation):
     """The rule of a complement (1.3.8): the 0 of the vector of ones stays, each other γ becomes -(n + γ)."""
 

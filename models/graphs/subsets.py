@@ -1,4 +1,4 @@
-"""Graphs whose nodes are the k-subsets of a set: how many there are, and which is which."""
+"""The k-subsets of a set, which are the nodes of Johnson and Kneser graphs."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ if TYPE_CHECKING:
 
 def ground_set(n: int, k: int) -> int:
     """Return the number of elements of a set that has n subsets of k elements."""
+    # C(m, k) rises with m: double, then bisect to two neighbours C(low, k) < n <= C(high, k)
     low, high = k, k + 1
     while comb(high, k) < n:
         low, high = high, 2 * high
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (low, middle) if comb(middle, k) >= n else (middle, high)
-    found = next((m for m in (low, high) if comb(m, k) == n), None)
-    if found is None:
-        raise ValueError(
-            f"found n = {n} with k = {k}; expected a number of {k}-subsets, such as {comb(low, k)} (of a set of {low}) "
-            f"or {comb(high, k)} (of a set of {high})"
-        )
-    return found
+    for elements in (low, high):
+        if comb(elements, k) == n:
+            return elements
+    raise ValueError(
+        f"found n = {n} with k = {k}; expected a number of {k}-subsets, such as {comb(low, k)} (of a set of {low}) "
+        f"or {comb(high, k)} (of a set of {high})"
+    )
 
 
 def numbered(m: int, k: int) -> dict[tuple[int, ...], int]:
@@ -42,7 +43,7 @@ def size(k: int) -> sp.Expr:
 
 
 def multiplicity() -> sp.Expr:
-    """Return C(p, j) - C(p, j - 1), the dimension of the j-th common eigenspace, in symbols p and j."""
+    """Return C(p, j) - C(p, j - 1) in symbols p and j: the dimension of the j-th eigenspace of the Johnson scheme."""
     from sympy import binomial
 
     from .closed_forms import J, P

@@ -18,14 +18,17 @@ from typing import NoReturn
 
 import sympy as sp
 
+from ..algebra.rationals import to_sympy
 from ..inputs.rational_text import file_text, parse_rows, rational, square
 from ..inputs.reader import Algebra, NoMeaning, parse
 from ..spectra.symbolic_spectrum import SymbolicSpectrum, Z, symbolic_spectrum
 from .topology import Topology, from_matrix
 
 LARGEST, LENGTH, DEPTH, EXPONENT = 30, 200, 20, 12
+"""Most nodes, characters of a weight, nested operations and highest power, a choice."""
+
 DEGREE, TERMS, BITS = 60, 2000, 10_000
-"""Largest degree, number of terms and bits of a number that a weight may have once it is multiplied out."""
+"""Largest degree, number of terms and bits of a number that a weight may have once it is multiplied out, a choice."""
 
 _LETTERS = re.compile(r"[A-Za-z0-9_+\-*/(). ]*", re.ASCII)
 _EXPECTED = "expected whole numbers, fractions, letters, + - * / **, e.g. a/2 or 1/(1+b)"
@@ -59,15 +62,14 @@ class SymbolicTopology:
         return symbolic_spectrum(self.matrix, self.name)
 
     def at(self, **values: object) -> Topology:
-        """The graph with rational numbers for all symbols; weights that become 0 are left out.
+        """Return the graph with rational numbers for all symbols, without the links whose weights become 0.
 
         Raises ValueError on a missing or unknown symbol, a number that is not rational and a division by zero.
         """
-        known = {str(symbol): symbol for symbol in self.symbols}
-        if set(values) != set(known):
-            raise ValueError(f"{self.name}: found values of {sorted(values)}; expected them of {sorted(known)}")
-        numbers = {known[key]: rational(value, f"{self.name}: {key}") for key, value in values.items()}
-        exact = {symbol: sp.Rational(x.numerator, x.denominator) for symbol, x in numbers.items()}
+        symbols = {str(symbol): symbol for symbol in self.symbols}
+        if set(values) != set(symbols):
+            raise ValueError(f"{self.name}: found values of {sorted(values)}; expected them of {sorted(symbols)}")
+        exact = {symbols[key]: to_sympy(rational(value, f"{self.name}: {key}")) for key, value in values.items()}
         rows = [[sp.S.Zero] * self.n for _ in range(self.n)]
         for target, source, w in self.links:
             value = w.subs(exact)
@@ -81,7 +83,7 @@ class SymbolicTopology:
 
 
 def from_symbols(rows: Iterable[Iterable[object]] | sp.MatrixBase, name: str = "matrix") -> SymbolicTopology:
-    """The graph of a connectivity matrix of rational functions: SymPy expressions, numbers or texts such as "a/2".
+    """Return the graph of a connectivity matrix of rational functions: SymPy expressions, numbers or texts such as "a/2".
 
     Every row must sum to zero.  Raises ValueError on another shape, a row sum that is not 0, more than LARGEST nodes and
     an entry that is no rational function.
@@ -102,31 +104,36 @@ def from_symbols(rows: Iterable[Iterable[object]] | sp.MatrixBase, name: str = "
 
 
 def read_symbols(path: str | Path) -> SymbolicTopology:
-    """The graph of a text file, as `topology.read_matrix` reads it, with letters in its entries; nothing in it is run."""
+    """Return the graph of a text file as `topology.read_matrix` does, with letters in its entries; nothing in it is run."""
     text, name = file_text(path, "matrix file")
     return from_symbols(parse_rows(text, name), name)
 
 
 def weight(entry: object, where: str) -> sp.Expr:
-    """A rational function in lowest terms; ValueError on anything else, and on the letter z."""
+    """Return a rational function in lowest terms; ValueError on anything else, and on the letter z."""
     if isinstance(entry, str):
-        found = _read(entry.strip(), where)
+        text = entry.strip()
+        if len(text) > LENGTH or not _LETTERS.fullmatch(text):
+            raise ValueError(f"{where} is {text[:40]!r}; {_EXPECTED}")
+        parsed = parse(text)
+        if parsed is None:
+            raise ValueError(f"{where} is {text!r}; {_EXPECTED}")
+        expr = parsed.evaluate(_Weights(text, where))
     elif isinstance(entry, sp.Expr) and entry.free_symbols:
-        found = entry
+        expr = entry
     else:
-        number = rational(entry, where)
-        found = sp.Rational(number.numerator, number.denominator)
-    if found.has(sp.zoo, sp.nan) or not found.is_rational_function(*found.free_symbols) or found.atoms(sp.Float):
+        expr = to_sympy(rational(entry, where))
+    if expr.has(sp.zoo, sp.nan) or not expr.is_rational_function(*expr.free_symbols) or expr.atoms(sp.Float):
         raise ValueError(f"{where} is {entry}; {_EXPECTED}")
-    if Z in found.free_symbols or any(str(s) == "z" for s in found.free_symbols):
+    if Z in expr.free_symbols or any(str(s) == "z" for s in expr.free_symbols):
         raise ValueError(f"{where} is {entry}; z is the variable of the characteristic polynomial: rename the weight")
-    _check_size(found, where)
-    return sp.cancel(found)
+    _size(expr, where)
+    return sp.cancel(expr)
 
 
 @dataclass(frozen=True, slots=True)
 class _Size:
-    """At most so many terms above and below the line, and so high a degree, of an expression that is multiplied out."""
+    """Bounds on an expression that is multiplied out: terms above and below the line, and the degree."""
 
     above: int = 1
     below: int = 1
@@ -147,37 +154,23 @@ class _Size:
         return _Size(comb(self.above + power - 1, power), comb(self.below + power - 1, power), self.degree * power)
 
 
-def _check_size(found: sp.Expr, where: str) -> None:
-    """Refuse an expression that is too large multiplied out, before it is."""
-
-    def size(e: sp.Expr) -> _Size:
-        if e.is_Symbol:
-            return _Size(degree=1)
-        if e.is_Pow and e.exp.is_Integer:
-            inner = size(e.base)
-            made = inner ** int(e.exp) if inner.degree * abs(int(e.exp)) <= DEGREE else _Size(degree=DEGREE + 1)
-        elif e.is_Add or e.is_Mul:
-            parts = [size(part) for part in e.args]
-            made = reduce(add if e.is_Add else mul, parts)
-        else:
-            return _Size()
-        if made.degree > DEGREE or max(made.above, made.below) > TERMS:
-            raise ValueError(
-                f"{where} may have more than {TERMS} terms or a degree above {DEGREE} when multiplied out; "
-                "write it shorter or give the weight a letter of its own"
-            )
-        return made
-
-    size(found)
-
-
-def _read(text: str, where: str) -> sp.Expr:
-    if len(text) > LENGTH or not _LETTERS.fullmatch(text):
-        raise ValueError(f"{where} is {text[:40]!r}; {_EXPECTED}")
-    expression = parse(text)
-    if expression is None:
-        raise ValueError(f"{where} is {text!r}; {_EXPECTED}")
-    return expression.evaluate(_Weights(text, where))
+def _size(expr: sp.Expr, where: str) -> _Size:
+    """Return bounds on an expression before it is multiplied out; ValueError if it is too large."""
+    if expr.is_Symbol:
+        return _Size(degree=1)
+    if expr.is_Pow and expr.exp.is_Integer:
+        base, power = _size(expr.base, where), int(expr.exp)
+        size = base**power if base.degree * abs(power) <= DEGREE else _Size(degree=DEGREE + 1)
+    elif expr.is_Add or expr.is_Mul:
+        size = reduce(add if expr.is_Add else mul, [_size(part, where) for part in expr.args])
+    else:
+        return _Size()
+    if size.degree > DEGREE or max(size.above, size.below) > TERMS:
+        raise ValueError(
+            f"{where} may have more than {TERMS} terms or a degree above {DEGREE} when multiplied out; "
+            "write it shorter or give the weight a letter of its own"
+        )
+    return size
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,8 +188,7 @@ class _Weights(Algebra[sp.Expr]):
         raise ValueError(f"{self.where} is {self.text!r}, nested more than {DEPTH} times; write it shorter")
 
     def number(self, value: int | float) -> sp.Expr:
-        number = rational(value, self.where)
-        return sp.Rational(number.numerator, number.denominator)
+        return to_sympy(rational(value, self.where))
 
     def name(self, name: str) -> sp.Expr:
         return sp.Symbol(name)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class Rule(Protocol):
-    """How a graph came about: what is known without its links, and the links themselves.
+    """The family or operation that made a graph: its links, and facts about it that need no links.
 
     Equal rules make equal graphs.
     """
@@ -99,9 +99,9 @@ class Topology(Exact, HasDrawing):
         if links is not None or rule is None:
             _check_size(name, n)
             _check_links(name, n, links)
-        called = None if labels is None else _node_labels(name, n, labels)
-        values = (name, n, options, rule, links, called)
-        for key, value in zip(("name", "n", "options", "rule", "_links", "_labels"), values, strict=True):
+        own_labels = None if labels is None else _node_labels(name, n, labels)
+        values = {"name": name, "n": n, "options": options, "rule": rule, "_links": links, "_labels": own_labels}
+        for key, value in values.items():
             object.__setattr__(self, key, value)
 
     def __eq__(self, other: object) -> bool:
@@ -163,7 +163,7 @@ class Topology(Exact, HasDrawing):
 
     @property
     def asymmetry(self) -> str:
-        """The first two nodes whose links there and back differ, in words for a message; "" on a symmetric graph."""
+        """The first pair of nodes whose links there and back differ, as text of a message; "" on a symmetric graph."""
         weights = {} if self.all_to_all is not None else {link[:2]: link[2] for link in self.links}
         for (target, source), weight in weights.items():
             back = weights.get((source, target))
@@ -184,9 +184,7 @@ class Topology(Exact, HasDrawing):
     def leading_groups(self) -> int:
         """Number of groups of nodes that reach one another and feel no other node; at least 1.
 
-        A search along the links starts at nodes from which all nodes are reached, no start from an
-        earlier one.  A second search takes these starts backwards: each start that is not reached
-        yet is in a group of its own.
+        They are the source components of the graph of influence; with one, G has the eigenvalue 0 once.
         """
         if self.all_to_all is not None:
             return 1
@@ -199,18 +197,21 @@ class Topology(Exact, HasDrawing):
             followers[source].append(target)
 
         def starts(order: Iterable[int]) -> list[int]:
-            found, reached = [], [False] * self.n
+            """Search depth first from each node not yet reached; return these nodes."""
+            roots, reached = [], [False] * self.n
             for start in order:
                 if not reached[start]:
-                    found.append(start)
+                    roots.append(start)
                     reached[start], waiting = True, [start]
                     while waiting:
                         new = [i for i in followers[waiting.pop()] if not reached[i]]
                         for i in new:
                             reached[i] = True
                         waiting += new
-            return found
+            return roots
 
+        # All nodes are reached from `first`, and no start from an earlier one.  Searched backwards, a start
+        # that no later one reaches lies in a source component, and each component has one.
         first = starts(range(self.n))
         return len(starts(reversed(first))) if len(first) > 1 else 1
 
@@ -222,8 +223,8 @@ class Topology(Exact, HasDrawing):
     @property
     def entries(self) -> tuple[tuple[int, int, Fraction], ...]:
         """The entries of G other than 0 as (row, column, entry): the links, then the diagonal."""
-        felt = ((i, total(weight for _, _, weight in row)) for i, row in groupby(self.links, itemgetter(0)))
-        return (*self.links, *((i, i, -degree) for i, degree in felt if degree))
+        degrees = ((i, total(weight for _, _, weight in row)) for i, row in groupby(self.links, itemgetter(0)))
+        return (*self.links, *((i, i, -degree) for i, degree in degrees if degree))
 
     @property
     def adjacency(self) -> GraphMatrix:
@@ -287,19 +288,19 @@ class Topology(Exact, HasDrawing):
             raise ModuleNotFoundError(
                 'to_networkx needs the package networkx; install it: python -m pip install "synchain[graphs]"'
             ) from None
-        both = self.symmetric
-        graph = networkx.Graph(name=self.name) if both else networkx.DiGraph(name=self.name)
+        symmetric = self.symmetric
+        graph = networkx.Graph(name=self.name) if symmetric else networkx.DiGraph(name=self.name)
         nodes = self.labels if self.labelled else range(self.n)
         graph.add_nodes_from(nodes)
         for target, source, weight in self.links:
-            if not both or source < target:
-                number = int(weight) if weight.denominator == 1 else weight
-                graph.add_edge(nodes[source], nodes[target], weight=number)
+            if not symmetric or source < target:  # an edge of a Graph is both links
+                value = int(weight) if weight.denominator == 1 else weight
+                graph.add_edge(nodes[source], nodes[target], weight=value)
         return graph
 
     def __repr__(self) -> str:
-        more = "".join(f", {key}={value!r}" for key, value in self.options)
-        return f"Topology({self.name!r}, n={self.n}{more}, {self.link_count} links)"
+        options = "".join(f", {key}={value!r}" for key, value in self.options)
+        return f"Topology({self.name!r}, n={self.n}{options}, {self.link_count} links)"
 
 
 def from_matrix(rows: Iterable[Iterable[object]] | sp.MatrixBase, name: str = "matrix") -> Topology:
@@ -328,13 +329,16 @@ def from_matrix(rows: Iterable[Iterable[object]] | sp.MatrixBase, name: str = "m
         On an entry that is no number.
     """
     table = [list(row) for row in rational_rows(rows, name)]
-    # The numbers of an iterator, which is used up, are taken to be exact.
-    given = rows.tolist() if hasattr(rows, "tolist") else rows
+    entries = rows.tolist() if hasattr(rows, "tolist") else rows
     for i, row in enumerate(table):
         excess = total(row)
         if not excess:
             continue
-        rounded = isinstance(given, list | tuple) and any(map(_rounded, given[i]))
+        # Floats, and texts with decimals, can be rounded numbers; an iterator is used up, so its entries count as exact.
+        rounded = isinstance(entries, list | tuple) and any(
+            isinstance(entry, float) or (isinstance(entry, str) and not set(entry).isdisjoint(".eE"))
+            for entry in entries[i]
+        )
         if not rounded or abs(excess) > total(map(abs, row)) / 10**12:
             adjacency = not any(row[k] for k, row in enumerate(table))
             remedy = "; of an adjacency matrix take from_sparse(scipy.sparse.coo_array(A), adjacency=True)"
@@ -345,11 +349,6 @@ def from_matrix(rows: Iterable[Iterable[object]] | sp.MatrixBase, name: str = "m
         row[i] -= excess
     links = tuple((i, j, weight) for i, row in enumerate(table) for j, weight in enumerate(row) if weight and i != j)
     return Topology(name, len(table), links)
-
-
-def _rounded(entry: object) -> bool:
-    """True for a float, and for a text with decimals: they can be those of a rounded number."""
-    return isinstance(entry, float) or (isinstance(entry, str) and not set(entry).isdisjoint(".eE"))
 
 
 def read_matrix(path: str | Path) -> Topology:
@@ -379,13 +378,13 @@ def _check_size(name: object, n: object) -> None:
 
 
 def _node_labels(name: str, n: int, labels: Sequence[object]) -> tuple[int, ...] | tuple[str, ...]:
-    """The labels as whole numbers if all are, else as texts; ValueError unless they are n different ones."""
+    """Return the labels as whole numbers if all are, else as texts; ValueError unless they are n different ones."""
     if all(type(label) is int for label in labels):
-        numbers = tuple(label for label in labels if isinstance(label, int))
-        if len(numbers) == n == len(set(numbers)):
-            return numbers
+        integers = tuple(label for label in labels if isinstance(label, int))
+        if len(integers) == n == len(set(integers)):
+            return integers
     texts = tuple(label if isinstance(label, str) else str(label) for label in labels)
-    if len(set(texts)) < len(texts):
+    if len(set(texts)) < len(texts):  # 1 and "1" are different labels
         texts = tuple(map(repr, labels))
     if len(texts) != n or len(set(texts)) < n:
         raise ValueError(f"topology {name}: found the labels {short_repr(texts)}; expected {n} different ones")
@@ -405,26 +404,22 @@ def _check_links(name: str, n: int, links: object) -> None:
         if not isinstance(link, tuple) or len(link) != 3:
             raise TypeError(f"topology {name}: found the link {short_repr(link)}; expected (target, source, weight)")
         target, source, weight = link
-        sound = type(target) is int and type(source) is int and type(weight) is Fraction and weight
-        if not (sound and 0 <= target < n and 0 <= source < n and target != source and before < (target, source)):
-            _refuse(f"topology {name}", n, before, link)
-        before = (target, source)
-
-
-def _refuse(what: str, n: int, before: tuple[int, int], link: tuple[object, object, object]) -> None:
-    """Raise TypeError or ValueError that says what is wrong with a link."""
-    target, source, weight = link
-    if not isinstance(target, int) or not isinstance(source, int):
-        raise TypeError(f"{what}: found the link {short_repr(link)}; expected (target, source, weight)")
-    if not (0 <= target < n and 0 <= source < n) or target == source:
-        raise ValueError(f"{what}: link {target} <- {source}; expected two different nodes of 0 … {n - 1}")
-    if (target, source) <= before:
-        raise ValueError(
-            f"{what}: link {target} <- {source} is repeated or out of order; "
-            "expected each pair once, sorted: add the weights up and sort"
-        )
-    if not isinstance(weight, Fraction) or not weight:
-        raise ValueError(
-            f"{what}: link {target} <- {source} has weight {weight!r}; "
-            "expected a Fraction other than 0: leave the link out or give it a weight"
-        )
+        # one condition for the millions of links that are sound
+        typed = type(target) is int and type(source) is int and type(weight) is Fraction
+        if typed and weight and 0 <= target < n and 0 <= source < n and target != source and before < link[:2]:
+            before = link[:2]
+            continue
+        if not isinstance(target, int) or not isinstance(source, int):
+            raise TypeError(f"topology {name}: found the link {short_repr(link)}; expected (target, source, weight)")
+        where = f"topology {name}: link {target} <- {source}"
+        if not (0 <= target < n and 0 <= source < n) or target == source:
+            raise ValueError(f"{where}; expected two different nodes of 0 … {n - 1}")
+        if (target, source) <= before:
+            raise ValueError(
+                f"{where} is repeated or out of order; expected each pair once, sorted: add the weights up and sort"
+            )
+        if not isinstance(weight, Fraction) or not weight:
+            raise ValueError(
+                f"{where} has weight {weight!r}; expected a Fraction other than 0: leave the link out or give it a weight"
+            )
+        before = (target, source)  # booleans and subclasses of Fraction pass

@@ -8,7 +8,7 @@ displacement and tau for the time.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
@@ -20,13 +20,9 @@ from ..mechanics.oscillator import FRICTION
 from .writer import ExpressionWriter, Latex, Style, Text
 
 LARGEST = 6
-"""Networks of more nodes are written once, for node i, instead of node by node."""
+"""Networks of more nodes are written once, for node i, instead of node by node; a choice."""
 
-
-def _weights(equations: Equations) -> list[tuple[Edge, str]]:
-    """The templates of links between equal nodes, and what their weights are called: G, of several layers G_1, G_2, …"""
-    edges = equations.edges
-    return [(edge, "G" if len(edges) == 1 else f"G_{k}") for k, edge in enumerate(edges, start=1)]
+EXPECTED = "equations, such as scene.equations"
 
 
 def latex(equations: Equations) -> str:
@@ -42,7 +38,8 @@ def latex(equations: Equations) -> str:
     str
         An align* environment; more than LARGEST nodes give one equation for node i.
     """
-    body = " \\\\\n".join(f"  & {line}" for line in lines(_those("latex", equations), Latex()))
+    checked = check_instance("latex", equations, Equations, EXPECTED)
+    body = " \\\\\n".join(f"  & {line}" for line in lines(checked, Latex()))
     return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"
 
 
@@ -59,12 +56,7 @@ def text(equations: Equations) -> str:
     str
         One equation a line; more than LARGEST nodes give one for node i.
     """
-    return "\n".join(lines(_those("text", equations), Text()))
-
-
-def _those(what: str, equations: object) -> Equations:
-    """The equations; TypeError for anything else."""
-    return check_instance(what, equations, Equations, "equations, such as scene.equations")
+    return "\n".join(lines(check_instance("text", equations, Equations, EXPECTED), Text()))
 
 
 def as_dict(equations: Equations) -> dict[str, object]:
@@ -87,25 +79,58 @@ def as_dict(equations: Equations) -> dict[str, object]:
     }
 
 
+def lines(equations: Equations, style: Style) -> Iterator[str]:
+    """Yield equation by equation, then the laws, then the meaning of the indices of a large network."""
+    network = _Network(_in_slip(equations), style)
+    generic = network.equations.n > LARGEST and not network.equations.mixed
+    if generic:
+        yield from network.generic()
+    else:
+        for i in range(network.equations.n):
+            yield from network.at_node(i)
+    yield from network.laws()
+    if equations.sticks:
+        yield style.words("at zero sliding velocity f is what holds the body, up to the static coefficient")
+    if generic:
+        yield network.legend()
+
+
+def _in_slip(equations: Equations) -> Equations:
+    """Return equations with set-valued friction in slip, without the modes."""
+    if not equations.sticks:
+        return equations
+
+    def node(node: Node) -> Node:
+        rate = node.events[0].shown if node.events else node.rhs[1]
+        return Node(node.state[:2], (node.rhs[0], rate), node.parameters, law=node.law)
+
+    def edge(edge: Edge) -> Edge:
+        rates = tuple(e.xreplace({edge.here[2]: sp.S.One}) for e in edge.rhs[:2])
+        return Edge(edge.here[:2], edge.there[:2], edge.weight, rates, edge.parameters)
+
+    return equations.map_templates(node, edge)
+
+
 @dataclass(frozen=True, slots=True)
-class _Named:
-    """A node's right-hand side with its friction law as f(w), and the law, None if it has none."""
+class _NamedNode:
+    """A node's right-hand side with its friction law as f(w), and the law; None if it is written in place."""
 
     rhs: tuple[sp.Expr, ...]
     law: sp.Expr | None
 
-
-def _name_law(node: Node) -> _Named:
-    taken = {s.name for s in (*node.state, *node.parameters)}
-    if node.law is not None and not taken & {SLIDING.name, "f"}:
-        rhs = tuple(_with_law(e, node.law, node.state) for e in node.rhs)
-        if any(e.has(FRICTION) for e in rhs):
-            return _Named(rhs, node.law)
-    return _Named(node.rhs, None)
+    @classmethod
+    def of(cls, node: Node) -> _NamedNode:
+        """Name the law of a node, unless a state or parameter has the letter of f or of its argument."""
+        taken = {s.name for s in (*node.state, *node.parameters)}
+        if node.law is not None and not taken & {SLIDING.name, "f"}:
+            rhs = tuple(_with_law(e, node.law, node.state) for e in node.rhs)
+            if any(e.has(FRICTION) for e in rhs):
+                return cls(rhs, node.law)
+        return cls(node.rhs, None)
 
 
 def _with_law(e: sp.Expr, law: sp.Expr, state: tuple[sp.Symbol, ...]) -> sp.Expr:
-    """The expression with (factor) law(w) written as (factor) f(w).
+    """Return the expression with (factor) law(w) written as (factor) f(w).
 
     w is the first sum with a state for which that works.
     """
@@ -119,183 +144,163 @@ def _with_law(e: sp.Expr, law: sp.Expr, state: tuple[sp.Symbol, ...]) -> sp.Expr
     return e
 
 
-def lines(equations: Equations, style: Style) -> Iterator[str]:
-    """Yield equation by equation, then the laws, then what the indices of a large network mean."""
-    sticks, equations = equations.sticks, _in_slip(equations)
-    named = tuple(_name_law(node) for node in equations.nodes)
-    generic = equations.n > LARGEST and not equations.mixed
-    if generic:
-        yield from _generic(equations, named[0], style)
-    else:
-        for i in range(equations.n):
-            yield from _at_node(equations, named, style, i)
-    for kind, one in enumerate(named):
-        if one.law is not None:
-            yield _law(equations, one.law, style, kind)
-    if sticks:
-        yield style.words("at zero sliding velocity f is what holds the body, up to the static coefficient")
-    if generic:
-        count, meaning = equations.link_count, ""
-        layers = (layer for layer in equations.layers if layer.links)
-        for layer, (_, name) in zip(layers, _weights(equations), strict=True):
+class _Network:
+    """Writes the equations of a network in one style."""
+
+    def __init__(self, equations: Equations, style: Style) -> None:
+        self.equations, self.style = equations, style
+        self.named = tuple(_NamedNode.of(node) for node in equations.nodes)
+        # parameters of the templates with a value for each node
+        self.varied = [sp.Symbol(name, real=True) for name in equations.varied]
+        # the layers of links, with the letter of their weights: G, of several layers G_1, G_2, …
+        edges = equations.edges
+        self.layers = [(edge, "G" if len(edges) == 1 else f"G_{k}") for k, edge in enumerate(edges, start=1)]
+
+    def at_node(self, i: int) -> Iterator[str]:
+        """Yield the equations of node i with all its links."""
+        equations = self.equations
+        here, node, named = equations.at_node(i), equations.node_at(i), self.named[equations.kind_of[i]]
+        letters: dict[sp.Symbol, str] = {}
+        for j in range(equations.n):
+            index = str(j + 1) if equations.n > 1 else ""
+            letters |= self._letters(self.named[equations.kind_of[j]], equations.symbols(j), index, j)
+        writer = ExpressionWriter(self.style, letters, frozenset((*letters, TIME)))
+        links = [(link, edge) for link, edge in equations.linked() if link[0] == i]
+        for c in _shown(equations, i):
+            terms = [term.xreplace(here) for term in _ordered(named.rhs[c], node)]
+            parts = (edge.rhs[c].xreplace(equations.at_link(link, edge)) for link, edge in links)
+            felt = sp.factor_terms(sp.Add(*parts))
+            terms += [term for term in sp.Add.make_args(felt) if term != 0]
+            yield f"{self._left(writer, c, i)} = {writer.total(terms)}"
+
+    def _left(self, writer: ExpressionWriter, c: int, i: int) -> str:
+        """Return the left side: the rate of component c of node i, and the masses times rates that links add.
+
+        The rate is written chi'' if the component is the velocity of chi.
+        """
+        equations, states = self.equations, self.equations.symbols(i)
+        row = [e.xreplace(equations.at_node(i)) for e in _masses(equations.node_at(i), c)]
+        left = _massive(row, states, writer) if row else writer.write(states[c]) + "'"
+        ends: dict[sp.Symbol, None] = {}
+        terms: list[sp.Expr] = []
+        for link, edge in equations.linked() if equations.inertial else ():
+            if link[0] == i:
+                for block, end in zip(edge.inertia, link[:2], strict=False):
+                    values = equations.at_link(link, edge)
+                    for symbol, e in zip(equations.symbols(end), block[c], strict=True):
+                        ends[symbol] = None
+                        terms.append(e.xreplace(values) * _rate(symbol))
+        added = sp.collect(sp.expand(sp.Add(*terms)), list(map(_rate, ends)))
+        if added == 0:
+            return left
+        full = _with_rates(writer, tuple(ends))
+        more = full.total([sp.factor_terms(term) for term in sp.Add.make_args(added)])
+        return f"{left} {'- ' + more[1:] if more.startswith('-') else '+ ' + more}"
+
+    def generic(self) -> Iterator[str]:
+        """Yield the equations of node i, its links as a sum over j."""
+        equations, style, (named, *_) = self.equations, self.style, self.named
+        node = equations.node
+        states = tuple(sp.Symbol(f"{s.name}_i", real=True) for s in node.state)
+        here = dict(zip(node.state, states, strict=True))
+        weights = {name: sp.Symbol(f"{name}_ij", real=True) for _, name in self.layers}
+
+        # letters: states and parameters of node i, values of links ij, states and parameters of node j
+        letters = self._letters(named, states, "i") | {s: style.letter(s.name, "i") for s in self.varied}
+        numbered = tuple(sp.Symbol(name, real=True) for name in equations.numbered)
+        letters |= {s: style.letter(s.name, "ij") for s in numbered}
+        for edge, name in self.layers:
+            letters |= self._letters(named, edge.here, "i") | self._letters(named, edge.there, "j")
+            letters |= {s: style.letter(of.name, "j") for s, of in edge.theirs}
+            letters[weights[name]] = style.letter(name, "ij")
+        writer = ExpressionWriter(style, letters, frozenset({TIME, *letters} - set(weights.values())))
+
+        for c in _shown(equations):
+            line = writer.total([term.xreplace(here) for term in _ordered(named.rhs[c], node)])
+            row = [e.xreplace(here) for e in _masses(node, c)]
+            left = _massive(row, states, writer) if row else writer.write(here[node.state[c]]) + "'"
+            for edge, name in self.layers:
+                weight, ends = weights[name], (*edge.here, *edge.there)
+                if edge.rhs[c] != 0:
+                    inside = (weight, *ends, *(s for s, _ in edge.theirs), *numbered)
+                    summed = _summed(edge.rhs[c].xreplace({edge.weight: weight}), inside, writer)
+                    line = line + summed if line != "0" else summed.removeprefix(" + ").lstrip()
+                if edge.inertia:  # the links add masses times rates to the left side
+                    masses = (e for block in edge.inertia for e in block[c])
+                    term = sp.factor(sp.Add(*(e * _rate(s) for e, s in zip(masses, ends, strict=True))))
+                    if term != 0:
+                        inside = (weight, *ends, *map(_rate, ends))
+                        full = _with_rates(writer, ends)
+                        left += _summed(term.xreplace({edge.weight: weight}), inside, full)
+            yield f"{left} = {line}"
+
+    def laws(self) -> Iterator[str]:
+        """Yield the friction law of each kind of node; i is the node whose parameters it has."""
+        for kind, named in enumerate(self.named):
+            if (law := named.law) is None:
+                continue
+            letters = {s: self.style.letter(s.name, "i") for s in self.varied if law.has(s)}
+            writer = ExpressionWriter(self.style, letters, frozenset((SLIDING,)))
+            nodes = [str(i + 1) for i, k in enumerate(self.equations.kind_of) if k == kind]
+            about = ""
+            if self.equations.mixed:
+                about = self.style.words(f", of node{'s' * (len(nodes) > 1)} {', '.join(nodes)}")
+            elif letters:
+                about = self.style.words(", of node i")
+            yield f"{writer.write(FRICTION(SLIDING))} = {writer.write(law)}{about}"
+
+    def legend(self) -> str:
+        """Return the range of the indices, and the meaning of the weights."""
+        equations, style, meaning = self.equations, self.style, ""
+        linked = (layer for layer in equations.layers if layer.links)
+        for layer, (_, name) in zip(linked, self.layers, strict=True):
             shown = WEIGHT_NUMBER.name if WEIGHT_NUMBER.name in layer.varied else name
             meaning += f", {style.letter(shown, 'ij')}" + style.words(f" the weights of the {len(layer.links)} links")
         if any(edge.oriented for edge in equations.edges):
             meaning += style.words(", -1 where a link runs from j to i")
-        yield ("i, j" if count else "i") + f" = 1, {style.dots}, {equations.n}{meaning}"
+        return ("i, j" if equations.link_count else "i") + f" = 1, {style.dots}, {equations.n}{meaning}"
 
+    def _letters(
+        self, named: _NamedNode, symbols: tuple[sp.Symbol, ...], index: str, i: int = 0
+    ) -> dict[sp.Symbol, str]:
+        """Return the written forms of the states of node i and of the time.
 
-def _law(equations: Equations, law: sp.Expr, style: Style, kind: int) -> str:
-    """The friction law of nodes of some kind; i is the node whose parameters they are."""
-    own = {s: style.letter(s.name, "i") for s in _varied(equations) if law.has(s)}
-    writer = ExpressionWriter(style, own, frozenset((SLIDING,)))
-    text = f"{writer.write(FRICTION(SLIDING))} = {writer.write(law)}"
-    nodes = [str(i + 1) for i, k in enumerate(equations.kind_of) if k == kind]
-    about = [f"of node{'s' * (len(nodes) > 1)} {', '.join(nodes)}"] if equations.mixed else []
-    about += ["of node i"] if own and not equations.mixed else []
-    return text + "".join(style.words(f", {words}") for words in about)
-
-
-def _varied(equations: Equations) -> list[sp.Symbol]:
-    """The parameters of the templates that have a value for each node."""
-    return [sp.Symbol(name, real=True) for name in equations.varied]
-
-
-def _in_slip(equations: Equations) -> Equations:
-    """Equations with set-valued friction as they are in slip, without the modes."""
-    if not equations.sticks:
-        return equations
-    return equations.map_templates(_node_in_slip, _edge_in_slip)
-
-
-def _node_in_slip(node: Node) -> Node:
-    rate = node.events[0].shown if node.events else node.rhs[1]
-    return Node(node.state[:2], (node.rhs[0], rate), node.parameters, law=node.law)
-
-
-def _edge_in_slip(edge: Edge) -> Edge:
-    rates = tuple(e.xreplace({edge.here[2]: sp.S.One}) for e in edge.rhs[:2])
-    return Edge(edge.here[:2], edge.there[:2], edge.weight, rates, edge.parameters)
-
-
-def _at_node(equations: Equations, named: tuple[_Named, ...], style: Style, i: int) -> Iterator[str]:
-    """The equations of node i with all its links."""
-    here, node, own = equations.at_node(i), equations.node_at(i), named[equations.kind_of[i]]
-    letters: dict[sp.Symbol, str] = {}
-    for j in range(equations.n):
-        index = str(j + 1) if equations.n > 1 else ""
-        letters |= _letters(equations, named[equations.kind_of[j]], style, equations.symbols(j), index, j)
-    writer = ExpressionWriter(style, letters, frozenset((*letters, TIME)))
-    links = [(link, edge) for link, edge in equations.linked() if link[0] == i]
-    for c in _shown(equations, i):
-        terms = [term.xreplace(here) for term in _ordered(own.rhs[c], node)]
-        parts = (edge.rhs[c].xreplace(equations.at_link(link, edge)) for link, edge in links)
-        felt = sp.factor_terms(sp.Add(*parts))
-        terms += [term for term in sp.Add.make_args(felt) if term != 0]
-        yield f"{_left(equations, writer, c, i)} = {writer.total(terms)}"
-
-
-def _left(equations: Equations, writer: ExpressionWriter, c: int, i: int) -> str:
-    """The left side: the rate of component c of node i, and the rates that links add.
-
-    The rate is written chi'' if the component is the velocity of chi.
-    """
-    own = writer.write(equations.symbols(i)[c]) + "'"
-    row = [e.xreplace(equations.at_node(i)) for e in _masses(equations.node_at(i), c)]
-    if row:
-        own = _massive(row, equations.symbols(i), writer)
-    rates: dict[sp.Symbol, str] = {}
-    terms: list[sp.Expr] = []
-    for link, edge in equations.linked() if equations.inertial else ():
-        if link[0] == i:
-            for block, end in zip(edge.inertia, link[:2], strict=False):
-                values = equations.at_link(link, edge)
-                for symbol, e in zip(equations.symbols(end), block[c], strict=True):
-                    rate = sp.Symbol(f"{symbol.name}'", real=True)
-                    rates[rate] = writer.write(symbol) + "'"
-                    terms.append(e.xreplace(values) * rate)
-    added = sp.collect(sp.expand(sp.Add(*terms)), list(rates))
-    if added == 0:
-        return own
-    full = ExpressionWriter(writer.style, {**writer.letters, **rates}, frozenset((*writer.letters, *rates, TIME)))
-    more = full.total([sp.factor_terms(term) for term in sp.Add.make_args(added)])
-    return f"{own} {'- ' + more[1:] if more.startswith('-') else '+ ' + more}"
+        They are chi and tau beside a friction law; velocities have a prime.
+        """
+        node, style = self.equations.node_at(i), self.style
+        plain = named.law is None or {"chi", "tau"} & {s.name for s in (*node.state, *node.parameters)}
+        speeds = {velocity: c for c, velocity in _pairs(self.equations, i).items()}
+        letters = {} if plain else {TIME: style.letter("tau")}
+        for c, symbol in enumerate(symbols):
+            name = node.state[speeds.get(c, c)].name
+            letters[symbol] = style.letter("chi" if name == "x" and not plain else name, index, int(c in speeds))
+        return letters
 
 
 def _masses(node: Node, c: int) -> tuple[sp.Expr, ...]:
-    """Row c of the mass matrix of a node, empty if it is a row of the identity."""
+    """Return row c of the mass matrix of a node, empty if it is a row of the identity."""
     row = node.inertia[c] if node.inertia else ()
     return () if all(e == sp.Integer(k == c) for k, e in enumerate(row)) else row
 
 
+def _rate(state: sp.Symbol) -> sp.Symbol:
+    return sp.Symbol(f"{state.name}'", real=True)
+
+
+def _with_rates(writer: ExpressionWriter, states: Sequence[sp.Symbol]) -> ExpressionWriter:
+    """Return a writer that writes the rates of states too, with a prime."""
+    rates = {_rate(s): writer.write(s) + "'" for s in states}
+    return replace(writer, letters={**writer.letters, **rates}, variables=writer.variables | set(rates))
+
+
 def _massive(row: Sequence[sp.Expr], states: Sequence[sp.Symbol], writer: ExpressionWriter) -> str:
-    """A row of masses times rates."""
-    rates = {sp.Symbol(f"{s.name}'", real=True): writer.write(s) + "'" for s in states}
-    full = ExpressionWriter(writer.style, {**writer.letters, **rates}, frozenset((*writer.letters, *rates, TIME)))
-    return full.total([e * rate for e, rate in zip(row, rates, strict=True) if e != 0])
-
-
-def _generic(equations: Equations, named: _Named, style: Style) -> Iterator[str]:
-    """The equations of node i, its links as a sum over j."""
-    node, joints = equations.node, _weights(equations)
-    own = tuple(sp.Symbol(f"{s.name}_i", real=True) for s in node.state)
-    here = dict(zip(node.state, own, strict=True))
-    letters = _letters(equations, named, style, own, "i")
-    letters |= {s: style.letter(s.name, "i") for s in _varied(equations)}
-    numbered = tuple(sp.Symbol(name, real=True) for name in equations.numbered)
-    letters |= {s: style.letter(s.name, "ij") for s in numbered}
-    for edge, name in joints:
-        letters |= _letters(equations, named, style, edge.here, "i")
-        letters |= _letters(equations, named, style, edge.there, "j")
-        letters |= {s: style.letter(of.name, "j") for s, of in edge.theirs}
-        letters[_weight(name)] = style.letter(name, "ij")
-    writer = ExpressionWriter(style, letters, frozenset({TIME, *letters} - {_weight(name) for _, name in joints}))
-    for c in _shown(equations):
-        line = writer.total([term.xreplace(here) for term in _ordered(named.rhs[c], node)])
-        for edge, name in joints:
-            if edge.rhs[c] != 0:
-                summed = _sum_over_links(edge, _weight(name), c, writer, numbered)
-                line = line + summed if line != "0" else summed.removeprefix(" + ").lstrip()
-        row = [e.xreplace(here) for e in _masses(node, c)]
-        left = _massive(row, own, writer) if row else writer.write(here[node.state[c]]) + "'"
-        for edge, name in joints:
-            if edge.inertia:
-                left += _summed_inertia(edge, _weight(name), c, writer)
-        yield f"{left} = {line}"
-
-
-def _weight(name: str) -> sp.Symbol:
-    """The symbol of the weights of a layer."""
-    return sp.Symbol(f"{name}_ij", real=True)
-
-
-def _summed_inertia(edge: Edge, weight: sp.Symbol, c: int, writer: ExpressionWriter) -> str:
-    """What the links of node i add to the left side of component c: masses times rates."""
-    ends = (*edge.here, *edge.there)
-    rates = {sp.Symbol(f"{s.name}'", real=True): writer.write(s) + "'" for s in ends}
-    masses = (e for block in edge.inertia for e in block[c])
-    term = sp.factor(sp.Add(*(e * rate for e, rate in zip(masses, rates, strict=True))))
-    if term == 0:
-        return ""
-    full = ExpressionWriter(
-        writer.style, {**writer.letters, **rates}, frozenset((*writer.letters, *rates, TIME)) - {weight}
-    )
-    return _summed(term.xreplace({edge.weight: weight}), (weight, *ends, *rates), full)
-
-
-def _sum_over_links(
-    edge: Edge, weight: sp.Symbol, c: int, writer: ExpressionWriter, numbered: tuple[sp.Symbol, ...]
-) -> str:
-    """The links of node i: what all of them share, not what is `numbered` by link, stands before the sum sign."""
-    inside = (weight, *edge.here, *edge.there, *(s for s, _ in edge.theirs), *numbered)
-    return _summed(edge.rhs[c].xreplace({edge.weight: weight}), inside, writer)
+    """Return a row of masses times rates."""
+    terms = [e * _rate(s) for e, s in zip(row, states, strict=True) if e != 0]
+    return _with_rates(writer, states).total(terms)
 
 
 def _summed(term: sp.Expr, inside: tuple[sp.Symbol, ...], writer: ExpressionWriter) -> str:
-    """A sum over j with its sign in front.
-
-    Factors that do not depend on symbols `inside` stand before the sum sign.
-    """
+    """Return a sum over j with its sign; factors without symbols `inside` stand before the sum sign."""
     term = sp.factor_terms(term) if term.is_Add else term
     negative = term.as_coeff_Mul()[0].is_negative
     outer, inner = (-term if negative else term).as_independent(*inside, as_Add=False)
@@ -305,48 +310,33 @@ def _summed(term: sp.Expr, inside: tuple[sp.Symbol, ...], writer: ExpressionWrit
 
 
 def _pairs(equations: Equations, i: int = 0) -> dict[int, int]:
-    """Component -> component that is its velocity, of node i.
+    """Map each coordinate of node i to its velocity.
 
-    The rate of such a component is that state alone: links add nothing.
+    The rate of a coordinate is another state alone, to which links add nothing.
     """
     node, kind = equations.node_at(i), equations.kind_of[i]
     edges = [edge for (target, _), edge in equations.edge_of if target == kind]
-    found: dict[int, int] = {}
+    velocity_of: dict[int, int] = {}
     for c, rate in enumerate(node.rhs):
-        free = all(edge.rhs[c] == 0 for edge in edges)
-        if free and rate in node.state and rate != node.state[c] and node.state.index(rate) not in found.values():
-            found[c] = node.state.index(rate)
-    return found if not set(found) & set(found.values()) else {}
+        if rate in node.state and rate != node.state[c] and all(edge.rhs[c] == 0 for edge in edges):
+            velocity = node.state.index(rate)
+            if velocity not in velocity_of.values():
+                velocity_of[c] = velocity
+    # a chain x' = v, v' = a is written to first order
+    return {} if set(velocity_of) & set(velocity_of.values()) else velocity_of
 
 
 def _shown(equations: Equations, i: int = 0) -> list[int]:
-    """The components whose rate gets an equation: all but coordinates."""
+    """Return the components with an equation: all but coordinates, whose rate is a velocity."""
     pairs = _pairs(equations, i)
     return [c for c in range(len(equations.node_at(i).state)) if c not in pairs]
 
 
-def _letters(
-    equations: Equations, named: _Named, style: Style, symbols: tuple[sp.Symbol, ...], index: str, i: int = 0
-) -> dict[sp.Symbol, str]:
-    """How the states of a node and the time are written.
-
-    They are chi and tau beside a friction law; velocities have a prime.
-    """
-    node = equations.node_at(i)
-    plain = named.law is None or {"chi", "tau"} & {s.name for s in (*node.state, *node.parameters)}
-    speeds = {velocity: c for c, velocity in _pairs(equations, i).items()}
-    letters = {} if plain else {TIME: style.letter("tau")}
-    for c, symbol in enumerate(symbols):
-        name = node.state[speeds.get(c, c)].name
-        letters[symbol] = style.letter("chi" if name == "x" and not plain else name, index, int(c in speeds))
-    return letters
-
-
 def _ordered(e: sp.Expr, node: Node) -> list[sp.Expr]:
-    """The terms of an equation: springs, damping, constants, functions of time, friction last."""
+    """Return the terms of an equation: springs, damping, constants, functions of time, friction last."""
 
-    def place(term: sp.Expr) -> tuple[bool, bool, int, int, tuple[object, ...]]:
+    def order(term: sp.Expr) -> tuple[bool, bool, int, int, tuple[object, ...]]:
         last = max((c for c, s in enumerate(node.state) if term.has(s)), default=len(node.state))
         return term.has(FRICTION), term.has(TIME), last, sp.count_ops(term), sp.default_sort_key(term)
 
-    return sorted((term for term in sp.Add.make_args(e) if term != 0), key=place)
+    return sorted((term for term in sp.Add.make_args(e) if term != 0), key=order)

@@ -1,5 +1,9 @@
 """The LaTeX that this package writes, as MathML, which browsers show without help from a network."""
 
+# Why no library: reports and notebooks need this at run time, and latex2mathml 3.81, a dependency of the
+# documentation only, writes \mathrm{end} as three separate letters, sets \chi'' as a power of a power, keeps no
+# LaTeX beside the formula, and brings 411 kB of tables.
+
 from __future__ import annotations
 
 import re
@@ -33,16 +37,16 @@ SIGNS = {
     "\\}": "}",
     "-": "−",
 }
-"""Operators that are not written as they stand."""
+"""Operators that MathML writes with another character."""
 
 SPACES = ("\\left", "\\right", "\\:", "\\,", "\\;", "\\ ", "\\quad", "&")
-"""What MathML spaces by itself."""
+"""Tokens that MathML needs no element for, since it spaces operators itself."""
 
 NO_BREAK = "\u00a0"
-"""The space that stands at the ends of words too."""
+"""A space that browsers keep at the ends of a text too."""
 
 GAP = '<mspace width="0.14em"/>'
-"""What sets names of several letters apart from their neighbours in a product."""
+"""The space around a name of several letters in a product; its width is a choice."""
 
 LETTERS = {
     **{f"\\{name}": letter for name, letter in greek_unicode.items()},
@@ -64,7 +68,7 @@ def mathml(equations: Equations) -> str:
 
 @dataclass(slots=True)
 class _TokenReader:
-    """Reads tokens of LaTeX from left to right."""
+    """Reads tokens of LaTeX from left to right; each method returns an element and moves `at` behind its tokens."""
 
     tokens: list[str]
     at: int = 0
@@ -75,30 +79,25 @@ class _TokenReader:
             "{": lambda: self.row("}"),
             "\\frac": lambda: f"<mfrac>{self.atom()}{self.atom()}</mfrac>",
             "\\sqrt": lambda: f"<msqrt>{self.atom()}</msqrt>",
-            "\\mathrm": lambda: f'<mi mathvariant="normal">{self.words()}</mi>',
-            "\\operatorname": lambda: _function(self.words()),
-            "\\text": lambda: f"<mtext>{self.words().replace(' ', NO_BREAK)}</mtext>",
+            "\\mathrm": lambda: f'<mi mathvariant="normal">{self.group_text()}</mi>',
+            "\\operatorname": lambda: _function(self.group_text()),
+            "\\text": lambda: f"<mtext>{self.group_text().replace(' ', NO_BREAK)}</mtext>",
             "\\begin": self.cases,
             **{f"\\{name}": partial(_function, name) for name in LATEX_FUNCTIONS},
         }
 
     def row(self, end: str = "") -> str:
-        """All up to a token, or to the end."""
-        found = []
+        """Read up to a token, or to the end."""
+        elements = []
         while self.at < len(self.tokens) and self.tokens[self.at] != end:
-            found.append(self.scripted())
+            elements.append(self.scripted())
         self.at += 1
-        return f"<mrow>{''.join(found)}</mrow>"
+        return f"<mrow>{''.join(elements)}</mrow>"
 
     def scripted(self) -> str:
-        """An atom with what stands below and above it."""
+        """Read an atom with its index, primes and exponent; a word gets a gap on both sides."""
         gap = GAP if self.tokens[self.at] == "\\mathrm" else ""
-        made = self.raised()
-        return f"<mrow>{gap}{made}{gap}</mrow>" if gap else made
-
-    def raised(self) -> str:
-        """An atom with its index, its primes and its exponent."""
-        base, below, above, primes = self.atom(), "", "", ""
+        element, below, above, primes = self.atom(), "", "", ""
         while self.at < len(self.tokens) and self.tokens[self.at] in ("_", "^", "'"):
             token = self.tokens[self.at]
             self.at += 1
@@ -108,15 +107,17 @@ class _TokenReader:
                 above += self.atom()
             else:
                 primes += "′"
-        if primes:
-            base = f"<msub>{base}{below}</msub>" if below else base
-            base, below = f'<mrow>{base}<mo lspace="0" rspace="0">{primes}</mo></mrow>', ""
+        if primes:  # primes stand behind the index: (χ₁)″
+            element = f"<msub>{element}{below}</msub>" if below else element
+            element, below = f'<mrow>{element}<mo lspace="0" rspace="0">{primes}</mo></mrow>', ""
         if below and above:
-            return f"<msubsup>{base}{below}{above}</msubsup>"
-        return f"<msub>{base}{below}</msub>" if below else f"<msup>{base}{above}</msup>" if above else base
+            element = f"<msubsup>{element}{below}{above}</msubsup>"
+        elif below or above:
+            element = f"<msub>{element}{below}</msub>" if below else f"<msup>{element}{above}</msup>"
+        return f"<mrow>{gap}{element}{gap}</mrow>" if gap else element
 
     def atom(self) -> str:
-        """A group, a command, a number, a letter or an operator."""
+        """Read a group, a command, a number, a letter or an operator."""
         token = self.tokens[self.at]
         self.at += 1
         if token in self.commands:
@@ -129,19 +130,20 @@ class _TokenReader:
             return f"<mn>{token}</mn>"
         if token.startswith("\\") and token not in SIGNS:
             raise ValueError(f"formula: found {token}; expected LaTeX as this package writes it")
-        return f"<mo{self.form(token)}>{escape(SIGNS.get(token, token))}</mo>"
 
-    def form(self, token: str) -> str:
-        """The attributes of an operator: signs stand close to what follows, fences keep their size."""
+        # an operator: signs stand close to the term that follows, fences keep their size
         before = next((t for t in reversed(self.tokens[: self.at - 1]) if not t.isspace()), "=")
+        form = ""
         if token in "+-" and before in ("=", "(", "{", "|", ",", "&"):
-            return ' form="prefix"'
-        if token == "|":
-            return ' stretchy="false" lspace="0" rspace="0"'
-        return ' stretchy="false"' if token in "()[]" else ""
+            form = ' form="prefix"'
+        elif token == "|":
+            form = ' stretchy="false" lspace="0" rspace="0"'
+        elif token in "()[]":
+            form = ' stretchy="false"'
+        return f"<mo{form}>{escape(SIGNS.get(token, token))}</mo>"
 
-    def words(self) -> str:
-        """The text of a group, as it is."""
+    def group_text(self) -> str:
+        """Read a group as plain text."""
         self.at += 1
         start, depth = self.at, 1
         while depth:
@@ -150,31 +152,26 @@ class _TokenReader:
         return escape("".join(self.tokens[start : self.at - 1]))
 
     def cases(self) -> str:
-        """Cases with their conditions."""
-        name = self.words()
+        """Read cases with their conditions, between \\begin{cases} and \\end{cases}."""
+        name = self.group_text()
         if name != "cases":
             raise ValueError(f"formula: found \\begin{{{name}}}; expected \\begin{{cases}}")
-        rows: list[list[str]] = []
-        cells: list[str] = []
-        found: list[str] = []
-        while self.tokens[self.at] != "\\end":
-            token = self.tokens[self.at]
-            if token in ("&", "\\\\"):
-                self.at += 1
-                cells.append("".join(found))
-                found = []
-                if token == "\\\\":
-                    rows.append(cells)
-                    cells = []
+        rows = [[""]]
+        while (token := self.tokens[self.at]) != "\\end":
+            if token not in ("&", "\\\\"):
+                rows[-1][-1] += self.scripted()
                 continue
-            found.append(self.scripted())
+            self.at += 1
+            if token == "&":
+                rows[-1].append("")
+            else:
+                rows.append([""])
         self.at += 1
-        self.words()
-        rows.append([*cells, "".join(found)])
-        made = "".join(f"<mtr>{''.join(f'<mtd>{cell}</mtd>' for cell in row)}</mtr>" for row in rows)
-        return f'<mrow><mo>{{</mo><mtable columnalign="left">{made}</mtable></mrow>'
+        self.group_text()
+        table = "".join(f"<mtr>{''.join(f'<mtd>{cell}</mtd>' for cell in row)}</mtr>" for row in rows)
+        return f'<mrow><mo>{{</mo><mtable columnalign="left">{table}</mtable></mrow>'
 
 
 def _function(name: str) -> str:
-    """The name of a function, a little apart from what stands before it."""
+    """Return the name of a function, a little apart from the factor before it."""
     return f'<mrow>{GAP}<mi mathvariant="normal">{name}</mi></mrow>'
