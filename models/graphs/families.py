@@ -224,8 +224,8 @@ class Family:
         """Return the options as a graph stores them, checked by `settle`."""
         for key in options:
             if key not in self.options:
-                known = f"known: {', '.join(self.options)}" if self.options else "this family has none: remove it"
-                raise ValueError(f"topology {self.name}: unknown option {key!r}; {known}")
+                remedy = f"known: {', '.join(self.options)}" if self.options else "this family has none: remove it"
+                raise ValueError(f"topology {self.name}: unknown option {key!r}; {remedy}")
         if self.settle is None:
             return ()
         try:

@@ -131,7 +131,7 @@ def from_graph(graph: Any, weight: str | None = "weight", name: str = "graph") -
 
 
 def is_graph(value: object) -> bool:
-    """True for a Topology and for a graph of networkx."""
+    """Return whether a value is a Topology or a graph of networkx."""
     return isinstance(value, Topology) or all(hasattr(value, need) for need in ("nodes", "edges", "is_directed"))
 
 

@@ -18,7 +18,7 @@ VARIANTS = {"theta": ("\\vartheta", "ϑ"), "epsilon": ("\\varepsilon", "ε")}
 """Greek letters of which the field writes the other form: (LaTeX, Unicode)."""
 
 NAMES = {"atan": "arctan", "asin": "arcsin", "acos": "arccos", "sign": "sgn"}
-"""Functions that LaTeX calls otherwise than SymPy."""
+"""Functions with other names in LaTeX than in SymPy."""
 
 LATEX_FUNCTIONS = {
     "arccos",
@@ -38,11 +38,11 @@ LATEX_FUNCTIONS = {
 
 
 class Style(Protocol):
-    """How the pieces of a formula are put together."""
+    """The way in which the pieces of a formula are put together; each method returns text."""
 
     @property
     def bars(self) -> bool:
-        """Whether fractions have a bar, so that sums need no parentheses there."""
+        """True if fractions have a bar, so that sums need no parentheses there."""
 
     @property
     def sum_over_j(self) -> str:
@@ -91,13 +91,13 @@ class Latex:
         return rf"\text{{{text}}}"
 
     def letter(self, name: str, index: str = "", primes: int = 0) -> str:
-        base, *own = filter(None, re.sub(r"(?<=[A-Za-z])(?=\d+(_|$))", "_", name).split("_"))
-        below = ",".join([*map(self._word, own), *filter(None, [index])])
+        base, *subscripts = filter(None, re.sub(r"(?<=[A-Za-z])(?=\d+(_|$))", "_", name).split("_"))
+        below = ",".join([*map(self._word, subscripts), *filter(None, [index])])
         head = self._word(base)
         return head + (f"_{below}" if len(below) == 1 else f"_{{{below}}}" if below else "") + "'" * primes
 
     def _word(self, name: str) -> str:
-        """A Greek letter, a letter or a number as it is, and a word upright."""
+        """Return the symbol of a Greek letter, a letter or number unchanged, and a word upright."""
         if name in VARIANTS:
             return VARIANTS[name][0]
         if name in greek_unicode:
@@ -145,9 +145,9 @@ class Text:
         return text
 
     def letter(self, name: str, index: str = "", primes: int = 0) -> str:
-        base, _, own = name.partition("_")
+        base, _, subscript = name.partition("_")
         head = VARIANTS[base][1] if base in VARIANTS else greek_unicode.get(base, base)
-        return "_".join(filter(None, (head, own, index))) + "'" * primes
+        return "_".join(filter(None, (head, subscript, index))) + "'" * primes
 
     def product(self, factors: Sequence[str]) -> str:
         return " ".join(factors).replace(") (", ")(")
@@ -179,7 +179,7 @@ class ExpressionWriter:
 
     style: Style  # LaTeX or text
     letters: Mapping[sp.Symbol, str]  # the written forms of symbols; others have their names
-    variables: frozenset[sp.Symbol]  # the symbols that stand behind parameters in products
+    variables: frozenset[sp.Symbol]  # the symbols that follow the parameters in products
 
     def total(self, terms: Iterable[sp.Expr]) -> str:
         """Return a sum in the order given, 0 if it is empty."""
@@ -205,7 +205,7 @@ class ExpressionWriter:
         return self._called(e)
 
     def _called(self, e: sp.Expr) -> str:
-        """A function of expressions, the number pi, or what the style has another way for."""
+        """Write a function, pi, or anything else by the printer of SymPy."""
         if e is sp.pi:
             return self.style.letter("pi")
         if isinstance(e, sp.Abs):
@@ -223,14 +223,14 @@ class ExpressionWriter:
         top, bottom = _fraction(e)
         if bottom == 1:
             return self.style.product(self.factors(top))
-        constant, rest = top.as_independent(*top.free_symbols, as_Add=False)
-        if rest == 1 or not bottom.is_number:
+        constant, variable = top.as_independent(*top.free_symbols, as_Add=False)
+        if variable == 1 or not bottom.is_number:
             return self.style.fraction(self._part(top), self._part(bottom), not bottom.is_Mul)
         front = self.style.fraction(self._part(constant), self._part(bottom), not bottom.is_Mul)
-        return self.style.product([self.style.beside(front), *self.factors(rest)])
+        return self.style.product([self.style.beside(front), *self.factors(variable)])
 
     def _part(self, e: sp.Expr) -> str:
-        """The top or bottom of a fraction."""
+        """Write the top or bottom of a fraction."""
         if e.is_Mul:
             return self.style.product(self.factors(e))
         return self.write(e) if self.style.bars else self._factor(e)
@@ -263,14 +263,14 @@ def _negative(e: sp.Expr) -> bool:
 
 
 def _turned(e: sp.Expr) -> sp.Expr:
-    """A product with the sign of a wholly negative sum taken out: -(1 + a) d, not (-1 - a) d."""
+    """Take the sign out of sums with negative terms only: -(1 + a) d, not (-1 - a) d."""
     if not e.is_Mul:
         return e
     return sp.Mul(*(sp.Mul(-1, -f, evaluate=False) if f.is_Add and all(map(_negative, f.args)) else f for f in e.args))
 
 
 def _fraction(e: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Numerator and denominator; other than SymPy's, exp(-x) stays above."""
+    """Return numerator and denominator; unlike in SymPy, exp(-x) stays above."""
     top, bottom = [], []
     for factor in sp.Mul.make_args(e):
         if factor.is_Rational:

@@ -1,1 +1,1 @@
-"""What of a graph may move alike: balanced partitions, automorphisms, cluster states. Knows no oscillator."""
+"""Balanced partitions, automorphisms and cluster states of a graph. It imports nothing of oscillators."""

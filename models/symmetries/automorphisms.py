@@ -12,7 +12,7 @@ Permutation = tuple[int, ...]
 """The image of each node."""
 
 STEP_LIMIT = 2_000_000
-"""Images tried before the search ends."""
+"""Images tried before the search ends, a choice: a few seconds."""
 
 
 def automorphisms(graph: Topology, limit: int = 20_000, step_limit: int = STEP_LIMIT) -> tuple[Permutation, ...]:
@@ -29,7 +29,8 @@ def automorphisms(graph: Topology, limit: int = 20_000, step_limit: int = STEP_L
 
 
 def _search(graph: Topology, step_limit: int) -> Iterator[Permutation]:
-    """Assign images along the links: each image is next to one that is already fixed."""
+    """Yield the automorphisms, by backtracking: assign images node by node, each next to one that is fixed."""
+    # An automorphism keeps the classes of the coarsest balanced partition, so images of other colours are not tried.
     weights = graph.rows
     colour = coarsest_balanced(graph.n, graph.links, [row[i] for i, row in enumerate(weights)])
     order, anchor = _order(graph, colour)
@@ -38,12 +39,12 @@ def _search(graph: Topology, step_limit: int) -> Iterator[Permutation]:
     used: set[int] = set()
     steps = 0
 
-    def extend(place: int) -> Iterator[Permutation]:
+    def extend(depth: int) -> Iterator[Permutation]:
         nonlocal steps
-        if place == graph.n:
+        if depth == graph.n:
             yield tuple(image[i] for i in range(graph.n))
             return
-        i = order[place]
+        i = order[depth]
         for j in near[image[anchor[i]]] if i in anchor else range(graph.n):
             steps += 1
             if steps > step_limit:
@@ -53,17 +54,18 @@ def _search(graph: Topology, step_limit: int) -> Iterator[Permutation]:
                 )
             if j in used or colour[i] != colour[j]:
                 continue
+            # the weights to and from all nodes with an image must agree
             if all(weights[i][o] == weights[j][p] and weights[o][i] == weights[p][j] for o, p in image.items()):
                 image[i] = j
                 used.add(j)
-                yield from extend(place + 1)
+                yield from extend(depth + 1)
                 used.discard(image.pop(i))
 
     return extend(0)
 
 
 def _order(graph: Topology, colour: tuple[int, ...]) -> tuple[list[int], dict[int, int]]:
-    """All nodes, part by part, breadth first from a rare colour; and earlier neighbours."""
+    """Return all nodes, breadth first from rare colours, and for each but the first of a part an earlier neighbour."""
     near = _neighbours(graph)
     rare = sorted(range(graph.n), key=lambda i: (colour.count(colour[i]), i))
     order: list[int] = []
@@ -84,7 +86,7 @@ def _order(graph: Topology, colour: tuple[int, ...]) -> tuple[list[int], dict[in
 
 
 def _neighbours(graph: Topology) -> list[list[int]]:
-    """Nodes joined by a link in either direction, ascending."""
+    """Return for each node those that it is linked with in either direction, ascending."""
     near: list[set[int]] = [set() for _ in range(graph.n)]
     for target, source, _ in graph.links:
         near[target].add(source)

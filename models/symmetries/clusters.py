@@ -1,7 +1,7 @@
-"""Cluster states of a small graph: what can move as one, and equations of differences.
+"""Cluster states of a small graph: nodes that can move as one, and the equations of their differences.
 
 A symmetry of the graph maps solutions to solutions: the nodes of an orbit of a group of symmetries
-may stay equal.  The differences within the clusters obey a linear equation of their own.  With
+may stay equal.  The differences within the clusters obey a linear equation among themselves.  With
 x_i - x_first(cluster) as coordinates it is rational, and it falls into blocks, one for each set of
 intertwined clusters.  The row sums of G are zero, so the partitions that G leaves invariant are the
 external equitable ones.
@@ -29,10 +29,10 @@ from .automorphisms import automorphisms
 from .partitions import class_links
 
 NODE_LIMIT = 64
-"""Largest graph with a search for symmetries."""
+"""Largest graph with a search for symmetries, a choice."""
 
 PARTITION_LIMIT = 5000
-"""Most partitions that are listed."""
+"""Most partitions that are listed, a choice."""
 
 Rows = tuple[tuple[Fraction, ...], ...]
 
@@ -104,6 +104,7 @@ def orbital_partitions(
             f"{graph.name}({graph.n}): expected at most {NODE_LIMIT} nodes to look for symmetries; describe single "
             "partitions with `clusters`"
         )
+    # Partitions into cycles of one symmetry; all others are joins of these.  Close them under joins, the finest first.
     cycles = {join(graph.n, enumerate(g)) for g in automorphisms(graph, limit)}
     closed = {tuple(range(graph.n))}
     for partition in sorted(cycles, key=_fine_first):
@@ -148,7 +149,7 @@ def clusters(graph: Topology, classes: Sequence[int]) -> Clusters:
 
 
 def _described(graph: Topology, classes: tuple[int, ...], characteristic: fmpq_poly) -> Clusters:
-    """Quotient and blocks of a balanced partition, proved."""
+    """Return quotient and blocks of a balanced partition, checked against det(x - G)."""
     quotient = Topology(f"{graph.name} quotient", max(classes) + 1, class_links(graph.n, graph.links, classes))
     state = Clusters(classes, quotient, _blocks(graph, classes))
     check(state, graph, characteristic)
@@ -168,32 +169,36 @@ def check(state: Clusters, graph: Topology, characteristic: fmpq_poly) -> None:
 
 
 def _blocks(graph: Topology, classes: tuple[int, ...]) -> tuple[Block, ...]:
-    """T G L of differences from the first nodes of clusters, in blocks of joined clusters."""
-    first = {k: i for i, k in reversed(list(enumerate(classes)))}
+    """Return the blocks of the differences from the first nodes of clusters."""
+    # Coordinates y_k = x_i - x_j, j the first node of the cluster of i.  With T the matrix of these differences and L
+    # the embedding x_i = y_k (0 on first nodes), the rates are T G L y: the partition is balanced, so the
+    # common part of a cluster drops out (Pecora et al. 2014, the lower right block of T G T^-1).
+    first = _first_members(classes)
     pairs = [(i, first[k]) for i, k in enumerate(classes) if i != first[k]]
     rows = graph.rows
     matrix = [[rows[i][column] - rows[j][column] for column, _ in pairs] for i, j in pairs]
-    on = [classes[i] for i, _ in pairs]
-    met = [(on[a], on[b]) for a, row in enumerate(matrix) for b, entry in enumerate(row) if entry]
-    group = join(max(classes) + 1, met)
+
+    # Clusters whose differences enter each other's rates are intertwined and share a block.
+    cluster_of = [classes[i] for i, _ in pairs]
+    coupled = [(cluster_of[a], cluster_of[b]) for a, row in enumerate(matrix) for b, entry in enumerate(row) if entry]
+    group = join(max(classes) + 1, coupled)
     blocks = []
-    for part in sorted({group[k] for k in on}):
-        places = [a for a, k in enumerate(on) if group[k] == part]
-        blocks.append(
-            Block(
-                tuple(sorted({on[a] for a in places})),
-                tuple(on[a] for a in places),
-                tuple(pairs[a] for a in places),
-                tuple(tuple(matrix[a][b] for b in places) for a in places),
-            )
-        )
+    for part in sorted({group[k] for k in cluster_of}):
+        members = [a for a, k in enumerate(cluster_of) if group[k] == part]
+        nodes = tuple(cluster_of[a] for a in members)
+        block = tuple(tuple(matrix[a][b] for b in members) for a in members)
+        blocks.append(Block(tuple(sorted(set(nodes))), nodes, tuple(pairs[a] for a in members), block))
     return tuple(blocks)
 
 
+def _first_members(classes: tuple[int, ...]) -> dict[int, int]:
+    return {k: i for i, k in reversed(list(enumerate(classes)))}
+
+
 def _stars(classes: tuple[int, ...]) -> list[tuple[int, int]]:
-    """Each node with the first of its class."""
-    first: dict[int, int] = {}
-    return [(i, first.setdefault(k, i)) for i, k in enumerate(classes)]
+    """Return each node with the first of its class: the pairs whose join is the partition."""
+    first = _first_members(classes)
+    return [(i, first[k]) for i, k in enumerate(classes)]
 
 
 def _fine_first(classes: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:

@@ -12,20 +12,22 @@ from ..graphs.links import Link, numbered
 
 def class_links(n: int, links: Iterable[Link], classes: Sequence[int]) -> tuple[Link, ...]:
     """Return the links between the classes of a balanced partition."""
+    # the total weight that each node feels from each other class
     felt: list[dict[int, Fraction]] = [{} for _ in range(n)]
     for target, source, weight in links:
         k = classes[source]
         if k != classes[target]:
             felt[target][k] = felt[target].get(k, Fraction(0)) + weight
+    # the first node of a class, and the totals that all others must feel too
     chosen: dict[int, tuple[int, dict[int, Fraction]]] = {}
-    for i, found in enumerate(felt):
-        total = {k: weight for k, weight in found.items() if weight != 0}
-        first, expected = chosen.setdefault(classes[i], (i, total))
-        if total != expected:
-            k = min(k for k in {*total, *expected} if total.get(k) != expected.get(k))
+    for i, totals in enumerate(felt):
+        nonzero = {k: weight for k, weight in totals.items() if weight != 0}
+        first, expected = chosen.setdefault(classes[i], (i, nonzero))
+        if nonzero != expected:
+            k = min(k for k in {*nonzero, *expected} if nonzero.get(k) != expected.get(k))
             raise ValueError(
                 f"partition is not balanced: nodes {first + 1} and {i + 1} are of one class, but feel class {k} with the "
-                f"total weights {expected.get(k, 0)} and {total.get(k, 0)}"
+                f"total weights {expected.get(k, 0)} and {nonzero.get(k, 0)}"
             )
     return tuple((a, b, weight) for a in sorted(chosen) for b, weight in sorted(chosen[a][1].items()))
 
@@ -45,58 +47,52 @@ def coarsest_balanced(n: int, links: Iterable[Link], colours: Sequence[Hashable]
     """
     if len(colours) != n:
         raise ValueError(f"colours: found {len(colours)} for {n} nodes; expected one for each node")
-    columns = _columns(n, tuple(links))
-    of = list(numbered(colours))
-    members: list[set[int]] = [set() for _ in {*of}]
-    for i, k in enumerate(of):
+
+    # For each source its targets with whole weights; the diagonal is minus the sum of the row.
+    listed = tuple(links)
+    scale = math.lcm(*(weight.denominator for _, _, weight in listed))
+    columns: list[list[tuple[int, int]]] = [[] for _ in range(n)]
+    row_sums = [0] * n
+    for target, source, weight in listed:
+        integer = weight.numerator * (scale // weight.denominator)
+        columns[source].append((target, integer))
+        row_sums[target] += integer
+    for i, total in enumerate(row_sums):
+        columns[i].append((i, -total))
+
+    # Split classes by the totals that their nodes feel from one class, until no class splits another.
+    class_of = list(numbered(colours))
+    members: list[set[int]] = [set() for _ in {*class_of}]
+    for i, k in enumerate(class_of):
         members[k].add(i)
     queue = deque(range(len(members)))
     while queue:
-        for k, parts in _felt(members[queue.popleft()], columns, of).items():
-            for part in _split(members, k, parts):
+        totals: dict[int, int] = {}
+        for j in members[queue.popleft()]:
+            for i, weight_ij in columns[j]:
+                totals[i] = totals.get(i, 0) + weight_ij
+        parts: dict[int, dict[int, set[int]]] = {}  # of each class, by totals other than 0
+        for i, total in totals.items():
+            if total != 0:
+                parts.setdefault(class_of[i], {}).setdefault(total, set()).add(i)
+        for k, by_total in parts.items():
+            for part in _split(members, k, list(by_total.values())):
                 queue.append(len(members))
                 for i in part:
-                    of[i] = len(members)
+                    class_of[i] = len(members)
                 members.append(part)
-    return numbered(of)
-
-
-def _columns(n: int, links: tuple[Link, ...]) -> list[list[tuple[int, int]]]:
-    """For each source its targets with whole weights; the diagonal is minus the sum of the row."""
-    scale = math.lcm(*(weight.denominator for _, _, weight in links))
-    columns: list[list[tuple[int, int]]] = [[] for _ in range(n)]
-    rows = [0] * n
-    for target, source, weight in links:
-        whole = weight.numerator * (scale // weight.denominator)
-        columns[source].append((target, whole))
-        rows[target] += whole
-    for i, total in enumerate(rows):
-        columns[i].append((i, -total))
-    return columns
-
-
-def _felt(sources: set[int], columns: list[list[tuple[int, int]]], of: list[int]) -> dict[int, list[set[int]]]:
-    """For each class the sets of its nodes that feel the sources with equal totals other than 0."""
-    totals: dict[int, int] = {}
-    for j in sources:
-        for i, weight in columns[j]:
-            totals[i] = totals.get(i, 0) + weight
-    found: dict[int, dict[int, set[int]]] = {}
-    for i, total in totals.items():
-        if total != 0:
-            found.setdefault(of[i], {}).setdefault(total, set()).add(i)
-    return {k: list(parts.values()) for k, parts in found.items()}
+    return numbered(class_of)
 
 
 def _split(members: list[set[int]], k: int, parts: list[set[int]]) -> list[set[int]]:
-    """Split class k into parts and the rest; return all but the largest, which stays k."""
-    left = len(members[k]) - sum(map(len, parts))
+    """Split class k into parts and its remaining nodes; return all but the largest, which stays k."""
+    remaining = len(members[k]) - sum(map(len, parts))
     parts.sort(key=len)
-    if left == 0 and len(parts) == 1:
+    if remaining == 0 and len(parts) == 1:
         return []
-    if left >= len(parts[-1]):
+    if remaining >= len(parts[-1]):
         members[k].difference_update(*parts)
         return parts
-    members[k], rest = parts.pop(), members[k]
-    rest.difference_update(members[k], *parts)
-    return [*parts, rest] if rest else parts
+    members[k], others = parts.pop(), members[k]
+    others.difference_update(members[k], *parts)
+    return [*parts, others] if others else parts
