@@ -158,12 +158,12 @@ class Family:
             raise ValueError(
                 f"found no settle for the options {', '.join(self.options)}; expected one that checks them"
             )
-        # all functions take n and the same options
+        # all functions take n, the same options, and perhaps further arguments with defaults
         for name in ("settle", "count", "expected", "spectrum"):
             if (function := getattr(self, name)) is not None:
-                parameters = list(inspect.signature(function).parameters)[1:]
-                for option in parameters:
-                    if option not in self.options:
+                parameters = dict(list(inspect.signature(function).parameters.items())[1:])
+                for option, parameter in parameters.items():
+                    if option not in self.options and parameter.default is inspect.Parameter.empty:
                         raise ValueError(f"{name} has the argument {option!r}, which is no option of edges")
                 for option in self.options:
                     if option not in parameters:

@@ -18,7 +18,7 @@ from family_sizes import size, sizes
 
 from synchain import models
 from synchain.models.graphs.closed_forms import closed_form
-from synchain.models.graphs.families import TOPOLOGY, family, names, topology
+from synchain.models.graphs.families import TOPOLOGY, Family, family, names, topology
 from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
 from synchain.models.spectra.solve import Proof, spectrum
@@ -493,3 +493,13 @@ def test_editors_see_the_options_of_a_family() -> None:
     assert str(inspect.signature(models.small_world)) == "(n: int, *, neighbours=4, p='1/10', seed=0)"
     assert str(inspect.signature(models.path)) == "(n: int)"
     assert "name" in inspect.signature(type(models.circulant)).parameters
+
+
+def test_functions_of_a_family_may_have_further_arguments_with_defaults() -> None:
+    def edges(n: int) -> list[tuple[int, int, int]]:
+        return [(i, i + 1, 1) for i in range(n - 1)]
+
+    path = Family(edges, minimum=1, count=lambda n, step=1: n - step, name="path of test")
+    assert path(4).link_count == 6
+    with pytest.raises(ValueError, match="count has the argument 'step', which is no option of edges"):
+        Family(edges, minimum=1, count=lambda n, step: n - step, name="path of test")
