@@ -1,26 +1,32 @@
 """From a Lagrangian and a graph to exact equations and exact spectra.
 
-Names are loaded on first use, so that importing this package costs next to nothing; `__init__.pyi`
-says to editors what they are. Every file of
-the folder `topologies` is offered as a function of the number of nodes and of its options:
-``circulant(10, offsets=(1, 3))`` is ``topology("circulant", 10, offsets=(1, 3))``.  Families whose
-name in networkx is another have that one too: ``path(4) == chain(4)``, ``cycle(5) == ring(5)``.
+    Lagrangian, Field, friction_law          one node
+    link_energy, Rates                       one link
+    chain, from_edges, cartesian …           a graph;   topology.spectrum: its exact eigenvalues
+    Scene                                    a network with its numbers, starts and records, which `run` takes
+
+Names are loaded on first use, so that importing this package costs next to nothing; editors read them in
+`__init__.pyi`.
+
+Every file of the folder `topologies` is offered as a function of the number of nodes and of its options:
+``circulant(10, offsets=(1, 3))`` is ``topology("circulant", 10, offsets=(1, 3))``.  Families with another name in
+networkx have that one too: ``path(4) == chain(4)``, ``cycle(5) == ring(5)``.
 
 Glossary
 --------
-node, link    An oscillator of a network; what node j does to node i, with an exact weight.
+node, link    An oscillator of a network; the influence of node j on node i, with an exact weight.
 kind          Nodes of one kind have the same oscillator, friction law and contact, and equations.
 topology      Nodes and weighted links; adjacency minus degree is the connectivity matrix G.
 family        A rule that makes the topology of any number of nodes: chain, ring, star.
 spectrum      The exact eigenvalues γ of G with their multiplicities; largest first, the first is 0.
-coupling      What a link adds: an energy, a matrix between states, or any rates of its target.
+coupling      The terms of a link: an energy, a matrix between states, or any rates of its target.
 layer         The links of one coupling on one graph; a network may have several.
-contact       How friction jumps at rest: smoothed ("atan", steepness κ), or "set-valued".
+contact       The jump of friction at rest: smoothed ("atan", steepness κ), or "set-valued".
 slip state    Of a node with set-valued contact: +1 or -1 while it slips, 0 while it sticks.
 quotient      The network of classes of nodes that move alike, which has fewer equations.
 observable    A value of the states, reduced over the nodes and then over the window of a cell.
-record        What a scene keeps: "sync_error", "section" or "trajectory".
-scene         Model, numbers, start, records and axes: everything that a run needs.
+record        Output of a run: "sync_error", "section" or "trajectory".
+scene         Model, parameter values, start, records and axes: everything that a run needs.
 cell          One point of the axes of a scene: one initial-value problem.
 """
 
@@ -60,6 +66,8 @@ _HOMES = {
     "from_matrix": "graphs.topology",
     "from_sparse": "graphs.readers",
     "from_symbols": "graphs.symbolic",
+    "integer_option": "inputs.options",
+    "integers_option": "inputs.options",
     "joint_spectrum": "spectra.joint",
     "kronecker": "graphs.products",
     "latex": "presentation.equations_text",
@@ -84,68 +92,10 @@ _HOMES = {
     "union": "graphs.products",
     "variance": "dynamics.observable",
     "weighted": "graphs.products",
-    "integer_option": "inputs.options",
-    "integers_option": "inputs.options",
 }
+"""The file of each public name; families of graphs have their own files."""
 
-__all__ = [
-    "Axis",
-    "Clusters",
-    "Family",
-    "Field",
-    "FrictionLaw",
-    "Lagrangian",
-    "Observable",
-    "Oscillator",
-    "Parameter",
-    "Potential",
-    "Rates",
-    "Scene",
-    "Section",
-    "Spectrum",
-    "Topology",
-    "allow_code",
-    "cartesian",
-    "clusters",
-    "complement",
-    "end",
-    "ends",
-    "energy",
-    "exprel",
-    "friction",
-    "friction_law",
-    "from_edges",
-    "from_graph",
-    "from_matrix",
-    "from_sparse",
-    "from_symbols",
-    "integer_option",
-    "integers_option",
-    "joint_spectrum",
-    "kronecker",
-    "latex",
-    "link_energy",
-    "load_scene",
-    "lorentzian",
-    "maximum",
-    "mean",
-    "minimum",
-    "nodes",
-    "normal",
-    "orbital_partitions",
-    "probability_option",
-    "rate",
-    "read_edges",
-    "read_graphml",
-    "read_matrix",
-    "scene_names",
-    "text",
-    "topology",
-    "uniform",
-    "union",
-    "variance",
-    "weighted",
-]
+__all__ = list(_HOMES)
 
 
 def __getattr__(name: str) -> Any:
@@ -172,5 +122,5 @@ def _families() -> set[str]:
 
     from .graphs.families import TOPOLOGY
 
-    found = iter_modules(import_module(".topologies", __name__).__path__)
-    return {module.name for module in found if not module.name.startswith("_")}.union(TOPOLOGY.also)
+    files = iter_modules(import_module(".topologies", __name__).__path__)
+    return {file.name for file in files if not file.name.startswith("_")}.union(TOPOLOGY.also)

@@ -1,14 +1,20 @@
-"""Running scenes: sweeps, thresholds, exponents, figures and the command line.
+"""From a scene to results: runs, exponents, thresholds, equilibria, periodic orbits and the command line.
+
+    run, stream                                        trajectories and records of all cells of a scene
+    exponents, msf, plane, cluster_exponents,
+    lyapunov_spectrum                                  stability of synchronous, clustered and other motion
+    thresholds, universal_probe, basin                 strengths and starts that synchronise
+    equilibrium, periodic_orbit, follow, skeleton      states at rest, orbits, their branches and bifurcations
 
 Names are loaded on first use, so that the command line starts fast.
 
 Glossary
 --------
-cell          One point of the axes of a scene: one initial-value problem with a status of its own.
-row           The numbers of one cell as a kernel takes them: parameters, initial states, span.
+cell          One point of the axes of a scene: one initial-value problem with one status.
+row           The input of a kernel for one cell: parameter values, initial states, span.
 span          Of one cell: the ends of its window, its period, and the error of a synchronous cell.
 block         Cells that are run, stored and resumed as one piece.
-lane          One of the numbers in a SIMD register; each lane integrates a cell of its own.
+lane          One of the numbers in a SIMD register; each lane integrates another cell.
 transient     Time that is integrated before anything is recorded; the window follows it.
 strength      α = -σγ, real or complex, of an eigenvalue γ of the network and the coupling σ.
 mode          A deviation from synchrony along an eigenvector of the network.
@@ -88,7 +94,7 @@ __all__ = [
     "universal_probe",
 ]
 
-_HOME = {
+_HOMES = {
     "Basin": "synchronisation.basin",
     "Branch": "bifurcation.branches",
     "ClusterExponents": "stability.cluster_exponents",
@@ -130,9 +136,9 @@ _HOME = {
 
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first used, so that the command line starts fast."""
-    if name not in _HOME:
+    if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has: {', '.join(__all__)}")
-    return public(getattr(importlib.import_module(f".{_HOME[name]}", __name__), name), __name__)
+    return public(getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name), __name__)
 
 
 def __dir__() -> list[str]:

@@ -1,7 +1,7 @@
-"""The front door: all names of the models and of the runtime, each loaded when it is first used.
+"""The package `synchain`: all names of its models and of its runtime, each loaded when it is first used.
 
-``import synchain`` is this file.  It knows the two packages and nothing of their rooms;
-`__init__.pyi` says to editors what it offers.
+``import synchain`` is this file, which imports the two packages and none of their rooms; editors read the names in
+`__init__.pyi`.
 """
 
 from __future__ import annotations
@@ -28,9 +28,6 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    own = {name for name in globals() if name.startswith("__")}
-    return sorted({*own, "__version__", "models", "runtime", *runtime.__all__, *_offered(models)})
-
-
-def _offered(package: Any) -> list[str]:
-    return [name for name in dir(package) if not name.startswith("_")]
+    dunders = {name for name in globals() if name.startswith("__")}
+    of_models = (name for name in dir(models) if not name.startswith("_"))
+    return sorted({*dunders, "__version__", "models", "runtime", *runtime.__all__, *of_models})
