@@ -142,7 +142,7 @@ def _belt(axes: Axes, scene: Scene, time: np.ndarray, x: np.ndarray, ground: np.
     masses = [Rectangle((0.0, 0.0), side, side, edgecolor=BLACK, linewidth=1.0, zorder=3) for _ in range(n)]
     for mass in masses:
         axes.add_patch(mass)
-    numbers = [
+    labels = [
         axes.text(0.0, 0.5 * side, str(label), ha="center", va="center", color="white", zorder=4)
         for label in scene.topology.labels
     ]
@@ -163,7 +163,7 @@ def _belt(axes: Axes, scene: Scene, time: np.ndarray, x: np.ndarray, ground: np.
         for i, mass in enumerate(masses):
             mass.set_xy((centre[i, frame] - 0.5 * side, 0.0))
             mass.set_facecolor(colours[frame, i])
-            numbers[i].set_position((centre[i, frame], 0.5 * side))
+            labels[i].set_position((centre[i, frame], 0.5 * side))
         for spring, (i, j) in zip(springs, pairs, strict=True):
             spring.set_data(*_spring(centre[i, frame], centre[j, frame], side, j - i))
 

@@ -45,8 +45,8 @@ DOTS: dict[str, Any] = {"linestyle": "none", "marker": "."}
 
 def drawn(value: HasPlot, ax: Axes | None, **style: Any) -> Axes:
     """Draw a value into axes, by default pyplot's current ones, and return them; `style` goes to Matplotlib's artists."""
-    own = [name for name in inspect.signature(type(value).plot).parameters if name not in ("self", "style")]
-    check_style({name: x for name, x in style.items() if name not in own}, "plot", ", ".join(own))
+    keywords = [name for name in inspect.signature(type(value).plot).parameters if name not in ("self", "style")]
+    check_style({name: x for name, x in style.items() if name not in keywords}, "plot", ", ".join(keywords))
     if isinstance(value, Result | Streamed):  # refuses kinds before it opens a figure
         return draw_result(value if isinstance(value, Result) else value.result, ax, **style)
     return _draw(value, axes_of(ax), **style)

@@ -18,10 +18,10 @@ from synchain.models.graphs.links import join
 from synchain.models.graphs.topology import Topology
 
 DENSE = 300
-"""Largest number of nodes with dense matrices."""
+"""Largest number of nodes with dense matrices, whose pseudo-inverse costs n^3 (a choice)."""
 
 ROUNDS = 80
-"""Number of steps of the majorisation."""
+"""Number of steps of the majorisation (a choice)."""
 
 
 def positions(graph: Topology) -> np.ndarray:
@@ -71,8 +71,8 @@ def _levels(graph: Topology) -> np.ndarray:
     """Put the root of a binary tree at the top: node i has the children 2 i + 1 and 2 i + 2."""
     number = np.arange(1, graph.n + 1)
     level = np.floor(np.log2(number)).astype(int)
-    place = (number - 2**level + 0.5) / 2.0**level
-    return np.stack([2.0 * place - 1.0, -level / max(level.max(initial=0), 1) * 1.2], axis=1)
+    across = (number - 2**level + 0.5) / 2.0**level
+    return np.stack([2.0 * across - 1.0, -level / max(level.max(initial=0), 1) * 1.2], axis=1)
 
 
 def _sides(graph: Topology) -> np.ndarray:
@@ -102,18 +102,18 @@ _FAMILIES: dict[str, Callable[[Topology], np.ndarray]] = {
 def _spectral(graph: Topology) -> np.ndarray:
     """Put the connected parts side by side, each by its eigenvectors; a graph of nearly no links on a circle."""
     part = np.array(join(graph.n, ((target, source) for target, source, _ in graph.links)))
-    numbers = np.unique(part)
-    if len(numbers) > graph.n // 2:
+    parts = np.unique(part)
+    if len(parts) > graph.n // 2:
         return _circle(graph.n)
-    place = np.zeros((graph.n, 2))
+    points = np.zeros((graph.n, 2))
     left = 0.0
-    for number in numbers:
-        members = np.flatnonzero(part == number)
+    for label in parts:
+        members = np.flatnonzero(part == label)
         # the area of a part grows with the number of its nodes
         layout = _fit(_eigenvectors(graph, members)) * np.sqrt(len(members))
-        place[members] = layout + np.array([left - layout[:, 0].min(), 0.0])
+        points[members] = layout + np.array([left - layout[:, 0].min(), 0.0])
         left += float(np.ptp(layout[:, 0])) + 0.6 * np.sqrt(len(members)) + 0.4
-    return place
+    return points
 
 
 def _eigenvectors(graph: Topology, members: np.ndarray) -> np.ndarray:
@@ -140,22 +140,22 @@ def _eigenvectors(graph: Topology, members: np.ndarray) -> np.ndarray:
     return np.asarray(vectors[:, np.argsort(values)[1:3]])
 
 
-def _majorise(place: np.ndarray, path_lengths: np.ndarray) -> np.ndarray:
+def _majorise(points: np.ndarray, path_lengths: np.ndarray) -> np.ndarray:
     """Move nodes by majorisation until their distances approach the lengths (m, m) of shortest paths."""
     scale = float(path_lengths.max()) / 2.0
-    place = scale * place + 0.05 * scale * _circle(len(place))  # separate coinciding nodes
+    points = scale * points + 0.05 * scale * _circle(len(points))  # separate coinciding nodes
     # each step solves L_w x = L_pull x_old, weights 1/d² (Gansner, Koren & North)
     weight = np.divide(1.0, path_lengths**2, where=path_lengths > 0.0, out=np.zeros_like(path_lengths))
     inverse = np.linalg.pinv(np.diag(weight.sum(axis=1)) - weight)
     for _ in range(ROUNDS):
-        now = np.linalg.norm(place[:, None] - place[None], axis=2)
+        now = np.linalg.norm(points[:, None] - points[None], axis=2)
         pull = np.divide(weight * path_lengths, now, where=now > 0.0, out=np.zeros_like(now))
-        place = inverse @ ((np.diag(pull.sum(axis=1)) - pull) @ place)
-    return np.asarray(place)
+        points = inverse @ ((np.diag(pull.sum(axis=1)) - pull) @ points)
+    return np.asarray(points)
 
 
-def _fit(place: np.ndarray) -> np.ndarray:
+def _fit(points: np.ndarray) -> np.ndarray:
     """Shift and scale positions into a box of side 2 about the origin, without distortion."""
-    low, high = place.min(axis=0), place.max(axis=0)
+    low, high = points.min(axis=0), points.max(axis=0)
     size = float((high - low).max()) or 1.0
-    return np.asarray((place - 0.5 * (low + high)) * (2.0 / size))
+    return np.asarray((points - 0.5 * (low + high)) * (2.0 / size))

@@ -27,7 +27,7 @@ NEGATIVE = "#D55E00"
 """Colour of links with a negative weight."""
 
 SVG_NODES, SVG_LINES = 300, 3000
-"""Most nodes and lines of an SVG; a larger graph is described in words."""
+"""Most nodes and lines of an SVG; of a larger graph it gives the numbers of nodes and links."""
 
 NUMBERED = 0.05
 """Least radius of nodes that carry their labels."""
@@ -141,10 +141,10 @@ def draw_graph(value: HasDrawing, ax: Axes | None = None, values: ArrayLike | No
     check_style(style, "draw", "ax, values")
     picture, axes = Picture.of(value), axes_of(ax)
     # straight lines as one collection, which draws fast
-    place, straight = picture.positions, [line for line in picture.lines if not (line.arrow or line.bent)]
+    points, straight = picture.positions, [line for line in picture.lines if not (line.arrow or line.bent)]
     axes.add_collection(
         LineCollection(
-            [place[[line.source, line.target]] for line in straight],
+            [points[[line.source, line.target]] for line in straight],
             linewidths=[line.width for line in straight],
             colors=[NEGATIVE if line.negative else "0.45" for line in straight],
             zorder=1,
@@ -154,8 +154,8 @@ def draw_graph(value: HasDrawing, ax: Axes | None = None, values: ArrayLike | No
     for line in picture.lines:
         if line.arrow or line.bent:
             patch = FancyArrowPatch(
-                place[line.source],
-                place[line.target],
+                points[line.source],
+                points[line.target],
                 arrowstyle="-|>" if line.arrow else "-",
                 connectionstyle=f"arc3,rad={BEND if line.bent else 0.0}",
                 mutation_scale=8.0,
@@ -172,12 +172,12 @@ def draw_graph(value: HasDrawing, ax: Axes | None = None, values: ArrayLike | No
 
 def _nodes(axes: Axes, picture: Picture, values: ArrayLike | None, style: dict[str, Any]) -> None:
     """Draw the nodes with their colours and labels, with a legend if there are several kinds."""
-    place, kind = picture.positions, np.array(picture.kind)
+    points, kind = picture.positions, np.array(picture.kind)
     size = (2.0 * POINTS * picture.radius) ** 2  # matplotlib takes the square of the diameter in points
     dots: dict[str, Any] = {"s": size, "zorder": 2, "linewidths": 0.0, **style}
     if values is None:
         for k, name in enumerate(picture.names):
-            axes.scatter(*place[kind == k].T, **{"color": COLOURS[k % len(COLOURS)], "label": name, **dots})
+            axes.scatter(*points[kind == k].T, **{"color": COLOURS[k % len(COLOURS)], "label": name, **dots})
     else:
         colour = np.asarray(values)
         if colour.shape != kind.shape or colour.dtype.kind not in "biuf":
@@ -185,12 +185,12 @@ def _nodes(axes: Axes, picture: Picture, values: ArrayLike | None, style: dict[s
                 f"values: found an array {colour.shape} of {colour.dtype}; expected {len(kind)} real numbers, one a node"
             )
         if colour.dtype.kind == "f":
-            axes.figure.colorbar(axes.scatter(*place.T, **{"c": colour, **dots}), ax=axes)
+            axes.figure.colorbar(axes.scatter(*points.T, **{"c": colour, **dots}), ax=axes)
         else:  # whole numbers are classes, such as clusters
             classes = np.unique(colour, return_inverse=True)[1]
-            axes.scatter(*place.T, **{"color": [COLOURS[k % len(COLOURS)] for k in classes], **dots})
+            axes.scatter(*points.T, **{"color": [COLOURS[k % len(COLOURS)] for k in classes], **dots})
     if picture.radius >= NUMBERED:
-        for i, (x, y) in enumerate(place.tolist()):
+        for i, (x, y) in enumerate(points.tolist()):
             axes.text(
                 x,
                 y,
@@ -203,13 +203,13 @@ def _nodes(axes: Axes, picture: Picture, values: ArrayLike | None, style: dict[s
             )
     if len(picture.names) > 1 and values is None:
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
-    low, high = place.min(axis=0) - 0.2, place.max(axis=0) + 0.2
+    low, high = points.min(axis=0) - 0.2, points.max(axis=0) + 0.2
     axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.set_axis_off()
 
 
 def svg(value: HasDrawing, width: int = 300) -> str:
-    """Return a graph as SVG text; of more than SVG_NODES nodes or SVG_LINES lines only words.
+    """Return a graph as SVG text, or a sentence for more than SVG_NODES nodes or SVG_LINES lines.
 
     Lines have the colour of the text around, so that the drawing reads on any ground.
     """

@@ -51,8 +51,8 @@ def draw_plane(axes: Axes, plane: Plane, **style: Any) -> Axes:
 
 def _colours(value: np.ndarray) -> tuple[str, TwoSlopeNorm]:
     """Return a colour map that is white at zero, and its scale; half of the map if all values have one sign."""
-    numbers = value[np.isfinite(value)]
-    low, high = (float(numbers.min()), float(numbers.max())) if numbers.size else (0.0, 0.0)
+    valid = value[np.isfinite(value)]
+    low, high = (float(valid.min()), float(valid.max())) if valid.size else (0.0, 0.0)
     if low * high > 0 and not np.isclose(low, high):
         return ("Blues_r", TwoSlopeNorm(high, low, 0.0)) if high < 0 else ("Reds", TwoSlopeNorm(low, 0.0, high))
     size = max(-low, high) or 1.0
