@@ -10,9 +10,10 @@ from synchain.models.definitions.inline import Field
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.models.symmetries.clusters import clusters
-from synchain.runtime.bifurcation.bifurcations import Bifurcation, BifurcationKind
+from synchain.runtime.bifurcation.bifurcations import Bifurcation
 from synchain.runtime.bifurcation.branches import Branch
 from synchain.runtime.bifurcation.equilibrium import Equilibrium
+from synchain.runtime.bifurcation.kinds import BifurcationKind
 from synchain.runtime.bifurcation.periodic import PeriodicOrbit
 from synchain.runtime.bifurcation.phases import Phases
 from synchain.runtime.bifurcation.skeleton import Skeleton

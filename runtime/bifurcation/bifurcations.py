@@ -1,24 +1,31 @@
 """Bifurcations of periodic orbits between two neighbours on a branch, and at its end.
 
-Multipliers that leave or enter the unit circle are found by their moduli, sorted by size: those are
-continuous along a branch, each passes 1 where a multiplier passes the circle, and a saddle whose
-multipliers have the product 1 is none. Multipliers that change places in one step are found by the
-signs of det(M + 1) and det(M - 1) of the monodromy matrix M. At -1 the period doubles. At 1 the
-branch has a fold if it turns back in its parameter, and a branch point (transcritical, pitchfork) if it does not. A
-complex pair passes in a Neimark-Sacker bifurcation, also called a torus bifurcation. Stick is lost if the load at a landing passes the limit of static friction, a number of either
-sign. Grazing can be approached only from the side of fewer phases, where the closing gap is known:
-each orbit on the way has a sixteenth of the gap of the one before, and Newton's method starts from
-a polynomial through those, so that it does not leave this side.
+A test function of the orbit changes its sign at each kind, and its zero is found along the branch.  M is the monodromy matrix.
 
-Sources: Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed. (Springer, 2004), chapter 10; Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapters 5
-and 7; di Bernardo, Budd, Champneys & Kowalczyk, Piecewise-smooth Dynamical Systems (Springer,
-2008), chapters 7-8.
+| kind | test function | beside it |
+|---|---|---|
+| period doubling | modulus - 1 of the k-th multiplier, sorted by size | the multiplier is -1 |
+| fold | the same | the multiplier is 1, and the branch turns back in its parameter |
+| branch point (transcritical, pitchfork) | the same | the multiplier is 1, and the branch does not turn |
+| Neimark-Sacker (torus) | the same | a complex pair |
+| stick loss | the load at a landing, less the limit of static friction | only stick phases come or go |
+| grazing | the gap that closes inside a phase | phases come or go |
+
+Moduli sorted by size are continuous along a branch, and a saddle with multipliers of the product 1 makes no sign change.
+Multipliers that change places in one step are found by the signs of det(M + I) and det(M - I).  Grazing can be approached only
+from the side of fewer phases, where the closing gap is defined: each orbit on the way has a sixteenth of the gap of the one
+before, and Newton's method starts from a polynomial through those, so that it does not leave this side.
+
+Sources: Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed. (Springer, 2004), chapter 10; Seydel, Practical
+Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapters 5 and 7; di Bernardo, Budd, Champneys & Kowalczyk,
+Piecewise-smooth Dynamical Systems (Springer, 2008), chapters 7-8.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -30,34 +37,32 @@ from .kinds import BifurcationKind
 from .periodic import PeriodicOrbit, periodic_orbit, strobe
 from .phases import Phases
 
-__all__ = ["Bifurcation", "BifurcationKind", "bifurcations_at_end", "bifurcations_between"]
-
 Test = Callable[[PeriodicOrbit], float]
 """A test function of the orbit, zero at a bifurcation."""
 
 LOCATED = 1e-6
-"""Largest residual of a bifurcation; a larger one shows that a test function jumps, as it does between two branches."""
+"""Largest residual of a bifurcation (a choice); a larger one shows that a test function jumps, as between two branches."""
 
 SHUT = 1e-13
 """Gap as small as the error of the integration, which cannot be closed further."""
 
 SHARE = 1.0 / 16.0
-"""Part of the gap that remains after each step towards a graze."""
+"""Part of the gap that remains after each step towards a graze (a choice)."""
 
 MOST_STEPS = 80
 """Most steps towards a graze; halving alone exhausts the digits of the parameter in 53."""
 
 LEAST_REACH = 1e-4
-"""Shortest step towards a graze, relative to the distance to the other end."""
+"""Shortest step towards a graze, relative to the distance to the other end (a choice)."""
 
 NEUTRAL = 1e-9
-"""Distance from the unit circle that may be a rounding error, as all are of orbits without damping."""
+"""Distance from the unit circle that may be a rounding error, as all are of orbits without damping (a choice)."""
 
 BESIDE = 1e-2
-"""Distance from a crossing, relative to the step, at which such a multiplier must have left the circle."""
+"""Distance from a crossing, relative to the step, at which such a multiplier must have left the circle (a choice)."""
 
 REAL = 1e-6
-"""Largest imaginary part of a multiplier that passes the circle at -1 or 1."""
+"""Largest imaginary part of a multiplier that passes the circle at -1 or 1 (a choice)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +74,7 @@ class Bifurcation:
     # how far `orbit` is from the bifurcation: the distance of its multiplier from -1, from 1 or, for Neimark-Sacker,
     # from the unit circle; the gap in grazing; the excess of the load in stick loss. `follow` accepts 1e-6 at most
     residual: float
-    orbit: PeriodicOrbit = field(repr=False)  # nearest orbit that was found
+    orbit: PeriodicOrbit = field(repr=False)  # nearest orbit to the bifurcation
 
     @property
     def located(self) -> bool:
@@ -83,21 +88,20 @@ def bifurcations_between(arc: Arc, value: float, orbit: PeriodicOrbit, phases: P
     if before is None or phases is None or before.slip_states == phases.slip_states:
         both = arc.copy().take(value, orbit, phases)
         return _crossings(OrbitPair(both, (arc.values[-1], value), (arc.orbits[-1], orbit)))
+    # Phases change: stick loss or grazing.  A graze is approached from the side of fewer phases.
     ahead = len(before.slip_states) <= len(phases.slip_states)
-    known = arc.copy() if ahead else arc.empty().take(value, orbit, phases)
+    side = arc.copy() if ahead else arc.empty().take(value, orbit, phases)
     far = value if ahead else arc.values[-1]
     change = _stick_loss(arc, value, orbit, before, phases) if _same_slips(before, phases) else None
-    change = change or _graze(known, far)
-    start = (known.values[0], known.orbits[0]) if not ahead else (arc.values[-1], arc.orbits[-1])
-    beside = _crossings(OrbitPair(known, (start[0], change.value), (start[1], change.orbit)))
-    return sorted([change, *beside], key=lambda bifurcation: bifurcation.value)
+    change = change or _graze(side, far)
+    # Smooth bifurcations on that side, before the change.
+    start = (side.values[0], side.orbits[0]) if not ahead else (arc.values[-1], arc.orbits[-1])
+    smooth = _crossings(OrbitPair(side, (start[0], change.value), (start[1], change.orbit)))
+    return sorted([change, *smooth], key=lambda bifurcation: bifurcation.value)
 
 
 def bifurcations_at_end(arc: Arc, beyond: float, final: bool) -> list[Bifurcation]:
-    """Locate the bifurcation at which a branch ends.
-
-    The branch may be born of one of half as many periods, or end at a fold, at a branch point or at a graze.
-    """
+    """Locate the bifurcation at which a branch ends: period doubling of half the periods, fold, branch point or graze."""
     birth = _birth(arc, beyond)
     if birth is not None:
         return [birth]
@@ -107,20 +111,21 @@ def bifurcations_at_end(arc: Arc, beyond: float, final: bool) -> list[Bifurcatio
         turn = None
     if turn is not None and (beyond - turn[1]) * (turn[1] - arc.values[-1]) >= 0.0:
         kind, at, orbit = turn
-        found = Bifurcation(at, kind, _residual(orbit, kind), orbit)
-        return [found] if found.located else []
+        bifurcation = Bifurcation(at, kind, _residual(orbit, kind), orbit)
+        return [bifurcation] if bifurcation.located else []
     if arc.phases[-1] is None or not final:
         return []
-    last = _graze(arc.copy(), beyond)
-    return [last] if last.located else []
+    graze = _graze(arc.copy(), beyond)
+    return [graze] if graze.located else []
 
 
 def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
-    """Period doubling of an orbit of half the periods, between the halves of the last orbit."""
+    """Locate the period doubling of half the periods from which a branch is born, None if there is none."""
     half, last = arc.periods // 2, arc.orbits[-1]
     if arc.periods % 2:
         return None
     try:
+        # The orbit of half the periods lies between the halves of the last orbit.
         middle = 0.5 * (last.state + strobe(last.scene, last.state, half)[0])
         single = Arc(arc.scene, arc.name, half)
         for value in (arc.values[-1], beyond):
@@ -148,36 +153,37 @@ class OrbitPair:
 
     def root(self, test: Test) -> tuple[float, PeriodicOrbit]:
         """Locate the zero of a test function that changes its sign, and the orbit there."""
-        known = dict(zip(self.values, map(test, self.orbits), strict=True))
+        results = dict(zip(self.values, map(test, self.orbits), strict=True))
         arc = self.arc.copy()
 
         def tested(at: float) -> float:
-            if at not in known:
+            if at not in results:
                 orbit = arc.at(at)
                 arc.take(at, orbit, None)
-                known[at] = test(orbit)
-            return known[at]
+                results[at] = test(orbit)
+            return results[at]
 
         return _root(tested, arc, self.values)
 
     def passes(self, k: int) -> bool:
         """Return whether the modulus of the k-th multiplier passes 1."""
         test = partial(_outside, k=k)
-        near = [abs(test(orbit)) < NEUTRAL for orbit in self.orbits]
-        if not self.changes(test) or all(near):
+        neutral = [abs(test(orbit)) < NEUTRAL for orbit in self.orbits]
+        if not self.changes(test) or all(neutral):
             return False
-        if not any(near):
+        if not any(neutral):
             return True
+        # A multiplier on the circle at one end: it must lie clearly on either side beside the crossing.
         at, beside = self.root(test)[0], BESIDE * (self.values[1] - self.values[0])
         try:
-            one, other = (test(self.arc.at(at + way)) for way in (-beside, beside))
+            before, after = (test(self.arc.at(at + shift)) for shift in (-beside, beside))
         except ArithmeticError:
             return True
-        return one * other < 0.0 and min(abs(one), abs(other)) > NEUTRAL
+        return before * after < 0.0 and min(abs(before), abs(after)) > NEUTRAL
 
 
 def _crossings(step: OrbitPair) -> list[Bifurcation]:
-    """Crossings of the unit circle by multipliers."""
+    """Locate the crossings of the unit circle by multipliers."""
     at_one = BifurcationKind.FOLD if turns(step.arc, step.values, step.orbits) else BifurcationKind.BRANCH_POINT
     kinds = {-1.0: BifurcationKind.PERIOD_DOUBLING, 1.0: at_one}
     crossings = []
@@ -190,6 +196,7 @@ def _crossings(step: OrbitPair) -> list[Bifurcation]:
             kind = BifurcationKind.NEIMARK_SACKER
             next(passing, None)  # the other multiplier of the pair
         crossings.append(Bifurcation(value, kind, _residual(orbit, kind), orbit))
+    # A determinant that changes its sign demands an odd number of crossings: one is left where multipliers change places.
     for point, kind in kinds.items():
         test = partial(det, point=point)
         if step.changes(test) and sum(each.kind is kind for each in crossings) % 2 == 0:
@@ -199,7 +206,7 @@ def _crossings(step: OrbitPair) -> list[Bifurcation]:
 
 
 def _residual(orbit: PeriodicOrbit, kind: BifurcationKind) -> float:
-    """Least distance of a multiplier from -1, from 1 or, of a complex one, from the unit circle."""
+    """Return the least distance of a multiplier from -1, from 1 or, of a complex one, from the unit circle."""
     if kind is BifurcationKind.NEIMARK_SACKER:
         pairs = orbit.multipliers[np.abs(orbit.multipliers.imag) > REAL]
         return float(np.abs(np.abs(pairs) - 1.0).min())
@@ -207,10 +214,7 @@ def _residual(orbit: PeriodicOrbit, kind: BifurcationKind) -> float:
 
 
 def _root(test: Callable[[float], float], arc: Arc, ends: tuple[float, float]) -> tuple[float, PeriodicOrbit]:
-    """Zero of a test function of the orbit, and the orbit there.
-
-    If Newton's method loses the orbit on the way, the end nearer to zero is returned.
-    """
+    """Return the zero of a test function and the orbit there; the end nearer to zero if Newton's method loses the orbit."""
     try:
         value = float(brentq(test, *ends, xtol=1e-14 * max(map(abs, ends)), rtol=1e-14))
         return value, arc.at(value)
@@ -220,18 +224,18 @@ def _root(test: Callable[[float], float], arc: Arc, ends: tuple[float, float]) -
 
 
 def _outside(orbit: PeriodicOrbit, k: int) -> float:
-    """Distance by which the k-th multiplier, sorted by modulus, lies outside the unit circle."""
+    """Return the distance by which the k-th multiplier, sorted by modulus, lies outside the unit circle."""
     return float(np.abs(orbit.multipliers[k])) - 1.0
 
 
 def _same_slips(before: Phases, after: Phases) -> bool:
-    """True if only stick phases come or go."""
+    """Return whether only stick phases come or go."""
     slips = [sorted(mode for mode in phases.slip_states if mode != 0) for phases in (before, after)]
     return slips[0] == slips[1] and before.slip_states.count(0) != after.slip_states.count(0)
 
 
 def _stick_loss(arc: Arc, value: float, orbit: PeriodicOrbit, before: Phases, after: Phases) -> Bifurcation | None:
-    """Stick loss between the last orbit of an arc and the next, None if there is none."""
+    """Locate stick loss between the last orbit of an arc and the next, None if there is none."""
     if not before.landing * after.landing < 0.0:
         return None
     ends = {arc.values[-1]: before.landing, value: after.landing}
@@ -252,52 +256,47 @@ def _stick_loss(arc: Arc, value: float, orbit: PeriodicOrbit, before: Phases, af
 
 
 def _graze(arc: Arc, beyond: float) -> Bifurcation:
-    """Grazing at which the gap of an arc's last orbit closes before `beyond`."""
-    slip_states = _known(arc).slip_states
+    """Locate the graze at which the gap of an arc's last orbit closes before `beyond`."""
+    slip_states = _last_phases(arc).slip_states
     share, reach = SHARE, 0.5
     for _ in range(MOST_STEPS):
-        low, gap = arc.values[-1], _known(arc).gap
+        low, gap = arc.values[-1], _last_phases(arc).gap
         if gap < SHUT or abs(beyond - low) <= 1e-15 * abs(low) or reach < LEAST_REACH:
             break
-        value = _where(arc, share * gap)
+        # The next value: where the gap should be a share of its last one, or else a part of the way to `beyond`.
+        value = _value_at_gap(arc, share * gap)
         guided = share < 0.99 and min(low, beyond) < value < max(low, beyond)
         value = value if guided else low + reach * (beyond - low)
-        orbit = _orbit(arc, value)
+        orbit: PeriodicOrbit | None = None
+        with suppress(ArithmeticError):
+            orbit = arc.at(value)
         phases = None if orbit is None else orbit.phases
         # A gap below zero belongs to a phase too short for the samples.
         if orbit is not None and phases is not None and phases.slip_states == slip_states and phases.gap > -SHUT:
             arc.take(value, orbit, phases)
             share, reach = SHARE, 0.5
-        elif orbit is not None:
+        elif orbit is not None:  # an orbit beyond the graze
             beyond = value
         elif guided:
-            share = math.sqrt(share)  # a shorter step, on which more is known of the orbit
+            share = math.sqrt(share)  # a shorter step, close to the orbits that the polynomial passes through
         else:
             reach *= 0.5
-    at = _where(arc, 0.0)
+    at = _value_at_gap(arc, 0.0)
     low = arc.values[-1]
     at = at if min(low, beyond) <= at <= max(low, beyond) else 0.5 * (low + beyond)
-    return Bifurcation(at, BifurcationKind.GRAZING, abs(_known(arc).gap), arc.orbits[-1])
+    return Bifurcation(at, BifurcationKind.GRAZING, abs(_last_phases(arc).gap), arc.orbits[-1])
 
 
-def _known(arc: Arc) -> Phases:
-    """Phases of the last orbit of an arc."""
+def _last_phases(arc: Arc) -> Phases:
+    """Return the phases of the last orbit of an arc."""
     phases = arc.phases[-1]
     if phases is None:
         raise RuntimeError("friction without phases has no gaps")
     return phases
 
 
-def _orbit(arc: Arc, value: float) -> PeriodicOrbit | None:
-    """Orbit at a value, None if Newton's method does not find it."""
-    try:
-        return arc.at(value)
-    except ArithmeticError:
-        return None
-
-
-def _where(arc: Arc, gap: float) -> float:
-    """Value at which a gap is expected by linear extrapolation; nan if there is none."""
+def _value_at_gap(arc: Arc, gap: float) -> float:
+    """Extrapolate linearly to the parameter at which the gap has a value; nan if it does not change."""
     if len(arc.values) < 2:
         return float("nan")
     (a, b), (one, two) = arc.values[-2:], arc.phases[-2:]

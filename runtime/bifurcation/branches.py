@@ -1,10 +1,15 @@
 """Branches of periodic orbits along a parameter, and the bifurcations on them.
 
-A smooth bifurcation is a multiplier that passes the unit circle: at -1, at 1, or in a complex pair. A bifurcation of friction is a change
-of the phases of stick and slip. In grazing, a phase begins in the middle of another one, as its
-distance from it becomes zero. In stick loss, a body that landed in stick turns at once, as the load
-at the landing passes the limit of static friction.
-`synchain.runtime.bifurcation.bifurcations` locates them.
+A smooth bifurcation is a multiplier that passes the unit circle: at -1, at 1, or in a complex pair.  A bifurcation of friction
+is a change of the phases of stick and slip.  In grazing, a phase begins in the middle of another one, as its distance from
+it becomes zero.  In stick loss, a body that landed in stick turns at once, as the load at the landing passes the limit of
+static friction.  `synchain.runtime.bifurcation.bifurcations` locates them.
+
+The tracer doubles its step after each orbit.  It halves the step if no orbit fits the arc, if a bifurcation on it is not
+located, or if phases change on it and it is long.  Where steps are refused, it looks for a bifurcation that ends the branch.
+
+Sources: as `synchain.runtime.bifurcation.continuation`; di Bernardo, Budd, Champneys & Kowalczyk, Piecewise-smooth
+Dynamical Systems (Springer, 2008), chapters 7-8, for friction.
 """
 
 from __future__ import annotations
@@ -33,22 +38,23 @@ from .periodic import NEWTON, PeriodicOrbit, periodic_orbit, relative
 from .phases import Phases
 
 LONGEST = 1.0 / 4.0
-"""Longest step, relative to the range of the parameter."""
+"""Longest step, relative to the range of the parameter (a choice)."""
 
 SHORT = 1.0 / 32.0
-"""Length of a refused step, relative to the range or to the last such step, at which the end of the branch is sought."""
+"""Length of a refused step, relative to the range or to the last such step, at which the branch's end is sought (a choice)."""
 
 SHORTEST = 2.0**-20
-"""Shortest step, relative to the range; if it is refused too, the branch is lost."""
+"""Shortest step, relative to the range; if it is refused too, the branch is lost (a choice)."""
 
 APART = 1.0 / 64.0
-"""Length of the steps, relative to the range, in which a change of phases is located; two changes in one count as one."""
+"""Longest step, relative to the range, in which a change of phases is located; two changes in one count as one (a choice)."""
 
 FAR = 0.3
-"""Largest distance from the expected state, relative to the step, of an orbit of other phases on the same branch."""
+"""Largest distance from the expected state, relative to the step, of an orbit of other phases on the same branch (a choice)."""
 
 KINK = 1e-2
-"""Distance from the expected state that such an orbit may always have, relative to its extent: changes of phases are kinks."""
+"""Distance from the expected state that such an orbit may always have, relative to its extent: a change of phases is a kink of
+the branch (a choice)."""
 
 NAMES = frozenset(
     {
@@ -64,7 +70,7 @@ NAMES = frozenset(
         "turn",
     }
 )
-"""What branches and skeletons have under these names beside those of all results."""
+"""Names in the data of branches and skeletons, which no parameter may have, beside those of all results."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -115,7 +121,7 @@ class Branch(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """Orbits, their stability, the bifurcations, and where the branch is lost."""
+        """Rows of orbits with their stability, of the bifurcations, and of the ends where the branch is lost."""
         stable = sum(orbit.stable for orbit in self.orbits)
         turns = "; ".join(f"{turn.kind} at {turn.value:.8g}" for turn in self.bifurcations)
         return (
@@ -125,7 +131,7 @@ class Branch(Labelled):
             ),
             (self.name, range_text(self.values)),
             ("bifurcations", turns or "none"),
-            *((("lost", f"at {numbers(self.lost)}"),) if self.lost else ()),
+            *((("lost", f"at {digits_of(self.lost)}"),) if self.lost else ()),
         )
 
 
@@ -142,8 +148,8 @@ def follow(
 ) -> Branch:
     """Follow a periodic orbit along a parameter and locate its bifurcations.
 
-    Steps are chosen by the branch; `values` say only where orbits are returned. A step is halved if the orbit does not
-    fit the tangents of the branch, if a multiplier moves far, or if a bifurcation on it has a residual above 1e-6.
+    The branch alone determines the steps; `values` select the orbits that are returned. A step is halved if the orbit does
+    not fit the tangents of the branch, if a multiplier moves far, or if a bifurcation on it has a residual above 1e-6.
 
     Parameters
     ----------
@@ -188,10 +194,10 @@ def follow(
             "first: found the limit cycle of an oscillator without a drive; expected an orbit of a driven one; "
             "periodic_orbit finds cycles value by value"
         )
-    wanted = checked_values(first.scene, name, values)
+    checked = checked_values(first.scene, name, values)
     scene = others(Given(follow, parameters, more, NEWTON), scene, name)
-    with Execution(1, None, show_progress, progress).reporter(len(wanted), "value") as reporter:
-        branch = traced(scene, name, reporter.each(wanted), first, abs(wanted[-1] - wanted[0]))
+    with Execution(1, None, show_progress, progress).reporter(len(checked), "value") as reporter:
+        branch = traced(scene, name, reporter.each(checked), first, abs(checked[-1] - checked[0]))
     warn_of_lost("follow", [branch])
     return branch
 
@@ -201,18 +207,18 @@ def warn_of_lost(function: str, branches: Sequence[Branch]) -> None:
     lost = [value for branch in branches for value in branch.lost]
     if lost:
         warn(
-            f"{function}: found no orbit and no bifurcation beyond {branches[0].name} = {numbers(lost)}; expected the "
+            f"{function}: found no orbit and no bifurcation beyond {branches[0].name} = {digits_of(lost)}; expected the "
             "branch to go on, or to end at a bifurcation; try a shorter range there, or periodic_orbit beyond"
         )
 
 
-def numbers(values: Sequence[float]) -> str:
-    """Return numbers in words, with eight digits."""
+def digits_of(values: Sequence[float]) -> str:
+    """Write numbers with eight digits, separated by commas."""
     return ", ".join(f"{value:.8g}" for value in values)
 
 
 def others(given: Given, scene: Scene, name: str) -> Scene:
-    """Return a scene with parameters beside the one that is swept."""
+    """Return a scene with other parameters than the one along which a branch is followed."""
     if name in given.values:
         raise ValueError(f"{given.function.__name__}: {name!r} takes its values one after the other; expected others")
     return given.scene(scene)
@@ -243,46 +249,40 @@ def traced(scene: Scene, name: str, values: Iterable[float], first: PeriodicOrbi
 
 
 def checked_values(scene: Scene, name: str, values: Sequence[float] | np.ndarray) -> list[float]:
-    """Convert the values of a parameter to floats. Shapes: values (k,)."""
+    """Check the values (k,) of a parameter: finite, and rising or falling all the way; return them as floats."""
     if name not in scene.parameters:
         raise ValueError(f"unknown parameter {name!r}; known: {', '.join(scene.parameters)}")
     expect_free("branch", [name], NAMES)
     if not np.iterable(values) or not all(isinstance(value, Real) and math.isfinite(value) for value in values):
         raise ValueError(f"values: found {short_repr(values)}; expected finite numbers for {name}")
-    wanted = [float(value) for value in values]
-    steps = np.diff(wanted)
-    if not wanted or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
+    checked = [float(value) for value in values]
+    steps = np.diff(checked)
+    if not checked or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         raise ValueError(
-            f"values: found {short_repr(wanted)}; expected at least one number, rising or falling all the way"
+            f"values: found {short_repr(checked)}; expected at least one number, rising or falling all the way"
         )
-    return wanted
+    return checked
 
 
 class BranchTracer:
-    """Traces a branch orbit by orbit.
-
-    Parameters
-    ----------
-    arc : Arc
-        Smooth arc of the branch up to its last orbit.
-    """
+    """Trace a branch orbit by orbit, from the last orbit of a smooth arc."""
 
     def __init__(self, arc: Arc) -> None:
         self.arc = arc
         self.bifurcations: list[Bifurcation] = []
-        self.phases: dict[float, Phases | None] = {}
-        self.least: int | None = None
+        self.phases: dict[float, Phases | None] = {}  # by value of the parameter
+        self.least: int | None = None  # least number of drive periods of all orbits
         self.lost: tuple[float, ...] = ()
-        self.size = LONGEST * arc.span
+        self.step = LONGEST * arc.span
 
     def take(
-        self, value: float, orbit: PeriodicOrbit, phases: Phases | None, way: Sequence[Bifurcation] = ()
+        self, value: float, orbit: PeriodicOrbit, phases: Phases | None, crossed: Sequence[Bifurcation] = ()
     ) -> PeriodicOrbit:
-        """Append an orbit, after the bifurcations on the way to it."""
+        """Append an orbit, after the bifurcations that the step to it crosses."""
         self.phases[value] = phases
         self.least = self.least or orbit.least
         if self.arc.values:
-            self.bifurcations += sorted(way, key=lambda each: abs(each.value - self.arc.values[-1]))
+            self.bifurcations += sorted(crossed, key=lambda each: abs(each.value - self.arc.values[-1]))
             if self._changes(phases):
                 self.arc = self.arc.empty()
         self.arc.take(value, orbit, phases)
@@ -292,40 +292,41 @@ class BranchTracer:
         """Find the orbit at the next value by steps whose length follows the branch alone, None if the branch ends."""
         span, longest, sought = self.arc.span, np.inf, SHORT * self.arc.span
         while (last := self.arc.values[-1]) != value:
-            size = min(self.size, longest)
-            piece = min(size, abs(value - last))
-            at = value if size >= abs(value - last) else last + math.copysign(size, value - last)
-            found = self._found(at)
+            step = min(self.step, longest)
+            length = min(step, abs(value - last))
+            at = value if step >= abs(value - last) else last + math.copysign(step, value - last)
+            next_orbit = self._orbit_on_branch(at)
             # An orbit of other phases: halve the step until the change is located.
-            if found is not None and piece > APART * span and self._changes(found[1]):
-                longest = 0.5 * piece
+            if next_orbit is not None and length > APART * span and self._changes(next_orbit[1]):
+                longest = 0.5 * length
                 continue
-            way = None if found is None else bifurcations_between(self.arc, at, *found)
-            if found is not None and way is not None and all(each.located for each in way):
-                longest = np.inf if self._changes(found[1]) else longest
-                self.take(at, *found, way)
-                self.size = max(self.size, min(2.0 * piece, LONGEST * span))
+            # Accept the orbit if every bifurcation on the step is located.
+            crossed = None if next_orbit is None else bifurcations_between(self.arc, at, *next_orbit)
+            if next_orbit is not None and crossed is not None and all(each.located for each in crossed):
+                longest = np.inf if self._changes(next_orbit[1]) else longest
+                self.take(at, *next_orbit, crossed)
+                self.step = max(self.step, min(2.0 * length, LONGEST * span))
                 continue
             # A refused step: the branch ends within its double, or the step is too long.
-            if piece <= max(sought, SHORTEST * span):
-                sought = SHORT * piece
-                beyond = value if 2.0 * piece > abs(value - last) else last + 2.0 * (at - last)
-                final = piece <= SHORTEST * span
+            if length <= max(sought, SHORTEST * span):
+                sought = SHORT * length
+                beyond = value if 2.0 * length > abs(value - last) else last + 2.0 * (at - last)
+                final = length <= SHORTEST * span
                 end = bifurcations_at_end(self.arc, beyond, final)
                 if end or final:
                     self.bifurcations += end
                     self.lost = () if end else (last,)
                     return None
-            self.size = 0.5 * piece
+            self.step = 0.5 * length
         return self.arc.orbits[-1]
 
     def _changes(self, phases: Phases | None) -> bool:
-        """True if phases differ from those of the last orbit."""
+        """Return whether phases differ from those of the last orbit."""
         last = self.arc.phases[-1]
         return phases is not None and last is not None and phases.slip_states != last.slip_states
 
-    def _found(self, value: float) -> tuple[PeriodicOrbit, Phases | None] | None:
-        """Orbit at a value and its phases if Newton's method finds one on the branch, else None."""
+    def _orbit_on_branch(self, value: float) -> tuple[PeriodicOrbit, Phases | None] | None:
+        """Find the orbit at a value and its phases; None if Newton's method finds none, or one of another branch."""
         try:
             orbit = self.arc.at(value)
         except ArithmeticError:
@@ -333,12 +334,10 @@ class BranchTracer:
         if self.least not in (None, orbit.least):
             return None
         phases = orbit.phases
-        joins = self._kinks if self._changes(phases) else self.arc.joins
-        return (orbit, phases) if joins(value, orbit) else None
-
-    def _kinks(self, value: float, orbit: PeriodicOrbit) -> bool:
-        """True if an orbit of other phases is close to the expected state."""
-        extent, last = self.arc.orbits[-1].extent, self.arc.orbits[-1].state
-        change, miss = self.arc.guess(value) - last, orbit.state - self.arc.guess(value)
-        near = FAR * relative(change, extent) + KINK
-        return len(self.arc.values) == 1 or relative(miss, extent) < near
+        if not self._changes(phases):
+            return (orbit, phases) if self.arc.joins(value, orbit) else None
+        # Orbits of other phases have other tangents: compare with the extrapolated state.
+        expected, last = self.arc.guess(value), self.arc.orbits[-1]
+        allowed = FAR * relative(expected - last.state, last.extent) + KINK
+        near = len(self.arc.values) == 1 or relative(orbit.state - expected, last.extent) < allowed
+        return (orbit, phases) if near else None

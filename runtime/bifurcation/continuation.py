@@ -1,18 +1,17 @@
 """Continuation of periodic orbits along a smooth arc of their branch, and through a fold.
 
-All orbits of an arc pass through the same phases of stick and slip. Newton's method starts from a
-polynomial through the nearest known orbits, so that it stays on the arc if the branch has a kink,
-as it has at a change of phases.
+1. An arc.  All its orbits have the same phases of stick and slip.  Newton's method starts from a polynomial through the
+   nearest orbits of the arc, so that it stays on the arc where the branch has a kink, as at a change of phases.
+2. Tangents.  An orbit x(p) of the map P(x, p) has dx/dp = (I - M)^-1 P_p.  A step is accepted if its chord fits the
+   tangents at both ends, and if no multiplier moves far.
+3. Folds.  There the branch turns back in p and a multiplier is 1, so that I - M is singular.  Pseudo-arclength continuation
+   (Keller) passes through: x and p are unknowns together, and the length along a direction t is prescribed, with the matrix
 
-At a fold the branch turns back in its parameter and a multiplier is 1, so that the parameter alone
-does not lead on. Pseudo-arclength continuation passes through it: state and parameter are unknowns
-together, and the length along the arc is prescribed.
+       B = [M - I, P_p; t'].
 
-Two determinants tell folds from branch points: det(M - 1) of the monodromy matrix M, and that of
-M - 1 bordered by the derivative by the parameter and by the direction of the arc. Their ratio is the
-parameter's share of the tangent. At a fold the first alone changes sign. At a branch point both
-do if the arc goes straight on, and the second alone if it turns there, as one that is born in a
-pitchfork does.
+4. Folds against branch points.  det(M - I)/det B is the parameter's share of the tangent.  At a fold det(M - I) alone
+   changes its sign.  At a branch point both do if the arc goes straight on, and det B alone if it turns there, as one that
+   is born in a pitchfork does.
 
 Sources: Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems, in Rabinowitz
 (ed.), Applications of Bifurcation Theory (Academic Press, 1977), pages 359-384; Seydel, Practical
@@ -36,32 +35,35 @@ from .periodic import SAME, PeriodicOrbit, closed, orbit_through, periodic_orbit
 from .phases import Phases
 
 NEAR = 3
-"""Number of orbits that the polynomial passes through."""
+"""Number of orbits that the polynomial of a first guess passes through (a choice)."""
 
 FIT = 0.5
-"""Largest part of the change of the state on a step that its derivative at either end leaves unexplained."""
+"""Largest part of the change of the state on a step that its derivative at either end leaves unexplained (a choice)."""
 
 MOVE = 0.75
-"""Largest distance that a multiplier moves in a step, relative to its modulus if that exceeds 1."""
+"""Largest distance that a multiplier moves in a step, relative to its modulus if that exceeds 1 (a choice)."""
+
+MOST_ITERATIONS = 30
+"""Most steps of Newton's method to a point of an arc (a choice)."""
 
 MOST_STEPS = 24
-"""Most steps along the arc towards a turn, each at most twice as long as the one before."""
+"""Most steps along the arc towards a turn, each at most twice as long as the one before (a choice)."""
 
 SHORTEST = 1e-7
-"""Shortest step, relative to the first; if a step must be shorter, the arc does not end at a turn.
-"""
+"""Shortest step, relative to the first; if a step must be shorter, the arc does not end at a turn (a choice)."""
 
 BESIDE = 1e-2
-"""Distance from a branch point, relative to the step, of the points that lead to it."""
+"""Distance from a branch point, relative to the step, of the points that lead to it (a choice)."""
 
 NEUTRAL = 1e-6
-"""Largest distance from 1 of the multiplier at a branch point; a kink has none so near."""
+"""Largest distance from 1 of the multiplier at a branch point; a kink has none so near (a choice)."""
 
 DIFFERENCE, SHARE = 1e-6, 1e-3
-"""Step of the difference quotient for the derivative by the parameter, relative to it and to its way along the arc."""
+"""Half width of the central difference for P_p: this part of the parameter, or of its way along the arc if that is more.
+With rtol = 1e-12 the quotient has some six digits, which Newton's method does not need more of (choices)."""
 
 CLOSED = 1e-11
-"""Largest distance of a point of an arc from its image, relative to the extent of each component."""
+"""Largest distance of a point of an arc from its image, relative to the extent of each component (a choice)."""
 
 
 @dataclass(slots=True)
@@ -110,13 +112,13 @@ class Arc:
         return strobe(self.scene, point[:-1], self.periods, {self.name: float(point[-1])}, self.orbits[-1].extent)
 
     def slope(self, point: np.ndarray, way: float) -> np.ndarray:
-        """Return the derivative of `image` by the parameter at a point, shape (components,); the parameter goes a `way`."""
+        """Return P_p (components,), the derivative of `image` by the parameter, which goes a `way` along the arc."""
         step = np.zeros(len(point))
         step[-1] = max(DIFFERENCE * abs(point[-1]), SHARE * abs(way))
         return np.asarray((self.image(point + step)[0] - self.image(point - step)[0]) / (2.0 * step[-1]))
 
     def tangent(self, value: float, orbit: PeriodicOrbit) -> np.ndarray:
-        """Derivative (components,) of an orbit's state by the parameter, relative to the extent of each component."""
+        """Return dx/dp (components,) of an orbit in units of its extent: the solution of (I - M) dx/dp = P_p."""
         key = (value, orbit.state.tobytes())
         if key not in self.tangents:
             point, units = np.append(orbit.state, value), _units(orbit)
@@ -126,18 +128,16 @@ class Arc:
         return self.tangents[key]
 
     def joins(self, value: float, orbit: PeriodicOrbit) -> bool:
-        """Return whether the arc can go from its last orbit to another one of the same phases in one step.
-
-        An orbit of another branch lies far from the prediction by the tangent at the last orbit, or does not fit its
-        own tangent. A step on which a multiplier moves far can hide bifurcations.
-        """
+        """Return whether the arc can go from its last orbit to another one of the same phases in one step."""
         last = self.orbits[-1]
+        # A step on which a multiplier moves far can hide bifurcations.
         if not _moved(last.multipliers, orbit.multipliers) < MOVE:
             return False
         way, change = value - self.values[-1], orbit.state - last.state
         allowed = FIT * relative(change, orbit.extent) + SAME
-        # Compare the chord with the tangents at both ends, which bounds the angle between them. Under set-valued friction
-        # the state has a kink where the start of the period passes from stick to slip: only the tangent at the end fits.
+        # An orbit of another branch does not fit the tangent at the last orbit, or the chord does not fit its tangent. Under
+        # set-valued friction the state has a kink where the start of the period passes from stick to slip: only the tangent
+        # at the end fits.
         ends = [(value, orbit), (self.values[-1], last)]
         for at, end in ends if self.phases[-1] is None else ends[:1]:
             if not np.abs(change / _units(end) - way * self.tangent(at, end)).max() < allowed:
@@ -146,24 +146,25 @@ class Arc:
 
 
 def _units(orbit: PeriodicOrbit) -> np.ndarray:
-    """Extent (components,) of an orbit, 1 for components that do not move."""
+    """Return the extent (components,) of an orbit, 1 for components that do not move."""
     return np.where(orbit.extent > 0.0, orbit.extent, 1.0)
 
 
 def _moved(before: np.ndarray, after: np.ndarray) -> float:
-    """Largest distance that a multiplier moves, relative to its modulus if that exceeds 1; pairs are the nearest ones."""
+    """Return the largest distance that a multiplier moves, relative to its modulus if that exceeds 1."""
+    # Multipliers are paired so that the sum of their distances is least.
     distances = np.abs(before[:, None] - after) / np.maximum(1.0, np.maximum(np.abs(before)[:, None], np.abs(after)))
     return float(distances[linear_sum_assignment(distances)].max())
 
 
-def _through(values: Sequence[float], places: Sequence[np.ndarray], value: float) -> np.ndarray:
-    """Polynomial through the places at the NEAR values that are nearest to another value."""
+def _through(values: Sequence[float], points: Sequence[np.ndarray], value: float) -> np.ndarray:
+    """Interpolate points, or extrapolate them, by the polynomial through those at the NEAR values nearest to `value`."""
     order = np.argsort(np.abs(np.array(values) - value), kind="stable")[:NEAR].tolist()
-    place = np.zeros_like(places[-1])
-    for k in order:
+    point = np.zeros_like(points[-1])
+    for k in order:  # Lagrange's form
         share = math.prod((value - values[j]) / (values[k] - values[j]) for j in order if j != k)
-        place += share * places[k]
-    return place
+        point += share * points[k]
+    return point
 
 
 def det(orbit: PeriodicOrbit, point: float) -> float:
@@ -172,7 +173,7 @@ def det(orbit: PeriodicOrbit, point: float) -> float:
 
 
 def turns(arc: Arc, values: tuple[float, float], orbits: tuple[PeriodicOrbit, PeriodicOrbit]) -> bool:
-    """Return whether an arc turns back in its parameter between two orbits."""
+    """Return whether an arc turns back in its parameter between two orbits: det(M - I) changes its sign, det B does not."""
     if (det(orbits[0], 1.0) < 0.0) == (det(orbits[1], 1.0) < 0.0):
         return False
     start, end = (np.append(orbit.state, value) for value, orbit in zip(values, orbits, strict=True))
@@ -181,45 +182,47 @@ def turns(arc: Arc, values: tuple[float, float], orbits: tuple[PeriodicOrbit, Pe
 
 
 def find_turn(arc: Arc, beyond: float) -> tuple[BifurcationKind, float, PeriodicOrbit] | None:
-    """Find the fold or the branch point at which an arc turns back before a value of its parameter."""
+    """Find the fold or the branch point at which an arc turns back before a value of its parameter, by arclength steps."""
     if len(arc.values) < 2:
         return None
     slip_states = None if arc.phases[-1] is None else arc.phases[-1].slip_states
     here, before = (np.append(arc.orbits[k].state, arc.values[k]) for k in (-1, -2))
-    way, path = ArclengthStep(arc, here, here - before), [before, here]
-    length = way.length(here - before)
+    # Steps begin in the direction of the last two orbits, with the length of the distance between them.
+    step, path = ArclengthStep(arc, here, here - before), [before, here]
+    length = step.length(here - before)
     shortest = SHORTEST * length
     for _ in range(MOST_STEPS):
-        there = way.point(length)
+        there = step.point(length)
         # Refuse a point that is far from its prediction, or whose orbit has other phases.
         if (
             there is None
-            or not way.length(there - way.guess(length)) < FIT * length
-            or _slip_states(way.orbit(there)) != slip_states
+            or not step.length(there - step.guess(length)) < FIT * length
+            or _slip_states(step.orbit(there)) != slip_states
         ):
             length *= 0.25
             if length < shortest:
                 return None
             continue
         path.append(there)
-        chord = ArclengthStep(arc, way.start, there - way.start)
-        turned = (way.side(way.start) < 0.0) != (way.side(there) < 0.0)
-        branched = (chord.border(way.start) < 0.0) != (chord.border(there) < 0.0)
+        # Fold or branch point on this step: the signs of det(M - I) and of det B with the chord as direction.
+        chord = ArclengthStep(arc, step.start, there - step.start)
+        turned = (step.side(step.start) < 0.0) != (step.side(there) < 0.0)
+        branched = (chord.border(step.start) < 0.0) != (chord.border(there) < 0.0)
         if turned and not branched:
-            return BifurcationKind.FOLD, *way.root(way.side, path)
+            return BifurcationKind.FOLD, *step.root(step.side, path)
         if branched and not turned:
-            value, orbit = way.summit(chord.rate, path)
-            near = np.abs(orbit.multipliers - 1.0).min() < NEUTRAL
-            return (BifurcationKind.BRANCH_POINT, value, orbit) if near else None
-        if not (beyond - there[-1]) * (there[-1] - way.start[-1]) > 0.0:  # past the end, or back without a turn
+            value, orbit = step.summit(chord.rate, path)
+            neutral = np.abs(orbit.multipliers - 1.0).min() < NEUTRAL
+            return (BifurcationKind.BRANCH_POINT, value, orbit) if neutral else None
+        if not (beyond - there[-1]) * (there[-1] - step.start[-1]) > 0.0:  # past the end, or back without a turn
             return None
-        way = ArclengthStep(arc, there, there - way.start)
+        step = ArclengthStep(arc, there, there - step.start)
         length *= 2.0
     return None
 
 
 def _slip_states(orbit: PeriodicOrbit) -> tuple[int, ...] | None:
-    """Slip states of an orbit's phases, None for friction that is not set-valued."""
+    """Return the slip states of an orbit's phases, None without set-valued friction."""
     phases = orbit.phases
     return None if phases is None else phases.slip_states
 
@@ -237,11 +240,11 @@ class ArclengthStep:
         return orbit_through(self.arc.scene, self.arc.periods, point[:-1], {self.arc.name: float(point[-1])})
 
     def side(self, point: np.ndarray) -> float:
-        """Return det(M - 1) of the monodromy matrix M at a point: zero at a fold."""
+        """Return det(M - I) of the monodromy matrix M at a point: zero at a fold."""
         return det(self.orbit(point), 1.0)
 
     def border(self, point: np.ndarray) -> float:
-        """Return the determinant of M - 1 with its border at a point: zero at a branch point."""
+        """Return det B at a point: zero at a branch point."""
         return float(np.linalg.det(self._bordered(self.arc.image(point)[1], self._slope(point))))
 
     def rate(self, point: np.ndarray) -> float:
@@ -258,59 +261,59 @@ class ArclengthStep:
         Shapes: guess (components + 1,); returns (components + 1,).
         """
         guess = self.guess(length) if guess is None else guess
-        slope = self._slope(guess)
+        slope = self._slope(guess)  # kept for all steps: their limit depends on the gap alone
         point, best = guess, np.inf
-        for _ in range(30):
+        for _ in range(MOST_ITERATIONS):
             image, matrix = self.arc.image(point)
-            gap = image - point[:-1]
-            size = max(relative(gap, self.weights[:-1]), abs(self.along_way(point - guess)))
+            gap, ahead = image - point[:-1], self.along_way(point - guess)
+            size = max(relative(gap, self.weights[:-1]), abs(ahead))
             if not size < best:
                 break
-            best, kept, rest = size, point, gap
+            best, nearest, left = size, point, gap
             try:
-                point = point - np.linalg.solve(
-                    self._bordered(matrix, slope), np.append(gap, self.along_way(point - guess))
-                )
+                point = point - np.linalg.solve(self._bordered(matrix, slope), np.append(gap, ahead))
             except np.linalg.LinAlgError:
                 return None
-        return kept if closed(rest, CLOSED * self.weights[:-1], kept[:-1]) else None
+        return nearest if closed(left, CLOSED * self.weights[:-1], nearest[:-1]) else None
 
     def root(self, test: Callable[[np.ndarray], float], path: Sequence[np.ndarray]) -> tuple[float, PeriodicOrbit]:
         """Locate the zero of a function of the point between the last two points of a path along the arc."""
-        known = self._known(path)
-        one, other = [*known][-2:]
-        at = brentq(lambda at: test(self._between(known, at)), one, other, xtol=1e-13 * abs(other - one), rtol=1e-13)
-        return self._place(self._between(known, float(at)))
+        points = self._by_length(path)
+        one, other = [*points][-2:]
+        at = brentq(lambda at: test(self._between(points, at)), one, other, xtol=1e-13 * abs(other - one), rtol=1e-13)
+        return self._value_and_orbit(self._between(points, float(at)))
 
     def summit(self, test: Callable[[np.ndarray], float], path: Sequence[np.ndarray]) -> tuple[float, PeriodicOrbit]:
         """Locate the turn at a branch point between the last two points of a path, where a function changes its sign.
 
-        At a branch point Newton's method has no direction to go; a cubic through four points beside it leads there.
+        B is singular at the branch point itself: a cubic through four points beside it leads there.
         """
-        known = self._known(path)
-        one, other = [*known][-2:]
+        points = self._by_length(path)
+        one, other = [*points][-2:]
         length = abs(other - one)
-        at = float(brentq(lambda at: test(self._between(known, at)), one, other, xtol=BESIDE * length))
+        at = float(brentq(lambda at: test(self._between(points, at)), one, other, xtol=BESIDE * length))
         beside = BESIDE * length * np.array([-2.0, -1.0, 1.0, 2.0])
-        cubic = np.polyfit(beside, [self._between(known, at + each) for each in beside], 3)
+        cubic = np.polyfit(beside, [self._between(points, at + each) for each in beside], 3)
+        # The turn is the zero of the cubic's derivative of the parameter, its last column, that lies nearest.
         turns = np.roots(cubic[:3, -1] * [3.0, 2.0, 1.0])
-        return self._place(np.array([np.polyval(each, turns[np.abs(turns).argmin()].real) for each in cubic.T]))
+        turn = turns[np.abs(turns).argmin()].real
+        return self._value_and_orbit(np.array([np.polyval(each, turn) for each in cubic.T]))
 
-    def _known(self, path: Sequence[np.ndarray]) -> dict[float, np.ndarray]:
-        """Points by their length."""
+    def _by_length(self, path: Sequence[np.ndarray]) -> dict[float, np.ndarray]:
+        """Return points by their length along the direction."""
         return {self.along_way(point - self.start): point for point in path}
 
-    def _between(self, known: dict[float, np.ndarray], length: float) -> np.ndarray:
-        """Point at a length, kept among the known ones: Newton's method starts from a polynomial through them."""
-        if length not in known:
-            found = self.point(length, _through([*known], [*known.values()], length))
-            if found is None:
+    def _between(self, points: dict[float, np.ndarray], length: float) -> np.ndarray:
+        """Return the point at a length, from a polynomial through the points, and add it to them."""
+        if length not in points:
+            point = self.point(length, _through([*points], [*points.values()], length))
+            if point is None:
                 raise ArithmeticError("the arc of a branch is lost close to its turn")
-            known[length] = found
-        return known[length]
+            points[length] = point
+        return points[length]
 
-    def _place(self, point: np.ndarray) -> tuple[float, PeriodicOrbit]:
-        """Parameter and orbit at a point."""
+    def _value_and_orbit(self, point: np.ndarray) -> tuple[float, PeriodicOrbit]:
+        """Return parameter and orbit at a point."""
         return float(point[-1]), self.orbit(point)
 
     def length(self, way: np.ndarray) -> float:
@@ -323,23 +326,23 @@ class ArclengthStep:
 
     @property
     def weights(self) -> np.ndarray:
-        """By what state and parameter (components + 1,) are measured: the extent of the orbit, and the way along the whole arc.
+        """Units (components + 1,) of state and parameter: the extent of the orbit, and the way along the whole arc.
 
-        Near a turn the parameter hardly moves in this measure, so that the direction is that of the state.
+        Near a turn the parameter hardly moves in this unit, so that the direction is that of the state.
         """
         ways = [abs(value - self.arc.values[-1]) for value in self.arc.values]
-        known = np.append(self.arc.orbits[-1].extent, max(ways) or abs(self.along[-1]))
-        return np.where(known > 0.0, known, 1.0)
+        units = np.append(self.arc.orbits[-1].extent, max(ways) or abs(self.along[-1]))
+        return np.where(units > 0.0, units, 1.0)
 
     @property
     def _row(self) -> np.ndarray:
-        """The row that takes the part along the direction from a difference of points."""
+        """The row t' of B: its product with a difference of points is the part along the direction."""
         return np.asarray(self.along / self.weights**2 / self.length(self.along))
 
     def _slope(self, point: np.ndarray) -> np.ndarray:
-        """Derivative (components,) of the image by the parameter."""
+        """Return P_p (components,) at a point."""
         return self.arc.slope(point, float(self.weights[-1]))
 
     def _bordered(self, matrix: np.ndarray, slope: np.ndarray) -> np.ndarray:
-        """M - 1 with the derivative by the parameter as last column and the direction as last row."""
+        """Return B = [M - I, P_p; t']."""
         return np.vstack([np.column_stack([matrix - np.eye(len(matrix)), slope]), self._row])

@@ -1,8 +1,12 @@
-"""Periodic orbits by Newton's method: of a driven oscillator on its stroboscopic map, of an undriven one with its period.
+"""Periodic orbits by Newton's method.
 
-The derivative of the map is the propagator of a deviation along the orbit
-(`synchain.runtime.stability.orbits`), through stick and slip if friction is set-valued. Newton's
-method therefore converges quadratically for both forms of the law.
+A drive of period T makes the stroboscopic map P: x(0) -> x(kT) over k of its periods.  An orbit of k periods is a fixed point,
+found by x <- x + (I - M)^-1 (P(x) - x).  The derivative M of P is the monodromy matrix: the propagator of a deviation along
+the orbit (`synchain.runtime.stability.orbits`), through stick and slip if friction is set-valued, so that the method
+converges quadratically for both forms of the law.  The eigenvalues of M are the Floquet multipliers.
+
+The cycle of an undriven oscillator is followed to its attractor first; `synchain.runtime.stability.limit_cycle` then solves
+for a state and the period together.
 
 Sources: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapter 7;
 for orbits with stick, Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems
@@ -37,46 +41,34 @@ from ..stability.motion import Turns, rests
 from ..stability.orbits import OrbitProblem, unit_of_time, within
 from .phases import Phases, phases_of
 
-__all__ = [
-    "NEWTON",
-    "SAME",
-    "PeriodicOrbit",
-    "check_periods",
-    "closed",
-    "orbit_through",
-    "periodic_orbit",
-    "relative",
-    "stability_end",
-    "strobe",
-    "whole_turns",
-]
-
 TOLERANCE = 1e-12
-"""Relative tolerance of the integration."""
+"""Relative tolerance of the integration: five digits below SAME (a choice)."""
 
 NEWTON = {
     "rtol": f"orbits are integrated with rtol = {TOLERANCE:g}, on which the comparison of orbits rests",
     "workers": "each step of Newton's method needs the one before",
     "executor": "each step of Newton's method needs the one before",
 }
-"""What functions of periodic orbits do not take, and why."""
+"""Keywords that functions of periodic orbits refuse, with the reason."""
 
 SAME = 1e-7
-"""Largest distance of two orbits that count as one, relative to the extent of each component."""
+"""Largest distance of two orbits that count as one, relative to the extent of each component (a choice)."""
 
 CLOSED = 1e-9
-"""Largest distance of the state of an orbit from its image, relative to the extent of each component."""
+"""Largest distance of the state of an orbit from its image, relative to the extent of each component (a choice)."""
 
 ROUNDING = 10.0 * TOLERANCE
-"""Largest error of the integration, relative to a state; a sliding speed below this part of its extent is one."""
+"""Largest error of the integration, relative to a state (a choice); a sliding speed below this part of its extent is one."""
 
 TRAVELLED = 1e-3
-"""An orbit that moves less than this part of the way on which Newton's method came to it is measured by that part."""
+"""An orbit that moves less than this part of the way on which Newton's method came to it is measured by that part (a choice)."""
 
 ASTRAY = 1e6
-"""How many extents of the motion from its start Newton's method may go away."""
+"""Newton's method ends if it goes farther than this many extents of the motion from its start (a choice)."""
 
 MOST_STEPS = 30
+"""Most steps of Newton's method: it doubles the digits in a step near an orbit (a choice)."""
+
 LONGEST = 10_000
 """Most drive periods of an orbit; unstable ones far shorter already lose all their digits."""
 
@@ -160,7 +152,7 @@ class PeriodicOrbit(Labelled):
 
     @property
     def phases(self) -> Phases | None:
-        """Phases of stick and slip of one cycle; None for friction that is not set-valued."""
+        """Phases of stick and slip of one cycle; None without set-valued friction."""
         return phases_of(self.scene, self.state, self.periods)
 
     @property
@@ -198,7 +190,7 @@ class PeriodicOrbit(Labelled):
         ndarray, shape (components,)
             The largest first.
         """
-        return _sorted(_strobe(self.scene, self.state, self.periods, alpha, self.free, self.extent)[1])
+        return _multipliers(_strobe(self.scene, self.state, self.periods, alpha, self.free, self.extent)[1])
 
 
 def periodic_orbit(
@@ -211,7 +203,7 @@ def periodic_orbit(
 ) -> PeriodicOrbit:
     """Find a periodic orbit of a scene's oscillator: of one, which all of a network follow in step.
 
-    Whether a network stays in step is told by `PeriodicOrbit.transversal_multipliers`.  Of the scene, model, parameters,
+    `PeriodicOrbit.transversal_multipliers` decides whether a network stays in step.  Of the scene, model, parameters,
     initial state, transient with its unit, integrator and max_steps count.  The tolerance is 1e-12, nothing is recorded,
     and axes, draws and `stop` are refused.
 
@@ -257,19 +249,21 @@ def periodic_orbit(
 
 
 def _newton(scene: Scene, periods: int, start: np.ndarray) -> PeriodicOrbit:
-    """The orbit of a driven oscillator near a start (components,), by Newton's method."""
+    """Find the orbit of a driven oscillator near a start (components,)."""
     extent = _extent(scene, start, periods)
-    best, steps, kept, state = np.inf, 0, start, start
+    best, steps, nearest, state = np.inf, 0, start, start
     while steps < MOST_STEPS:
         image, matrix = _strobe(scene, state, periods, 0.0, extent=extent)
         gap = image[: len(state)] - state
+        # A state that slips at a rounding error, and whose image sticks: take the velocity of the ground.
         if _nearly_sticks(image, gap, extent):
             state = image[: len(state)] - np.array([gap[0], 0.0])
             continue
+        # Stop where the gap no longer falls: it has come down to the errors of the integration, or diverges.
         residual = relative(gap, extent)
         if not residual < best:
             break
-        best, kept, monodromy, rest = residual, state, matrix, gap
+        best, nearest, monodromy, left = residual, state, matrix, gap
         if residual == 0.0:
             break
         if _sticks_throughout(image, matrix):
@@ -280,22 +274,23 @@ def _newton(scene: Scene, periods: int, start: np.ndarray) -> PeriodicOrbit:
         steps += 1
         if not relative(state - start, extent) < ASTRAY:
             break
-    extent = np.maximum(_extent(scene, kept, periods, extent), TRAVELLED * np.abs(kept - start))
-    size = float(np.abs(rest).max())
-    if not closed(rest, CLOSED * extent, kept):
+    # Accept by the extent of the orbit itself; a component at rest is measured by the way from the start.
+    extent = np.maximum(_extent(scene, nearest, periods, extent), TRAVELLED * np.abs(nearest - start))
+    size = float(np.abs(left).max())
+    if not closed(left, CLOSED * extent, nearest):
         raise ArithmeticError(
             f"no orbit of {periods} drive period{'s' * (periods > 1)} near the start: the best residual was {size:.1e}"
         )
-    return PeriodicOrbit(scene, periods, kept, _sorted(monodromy), size, steps, extent=extent)
+    return PeriodicOrbit(scene, periods, nearest, _multipliers(monodromy), size, steps, extent=extent)
 
 
 def relative(distance: np.ndarray, extent: np.ndarray) -> float:
-    """The largest component of a distance, relative to the extent of the motion; one that never moved has no extent."""
+    """Return the largest component of a distance in units of the extent of the motion, or in its own unit without one."""
     return float(np.abs(distance / np.where(extent > 0.0, extent, 1.0)).max())
 
 
 def closed(gap: np.ndarray, allowed: np.ndarray, state: np.ndarray) -> bool:
-    """Return whether no component of a gap at a state is larger than allowed, errors of the integration left out."""
+    """Return whether every component of a gap at a state is as small as allowed, but for errors of the integration."""
     return bool(np.all(np.abs(gap) <= allowed + ROUNDING * np.abs(state)))
 
 
@@ -310,26 +305,28 @@ def whole_turns(scene: Scene, differences: np.ndarray) -> np.ndarray:
     return turns
 
 
-def _extent(scene: Scene, state: np.ndarray, periods: int, known: np.ndarray | None = None) -> np.ndarray:
-    """How far each component (components,) moves within some drive periods from a state."""
-    problem, first = _problem(scene, state, 0.0, scene.period, known)
+def _extent(scene: Scene, state: np.ndarray, periods: int, scales: np.ndarray | None = None) -> np.ndarray:
+    """Measure how far each component (components,) moves within some drive periods; `scales` set the tolerances."""
+    problem, first = _problem(scene, state, 0.0, scene.period, scales)
     return np.asarray(np.ptp([first, *within(problem, first[None], periods)], axis=0)[: len(state)])
 
 
 def _limit_cycle(scene: Scene, periods: int, start: Sequence[float] | np.ndarray | None) -> PeriodicOrbit:
-    """The cycle that attracts an undriven oscillator from its start."""
+    """Find the cycle that attracts an undriven oscillator from its start."""
     if periods != 1:
         raise ValueError(f"periods = {periods}; expected 1 for an oscillator without a drive, whose period is found")
     if scene.equations.sticks:
         raise ValueError(
             "periodic orbits: found set-valued friction without a drive; expected a drive, or a smoothed law"
         )
+    # Follow the motion through the transient; it must not come to rest.
     first = (_initial(scene) if start is None else _state(scene, start))[None]
     problem = OrbitProblem.of_modes(scene, np.zeros(1), first, 1)
     problem, (settled,) = problem.settled(problem.with_slip_states(first), scene.transient)
     if rests(problem.rates, settled, RETURN, problem.extent):
         at = ", ".join(f"{name} = {x:.6g}" for name, x in zip(scene.components, settled, strict=False))
         raise ArithmeticError(f"no cycle: the motion comes to rest at {at}; `equilibrium` finds such states")
+    # Newton's method for state and period, then the multipliers along the cycle.
     cycle = limit_cycle(problem, settled, RETURN)
     if cycle is None:
         raise ArithmeticError(
@@ -338,16 +335,16 @@ def _limit_cycle(scene: Scene, periods: int, start: Sequence[float] | np.ndarray
     state, extent = cycle.state, problem.extent
     image, matrix = _strobe(scene, state, 1, 0.0, cycle.period, extent)
     residual = float(np.abs(image - state).max())
-    return PeriodicOrbit(scene, 1, state, _sorted(matrix), residual, cycle.steps, cycle.period, extent)
+    return PeriodicOrbit(scene, 1, state, _multipliers(matrix), residual, cycle.steps, cycle.period, extent)
 
 
 def _nearly_sticks(image: np.ndarray, gap: np.ndarray, extent: np.ndarray) -> bool:
-    """True if a state slips at a speed of rounding errors and its image sticks."""
+    """Return whether a state slips at a speed of rounding errors and its image sticks."""
     return len(image) > len(gap) and image[-1] == 0.0 and 0.0 < abs(gap[1]) < ROUNDING * extent[1]
 
 
 def _sticks_throughout(image: np.ndarray, matrix: np.ndarray) -> bool:
-    """True if a body sticks over all periods: the map shifts its place and forgets its velocity, M = [[1, 0], [0, 0]]."""
+    """Return whether a body sticks over all periods: the map shifts its place and forgets its velocity, M = diag(1, 0)."""
     return len(image) > len(matrix) and image[-1] == 0.0 and np.array_equal(matrix, np.diag([1.0, 0.0]))
 
 
@@ -358,12 +355,12 @@ def check_periods(periods: object) -> None:
 
 
 def orbit_through(scene: Scene, periods: int, state: np.ndarray, parameters: Mapping[str, float]) -> PeriodicOrbit:
-    """Return the orbit through a state that is known to return to itself. Shapes: state (components,)."""
+    """Return the orbit through a state that returns to itself, without a search. Shapes: state (components,)."""
     scene = _driven(Given(orbit_through, parameters), scene)
     extent = _extent(scene, state, periods)
     image, matrix = _strobe(scene, state, periods, 0.0, extent=extent)
     residual = float(np.abs(image[: len(state)] - state).max())
-    return PeriodicOrbit(scene, periods, state, _sorted(matrix), residual, 0, extent=extent)
+    return PeriodicOrbit(scene, periods, state, _multipliers(matrix), residual, 0, extent=extent)
 
 
 def strobe(
@@ -382,7 +379,7 @@ def strobe(
 
 
 def _driven(given: Given, scene: Scene) -> Scene:
-    """Scene with its parameters at the tolerance of orbits; ValueError if it has no drive."""
+    """Return the scene with its parameters and the tolerance of orbits; ValueError if it has no drive."""
     scene = given.scene(scene, rtol=TOLERANCE)
     unit_of_time(scene)
     if not scene.period:
@@ -394,22 +391,22 @@ def _driven(given: Given, scene: Scene) -> Scene:
 
 def _warn_of_different_starts(scene: Scene) -> None:
     """Warn if the nodes of a network were given different initial states."""
-    given = check_scene(scene).given["initial"] or {}
-    apart = next((name for name in given if name in scene.initial and len({*scene.initial[name]}) > 1), None)
-    if apart is not None:
+    initial = check_scene(scene).given["initial"] or {}
+    different = next((name for name in initial if name in scene.initial and len({*scene.initial[name]}) > 1), None)
+    if different is not None:
         warn(
-            f"periodic_orbit: found different initial {apart} of {scene.n} nodes; expected equal ones, as the orbit is that "
+            f"periodic_orbit: found different initial {different} of {scene.n} nodes; expected equal ones, as the orbit is that "
             "of one oscillator; the start of the first is taken; run the scene to see how the network moves"
         )
 
 
 def _initial(scene: Scene) -> np.ndarray:
-    """The initial state of the first oscillator."""
+    """Return the initial state of the first oscillator, with its slip state if it has one."""
     return np.array([values[0] for values in scene.initial.values()], dtype=float)
 
 
 def _settled(scene: Scene) -> np.ndarray:
-    """State (components,) after the scene's transient from its initial one."""
+    """Return the state (components,) after the scene's transient."""
     first = _initial(scene)[None]
     problem = OrbitProblem.of_modes(scene, np.zeros(1), first, 1)
     units = scene.transient if scene.time_unit == "period" else math.ceil(scene.transient / problem.unit)
@@ -418,7 +415,7 @@ def _settled(scene: Scene) -> np.ndarray:
 
 
 def _state(scene: Scene, start: Sequence[float] | np.ndarray) -> np.ndarray:
-    """Check a start as the state (components,) of one oscillator."""
+    """Check a start and return it as the state (components,) of one oscillator, without a slip state."""
     names = tuple(name for name in scene.components if name != SLIP.name)
     try:
         state = np.array(start, dtype=float)
@@ -430,7 +427,7 @@ def _state(scene: Scene, start: Sequence[float] | np.ndarray) -> np.ndarray:
 
 
 def _correction(matrix: np.ndarray, gap: np.ndarray) -> np.ndarray:
-    """Step of Newton's method; ArithmeticError if the orbit is not isolated."""
+    """Return the step of Newton's method; ArithmeticError if the orbit is not isolated."""
     try:
         return np.asarray(np.linalg.solve(np.eye(len(gap)) - matrix, gap))
     except np.linalg.LinAlgError:
@@ -455,10 +452,10 @@ def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:
 def _strobe(
     scene: Scene, state: np.ndarray, periods: int, alpha: float, free: float = 0.0, extent: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """State some periods later, of the drive or of length `free`, and the propagator of a deviation of strength alpha."""
+    """Return the state some periods later, of the drive or of length `free`, and the propagator of a mode of strength alpha."""
     problem, first = _problem(scene, state, alpha, free or scene.period, extent)
     propagators, logarithms, image = cycle_propagators(problem, first, periods)
-    if (size := float(logarithms[0, 0])) > 700.0:
+    if (size := float(logarithms[0, 0])) > 700.0:  # double precision ends at exp(709.8)
         raise FloatingPointError(
             f"multipliers: found a deviation that grows by exp({size:.3g}); expected exp(700) at most"
         )
@@ -468,7 +465,10 @@ def _strobe(
 def _problem(
     scene: Scene, state: np.ndarray, alpha: float, period: float | None, extent: np.ndarray | None = None
 ) -> tuple[OrbitProblem, np.ndarray]:
-    """Orbits with a mode of strength alpha in units of a period, and the state with its slip state; tolerances follow the extent."""
+    """Return orbits with a mode of strength alpha in units of a period, and the state with its slip state.
+
+    Absolute tolerances follow the extent.
+    """
     start, moves = np.zeros(len(scene.initial)), np.zeros(len(scene.initial))
     start[: len(state)] = state
     if extent is not None:
@@ -478,7 +478,7 @@ def _problem(
     return problem, problem.with_slip_states(start[None])[0]
 
 
-def _sorted(matrix: np.ndarray) -> np.ndarray:
-    """Eigenvalues of a matrix, the largest first."""
+def _multipliers(matrix: np.ndarray) -> np.ndarray:
+    """Return the eigenvalues of a monodromy matrix, the largest first."""
     multipliers = np.linalg.eigvals(matrix)
     return np.asarray(multipliers[np.argsort(-np.abs(multipliers), kind="stable")])

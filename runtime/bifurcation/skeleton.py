@@ -1,8 +1,11 @@
 """The skeleton of a bifurcation diagram: branches of periodic orbits of few periods, stable or not.
 
-A chaotic motion comes close to every periodic orbit on its attractor again and again, and a
-transient to those beside it. States that nearly return after some periods of the drive are
-therefore good starts for Newton's method.
+A chaotic motion comes close to every periodic orbit on its attractor again and again, and a transient to those beside it.
+States x with P^k(x) near x, P the stroboscopic map, are therefore good starts for Newton's method (Auerbach et al.).
+
+1. At some values of the parameter, motions from many starts are followed, and states that nearly return are collected.
+2. Newton's method makes them orbits; one that a branch passes through already is left out.
+3. Each new orbit is followed up and down, and at a fold the search goes on along the other sheet.
 
 Source: Auerbach, Cvitanovic, Eckmann, Gunaratne & Procaccia, Phys. Rev. Lett. 58, 2387 (1987).
 """
@@ -29,27 +32,31 @@ from ..stability.orbits import OrbitProblem, driven_states, within
 from ..support.arrays import row
 from ..support.execution import Execution
 from ..support.progress import Hook
-from .bifurcations import BifurcationKind
 from .branches import Branch, checked_values, others, traced, warn_of_lost
+from .kinds import BifurcationKind
 from .periodic import NEWTON, TOLERANCE, PeriodicOrbit, check_periods, periodic_orbit, relative, whole_turns
 
 Range = tuple[float, float]
 """Ends of an interval."""
 
 STARTS, LENGTH, DROPPED = 96, 200, 20
-"""Motions that are searched for returns, their length and their transient in drive periods."""
+"""Number of motions that are searched for returns, their length and their transient in drive periods (choices)."""
 
 SCALES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
-"""Sizes of the boxes of their starts around the motion from the scene's own start, relative to the extent of that."""
+"""Sizes of the boxes of starts around the motion from the scene's own start, relative to the extent of that motion (choices)."""
 
 MOST_STEPS = 100_000
-"""Most steps of a motion in a drive period; one that takes more is left."""
+"""Most steps of a motion in a drive period; one that takes more is left out (a choice)."""
+
+LOOSE = 1e-8
+"""Relative tolerance of these motions: returns are searched to CLOSE only (a choice)."""
 
 NEARER = 4
-"""The other sheet at a fold is entered at 4^-NEARER of the distance between fold and last orbit."""
+"""The other sheet at a fold is entered at 4^-NEARER of the distance between fold and last orbit (a choice)."""
 
 CLOSE, APART, TRIES = 0.05, 0.02, 12
-"""Largest distance of a return and least distance between starts, relative to the extent of the motion; most starts for one period."""
+"""Largest distance of a return and least distance between starts, relative to the extent of the motion, and most starts for
+one period (choices)."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -73,8 +80,8 @@ class Skeleton(Labelled):
     def __iter__(self) -> Iterator[Branch]:
         return iter(self.branches)
 
-    def __getitem__(self, place: int) -> Branch:
-        return self.branches[place]
+    def __getitem__(self, index: int) -> Branch:
+        return self.branches[index]
 
     @property
     def data(self) -> xr.Dataset:
@@ -104,11 +111,11 @@ class Skeleton(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """One row for each branch, and where orbits were searched."""
+        """One row for each branch, and the box in which orbits were searched."""
         rows = tuple(
             (
                 f"branch {k}",
-                ", ".join(f"{name} {words}" if name != "orbits" else words for name, words in branch.summary),
+                ", ".join(f"{name} {text}" if name != "orbits" else text for name, text in branch.summary),
             )
             for k, branch in enumerate(self.branches, 1)
         )
@@ -152,7 +159,7 @@ def skeleton(
     ranges : mapping of str to (float, float), optional
         Components and the ends of the initial values between which motions are searched; other components start as the
         scene does. By default all components start in boxes of 1, 2, 4 … 32 times the extent of the motion from the
-        scene's own start, around it. `Skeleton.searched` says what was searched.
+        scene's own start, around it. `Skeleton.searched` holds the ranges that were searched.
     transient : float
         Drive periods before the search.
     seed : int
@@ -203,10 +210,10 @@ def skeleton(
             take(grid.index(end), other)
 
     count = min(looks, len(grid))
-    places = sorted({int((2 * j + 1) * len(grid) / (2 * count)) for j in range(count)})
+    looked_at = sorted({int((2 * j + 1) * len(grid) / (2 * count)) for j in range(count)})  # evenly spread indices
     transient, seed = check_number("transient", transient, 0.0), check_integer("seed", seed, 0)
-    with Execution(1, None, show_progress, progress).reporter(len(places), "value") as reporter:
-        for k in reporter.each(places):
+    with Execution(1, None, show_progress, progress).reporter(len(looked_at), "value") as reporter:
+        for k in reporter.each(looked_at):
             one = with_numbers(scene, {name: grid[k]})
             states = starts_of(one, seed, box)
             searched.append(states)
@@ -222,15 +229,15 @@ def skeleton(
 
 
 def _box(scene: Scene, ranges: Mapping[str, Range]) -> np.ndarray:
-    """The ends (2, components) of the initial values in some ranges and, of other components, those of the scene."""
+    """Return the ends (2, components) of the ranges; a component without a range has the scene's initial value twice."""
     names = [name for name in scene.components if name != SLIP.name]
     check_keys("skeleton: ranges", check_table("skeleton: ranges", ranges), names)
     ends = np.array([[scene.initial[name][0]] * 2 for name in names], dtype=float).T
-    for name, given in ranges.items():
-        pair = row(f"skeleton: the range of {name}", given, 2)
+    for name, interval in ranges.items():
+        pair = row(f"skeleton: the range of {name}", interval, 2)
         if len(pair) != 2 or not pair[0] < pair[1]:
             raise ValueError(
-                f"skeleton: the range of {name} is {short_repr(given)}; expected two numbers, the lower one first"
+                f"skeleton: the range of {name} is {short_repr(interval)}; expected two numbers, the lower one first"
             )
         ends[:, names.index(name)] = pair
     return ends
@@ -244,10 +251,11 @@ def starts_of(scene: Scene, seed: int, box: np.ndarray | None = None) -> np.ndar
         problem, (state,) = _problem(scene, own[None])
         try:
             motion = np.concatenate([own[None], *(states[:, : len(own)] for states in driven_states(problem, state))])
-        except FloatingPointError:  # its own start escapes, and says nothing of bounded motion but its size
+        except FloatingPointError:  # the motion escapes: of its start only the size is a scale of bounded motion
             motion = np.array([own, -own])
         extent = np.ptp(motion, axis=0)
-        extent = np.where(extent > 0.0, extent, 1.0 if not extent.any() else 0.0)  # nothing moves, so no scale is known
+        extent = np.where(extent > 0.0, extent, 1.0 if not extent.any() else 0.0)  # without any motion the scale is 1
+        # One box for each start, of each size in turn: box (2, STARTS, components).
         sizes = np.resize(SCALES, STARTS)[:, None] * extent
         box = 0.5 * (motion.min(axis=0) + motion.max(axis=0)) + sizes * np.array([-0.5, 0.5])[:, None, None]
     starts = box[0] + (box[1] - box[0]) * share
@@ -274,22 +282,22 @@ def near_returns(
 
 
 def _paths(scene: Scene, transient: float, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """States (LENGTH + 1, motions, components) at the beginning of periods of bounded motions, and the extents of those."""
-    loose = scene.replace(rtol=1e-8, max_steps=min(scene.max_steps, MOST_STEPS))
-    parts = [starts]
-    found: list[tuple[np.ndarray, np.ndarray]] = []
-    for part in parts:
+    """Return states (LENGTH + 1, motions, components) at the beginning of periods of bounded motions, and their extents."""
+    loose = scene.replace(rtol=LOOSE, max_steps=min(scene.max_steps, MOST_STEPS))
+    batches = [starts]
+    motions: list[tuple[np.ndarray, np.ndarray]] = []
+    for batch in batches:
         try:
-            found.append(_path(loose, transient, part))
-        except FloatingPointError:  # some escape or take too many steps: halves are tried
-            parts += np.array_split(part, 2) if len(part) > 1 else []
-    if not found:
+            motions.append(_path(loose, transient, batch))
+        except FloatingPointError:  # some escape or take too many steps: try both halves
+            batches += np.array_split(batch, 2) if len(batch) > 1 else []
+    if not motions:
         return np.empty((LENGTH + 1, 0, starts.shape[1])), np.empty((0, starts.shape[1]))
-    return np.concatenate([path for path, _ in found], axis=1), np.concatenate([extent for _, extent in found])
+    return np.concatenate([path for path, _ in motions], axis=1), np.concatenate([extent for _, extent in motions])
 
 
 def _path(scene: Scene, transient: float, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """States (LENGTH + 1, starts, components) at the beginning of each period, and the extent of each motion."""
+    """Return states (LENGTH + 1, starts, components) at the beginning of each period, and the extent of each motion."""
     problem, states = _problem(scene, starts)
     problem, states = problem.settled(states, transient)
     integrator = problem.integrator(states)
@@ -298,12 +306,13 @@ def _path(scene: Scene, transient: float, starts: np.ndarray) -> tuple[np.ndarra
         integrator.advance(problem.unit)
         strobes.append(integrator.state)
     path = np.array(strobes)[:, :, : problem.components]
+    # States inside the last period count for the extent, too.
     inner = [within(problem, last[None])[:, : problem.components] for last in strobes[-1]]
-    return path, np.array([np.ptp([*path[:, k], *looks], axis=0) for k, looks in enumerate(inner)])
+    return path, np.array([np.ptp([*path[:, k], *states], axis=0) for k, states in enumerate(inner)])
 
 
 def _problem(scene: Scene, starts: np.ndarray) -> tuple[OrbitProblem, np.ndarray]:
-    """Orbits from starts (any, components) without slip states, and these states with them."""
+    """Return orbits from starts (any, components) without slip states, and the starts with slip states."""
     states = np.zeros((len(starts), len(scene.initial)))
     states[:, : starts.shape[1]] = starts
     problem = OrbitProblem.of_modes(scene, np.zeros(1), states, 1)
@@ -311,8 +320,9 @@ def _problem(scene: Scene, starts: np.ndarray) -> tuple[OrbitProblem, np.ndarray
 
 
 def _returning(scene: Scene, path: np.ndarray, extent: np.ndarray, periods: int) -> list[np.ndarray]:
-    """States of paths with the closest returns after some periods, apart from each other."""
+    """Return states of paths with the closest returns after some periods, apart from each other, the closest first."""
     size = np.where(extent > 0.0, extent, 1.0)
+    # |x(j + periods) - x(j)| of each motion, the largest component in units of its extent.
     gap = np.abs((path[periods:] - path[:-periods]) / size).max(axis=2)
     # An angle is counted in the turn of the scene's own start: an orbit some turns away is the same orbit.
     own = _own_start(scene)
@@ -328,24 +338,23 @@ def _returning(scene: Scene, path: np.ndarray, extent: np.ndarray, periods: int)
 
 
 def _own_start(scene: Scene) -> np.ndarray:
-    """Initial state (components,) of the first oscillator."""
+    """Return the initial state (components,) of the first oscillator, without a slip state."""
     return np.array([values[0] for name, values in scene.initial.items() if name != SLIP.name], dtype=float)
 
 
 def _same(orbit: PeriodicOrbit, other: PeriodicOrbit) -> bool:
-    """True if two orbits of as many periods are one, perhaps shifted by drive periods."""
+    """Return whether two orbits of equal periods are one, perhaps shifted by drive periods."""
     return any(other.meets(point) for point in orbit.points)
 
 
 def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
-    """True if a branch passes through an orbit."""
-    (places,) = np.nonzero(branch.values == value)
+    """Return whether a branch passes through an orbit."""
     alike = branch.orbits[0].periods == orbit.periods
-    return alike and any(_same(orbit, branch.orbits[k]) for k in places)
+    return alike and any(_same(orbit, branch.orbits[k]) for k in np.flatnonzero(branch.values == value))
 
 
 def _both_ways(scene: Scene, name: str, grid: list[float], k: int, orbit: PeriodicOrbit) -> Branch:
-    """Branch through an orbit at grid[k], in one piece."""
+    """Follow an orbit at grid[k] up and down, and join both parts to one branch that rises in the parameter."""
     up, down = (traced(scene, name, part, orbit, grid[-1] - grid[0]) for part in (grid[k:], grid[k::-1]))
     return Branch(
         name,
@@ -358,11 +367,7 @@ def _both_ways(scene: Scene, name: str, grid: list[float], k: int, orbit: Period
 
 
 def _other_sheets(scene: Scene, branch: Branch) -> list[tuple[float, PeriodicOrbit]]:
-    """Values of a branch's ends at folds, with the orbits of the other sheets there.
-
-    Near a fold the sheets lie on both sides of it, at distances proportional to the square root of
-    that of the parameter.
-    """
+    """Return the values of a branch's ends at folds, with the orbits of the other sheets there."""
     sheets = []
     for turn in branch.bifurcations:
         if turn.kind is not BifurcationKind.FOLD:
@@ -372,12 +377,13 @@ def _other_sheets(scene: Scene, branch: Branch) -> list[tuple[float, PeriodicOrb
             if not inner:
                 continue
             end, last = float(branch.values[k]), branch.orbits[k]
-            way = [fold + 4.0**-j * (end - fold) for j in range(NEARER, -1, -1)]
+            # Near a fold both sheets lie at distances +-c sqrt|p - p_fold| from it: at 4^-j of the way, 2^-j of the distance.
+            values = [fold + 4.0**-j * (end - fold) for j in range(NEARER, -1, -1)]
             try:
                 start = turn.orbit.state - 2.0**-NEARER * (last.state - turn.orbit.state)
-                first = periodic_orbit(scene, last.periods, start, parameters={branch.name: way[0]})
-                sheet = traced(scene, branch.name, way, first, abs(end - fold))
+                first = periodic_orbit(scene, last.periods, start, parameters={branch.name: values[0]})
+                sheet = traced(scene, branch.name, values, first, abs(end - fold))
             except ArithmeticError:
                 continue
-            sheets += [(end, sheet.orbits[-1])] if len(sheet.orbits) == len(way) else []
+            sheets += [(end, sheet.orbits[-1])] if len(sheet.orbits) == len(values) else []
     return sheets

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..bifurcation.bifurcations import BifurcationKind
+from ..bifurcation.kinds import BifurcationKind
 
 MARKERS = {
     BifurcationKind.PERIOD_DOUBLING: "o",

@@ -11,7 +11,8 @@ from synchain.models import Field, Rates, Scene, chain, normal
 from synchain.models.inputs.names import ATTRIBUTES, TAKEN
 from synchain.runtime import follow, plane, run, skeleton
 from synchain.runtime.bifurcation import branches
-from synchain.runtime.bifurcation.bifurcations import Bifurcation, BifurcationKind
+from synchain.runtime.bifurcation.bifurcations import Bifurcation
+from synchain.runtime.bifurcation.kinds import BifurcationKind
 from synchain.runtime.bifurcation.periodic import PeriodicOrbit
 from synchain.runtime.bifurcation.skeleton import Skeleton
 from synchain.runtime.cells.buffers import Buffers
