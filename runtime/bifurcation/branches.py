@@ -187,6 +187,22 @@ def follow(
         If `first` is no PeriodicOrbit.
     ArithmeticError
         If there is no orbit near `first` at values[0].
+
+    See Also
+    --------
+    periodic_orbit : Find the first orbit.
+    skeleton : Find orbits by a search, and follow all of them.
+
+    Examples
+    --------
+    The large oscillation of Duffing's oscillator ends at a fold above its resonance:
+
+    >>> from synchain import Field, Scene, follow, periodic_orbit
+    >>> duffing = Field({"x": "v", "v": "-x - x**3 - v/10 + 0.3*cos(w*t)"}, parameters={"w": 1.2})
+    >>> scene = Scene(duffing, None, initial={"x": 0.5, "v": 0}, transient=100)
+    >>> branch = follow(scene, "w", [1.2, 1.6, 2.0], periodic_orbit(scene))
+    >>> [(str(each.kind), round(each.value, 6)) for each in branch.bifurcations]
+    [('fold', 1.77972)]
     """
     check_instance("first", first, PeriodicOrbit, "a PeriodicOrbit, such as periodic_orbit(scene) returns")
     if first.free:

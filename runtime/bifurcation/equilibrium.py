@@ -244,6 +244,10 @@ def equilibrium(
     ArithmeticError
         If Newton's method does not converge, or the eigenvalues of a large network do not.
 
+    See Also
+    --------
+    periodic_orbit : Find a motion that repeats itself.
+
     Examples
     --------
     Two machines of a power grid: sin(delta) = P/K.

@@ -236,6 +236,21 @@ def periodic_orbit(
         If `periods` is out of range, a parameter is unknown, or `start` is no state.
     ArithmeticError
         If Newton's method does not converge.
+
+    See Also
+    --------
+    follow : Follow an orbit along a parameter and locate its bifurcations.
+    skeleton : Search all orbits of some periods, stable or not.
+    equilibrium : Find a state at rest.
+
+    Examples
+    --------
+    The limit cycle of van der Pol's oscillator:
+
+    >>> from synchain import Scene, periodic_orbit
+    >>> orbit = periodic_orbit(Scene("van_der_pol"))
+    >>> round(orbit.period, 6), orbit.stable
+    (6.663287, True)
     """
     if start is None:
         _warn_of_different_starts(scene)

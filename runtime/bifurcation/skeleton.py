@@ -183,6 +183,22 @@ def skeleton(
     ValueError
         If the parameter is unknown, the values are not monotonic, `looks` is less than one, a range is empty or of an
         unknown component, and for an oscillator without a drive.
+
+    See Also
+    --------
+    follow : Follow one orbit.
+    periodic_orbit : Find one orbit by Newton's method.
+
+    Examples
+    --------
+    Near its resonance Duffing's oscillator has a large and a small oscillation:
+
+    >>> from synchain import Field, Scene, skeleton
+    >>> duffing = Field({"x": "v", "v": "-x - x**3 - v/10 + 0.3*cos(w*t)"}, parameters={"w": 1.2})
+    >>> scene = Scene(duffing, None, initial={"x": 0.5, "v": 0}, transient=100)
+    >>> branches = skeleton(scene, "w", [1.4, 1.5], (1,), looks=1)
+    >>> len(branches), all(branch.orbits[0].stable for branch in branches)
+    (2, True)
     """
     grid = sorted(checked_values(check_scene(scene), name, values))
     if isinstance(periods, Integral | str) or len(periods) == 0:
