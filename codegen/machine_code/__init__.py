@@ -1,1 +1,1 @@
-"""Kernels as machine code: compiled, kept on disk, loaded; no step and no scene."""
+"""Compile kernels to machine code, keep it on disk, load it: `compile.load` is the entry; no step and no scene."""

@@ -1,11 +1,10 @@
-"""The folder of compiled kernels and drivers.  Code is loaded from it, so a folder that others can change is refused.
+"""The folder of compiled kernels and drivers, from which code is loaded: a folder that others can change is refused.
 
-The folder is opened once and its files are reached through it, so that nobody can replace the folder
-between a check and a reading.  The machine code of a kernel is one file, a pickle, which may run
-anything when it is read: it begins with a signature (HMAC) by a key of the user, which does not lie
-in the folder, so that code of another user or machine is refused, and damaged code too.  The file is
-read once: the bytes that were checked are the bytes that are loaded.  A file that is refused is
-written anew.  Reading needs no right to write.
+The folder is opened once and its files are reached through its descriptor, so that nobody can replace it between a
+check and a reading.  The machine code of a module is one file, a pickle, which may run anything when it is loaded.
+Hence it begins with a signature (HMAC) by a key of the user, which lies outside of the folder: code of another user or
+machine is refused, and damaged code too.  The file is read once: the bytes that were checked are the bytes that are
+loaded.  A file that is refused is compiled and written again.  Reading needs no right to write.
 """
 
 from __future__ import annotations
@@ -23,7 +22,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from io import FileIO
 from pathlib import Path
-from types import TracebackType
 
 from synchain.models.inputs.keywords import warn
 from synchain.models.inputs.regular_file import open_regular
@@ -34,15 +32,16 @@ except ImportError:  # Windows has no such locks
     fcntl = None  # type: ignore[assignment]
 
 DIGEST = hashlib.sha256().digest_size
+"""Bytes of a signature and of the key."""
 
 KINDS = ("kernel", "driver")
-"""The modules in the folder, by the beginnings of their names: the functions of a scene, and what runs and records them."""
+"""Beginnings of the file names: the functions of a scene, and drivers and recorders, which scenes share."""
 
 KEY = "cache.key"
 """The file of the key that signs machine code."""
 
-PATIENCE = 120.0
-"""Seconds after which a process no longer waits for another one that compiles the same kernel."""
+LOCK_TIMEOUT = 120.0
+"""Seconds that a process waits for another one to compile the same module; compilation takes some 10 s at most."""
 
 
 def cache_folder() -> Path:
@@ -57,7 +56,7 @@ def cache_folder() -> Path:
 
 
 def _user_folder(variable: str, linux: str, mac: str) -> Path:
-    """The folder of this package among those of the user, of a kind that systems name differently."""
+    """Return the folder of this package in the user's folder of caches or settings, as each system names it."""
     if sys.platform == "win32":
         base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
     elif sys.platform == "darwin":
@@ -69,21 +68,10 @@ def _user_folder(variable: str, linux: str, mac: str) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Folder:
-    """An open cache folder."""
+    """An open cache folder (`open_folder`)."""
 
-    path: Path  # where the folder is
-    # the open folder, through which its files are reached. Windows has no such descriptors: there it is None, and
-    # files are reached by their paths
-    descriptor: int | None
-
-    def __enter__(self) -> Folder:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, problem: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self.descriptor is not None:
-            os.close(self.descriptor)
+    path: Path
+    descriptor: int | None  # None on Windows, which has none of folders: files are reached by their paths there
 
     def read(self, name: str) -> bytes | None:
         """Return the content of a file, None if there is no such file."""
@@ -95,23 +83,7 @@ class Folder:
             _check_owner(self.path / name, os.fstat(file.fileno()))
             return file.readall()
 
-    def write(self, name: str, data: bytes) -> None:
-        """Write a file that appears whole or not at all, for its owner alone."""
-        temporary = f"{name}-{secrets.token_hex(8)}.tmp"
-        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
-        descriptor = os.open(self._at(temporary), flags, 0o600, dir_fd=self.descriptor)
-        try:
-            with FileIO(descriptor, "wb") as file:
-                left = memoryview(data)
-                while left:
-                    left = left[file.write(left) :]
-            here = self.descriptor
-            os.replace(self._at(temporary), self._at(name), src_dir_fd=here, dst_dir_fd=here)
-        except BaseException:
-            self.delete(temporary)
-            raise
-
-    def trusted(self, name: str) -> bytes | None:
+    def read_trusted(self, name: str) -> bytes | None:
         """Return the content of a file; None if there is none, or, with a warning, if it is refused."""
         try:
             return self.read(name)
@@ -119,42 +91,64 @@ class Folder:
             _warn_of_refusal(self.path, str(problem))
             return None
 
-    def machine_code(self, name: str) -> bytes | None:
-        """Return the machine code of the kernel `name`; None if there is none, or, with a warning, if it is refused."""
-        data = self.trusted(f"{name}.code")
+    def write(self, name: str, data: bytes) -> None:
+        """Write a file, for its owner alone, that appears complete or not at all."""
+        temporary = f"{name}-{secrets.token_hex(8)}.tmp"
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+        descriptor = os.open(self._at(temporary), flags, 0o600, dir_fd=self.descriptor)
+        try:
+            with FileIO(descriptor, "wb") as file:
+                remaining = memoryview(data)
+                while remaining:
+                    remaining = remaining[file.write(remaining) :]
+            here = self.descriptor
+            os.replace(self._at(temporary), self._at(name), src_dir_fd=here, dst_dir_fd=here)
+        except BaseException:
+            self.delete(temporary)
+            raise
+
+    def delete(self, name: str) -> None:
+        with suppress(FileNotFoundError):
+            os.unlink(self._at(name), dir_fd=self.descriptor)
+
+    def _at(self, name: str) -> str:
+        return name if self.descriptor is not None else str(self.path / name)
+
+    # -- machine code and its signature -----------------------------------------------------------------------
+
+    def load_code(self, name: str) -> bytes | None:
+        """Return the machine code of the module `name`; None if there is none, or, with a warning, if it is refused."""
+        data = self.read_trusted(f"{name}.code")
         if data is None:
             return None
-        signed, code = data[:DIGEST], data[DIGEST:]
-        if not hmac.compare_digest(signed, self._signature(name, code)):
+        signature, code = data[:DIGEST], data[DIGEST:]
+        if not hmac.compare_digest(signature, self._signature(name, code)):
             _warn_of_refusal(self.path, f"{name}.code is damaged, or was signed by another user or machine")
             return None
         return code
 
-    def keep(self, name: str, code: bytes) -> None:
-        """Write the machine code of the kernel `name` with its signature."""
+    def store_code(self, name: str, code: bytes) -> None:
+        """Write the machine code of the module `name` with its signature."""
         self.write(f"{name}.code", self._signature(name, code) + code)
 
     def _signature(self, name: str, code: bytes) -> bytes:
         return hmac.digest(self.key(), f"{name}\n".encode() + code, "sha256")
 
     def key(self) -> bytes:
-        """Return the key of the user, which is made if it is missing.
-
-        It lies in the user's folder of settings; in this folder only if that one cannot be used.
-        """
+        """Return the user's key, from the folder of settings, or from this folder if that one cannot be used."""
         try:
             with open_folder(_user_folder("XDG_CONFIG_HOME", ".config", "Application Support")) as settings:
-                return settings.own_key()
+                return settings.key_here()
         except (OSError, RuntimeError):  # RuntimeError: no home folder
-            return self.own_key()
+            return self.key_here()
 
-    def own_key(self) -> bytes:
-        """Return the key in this folder, which is made if it is missing."""
+    def key_here(self) -> bytes:
+        """Return the key in this folder; create one if there is none."""
         key = self.read(KEY)
         if key is None:
             fresh = f"{KEY}-{secrets.token_hex(8)}.tmp"
             self.write(fresh, secrets.token_bytes(DIGEST))
-            with suppress(FileExistsError):  # of processes that make one at once, the first wins
+            with suppress(FileExistsError):  # if several processes create a key at once, the first wins
                 os.link(self._at(fresh), self._at(KEY), src_dir_fd=self.descriptor, dst_dir_fd=self.descriptor)
             self.delete(fresh)
             key = self.read(KEY)
@@ -162,115 +156,102 @@ class Folder:
             raise OSError(f"{self.path / KEY}: found no key of {DIGEST} bytes; expected one; delete the file")
         return key
 
-    @contextmanager
-    def turn(self, name: str) -> Iterator[None]:
-        """Let one process at a time compile the kernel `name`; the others wait, and then find it.
+    # -- one compilation at a time ----------------------------------------------------------------------------
 
-        The operating system frees the lock of a process that ends.  A system without locks compiles
-        the kernel twice, with the same result.
+    @contextmanager
+    def locked(self, name: str) -> Iterator[None]:
+        """Let one process at a time compile the module `name`; the others wait, and then load it.
+
+        The operating system frees the lock of a process that ends.  Without locks, or after LOCK_TIMEOUT, two processes
+        compile the module, with the same result.
         """
         lock = f"{name}.lock"
         flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
         descriptor = None
         if fcntl is not None:
-            with suppress(OSError):
+            with suppress(OSError):  # a folder that can only be read
                 descriptor = os.open(self._at(lock), flags, 0o600, dir_fd=self.descriptor)
         if descriptor is None:
             yield
             return
         try:
-            _wait_for(descriptor)
+            end = time.monotonic() + LOCK_TIMEOUT
+            while time.monotonic() < end:
+                try:
+                    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError:
+                    time.sleep(0.05)
+                except OSError:  # a file system without locks
+                    break
+                else:
+                    break
             yield
         finally:
             with suppress(OSError):
                 self.delete(lock)
             os.close(descriptor)
 
-    def delete(self, name: str) -> None:
-        """Delete a file if it is there."""
-        with suppress(FileNotFoundError):
-            os.unlink(self._at(name), dir_fd=self.descriptor)
 
-    def _at(self, name: str) -> str:
-        return name if self.descriptor is not None else str(self.path / name)
-
-
-def _wait_for(descriptor: int) -> None:
-    """Lock an open file, or give up when patience ends or the file system has no locks."""
-    end = time.monotonic() + PATIENCE
-    while time.monotonic() < end:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            time.sleep(0.05)
-        except OSError:
-            return
-        else:
-            return
+@contextmanager
+def open_folder(path: Path) -> Iterator[Folder]:
+    """Open a folder, and create it if it is missing; raise PermissionError if others can change or replace it."""
+    for parent in reversed(path.parents):
+        if not parent.exists():
+            parent.mkdir(mode=0o700, exist_ok=True)
+    path.mkdir(mode=0o700, exist_ok=True)
+    if not hasattr(os, "getuid"):
+        yield Folder(path, None)
+        return
+    real = path.resolve(strict=True)
+    _check_parents(real)
+    descriptor = os.open(real, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    try:
+        _check_owner(path, os.fstat(descriptor))
+        yield Folder(path, descriptor)
+    finally:
+        os.close(descriptor)
 
 
-_refusing: set[Path] = set()
+_warned_folders: set[Path] = set()
 """The folders with files that were refused."""
 
 
 def _warn_of_refusal(folder: Path, problem: str) -> None:
     """Warn, once for each folder, of a file that is not loaded."""
-    if folder not in _refusing:
-        _refusing.add(folder)
+    if folder not in _warned_folders:
+        _warned_folders.add(folder)
         warn(f"kernel cache {folder}: refused a file, whose kernel is compiled anew, as others may be: {problem}")
 
 
-def open_folder(folder: Path) -> Folder:
-    """Create the folder if it is missing and open it."""
-    for place in reversed(folder.parents):
-        if not place.exists():
-            place.mkdir(mode=0o700, exist_ok=True)
-    folder.mkdir(mode=0o700, exist_ok=True)
-    if not hasattr(os, "getuid"):
-        opened = Folder(folder, None)
-    else:
-        real = folder.resolve(strict=True)
-        _check_way(real)
-        opened = Folder(folder, os.open(real, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC))
-    try:
-        if opened.descriptor is not None:
-            _check_owner(folder, os.fstat(opened.descriptor))
-    except BaseException:
-        opened.__exit__(None, None, None)
-        raise
-    return opened
-
-
-def _check_owner(place: Path, status: os.stat_result) -> None:
+def _check_owner(path: Path, status: os.stat_result) -> None:
+    """Raise PermissionError unless a file or folder belongs to the user, who alone can write to it."""
     if not hasattr(os, "getuid"):
         return
     if status.st_uid != os.getuid():
-        raise PermissionError(f"kernel cache {place} belongs to another user; set SYNCHAIN_CACHE to a folder of yours")
+        raise PermissionError(f"kernel cache {path} belongs to another user; set SYNCHAIN_CACHE to a folder of yours")
     if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        raise PermissionError(f"kernel cache {place} can be written by others; run: chmod go-w '{place}'")
+        raise PermissionError(f"kernel cache {path} can be written by others; run: chmod go-w '{path}'")
 
 
-def _check_way(real: Path) -> None:
-    """Refuse a folder that another user can replace; the path has no symbolic links.
-
-    The owner of a parent folder can, and so can all who may write to it, unless it is sticky (/tmp).
-    """
-    for place in real.parents:
-        status = place.stat()
+def _check_parents(real: Path) -> None:
+    """Raise PermissionError if another user can replace a folder, given by its path without symbolic links."""
+    for parent in real.parents:
+        status = parent.stat()
+        # The owner of a parent can, and so can all who may write to it, unless it is sticky (/tmp).
         if status.st_uid not in (os.getuid(), 0):
             raise PermissionError(
-                f"kernel cache {real} lies in {place}, which belongs to another user; "
+                f"kernel cache {real} lies in {parent}, which belongs to another user; "
                 "set SYNCHAIN_CACHE to a folder of yours"
             )
         if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not status.st_mode & stat.S_ISVTX:
             raise PermissionError(
-                f"kernel cache {real} lies in {place}, which others can write; run: chmod go-w '{place}', "
+                f"kernel cache {real} lies in {parent}, which others can write; run: chmod go-w '{parent}', "
                 "or set SYNCHAIN_CACHE to a folder of yours"
             )
 
 
 def describe() -> dict[str, str | int]:
-    """Return folder, number of kernels, number of drivers that they share, and bytes on disk."""
+    """Return the folder, the numbers of kernels and of drivers with their recorders, and the bytes on disk."""
     folder = cache_folder()
     files = [p for p in folder.rglob("*") if p.is_file()] if folder.is_dir() else []
     return {
@@ -281,7 +262,7 @@ def describe() -> dict[str, str | int]:
 
 
 def clear() -> dict[str, int]:
-    """Delete all cached kernels and drivers and return their numbers; other files in the folder stay."""
+    """Delete all cached kernels and drivers and return their numbers; keep other files in the folder."""
     folder = cache_folder()
     counts = {}
     for kind in KINDS:

@@ -1,6 +1,7 @@
 """The functions that a driver takes, as one argument: a table of the addresses of their machine code.
 
-Numba takes functions one by one and looks for their types and addresses at each call, which takes longer than a short run.
+Numba takes first-class functions one by one and looks up the types and addresses of each at every call, which takes
+longer than a short run.  Here this happens once, when the table is made.
 """
 
 from __future__ import annotations
@@ -18,52 +19,58 @@ from numba.extending import NativeValue, models, register_model, unbox
 
 
 class FunctionsType(types.Type):
-    """Numba type of `Functions`, whose attributes are first-class functions of these signatures."""
+    """Numba type of `Functions`: its attributes are first-class functions of these signatures."""
 
     def __init__(self, signatures: Mapping[str, Any]) -> None:
-        self.kinds = {name: types.FunctionType(signature) for name, signature in signatures.items()}
-        super().__init__(name=f"Functions({self.kinds})")
+        self.types = {name: types.FunctionType(signature) for name, signature in signatures.items()}
+        super().__init__(name=f"Functions({self.types})")
 
 
 class Functions:
     """Compiled functions, None in the place of those that are not called."""
 
-    def __init__(self, kind: FunctionsType, functions: Sequence[Any]) -> None:
-        self._numba_type_ = kind
+    def __init__(self, functions_type: FunctionsType, functions: Sequence[Any]) -> None:
+        self._numba_type_ = functions_type  # `typeof` of Numba looks here
         self.functions = functions
-        addresses = default_manager.lookup(next(iter(kind.kinds.values())))._fields  # Numba has several of a function
-        self.table = np.zeros((len(functions), len(addresses)), np.uintp)
-        called = self.table[:, addresses.index("jit_addr")]
+        # Numba's struct of a function has several addresses; kernels call the one of the machine code.
+        fields = default_manager.lookup(next(iter(functions_type.types.values())))._fields
+        self.table = np.zeros((len(functions), len(fields)), np.uintp)
+        addresses = self.table[:, fields.index("jit_addr")]
         for k, function in enumerate(functions):
             if function is not None:
-                (found,) = function.overloads.values()
-                called[k] = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
+                (compiled,) = function.overloads.values()
+                addresses[k] = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
         self.address = self.table.ctypes.data
+
+
+# In machine code the table is a struct of these structs, which a kernel gets as a copy.
 
 
 @register_model(FunctionsType)
 class _Model(models.StructModel):
     def __init__(self, manager: Any, fe_type: FunctionsType) -> None:
-        super().__init__(manager, fe_type, list(fe_type.kinds.items()))
+        super().__init__(manager, fe_type, list(fe_type.types.items()))
 
 
 @infer_getattr
 class _Attributes(AttributeTemplate):
     key = FunctionsType
 
-    def generic_resolve(self, kind: FunctionsType, name: str) -> Any:
-        return kind.kinds.get(name)
+    def generic_resolve(self, functions_type: FunctionsType, name: str) -> Any:
+        return functions_type.types.get(name)
 
 
 @lower_getattr_generic(FunctionsType)
-def _function(context: Any, builder: Any, kind: FunctionsType, value: Any, name: str) -> Any:
-    found = getattr(cgutils.create_struct_proxy(kind)(context, builder, value=value), name)
-    return impl_ret_borrowed(context, builder, kind.kinds[name], found)
+def _attribute(context: Any, builder: Any, functions_type: FunctionsType, value: Any, name: str) -> Any:
+    function = getattr(cgutils.create_struct_proxy(functions_type)(context, builder, value=value), name)
+    return impl_ret_borrowed(context, builder, functions_type.types[name], function)
 
 
 @unbox(FunctionsType)
-def _taken(kind: FunctionsType, functions: Any, c: Any) -> NativeValue:
+def _unbox(functions_type: FunctionsType, functions: Any, c: Any) -> NativeValue:
+    """Load the struct from the address that the Python object has as an attribute."""
     number = c.pyapi.object_getattr_string(functions, "address")
-    place = c.pyapi.long_as_voidptr(number)
+    pointer = c.pyapi.long_as_voidptr(number)
     c.pyapi.decref(number)
-    return NativeValue(c.builder.load(c.builder.bitcast(place, c.context.get_value_type(kind).as_pointer())))
+    struct = c.context.get_value_type(functions_type)
+    return NativeValue(c.builder.load(c.builder.bitcast(pointer, struct.as_pointer())))

@@ -4,4 +4,4 @@ from __future__ import annotations
 
 
 class InstallationError(RuntimeError):
-    """A kernel cannot be made here: versions differ, the kernel differs, or Numba does not compile."""
+    """Raised if a kernel cannot be made here: versions differ, the kernel differs, or Numba does not compile."""

@@ -18,7 +18,7 @@ from numba.core.runtime import _nrt_python, rtsys
 
 from synchain.codegen.front_end import compiler, decorator, emitter, syntax_reader, syntax_trees
 from synchain.codegen.kernels.sweep_kernel import emit
-from synchain.codegen.machine_code.compile import _compile, _MachineCode
+from synchain.codegen.machine_code.compile import _compile
 from synchain.codegen.simd.addresses import ADDRESS
 from synchain.codegen.simd.lane_types import Lane
 from synchain.models import Lagrangian, Potential, Scene, chain
@@ -67,7 +67,7 @@ def _in_both_ways(bodies: dict[str, str], folder: Path) -> dict[str, tuple[Any, 
     names, text = _module(bodies)
     path, wanted = folder / "text.py", dict.fromkeys(names, types.void(*ARGUMENTS))
     path.write_text(text)
-    read = _compile(text, path, wanted, _MachineCode()).functions
+    read = _compile(text, path, wanted)[0].functions
     space = {"numba": numba}
     exec(text.replace(" njit,", "").replace("@njit", "@numba.njit").replace(", cache=True", ""), space)
     return {body: (read[name], space[name]) for name, body in zip(names, bodies, strict=True)}

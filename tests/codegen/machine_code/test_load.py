@@ -105,7 +105,7 @@ HOLDER = """
 import sys, time
 from pathlib import Path
 from synchain.codegen.machine_code.cache import open_folder
-with open_folder(Path(sys.argv[1])) as folder, folder.turn(sys.argv[2]):
+with open_folder(Path(sys.argv[1])) as folder, folder.locked(sys.argv[2]):
     print("held", flush=True)
     time.sleep(600)
 """
@@ -215,7 +215,7 @@ def folder(tmp_path, monkeypatch) -> Path:
 def fresh(source=SOURCE):
     """Load without what this process remembers."""
     loading.forget()
-    cache._refusing.clear()
+    cache._warned_folders.clear()
     return loading.load(source)
 
 
@@ -765,11 +765,11 @@ def test_a_folder_in_the_folder_of_another_user_is_refused(tmp_path, monkeypatch
 def test_another_folder_in_the_place_of_an_open_one_is_not_read(tmp_path):
     """A swap between the check of a folder and the reading of its files changes nothing."""
     with cache.open_folder(tmp_path / "kernels") as opened:
-        opened.keep("kernel_a", b"mine")
+        opened.store_code("kernel_a", b"mine")
         (tmp_path / "kernels").rename(tmp_path / "aside")
         with cache.open_folder(tmp_path / "kernels") as evil:
-            evil.keep("kernel_a", b"theirs")
-        assert opened.machine_code("kernel_a") == b"mine"
+            evil.store_code("kernel_a", b"theirs")
+        assert opened.load_code("kernel_a") == b"mine"
         opened.write("kernel_b.py", b"b")
     assert (tmp_path / "aside" / "kernel_b.py").exists()
 
@@ -867,18 +867,18 @@ def test_processes_that_make_a_key_at_once_agree(folder, settings, monkeypatch):
         def slow(opened, name, data):
             if not first:
                 first.append(None)
-                first[0] = two.own_key()
+                first[0] = two.key_here()
             write(opened, name, data)
 
         monkeypatch.setattr(cache.Folder, "write", slow)
-        assert one.own_key() == first[0] == two.own_key()
+        assert one.key_here() == first[0] == two.key_here()
 
 
 def test_without_settings_the_key_lies_in_the_cache(folder, settings):
     settings.parent.write_text("no folder")
     with cache.open_folder(folder) as opened:
-        opened.keep("kernel_a", b"code")
-        assert opened.machine_code("kernel_a") == b"code"
+        opened.store_code("kernel_a", b"code")
+        assert opened.load_code("kernel_a") == b"code"
         assert (folder / cache.KEY).read_bytes() == opened.key()
 
 
