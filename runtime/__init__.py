@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from .support.progress import Progress
     from .support.status import Status
     from .sweeps.errors import SweepFailed, SweepInterrupted
+    from .sweeps.merge import merge
     from .sweeps.run import run
     from .sweeps.stream import Streamed, stream
     from .synchronisation.basin import Basin, basin
@@ -83,6 +84,7 @@ __all__ = [
     "follow",
     "kernel",
     "lyapunov_spectrum",
+    "merge",
     "msf",
     "open_result",
     "periodic_orbit",
@@ -122,6 +124,7 @@ _HOMES = {
     "follow": "bifurcation.branches",
     "kernel": "engines.scene_kernels",
     "lyapunov_spectrum": "stability.lyapunov",
+    "merge": "sweeps.merge",
     "msf": "stability.msf",
     "open_result": "results.open",
     "periodic_orbit": "bifurcation.periodic",

@@ -45,6 +45,25 @@ class Layout:
         steps = max(self.columns, 1)
         return math.ceil(self.cells / steps / self.size) * steps
 
+    def part(self, part: tuple[int, int] | None) -> np.ndarray:
+        """Return whether each block (blocks,) belongs to part (k, N) of the sweep; to a whole sweep (None) all do.
+
+        Parts take the blocks in turn, so that a costly region of a map is shared among them. The columns of a
+        continued sweep depend on one another and stay together.
+        """
+        chains = np.arange(self.blocks) // max(self.columns, 1)
+        if part is None:
+            return np.ones(self.blocks, dtype=bool)
+        k, parts = part
+        return np.asarray(chains % parts == k - 1)  # none, if there are more parts than independent blocks
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """Number of cells in each block. Shapes: (blocks,)."""
+        steps = max(self.columns, 1)
+        first = np.arange(self.blocks) // steps * self.size  # row of a continued sweep, else cell
+        return np.minimum(self.size, self.cells // steps - first)
+
     def rows(self, block: int) -> np.ndarray:
         """Return the numbers of the cells of a block."""
         if not self.columns:

@@ -10,9 +10,9 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from ..console.arguments import add_scene, add_set, add_workers, folder, settings, tolerance
+from ..console.arguments import add_scene, add_set, add_workers, folder, part, settings, tolerance
 from ..console.outcome import FAILED, FINE, Failed, WrongUse, sentence, warn, wrong_use
 from ..support.error_text import counted
 from ..support.files import output_folder, whole_file
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from ..cells.reduce import ReducedScene
     from ..sweeps.errors import SweepFailed, SweepInterrupted
+    from ..sweeps.stream import Streamed
 
 SUMMARY = "run a scene; write its results (netCDF or Zarr) and a figure"
 EXAMPLES = (
@@ -31,6 +32,7 @@ EXAMPLES = (
     "synchain run two_oscillators --out results --set sigma=0:0.6:61 omega=1.4 --rtol 1e-9",
     "synchain run figure_4a --out results --resume",
     "synchain run figure_4a --out results --format zarr",
+    "synchain run figure_4a --out results --part 3/8 --resume",
     "synchain run figure_4a --out results --dask tcp://192.168.0.1:8786",
     "synchain run figure_4a --explain",
 )
@@ -49,8 +51,8 @@ def configure(parser: ArgumentParser) -> None:
     """Add scene, folder and changes to the scene."""
     parser.usage = (
         "synchain run SCENE --out DIR [--rtol X] [--workers N] [--set NAME=VALUE ...]\n"
-        "                    [--format FORMAT] [--resume | --overwrite] [--dask ADDRESS] [--certify]\n"
-        "                    [--no-skip] [--explain]\n"
+        "                    [--format FORMAT] [--resume | --overwrite] [--part K/N] [--dask ADDRESS]\n"
+        "                    [--certify] [--no-skip] [--explain]\n"
         "       synchain run SCENE --explain [--rtol X] [--set NAME=VALUE ...] [--no-skip]"
     )
     add_scene(parser)
@@ -73,6 +75,12 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument("--resume", action="store_true", help="continue an interrupted run; finished cells are kept")
     parser.add_argument("--overwrite", action="store_true", help="replace a result that is there already")
     parser.add_argument(
+        "--part",
+        metavar="K/N",
+        type=part,
+        help="run part K of N alone, as one job of a job array; synchain merge makes the result of all parts",
+    )
+    parser.add_argument(
         "--dask", metavar="ADDRESS", help="run on the workers of a Dask scheduler, e.g. tcp://192.168.0.1:8786"
     )
     parser.add_argument(
@@ -91,7 +99,6 @@ def execute(arguments: Namespace) -> int:
     """Explain the scene with --explain; run it to a file, draw it, and print how the cells ended."""
     from ..cells.reduce import explain, reduce_scene
     from ..engines.scene_kernels import kernel
-    from ..support.status import Status
     from ..sweeps.errors import SweepFailed, SweepInterrupted
     from ..sweeps.stream import claim, stream
 
@@ -107,7 +114,8 @@ def execute(arguments: Namespace) -> int:
         _check(skip, arguments)
         if target is None:
             return FINE
-        options = {"resume": arguments.resume, "overwrite": arguments.overwrite, "certified": arguments.certify}
+        options: dict[str, Any] = {"resume": arguments.resume, "overwrite": arguments.overwrite}
+        options |= {"certified": arguments.certify, "part": arguments.part}
         if claim(skip, target, **options) == "complete":
             return _nothing_to_do(target)
         output_folder(target.parent)
@@ -119,11 +127,19 @@ def execute(arguments: Namespace) -> int:
             done = stream(scene, target, reduce=skip, workers=arguments.workers, executor=executor, **options)
         except (SweepInterrupted, SweepFailed) as stop:
             raise _stopped(stop, target, arguments) from None
+    return print_run(done, "run")
+
+
+def print_run(done: Streamed, name: str) -> int:
+    """Print how the cells of a finished run ended, draw its figure if it has all cells, and return the exit code."""
+    from ..support.status import Status
+
     print(done)
     for status, count in done.progress.statuses.items():
         if status != Status.FINISHED:
-            print(f"synchain run: {counted(count, 'cell')}: {status.message}", file=sys.stderr)
-    print(f"  {_drawn(target)}")
+            print(f"synchain {name}: {counted(count, 'cell')}: {status.message}", file=sys.stderr)
+    if done.part is None:
+        print(f"  {_drawn(done.path)}")
     return FINE if done.success else FAILED
 
 
@@ -249,7 +265,7 @@ def _stopped(stop: SweepInterrupted | SweepFailed, target: Path, arguments: Name
 
     line = [text for text in arguments.command_line if text != "--overwrite"]
     again = shlex.join([*line, *(() if arguments.resume else ("--resume",))])
-    partial = partial_path(target)
+    partial = partial_path(target, arguments.part)
     state = f"{stop.finished} of {stop.cells} cells finished, kept in {partial}\ncontinue with: {again}"
     if stop.finished == 0:
         partial.unlink(missing_ok=True)

@@ -124,6 +124,15 @@ def settings(arguments: Namespace) -> dict[str, float | tuple[float, ...] | dict
     return values
 
 
+def part(text: str) -> tuple[int, int]:
+    """Read K/N, part K of N."""
+    k, slash, parts = text.partition("/")
+    if not slash:
+        raise ArgumentTypeError(f"found {short_repr(text)}; expected K/N, e.g. 3/8")
+    most = positive(parts)
+    return whole(k, 1, most), most
+
+
 def add_set(parser: ArgumentParser, text: str) -> None:
     """Add the option --set with its help."""
     parser.add_argument("--set", metavar="NAME=VALUE", nargs="+", action="extend", type=setting, default=[], help=text)

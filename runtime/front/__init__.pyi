@@ -116,6 +116,7 @@ from synchain.runtime import exponents as exponents
 from synchain.runtime import follow as follow
 from synchain.runtime import kernel as kernel
 from synchain.runtime import lyapunov_spectrum as lyapunov_spectrum
+from synchain.runtime import merge as merge
 from synchain.runtime import msf as msf
 from synchain.runtime import open_result as open_result
 from synchain.runtime import periodic_orbit as periodic_orbit

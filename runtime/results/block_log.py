@@ -72,6 +72,7 @@ class Description(TypedDict):
     kept: int  # states in a section point
     merged: list[list[int]] | None  # states and indices of `NodeMerge`
     together: bool
+    part: list[int] | None  # k and N of part k of N, None for a whole sweep
     certificate: list[list[float]] | None  # fields of `Certificate`
 
 

@@ -5,9 +5,10 @@ file.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import fields
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,11 @@ from .store import filled
 
 
 def describe_sweep(
-    reduction: ReducedScene, layout: Layout, attributes: Mapping[str, object], certificate: Certificate | None
+    reduction: ReducedScene,
+    layout: Layout,
+    attributes: Mapping[str, object],
+    certificate: Certificate | None,
+    part: tuple[int, int] | None = None,
 ) -> Description:
     """Return the description of a sweep for its block log."""
     merge = reduction.merge
@@ -45,6 +50,7 @@ def describe_sweep(
         "kept": reduction.point_size,
         "merged": [merge.states.tolist(), merge.places.tolist()] if merge.merges else None,
         "together": merge.together,
+        "part": None if part is None else list(part),
         "certificate": None if exponents is None else [part.tolist() for part in exponents],
     }
 
@@ -57,6 +63,15 @@ def layout_of(about: Description, scene: Scene) -> Layout:
     return layout
 
 
+def part_of(about: Description) -> tuple[int, int] | None:
+    """Return the part (k, N) of a sweep that a log holds, or None if it is the log of a whole sweep."""
+    part = about.get("part")
+    if part is None:
+        return None
+    k, parts = part
+    return check_integer("part", k, 1), check_integer("part", parts, k)
+
+
 def certificate_of(about: Description) -> Certificate | None:
     """Return the certificate of a log's cells, or None if they are not certified."""
     exponents = about["certificate"]
@@ -66,9 +81,9 @@ def certificate_of(about: Description) -> Certificate | None:
 class _BlockReader:
     """Reads the blocks of a log, expanded from the reduced to the whole network."""
 
-    def __init__(self, log: BlockLog, scene: Scene) -> None:
+    def __init__(self, log: BlockLog, scene: Scene, most: int | None = None) -> None:
         about = log.about
-        self.log, self.scene = log, scene
+        self.log, self.scene, self.most = log, scene, log.most if most is None else most
         self.layout, self.certificate = layout_of(about, scene), certificate_of(about)
         self.planner = Planner(scene)
         if check_integer("dimension", about["dimension"], 1) > len(scene.y0):
@@ -84,7 +99,7 @@ class _BlockReader:
     def variables(self, cells: np.ndarray, buffers: Buffers) -> Iterator[Variable]:
         """Yield the variables of cells from their buffers. Shapes: cells (k,)."""
         certificate = None if self.certificate is None else self.certificate.take(cells)
-        return variables(self.scene, self.planner.spans(cells), buffers, certificate, self.log.most)
+        return variables(self.scene, self.planner.spans(cells), buffers, certificate, self.most)
 
 
 def read_partial(path: str | os.PathLike[str]) -> Result:
@@ -110,27 +125,32 @@ def read_partial(path: str | os.PathLike[str]) -> Result:
             return gather(scene, lambda: about["attributes"], spans, buffers, reader.certificate)
 
 
-def write_result(log: BlockLog, path: str | os.PathLike[str], scene: Scene) -> dict[str, int]:
-    """Write the result of a complete log, one block in memory at a time; return the count of each verdict.
+def write_result(logs: Iterable[BlockLog], path: str | os.PathLike[str], scene: Scene, most: int) -> dict[str, int]:
+    """Write the result of logs that hold each block once, one block in memory at a time; count the verdicts.
 
-    The ending of `path` chooses the form of the file.
+    The first log holds block 0; a cell has at most `most` section points. The ending of `path` chooses the form of
+    the file.
     """
-    reader = _BlockReader(log, scene)
+    following = iter(logs)
+    first_log = next(following)
+    reader = _BlockReader(first_log, scene, most)
     verdicts: dict[str, int] = {}
     # The first cell alone has all variables: the file is that, but for the lengths of the axes.
     first = Buffers(*(array[:1] for array in reader.buffers(0).arrays()))
     arrays = reader.variables(np.arange(1), first)
-    template = labelled(scene, arrays, (1,) * len(scene.shape), log.about["attributes"])
+    template = labelled(scene, arrays, (1,) * len(scene.shape), first_log.about["attributes"])
     lengths = dict(zip(dimensions(scene), scene.shape, strict=True))
     with filled(path, template, lengths) as file:
         for name, _, values in swept(scene):
             file.put(name, np.arange(len(values)), values)
-        for block in range(reader.layout.blocks):
-            rows = reader.layout.rows(block)
-            for name, _, values in reader.variables(rows, reader.buffers(block)):
-                file.put(name, rows, values)
-                for verdict, count in _verdicts(name, values):
-                    verdicts[verdict] = verdicts.get(verdict, 0) + count
+        for log in chain((first_log,), following):
+            reader = _BlockReader(log, scene, most)
+            for block in np.flatnonzero(log.done).tolist():
+                rows = reader.layout.rows(block)
+                for name, _, values in reader.variables(rows, reader.buffers(block)):
+                    file.put(name, rows, values)
+                    for verdict, count in _verdicts(name, values):
+                        verdicts[verdict] = verdicts.get(verdict, 0) + count
     return verdicts
 
 
@@ -149,6 +169,7 @@ def _verdicts(name: str, values: np.ndarray | xr.DataArray) -> list[tuple[str, i
     return []
 
 
-def partial_path(path: str | os.PathLike[str]) -> Path:
-    """Return the path of the block log of a run, beside its result."""
-    return Path(path).with_suffix(".partial")
+def partial_path(path: str | os.PathLike[str], part: tuple[int, int] | None = None) -> Path:
+    """Return the path of the block log of a run, beside its result: a.partial, or a.3of8.partial of part (3, 8)."""
+    path = Path(path).with_suffix(".partial")
+    return path if part is None else path.with_name(f"{path.stem}.{part[0]}of{part[1]}.partial")

@@ -43,9 +43,10 @@ class PreparedRun:
         job, spec = self.job, self.job.spec
         return provenance(self.scene, job.kernel, self.reduction.skipped, spec.versions, spec.processor)
 
-    def layout(self) -> Layout:
-        """Return the blocks of the sweep, of a size that suits the workers."""
-        return Layout.of(self.scene, block_size(self.scene, self.job.spec.width, self.execution.size))
+    def layout(self, workers: int | None = None) -> Layout:
+        """Return the blocks of the sweep, of a size that suits so many workers (default: those of the execution)."""
+        workers = self.execution.size if workers is None else workers
+        return Layout.of(self.scene, block_size(self.scene, self.job.spec.width, workers))
 
 
 def prepare(

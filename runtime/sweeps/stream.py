@@ -15,7 +15,7 @@ import xarray as xr
 
 from synchain.codegen.machine_code.installation import InstallationError
 from synchain.codegen.machine_code.processor import told_apart
-from synchain.models.inputs.checks import check_flag, check_path, short_repr
+from synchain.models.inputs.checks import check_flag, check_integer, check_path, short_repr
 from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
@@ -26,7 +26,16 @@ from ..engines.job import Start
 from ..results.block_log import BlockLog
 from ..results.labelled import Labelled
 from ..results.labels import alike, changed, scene_of
-from ..results.partial import certificate_of, describe_sweep, layout_of, partial_path, verdicts_in, write_result
+from ..results.partial import (
+    certificate_of,
+    describe_sweep,
+    layout_of,
+    part_of,
+    partial_path,
+    read_partial,
+    verdicts_in,
+    write_result,
+)
 from ..results.result import Result, read_result
 from ..results.store import NO_ROOM, attributes_of, form_of, opened
 from ..support.error_text import counted
@@ -40,6 +49,9 @@ from .pool import Task
 from .prepare import PreparedRun, prepare
 from .scheduler import BlockScheduler, Sink
 
+JOB_THREADS = 8
+"""Threads that a job of a job array is expected to have (a choice); its part is cut into blocks for so many."""
+
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Streamed(Labelled):
@@ -49,11 +61,12 @@ class Streamed(Labelled):
     scene: Scene
     progress: Progress
     verdicts: Mapping[str, int]
+    part: tuple[int, int] | None = None  # k and N if the file holds part k of N alone
 
     @property
     def result(self) -> Result:
-        """The result in memory, read from its file."""
-        return read_result(self.path)
+        """The result in memory, read from its file; cells of other parts have the status NOT_RUN."""
+        return read_result(self.path) if self.part is None else read_partial(self.path)
 
     @property
     def data(self) -> xr.Dataset:
@@ -66,6 +79,8 @@ class Streamed(Labelled):
         done, scene = self.progress, self.scene
         times = f"{done.running:.1f} s, after {done.compiling:.1f} s for the kernel"
         earlier = f", {done.kept} of them in an earlier run" if done.kept else ""
+        if self.part is not None:
+            earlier += "; part {} of {}: {:.0f} cells".format(*self.part, done.total)
         verdicts, certain = self.verdicts.items(), ", certain to stay synchronous"
         return (
             ("scene", scene.title or repr(scene)),
@@ -94,6 +109,7 @@ def stream(
     width: int | None = None,
     reduce: bool | ReducedScene = True,
     certified: bool = False,
+    part: tuple[int, int] | None = None,
     realisations: int | None = None,
     draws: Mapping[str, object] | None = None,
     rng: int | None = None,
@@ -119,6 +135,10 @@ def stream(
         interruption. Nothing is run if it was finished.
     overwrite : bool
         Replace what is there already.
+    part : tuple of int, optional
+        Run part k of N alone, (k, N) with k from 1 to N, into the file ".kofN.partial" beside `path`, as
+        one job of a job array. `merge` makes the result of all parts. With `resume` a part that is not
+        there is begun.
     width, reduce, certified, realisations, draws, rng, parameters, **axes
         As for `run`.
     workers, executor, show_progress, progress
@@ -150,21 +170,24 @@ def stream(
     reduction = as_reduction(scene, reduce)
     execution = Execution(workers, executor, show_progress, progress)
     reporter = execution.reporter(scene.cells)
-    if (state := claim(reduction, path, resume=resume, overwrite=overwrite, certified=certified)) == "complete":
+    state = claim(reduction, path, resume=resume, overwrite=overwrite, certified=certified, part=part)
+    if state == "complete":
         if not resume:
             raise FileExistsError(
                 f"{os.fspath(path)} holds the result of this scene already; give resume (--resume) to take it, or "
                 "overwrite (--overwrite) to run it again"
             )
         return _finished(Path(path), scene, reporter)
-    partial = partial_path(path)
+    partial = partial_path(path, part)
     if state == "continue":
         certificate = certificate_of(BlockLog.describe(partial))
         prepared = prepare(reduction, execution, certificate, width=width)
     else:
         prepared = prepare(reduction, execution, width=width)
         prepared = with_certificate(prepared) if certified else prepared
-        about = describe_sweep(reduction, prepared.layout(), prepared.attributes, prepared.certificate)
+        # All parts must divide the sweep alike, however many threads each job has.
+        layout = prepared.layout(None if part is None else JOB_THREADS * part[1])
+        about = describe_sweep(reduction, layout, prepared.attributes, prepared.certificate, part)
         try:
             BlockLog.create(partial, about)
         except OSError as problem:
@@ -177,6 +200,8 @@ def stream(
     finally:
         log.close()
         reporter.close()
+    if part is not None:
+        return Streamed(partial, scene, reporter.now, verdicts, part)
     partial.unlink()
     return Streamed(Path(path), scene, reporter.now, verdicts)
 
@@ -188,12 +213,14 @@ def claim(
     resume: bool = False,
     overwrite: bool = False,
     certified: bool = False,
+    part: tuple[int, int] | None = None,
 ) -> str:
     """Return what to do about a result at `path`: "begin", "continue", or nothing because it is "complete"."""
+    check_part(part)
     for name, value in (("resume", resume), ("overwrite", overwrite), ("certified", certified)):
         check_flag(name, value)
     target = check_path("path", path)
-    partial = partial_path(target)
+    partial = partial_path(target, part)
     form = form_of(target)
     if resume and overwrite:
         raise ValueError("found both resume and overwrite; expected one of them")
@@ -205,10 +232,13 @@ def claim(
     if partial.exists() and (resume or not target.exists()):
         with understood(partial):
             about = BlockLog.describe(partial)
+            if part_of(about) != part:
+                raise ValueError(f"it does not hold what its name says; found part {part_of(about)}, expected {part}")
             _check_same(reduction, certified, partial, about["attributes"], about["certificate"] is not None)
         if not resume:
+            state = "a run of this scene that was not finished" if part is None else "this part, finished or not"
             raise FileExistsError(
-                f"{partial} keeps a run of this scene that was not finished; "
+                f"{partial} keeps {state}; "
                 "continue it with resume (--resume), or start again with overwrite (--overwrite)"
             )
         return "continue"
@@ -218,9 +248,20 @@ def claim(
                 attributes, exponents = dict(file.attrs), "transversal_exponent" in file
             _check_same(reduction, certified, target, attributes_of(attributes, target), exponents)
         return "complete"
-    if resume:
+    if resume and part is None:
         raise FileNotFoundError(f"nothing to resume: {target} does not exist; run without resume (--resume)")
     return "begin"
+
+
+def check_part(part: object) -> None:
+    """Raise TypeError or ValueError unless a part is None or (k, N) with k from 1 to N."""
+    if part is None:
+        return
+    if not (isinstance(part, tuple) and len(part) == 2):
+        raise TypeError(f"part: found {short_repr(part)}; expected a tuple (k, N), e.g. (3, 8)")
+    k, parts = (check_integer("part", number, 1) for number in part)
+    if k > parts:
+        raise ValueError(f"part: found part {k} of {parts}; expected one from 1 to {parts}")
 
 
 def _check_same(
@@ -279,7 +320,10 @@ def _run_blocks(
     scene = prepared.scene
     _check_kernel(prepared, log)
     layout = layout_of(log.about, scene)
-    scheduler = BlockScheduler(log.done, _Disk(layout, log), prepared, reporter)
+    part = part_of(log.about)
+    wanted = layout.part(part)
+    reporter.total = int(layout.lengths[wanted].sum())
+    scheduler = BlockScheduler(log.done | ~wanted, _Disk(layout, log), prepared, reporter)
 
     def reason(problem: Exception) -> str | None:
         """Return why workers, their installations or the disk failed; None for any other error."""
@@ -289,12 +333,12 @@ def _run_blocks(
             return reason_of(problem)
         return f"cannot write {problem.filename or log.path}: {problem.strerror}" if problem.strerror else str(problem)
 
-    with sweep_errors(scene.cells, lambda: (int(log.counts.sum()), None), reason):
+    with sweep_errors(int(reporter.total), lambda: (int(log.counts.sum()), None), reason):
         for target in (path, log.path):
             drop_leftovers(target)
         reporter.start(log.counts, prepared.compiling)
         scheduler.run()
-        return write_result(log, path, scene)
+        return write_result((log,), path, scene, log.most) if part is None else {}
 
 
 def _check_kernel(prepared: PreparedRun, log: BlockLog) -> None:
