@@ -2,15 +2,15 @@ r"""
 A first model
 =============
 
-In five minutes: say what an oscillator is, join some of them, run, look.
+In five minutes: define an oscillator, connect several, run them, plot the result.
 """
 
 # %%
 # One oscillator
 # --------------
 # An oscillator is a Lagrangian: kinetic energy T, potential energy V, and the forces Q that have no
-# energy.  This one is van der Pol's with a cubic spring and a drive.  Numbers are parameters,
-# with a default each.
+# energy.  This one is van der Pol's with a cubic spring and a drive.  Each constant is a parameter
+# with a default value.
 import sympy as sp
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -28,7 +28,7 @@ node = sc.Lagrangian(
 )
 
 # %%
-# A mistake is refused here and not later.
+# The program checks a model when you define it, so you see errors at once.
 try:
     sc.Lagrangian(T=v**2 / 2, V=x**2 / 2 + beta * x**4 / 4)
 except ValueError as error:
@@ -37,7 +37,8 @@ except ValueError as error:
 # %%
 # A network
 # ---------
-# A scene joins nodes by a link and a graph.  Its equations are derived, and those are what runs.
+# A scene connects nodes by a link and a graph.  The program derives the equations of motion and
+# simulates exactly these.
 start = {"x": [1.2, 0.8, 0.4, 0.0]}
 scene = sc.Scene(node, "spring", sc.ring(4), initial=start, record=("sync_error", "trajectory"), samples=801)
 print(sc.text(scene.equations))
@@ -46,9 +47,9 @@ print("parameters:", scene.parameters)
 # %%
 # A run
 # -----
-# ``sigma`` is the stiffness of the springs.  A number sets a parameter; what else a scene says is
-# changed by ``replace``: here, nothing is waited for, and twelve periods of the drive are recorded.
-# The first run compiles a kernel, in some seconds; every later one finds it in a cache.
+# ``sigma`` is the stiffness of the springs.  A number sets a parameter.  To change any other setting,
+# use ``replace``.  Here we skip the transient and record twelve drive periods.  The first run
+# compiles a kernel in some seconds; later runs load it from a cache.
 import matplotlib.pyplot as plt
 
 result = sc.run(scene.replace(transient=0, window=12), sigma=0.05)

@@ -15,8 +15,8 @@ The question is that of Marszal, Saha, Jankowski & Stefański, *Eur. Phys. J. Sp
 # %%
 # The scene
 # ---------
-# A scene says everything that a run needs.  What is not said has a default: the friction
-# oscillator, springs, the published parameters.
+# A scene contains all settings of a run.  Settings that you leave out have default values: the
+# friction oscillator, springs, the published parameters.
 import synchain as sc
 
 scene = sc.Scene(topology=sc.chain(4), parameters={"omega": 1.15}, record=("sync_error",))
@@ -31,10 +31,10 @@ for eigenvalue in scene.spectrum:
     print(eigenvalue.number, "=", eigenvalue.value)
 
 # %%
-# One orbit tells the stability
-# -----------------------------
+# Stability from one orbit
+# ------------------------
 # The master stability function is the exponent :math:`\Lambda(\alpha)` with which a mode of
-# strength α grows or decays along the synchronous motion.  It knows nothing of the graph.
+# strength α grows or decays along the synchronous motion.  It does not depend on the graph.
 import matplotlib.pyplot as plt
 import numpy as np
 
