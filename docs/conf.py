@@ -61,6 +61,7 @@ sphinx_gallery_conf = {
     "write_computation_times": False,
     "abort_on_example_error": True,
     "image_srcset": ["2x"],
+    "matplotlib_animations": (True, "jshtml"),
     "thumbnail_size": (500, 210),  # the shape of most figures
     "parallel": 2,
     "run_stale_examples": True,  # the package may have changed though the example has not
