@@ -87,24 +87,24 @@ class Reference:
     def advance(self, end: mpf) -> None:
         end, step, tiny = mpf(end), mpf(STEP), mpf(10) ** (-mp.dps + 8)
         while self.t < end:
-            made, h = self.series(), min(step, end - self.t)
+            series, h = self.series(), min(step, end - self.t)
             first, who = h, []
             for i in range(len(self.x)):
                 low = mpf(0)
                 for k in range(1, LOOKS + 1):
                     high = h * k / LOOKS
-                    if self.gap(i, made, high) < -tiny:
+                    if self.gap(i, series, high) < -tiny:
                         while high - low > tiny:
                             half = (low + high) / 2
-                            low, high = (low, half) if self.gap(i, made, half) < -tiny else (half, high)
+                            low, high = (low, half) if self.gap(i, series, half) < -tiny else (half, high)
                         if high < first - 2 * tiny:
                             first, who = high, []
                         if high <= first + 2 * tiny:
                             who.append(i)
                         break
                     low = high
-            self.x = [value(s, first) for s in made[0]]
-            self.v = [value(s, first) for s in made[1]]
+            self.x = [value(s, first) for s in series[0]]
+            self.v = [value(s, first) for s in series[1]]
             self.t += first
             for i in who:
                 self.v[i] = self.p["theta_b"]

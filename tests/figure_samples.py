@@ -12,15 +12,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene
+from synchain.runtime import MSF, Exponents, Plane, Result, Status
 from synchain.runtime.paper import exponent_figure, figure_runs, load, make, plane_figure, synchronisability_map
 from synchain.runtime.plots import style
 from synchain.runtime.results.labels import States
-from synchain.runtime.results.result import Result
 from synchain.runtime.stability.attractor import Attractor, Motion
-from synchain.runtime.stability.exponents import Exponents
-from synchain.runtime.stability.msf import MSF, Plane
-from synchain.runtime.support.status import Status
 from synchain.runtime.synchronisation.criterion import PAPER
 from synchain.runtime.synchronisation.threshold import Sweep, project
 

@@ -6,14 +6,12 @@ from fractions import Fraction
 
 import sympy as sp
 
+from synchain.models import FrictionLaw, Oscillator, Parameter, Topology
 from synchain.models.dynamics import network
-from synchain.models.graphs.topology import Topology
 from synchain.models.interactions import link
 from synchain.models.interactions.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling
 from synchain.models.mechanics.components import Edge, Node
-from synchain.models.mechanics.contact import FrictionLaw
-from synchain.models.mechanics.oscillator import LagrangianModel, Oscillator
-from synchain.models.mechanics.parameter import Parameter
+from synchain.models.mechanics.oscillator import LagrangianModel
 from synchain.models.networks.layers import as_coupling, as_law, as_oscillator
 
 __all__ = ["connectivity", "coupling_of", "edge", "is_lagrangian", "law_of", "node", "oscillator_of", "parameters"]
@@ -97,9 +95,9 @@ def _hessian(coupling: LagrangianCoupling) -> tuple[Fraction, Fraction]:
     functions = (coupling.potential, coupling.dissipation, coupling.kinetic)
     energy = next((e for e in functions if e != 0), sp.S.Zero).xreplace({v_i: q_i, v_j: q_j})
     slopes = (-energy.diff(q_i, q).xreplace({q_j: q_i}) for q in (q_i, q_j))
-    own, other = (sp.simplify(slope / (sigma * WEIGHT)) for slope in slopes)
-    if not (own.is_Rational and other.is_Rational) or own == 0:
+    diagonal, other = (sp.simplify(slope / (sigma * WEIGHT)) for slope in slopes)
+    if not (diagonal.is_Rational and other.is_Rational) or diagonal == 0:
         raise ValueError(
-            f"coupling {str(coupling)!r}: Hessian over sigma and weight is {own}, {other}; expected numbers other than 0"
+            f"coupling {str(coupling)!r}: Hessian over sigma and weight is {diagonal}, {other}; expected numbers other than 0"
         )
-    return Fraction(int(own.p), int(own.q)), Fraction(int(other.p), int(other.q))
+    return Fraction(int(diagonal.p), int(diagonal.q)), Fraction(int(other.p), int(other.q))

@@ -36,12 +36,11 @@ import sympy as sp
 from scipy.io import netcdf_file
 
 from synchain import models
-from synchain.models import chain, complete, ring, star
+from synchain.models import Scene, chain, complete, ring, star
 from synchain.models.graphs.readers import from_edges
 from synchain.models.graphs.symbolic import from_symbols
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.scenes.file import load_scene
-from synchain.models.scenes.scene import Scene
 from synchain.runtime.bifurcation.branches import follow
 from synchain.runtime.bifurcation.periodic import periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton

@@ -21,12 +21,10 @@ from synchain.codegen.driver.columns import COUNTS
 from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import SweepKernel, emit
 from synchain.codegen.machine_code.compile import Kernel, load
-from synchain.models import Potential, Rates, chain, ends, ring, star
+from synchain.models import Potential, Rates, Scene, chain, ends, from_matrix, ring, star
 from synchain.models.definitions.loader import load_oscillator
 from synchain.models.dynamics.equations import Equations
-from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Edge, Node
-from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.plan import plan
 from synchain.runtime.engines.control import control_array, tolerances
 
@@ -196,17 +194,17 @@ def two_kinds() -> Equations:
 def numbered(n: int = 3, mutual: bool = True) -> Equations:
     """Springs with strengths and rest lengths of their own, or one-way links of squared strengths and own weights."""
     i, j, w = ends(load_oscillator("duffing"))
-    k, rest = sp.symbols("k rest")
+    k, length = sp.symbols("k rest")
     if mutual:
         coupling: Potential | Rates = Potential(
-            k * w * ((i.x - j.x) ** 2 / 2 + sp.cos(i.x - j.x) / rest), {k: 1, rest: 1}
+            k * w * ((i.x - j.x) ** 2 / 2 + sp.cos(i.x - j.x) / length), {k: 1, length: 1}
         )
     else:
-        coupling = Rates({i.v: k**2 * w * sp.sin(j.x - i.x) / (2 + sp.cos(rest * i.v))}, {k: 1, rest: 1})
+        coupling = Rates({i.v: k**2 * w * sp.sin(j.x - i.x) / (2 + sp.cos(length * i.v))}, {k: 1, length: 1})
     graph = ring(n) if mutual else one_way_ring(n)
-    own = {name: [0.3 + 0.1 * a * b for a in range(n)] for b, name in enumerate(("k", "rest"), start=1)}
+    numbers_of_links = {name: [0.3 + 0.1 * a * b for a in range(n)] for b, name in enumerate(("k", "rest"), start=1)}
     draws = {"draws": {"W": [[1.0] * n]}, "realisations": 1} if not mutual else {}
-    return Scene("duffing", coupling, graph, parameters=own, **draws).equations
+    return Scene("duffing", coupling, graph, parameters=numbers_of_links, **draws).equations
 
 
 UNEQUAL = Late({
@@ -290,7 +288,7 @@ def drive(
 def run_cells(compiled: Kernel, scene: Scene) -> Outcome:
     """All cells of a scene by a kernel of its equations, as `run` has them but without reductions and early ends."""
     cells = plan(scene)
-    rtol, atol = (own.min() for own in tolerances(scene, scene.equations, cells.numbers))
+    rtol, atol = (tolerance.min() for tolerance in tolerances(scene, scene.equations, cells.numbers))
     control = control_array(rtol, atol, math.inf, scene.max_steps, jumps=False)
     outcome = blank(*cells.start.shape)
     compiled.drive(0, scene.cells, cells.start, cells.numbers, cells.spans, control, *outcome.arrays)

@@ -53,21 +53,21 @@ def sit(scene: Scene, path: Path, said: Connection) -> None:
 
 def last(said: Connection) -> int:
     """The last number that a process has sent before its end."""
-    found = 0
+    cells = 0
     try:
         while True:
-            found = said.recv()
+            cells = said.recv()
     except (EOFError, OSError):
-        return found
+        return cells
 
 
 def forking() -> multiprocessing.context.ForkServerContext:
     """Processes that start with everything imported and compiled."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["streams_warm"])
-    here, known = str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")
-    if here not in known.split(os.pathsep):
-        os.environ["PYTHONPATH"] = os.pathsep.join([here, known])
+    here, search_path = str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")
+    if here not in search_path.split(os.pathsep):
+        os.environ["PYTHONPATH"] = os.pathsep.join([here, search_path])
     return context
 
 
@@ -87,7 +87,7 @@ def kill_again_and_again(scene: Scene, folder: Path, times: int, seed: int, endi
     expected = contents(folder / f"whole{ending}")
     context = forking()
     dice, path = random.Random(seed), folder / f"cut{ending}"
-    span, killed, kept, done = float("inf"), -2, 0, 0  # the first two are left alone, to see how long it takes
+    span, killed, resumed, done = float("inf"), -2, 0, 0  # the first two are left alone, to see how long it takes
     while killed < times:
         hears, says = context.Pipe(duplex=False)
         process = context.Process(target=sit, args=(scene, path, says))
@@ -104,7 +104,7 @@ def kill_again_and_again(scene: Scene, folder: Path, times: int, seed: int, endi
         if partial(path).exists():
             stored = int((open_result(partial(path)).status != 0).sum())
             assert stored >= said, f"{said} cells were done, {stored} are on the disk"
-            kept += stored > 0
+            resumed += stored > 0
         if path.exists():
             assert contents(path) == expected
             shutil.rmtree(path) if path.is_dir() else path.unlink()
@@ -113,4 +113,4 @@ def kill_again_and_again(scene: Scene, folder: Path, times: int, seed: int, endi
     stream(scene, path, resume=partial(path).exists(), workers=1, show_progress=False)
     assert contents(path) == expected
     assert sorted(p.name for p in folder.iterdir()) == [f"cut{ending}", f"whole{ending}"]
-    return kept, done
+    return resumed, done

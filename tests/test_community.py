@@ -46,7 +46,7 @@ def test_entries_say_where_they_are_found() -> None:
 def test_the_paper_has_the_form_of_the_journal() -> None:
     assert {"title", "tags", "authors", "affiliations", "date", "bibliography"} <= set(HEAD)
     assert HEAD["bibliography"] == "paper.bib"
-    homes = {place["index"] for place in HEAD["affiliations"]}
+    homes = {affiliation["index"] for affiliation in HEAD["affiliations"]}
     assert {author["affiliation"] for author in HEAD["authors"]} == homes
     titles = re.findall(r"^# (.*)$", BODY, re.MULTILINE)
     assert titles[: len(SECTIONS)] == SECTIONS

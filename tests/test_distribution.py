@@ -79,13 +79,13 @@ def names_in(archive: zipfile.Path) -> set[str]:
 
 def test_the_sdist_holds_the_repository_and_nothing_else(sdist: Path) -> None:
     names_found = {path.relative_to(sdist).as_posix() for path in sdist.rglob("*") if path.is_file()}
-    own = {name for name in names_found if name not in MADE and ".egg-info/" not in name}
-    assert own == tracked()
+    distributed = {name for name in names_found if name not in MADE and ".egg-info/" not in name}
+    assert distributed == tracked()
 
 
 def test_the_wheel_holds_the_packages_and_nothing_else(wheel: zipfile.Path) -> None:
     names_found = {name for name in names_in(wheel) if ".dist-info/" not in name}
-    assert names_found == {place for name in tracked() if (place := packaged(name)) is not None}
+    assert names_found == {path for name in tracked() if (path := packaged(name)) is not None}
 
 
 @pytest.mark.parametrize(

@@ -62,10 +62,10 @@ def accepted(annotation: str) -> str:
 
 def arguments(made: families.Family) -> tuple[str, ...]:
     """What a family takes."""
-    given = inspect.signature(made.edges).parameters.values()
+    parameters = inspect.signature(made.edges).parameters.values()
     options = [
         f"{p.name}: {accepted(p.annotation)} = {written(p.default)}"
-        for p in given
+        for p in parameters
         if p.kind is inspect.Parameter.KEYWORD_ONLY
     ]
     return "n: int", *(["*"] if options else []), *options
@@ -90,8 +90,8 @@ def listed(line: str) -> str:
 
 def function_stub(name: str) -> str:
     """The stub of a family."""
-    made = families.family(name)
-    return f'{head(name, arguments(made))}\n    """{made.summary.replace(chr(34), chr(39))}."""\n'
+    graph_family = families.family(name)
+    return f'{head(name, arguments(graph_family))}\n    """{graph_family.summary.replace(chr(34), chr(39))}."""\n'
 
 
 def topology_stub() -> str:
@@ -100,8 +100,8 @@ def topology_stub() -> str:
     for name in shipped():
         takes.setdefault(arguments(families.family(name)), []).append(f'"{name}"')
     overloads = [
-        "@overload\n" + head("topology", (f"name: Literal[{', '.join(names)}]", *given)) + " ...\n"
-        for given, names in sorted(takes.items(), key=lambda each: each[1])
+        "@overload\n" + head("topology", (f"name: Literal[{', '.join(names)}]", *keywords)) + " ...\n"
+        for keywords, names in sorted(takes.items(), key=lambda each: each[1])
     ]
     return "".join([*overloads, "@overload\ndef topology(name: str, n: int, **options: object) -> Topology: ...\n"])
 
@@ -170,12 +170,12 @@ def test_a_type_checker_sees_what_an_editor_completes(tmp_path: Path) -> None:
     pytest.importorskip("mypy")
     file = tmp_path / "edited.py"
     file.write_text(EDITED)
-    known = tmp_path / "known" / "synchain"
-    known.mkdir(parents=True)
+    folder_on_path = tmp_path / "known" / "synchain"
+    folder_on_path.mkdir(parents=True)
     for room in ("models", "codegen", "runtime"):
-        (known / room).symlink_to(ROOT / room)
+        (folder_on_path / room).symlink_to(ROOT / room)
     for part in ("__init__.py", "__init__.pyi"):
-        (known / part).symlink_to(ROOT / "runtime" / "front" / part)
+        (folder_on_path / part).symlink_to(ROOT / "runtime" / "front" / part)
     command = [
         sys.executable,
         "-m",
@@ -195,9 +195,11 @@ def test_a_type_checker_sees_what_an_editor_completes(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", shipped())
 def test_a_family_tells_its_options(name: str) -> None:
-    own = inspect.signature(getattr(synchain, name))
-    assert list(own.parameters) == ["n", *getattr(synchain, name).options]
-    assert {p.name: p.default for p in own.parameters.values() if p.name != "n"} == getattr(synchain, name).options
+    signature = inspect.signature(getattr(synchain, name))
+    assert list(signature.parameters) == ["n", *getattr(synchain, name).options]
+    assert {p.name: p.default for p in signature.parameters.values() if p.name != "n"} == getattr(
+        synchain, name
+    ).options
 
 
 def test_the_class_of_families_has_the_signature_of_its_constructor() -> None:

@@ -16,10 +16,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from synchain.codegen.export.python import to_python
-from synchain.models.graphs.families import topology
-from synchain.models.scenes.scene import Scene
-from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps.run import run
+from synchain.models import Scene, topology
+from synchain.runtime import Status, run
 
 EXAMPLES = 12
 """Scenes of each structure where no time is given."""
@@ -65,23 +63,23 @@ def reference(scene: Scene, method: str) -> np.ndarray:
 
 
 def check(name: str, examples: int) -> None:
-    scene, method, numbers, longest = STRUCTURES[name]
+    scene, method, strategies, longest = STRUCTURES[name]
 
     @settings(max_examples=examples, deadline=None, derandomize=FUZZ_SECONDS == 0, database=None,
               suppress_health_check=list(HealthCheck))  # fmt: skip
     @given(
-        st.fixed_dictionaries(numbers), between(0.1, longest), st.sampled_from([1e-4, 1e-7, 1e-10]),
+        st.fixed_dictionaries(strategies), between(0.1, longest), st.sampled_from([1e-4, 1e-7, 1e-10]),
         st.lists(between(-1.0, 1.0), min_size=len(scene.y0), max_size=len(scene.y0)),
     )  # fmt: skip
     def agree(values: dict[str, float], length: float, rtol: float, start: list[float]) -> None:
         parts = np.reshape(start, (len(scene.components), scene.n))
         initial = {c: tuple(row.tolist()) for c, row in zip(scene.components, parts, strict=True)}
         drawn = scene.replace(parameters=values, window=length, rtol=rtol, initial=initial)
-        found = run(drawn, show_progress=False)
-        assert int(found.status) == Status.FINISHED, found.message
+        result = run(drawn, show_progress=False)
+        assert int(result.status) == Status.FINISHED, result.message
         expected = reference(drawn, method)
         size = max(1.0, float(np.abs(expected).max()))
-        error = float(np.abs(found.states("end") - expected).max())
+        error = float(np.abs(result.states("end") - expected).max())
         note(f"error {error:.3g}, size {size:.3g}")
         assert error <= 100.0 * rtol * size + 1e-9 * size
 

@@ -141,10 +141,10 @@ HUGE = {
 @pytest.mark.parametrize("name", HUGE)
 def test_too_much_is_refused_at_once(name: str, tmp_path: Path, monkeypatch, capsys) -> None:
     words, part = HUGE[name]
-    top, _, rest = words.partition("[sweep]")
+    top, _, sweep = words.partition("[sweep]")
     first = top if "topology" in words or "sigma" not in words else "[topology]\nname = 'chain'\nn = 2\n" + top
     path = tmp_path / "scene.toml"
-    path.write_text(first + (f"[sweep]{rest}" if rest else ""))
+    path.write_text(first + (f"[sweep]{sweep}" if sweep else ""))
     (tmp_path / "evil.py").write_text("open('here', 'w')")
     os.mkfifo(tmp_path / "pipe")
     monkeypatch.chdir(tmp_path)

@@ -127,8 +127,8 @@ def allowed(room: str) -> set[str]:
     """All rooms that a room may import."""
     package = room.partition(".")[0]
     names = {word if word.partition(".")[0] in PACKAGES else f"{package}.{word}" for word in ARROWS[room].split()}
-    whole = {name for name in names if name in PACKAGES}
-    return names | {other for other in KNOWN if other.partition(".")[0] in whole} | {room}
+    packages = {name for name in names if name in PACKAGES}
+    return names | {other for other in KNOWN if other.partition(".")[0] in packages} | {room}
 
 
 def wrong_imports(path: Path, text: str) -> list[str]:
@@ -171,14 +171,14 @@ def in_circles(texts: dict[Path, str]) -> set[str]:
     modules = {module_name(path) for path in texts}
     reach: dict[str, set[str]] = {}
     for path, text in texts.items():
-        found = reach[module_name(path)] = set()
+        reached = reach[module_name(path)] = set()
         for _, name in imported(path, text):
             parts = name.split(".")[1:] if name.startswith("synchain.") else []
             while parts and ".".join(parts) not in modules:
                 parts.pop()
             if (path.relative_to(PROJECT).as_posix(), room_of(name)) not in DOORS:
-                found.add(".".join(parts))
-        found -= {module_name(path), ""}
+                reached.add(".".join(parts))
+        reached -= {module_name(path), ""}
     left = set(reach)
     while ground := {module for module in left if not reach[module] & left}:
         left -= ground
@@ -242,9 +242,9 @@ def test_values_of_the_models_cannot_be_changed() -> None:
         kinds = [kind for kind in vars(module).values() if isinstance(kind, type) and is_dataclass(kind)]
         collected += [kind for kind in kinds if kind.__module__ == dotted]
     assert len(collected) > 20
-    own = [kind for kind in collected if not kind.__name__.startswith("_")]
-    assert [kind for kind in own if "__slots__" not in vars(kind)] == []
-    assert [kind for kind in own if not kind.__dataclass_params__.frozen] == []  # type: ignore[attr-defined]
+    public = [kind for kind in collected if not kind.__name__.startswith("_")]
+    assert [kind for kind in public if "__slots__" not in vars(kind)] == []
+    assert [kind for kind in public if not kind.__dataclass_params__.frozen] == []  # type: ignore[attr-defined]
 
 
 def test_every_package_that_is_imported_is_declared() -> None:

@@ -15,12 +15,10 @@ from catalogue import PAIR
 from synchain import runtime
 from synchain.models import Field, Rates, Scene, chain
 from synchain.models.scenes.scene import KEYWORDS
+from synchain.runtime import Criterion, Progress, Status
 from synchain.runtime.bifurcation import skeleton as skeletons
 from synchain.runtime.cells.run_keywords import Given
-from synchain.runtime.support.progress import Progress
-from synchain.runtime.support.status import Status
 from synchain.runtime.synchronisation.agreement import agreement
-from synchain.runtime.synchronisation.threshold import Criterion
 
 SHARED = {
     "workers": None,

@@ -13,10 +13,9 @@ from scipy.integrate import solve_ivp
 
 import synchain.runtime
 from synchain.codegen.export import to_c
-from synchain.models import chain, latex, text
+from synchain.models import Scene, chain, latex, text
 from synchain.models.dynamics.network import node
 from synchain.models.dynamics.variational import mode, network_variation
-from synchain.models.scenes.scene import Scene
 from synchain.runtime import run
 from synchain.runtime.cells.paces import Templates
 from synchain.runtime.engines.scene_kernels import kernel_source
@@ -148,10 +147,10 @@ def test_large_networks_of_a_mass_matrix_are_not_exported():
 
 def test_masses_that_depend_on_time_or_vanish_are_refused():
     (a, b, c, d), t = real("w", 4), sp.Symbol("t", real=True)
-    whole = (a + b + c + d) ** 2 / 2
+    square = (a + b + c + d) ** 2 / 2
     with pytest.raises(ValueError, match="mass matrix of w1, w2, w3, w4 is singular"):
-        node(of_energies("rigid", 4, whole, sp.S.Zero, sp.S.Zero))
-    swelling = whole + (2 + sp.cos(t)) * (a**2 + b**2 + c**2 + d**2) / 2
+        node(of_energies("rigid", 4, square, sp.S.Zero, sp.S.Zero))
+    swelling = square + (2 + sp.cos(t)) * (a**2 + b**2 + c**2 + d**2) / 2
     with pytest.raises(ValueError, match="depend on time; expected a mass matrix of states and parameters"):
         node(of_energies("swelling", 4, swelling, sp.S.Zero, sp.S.Zero))
 

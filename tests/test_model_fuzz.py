@@ -19,8 +19,7 @@ from scipy.integrate import solve_ivp
 
 from synchain.models import Field, Lagrangian, Scene, chain
 from synchain.models.mechanics.components import TIME
-from synchain.runtime import run
-from synchain.runtime.support.status import Status
+from synchain.runtime import Status, run
 
 MODELS = 12
 """Models where no time is given."""

@@ -39,7 +39,8 @@ def test_the_tables_are_those_of_the_modules(kind: PluginKind) -> None:
     if kind is COUPLING:
         expected["components"] = STRENGTH
     assert table(TABLES[kind]) == {
-        name: [(p, value.default, value.meaning) for p, value in known.items()] for name, known in expected.items()
+        name: [(p, value.default, value.meaning) for p, value in parameters_of_part.items()]
+        for name, parameters_of_part in expected.items()
     }
 
 

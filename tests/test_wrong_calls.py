@@ -16,18 +16,14 @@ import scipy.sparse
 from catalogue import PAIR
 
 from synchain import models, runtime
-from synchain.models import chain, star
-from synchain.models.graphs.topology import Topology
-from synchain.models.scenes.scene import Scene
-from synchain.models.scenes.section import Section
-from synchain.models.spectra.spectrum import Spectrum
+from synchain.models import Scene, Section, Spectrum, Topology, chain, star
 from synchain.models.symmetries.clusters import clusters, orbital_partitions
+from synchain.runtime import Criterion
 from synchain.runtime.cells.run_keywords import Given
 from synchain.runtime.results.energy_of_states import energy_function
 from synchain.runtime.results.labelled import Labelled
 from synchain.runtime.support.threads import worker_count
 from synchain.runtime.synchronisation.agreement import agreement
-from synchain.runtime.synchronisation.criterion import Criterion
 
 ONE = Scene(oscillator="harmonic", transient=1, window=1)
 ENERGY = energy_function(PAIR)
@@ -241,10 +237,14 @@ def test_unknown_keywords_are_refused_with_those_that_are_known(value: Any) -> N
     parameters = inspect.signature(value).parameters.values()
     if any(each.kind is each.VAR_KEYWORD for each in parameters):  # parameters of a scene; see tests/test_keywords.py
         return
-    known = [each.name for each in parameters if each.kind is not each.VAR_POSITIONAL]
+    parameter_names = [each.name for each in parameters if each.kind is not each.VAR_POSITIONAL]
     with pytest.raises(TypeError) as caught:
-        value(**{f"{known[-1]}_" if known else "wrong": 1})
-    words = f"known: {', '.join(known)}; did you mean '{known[-1]}'?" if known else "known: none"
+        value(**{f"{parameter_names[-1]}_" if parameter_names else "wrong": 1})
+    words = (
+        f"known: {', '.join(parameter_names)}; did you mean '{parameter_names[-1]}'?"
+        if parameter_names
+        else "known: none"
+    )
     assert f" of {value.__name__}; {words}" in str(caught.value)
 
 
@@ -252,9 +252,9 @@ def test_unknown_keywords_are_refused_with_those_that_are_known(value: Any) -> N
 def test_arguments_at_no_place_and_missing_ones_are_refused_in_words_of_ours(value: Any) -> None:
     parameters = inspect.signature(value).parameters.values()
     further = {each.kind for each in parameters} & {inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD}
-    own = [each for each in parameters if each.kind not in further]
+    accepted = [each for each in parameters if each.kind not in further]
     if inspect.Parameter.VAR_POSITIONAL not in further:
-        places = [each.name for each in own if each.kind is not inspect.Parameter.KEYWORD_ONLY]
+        places = [each.name for each in accepted if each.kind is not inspect.Parameter.KEYWORD_ONLY]
         with pytest.raises(
             TypeError, match=f"^{value.__name__}: found 99 arguments without a name; expected "
         ) as caught:
@@ -264,7 +264,7 @@ def test_arguments_at_no_place_and_missing_ones_are_refused_in_words_of_ours(val
         for name in places[:1]:
             with pytest.raises(TypeError, match=f"^{value.__name__}: found '{name}' without a name and by name"):
                 value(None, **{name: None})
-    needed = [each.name for each in own if each.default is inspect.Parameter.empty]
+    needed = [each.name for each in accepted if each.default is inspect.Parameter.empty]
     if needed:
         with pytest.raises(
             TypeError, match=f"^{value.__name__}: found no '{needed[0]}'; expected {', '.join(needed)}$"
@@ -279,8 +279,8 @@ KEPT = [kind for kind in OFFERED if inspect.isclass(kind) and issubclass(kind, L
 def test_plots_refuse_unknown_keywords() -> None:
     assert len(KEPT) > 10
     for kind in KEPT:
-        known = ", ".join(name for name in inspect.signature(kind.plot).parameters if name not in ("self", "style"))
-        with pytest.raises(TypeError, match=f"^unknown keyword 'axes' of plot; known: {known}"):
+        valid = ", ".join(name for name in inspect.signature(kind.plot).parameters if name not in ("self", "style"))
+        with pytest.raises(TypeError, match=f"^unknown keyword 'axes' of plot; known: {valid}"):
             kind.plot(object.__new__(kind), axes=1)
         with pytest.raises(TypeError, match=r"^save: found no 'path'; expected path$"):
             kind.save(object.__new__(kind))
@@ -297,8 +297,13 @@ def test_public_names_can_be_sent_to_other_processes(value: Any) -> None:
 
 def test_a_class_is_changed_once() -> None:
     for _ in range(3):
-        made = (runtime.Criterion.__init__, runtime.Result.plot, runtime.Plane.as_dict, models.Topology.to_networkx)
-    assert [hasattr(each.__wrapped__, "__wrapped__") for each in made] == [False] * 4
+        callables = (
+            runtime.Criterion.__init__,
+            runtime.Result.plot,
+            runtime.Plane.as_dict,
+            models.Topology.to_networkx,
+        )
+    assert [hasattr(each.__wrapped__, "__wrapped__") for each in callables] == [False] * 4
 
 
 def test_a_parameter_among_the_keywords_is_said_to_be_one() -> None:

@@ -30,9 +30,9 @@ def jacobian(case: Case) -> np.ndarray:
     """Of the whole network at its equilibrium 0."""
     scene = case.scene
     found = np.zeros((scene.equations.dimension,) * 2)
-    for place, entry in scene.equations.jacobian().items():
+    for entry_at, entry in scene.equations.jacobian().items():
         values = {s: scene.parameters.get(s.name, 0.0) for s in entry.free_symbols}
-        found[place] = float(entry.xreplace(values))
+        found[entry_at] = float(entry.xreplace(values))
     return found
 
 

@@ -44,8 +44,8 @@ def test_error_and_steps_are_those_of_the_kernel(rows):
 def test_time_is_per_period_and_cell(monkeypatch):
     """Counted with a clock that gives 80 seconds a call: 5 periods of 16 cells, 1 second each."""
     monkeypatch.setattr("benchmarks.kit.own_program.best_time", lambda run, quick: 80.0)
-    own = Own.compiled(CASE, "rodas5p", native_width(), 16, 5)
-    point = own.point(1e-6, 1e-7, quick=True)
+    compiled = Own.compiled(CASE, "rodas5p", native_width(), 16, 5)
+    point = compiled.point(1e-6, 1e-7, quick=True)
     assert point.seconds == 1.0
     assert point.remark == f"5 of {CASE.periods} periods"
     assert (point.rtol, point.atol, point.periods) == (1e-6, 1e-7, 5)

@@ -14,8 +14,7 @@ import pytest
 
 from benchmarks import msf
 from benchmarks.peers import PEERS, jitcode_transversal
-from synchain.models.graphs.families import topology
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, topology
 from synchain.runtime.stability import march
 
 ABSENT = replace(PEERS[msf.PEER], modules=("a_peer_that_nobody_has",))
@@ -115,14 +114,14 @@ def row(program: str, alpha: str, count: int, seconds: float) -> tuple[object, .
 
 
 def test_ratios_are_those_of_the_same_strength_and_of_a_share_of_the_thousand() -> None:
-    own = [row("synchain", "0.2", 1, 0.5), row("synchain", "1", 1, 0.25), row("synchain", "0 … 6", 1000, 4.0)]
+    ours = [row("synchain", "0.2", 1, 0.5), row("synchain", "1", 1, 0.25), row("synchain", "0 … 6", 1000, 4.0)]
     peer = [row("JiTCODE lsoda", "1", 1, 3.0), row("JiTCODE lsoda", "0.2", 1, 2.0)]
-    lines = [line.strip("| ").split(" | ") for line in msf.summary([*own, *peer]).splitlines()[2:]]
+    lines = [line.strip("| ").split(" | ") for line in msf.summary([*ours, *peer]).splitlines()[2:]]
     assert lines == [
         ["s", "1", "3", "0.25", "12", "4", "750"],
         ["s", "0.2", "2", "0.5", "4", "4", "500"],
     ]
-    assert msf.summary(own) == "No peer to compare with."
+    assert msf.summary(ours) == "No peer to compare with."
 
 
 def test_the_peer_has_the_exponent_of_a_linear_oscillator_in_closed_form() -> None:
@@ -132,8 +131,8 @@ def test_the_peer_has_the_exponent_of_a_linear_oscillator_in_closed_form() -> No
     growths = jitcode_transversal.prepare(scene, "dopri5", 1e-8)
     for alpha in (0.2, 0.6):
         turn = math.pi / math.sqrt(1 - alpha**2 / 4)  # after which every direction is back
-        found = list(itertools.islice(growths(alpha, np.array([1.0, 0.0]), turn, 2), 10))
-        assert fmean(found) / turn == pytest.approx(-alpha / 2, abs=1e-6)
+        rates = list(itertools.islice(growths(alpha, np.array([1.0, 0.0]), turn, 2), 10))
+        assert fmean(rates) / turn == pytest.approx(-alpha / 2, abs=1e-6)
 
 
 def test_the_peer_takes_two_oscillators() -> None:

@@ -13,8 +13,7 @@ from samples import source_of
 from benchmarks import roofline, skip
 from benchmarks.kit.operations import PRIMITIVE, Counter, operations
 from synchain.codegen.simd import elementary, lanes
-from synchain.models import chain, ring
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, chain, ring
 from synchain.runtime.engines.scene_kernels import kernel_source
 
 TEXT = """
@@ -38,9 +37,9 @@ def step(t, h, y, p):
 
 
 def counter(text: str) -> Counter:
-    made = Counter()
-    made.read(text)
-    return made
+    counts = Counter()
+    counts.read(text)
+    return counts
 
 
 def test_operations_counted_by_hand():

@@ -36,10 +36,10 @@ def test_references_agree_with_a_tight_integration(name):
 @pytest.mark.parametrize("name", CASES)
 def test_half_of_the_times_are_period_boundaries(name):
     case = read_case(name)
-    whole = case.times / case.period
-    assert len(whole) >= 40
-    assert (np.diff(whole) > 0).all()
-    assert 2 * np.count_nonzero(np.abs(whole - np.round(whole)) < 1e-12) == len(whole)
+    periods = case.times / case.period
+    assert len(periods) >= 40
+    assert (np.diff(periods) > 0).all()
+    assert 2 * np.count_nonzero(np.abs(periods - np.round(periods)) < 1e-12) == len(periods)
 
 
 def test_unknown_cases_are_refused():

@@ -26,10 +26,10 @@ def test_quick_rows(rows: list[tuple]) -> None:
     }
     methods = [row[2] for row in rows if row[:2] == ("random integers", 4)]
     assert methods == ["synchain", "numpy eigvalsh", "python-flint factors", "sympy eigenvals"]
-    own = [row for row in rows if row[2] == "synchain"]
-    assert {row[6] for row in own} == {"proved"}
-    assert all(row[3] > 0 for row in own)
-    assert all(row[4] > 15.9 for row in own)
+    ours = [row for row in rows if row[2] == "synchain"]
+    assert {row[6] for row in ours} == {"proved"}
+    assert all(row[3] > 0 for row in ours)
+    assert all(row[4] > 15.9 for row in ours)
     assert all(11 < row[4] < 16 for row in rows if row[2] == "numpy eigvalsh")
 
 
@@ -60,11 +60,11 @@ def test_random_graphs_are_connected_and_have_no_structure() -> None:
 
 
 def test_figure_has_a_line_for_each_method(rows: list[tuple]) -> None:
-    times, found = bench.draw(rows).axes
+    times, panel = bench.draw(rows).axes
     assert [line.get_label() for line in times.lines] == [
         "synchain",
         "numpy eigvalsh",
         "python-flint factors",
         "sympy eigenvals",
     ]
-    assert [line.get_label() for line in found.lines] == ["synchain", "numpy eigvalsh"]
+    assert [line.get_label() for line in panel.lines] == ["synchain", "numpy eigvalsh"]

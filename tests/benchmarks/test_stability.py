@@ -12,11 +12,9 @@ from family_sizes import size
 from benchmarks import stability
 from benchmarks.kit.stability_cases import Case, cases
 from benchmarks.kit.stability_reference import end_state
-from synchain.models.graphs.families import names, topology
-from synchain.models.scenes.scene import Scene
-from synchain.runtime.stability.exponents import exponents
-from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps.run import run
+from synchain.models import Scene, topology
+from synchain.models.graphs.families import names
+from synchain.runtime import Status, exponents, run
 
 QUICK = list(cases(quick=True))
 STATUS, ALLOWED, ENERGY, VERDICT = (
@@ -186,6 +184,6 @@ def test_many_equal_oscillators_move_as_one_alone() -> None:
     ends = [
         run(s, reduce=False, show_progress=False).states("end") for s in (many, Scene(parameters=values, **settings))
     ]
-    for place, alone in zip(ends[0].reshape(2, 100), ends[1], strict=True):
-        assert (place == place[0]).all()
-        assert place[0] == pytest.approx(alone, abs=1e-6)
+    for end, alone in zip(ends[0].reshape(2, 100), ends[1], strict=True):
+        assert (end == end[0]).all()
+        assert end[0] == pytest.approx(alone, abs=1e-6)

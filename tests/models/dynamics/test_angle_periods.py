@@ -53,9 +53,9 @@ def test_a_state_that_another_rate_has_bare_is_no_angle() -> None:
 )
 def test_links_decide_by_either_end(push: str, period: int | None) -> None:
     scene = sc.Scene(sc.Field({"q": "sin(q/2)"}), sc.Rates({"q": f"W*({push})"}), sc.ring(5))
-    found = None if period is None else pytest.approx(period * math.pi)
-    assert periods_of_kinds(scene.equations) == ((found,),)
-    assert periods_of_states(scene.equations) == (found,) * 5
+    expected = None if period is None else pytest.approx(period * math.pi)
+    assert periods_of_kinds(scene.equations) == ((expected,),)
+    assert periods_of_states(scene.equations) == (expected,) * 5
 
 
 @pytest.mark.parametrize("name", ["pendulum", "double_pendulum"])

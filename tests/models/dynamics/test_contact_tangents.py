@@ -8,15 +8,10 @@ import sympy as sp
 from event_reference import Reference
 from mpmath import mp, mpf
 
+from synchain.models import Scene, Topology, clusters, topology
 from synchain.models.dynamics.saltation import of_network
 from synchain.models.dynamics.variational import MODE, clustered, mode, network_variation
-from synchain.models.graphs.families import topology
-from synchain.models.graphs.topology import Topology
-from synchain.models.scenes.scene import Scene
-from synchain.models.symmetries.clusters import clusters
-from synchain.runtime.bifurcation.periodic import periodic_orbit
-from synchain.runtime.stability.cluster_exponents import cluster_exponents
-from synchain.runtime.stability.lyapunov import lyapunov_spectrum
+from synchain.runtime import cluster_exponents, lyapunov_spectrum, periodic_orbit
 from synchain.runtime.stability.orbits import OrbitProblem
 
 ONE, PAIR = topology("chain", 1), topology("chain", 2)
@@ -61,10 +56,10 @@ def test_exits_of_clusters_are_those_of_the_network() -> None:
     on = {x1: a, x2: b, x3: a, v1: c, v2: d, v3: c}
     values = {x1: a, x2: b, v1: c, v2: d, m: s}
     first = {column: e.xreplace(on) for (_, column), e in full.exits[0][0]}
-    made = {key: e.xreplace(values) for key, e in network.events.exits[0][0]}
-    assert sp.simplify(made[5, 4] - first[0]) == 0  # the difference x_3 - x_1 of the two that move as one
-    assert sp.simplify(made[2, 0] - first[0]) == 0
-    assert sp.simplify(made[2, 1] - first[1]) == 0
+    rows = {key: e.xreplace(values) for key, e in network.events.exits[0][0]}
+    assert sp.simplify(rows[5, 4] - first[0]) == 0  # the difference x_3 - x_1 of the two that move as one
+    assert sp.simplify(rows[2, 0] - first[0]) == 0
+    assert sp.simplify(rows[2, 1] - first[1]) == 0
 
 
 def test_dampers_and_a_jump_have_no_tangent() -> None:
@@ -111,10 +106,10 @@ def test_a_pair_out_of_phase_follows_its_mode() -> None:
     from synchain.runtime.sweeps.run import run
 
     scene = jumping(sigma=0.15).replace(transient=0.0, window=2.0, record=(), rtol=1e-12)
-    found = propagator(scene, 0.3)[:, 0]
+    column = propagator(scene, 0.3)[:, 0]
     d = 1e-6
     end = run(scene, reduce=False, show_progress=False, x_1=0.1 + d, x_2=0.1 - d).states("end")
-    np.testing.assert_allclose(found, (end[[0, 2]] - end[[1, 3]]) / (2 * d), rtol=1e-4)
+    np.testing.assert_allclose(column, (end[[0, 2]] - end[[1, 3]]) / (2 * d), rtol=1e-4)
 
 
 def exponents_of(scene: Scene, periods: int, *alpha: float) -> np.ndarray:

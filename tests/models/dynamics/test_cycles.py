@@ -36,12 +36,12 @@ def both(*arguments, **values) -> tuple[Outcome, Outcome]:
 
 def test_a_periodic_transient_is_jumped_over():
     spans = [[1000 * PERIOD, 1003 * PERIOD, PERIOD], [2001 * PERIOD, 2002 * PERIOD, PERIOD]]
-    jumped, whole = both(1, (), [[0.3, 0.0], [0.28, 0.0]], spans)
+    jumped, full = both(1, (), [[0.3, 0.0], [0.28, 0.0]], spans)
     assert (jumped.counts[:, 4] > [400, 1400]).all()
-    assert (whole.counts[:, 4] == 0).all()
-    assert (jumped.counts[:, 1] < 0.6 * whole.counts[:, 1]).all()
-    np.testing.assert_allclose(jumped.end, whole.end, rtol=0, atol=1e-12)
-    assert np.abs(whole.end[0] - whole.end[1]).max() > 0.1, "the two cells end in different halves of a cycle of two"
+    assert (full.counts[:, 4] == 0).all()
+    assert (jumped.counts[:, 1] < 0.6 * full.counts[:, 1]).all()
+    np.testing.assert_allclose(jumped.end, full.end, rtol=0, atol=1e-12)
+    assert np.abs(full.end[0] - full.end[1]).max() > 0.1, "the two cells end in different halves of a cycle of two"
 
 
 @pytest.mark.long
@@ -50,19 +50,19 @@ def test_sums_over_a_window_are_those_of_every_period():
     within = [333.3 * PERIOD, 1500.5 * PERIOD, PERIOD]
     spans = [[0.0, 1500 * PERIOD, PERIOD], within, within]
     start = [[0.3, -0.2, 0.0, 0.1], [0.3, -0.2, 0.0, 0.1], [0.3, 0.28, 0.0, 0.0]]
-    jumped, whole = both(2, ("sync_error",), start, spans, sigma=0.001)
+    jumped, full = both(2, ("sync_error",), start, spans, sigma=0.001)
     assert (jumped.counts[:, 4] > 200).all()
-    np.testing.assert_allclose(jumped.sums, whole.sums, rtol=1e-11, atol=1e-12)
-    np.testing.assert_array_equal(jumped.end, whole.end)
+    np.testing.assert_allclose(jumped.sums, full.sums, rtol=1e-11, atol=1e-12)
+    np.testing.assert_array_equal(jumped.end, full.end)
 
 
 @pytest.mark.long
 def test_section_points_of_a_window_are_all_there():
     spans = [[1000 * PERIOD, 1064 * PERIOD, PERIOD]]
-    jumped, whole = both(1, ("section",), [[0.3, 0.0]], spans)
+    jumped, full = both(1, ("section",), [[0.3, 0.0]], spans)
     assert jumped.counts[0, 4] > 400
-    assert jumped.counts[0, 3] == whole.counts[0, 3] > 30
-    np.testing.assert_allclose(jumped.section(0), whole.section(0), rtol=1e-13, atol=1e-10)
+    assert jumped.counts[0, 3] == full.counts[0, 3] > 30
+    np.testing.assert_allclose(jumped.section(0), full.section(0), rtol=1e-13, atol=1e-10)
 
 
 def test_chaos_never_repeats():
@@ -70,10 +70,10 @@ def test_chaos_never_repeats():
     values = {"omega": 1.4, "sigma": 0.01}
     period = 2 * np.pi / 1.4
     spans = [[300 * period, 310 * period, period]]
-    jumped, whole = both(2, ("sync_error",), [[0.3, 0.28, 0.0, 0.0]], spans, **values)
+    jumped, full = both(2, ("sync_error",), [[0.3, 0.28, 0.0, 0.0]], spans, **values)
     assert jumped.counts[0, 4] == 0
-    np.testing.assert_array_equal(jumped.end, whole.end)
-    np.testing.assert_array_equal(jumped.sums, whole.sums)
+    np.testing.assert_array_equal(jumped.end, full.end)
+    np.testing.assert_array_equal(jumped.sums, full.sums)
 
 
 def test_long_runs_keep_the_phase_of_the_drive():

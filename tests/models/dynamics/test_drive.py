@@ -10,12 +10,11 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from synchain.codegen.driver.columns import SpanColumn
-from synchain.models import Rates, ends
+from synchain.models import Rates, Scene, ends
 from synchain.models.definitions.inline import Field
 from synchain.models.graphs.families import topology
 from synchain.models.inputs.plugins import allow_code
 from synchain.models.mechanics.components import TIME
-from synchain.models.scenes.scene import Scene
 from synchain.runtime.bifurcation.branches import follow
 from synchain.runtime.bifurcation.periodic import periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton
@@ -86,18 +85,18 @@ def monodromy(state: np.ndarray, force: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_a_scene_takes_its_period_from_the_equations(files: Path) -> None:
-    own, half = scene(files), scene(files, "half")
-    assert (own.drive.frequency, half.drive.frequency) == (
+    full, half = scene(files), scene(files, "half")
+    assert (full.drive.frequency, half.drive.frequency) == (
         sp.Symbol("Omega", real=True),
         2 * sp.Symbol("Omega", real=True),
     )
-    for found in (own, half):
-        assert found.time_unit == "period"
-        assert found.angular_frequency == 1.2
-        assert found.period == PERIOD
-        assert found.replace(omega=3.0).period == PERIOD
-        assert longest_step(found) == PERIOD / 2
-    assert own.replace(Omega=2.4).period == PERIOD / 2
+    for driven in (full, half):
+        assert driven.time_unit == "period"
+        assert driven.angular_frequency == 1.2
+        assert driven.period == PERIOD
+        assert driven.replace(omega=3.0).period == PERIOD
+        assert longest_step(driven) == PERIOD / 2
+    assert full.replace(Omega=2.4).period == PERIOD / 2
     assert Scene(parameters={"omega": 1.4}).period == 2 * np.pi / 1.4
 
 
@@ -206,10 +205,10 @@ def test_each_cell_has_the_longest_step_of_its_own_pulses() -> None:
     node = Field({"x": "1 if sin(w*t) > level else 0"}, parameters={"w": 2.0, "level": 0.0})
     swept = Scene(node, None, ALONE, axes={"level": [0.0, 0.99, 1.1]}, transient=0.0, window=1.0)
     shortest = [0.5 * np.pi, np.arccos(0.99), 0.5 * np.sqrt(np.pi)]
-    found = plan(swept).spans[:, SpanColumn.LONGEST]
-    np.testing.assert_allclose(found[1], shortest[1], rtol=1e-3)
+    longest = plan(swept).spans[:, SpanColumn.LONGEST]
+    np.testing.assert_allclose(longest[1], shortest[1], rtol=1e-3)
     for k, level in enumerate([0.0, 0.99, 1.1]):
-        assert found[k] == longest_step(swept.replace(axes={}, parameters={"level": level}))
+        assert longest[k] == longest_step(swept.replace(axes={}, parameters={"level": level}))
 
 
 def test_short_pulses_of_unequal_nodes_are_seen_by_sweeps_and_modes() -> None:

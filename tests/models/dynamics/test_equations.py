@@ -15,10 +15,9 @@ import sympy as sp
 from differences import DIGITS, close, evaluate, made, slopes, states
 from effort import effort
 
+from synchain.models import from_matrix, topology
 from synchain.models.dynamics.equations import Equations
-from synchain.models.graphs.families import topology
 from synchain.models.graphs.links import Link
-from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.calculus import derivative
 from synchain.models.mechanics.components import TIME, Edge, Node
 
@@ -57,8 +56,8 @@ def test_the_jacobian_is_the_derivative_of_the_right_hand_side(name: str, near: 
     entries = equations.jacobian()
     parameter_values = dict(zip(entries, evaluate(list(entries.values()), values), strict=True))
     for column, state in enumerate(equations.state):
-        found = [parameter_values.get((row, column), mpmath.mpf(0)) for row in range(equations.dimension)]
-        assert close(found, slopes(equations.rhs(), {sp.Symbol(state, real=True): mpmath.mpf(1)}, values))
+        column_values = [parameter_values.get((row, column), mpmath.mpf(0)) for row in range(equations.dimension)]
+        assert close(column_values, slopes(equations.rhs(), {sp.Symbol(state, real=True): mpmath.mpf(1)}, values))
 
 
 @pytest.mark.parametrize("name", MODELS)

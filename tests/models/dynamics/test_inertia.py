@@ -14,13 +14,9 @@ from scipy.integrate import solve_ivp
 from sympy.physics import mechanics
 
 from synchain.codegen.export.python import to_python
-from synchain.models import chain
+from synchain.models import Scene, chain, from_matrix, load_scene, topology
 from synchain.models.dynamics.equations import Equations
-from synchain.models.graphs.families import topology
-from synchain.models.graphs.topology import from_matrix
-from synchain.models.scenes.file import load_scene
-from synchain.models.scenes.scene import Scene
-from synchain.runtime.sweeps.run import run
+from synchain.runtime import run
 
 T = mechanics.dynamicsymbols._t
 
@@ -48,9 +44,9 @@ def the_whole_at_once(lagrangian: sp.Expr, forces: dict[str, sp.Expr], names: di
     loads = [(points[name], forces[name].subs(swap) * frame.x) for name in names]
     method = mechanics.LagrangesMethod(lagrangian.subs(swap), q, forcelist=loads, frame=frame)
     method.form_lagranges_equations()
-    found = method.mass_matrix.LUsolve(method.forcing)
+    accelerations_of_all = method.mass_matrix.LUsolve(method.forcing)
     back = {value: key for key, value in swap.items()}
-    return {v: e.subs(back) for v, e in zip(names.values(), found, strict=True)}
+    return {v: e.subs(back) for v, e in zip(names.values(), accelerations_of_all, strict=True)}
 
 
 def pendulums(n: int) -> tuple[Equations, dict[str, str], list[sp.Symbol], list[sp.Symbol]]:
@@ -74,9 +70,9 @@ def test_clocks_on_a_beam_by_lagranges_method() -> None:
     potential = real("stiffness") * x**2 / 2 - sum(map(sp.cos, thetas))
     forces = {"x_1": -real("drag") * v} | {a.name: escapement(a, b) for a, b in zip(thetas, rates, strict=True)}
     expected = the_whole_at_once(kinetic - potential, forces, names)
-    found = accelerations(equations)
+    computed = accelerations(equations)
     for name, e in expected.items():
-        assert vanishes((found[name] - e).subs(sigma, 1))
+        assert vanishes((computed[name] - e).subs(sigma, 1))
 
 
 @pytest.mark.long
@@ -100,9 +96,9 @@ def test_clocks_on_a_beam_by_kanes_method() -> None:
     method.kanes_equations([mechanics.Particle("beam", beam, real("mass")), mechanics.Particle("bob", bob, 1)], loads)
     theirs = method.mass_matrix.LUsolve(method.forcing)
     back = dict(zip([*q, *u], [real(name) for name in (*names, *names.values())], strict=True))
-    found = accelerations(equations)
+    computed = accelerations(equations)
     for name, e in zip(names.values(), theirs, strict=True):
-        assert vanishes(found[name].subs(real("sigma"), 1) - e.subs(back))
+        assert vanishes(computed[name].subs(real("sigma"), 1) - e.subs(back))
     assert swap
 
 

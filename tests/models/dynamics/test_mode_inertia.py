@@ -12,15 +12,12 @@ from parts import edge
 from samples import real
 from variational_reference import ALPHA, transversal_equations
 
-from synchain.models import chain
+from synchain.models import Scene, chain, from_matrix, orbital_partitions
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.network import network
 from synchain.models.dynamics.variational import MODE, clustered, mode
-from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Edge, Node
-from synchain.models.scenes.scene import Scene
-from synchain.models.symmetries.clusters import orbital_partitions
-from synchain.runtime.stability.exponents import exponents
+from synchain.runtime import exponents
 from synchain.runtime.sweeps.certify import certify
 
 GRAPH = from_matrix([[-3, 1, 2], [1, -2, 1], [2, 1, -3]])
@@ -114,8 +111,8 @@ def test_the_slowest_eigenvalue_of_a_linear_network_is_that_of_its_certificate()
     free = scipy.linalg.block_diag(np.eye(4), heavy)
     push = np.block([[np.zeros((4, 4)), np.eye(4)], [-np.eye(4), -0.5 * np.eye(4)]])
     values = scipy.linalg.eigvals(push, free)
-    own = np.roots([1, 0.5, 1])  # the synchronous motion
-    others = [z for z in values if np.abs(z - own).min() > 1e-9]
+    synchronous = np.roots([1, 0.5, 1])  # the synchronous motion
+    others = [z for z in values if np.abs(z - synchronous).min() > 1e-9]
     assert len(others) == 6
     assert certify(network).exponent[0] == pytest.approx(max(z.real for z in others), abs=1e-8)
 

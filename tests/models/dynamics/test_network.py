@@ -12,18 +12,16 @@ from effort import effort
 from parts import connectivity, coupling_of, edge, is_lagrangian, law_of, node, oscillator_of, parameters
 from sympy.physics import mechanics
 
+from synchain.models import Oscillator, Topology, from_matrix, topology
 from synchain.models.definitions.definition import FRICTION_LAW, OSCILLATOR
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.network import network
 from synchain.models.graphs.families import names as families
-from synchain.models.graphs.families import topology
-from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.inputs.plugins import names
 from synchain.models.interactions.coupling import Coupling
 from synchain.models.mechanics.components import TIME, Node
 from synchain.models.mechanics.contact import ContactModel
 from synchain.models.mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, static_coefficient
-from synchain.models.mechanics.oscillator import Oscillator
 
 SPRING = coupling_of("spring")
 HARMONIC = oscillator_of("harmonic")
@@ -80,10 +78,10 @@ def in_one_piece(oscillator: str, coupling: str, graph: Topology) -> list[sp.Exp
     loads = [(point, force * frame.x) for point, force in zip(points, forces, strict=True)]
     method = mechanics.LagrangesMethod(lagrangian, q, forcelist=loads, frame=frame)
     method.form_lagranges_equations()
-    found = method.mass_matrix.LUsolve(method.forcing)
+    accelerations = method.mass_matrix.LUsolve(method.forcing)
     plain = {b: sp.Symbol(f"v_{i + 1}", real=True) for i, b in enumerate(rate)}
     plain |= {a: sp.Symbol(f"x_{i + 1}", real=True) for i, a in enumerate(q)}
-    return [e.xreplace(plain).xreplace({mechanics.dynamicsymbols._t: TIME}) for e in found]
+    return [e.xreplace(plain).xreplace({mechanics.dynamicsymbols._t: TIME}) for e in accelerations]
 
 
 def assemble(oscillator: str, friction: str | None, coupling: str, graph: Topology) -> Equations:
@@ -163,9 +161,9 @@ def test_connectivity_of_one_way_links_is_the_jacobian_of_the_forces(coupling: s
 
 def test_connectivity_of_a_thousand_nodes() -> None:
     ring = topology("ring", 1000)
-    found, calls = effort(lambda: connectivity("spring", ring))
+    matrix, calls = effort(lambda: connectivity("spring", ring))
     assert calls < 400 * ring.n
-    assert found == ring.rows
+    assert matrix == ring.rows
 
 
 def sprung(potential: sp.Expr) -> Coupling:

@@ -9,11 +9,9 @@ import pytest
 import sympy as sp
 from sympy.physics.mechanics import dynamicsymbols
 
-from synchain.models import end, maximum, mean, minimum, nodes, rate, ring, variance
+from synchain.models import Scene, end, load_scene, maximum, mean, minimum, nodes, rate, ring, variance
 from synchain.models.dynamics.observable_text import as_observable
 from synchain.models.inputs.names import TAKEN
-from synchain.models.scenes.file import load_scene
-from synchain.models.scenes.scene import Scene
 from synchain.runtime.results.labels import MEANINGS
 
 x, v, x_1, theta, t = sp.symbols("x v x_1 theta t")

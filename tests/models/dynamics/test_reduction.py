@@ -232,15 +232,15 @@ def trajectory(equations: Equations, start: np.ndarray, values: dict[str, float]
     names = [*equations.state, *equations.parameters]
     rate = sp.lambdify([TIME, *real(*names)], equations.rhs(), "math")
     parameter_values, y, h = [values[name] for name in equations.parameters], start, 0.01
-    made = []
+    built = []
     for k in range(600):
         k1 = np.array(rate(k * h, *y, *parameter_values))
         k2 = np.array(rate((k + 0.5) * h, *(y + h / 2 * k1), *parameter_values))
         k3 = np.array(rate((k + 0.5) * h, *(y + h / 2 * k2), *parameter_values))
         k4 = np.array(rate((k + 1) * h, *(y + h * k3), *parameter_values))
         y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        made.append(y)
-    return np.array(made)
+        built.append(y)
+    return np.array(built)
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -259,10 +259,10 @@ def test_trajectories_of_quotients_are_those_of_random_graphs(seed):
     values = {"delta": 0.1, "beta": 1.0, "u": 0.3, "omega": 1.0, "sigma": 0.3}
     begin = np.array([dice.uniform(-1, 1) for _ in range(8)])
     columns = [c * 4 + k for c in range(2) for k in classes]
-    whole, fewer = trajectory(full, begin[columns], values), trajectory(small, begin, values)
-    assert np.abs(whole - fewer[:, columns]).max() < 1e-12
+    complete, fewer = trajectory(full, begin[columns], values), trajectory(small, begin, values)
+    assert np.abs(complete - fewer[:, columns]).max() < 1e-12
     wrong = Equations.of_equal_nodes(small.node, small.edge, 4, tuple((a, b, w / 2) for a, b, w in small.links))
-    assert np.abs(whole - trajectory(wrong, begin, values)[:, columns]).max() > 1e-2
+    assert np.abs(complete - trajectory(wrong, begin, values)[:, columns]).max() > 1e-2
 
 
 def test_a_wrong_partition_is_caught():

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import Rates, Scene, Topology, chain, complete, ends, from_matrix, ring
+from synchain.models import Rates, Scene, Topology, chain, clusters, complete, ends, from_matrix, ring
 from synchain.models.definitions.loader import load_oscillator
 from synchain.models.dynamics.synchrony import NoSynchrony, expect_vanishing, synchronous_node
 from synchain.models.dynamics.variational import clustered, mode
-from synchain.models.symmetries.clusters import clusters
 
 G, LAM = sp.symbols("g lam")
 
@@ -51,10 +50,10 @@ def test_the_modes_are_those_of_the_whole_network(graph: Topology) -> None:
     collected = []
     for gamma in np.linalg.eigvals(np.array(graph.matrix, dtype=float)):
         alpha = {"mode_alpha": -values["g"] * gamma.real, "mode_beta": -values["g"] * gamma.imag}
-        own = np.zeros((6, 6), complex)
+        block = np.zeros((6, 6), complex)
         for (r, c), e in plane.matrix:
-            own[r, c] = numeric(e, values | alpha | {f"{name}_1": value for name, value in state.items()})
-        collected += list(np.linalg.eigvals(own[:3, :3] - 1j * own[:3, 3:]))
+            block[r, c] = numeric(e, values | alpha | {f"{name}_1": value for name, value in state.items()})
+        collected += list(np.linalg.eigvals(block[:3, :3] - 1j * block[:3, 3:]))
     expected = np.linalg.eigvals(matrix)
     gaps = np.abs(expected[:, None] - np.array(collected)[None])
     assert gaps.min(axis=0).max() < 1e-9

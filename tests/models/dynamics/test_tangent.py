@@ -11,10 +11,9 @@ from differences import DIGITS, TABLE, close, evaluate, made, slopes, states
 from parts import edge, node
 from variational_reference import ALPHA, deviation_names, tangent_equations, transversal_equations
 
+from synchain.models import Topology, from_matrix, topology
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import mode
-from synchain.models.graphs.families import topology
-from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.mechanics.components import Edge, Node
 
 OSCILLATORS = [("friction", "exponential", "atan"), ("friction", "stribeck", "sign"), ("duffing", None, "atan")]
@@ -84,8 +83,8 @@ def test_the_jacobian_of_the_extended_system_is_its_derivative(kind: str, model:
     entries = equations.jacobian()
     parameter_values = dict(zip(entries, evaluate(list(entries.values()), values), strict=True))
     for column, state in enumerate(equations.symbols(0)):
-        found = [parameter_values.get((row, column), mpmath.mpf(0)) for row in range(equations.dimension)]
-        assert close(found, slopes(equations.rhs(), {state: mpmath.mpf(1)}, values), digits=20)
+        column_values = [parameter_values.get((row, column), mpmath.mpf(0)) for row in range(equations.dimension)]
+        assert close(column_values, slopes(equations.rhs(), {state: mpmath.mpf(1)}, values), digits=20)
 
 
 # -- modes of a network --------------------------------------------------------------------------------------

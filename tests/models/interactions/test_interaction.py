@@ -10,12 +10,11 @@ import pytest
 import sympy as sp
 from catalogue import BODY, ROTOR, real
 
-from synchain.models import Potential, Rates, Scene, chain, complete, ends, ring, star
+from synchain.models import Parameter, Potential, Rates, Scene, chain, complete, ends, ring, star
 from synchain.models.definitions.loader import load_oscillator
 from synchain.models.interactions.coupling import from_table
 from synchain.models.interactions.link import edge, strength
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.parameter import Parameter
 
 K, LAG, G = sp.symbols("K lag G")
 V = real("v")
@@ -135,9 +134,9 @@ def test_a_table_is_the_same_coupling(coupling: Rates | Potential) -> None:
      "W*tanh(x_i/3)**2 + floor(x_i)", "W*x_j if x_i > x_j else 0"],
 )  # fmt: skip
 def test_text_and_expression_are_one(e: str) -> None:
-    made = from_table("coupling", {"rates": {"x": e}})
-    assert isinstance(made, Rates)
-    assert Rates({real("x_i"): made.rates["x"]}) == made == from_table("coupling", made.as_dict())
+    coupling = from_table("coupling", {"rates": {"x": e}})
+    assert isinstance(coupling, Rates)
+    assert Rates({real("x_i"): coupling.rates["x"]}) == coupling == from_table("coupling", coupling.as_dict())
 
 
 @pytest.mark.parametrize(
@@ -255,8 +254,10 @@ def test_a_potential_of_one_coordinate_is_a_spring() -> None:
     i, j, w = ends(load_oscillator("duffing"))
     sigma = sp.Symbol("sigma")
     potential = Potential(sigma * w * (i.x - j.x) ** 2 / 2, {sigma: 0})
-    made, spring = (Scene(oscillator="duffing", coupling=c, topology=ring(4)).equations for c in (potential, "spring"))
-    assert made.digest == spring.digest
+    written, spring = (
+        Scene(oscillator="duffing", coupling=c, topology=ring(4)).equations for c in (potential, "spring")
+    )
+    assert written.digest == spring.digest
 
 
 def test_a_potential_that_tells_its_ends_apart_has_a_direction() -> None:
@@ -264,8 +265,8 @@ def test_a_potential_that_tells_its_ends_apart_has_a_direction() -> None:
     r, sigma, alpha, beta = j.x - i.x, *sp.symbols("sigma fput_alpha fput_beta")
     energy = sigma * w * (r**2 / 2 + alpha * r**3 / 3 + beta * r**4 / 4)
     potential = Potential(energy, {sigma: 1, alpha: 0.25, beta: 0})
-    made, fput = (Scene(oscillator="mass", coupling=c, topology=chain(4)).equations for c in (potential, "fput"))
-    for a, b in zip(made.rhs(), fput.rhs(), strict=True):
+    written, fput = (Scene(oscillator="mass", coupling=c, topology=chain(4)).equations for c in (potential, "fput"))
+    for a, b in zip(written.rhs(), fput.rhs(), strict=True):
         assert sp.expand(a - b) == 0
 
 

@@ -120,12 +120,12 @@ def test_sums_over_links_and_the_rest_are_the_link(name: str) -> None:
     sums = summed(link, ("omega",))
     assert sums is not None
     assert (len(sums.sources), any(sums.rest)) == (sources, remains)
-    for rate, row, rest in zip(link.rhs, sums.products, sums.rest, strict=True):
-        total = rest + sum(shared * own * target * source for shared, own, target, source in row)
+    for rate, row, remainder in zip(link.rhs, sums.products, sums.rest, strict=True):
+        total = remainder + sum(shared * of_link * target * source for shared, of_link, target, source in row)
         assert sp.expand(sp.expand_trig(rate - total)) == 0
-        for shared, own, target, source in row:
+        for shared, of_link, target, source in row:
             assert not shared.free_symbols & {X, Y, X_J, Y_J, OMEGA, OMEGA_J, W}
-            assert own.free_symbols <= {W}
+            assert of_link.free_symbols <= {W}
             assert not target.free_symbols & {X_J, Y_J, OMEGA_J}
             assert not source.free_symbols & {X, Y, OMEGA}
 
@@ -137,7 +137,7 @@ def test_links_whose_products_lose_digits_stay_as_they_are(name: str) -> None:
 
 def test_numbers_of_a_link_stand_with_its_weight() -> None:
     sums = summed(edge(K * A * W * sp.sin(GAP)), (), ("a",))
-    assert {own for _, own, *_ in sums.products[0]} == {A * W}
+    assert {of_link for _, of_link, *_ in sums.products[0]} == {A * W}
 
 
 @pytest.mark.parametrize("rate", [W * sp.tanh(A * X_J), sp.tanh(W * X_J), W * X_J * sp.exp(-A * X)])

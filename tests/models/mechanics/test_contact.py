@@ -8,14 +8,11 @@ import sympy as sp
 from parts import node
 from scipy.integrate import quad
 
-from synchain.models.definitions.inline import Lagrangian, friction_law
+from synchain.models import Lagrangian, Scene, friction_law, topology
 from synchain.models.dynamics.reduction import substitute_constants
-from synchain.models.graphs.families import topology
 from synchain.models.mechanics.contact import SLIP
 from synchain.models.mechanics.events import set_valued
-from synchain.models.scenes.scene import Scene
-from synchain.runtime.stability.exponents import exponents
-from synchain.runtime.sweeps.run import run
+from synchain.runtime import exponents, run
 
 X, V, W, MU = (sp.Symbol(name, real=True) for name in ("x", "v", "w", "mu"))
 FORCE = sp.Function("f", real=True)
@@ -31,8 +28,8 @@ def test_the_derived_node_is_the_smooth_one_away_from_the_jump() -> None:
     ground = sp.Symbol("theta_b", real=True)
     for sign in (1, -1):
         at = {V: ground - sign * sp.Rational(1, 3)}
-        found = exact.rhs[1].xreplace({SLIP: sp.Integer(sign)}).xreplace(at)
-        assert sp.simplify(found - plain.rhs[1].xreplace(at)) == 0
+        rate = exact.rhs[1].xreplace({SLIP: sp.Integer(sign)}).xreplace(at)
+        assert sp.simplify(rate - plain.rhs[1].xreplace(at)) == 0
     assert exact.rhs[1].xreplace({SLIP: sp.S.Zero}) == 0
     (event,) = exact.events
     assert event.target == ground
@@ -93,8 +90,8 @@ def test_friction_in_slip_is_the_law(law: sp.Expr) -> None:
     for value in (sp.Rational(-2, 3), sp.Rational(3, 2)):
         assert (event.departures[0] - slow).xreplace({MU: value}).evalf() == pytest.approx(0, abs=1e-8)
         for w in map(sp.Rational, ("-1", "-0.3", "-0.1", "0.1", "0.3", "1")):
-            found = rate.xreplace({V: -w, SLIP: sp.sign(w), MU: value})
-            assert float(found) == pytest.approx(float(law.xreplace({W: w, MU: value})))
+            force = rate.xreplace({V: -w, SLIP: sp.sign(w), MU: value})
+            assert float(force) == pytest.approx(float(law.xreplace({W: w, MU: value})))
 
 
 @pytest.mark.parametrize("n", [1, 9])

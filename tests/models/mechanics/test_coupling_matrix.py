@@ -18,18 +18,14 @@ from variational_reference import ALPHA, deviation_names, transversal_equations
 
 from synchain.codegen.program.lowering import lower
 from synchain.codegen.program.printers import LANES
-from synchain.models import chain, ring
+from synchain.models import Scene, chain, from_matrix, load_scene, ring, text
 from synchain.models.definitions.definition import OSCILLATOR
 from synchain.models.dynamics.network import network
-from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.plugins import names
 from synchain.models.interactions.coupling import MatrixCoupling
 from synchain.models.mechanics.components import Node
 from synchain.models.mechanics.oscillator import FieldModel
-from synchain.models.presentation.equations_text import text
-from synchain.models.scenes.file import load_scene
-from synchain.models.scenes.scene import Scene
-from synchain.runtime.sweeps.run import run
+from synchain.runtime import run
 
 STATE = ("x", "y", "z")
 WEIGHT, SIGMA = sp.symbols("weight sigma", real=True)

@@ -37,10 +37,10 @@ TEXTS = st.recursive(st.sampled_from(["x", "z", "k", "t", "pi", "1", "2", "0.1",
 @settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 def test_texts_of_models_make_them_again(text: str) -> None:
     try:
-        kept = exact("e", text, NAMES)
+        expression = exact("e", text, NAMES)
     except ValueError:
         return  # refused at the definition
-    assert read("e", written(kept), NAMES) == kept
+    assert read("e", written(expression), NAMES) == expression
 
 
 @pytest.mark.parametrize(
@@ -55,11 +55,11 @@ def test_texts_of_models_make_them_again(text: str) -> None:
 )
 def test_signs_before_sums(text: str) -> None:
     x, z, k, t = NAMES.values()
-    kept = exact("e", text, NAMES)
-    assert read("e", written(kept), NAMES) == kept
-    place = {x: 0.3, z: -0.7, k: 1.1, t: 0.9}
+    expression = exact("e", text, NAMES)
+    assert read("e", written(expression), NAMES) == expression
+    point = {x: 0.3, z: -0.7, k: 1.1, t: 0.9}
     value = eval(text, {"x": 0.3, "z": -0.7, "k": 1.1, "t": 0.9, "cos": sp.cos, "sin": sp.sin})
-    assert float(kept.subs(place)) == pytest.approx(float(value))
+    assert float(expression.subs(point)) == pytest.approx(float(value))
 
 
 def test_a_model_that_runs_can_be_saved() -> None:
@@ -76,7 +76,7 @@ def test_limits_of_quotients_are_equal_elsewhere() -> None:
         "x*abs(x)**-1.5",
         "k*x/sqrt(abs(k))",
     ):
-        kept = exact("e", text, {"x": x, "k": k})
+        expression = exact("e", text, {"x": x, "k": k})
         for at in (0.3, -0.7, 2.5):
             value = eval(text, {"x": at, "k": -1.7, "sqrt": np.sqrt, "abs": abs})
-            assert float(kept.subs({x: at, k: -1.7})) == pytest.approx(value, rel=1e-14), text
+            assert float(expression.subs({x: at, k: -1.7})) == pytest.approx(value, rel=1e-14), text

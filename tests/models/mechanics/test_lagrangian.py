@@ -77,11 +77,11 @@ def test_energy_balance_of_every_oscillator(name: str, form: object) -> None:
 
 def test_energy_balance_of_the_friction_oscillator_by_hand() -> None:
     """The belt does the work epsilon f(theta_b - v) v; the driven end -dL/dt = u omega sin(omega t) (x - u cos(omega t))."""
-    found, _ = nondimensional(oscillator_of("friction")).energy_rate()
+    rate, _ = nondimensional(oscillator_of("friction")).energy_rate()
     epsilon, belt, u, omega = sp.symbols("epsilon theta_b u omega", real=True)
     f = sp.Function("f", real=True)
     end = u * sp.cos(omega * TIME)
-    assert sp.expand(found - epsilon * f(belt - v) * v - u * omega * sp.sin(omega * TIME) * (x - end)) == 0
+    assert sp.expand(rate - epsilon * f(belt - v) * v - u * omega * sp.sin(omega * TIME) * (x - end)) == 0
 
 
 def test_energy_balance_notices_a_wrong_force() -> None:

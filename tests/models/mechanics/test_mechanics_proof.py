@@ -12,10 +12,9 @@ from mechanics_proof import PARTICLES, T, by_kane, by_lagrange, residual, vanish
 from parts import edge, node, oscillator_of
 from parts import law_of as friction_law
 
+from synchain.models import Topology, topology
 from synchain.models.definitions.definition import OSCILLATOR
 from synchain.models.dynamics.network import network
-from synchain.models.graphs.families import topology
-from synchain.models.graphs.topology import Topology
 from synchain.models.inputs.plugins import names
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional
@@ -39,9 +38,9 @@ def accelerations(oscillator: str, coupling: str | None, graph: Topology, orient
         for q, v in zip(names_of[:half], names_of[half:], strict=True)
         for i in range(graph.n)
     }
-    found = equations.rhs()[half * graph.n :]
+    accelerations_of_all = equations.rhs()[half * graph.n :]
     keys = [f"{q}_{i + 1}" for q in names_of[:half] for i in range(graph.n)]
-    return {key: e.xreplace(rates) for key, e in zip(keys, found, strict=True)}
+    return {key: e.xreplace(rates) for key, e in zip(keys, accelerations_of_all, strict=True)}
 
 
 def check(method: object, oscillator: str, coupling: str | None, graph: Topology, on: tuple[str, ...] = ()) -> None:

@@ -14,14 +14,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from parts import edge, is_lagrangian, node, oscillator_of, parameters
 
-from synchain.models import oscillators
+from synchain.models import Oscillator, Parameter, oscillators
 from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.inputs.plugins import PluginKind, load, names
 from synchain.models.mechanics.calculus import cancelled, operations
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.nondimensional import FRICTION, nondimensional, physical, scale
-from synchain.models.mechanics.oscillator import Oscillator
-from synchain.models.mechanics.parameter import Parameter, dimension
+from synchain.models.mechanics.parameter import dimension
 
 x, v = sp.symbols("x v", real=True)
 theta_b, epsilon, u, omega = sp.symbols("theta_b epsilon u omega", real=True)
@@ -35,14 +34,14 @@ OWNERS = [
 def test_eq_2_from_the_physical_lagrangian() -> None:
     m, k = sp.symbols("m k", positive=True)
     drive, frequency, belt, load_on_belt = sp.symbols("U Omega v_b F_N", real=True)
-    found = physical(oscillator_of("friction")).accelerations()
+    acceleration = physical(oscillator_of("friction")).accelerations()
     expected = (-k * (x - drive * sp.cos(frequency * TIME)) + load_on_belt * FRICTION(belt - v)) / m
-    assert sp.expand(found[0] - expected) == 0
+    assert sp.expand(acceleration[0] - expected) == 0
 
 
 def test_eq_3_comes_out_of_the_scaling() -> None:
-    (found,) = nondimensional(oscillator_of("friction")).accelerations()
-    assert found == -x + u * sp.cos(omega * TIME) + epsilon * FRICTION(theta_b - v)
+    (acceleration,) = nondimensional(oscillator_of("friction")).accelerations()
+    assert acceleration == -x + u * sp.cos(omega * TIME) + epsilon * FRICTION(theta_b - v)
 
 
 def test_eq_3_with_the_law_of_eqs_4_and_5() -> None:
@@ -94,8 +93,8 @@ def test_physical_and_scaled_motion_agree_in_numbers(
     derived = node("friction", "exponential", "atan")
     symbols = [TIME, *derived.state, *derived.parameters]
     values = [t, at, rate, *(value[s.name] for s in derived.parameters)]
-    found = derived.rhs[1].subs(dict(zip(symbols, values, strict=True)))
-    assert float(found) == pytest.approx(by_hand, rel=1e-12, abs=1e-12)
+    acceleration = derived.rhs[1].subs(dict(zip(symbols, values, strict=True)))
+    assert float(acceleration) == pytest.approx(by_hand, rel=1e-12, abs=1e-12)
 
 
 def test_coupling_scales_with_the_oscillators_own_spring() -> None:
@@ -224,10 +223,10 @@ def test_cancelling_changes_the_text_of_an_equation_alone(name: str) -> None:
     functions = [sp.lambdify(symbols, form, [{"f": math.tanh}, "math"]) for form in forms]
     random = Random(name)
     for _ in range(20):
-        place = [random.uniform(0.1, 2.0) for _ in symbols]
-        expected = functions[0](*place)
+        point = [random.uniform(0.1, 2.0) for _ in symbols]
+        expected = functions[0](*point)
         for function in functions[1:]:
-            assert function(*place) == pytest.approx(expected, rel=1e-13, abs=1e-13)
+            assert function(*point) == pytest.approx(expected, rel=1e-13, abs=1e-13)
 
 
 def test_long_equations_and_shorter_ones_stay_as_they_were_derived() -> None:
@@ -291,11 +290,11 @@ def test_unreadable_units(unit: str) -> None:
 
 @pytest.mark.parametrize(("kind", "name"), OWNERS)
 def test_every_plug_in_declares_itself(kind: PluginKind, name: str) -> None:
-    made = load(kind, name)
-    assert made.name == name
-    assert made.summary.strip()
-    assert any(character.isdigit() for character in made.source), "a source has a year or a volume"
-    assert all(isinstance(parameter, Parameter) and parameter.meaning for parameter in made.parameters.values())
+    part = load(kind, name)
+    assert part.name == name
+    assert part.summary.strip()
+    assert any(character.isdigit() for character in part.source), "a source has a year or a volume"
+    assert all(isinstance(parameter, Parameter) and parameter.meaning for parameter in part.parameters.values())
 
 
 def test_table_1_is_the_default() -> None:

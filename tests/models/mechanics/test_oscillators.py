@@ -11,20 +11,16 @@ import sympy as sp
 from parts import is_lagrangian, node, oscillator_of
 from scipy.integrate import solve_ivp
 
-from synchain.models import chain, ring, star
+from synchain.models import Scene, Section, chain, from_matrix, ring, star
 from synchain.models.definitions.definition import OSCILLATOR
 from synchain.models.dynamics.network import oriented_links
 from synchain.models.dynamics.variational import source_slopes
-from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.inputs.plugins import names
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.energy import energy
-from synchain.models.scenes.scene import Scene
-from synchain.models.scenes.section import Section
 from synchain.models.sweeps.initial_values import default_start
-from synchain.runtime.stability.exponents import exponents
-from synchain.runtime.sweeps.run import run
+from synchain.runtime import exponents, run
 
 X, Y, Z, V = sp.symbols("x y z v", real=True)
 A, B, C, P, Q, MU, U = sp.symbols("a b c p q mu u", real=True)
@@ -195,10 +191,10 @@ def test_the_fermi_pasta_ulam_ring_is_that_of_the_report() -> None:
     n, alpha, beta = 5, *sp.symbols("fput_alpha fput_beta", real=True)
     equations = Scene(oscillator="mass", coupling="fput", topology=ring(n)).equations
     x = sp.symbols(f"x_1:{n + 1}", real=True)
-    for i, found in enumerate(equations.rhs()[n:]):
+    for i, rate in enumerate(equations.rhs()[n:]):
         right, left = x[(i + 1) % n] - x[i], x[i] - x[i - 1]
         written = right - left + alpha * (right**2 - left**2) + beta * (right**3 - left**3)
-        assert sp.expand(found.subs(sp.Symbol("sigma", real=True), 1) - written) == 0
+        assert sp.expand(rate.subs(sp.Symbol("sigma", real=True), 1) - written) == 0
 
 
 def test_a_chain_is_drawn_from_its_first_node_and_a_star_from_its_hub() -> None:

@@ -10,15 +10,14 @@ from catalogue import FORCES, LAGRANGIAN
 from mechanics_proof import vanishes
 from parts import oscillator_of
 
-from synchain.models import Parameter, Potential, Rates, chain, complete, ends, ring
+from synchain.models import Oscillator, Parameter, Potential, Rates, Scene, chain, complete, ends, ring
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.lagrangian import total_derivative
-from synchain.models.mechanics.oscillator import Coordinate, LagrangianModel, Oscillator
+from synchain.models.mechanics.oscillator import Coordinate, LagrangianModel
 from synchain.models.scenes.energy import energy
 from synchain.models.scenes.file import load_scene
-from synchain.models.scenes.scene import Scene
 from synchain.runtime.results.energy_of_states import energy_function
 
 
@@ -30,10 +29,10 @@ def scene_of(oscillator: str, coupling: str, n: int = 2, **more: object) -> Scen
 def balance(scene: Scene) -> sp.Expr:
     """dE/dt along the equations of the whole network less the power, in state symbols."""
     equations = scene.equations
-    found, power = energy(scene).whole()
+    total, power = energy(scene).whole()
     state, half = sp.symbols(equations.state, real=True), equations.dimension // 2
     rates = equations.rhs()
-    return total_derivative(found, state[:half], state[half:], rates[half:]) - power
+    return total_derivative(total, state[:half], state[half:], rates[half:]) - power
 
 
 @pytest.mark.parametrize("coupling", FORCES)
@@ -51,12 +50,12 @@ def test_the_power_of_every_oscillator_with_a_spring(oscillator: str) -> None:
 def test_the_power_of_a_cart_with_pendulums_that_is_joined_to_another() -> None:
     """In numbers: the symbolic proof of one of them alone is in test_lagrangian.py, and two would take minutes."""
     scene = scene_of("belt_double_pendulum", "spring on x", parameters={"sigma": 0.4, "damping": 0.2})
-    found, power = energy(scene).whole()
+    total, power = energy(scene).whole()
     state, half = sp.symbols(scene.equations.state, real=True), scene.equations.dimension // 2
     at = dict(zip(state, np.random.default_rng(3).uniform(-1, 1, 2 * half), strict=True))
     at |= {sp.Symbol(name, real=True): value for name, value in scene.parameters.items()}
     rates = sp.lambdify(list(at), scene.equations.rhs(), cse=True)(*at.values())
-    slopes = sp.lambdify(list(at), [found.diff(s) for s in state])(*at.values())
+    slopes = sp.lambdify(list(at), [total.diff(s) for s in state])(*at.values())
     gained = float(power.xreplace(at))
     assert float(np.dot(slopes, rates)) == pytest.approx(gained, rel=1e-12)
     assert abs(gained) > 1e-3
@@ -80,12 +79,12 @@ def unequal() -> dict[str, Scene]:
 def test_the_power_of_unequal_nodes_and_of_links_with_inertia(name: str) -> None:
     """In 40 digits at random states: M is solved by numbers, as the equations are."""
     scene = unequal()[name]
-    eq, (found, power) = scene.equations, energy(scene).whole()
+    eq, (total, power) = scene.equations, energy(scene).whole()
     state, random = sp.symbols(eq.state, real=True), np.random.default_rng(3)
     symbols = [TIME, *state, *sp.symbols(eq.parameters, real=True)]
     mass = sp.Matrix(sp.SparseMatrix(eq.dimension, eq.dimension, eq.mass())) if eq.inertial else sp.eye(eq.dimension)
-    made = [found.diff(TIME), [found.diff(s) for s in state], eq.rhs(), mass, power]
-    of = [sp.lambdify(symbols, e, "mpmath") for e in made]
+    terms = [total.diff(TIME), [total.diff(s) for s in state], eq.rhs(), mass, power]
+    of = [sp.lambdify(symbols, e, "mpmath") for e in terms]
     with mpmath.workdps(40):
         for _ in range(3):
             at = [mpmath.mpf(value) for value in random.uniform(0.2, 1.3, len(symbols))]
@@ -104,7 +103,7 @@ def test_what_conserves_energy(coupling: str) -> None:
 def test_what_has_no_energy() -> None:
     one_way = from_matrix([[0, 0], [1, -1]])
     uneven = from_matrix([[-1, 1, 0], [1, -3, 2], [0, 3, -3]])
-    for given, message in (
+    for keywords, message in (
         ({"oscillator": "lorenz", "coupling": "x->x", "topology": chain(2)}, "'lorenz' is a vector field"),
         ({"oscillator": "harmonic", "coupling": "x->v", "topology": chain(2)}, "the coupling 'x->v' has none"),
         ({"oscillator": "harmonic", "topology": one_way}, "found one-way links, first from 1 to 2 in"),
@@ -112,7 +111,7 @@ def test_what_has_no_energy() -> None:
         ({"contact": "set-valued"}, "set-valued friction does work that is no function of the state"),
     ):
         with pytest.raises(ValueError, match=message):
-            energy(Scene(**given))
+            energy(Scene(**keywords))
 
 
 def pendulums() -> Scene:
@@ -132,10 +131,10 @@ def test_arrays_have_the_energy_of_the_exact_expression(scene: Scene) -> None:
                        for real in sp.symbols(names, real=True))]  # fmt: skip
     values = [scene.parameters[name] for name in scene.equations.parameters]
     found_both = function(states, 0.7), function.power(states, 0.7)
-    for found, exact in zip(found_both, function.exact.whole(), strict=True):
+    for value, exact in zip(found_both, function.exact.whole(), strict=True):
         written = sp.lambdify(symbols, exact)(0.7, *np.moveaxis(states, -1, 0), *values)
-        assert found.shape == (2, 5)
-        assert np.allclose(found, written, rtol=1e-13, atol=1e-13)
+        assert value.shape == (2, 5)
+        assert np.allclose(value, written, rtol=1e-13, atol=1e-13)
     name = scene.equations.edges[0].parameters[0].name
     other = function(states, parameters={name: scene.parameters[name] + 0.4})
     assert (np.abs(other - function(states)).max() > 0.1) == (str(scene.coupling) != "damper")
@@ -180,9 +179,9 @@ def test_bodies_of_different_masses_have_an_energy_and_rates_have_none() -> None
     gravity = Potential(-g * w * i.m * j.m / sp.sqrt((i.x - j.x) ** 2 + (i.y - j.y) ** 2), {g: 1})
     for masses in ([1.0, 2.0, 3.0], 1.0):
         scene = Scene(oscillator=body, coupling=gravity, topology=complete(3), parameters={"m": masses})
-        found, power = energy(scene).whole()
+        total, power = energy(scene).whole()
         states = [sp.Symbol(name, real=True) for name in scene.equations.state]
-        drift = sum(found.diff(s) * rate for s, rate in zip(states, scene.equations.rhs(), strict=True))
+        drift = sum(total.diff(s) * rate for s, rate in zip(states, scene.equations.rhs(), strict=True))
         values = {s: sp.Rational(3 * k + 1, 7) for k, s in enumerate(sorted(drift.free_symbols, key=str))}
         assert power == 0
         assert abs(sp.N(drift.xreplace(values), 30)) < 1e-25

@@ -8,11 +8,7 @@ from pathlib import Path
 import pytest
 
 import synchain.models
-from synchain.models import chain, circulant, erdos_renyi, torus
-from synchain.models.graphs.families import topology
-from synchain.models.graphs.products import cartesian
-from synchain.models.scenes.file import load_scene
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, cartesian, chain, circulant, erdos_renyi, load_scene, topology, torus
 
 
 def test_families_take_their_options_as_functions() -> None:

@@ -241,11 +241,11 @@ def test_any_mutated_table_is_an_oscillator_or_one_clear_line(data: st.DataObjec
     tree: dict = copy.deepcopy(TABLE)
     for path in data.draw(st.lists(st.sampled_from(paths(TABLE)[1:]), min_size=1, max_size=2)):
         *inside, last = path
-        place: object = tree
+        branch: object = tree
         try:
             for key in inside:
-                place = place[key]  # type: ignore[index]
-            place[last] = data.draw(ANYTHING)  # type: ignore[index]
+                branch = branch[key]  # type: ignore[index]
+            branch[last] = data.draw(ANYTHING)  # type: ignore[index]
         except (LookupError, TypeError):
             pass  # an earlier change removed this place
     try:

@@ -21,13 +21,11 @@ from catalogue import paths
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synchain.models import Scene, cartesian, chain, complete, ring, star, weighted
-from synchain.models.graphs.topology import Topology, from_matrix
+from synchain.models import Axis, Scene, Section, Topology, cartesian, chain, complete, ring, star, weighted
+from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.scenes.file import load_scene, scene_names
 from synchain.models.scenes.scene import KEYWORDS
-from synchain.models.scenes.section import Section
-from synchain.models.sweeps.axis import Axis
 
 TABLE_1 = {
     "theta_b": 0.1,
@@ -746,14 +744,14 @@ def test_any_mutated_scene_is_a_scene_or_one_clear_line(data: st.DataObject) -> 
     tree = copy.deepcopy(VALID)
     for path in data.draw(st.lists(st.sampled_from(paths(VALID)[1:]), min_size=1, max_size=2)):
         *inside, last = path
-        place = tree
+        branch = tree
         try:
             for key in inside:
-                place = place[key]
+                branch = branch[key]
             if data.draw(st.booleans()):
-                place[last] = data.draw(ANYTHING)
-            elif isinstance(place, dict):
-                place[data.draw(st.text(max_size=6))] = place.pop(last)
+                branch[last] = data.draw(ANYTHING)
+            elif isinstance(branch, dict):
+                branch[data.draw(st.text(max_size=6))] = branch.pop(last)
         except (LookupError, TypeError):
             pass  # an earlier change removed this place
     scene, words = outcome(tree)

@@ -13,12 +13,11 @@ from typing import Any
 import pytest
 from jsonschema import Draft4Validator, Draft7Validator
 
-from synchain.models import Scene, Topology, load_scene, scene_names
+from synchain.models import Axis, Scene, Topology, load_scene, scene_names
 from synchain.models.graphs.families import family, names
 from synchain.models.networks.model import Group
 from synchain.models.scenes.scene import KEYWORDS
 from synchain.models.scenes.schema import _of_type, schema
-from synchain.models.sweeps.axis import Axis
 
 SCHEMA = schema()
 DRAFTS = [Draft4Validator(SCHEMA), Draft7Validator(SCHEMA)]
@@ -168,7 +167,7 @@ def test_ranges_are_those_of_the_scene() -> None:
 
 
 def test_parameters_are_named_with_the_parts_that_have_them() -> None:
-    known = SCHEMA["properties"]["parameters"]["properties"]
+    allowed = SCHEMA["properties"]["parameters"]["properties"]
     scene = load_scene("figure_4a")
-    assert set(scene.parameters) <= set(known)
-    assert known["theta_b"]["description"].startswith("belt_double_pendulum: belt speed; friction: belt speed")
+    assert set(scene.parameters) <= set(allowed)
+    assert allowed["theta_b"]["description"].startswith("belt_double_pendulum: belt speed; friction: belt speed")

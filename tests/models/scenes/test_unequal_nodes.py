@@ -14,18 +14,12 @@ from variational_reference import transversal_equations
 from synchain.codegen.export.python import to_python
 from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
-from synchain.models import Field, Lagrangian, chain, link_energy, ring, star
+from synchain.models import Field, Lagrangian, Scene, chain, from_matrix, link_energy, load_scene, ring, star, text
 from synchain.models.dynamics.equations import Equations
-from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Node
-from synchain.models.presentation.equations_text import text
-from synchain.models.scenes.file import load_scene
-from synchain.models.scenes.scene import Scene
+from synchain.runtime import exponents, open_result, run
 from synchain.runtime.cells.reduce import reduce_scene
-from synchain.runtime.results.open import open_result
-from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.certify import certify
-from synchain.runtime.sweeps.run import run
 from synchain.runtime.synchronisation.probe import ring_of_three
 
 DUFFING = {"delta": [0.1, 0.2, 0.3], "omega": [1.0, 1.5, 2.0]}

@@ -19,11 +19,11 @@ ACTING = Rates({"x": "K*W*tanh(x_j)"}, {"K": 0.1})
 
 def told(made: Callable[[], Scene]) -> list[str]:
     """The warnings while a scene is made, all of them at this file."""
-    with warnings.catch_warnings(record=True) as found:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         made()
-    assert all(each.filename == __file__ for each in found)
-    return [str(each.message) for each in found]
+    assert all(each.filename == __file__ for each in caught)
+    return [str(each.message) for each in caught]
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ def test_random_matrices_with_corners(n: int) -> None:
     stream = random.Random(n)
     for share in (1.0, 0.7):
         near = [(i, (i + step) % n) for i in range(n) for step in (-1, 0, 1)]
-        entries = {place: stream.randint(-9, 9) for place in near if stream.random() < share}
+        entries = {position: stream.randint(-9, 9) for position in near if stream.random() < share}
         assert banded(n, entries)
         assert cyclic(n, entries) == dense(n, entries)
 
@@ -37,7 +37,7 @@ def test_random_forests(n: int) -> None:
         names = stream.sample(range(n), n)
         links = [(names[i], names[stream.randrange(i)]) for i in range(1, n) if stream.random() < share]
         places = [(i, i) for i in range(n)] + links + [(j, i) for i, j in links if stream.random() < share]
-        entries = {place: stream.randint(-9, 9) for place in places}
+        entries = {position: stream.randint(-9, 9) for position in places}
         assert forest(n, entries) == dense(n, entries)
 
 

@@ -31,16 +31,16 @@ def floats(matrix: Topology | GraphMatrix) -> np.ndarray:
 
 def assert_right(matrix: Topology | GraphMatrix, spaces: tuple[Eigenspace, ...]) -> None:
     """All eigenvectors, independent: by floats, apart from the proof."""
-    given, columns = floats(matrix), []
+    matrix_values, columns = floats(matrix), []
     for space in spaces:
         assert space.dimension == len(space.basis) == space.eigenvalue.geometric
         for vector in space.values:
-            found = np.array(vector)
-            assert np.max(np.abs(found)) == pytest.approx(1.0, rel=1e-15)
-            assert given @ found == pytest.approx(
-                space.eigenvalue.value * found, abs=1e-12 * max(1.0, np.abs(given).max())
+            values = np.array(vector)
+            assert np.max(np.abs(values)) == pytest.approx(1.0, rel=1e-15)
+            assert matrix_values @ values == pytest.approx(
+                space.eigenvalue.value * values, abs=1e-12 * max(1.0, np.abs(matrix_values).max())
             )
-            columns.append(found)
+            columns.append(values)
     assert np.linalg.matrix_rank(np.array(columns, complex), tol=1e-8) == len(columns)
     if matrix.diagonalisable:
         assert len(columns) == matrix.n

@@ -12,10 +12,9 @@ import sympy as sp
 from catalogue import CLOSED
 from family_sizes import size, sizes
 
-from synchain.models import chain, one_way_ring, ring, star
+from synchain.models import Topology, chain, one_way_ring, ring, star
 from synchain.models.graphs.families import family, topology
 from synchain.models.graphs.products import cartesian, complement, kronecker, union, weighted
-from synchain.models.graphs.topology import Topology
 from synchain.models.spectra.characteristic import characteristic
 from synchain.models.spectra.eigenvalue import ProofError
 from synchain.models.spectra.modular import _characteristic, _claimed, _powers, _primes, _unit, check_modulo
@@ -85,20 +84,20 @@ def test_the_polynomial_modulo_a_prime_is_that_of_the_whole_numbers() -> None:
 def test_a_claim_modulo_a_prime_is_that_of_the_whole_numbers() -> None:
     """-2 ± sqrt(2), -2 and -1 ± I: z^5 + 8 z^4 + 24 z^3 + 36 z^2 + 28 z + 8, multiplied by hand."""
     values = [-2 + sp.sqrt(2), -2 - sp.sqrt(2), sp.Integer(-2), -1 + sp.I, -1 - sp.I]
-    found = [_powers(number) for number in values]
-    known = [(powers, 1) for powers in found if powers is not None]
-    m = lcm(*(t.denominator for (_, terms), _ in known for t, _ in terms))
+    all_powers = [_powers(number) for number in values]
+    claims = [(powers, 1) for powers in all_powers if powers is not None]
+    m = lcm(*(t.denominator for (_, terms), _ in claims for t, _ in terms))
     (p,) = islice(_primes(m, "b"), 1)
-    assert [int(c) for c in _claimed(known, m, p).coeffs()] == [8, 28, 36, 24, 8, 1]
+    assert [int(c) for c in _claimed(claims, m, p).coeffs()] == [8, 28, 36, 24, 8, 1]
 
 
 @pytest.mark.parametrize("m", [1, 2, 7, 360, 2000])
 def test_primes_and_roots_of_unity(m: int) -> None:
-    found = list(islice(_primes(m, "seed"), 3))
-    assert len(set(found)) == 3
-    assert found == list(islice(_primes(m, "seed"), 3))
-    assert found != list(islice(_primes(m, "other"), 3))
-    for p in found:
+    primes = list(islice(_primes(m, "seed"), 3))
+    assert len(set(primes)) == 3
+    assert primes == list(islice(_primes(m, "seed"), 3))
+    assert primes != list(islice(_primes(m, "other"), 3))
+    for p in primes:
         assert sp.isprime(p)
         assert p % m == 1 % m
         assert 2**61 <= p < 2**62

@@ -22,16 +22,15 @@ from family_sizes import size, sizes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from synchain.models import Spectrum, Topology, from_graph, from_matrix, topology
 from synchain.models.algebra.cosines import biquadratic, cosine, linear_cosine, minimal_polynomial
 from synchain.models.algebra.isolation import discs, sign
 from synchain.models.algebra.roots import ComplexRoot, RealRoot, roots
-from synchain.models.graphs.families import family, names, topology
-from synchain.models.graphs.readers import from_graph
-from synchain.models.graphs.topology import Topology, from_matrix
+from synchain.models.graphs.families import family, names
 from synchain.models.spectra.characteristic import characteristic
 from synchain.models.spectra.eigenvalue import Eigenvalue, ProofError, ordered
 from synchain.models.spectra.solve import Proof, spectrum
-from synchain.models.spectra.spectrum import Spectrum, table
+from synchain.models.spectra.spectrum import table
 
 ONE = Fraction(1)
 fresh: Callable[..., Spectrum] = spectrum.__wrapped__
@@ -84,11 +83,11 @@ def test_closed_forms_agree_with_numpy(name: str) -> None:
     for n in (size(name, 5), size(name, 40)):
         graph = topology(name, n)
         values = np.linalg.eigvalsh(floats(graph)) if graph.symmetric else np.linalg.eigvals(floats(graph))
-        found = np.array(expanded(graph.spectrum), complex)
-        gap = np.abs(found[:, None] - values[None, :])
+        eigenvalues = np.array(expanded(graph.spectrum), complex)
+        gap = np.abs(eigenvalues[:, None] - values[None, :])
         assert gap.min(axis=0).max() < 1e-11
-        assert np.sum(found) == pytest.approx(np.trace(floats(graph)))
-        assert np.sum(found**2) == pytest.approx(np.trace(floats(graph) @ floats(graph)))
+        assert np.sum(eigenvalues) == pytest.approx(np.trace(floats(graph)))
+        assert np.sum(eigenvalues**2) == pytest.approx(np.trace(floats(graph) @ floats(graph)))
 
 
 @pytest.mark.parametrize("n", [7, 9])
@@ -201,8 +200,8 @@ def test_all_connected_graphs_of_few_nodes_against_numpy(largest: int) -> None:
         assert exact.verified
         assert exact.n == n
         assert exact.eigenvalues[0] == Eigenvalue(sp.S.Zero, 1)
-        numbers = np.linalg.eigvalsh(-networkx.laplacian_matrix(graph).toarray().astype(float))
-        assert np.sort(expanded(exact)) == pytest.approx(numbers, rel=1e-12, abs=1e-12)
+        expected = np.linalg.eigvalsh(-networkx.laplacian_matrix(graph).toarray().astype(float))
+        assert np.sort(expanded(exact)) == pytest.approx(expected, rel=1e-12, abs=1e-12)
     assert [counts[n] for n in range(1, largest + 1)] == [1, 1, 2, 6, 21, 112, 853][:largest]
 
 
@@ -494,16 +493,16 @@ def test_cancellation_costs_no_digits() -> None:
 
 def test_conjugates_stay_together_where_real_parts_agree() -> None:
     values = [-1 + 2 * sp.I, sp.S(-3), -1 - sp.I, sp.S.Zero, -1 - 2 * sp.I, -1 + sp.I]
-    found = ordered([Eigenvalue(number, 1) for number in values])
-    assert [e.value for e in found] == [0, -1 - 1j, -1 + 1j, -1 - 2j, -1 + 2j, -3]
+    eigenvalues = ordered([Eigenvalue(number, 1) for number in values])
+    assert [e.value for e in eigenvalues] == [0, -1 - 1j, -1 + 1j, -1 - 2j, -1 + 2j, -3]
 
 
 def test_numbers_closer_than_floats_are_ordered_and_told_apart() -> None:
     tiny = sp.Rational(1, 10**40)
     values = [-sp.sqrt(2) - tiny, -sp.sqrt(2) + tiny, -sp.sqrt(2)]
-    found = ordered([Eigenvalue(number, 1) for number in values])
-    assert [e.number for e in found] == [values[1], values[2], values[0]]
-    assert Spectrum(found).largest == values[0]
+    eigenvalues = ordered([Eigenvalue(number, 1) for number in values])
+    assert [e.number for e in eigenvalues] == [values[1], values[2], values[0]]
+    assert Spectrum(eigenvalues).largest == values[0]
     with pytest.raises(ProofError, match="two of 2 eigenvalues coincide"):
         ordered([Eigenvalue(sp.S(-2), 1), Eigenvalue(sp.S(-2), 1)])
 
@@ -672,11 +671,11 @@ def test_the_largest_of_equal_size_is_the_first() -> None:
 def test_large_matrices_take_the_fast_route(n: int, share: float, monkeypatch: pytest.MonkeyPatch) -> None:
     graph = integer_graph(n, share, 3)
     monkeypatch.setattr("synchain.models.algebra.roots.discs", lambda f: discs(f) or pytest.fail("Arb is slow"))
-    found, calls = effort(lambda: fresh(graph))
+    eigenvalues, calls = effort(lambda: fresh(graph))
     assert calls < 2_000 * n  # 670 with the newest packages, 1900 with the lowest allowed
-    assert found.verified
+    assert eigenvalues.verified
     expected = np.linalg.eigvalsh(floats(graph))
-    assert np.sort(expanded(found)) == pytest.approx(expected, rel=1e-12, abs=1e-11)
+    assert np.sort(expanded(eigenvalues)) == pytest.approx(expected, rel=1e-12, abs=1e-11)
 
 
 @pytest.mark.parametrize("name", ["chain", "ring"])
@@ -685,9 +684,9 @@ def test_two_hundred_nodes_of_a_family_are_proved_without_general_algebra(
 ) -> None:
     graph = topology(name, 200)
     monkeypatch.setattr(sp, "minimal_polynomial", None)
-    found, calls = effort(lambda: fresh(graph))
+    eigenvalues, calls = effort(lambda: fresh(graph))
     assert calls < 4_200 * graph.n
-    assert found.verified
+    assert eigenvalues.verified
 
 
 def test_the_precision_of_arb_is_left_as_it_was() -> None:

@@ -8,15 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from synchain.models.graphs.families import topology
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, topology
+from synchain.runtime import Criterion, Status, open_result, run, thresholds
 from synchain.runtime.cells.reduce import explain, reduce_scene
 from synchain.runtime.plots.result_plot import draw_result
-from synchain.runtime.results.open import open_result
-from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps.run import run
-from synchain.runtime.synchronisation.criterion import Criterion
-from synchain.runtime.synchronisation.threshold import thresholds
 
 pytestmark = pytest.mark.long
 

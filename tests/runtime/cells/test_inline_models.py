@@ -10,9 +10,8 @@ import sympy as sp
 from sympy.physics.mechanics import dynamicsymbols
 
 import synchain as sc
+from synchain.models import Oscillator, Scene
 from synchain.models.definitions.loader import load_oscillator
-from synchain.models.mechanics.oscillator import Oscillator
-from synchain.models.scenes.scene import Scene
 from synchain.runtime.cli import main
 from synchain.runtime.engines.scene_kernels import kernel_source
 

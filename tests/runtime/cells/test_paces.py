@@ -21,12 +21,12 @@ def test_slopes_of_large_nodes_are_those_of_their_jacobian(monkeypatch):
     equations = sc.Scene(sc.Field(rates, parameters={"a": 2.0}), None, initial=dict.fromkeys(rates, 1.0)).equations
     node, rng = equations.nodes[0], np.random.default_rng(1)
     assert is_large(equations)
-    states, numbers, times = rng.uniform(0.1, 2.0, (4, size)), np.full((4, 1), 1.3), np.linspace(0.0, 3.0, 4)
+    states, parameters, times = rng.uniform(0.1, 2.0, (4, size)), np.full((4, 1), 1.3), np.linspace(0.0, 3.0, 4)
     states[3, 2] = 0.0
     time = next(iter({s for e in node.rhs for s in e.free_symbols} - {*node.state, *node.parameters}))
     jacobian = sp.lambdify([*node.state, *node.parameters, time], sp.Matrix(node.jacobian()), "numpy")
     with np.errstate(all="ignore"):
         expected = [jacobian(*y, 1.3, t) for y, t in zip(states, times, strict=True)]
     monkeypatch.setattr(type(node), "jacobian", lambda node: 1 / 0)
-    found = Templates(equations).blocks(states, numbers, times)[:, 0]
-    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+    blocks = Templates(equations).blocks(states, parameters, times)[:, 0]
+    np.testing.assert_allclose(blocks, expected, rtol=1e-12, atol=1e-12)

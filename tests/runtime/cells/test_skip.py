@@ -10,19 +10,14 @@ import xarray as xr
 from samples import source_of
 
 from benchmarks import skip as bench
-from synchain.models import chain, ring, star
+from synchain.models import Axis, Scene, chain, from_matrix, ring, star
 from synchain.models.dynamics import reduction as reduction_module
-from synchain.models.graphs.topology import from_matrix
-from synchain.models.scenes.scene import Scene
-from synchain.models.sweeps.axis import Axis
+from synchain.runtime import Result, Status, kernel, run
 from synchain.runtime.cells import reduce as skip_module
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.cells.reduce import explain, reduce_scene
 from synchain.runtime.cli import main
-from synchain.runtime.engines.scene_kernels import kernel, kernel_source
-from synchain.runtime.results.result import Result
-from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps.run import run
+from synchain.runtime.engines.scene_kernels import kernel_source
 
 RECORDS = ("sync_error", "section", "trajectory")
 DUFFING = Scene(
@@ -41,15 +36,15 @@ def compare(scene: Scene, tolerance: float = 1e-9, nodes: int | None = None, **o
     chosen = reduce_scene(scene, **options)
     assert chosen.skipped
     assert chosen.equations.n == (nodes or scene.n)
-    fewer, whole = (run(scene, reduce=skip, width=1) for skip in (chosen, False))  # scalar kernels compile fast
-    assert set(fewer.data) == set(whole.data)
-    for name in whole.data:
-        assert fewer.data[name].dims == whole.data[name].dims
+    fewer, full = (run(scene, reduce=skip, width=1) for skip in (chosen, False))  # scalar kernels compile fast
+    assert set(fewer.data) == set(full.data)
+    for name in full.data:
+        assert fewer.data[name].dims == full.data[name].dims
         limit = 1e-5 if name == "sync_error_max" else tolerance  # taken at the steps, whose ends round differently
         if name not in ("steps", "rejected"):
-            np.testing.assert_allclose(fewer.data[name], whole.data[name], rtol=0, atol=limit, err_msg=name)
+            np.testing.assert_allclose(fewer.data[name], full.data[name], rtol=0, atol=limit, err_msg=name)
     assert fewer.success
-    assert whole.data.attrs["skipped"] == "nothing"
+    assert full.data.attrs["skipped"] == "nothing"
     assert fewer.data.attrs["skipped"] == "; ".join(chosen.skipped)
     return fewer
 
@@ -192,8 +187,8 @@ def test_a_wrong_way_back_is_caught(monkeypatch):
     right = skip_module.NodeMerge.expand
 
     def turned(self, found):
-        made = right(self, found)
-        return replace(made, end=made.end[:, ::-1].copy()) if self.merges else made
+        values = right(self, found)
+        return replace(values, end=values.end[:, ::-1].copy()) if self.merges else values
 
     monkeypatch.setattr(skip_module.NodeMerge, "expand", turned)
     with pytest.raises(AssertionError, match="end"):
@@ -244,12 +239,12 @@ def test_cells_that_did_not_run_have_no_synchronisation_error():
     scene = DUFFING.replace(initial={"x": 0.5}, axes={"sigma": [0.1, 0.3]})
     buffers = Buffers.empty(2, 2, 3, 7)
     buffers.counts[0, 0] = Status.FINISHED
-    made = reduce_scene(scene).expand(buffers)
-    assert made.end.shape == (2, 6)
-    assert made.points.shape == (2, 3, 7)
-    assert made.samples.shape == (2, 7, 6)
-    assert made.sums[0, :3].tolist() == [0, 0, 0]
-    assert np.isnan(made.sums[1]).all()
+    expanded = reduce_scene(scene).expand(buffers)
+    assert expanded.end.shape == (2, 6)
+    assert expanded.points.shape == (2, 3, 7)
+    assert expanded.samples.shape == (2, 7, 6)
+    assert expanded.sums[0, :3].tolist() == [0, 0, 0]
+    assert np.isnan(expanded.sums[1]).all()
 
 
 # -- kernels, words, benchmark -------------------------------------------------------------------------------
@@ -272,9 +267,9 @@ def test_the_kernel_of_a_scene_is_the_one_that_runs(scene):
     shown = kernel(scene)
     assert (shown.digest, shown.equations.digest) == (result.data.attrs["kernel"], result.data.attrs["equations"])
     assert kernel_source(scene).text == shown.source
-    whole = kernel_source(scene, reduce=False)
-    assert whole.equations == scene.equations
-    assert (whole.digest == shown.digest) is not bool(reduce_scene(scene).skipped)
+    source = kernel_source(scene, reduce=False)
+    assert source.equations == scene.equations
+    assert (source.digest == shown.digest) is not bool(reduce_scene(scene).skipped)
 
 
 def test_scenes_that_differ_in_numbers_share_a_kernel():

@@ -18,19 +18,16 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import Scene, chain
+from synchain.models import Scene, chain, load_scene, scene_names
 from synchain.models.graphs.families import names as families
-from synchain.models.scenes.file import load_scene, scene_names
 from synchain.models.scenes.schema import schema
-from synchain.runtime import commands
+from synchain.runtime import ExponentWindows, commands, open_result
 from synchain.runtime.cli import main
 from synchain.runtime.console.outcome import print_json
 from synchain.runtime.engines import job, scene_kernels
-from synchain.runtime.results.open import open_result
 from synchain.runtime.sweeps import stream
 from synchain.runtime.synchronisation import threshold
 from synchain.runtime.synchronisation.criterion import PAPER
-from synchain.runtime.synchronisation.exponent_windows import ExponentWindows
 
 SCENE = """
 title = "short"
@@ -288,9 +285,9 @@ def test_a_numba_that_does_not_compile_is_no_bug(scene: str, tmp_path: Path) -> 
 def test_settings_reach_the_scene(scene: str, tmp_path: Path) -> None:
     settings = ["--set", "sigma=0.1", "--set", "x_1=0.1,0.2", "window=3", "max_steps=5000"]
     assert main(["run", scene, "--out", str(tmp_path), *settings]) == 0
-    found = open_result(tmp_path / "short.nc").scene
-    assert [(axis.name, axis.values) for axis in found.axes] == [("x_1", (0.1, 0.2))]
-    assert (found.parameters["sigma"], found.window, found.max_steps) == (0.1, 3.0, 5000)
+    changed = open_result(tmp_path / "short.nc").scene
+    assert [(axis.name, axis.values) for axis in changed.axes] == [("x_1", (0.1, 0.2))]
+    assert (changed.parameters["sigma"], changed.window, changed.max_steps) == (0.1, 3.0, 5000)
 
 
 def test_cells_that_fail_are_said_and_the_file_is_still_written(
@@ -339,9 +336,9 @@ def test_an_interrupted_run_is_kept_and_resumed(
     assert sum(driven) == 20 - done
     assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == ["short.nc", "short.png"]
     assert main(["run", scene, "--out", str(tmp_path / "whole")]) == 0
-    whole, resumed = (open_result(tmp_path / name / "short.nc") for name in ("whole", "cut"))
-    np.testing.assert_array_equal(whole.end, resumed.end)
-    np.testing.assert_array_equal(whole.sync_error, resumed.sync_error)
+    uncut, resumed = (open_result(tmp_path / name / "short.nc") for name in ("whole", "cut"))
+    np.testing.assert_array_equal(uncut.end, resumed.end)
+    np.testing.assert_array_equal(uncut.sync_error, resumed.sync_error)
 
 
 def test_an_interrupt_before_the_first_cell_writes_nothing(
@@ -475,10 +472,10 @@ def test_thresholds_in_a_hurry(monkeypatch: pytest.MonkeyPatch, capsys: pytest.C
     monkeypatch.setattr(threshold, "thresholds", fake_thresholds(asked))
     for words in ("", "--quick", "--quick --starts 2 --sigma 0:1:3"):
         assert main(["thresholds", "--n", "2", "--omega", "1.15", *words.split()]) == 0
-    full, quick, own = (a["criterion"] for a in asked)
+    full, quick, set_by_user = (a["criterion"] for a in asked)
     assert full == threshold.Criterion()
     assert (quick.starts, quick.transient) == (5, 400.0)
-    assert (own.starts, own.transient) == (2, 400.0)
+    assert (set_by_user.starts, set_by_user.transient) == (2, 400.0)
     assert [len(a["sigma"]) for a in asked] == [241, 121, 3]
     assert [a["resolution"] for a in asked] == [None, 2e-3, 2e-3]
 

@@ -55,8 +55,8 @@ def test_the_script_is_of_the_shell(script: tuple[str, Path]) -> None:
 
 def test_the_script_has_all_names(script: tuple[str, Path]) -> None:
     text = (script[1] / "script").read_text()
-    known = {*commands(), *scene_names(), *families(), *figures(extra=True), "--certify"}
-    assert [name for name in known if name.removeprefix("--") not in text] == []
+    offered = {*commands(), *scene_names(), *families(), *figures(extra=True), "--certify"}
+    assert [name for name in offered if name.removeprefix("--") not in text] == []
 
 
 CASES = [

@@ -26,11 +26,11 @@ def test_a_sound_installation_without_a_cache(tmp_path: Path, monkeypatch, capsy
     assert main(["doctor", "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["sound"] is True
-    found = {check["name"]: check for check in report["checks"]}
-    assert list(found) == list(doctor.CHECKS)
-    assert found.pop("cache")["outcome"] == "doubtful"
-    assert {check["outcome"] for check in found.values()} == {"fine"}
-    assert "error" in found["trajectory"]["found"]
+    checks = {check["name"]: check for check in report["checks"]}
+    assert list(checks) == list(doctor.CHECKS)
+    assert checks.pop("cache")["outcome"] == "doubtful"
+    assert {check["outcome"] for check in checks.values()} == {"fine"}
+    assert "error" in checks["trajectory"]["found"]
 
 
 def test_one_line_a_check(capsys) -> None:

@@ -15,7 +15,7 @@ from test_load import SOURCE
 
 from synchain.codegen.machine_code import compile as loading
 from synchain.models.presentation.writer import Latex
-from synchain.runtime import cli
+from synchain.runtime import cli, run
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.cli import main
 from synchain.runtime.console.arguments import spaced
@@ -24,7 +24,6 @@ from synchain.runtime.engines.scene_kernels import warn_of_chords, write_kernel
 from synchain.runtime.prediction.synchronisability import Window
 from synchain.runtime.support.error_text import interval_text, with_error
 from synchain.runtime.sweeps.certify import check_certifiable
-from synchain.runtime.sweeps.run import run
 from synchain.runtime.sweeps.stream import claim
 
 LARGE = {"sigma": np.linspace(0, 1, 1000), "x_1": np.linspace(0, 1, 1000), "x_2": np.linspace(0, 1, 1000)}

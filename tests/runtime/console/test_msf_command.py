@@ -17,16 +17,12 @@ import pytest
 from figure_samples import rows
 
 import synchain.runtime
-from synchain.models import chain, complete
-from synchain.models.graphs.topology import Topology, read_matrix
-from synchain.models.inputs.plugins import allow_code
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, Topology, allow_code, chain, complete, read_matrix
+from synchain.runtime import MSF, Exponents, Plane
 from synchain.runtime.cli import main
 from synchain.runtime.prediction.synchronisability import Answer
 from synchain.runtime.stability import orbits
 from synchain.runtime.stability.attractor import Attractor, Motion
-from synchain.runtime.stability.exponents import Exponents
-from synchain.runtime.stability.msf import MSF, Plane
 
 ONE_WAY = "-1 1 0\n0 -1 1\n1 0 -1\n"
 LOW, HIGH = 0.1, 0.6
@@ -71,8 +67,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
         return MSF(scene, alpha, line(alpha))
 
     def plane(scene: Scene, alpha: Any = None, beta: Any = None, parameters: Any = None, **options: Any) -> Plane:
-        given = {"alpha": alpha, "beta": beta, "parameters": parameters, **options}
-        collected.append({"scene": scene, **{name: value for name, value in given.items() if value is not None}})
+        keywords = {"alpha": alpha, "beta": beta, "parameters": parameters, **options}
+        collected.append({"scene": scene, **{name: value for name, value in keywords.items() if value is not None}})
         return (
             disc(scene, np.asarray(alpha), np.asarray(beta)) if parameters is None else mapped(scene, alpha, parameters)
         )
@@ -255,13 +251,13 @@ def test_where_the_grid_ends_no_mode_is_lost_and_no_is_not_said() -> None:
 
 def test_windows_in_python_are_those_of_the_command() -> None:
     for end, error in ((0.4, 1e-3), (1.2, math.inf)):
-        found = function(Scene(topology=chain(2)), end=end, error=error)
-        (window,) = found.windows
-        (told,) = found.as_dict()["windows"]
+        result = function(Scene(topology=chain(2)), end=end, error=error)
+        (window,) = result.windows
+        (window_as_dict,) = result.as_dict()["windows"]
         assert window.low_mode is not None
-        assert told["low_mode"] == window.low_mode.eigenvalue.text
-        assert (window.high_mode is None) == (told["high_mode"] is None) == (end < HIGH)
-        assert (told["low"], told["high"]) == (window.low, window.high)
+        assert window_as_dict["low_mode"] == window.low_mode.eigenvalue.text
+        assert (window.high_mode is None) == (window_as_dict["high_mode"] is None) == (end < HIGH)
+        assert (window_as_dict["low"], window_as_dict["high"]) == (window.low, window.high)
 
 
 def test_a_ratio_within_the_error_is_undecided() -> None:
@@ -341,15 +337,15 @@ def test_windows_in_the_plane_are_those_of_the_line_for_real_eigenvalues() -> No
 def test_a_mode_that_leaves_the_plane_ends_the_search_and_not_the_window(tmp_path: Path) -> None:
     scene = Scene(topology=read_matrix(matrix(tmp_path)))
     alpha, wide, low = np.linspace(0.0, 1.2, 121), np.linspace(0.0, 0.7, 71), np.linspace(0.0, 0.1, 11)
-    (whole,) = disc(scene, alpha, wide).windows
+    (window,) = disc(scene, alpha, wide).windows
     (cut,) = disc(scene, alpha, low).windows
-    assert cut.low == pytest.approx(whole.low, abs=1e-4)
+    assert cut.low == pytest.approx(window.low, abs=1e-4)
     assert cut.high == pytest.approx(0.1 / (math.sqrt(3) / 2))
-    assert whole.high > cut.high
+    assert window.high > cut.high
     assert cut.high_mode is None
-    assert whole.high_mode is not None
+    assert window.high_mode is not None
     mirrored = disc(scene, alpha, -wide[::-1]).windows
-    assert (mirrored[0].low, mirrored[0].high) == pytest.approx((whole.low, whole.high), abs=1e-6)
+    assert (mirrored[0].low, mirrored[0].high) == pytest.approx((window.low, window.high), abs=1e-6)
 
 
 # -- maps over parameters
@@ -369,11 +365,11 @@ def test_report_of_a_map_over_alpha_and_a_parameter(
     assert value(text, "attractor") == "aperiodic (2 of 3 starts); periodic (1 of 3 starts)"
     assert "drive" not in text  # omega is an axis
     assert "sigma  " not in text
-    (given,) = asked
-    assert given["parameters"] == {"omega": (0.5, 1.0, 1.5)}
-    assert given["alpha"].tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
-    assert given["starts"] == 1
-    assert given["scene"].parameters["kappa"] == 1e4
+    (call,) = asked
+    assert call["parameters"] == {"omega": (0.5, 1.0, 1.5)}
+    assert call["alpha"].tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
+    assert call["starts"] == 1
+    assert call["scene"].parameters["kappa"] == 1e4
     assert sorted(path.name for path in tmp_path.iterdir()) == ["plane.csv", "plane.png"]
     assert list(rows(tmp_path / "plane.csv")[0]) == ["alpha", "omega", "exponent", "stderr"]
     assert main(["msf", "figure_8", "--set", "omega=1,1.5"]) == 0
@@ -392,11 +388,11 @@ def test_report_of_a_map_over_two_parameters(asked: list[dict[str, Any]], capsys
         "gamma = -1, at 6 of 15 points",
     ]
     assert "500 units of time (111 drive periods)" in text
-    (given,) = asked
-    assert "alpha" not in given
-    assert given["parameters"] == {"sigma": (0.0, 0.5, 1.0, 1.5, 2.0), "kappa": (0.5, 1.0, 1.5)}
-    assert given["scene"].parameters["a"] == 2.0
-    assert given["scene"].topology.name == "star"
+    (call,) = asked
+    assert "alpha" not in call
+    assert call["parameters"] == {"sigma": (0.0, 0.5, 1.0, 1.5, 2.0), "kappa": (0.5, 1.0, 1.5)}
+    assert call["scene"].parameters["a"] == 2.0
+    assert call["scene"].topology.name == "star"
     assert main([*content.split(), "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["modes"] == ["(-1)", "(-3)"]

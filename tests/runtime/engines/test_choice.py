@@ -11,13 +11,12 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from synchain.models import Field, Scene, chain
-from synchain.runtime import run
+from synchain.runtime import Status, run
 from synchain.runtime.cells.plan import CellRows
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.engines.choice import chosen_for_rows
 from synchain.runtime.engines.scene_kernels import kernel_source, ladder_of
 from synchain.runtime.stability.orbits import OrbitProblem
-from synchain.runtime.support.status import Status
 from synchain.runtime.synchronisation.probe import ring_of_three
 
 
@@ -156,8 +155,10 @@ def test_the_probe_looks_at_its_strongest_ring():
 
     def method(alpha: float) -> str:
         values = {**scene.parameters, "mode_alpha": alpha, "mode_beta": 0.0}
-        numbers = np.array([[values[name] for name in equations.parameters]])
-        return chosen_for_rows(scene, equations, CellRows(np.full((1, 6), 0.1), numbers, np.full((1, 7), 100.0))).name
+        parameters = np.array([[values[name] for name in equations.parameters]])
+        return chosen_for_rows(
+            scene, equations, CellRows(np.full((1, 6), 0.1), parameters, np.full((1, 7), 100.0))
+        ).name
 
     assert (method(1.0), method(100.0)) == ("taylor", "rodas5p")
 

@@ -12,14 +12,12 @@ import pytest
 from figure_samples import TINY, Simulation, drawn, parabola, rows, words
 from matplotlib.colors import to_rgba
 
-from synchain.models import chain, complete
-from synchain.models.scenes.file import load_scene
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, chain, complete, load_scene
+from synchain.runtime import MSF, Plane
 from synchain.runtime.paper import exponent_figure, load, plane_figure, synchronisability_map
 from synchain.runtime.paper.figure_runs import QUICK, FigureRuns, Quality
 from synchain.runtime.paper.make import make
 from synchain.runtime.plots import style
-from synchain.runtime.stability.msf import MSF, Plane
 from synchain.runtime.synchronisation.criterion import PAPER
 
 
@@ -31,12 +29,12 @@ def simulation(monkeypatch: pytest.MonkeyPatch) -> Simulation:
 
 def test_exponents_are_drawn_with_their_stable_range_and_error(simulation: Simulation) -> None:
     panels, data = drawn("msf", FigureRuns(TINY))
-    assert [found.scene.parameters["omega"] for found in data] == [1.15, 1.4, 1.55]
-    for panel, found, (low, high) in zip(panels, data, ((0.0, 0.466), (0.09, 0.6), (0.176, 0.594)), strict=True):
+    assert [function.scene.parameters["omega"] for function in data] == [1.15, 1.4, 1.55]
+    for panel, function, (low, high) in zip(panels, data, ((0.0, 0.466), (0.09, 0.6), (0.176, 0.594)), strict=True):
         band = next(patch for patch in panel.patches if patch.get_facecolor() == to_rgba(style.GREY))
         assert (band.get_x(), band.get_x() + band.get_width()) == pytest.approx((low, high), abs=1e-3)
-        (line,) = (line for line in panel.lines if len(line.get_xdata()) == len(found.fine.alpha))
-        np.testing.assert_allclose(line.get_ydata(), (found.fine.alpha - low) * (found.fine.alpha - high))
+        (line,) = (line for line in panel.lines if len(line.get_xdata()) == len(function.fine.alpha))
+        np.testing.assert_allclose(line.get_ydata(), (function.fine.alpha - low) * (function.fine.alpha - high))
         cloud = panel.collections[0].get_paths()[0].vertices
         at_end = cloud[np.isclose(cloud[:, 0], 1.2), 1]
         assert at_end.max() - at_end.min() == pytest.approx(4 * 1e-3, rel=1e-3)  # two standard errors either side
@@ -193,8 +191,8 @@ def test_the_map_is_that_of_most_starts() -> None:
     alpha, sigma = np.linspace(0.0, 3.0, 31), np.array([0.1, 0.5])
     often, seldom = 0.2 - alpha, alpha - 0.2
     data = synchronisability_map.Map(np.array([1.0]), alpha, sigma, np.array([[often, seldom, often]]), ("a; b",))
-    found = synchronisability_map.largest_exponent(data, chain(3))  # gamma = -1 and -3
-    np.testing.assert_allclose(found, [[0.1, -0.3]])
+    largest = synchronisability_map.largest_exponent(data, chain(3))  # gamma = -1 and -3
+    np.testing.assert_allclose(largest, [[0.1, -0.3]])
 
 
 def test_the_map_is_written_with_a_column_for_each_network(simulation: Simulation, tmp_path: Path) -> None:
@@ -220,7 +218,7 @@ def test_the_map_is_written_with_a_column_for_each_network(simulation: Simulatio
 
 def test_a_tiny_function_from_a_real_run() -> None:
     runs = FigureRuns(Quality(points=3, criterion=replace(PAPER, starts=1, transient=2.0)), workers=1)
-    (found, *_) = (exponent_figure.curve(load_scene("figure_5"), runs),)
-    assert found.alpha.tolist() == [0.0, 0.6, 1.2]
-    assert found.exponent[0] < 0 < found.exponent[1]
-    assert found.attractors == ("periodic, 2 drive periods",)
+    (curve, *_) = (exponent_figure.curve(load_scene("figure_5"), runs),)
+    assert curve.alpha.tolist() == [0.0, 0.6, 1.2]
+    assert curve.exponent[0] < 0 < curve.exponent[1]
+    assert curve.attractors == ("periodic, 2 drive periods",)

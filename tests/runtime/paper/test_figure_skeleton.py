@@ -50,17 +50,17 @@ def test_it_is_made_when_asked_for() -> None:
 @pytest.mark.long
 def test_the_orbit_runs_through_the_motion_and_beyond() -> None:
     (branch,) = small().branches
-    assert [place.kind for place in branch] == [None, None, "period doubling", None]
+    assert [point.kind for point in branch] == [None, None, "period doubling", None]
     assert branch[2].value == pytest.approx(DOUBLING, abs=1e-11)
     cloud = skeleton_figure.points(small().motion)
-    for place in (branch[0], branch[-1]):
-        own = cloud[np.abs(cloud[:, 0] - place.value) < 1e-9, 1]
-        assert len(own) > 40
-        (x,) = place.x
-        if place.value < DOUBLING:
-            np.testing.assert_allclose(own, x, atol=2e-5)  # the motion is this orbit, up to 0.945^150 of the start
+    for point in (branch[0], branch[-1]):
+        nearby = cloud[np.abs(cloud[:, 0] - point.value) < 1e-9, 1]
+        assert len(nearby) > 40
+        (x,) = point.x
+        if point.value < DOUBLING:
+            np.testing.assert_allclose(nearby, x, atol=2e-5)  # the motion is this orbit, up to 0.945^150 of the start
         else:
-            assert own.min() < x - 1e-3 < x + 1e-3 < own.max()  # and goes round it
+            assert nearby.min() < x - 1e-3 < x + 1e-3 < nearby.max()  # and goes round it
 
 
 def test_stable_pieces_are_lines_and_unstable_ones_dashed() -> None:
@@ -89,13 +89,13 @@ def test_curves_stay_apart_where_crossings_change_places() -> None:
     """Of two crossings that one is first which the period of the drive begins with; the curves go on all the same."""
     (branch,) = small().branches
     pairs = ([0.6, 0.7], [0.71, 0.61], [0.62, 0.72], [0.63])
-    made = curves(tuple(BranchPoint(1.0 + k, branch[0].orbit, np.array(x)) for k, x in enumerate(pairs)))
-    assert [[x for _, x in line] for _, line in made] == [[0.6, 0.61, 0.62], [0.7, 0.71, 0.72]]
+    lines = curves(tuple(BranchPoint(1.0 + k, branch[0].orbit, np.array(x)) for k, x in enumerate(pairs)))
+    assert [[x for _, x in line] for _, line in lines] == [[0.6, 0.61, 0.62], [0.7, 0.71, 0.72]]
 
 
 def test_files_beside_the_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    known = small()
-    monkeypatch.setattr(skeleton_figure, "compute", lambda name, runs: known)
+    figure = small()
+    monkeypatch.setattr(skeleton_figure, "compute", lambda name, runs: figure)
     monkeypatch.setattr(maker, "QUICK", SMALL)
     written = make(["skeleton"], tmp_path, quick=True)
     assert {path.name for path in written} == {

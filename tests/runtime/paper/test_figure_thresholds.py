@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 from figure_samples import TINY, Simulation, drawn, rows, words
 
-from synchain.models import chain
-from synchain.models.scenes.file import load_scene
+from synchain.models import chain, load_scene
+from synchain.runtime import ExponentWindows
 from synchain.runtime.paper import load, published
 from synchain.runtime.paper import threshold_table as tables_of_thresholds
 from synchain.runtime.paper.figure_runs import QUICK, FigureRuns
 from synchain.runtime.paper.make import make
 from synchain.runtime.prediction.intervals import scale
-from synchain.runtime.synchronisation.exponent_windows import ExponentWindows
 from synchain.runtime.synchronisation.threshold import project
 
 
@@ -38,10 +37,10 @@ def test_projection_shows_probe_lines_and_network(simulation: Simulation, tmp_pa
     assert network.get_xlim() == lines.get_xlim()
     for axes in (probe, lines):
         assert any(patch.get_y() == pytest.approx(0.09) for patch in axes.patches)
-    (own,) = (axes for axes in probe.figure.axes if axes not in (probe, lines, network))
-    (ends,) = (line for line in own.lines if line.get_marker() == "o")
+    (inset,) = (axes for axes in probe.figure.axes if axes not in (probe, lines, network))
+    (ends,) = (line for line in inset.lines if line.get_marker() == "o")
     np.testing.assert_allclose(ends.get_ydata(), (0.09, 0.6), atol=1e-4)
-    assert own.get_ylim() == probe.get_ylim()
+    assert inset.get_ylim() == probe.get_ylim()
     for axes in (lines, network):
         assert any(patch.get_x() == pytest.approx(data.predicted[0][0]) for patch in axes.patches)
 
@@ -127,8 +126,8 @@ def test_exponents_are_right_where_the_quick_probe_is_not() -> None:
     """At n = 4, omega = 1.40 the quick probe finds [0.178, 0.179]; averages of 320 000 periods 0.1515 ± 0.0007, 0.1772 ± 0.0001."""
     runs = FigureRuns(QUICK)
     scene = tables_of_thresholds.scene_of(4, 1.4, runs)
-    found = tables_of_thresholds.windows_of(scene, runs)
-    ((low, high),), ((low_error, high_error),) = found.intervals, found.errors
+    windows = tables_of_thresholds.windows_of(scene, runs)
+    ((low, high),), ((low_error, high_error),) = windows.intervals, windows.errors
     assert 0.0 < high_error < low_error < 0.005
     assert abs(low - 0.1515) < 2 * low_error
     assert abs(high - 0.1772) < 2 * high_error
@@ -160,18 +159,18 @@ def test_a_row_without_exponents_says_why() -> None:
 
 def test_the_range_compared_is_the_one_that_shares_most() -> None:
     nearest = tables_of_thresholds.nearest
-    found = ((0.0, 0.01), (0.1, 0.2), (0.3, 0.6))
-    assert nearest(found, ((0.12, 0.35),)) == (0.1, 0.2)
-    assert nearest(found, ()) == (0.3, 0.6)
+    intervals = ((0.0, 0.01), (0.1, 0.2), (0.3, 0.6))
+    assert nearest(intervals, ((0.12, 0.35),)) == (0.1, 0.2)
+    assert nearest(intervals, ()) == (0.3, 0.6)
     assert nearest((), ((0.1, 0.2),)) is None
 
 
 def test_ragged_ranges_are_joined_over_narrow_gaps_only() -> None:
-    found = ((0.1, 0.12), (0.1205, 0.13), (0.1309, 0.14), (0.142, 0.15))
-    assert tables_of_thresholds.joined(found) == ((0.1, 0.14), (0.142, 0.15))
-    assert tables_of_thresholds.joined(found, 0.0) == found
+    intervals = ((0.1, 0.12), (0.1205, 0.13), (0.1309, 0.14), (0.142, 0.15))
+    assert tables_of_thresholds.joined(intervals) == ((0.1, 0.14), (0.142, 0.15))
+    assert tables_of_thresholds.joined(intervals, 0.0) == intervals
     assert tables_of_thresholds.joined(()) == ()
-    row = tables_of_thresholds.ThresholdRow(4, 1.4, found, (), ExponentWindows(), published.published(4, 1.4), 0, 9)
+    row = tables_of_thresholds.ThresholdRow(4, 1.4, intervals, (), ExponentWindows(), published.published(4, 1.4), 0, 9)
     assert "2 narrow gaps bridged; 1 more range measured" in row.remark
 
 

@@ -17,16 +17,14 @@ import numpy as np
 import pytest
 from figure_samples import TINY, Simulation, drawn, pretend, rows, words
 
-from synchain.models.scenes.file import load_scene, scene_names
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, load_scene, scene_names
+from synchain.runtime import Status, run
 from synchain.runtime.paper import load, names, projection, sync_error
 from synchain.runtime.paper import make as maker
 from synchain.runtime.paper.figure_runs import FULL, QUICK, FigureRuns, Quality, thin
 from synchain.runtime.paper.make import make
 from synchain.runtime.plots import style
 from synchain.runtime.plots.csv_table import as_csv
-from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps.run import run
 
 PAPER = (
     "figure_1b",
@@ -237,12 +235,12 @@ def test_an_interrupt_ends_the_figures_of_other_threads(monkeypatch: pytest.Monk
 
 
 def test_figures_at_a_time_share_their_runs() -> None:
-    runs, made, both = FigureRuns(TINY), [], Barrier(2, timeout=20.0)
+    runs, figures, both = FigureRuns(TINY), [], Barrier(2, timeout=20.0)
 
     def make_it() -> object:
         time.sleep(0.1)
-        made.append(object())
-        return made[0]
+        figures.append(object())
+        return figures[0]
 
     def ask(_: int) -> object:
         both.wait()
@@ -250,8 +248,8 @@ def test_figures_at_a_time_share_their_runs() -> None:
 
     with ThreadPoolExecutor(2) as pool:
         first, second = pool.map(ask, range(2))
-    assert first is second is made[0]
-    assert len(made) == 1
+    assert first is second is figures[0]
+    assert len(figures) == 1
 
 
 def test_a_table_has_rows_as_long_as_its_head() -> None:

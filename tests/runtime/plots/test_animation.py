@@ -9,8 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from synchain.models import chain, ring
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, chain, ring
 from synchain.runtime.plots.style import BLUE, ORANGE
 from synchain.runtime.sweeps.run import run
 

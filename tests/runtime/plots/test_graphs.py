@@ -17,11 +17,7 @@ from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 
-from synchain.models.graphs.families import topology
-from synchain.models.graphs.products import union
-from synchain.models.graphs.topology import Topology, from_matrix
-from synchain.models.scenes.file import load_scene
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, Topology, from_matrix, load_scene, topology, union
 from synchain.runtime.plots.graph_layout import positions
 from synchain.runtime.plots.graph_picture import NEGATIVE, Picture, svg
 

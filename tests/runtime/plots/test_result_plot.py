@@ -12,13 +12,10 @@ import pytest
 from figure_samples import pretend, words
 from matplotlib.axes import Axes
 
-from synchain.models import chain
+from synchain.models import Scene, chain, load_scene
 from synchain.models.dynamics.equations import Equations
-from synchain.models.scenes.file import load_scene
-from synchain.models.scenes.scene import Scene
+from synchain.runtime import Result, run
 from synchain.runtime.plots import result_plot, style
-from synchain.runtime.results.result import Result
-from synchain.runtime.sweeps.run import run
 
 
 @pytest.fixture(autouse=True)

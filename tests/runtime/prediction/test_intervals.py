@@ -25,8 +25,8 @@ def test_ends_are_found_to_the_resolution(points, first):
     def judge(x):
         return (np.searchsorted(ends, x) % 2 == 0) == first
 
-    found, verdict = find(judge, np.linspace(0, 1, 101), 1e-4)
-    flat = [e for interval in found for e in interval]
+    intervals, verdict = find(judge, np.linspace(0, 1, 101), 1e-4)
+    flat = [e for interval in intervals for e in interval]
     expected = ([0.0] if first else []) + list(ends) + ([1.0] if (len(ends) % 2 == 0) == first else [])
     np.testing.assert_allclose(flat, expected, atol=0.5e-4)
     assert verdict[0] == first
@@ -50,10 +50,10 @@ def test_a_bracket_narrows_to_the_change_next_to_its_good_end():
         asked.append(x.tolist())
         return (x <= 0.3) | ((x > 0.7) & (x < 0.9))
 
-    found, verdict = find(judge, np.array([0.0, 1.0]), 0.01, fan=3)
+    intervals, verdict = find(judge, np.array([0.0, 1.0]), 0.01, fan=3)
     assert asked[:3] == [[0.0, 1.0], [0.25, 0.5, 0.75], [0.3125, 0.375, 0.4375]]
     assert len(asked) == 5  # brackets of 1/4, 1/16, 1/64 and 1/256, the first below 0.01
-    assert found == [(0.0, 0.298828125)]  # the middle of the last one
+    assert intervals == [(0.0, 0.298828125)]  # the middle of the last one
     assert verdict.tolist() == [True, False]
 
 

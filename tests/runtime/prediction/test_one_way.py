@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from catalogue import nameless_one_way_ring
 
-from synchain.models.graphs.families import topology
-from synchain.models.graphs.topology import Topology
+from synchain.models import Topology, topology
 from synchain.runtime.prediction.intervals import intersect
 from synchain.runtime.prediction.synchronisability import windows, windows_complex
 
@@ -48,11 +47,11 @@ def test_the_modes_lost_first_are_named_and_only_upper_alpha_is_asked_for() -> N
         seen.append(alpha)
         return alpha.real <= 1.5
 
-    (found,) = windows_complex(wide, nameless_one_way_ring(4), GRID, 1e-7).windows
-    assert (found.low, found.low_error, found.low_mode) == (0.0, 0.0, None)
-    assert found.high == pytest.approx(0.75, abs=1e-7)
-    assert found.high_mode is not None
-    assert found.high_mode.eigenvalue.number == -2
+    (window,) = windows_complex(wide, nameless_one_way_ring(4), GRID, 1e-7).windows
+    assert (window.low, window.low_error, window.low_mode) == (0.0, 0.0, None)
+    assert window.high == pytest.approx(0.75, abs=1e-7)
+    assert window.high_mode is not None
+    assert window.high_mode.eigenvalue.number == -2
     assert all(np.all(alpha.imag >= 0) for alpha in seen)
     (narrow,) = windows_complex(lambda alpha: alpha.imag <= 0.5, nameless_one_way_ring(4), GRID, 1e-7).windows
     assert narrow.high == pytest.approx(0.5, abs=1e-7)

@@ -12,9 +12,8 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from synchain.models import Topology, from_matrix, topology
 from synchain.models.algebra.roots import RealRoot
-from synchain.models.graphs.families import topology
-from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.spectra.eigenvalue import Eigenvalue
 from synchain.models.spectra.eigenvalue_order import compare
 from synchain.models.spectra.jordan import geometric_multiplicity
@@ -86,41 +85,41 @@ def test_modes_straddle_ranges_and_the_modes_lost_first_are_named() -> None:
 
 def test_one_range_is_lost_by_the_slowest_mode_below_and_the_fastest_above() -> None:
     graph = topology("chain", 4)
-    (found,) = windows([(0.1, 2.0)], graph, [(0.01, 0.3)])
+    (window,) = windows([(0.1, 2.0)], graph, [(0.01, 0.3)])
     slow, fast = 2 - math.sqrt(2), 2 + math.sqrt(2)
-    assert (found.low, found.high) == pytest.approx((0.1 / slow, 2.0 / fast), rel=1e-14)
-    assert (found.low_error, found.high_error) == pytest.approx((0.01 / slow, 0.3 / fast), rel=1e-14)
-    assert found.low_mode is not None
-    assert found.high_mode is not None
-    assert (found.low_mode.number, found.high_mode.number) == (1, 3)
-    assert found.low_mode.eigenvalue.exact == -2 + sp.sqrt(2)
+    assert (window.low, window.high) == pytest.approx((0.1 / slow, 2.0 / fast), rel=1e-14)
+    assert (window.low_error, window.high_error) == pytest.approx((0.01 / slow, 0.3 / fast), rel=1e-14)
+    assert window.low_mode is not None
+    assert window.high_mode is not None
+    assert (window.low_mode.number, window.high_mode.number) == (1, 3)
+    assert window.low_mode.eigenvalue.exact == -2 + sp.sqrt(2)
 
 
 def test_ends_at_zero_and_infinity_have_no_mode_and_no_error() -> None:
-    (found,) = windows([(0.0, math.inf)], topology("ring", 5), [(0.1, 0.1)])
-    assert (found.low, found.high, found.low_mode, found.high_mode) == (0.0, math.inf, None, None)
-    assert (found.low_error, found.high_error) == (0.0, 0.0)
+    (window,) = windows([(0.0, math.inf)], topology("ring", 5), [(0.1, 0.1)])
+    assert (window.low, window.high, window.low_mode, window.high_mode) == (0.0, math.inf, None, None)
+    assert (window.low_error, window.high_error) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("ranges", [[(-3.5, -1.0), (-0.4, 0.9)], [(-2.0, 0.0)], [(-9.0, -0.5), (1.0, 4.0)]])
 def test_negative_sigma_is_served_by_negative_alpha(ranges: list[tuple[float, float]]) -> None:
     graph = topology("chain", 3)  # sigma and 3 sigma
     errors = [(0.01 * k, 0.02 * k) for k in range(1, 1 + len(ranges))]
-    found = windows(ranges, graph, errors)
+    sigma_windows = windows(ranges, graph, errors)
     back = windows([(0.0 - b, 0.0 - a) for a, b in ranges[::-1]], graph, [e[::-1] for e in errors[::-1]])
     ends = [(w.high, w.low, w.high_error, w.low_error, w.high_mode, w.low_mode) for w in back[::-1]]
-    assert [(-w.low, -w.high, w.low_error, w.high_error, w.low_mode, w.high_mode) for w in found] == ends
+    assert [(-w.low, -w.high, w.low_error, w.high_error, w.low_mode, w.high_mode) for w in sigma_windows] == ends
     expected = project(ranges, graph.spectrum, math.inf, -math.inf)
-    assert [list(p) for p in pieces(found)] == [pytest.approx(list(p), rel=1e-14) for p in expected]
+    assert [list(p) for p in pieces(sigma_windows)] == [pytest.approx(list(p), rel=1e-14) for p in expected]
 
 
 def test_a_window_across_zero_is_one() -> None:
-    (found,) = windows([(-0.6, 1.2)], topology("chain", 3), [(0.3, 0.6)])
-    assert (found.low, found.high) == pytest.approx((-0.2, 0.4))
-    assert (found.low_error, found.high_error) == pytest.approx((0.1, 0.2))
-    assert found.low_mode is not None
-    assert found.low_mode == found.high_mode
-    assert found.low_mode.size == 3.0
+    (window,) = windows([(-0.6, 1.2)], topology("chain", 3), [(0.3, 0.6)])
+    assert (window.low, window.high) == pytest.approx((-0.2, 0.4))
+    assert (window.low_error, window.high_error) == pytest.approx((0.1, 0.2))
+    assert window.low_mode is not None
+    assert window.low_mode == window.high_mode
+    assert window.low_mode.size == 3.0
 
 
 def test_parts_that_nothing_couples_ask_for_stability_at_zero() -> None:
@@ -351,11 +350,11 @@ def test_a_feed_forward_chain_has_one_eigenvector_for_all_its_modes() -> None:
 
 def test_missing_eigenvectors_of_irrational_modes_are_counted_exactly() -> None:
     graph = nested(topology("chain", 4))
-    found = {
+    multiplicities = {
         str(m.eigenvalue): (m.multiplicity, geometric_multiplicity(graph, m.eigenvalue))
         for m in transversal_modes(graph)
     }
-    assert found == {"-1": (2, 1), "-3 + sqrt(2)": (2, 1), "-3": (2, 1), "-3 - sqrt(2)": (2, 1)}
+    assert multiplicities == {"-1": (2, 1), "-3 + sqrt(2)": (2, 1), "-3": (2, 1), "-3 - sqrt(2)": (2, 1)}
 
 
 def test_modes_that_occur_twice_with_all_their_vectors_are_not_defective() -> None:

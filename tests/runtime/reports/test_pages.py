@@ -12,12 +12,9 @@ import pytest
 from kept_values import every_kind
 from matplotlib.axes import Axes
 
-from synchain.models.graphs.families import topology
-from synchain.models.graphs.topology import Topology
-from synchain.models.scenes.file import load_scene
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, Topology, load_scene, topology
+from synchain.runtime import run
 from synchain.runtime.reports.html import ROWS
-from synchain.runtime.sweeps.run import run
 
 NAME = '<b onclick="x">&'
 KINDS = every_kind()

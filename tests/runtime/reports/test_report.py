@@ -12,15 +12,11 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from synchain.models import Field
-from synchain.models.graphs.families import topology
-from synchain.models.scenes.file import load_scene
-from synchain.models.scenes.scene import Scene
+from synchain.models import Field, Scene, load_scene, topology
+from synchain.runtime import msf, run
 from synchain.runtime.cli import main
 from synchain.runtime.reports.html import provenance_rows
 from synchain.runtime.reports.scene_report import Effort, _ends, _strengths, report
-from synchain.runtime.stability.msf import msf
-from synchain.runtime.sweeps.run import run
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed")
@@ -38,12 +34,12 @@ def page() -> str:
 
 @pytest.fixture(scope="module")
 def folder(page: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    place = tmp_path_factory.mktemp("page")
-    (place / "page.html").write_text(page, encoding="utf-8")
+    folder_of_pages = tmp_path_factory.mktemp("page")
+    (folder_of_pages / "page.html").write_text(page, encoding="utf-8")
     for part in ("math", "img", "svg"):
         hidden = page.replace("</head>", f"<style>{part}{{visibility:hidden}}</style></head>")
-        (place / f"no_{part}.html").write_text(hidden, encoding="utf-8")
-    return place
+        (folder_of_pages / f"no_{part}.html").write_text(hidden, encoding="utf-8")
+    return folder_of_pages
 
 
 def browse(file: Path, *options: str) -> str:

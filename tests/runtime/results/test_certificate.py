@@ -10,19 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from synchain.models import Field
-from synchain.models.graphs.families import topology
-from synchain.models.scenes.scene import Scene
+from synchain.models import Field, Scene, topology
+from synchain.runtime import Status, SweepFailed, SweepInterrupted, exponents, open_result, run, stream
 from synchain.runtime.results.certificate import NEAR, VERDICTS, Certificate
-from synchain.runtime.results.open import open_result
-from synchain.runtime.stability.exponents import exponents
-from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps import certify as certification
 from synchain.runtime.sweeps.certify import certify
-from synchain.runtime.sweeps.errors import SweepFailed, SweepInterrupted
 from synchain.runtime.sweeps.prepare import PreparedRun
-from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.stream import stream
 
 SIGMA = np.array([0.05, 0.12, 0.3])
 
@@ -91,11 +84,11 @@ def test_when_an_early_end_is_safe() -> None:
     stderr = np.array([1e-3, 0.015, 1e-3, 1e-3, 1e-3])
     finished, mean = np.array([True, True, True, True, False]), np.array([0.0, 1.0, 1e-9, 1.0, 0.0])
     for size in (1e-9, 1.0):
-        made = Certificate(exponent, stderr, 1e-2 * one * [1, 1, 100, 1, 1], 5 * stderr, size * one)
-        assert list(made.near) == [NEAR * size, NEAR * size, 0.0, 0.0, 0.0]
-        assert list(made.verdicts(finished, size * mean, 10 * size * mean)) == [1, 6, 1, 5, 0]
-        assert list(made.verdicts(finished, 1e-4 * size * mean, 100 * size * mean)) == [1, 7, 1, 2, 0]
-    short = replace(made, margin=10 * stderr)  # of an average so short that its errors have long tails
+        certificate = Certificate(exponent, stderr, 1e-2 * one * [1, 1, 100, 1, 1], 5 * stderr, size * one)
+        assert list(certificate.near) == [NEAR * size, NEAR * size, 0.0, 0.0, 0.0]
+        assert list(certificate.verdicts(finished, size * mean, 10 * size * mean)) == [1, 6, 1, 5, 0]
+        assert list(certificate.verdicts(finished, 1e-4 * size * mean, 100 * size * mean)) == [1, 7, 1, 2, 0]
+    short = replace(certificate, margin=10 * stderr)  # of an average so short that its errors have long tails
     assert list(short.near) == [NEAR, 0.0, 0.0, 0.0, 0.0]
     assert list(short.verdicts(finished, mean, 10 * mean)) == [1, 5, 1, 5, 0]
 

@@ -17,12 +17,10 @@ import xarray as xr
 from kept_values import PAIR, every_kind
 
 import synchain.runtime
-from synchain.models.graphs.families import topology
+from synchain.models import topology
+from synchain.runtime import open_result, run, stream
 from synchain.runtime.results.labelled import Labelled
-from synchain.runtime.results.open import open_result
 from synchain.runtime.results.store import FORMS as KNOWN
-from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.stream import stream
 
 KINDS = every_kind()
 
@@ -44,7 +42,7 @@ def differences(first: Any, second: Any, where: str = "") -> list[str]:
     if type(first) is not type(second):
         return [f"{where}: {type(first).__name__} and {type(second).__name__}"]
     if is_dataclass(first) and type(first).__name__ not in ("Scene", "Topology"):
-        parts = [own.name for own in fields(first) if own.init]
+        parts = [attribute.name for attribute in fields(first) if attribute.init]
         return [
             line
             for name in parts
@@ -67,8 +65,8 @@ def differences(first: Any, second: Any, where: str = "") -> list[str]:
 def test_every_kind_is_among_the_values() -> None:
     """A result that is new gets data, a plot and a file, or this fails."""
     offered = [getattr(synchain.runtime, name) for name in synchain.runtime.__all__]
-    kept = {kind.__name__ for kind in offered if isinstance(kind, type) and issubclass(kind, Labelled)}
-    assert kept == {*KINDS, "Result", "Streamed"}
+    kinds = {kind.__name__ for kind in offered if isinstance(kind, type) and issubclass(kind, Labelled)}
+    assert kinds == {*KINDS, "Result", "Streamed"}
 
 
 @pytest.mark.parametrize("ending", FORMS)
@@ -138,11 +136,11 @@ def test_a_result_comes_back_in_every_form(result: Any, ending: str, tmp_path: P
 
 
 def test_a_streamed_result_has_data_and_is_saved_elsewhere(result: Any, tmp_path: Path) -> None:
-    made = stream(result.scene, tmp_path / "a.nc", show_progress=False)
-    assert made.data.identical(result.data)
-    made.save(tmp_path / "b.nc")
+    streamed = stream(result.scene, tmp_path / "a.nc", show_progress=False)
+    assert streamed.data.identical(result.data)
+    streamed.save(tmp_path / "b.nc")
     assert open_result(tmp_path / "b.nc").data.identical(result.data)
-    assert "a.nc" in repr(made)
+    assert "a.nc" in repr(streamed)
     with pytest.raises(
         ValueError, match=r"path: found '.*a\.csv'; expected a name that ends in \.nc or \.nc4 or \.zarr$"
     ):
@@ -167,9 +165,9 @@ def test_damage_is_seen(ending: str, tmp_path: Path) -> None:
     KINDS["Plane"].save(path)
     files = [path] if path.is_file() else sorted(p for p in path.rglob("exponent/*") if not p.name.startswith("."))
     text = bytearray(files[0].read_bytes())
-    place = text.find(np.array(0.25, ">f8" if ending == ".nc" else "<f8").tobytes())
-    place = place if place >= 0 else len(text) // 2  # compressed
-    text[place] ^= 1
+    index = text.find(np.array(0.25, ">f8" if ending == ".nc" else "<f8").tobytes())
+    index = index if index >= 0 else len(text) // 2  # compressed
+    text[index] ^= 1
     files[0].write_bytes(text)
     with pytest.raises(OSError, match="damaged"):
         open_result(path)
@@ -239,8 +237,8 @@ def test_a_damaged_file_leaves_no_traceback(monkeypatch: pytest.MonkeyPatch, tmp
     monkeypatch.setattr(sys, "unraisablehook", lambda found: ignored.append(found.exc_value))
     KINDS["Plane"].save(path)
     contents = path.read_bytes()
-    place = contents.index(b"OHDR") + 20  # the object header of the root group, which has a checksum
-    for damaged in (contents[:300], contents[:place] + bytes([contents[place] ^ 1]) + contents[place + 1 :]):
+    index = contents.index(b"OHDR") + 20  # the object header of the root group, which has a checksum
+    for damaged in (contents[:300], contents[:index] + bytes([contents[index] ^ 1]) + contents[index + 1 :]):
         path.write_bytes(damaged)
         with pytest.raises(OSError, match="the file is damaged"):
             open_result(path)

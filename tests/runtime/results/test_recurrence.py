@@ -7,10 +7,9 @@ import pytest
 import sympy as sp
 
 from benchmarks.energy import CASES
-from synchain.models.scenes.file import load_scene
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, load_scene
+from synchain.runtime import run
 from synchain.runtime.results.energy_of_states import energy_function
-from synchain.runtime.sweeps.run import run
 
 
 def test_the_linear_chain_moves_in_its_normal_modes() -> None:
@@ -33,8 +32,8 @@ FREQUENCY = 2 * np.sin(np.pi * K / 64)
 def first_mode(x: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Energy of mode 1 over that at the start, of the displacements and velocities (samples, 31) between the walls."""
     sine = np.sqrt(2 / 32) * np.sin(np.pi * K / 32)
-    found = (v @ sine) ** 2 + (FREQUENCY[0] * (x @ sine)) ** 2
-    return found / found[0]
+    energy = (v @ sine) ** 2 + (FREQUENCY[0] * (x @ sine)) ** 2
+    return energy / energy[0]
 
 
 def recurrence(t: np.ndarray, share: np.ndarray) -> tuple[float, float]:
@@ -52,15 +51,15 @@ def leapfrog(scene: Scene, step: float, count: int, every: int) -> tuple[np.ndar
     force = sp.lambdify([symbols], equations.rhs()[n:], cse=True)
     values = [scene.parameters[name] for name in equations.parameters]
     x, v = np.array(scene.y0[:n]), np.array(scene.y0[n:])
-    kept, pull = [np.concatenate([x, v])], np.array(force([*x, *values]))
+    states, pull = [np.concatenate([x, v])], np.array(force([*x, *values]))
     for k in range(count):
         v = v + step / 2 * pull
         x = x + step * v
         pull = np.array(force([*x, *values]))
         v = v + step / 2 * pull
         if (k + 1) % every == 0:
-            kept.append(np.concatenate([x, v]))
-    return step * every * np.arange(len(kept)), np.array(kept)
+            states.append(np.concatenate([x, v]))
+    return step * every * np.arange(len(states)), np.array(states)
 
 
 @pytest.mark.long
@@ -75,8 +74,8 @@ def test_the_energy_of_the_fput_chain_returns_to_its_first_mode() -> None:
     assert result.success
     states, t = result.states("trajectory")[:-1], result.time.values[:-1]
     assert np.abs(states[:, [0, 32, 64, 96]]).max() < 1e-10, "the walls rest"
-    found = energy_function(scene)(states)
-    assert np.abs(found / found[0] - 1).max() < 1e-8
+    energies = energy_function(scene)(states)
+    assert np.abs(energies / energies[0] - 1).max() < 1e-8
     ours, height = recurrence(t, first_mode(states[:, 1:32], states[:, 65:96]))
     published, _ = recurrence(*_shares(leapfrog(scene, 8**-0.5, 29_700, 10)))
     finer, _ = recurrence(*_shares(leapfrog(scene, 32**-0.5, 59_400, 20)))

@@ -9,15 +9,13 @@ import xarray as xr
 from synchain.codegen.driver.columns import SpanColumn
 from synchain.models import Field, Rates, Scene, chain, normal
 from synchain.models.inputs.names import ATTRIBUTES, TAKEN
-from synchain.runtime import follow, plane, run, skeleton
+from synchain.runtime import PeriodicOrbit, Result, Skeleton, follow, plane, run, skeleton
 from synchain.runtime.bifurcation import branches
 from synchain.runtime.bifurcation.bifurcations import Bifurcation
 from synchain.runtime.bifurcation.kinds import BifurcationKind
-from synchain.runtime.bifurcation.periodic import PeriodicOrbit
-from synchain.runtime.bifurcation.skeleton import Skeleton
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.results.certificate import Certificate
-from synchain.runtime.results.result import Result, gather
+from synchain.runtime.results.result import gather
 from synchain.runtime.stability import msf
 
 
@@ -35,11 +33,11 @@ def names_of(scene: Scene) -> set[str]:
 
 def test_no_result_of_a_run_has_other_names() -> None:
     link = Rates({"x": "k*W*(x_j - x_i)"}, {"k": 1})
-    whole = Scene(
+    complete = Scene(
         Field({"x": "-a*x"}, parameters={"a": 1}), link, chain(3), record=("sync_error", "section", "trajectory"),
         samples=4, zipped=True, axes={"a": [1, 2], "x_1": [3, 4]}, realisations=2, draws={"k": normal(1, 0.1)},
     )  # fmt: skip
-    assert names_of(whole) - TAKEN == {"a", "x_1", "k", "k_link"}
+    assert names_of(complete) - TAKEN == {"a", "x_1", "k", "k_link"}
 
 
 def test_no_result_has_other_attributes() -> None:
@@ -47,11 +45,11 @@ def test_no_result_has_other_attributes() -> None:
 
 
 def test_no_plane_and_no_branch_has_other_names() -> None:
-    made = msf.Plane(
+    result = msf.Plane(
         Scene("duffing", "spring", chain(2)), *np.eye(2), *np.zeros((2, 2, 2)), np.full((2, 2, 1), "rest"), 1.0,
         ("b", "c"), ("-1",), np.zeros((2, 2), int),
     )  # fmt: skip
-    assert (own(made.data) | {*made.as_dict()}) - TAKEN - {"b", "c"} <= msf.NAMES
+    assert (own(result.data) | {*result.as_dict()}) - TAKEN - {"b", "c"} <= msf.NAMES
     orbit = PeriodicOrbit(Scene("duffing"), 1, np.zeros(2), np.zeros(2), 0.0, 1)
     branch = branches.Branch("b", np.zeros(1), (orbit,), (Bifurcation(0.0, BifurcationKind.FOLD, 0.0, orbit),))
     assert own(branch.data) - TAKEN - {"b"} <= branches.NAMES

@@ -32,8 +32,8 @@ def distances(scene: Scene, alpha: list[float], periods: int) -> np.ndarray:
     march = March.begin(problem, states, interpolation_for(problem, states, periods))
     averaging = Averaging(0.0, periods, 0.0, 0, Execution(1, show_progress=False))
     with averaging.reporter() as reporter:
-        found = [average(march, averaging, reporter)[:2] for _ in range(WINDOWS)]
-    mean, error = (np.concatenate(part) for part in zip(*found, strict=True))
+        averages = [average(march, averaging, reporter)[:2] for _ in range(WINDOWS)]
+    mean, error = (np.concatenate(part) for part in zip(*averages, strict=True))
     return np.abs(mean - mean.mean(axis=0)) / error
 
 
@@ -148,8 +148,8 @@ def test_an_average_of_equal_terms_has_the_error_of_rounding():
 )
 def test_averages_are_as_long_as_asked(scene, unit, periods):
     def time(count):
-        given = {"periods": count, "transient": 10, "precision": 0.0, "show_progress": False}
-        return exponents(scene, [0.0, 0.2], starts=1, workers=1, **given).time
+        keywords = {"periods": count, "transient": 10, "precision": 0.0, "show_progress": False}
+        return exponents(scene, [0.0, 0.2], starts=1, workers=1, **keywords).time
 
     assert time(periods) == pytest.approx(periods * (time(1) if unit is None else unit), rel=1e-12)
 

@@ -9,16 +9,11 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from synchain.models import Scene, Topology, clusters, from_matrix, orbital_partitions, topology
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import STRENGTH, clustered
-from synchain.models.graphs.families import topology
-from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.mechanics.components import Edge
-from synchain.models.scenes.scene import Scene
-from synchain.models.symmetries.clusters import clusters, orbital_partitions
-from synchain.runtime.stability.cluster_exponents import ClusterExponents, cluster_exponents
-from synchain.runtime.stability.exponents import exponents
-from synchain.runtime.sweeps.run import run
+from synchain.runtime import ClusterExponents, cluster_exponents, exponents, run
 
 pytestmark = pytest.mark.long
 
@@ -103,10 +98,10 @@ def test_clusters_that_merge_are_said() -> None:
 
 
 def numbers(entries: dict, values: dict, size: int) -> mpmath.matrix:
-    made = mpmath.zeros(size)
+    matrix = mpmath.zeros(size)
     for key, e in entries.items():
-        made[key] = mpmath.mpmathify(sp.N(e.subs(values), 40))
-    return made
+        matrix[key] = mpmath.mpmathify(sp.N(e.subs(values), 40))
+    return matrix
 
 
 ONE_WAY = from_matrix(np.kron(np.eye(2, dtype=int), [[-1, 1, 0], [0, -2, 2], [3, 0, -3]]).tolist())

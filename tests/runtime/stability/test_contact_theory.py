@@ -11,13 +11,9 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
-from synchain.models.graphs.families import topology
-from synchain.models.inputs.plugins import allow_code
-from synchain.models.scenes.scene import Scene
-from synchain.runtime.results.result import Result
-from synchain.runtime.stability.exponents import exponents
+from synchain.models import Scene, allow_code, topology
+from synchain.runtime import Result, exponents, run
 from synchain.runtime.stability.orbits import OrbitProblem
-from synchain.runtime.sweeps.run import run
 
 ONE = topology("chain", 1)
 
@@ -28,8 +24,8 @@ def block(friction: str, x: float = 0.0, v: float = 0.0, **more: Any) -> Scene:
     All record sections, so that they share drivers.
     """
     keys = {"transient", "window", "record", "section", "samples", "rtol", "max_steps", "oscillator", "time_unit"}
-    own = {name: more.pop(name) for name in keys & set(more)}
-    settings = {"transient": 0.0, "rtol": 1e-13, "record": ("section",), "time_unit": "time", **own}
+    parameters_of_node = {name: more.pop(name) for name in keys & set(more)}
+    settings = {"transient": 0.0, "rtol": 1e-13, "record": ("section",), "time_unit": "time", **parameters_of_node}
     start = {"x": [x], "v": [v]}
     return Scene(
         topology=ONE, friction=friction, contact="set-valued", initial=start, parameters={"epsilon": 1.0, "u": 0.0,
@@ -117,15 +113,17 @@ def runge_kutta(y: np.ndarray, h: float) -> np.ndarray:
 def test_free_decay(hold: float) -> None:
     """Under Coulomb friction the amplitude falls by 2 F_k/k each half cycle, until the spring no longer overcomes F_s."""
     drag = 0.1
-    friction, numbers = ("coulomb", {"mu": drag}) if hold == drag else ("coulomb_static", {"mu_k": drag, "mu_s": hold})
-    scene = block(friction, theta_b=0.0, window=40.0, **numbers)
+    friction, coefficients = (
+        ("coulomb", {"mu": drag}) if hold == drag else ("coulomb_static", {"mu_k": drag, "mu_s": hold})
+    )
+    scene = block(friction, theta_b=0.0, window=40.0, **coefficients)
     starts = np.linspace(0.05, 1.53, 38)
     ends = finished(scene, x_1=starts).states("end")
     for x, (end, v, slip) in zip(starts, ends, strict=True):
-        rest = x
-        while abs(rest) > hold:
-            rest = 2.0 * math.copysign(drag, rest) - rest
-        assert end == pytest.approx(rest, abs=2e-12)
+        resting = x
+        while abs(resting) > hold:
+            resting = 2.0 * math.copysign(drag, resting) - resting
+        assert end == pytest.approx(resting, abs=2e-12)
         assert (v, slip) == (0.0, 0.0)
 
 
@@ -173,11 +171,12 @@ def test_hopf_point(damped: str) -> None:
     assert math.exp(-2.0 * hopf) / 2.0 == pytest.approx(0.05, rel=1e-15)
     for speed in (hopf - 0.1, hopf, hopf + 0.1):
         rate = math.exp(-2.0 * speed) / 2.0 - 0.05
-        rest = 0.5 + 0.5 * math.exp(-2.0 * speed)
+        resting = 0.5 + 0.5 * math.exp(-2.0 * speed)
         turns = 10.0 * 2.0 * math.pi / math.sqrt(1.0 - rate**2)
         # odd parts of the deviation alone: what is left is cubic
         ends = [
-            finished(damped_scene(damped, rest + x, 0.0, turns, 1e-13, speed)).states("end")[0] for x in (1e-4, -1e-4)
+            finished(damped_scene(damped, resting + x, 0.0, turns, 1e-13, speed)).states("end")[0]
+            for x in (1e-4, -1e-4)
         ]
         assert math.log((ends[0] - ends[1]) / 2e-4) / turns == pytest.approx(rate, abs=2e-8)
 
@@ -185,17 +184,17 @@ def test_hopf_point(damped: str) -> None:
 @pytest.mark.long
 def test_share_of_starts_at_rest(damped: str) -> None:
     """Stender & Hoffmann's bSTAB: 0.3040 ± 0.0065 of [-2, 2] x [0, 2] at v_d = 1.5; three sigma allowed."""
-    numbers, count = np.random.default_rng(1), 2000
+    dice, count = np.random.default_rng(1), 2000
     scene = damped_scene(damped, 0.0, 0.0, 400.0, 1e-7, 1.5)
-    starts = {"x_1": numbers.uniform(-2.0, 2.0, count), "v_1": numbers.uniform(0.0, 2.0, count)}
+    starts = {"x_1": dice.uniform(-2.0, 2.0, count), "v_1": dice.uniform(0.0, 2.0, count)}
     scene = scene.replace(axes=starts, zipped=True, record=())
     ends = finished(scene).states("end")
-    rest = 0.5 + 0.5 * math.exp(-3.0)
-    distance = np.hypot(ends[:, 0] - rest, ends[:, 1])
+    resting = 0.5 + 0.5 * math.exp(-3.0)
+    distance = np.hypot(ends[:, 0] - resting, ends[:, 1])
     assert not np.any((distance > 0.05) & (distance < 0.5)), "every start has decided"
     share = float(np.mean(distance < 0.05))
-    own = math.sqrt(0.304 * 0.696 / count)
-    assert abs(share - 0.3040) < 3.0 * math.hypot(own, 0.0065)
+    deviation = math.sqrt(0.304 * 0.696 / count)
+    assert abs(share - 0.3040) < 3.0 * math.hypot(deviation, 0.0065)
 
 
 def test_events_keep_their_digits_in_long_runs(damped: str) -> None:
@@ -236,11 +235,11 @@ def test_propagator_against_differences_of_the_flow(
     pair = scene.replace(record=(), samples=0, topology=topology("chain", 2), initial={"x": [x, x], "v": [v, v]})
     problem = OrbitProblem.of_modes(pair, np.array([0.0]), np.array([[x, v, 0.0]]), 1)
     start = problem.with_slip_states(np.array([[x, v, 0.0]]))
-    found = problem.propagators(problem.integrator(start), 1.0)[0][0, 0]
+    propagator = problem.propagators(problem.integrator(start), 1.0)[0][0, 0]
     d = 1e-6
     by_x, by_v = (flow(scene, x + p, v + q) - flow(scene, x - p, v - q) for p, q in ((d, 0.0), (0.0, d)))
     expected = np.stack([by_x, by_v], axis=1) / (2 * d)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(propagator, expected, rtol=0, atol=1e-6)
 
 
 def lost(contact: str, **numbers: float) -> float:

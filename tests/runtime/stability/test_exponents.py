@@ -13,14 +13,11 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from synchain.models import Field, Rates, ends
-from synchain.models.graphs.families import topology
-from synchain.models.scenes.scene import Scene
+from synchain.models import Field, Rates, Scene, ends, topology
+from synchain.runtime import Exponents, exponents, lyapunov_spectrum, msf, plane
 from synchain.runtime.stability.averages import Batches
-from synchain.runtime.stability.exponents import Exponents, exponents
 from synchain.runtime.stability.interpolation import strength_interpolation
-from synchain.runtime.stability.lyapunov import lyapunov_spectrum
-from synchain.runtime.stability.msf import classify, msf, plane
+from synchain.runtime.stability.msf import classify
 
 PAIR = topology("chain", 2)
 DRIVEN = Field({"x": "v", "v": "-x - 0.1*v + 0.3*cos(t) - 0.2*x**3"}, initial={"x": 0.5, "v": 0.1})
@@ -160,8 +157,8 @@ def test_the_error_of_a_zero_covers_what_lies_between_two_strengths(function, ze
         if uneven:  # as msf joins the strengths that were asked for and those of its fine grid
             alpha = np.union1d(alpha, np.nextafter(alpha[::3], 9.0))
         still = np.zeros(len(alpha))
-        found = Exponents(alpha, function(alpha), still, 1.0, 1, function(alpha)[None])
-        ((end, error),) = [end for pair in found.ranges for end in pair if end[0] not in (alpha[0], alpha[-1])]
+        line = Exponents(alpha, function(alpha), still, 1.0, 1, function(alpha)[None])
+        ((end, error),) = [end for pair in line.ranges for end in pair if end[0] not in (alpha[0], alpha[-1])]
         assert abs(end - zero) <= error + 1e-15
         assert error <= gap**power
 
@@ -178,8 +175,8 @@ def test_a_zero_without_neighbours_lies_anywhere_between_two_strengths() -> None
 def test_an_exponent_that_is_zero_to_its_error_begins_no_interval(error: float, begins: list[float]) -> None:
     """That of a limit cycle at strength 0."""
     alpha, exponent = np.linspace(0, 3, 4), np.array([-6e-9, 0.2, -0.1, -0.3])
-    found = Exponents(alpha, exponent, np.full(4, error), 1.0, 1, exponent[None]).intervals
-    assert [low for low, _ in found] == [*begins, pytest.approx(1 + 2 / 3)]
+    intervals = Exponents(alpha, exponent, np.full(4, error), 1.0, 1, exponent[None]).intervals
+    assert [low for low, _ in intervals] == [*begins, pytest.approx(1 + 2 / 3)]
     rounded = np.array([-2e-12, 0.2, -0.1, -0.3])
     assert len(Exponents(alpha, rounded, np.full(4, 1e-13), 1.0, 1, rounded[None]).intervals) == 1
     stable = np.array([-6e-9, -0.2, -0.1, -0.3])
@@ -288,9 +285,9 @@ def test_a_large_constant_beside_a_motion_does_not_hide_it(force: str, kind: str
         parameters={"Z": 1.0},
     )
     scenes = (Scene(node, "x->v", PAIR, initial={"x": 0.5, "z": z}, parameters={"Z": z}) for z in (1.0, 1e8))
-    found = [exponents(each, [0.0], starts=1, transient=50, periods=50) for each in scenes]
-    assert [a.kind for each in found for a in each.attractors] == [kind] * 2
-    assert found[0].exponent == pytest.approx(found[1].exponent, abs=1e-6)
+    results = [exponents(each, [0.0], starts=1, transient=50, periods=50) for each in scenes]
+    assert [a.kind for each in results for a in each.attractors] == [kind] * 2
+    assert results[0].exponent == pytest.approx(results[1].exponent, abs=1e-6)
 
 
 def test_two_fixed_points_with_small_exponents_are_not_averaged() -> None:
@@ -309,8 +306,8 @@ def test_two_periodic_attractors_are_not_averaged() -> None:
     assert len(result.groups) > 1
     for rows in result.groups:
         assert np.ptp(result.by_start[list(rows)]) < 1e-3
-    own = next(rows for rows in result.groups if 0 in rows)
-    assert result.exponent[0] == result.by_start[list(own)].mean()
+    first = next(rows for rows in result.groups if 0 in rows)
+    assert result.exponent[0] == result.by_start[list(first)].mean()
     assert np.ptp(result.by_start) > 0.3
 
 
@@ -345,8 +342,8 @@ def test_a_line_of_strengths_that_is_none_is_named(strengths: object, message: s
 @pytest.mark.parametrize("function", [msf, plane])
 def test_functions_of_strength_take_the_keywords_of_exponents(function: Callable[..., object]) -> None:
     def keywords(of: Callable[..., object]) -> list[tuple[str, object]]:
-        own = inspect.signature(of).parameters.values()
-        return [(p.name, p.default) for p in own if p.kind in (p.KEYWORD_ONLY, p.VAR_KEYWORD)]
+        parameters = inspect.signature(of).parameters.values()
+        return [(p.name, p.default) for p in parameters if p.kind in (p.KEYWORD_ONLY, p.VAR_KEYWORD)]
 
     assert keywords(function) == keywords(exponents)
 

@@ -6,16 +6,12 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models.definitions.inline import Field
+from synchain.models import Field, Scene, from_matrix, topology
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import PHASE, network_variation, phase_shifted, with_volume
-from synchain.models.graphs.families import topology
-from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import Node
-from synchain.models.scenes.scene import Scene
-from synchain.runtime.stability.exponents import exponents
-from synchain.runtime.stability.lyapunov import Lyapunov, TangentFrame, lyapunov_spectrum
-from synchain.runtime.sweeps.run import run
+from synchain.runtime import Lyapunov, exponents, lyapunov_spectrum, run
+from synchain.runtime.stability.lyapunov import TangentFrame
 
 pytestmark = pytest.mark.long
 
@@ -78,13 +74,13 @@ def test_damping_is_the_sum_of_a_driven_oscillator() -> None:
 
 def test_blocks_of_a_part_of_a_period_see_the_drive_at_its_phase() -> None:
     """The same orbit in one block a period and in eight: end and divergence agree, and the growth of all directions."""
-    made = []
+    spectra = []
     for parts in (1, 8):
         frame = TangentFrame.make(lone("duffing", u=4.0), 2, seed=0)
         frame.parts = parts
         growth = [frame.advance() for _ in range(5 * parts)]
-        made.append((frame.integrator.state[0], sum(g[0].sum() for g in growth), sum(g[2] for g in growth)))
-    for whole_block, eighths in zip(*made, strict=True):
+        spectra.append((frame.integrator.state[0], sum(g[0].sum() for g in growth), sum(g[2] for g in growth)))
+    for whole_block, eighths in zip(*spectra, strict=True):
         np.testing.assert_allclose(eighths, whole_block, atol=1e-6)
 
 
@@ -125,16 +121,16 @@ def test_the_log_of_a_volume_grows_by_the_divergence_of_the_network() -> None:
     equations = Scene(oscillator="lorenz", coupling="y->y, x->z", topology=topology("star", 4)).equations
     extended = with_volume(equations)
     rates = sp.Add(*extended.rhs()[equations.dimension :])
-    own = sp.Add(*(e for (r, c), e in equations.jacobian().items() if r == c))
-    assert sp.simplify(rates - own) == 0
+    trace = sp.Add(*(e for (r, c), e in equations.jacobian().items() if r == c))
+    assert sp.simplify(rates - trace) == 0
     assert extended.rhs()[: equations.dimension] == equations.rhs()
 
 
 def test_a_clock_set_later_shifts_equations_and_matrix() -> None:
-    made = phase_shifted(network_variation(lone("duffing").equations))
+    variation = phase_shifted(network_variation(lone("duffing").equations))
     t, omega, u = sp.Symbol("t", real=True), sp.Symbol("omega", real=True), sp.Symbol("u", real=True)
-    assert made.orbit.node.rhs[1].coeff(u) == sp.cos(omega * (t + PHASE))
-    assert made.orbit.parameters[-1] == "phase"
+    assert variation.orbit.node.rhs[1].coeff(u) == sp.cos(omega * (t + PHASE))
+    assert variation.orbit.parameters[-1] == "phase"
     x, d = sp.symbols("x d", real=True)
     wave = Equations.of_equal_nodes(Node((x,), (sp.cos(omega * t) * x - d * x,), (omega, d)), None, 1)
     assert dict(phase_shifted(network_variation(wave)).matrix) == {(0, 0): sp.cos(omega * (t + PHASE)) - d}
@@ -142,8 +138,8 @@ def test_a_clock_set_later_shifts_equations_and_matrix() -> None:
 
 def test_dimension_by_hand() -> None:
     def of(*values: float, components: int = 3) -> float:
-        known = np.array(values)
-        return Lyapunov(known, np.zeros(len(known)), known > -np.inf, 0.0, 0.0, 1.0, 1.0, components).dimension
+        expected = np.array(values)
+        return Lyapunov(expected, np.zeros(len(expected)), expected > -np.inf, 0.0, 0.0, 1.0, 1.0, components).dimension
 
     assert of(1.0, 0.0, -2.0) == 2.5
     assert of(-1.0, -2.0, -3.0) == 0.0
@@ -219,11 +215,11 @@ def test_an_average_takes_no_more_steps_than_max_steps() -> None:
 
 
 def test_the_absolute_tolerance_of_a_scene_counts() -> None:
-    found = [
+    spectra = [
         lyapunov_spectrum(lone("duffing").replace(atol=atol), periods=4, transient=0, rtol=1e-6).exponent[0]
         for atol in (1e-9, 1e-14)
     ]
-    assert found[0] != found[1]
+    assert spectra[0] != spectra[1]
 
 
 def test_products_of_propagators_grow_as_single_blocks_do() -> None:

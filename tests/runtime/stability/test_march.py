@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from synchain.models.graphs.families import topology
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, topology
 from synchain.runtime.stability.averages import BATCHES, FIRST, Batches
 from synchain.runtime.stability.interpolation import Interpolation, exact_interpolation, strength_interpolation
 from synchain.runtime.stability.march import MODE_TOLERANCE_RATIO, BlockInterpolation, March, interpolation_for
@@ -75,15 +74,15 @@ TWICE = ("of three states, in the plane",)
 
 @pytest.mark.parametrize("case", [pytest.param(case, marks=[pytest.mark.long] * (case in TWICE)) for case in CASES])
 def test_growth_is_that_of_products_of_propagators(case: str) -> None:
-    strengths, block, given = CASES[case]
-    orbit = settled(strengths, starts=2, **given)  # type: ignore[arg-type]
+    strengths, block, keywords = CASES[case]
+    orbit = settled(strengths, starts=2, **keywords)  # type: ignore[arg-type]
     wanted = expected(*orbit, block, 3)
     few = strength_interpolation(strengths, *((26, 1) if np.iscomplexobj(strengths) else (29, 2)))
     assert not few.is_exact
     for interpolation in (few, exact_interpolation(strengths)):
         march = march_of(*orbit, interpolation, block, 1.0)
-        found = march.growths(np.array([2, 1])).sum(axis=0)
-        close = np.abs(found - wanted)
+        growth = march.growths(np.array([2, 1])).sum(axis=0)
+        close = np.abs(growth - wanted)
         assert np.median(close) < 1e-7, interpolation.is_exact
         assert close.max() < 1e-4  # where a multiplier passes zero
         assert march.deviations.error < 1e-6
@@ -94,8 +93,8 @@ def test_growth_beyond_the_range_of_numbers_is_counted() -> None:
     alpha = np.linspace(0.5, 1.5, 9)
     orbit = settled(alpha, rtol=1e-6, oscillator="harmonic", coupling="damper")
     march = march_of(*orbit, exact_interpolation(alpha), 3000.0)
-    found = march.growths(np.array([1]))[0, 0]
-    np.testing.assert_allclose(found, -0.5 * alpha * 3000.0 * orbit[0].unit, rtol=0, atol=2.0)
+    growth = march.growths(np.array([1]))[0, 0]
+    np.testing.assert_allclose(growth, -0.5 * alpha * 3000.0 * orbit[0].unit, rtol=0, atol=2.0)
 
 
 def test_coarse_nodes_are_seen_by_the_strengths_for_comparison() -> None:
@@ -142,9 +141,9 @@ def test_stick_intervals_multiply_modes_of_very_different_growth() -> None:
     orbit = settled(strengths, rtol=1e-9, contact="set-valued", parameters={"omega": 1.15})
     wanted = expected(*orbit, 1.0, 16)
     march = march_of(*orbit, exact_interpolation(strengths), 8.0, 1.0)
-    found = march.growths(np.array([2]))[0]
-    assert found[0, 0] > 2000.0
-    np.testing.assert_allclose(found, wanted, rtol=1e-6, atol=1e-6)
+    growth = march.growths(np.array([2]))[0]
+    assert growth[0, 0] > 2000.0
+    np.testing.assert_allclose(growth, wanted, rtol=1e-6, atol=1e-6)
 
 
 def test_a_stick_interval_on_too_few_nodes_is_seen_by_the_strengths_for_comparison() -> None:
@@ -211,19 +210,19 @@ def test_a_deviation_that_has_vanished_stays_so() -> None:
 @pytest.mark.parametrize("ratio", [1.0, 2.5, math.inf])
 def test_batches_ahead_are_those_of_single_blocks(ratio: float) -> None:
     growth = np.random.default_rng(0).normal(size=(8 * BATCHES + 3, 2, 3))
-    one, many, looks, place = Batches(1.0), Batches(1.0), [], 0
-    while place < len(growth):
-        parts = many.ahead(len(growth) - place)
-        ends = place + np.cumsum(parts)
-        many.extend(np.array([growth[a:b].sum(axis=0) for a, b in itertools.pairwise([place, *ends])]), parts)
-        for row in growth[place : ends[-1]]:
-            assert not (one.due and one.blocks > place)
+    one, many, looks, position = Batches(1.0), Batches(1.0), [], 0
+    while position < len(growth):
+        parts = many.ahead(len(growth) - position)
+        ends = position + np.cumsum(parts)
+        many.extend(np.array([growth[a:b].sum(axis=0) for a, b in itertools.pairwise([position, *ends])]), parts)
+        for row in growth[position : ends[-1]]:
+            assert not (one.due and one.blocks > position)
             one.add(row)
-        place = int(ends[-1])
+        position = int(ends[-1])
         assert (one.blocks, one.count, one.per_batch, one.due) == (many.blocks, many.count, many.per_batch, many.due)
         np.testing.assert_allclose(one.error(), many.error(), rtol=1e-12)
         if many.due:
-            looks.append(place)
+            looks.append(position)
             one.plan(ratio, final=False)
             many.plan(ratio, final=False)
     assert looks[0] == FIRST

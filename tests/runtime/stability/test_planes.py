@@ -57,8 +57,8 @@ def test_two_layers_in_closed_form(second: Topology, modes: list[tuple[int, int]
 @pytest.mark.parametrize("name", ["duffing", "harmonic"])
 def test_complex_strengths_of_two_layers_in_closed_form(name: str) -> None:
     """Rings that run opposite ways have conjugate eigenvalues; harmonic oscillators are not integrated."""
-    one_way, given = topology("one_way_ring", 5), ALMOST_LINEAR if name == "duffing" else {}
-    scene = Scene(name, links=[(SPRING, one_way), (DAMPER, from_matrix(one_way.matrix.T))], parameters=given)
+    one_way, parameters = topology("one_way_ring", 5), ALMOST_LINEAR if name == "duffing" else {}
+    scene = Scene(name, links=[(SPRING, one_way), (DAMPER, from_matrix(one_way.matrix.T))], parameters=parameters)
     k, c = np.array([0.1, 0.4]), np.array([0.0, 0.3])
     result = plane(scene, k=k, c=c, rtol=1e-9, starts=1, transient=200)
     turn = np.exp(2j * np.pi * np.arange(1, 5) / 5)
@@ -80,7 +80,7 @@ def transversal(scene: Scene) -> float:
     jacobian = sp.zeros(2 * n, 2 * n)
     for at, e in equations.jacobian().items():
         jacobian[at] = e
-    rates, slopes = (sp.lambdify(symbols, made, cse=True) for made in (list(equations.rhs()), jacobian))
+    rates, slopes = (sp.lambdify(symbols, expressions, cse=True) for expressions in (list(equations.rhs()), jacobian))
     of_first = sp.lambdify(symbols, list(equations.rhs())[::n], cse=True)
 
     def of_all(t: float, y: np.ndarray) -> np.ndarray:
@@ -135,8 +135,8 @@ def test_axes_are_single_layers() -> None:
     ):
         alone = Scene("duffing", coupling, graph, parameters={"omega": 1.3})
         sizes = np.array([-complex(v).real for v in graph.spectrum.values[1:]])
-        own = exponents(alone, np.unique(np.outer(k, sizes)), starts=1, transient=100, rtol=1e-9)
-        expected = [own.exponent[np.searchsorted(own.alpha, x * sizes)].max() for x in k]
+        line = exponents(alone, np.unique(np.outer(k, sizes)), starts=1, transient=100, rtol=1e-9)
+        expected = [line.exponent[np.searchsorted(line.alpha, x * sizes)].max() for x in k]
         np.testing.assert_allclose(table, expected, atol=1e-8, err_msg=name)
 
 
@@ -230,14 +230,14 @@ def test_the_imaginary_part_is_not_the_parameter_of_that_name() -> None:
 
 
 def test_files_figures_and_threads(tmp_path: Path) -> None:
-    told: list[float] = []
+    reported: list[float] = []
     scene = layered(ring(4), complete(4), PULL, omega=1.3)
     axes = {"k": np.linspace(0.0, 0.5, 3), "g": np.linspace(0.0, 0.1, 4)}
-    result = plane(scene, starts=2, transient=50, workers=1, progress=lambda p: told.append(p.done), **axes)
+    result = plane(scene, starts=2, transient=50, workers=1, progress=lambda p: reported.append(p.done), **axes)
     other = plane(scene, starts=2, transient=50, workers=2, parameters=axes)
     np.testing.assert_array_equal(result.exponent, other.exponent)
-    assert told == sorted(told)
-    assert told[-1] == 4 * (50 + 5000)
+    assert reported == sorted(reported)
+    assert reported[-1] == 4 * (50 + 5000)
     result.save(tmp_path / "map.nc")
     opened = open_result(tmp_path / "map.nc")
     assert (opened.names, opened.modes, opened.scene) == (result.names, result.modes, result.scene)

@@ -10,12 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from synchain.models.graphs.families import topology
-from synchain.models.inputs.plugins import allow_code
-from synchain.models.scenes.scene import Scene
-from synchain.runtime.stability.exponents import exponents
+from synchain.models import Scene, allow_code, topology
+from synchain.runtime import exponents, run
 from synchain.runtime.stability.msf import classify
-from synchain.runtime.sweeps.run import run
 
 pytestmark = pytest.mark.long
 

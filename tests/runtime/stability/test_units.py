@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from synchain.models import Field, Scene, chain
-from synchain.runtime import exponents, msf, plane
-from synchain.runtime.stability.exponents import Exponents
-from synchain.runtime.stability.msf import MSF
+from synchain.runtime import MSF, Exponents, exponents, msf, plane
 
 VAN_DER_POL = Field(
     {"x": "k*v/w", "v": "k*((1 - ((x - c)/s)**2)*v - w*(x - c))"}, parameters={"s": 1.0, "c": 0.0, "k": 1.0, "w": 1.0}

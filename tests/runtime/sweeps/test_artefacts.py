@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from synchain.models.graphs.families import topology
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, topology
+from synchain.runtime import run
 from synchain.runtime.results.certificate import SYNCHRONOUS, VERDICTS
 from synchain.runtime.sweeps.certify import certify
-from synchain.runtime.sweeps.run import run
 
 STABLE = "synchronous, certified by the exponent"
 APART = VERDICTS[6]
@@ -55,21 +54,21 @@ def test_two_copies_of_one_cycle_are_not_synchronous_though_the_state_is_stable(
 def test_exchanged_oscillators_give_exchanged_ends() -> None:
     one = run(pair(initial={"x": [0.3, 0.1]}), sigma=[0.05], show_progress=False)
     two = run(pair(initial={"x": [0.1, 0.3]}), sigma=[0.05], show_progress=False)
-    ends = [found.states("end").reshape(2, 2) for found in (one, two)]
+    ends = [result.states("end").reshape(2, 2) for result in (one, two)]
     np.testing.assert_allclose(ends[0], ends[1][:, ::-1], rtol=0, atol=1e-10)
     assert one.sync_error.item() == pytest.approx(two.sync_error.item(), rel=1e-6)
 
 
 def test_equal_oscillators_stay_equal_and_are_not_called_stable() -> None:
     """Coalescence: what is equal bit for bit stays so for ever; a distance of 1e-12 tells that the state is unstable."""
-    found = [
+    differences = [
         run(pair(initial={"x": [0.3, 0.3 + gap]}), sigma=[0.5], certified=True, show_progress=False)
         for gap in (0.0, 1e-12)
     ]
-    assert found[0].sync_error.item() == 0.0
-    assert VERDICTS[found[0].verdict.item()] == "synchronous by round-off only: the state is unstable"
-    assert found[1].sync_error.item() > SYNCHRONOUS
-    assert VERDICTS[found[1].verdict.item()] == "not synchronous, the state is unstable"
+    assert differences[0].sync_error.item() == 0.0
+    assert VERDICTS[differences[0].verdict.item()] == "synchronous by round-off only: the state is unstable"
+    assert differences[1].sync_error.item() > SYNCHRONOUS
+    assert VERDICTS[differences[1].verdict.item()] == "not synchronous, the state is unstable"
 
 
 @pytest.mark.long

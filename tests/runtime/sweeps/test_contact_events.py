@@ -11,13 +11,8 @@ import pytest
 from event_reference import Reference
 from mpmath import mp, mpf
 
-from synchain.models.graphs.families import topology
-from synchain.models.graphs.topology import Topology
-from synchain.models.inputs.plugins import allow_code
-from synchain.models.scenes.scene import Scene
-from synchain.runtime.results.result import Result
-from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps.run import run
+from synchain.models import Scene, Topology, allow_code, topology
+from synchain.runtime import Result, Status, run
 
 pytestmark = pytest.mark.long
 
@@ -62,9 +57,9 @@ def test_no_short_release_is_missed() -> None:
     network = scene(ONE, [0.0], [0.0], 0.95, friction="coulomb", rtol=1e-12,
                  parameters={"theta_b": 0.0, "epsilon": 1.0, "mu": hold, "u": drive, "omega": 0.9})  # fmt: skip
     starts = hold - drive + over
-    found = ends(network, x_1=starts)
-    assert np.all(found[:, 2] == 0.0)
-    for start, end in zip(starts, found[:, 0], strict=True):
+    states = ends(network, x_1=starts)
+    assert np.all(states[:, 2] == 0.0)
+    for start, end in zip(starts, states[:, 0], strict=True):
         assert end == pytest.approx(slipped(start, hold, drive, 0.9), abs=1e-11)
 
 
@@ -199,16 +194,16 @@ def test_law_that_chatters_ends_with_its_status(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 3, 4])
 def test_against_taylor_series_in_thirty_digits(seed: int) -> None:
-    numbers = np.random.default_rng([2, seed])
+    dice = np.random.default_rng([2, seed])
     graph = [ONE, topology("chain", 2), THREE][seed % 3]
     n = graph.n
     values = {
-        "theta_b": numbers.uniform(-0.1, 0.4), "epsilon": numbers.uniform(0.5, 2.0), "u": numbers.uniform(0.05, 0.6),
-        "omega": numbers.uniform(1.25, 2.0), "mu_s": 0.3, "mu_k": numbers.uniform(0.1, 0.3), "a": numbers.uniform(0.5, 4.0),
+        "theta_b": dice.uniform(-0.1, 0.4), "epsilon": dice.uniform(0.5, 2.0), "u": dice.uniform(0.05, 0.6),
+        "omega": dice.uniform(1.25, 2.0), "mu_s": 0.3, "mu_k": dice.uniform(0.1, 0.3), "a": dice.uniform(0.5, 4.0),
     }  # fmt: skip
     values = {name: float(value) for name, value in values.items()}
-    coupled = {"sigma": float(numbers.uniform(0.05, 1.0))} if n > 1 else {}
-    x, v = numbers.uniform(-0.5, 0.5, n).tolist(), numbers.uniform(-0.5, 0.5, n).tolist()
+    coupled = {"sigma": float(dice.uniform(0.05, 1.0))} if n > 1 else {}
+    x, v = dice.uniform(-0.5, 0.5, n).tolist(), dice.uniform(-0.5, 0.5, n).tolist()
     result = ran(scene(graph, x, v, 20, parameters={**values, **coupled}, rtol=1e-12))
     with mp.workdps(30):
         pairs = sorted({(min(a, b), max(a, b)) for a, b, _ in graph.links})

@@ -10,12 +10,10 @@ import numpy as np
 import pytest
 from samples import kernel, run_cells
 
-from synchain.models.graphs.families import topology
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, topology
+from synchain.runtime import Status, run
 from synchain.runtime.cells.initial_modes import with_modes
 from synchain.runtime.cli import main
-from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps.run import run
 
 NINE = topology("chain", 9)
 WIDTH = 4

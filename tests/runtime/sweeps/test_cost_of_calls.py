@@ -41,16 +41,16 @@ def test_a_warm_call_takes_few_calls_of_functions(scene):
 
 
 def test_data_are_labelled_when_they_are_read(monkeypatch):
-    made = []
+    datasets = []
     built = xr.Dataset.__init__
     monkeypatch.setattr(
-        xr.Dataset, "__init__", lambda self, *rest, **more: (made.append(self), built(self, *rest, **more))[1]
+        xr.Dataset, "__init__", lambda self, *rest, **more: (datasets.append(self), built(self, *rest, **more))[1]
     )
     result = run(one_pendulum(), show_progress=False)
-    assert not made
+    assert not datasets
     assert result.data is result.data
     assert result.end.dims == ("component", "node")
-    assert made
+    assert datasets
 
 
 @pytest.mark.parametrize("through", [lambda r: pickle.loads(pickle.dumps(r)), copy.copy, copy.deepcopy])

@@ -49,9 +49,9 @@ def test_transits_keep_to_the_tolerance():
     for a, times in zip(
         STIFFNESS, data.section_time.transpose("a", ...).values.reshape(len(STIFFNESS), -1), strict=True
     ):
-        found = times[np.isfinite(times)]
-        assert found.size
-        turns = (found - np.pi / 2 - np.arctan(1 / a)) / np.pi
+        crossings = times[np.isfinite(times)]
+        assert crossings.size
+        turns = (crossings - np.pi / 2 - np.arctan(1 / a)) / np.pi
         assert np.abs(turns - np.round(turns)).max() < 1e-8
 
 

@@ -60,8 +60,8 @@ CONSERVATIVE = {
 @pytest.mark.parametrize("name", [pytest.param("fput", marks=pytest.mark.long), "swing", "few", "inerter"])
 def test_a_conservative_network_keeps_the_energy_of_its_nodes_and_links(name: str) -> None:
     """To the tolerance of the steps, where the nodes' own energy moves by more than a tenth of what the links hold."""
-    own = nodes.sum(sp.Symbol("v") ** 2 / 2)
-    scene = CONSERVATIVE[name].replace(observe={**EXTREMES, "e": maximum(own), "f": minimum(own)})
+    kinetic = nodes.sum(sp.Symbol("v") ** 2 / 2)
+    scene = CONSERVATIVE[name].replace(observe={**EXTREMES, "e": maximum(kinetic), "f": minimum(kinetic)})
     result = run(scene, show_progress=False)
     start = float(energy_function(scene)(np.array(scene.y0)))
     assert float(result.high - result.low) < 1e-8 * abs(start)
@@ -119,10 +119,10 @@ i, j, W = ends(load_oscillator("harmonic"))
 
 def test_the_sums_of_the_energy_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """They take 0.1 s at 9000 links."""
-    made, rows = [], EnergyTerms.rows
-    monkeypatch.setattr(EnergyTerms, "rows", lambda own: made.append(own) or rows(own))
+    built, rows = [], EnergyTerms.rows
+    monkeypatch.setattr(EnergyTerms, "rows", lambda own: built.append(own) or rows(own))
     kernel_source(Scene("harmonic", "spring", ring(3), observe={"e": "mean(energy)"}))
-    assert len(made) == 1
+    assert len(built) == 1
 
 
 @pytest.mark.parametrize(

@@ -19,17 +19,11 @@ import pytest
 from streams import MAP, UP, partial, warm
 
 from synchain.codegen.machine_code.installation import InstallationError
-from synchain.models import chain
-from synchain.models.graphs.products import cartesian
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, cartesian, chain
+from synchain.runtime import Result, SweepFailed, open_result, run, stream
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.engines.job import JobSpec, SweepSpec
 from synchain.runtime.engines.scene_kernels import write_kernel
-from synchain.runtime.results.open import open_result
-from synchain.runtime.results.result import Result
-from synchain.runtime.sweeps.errors import SweepFailed
-from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.stream import stream
 from synchain.runtime.sweeps.worker import JobCache, forget
 
 
@@ -96,10 +90,10 @@ def test_a_worker_with_another_processor_says_so(monkeypatch):
 def test_a_worker_that_does_not_know_the_sweep_asks_for_it():
     cells, jobs = np.arange(3), JobCache(size=1)
     assert jobs.run("first", None, cells) is None
-    made = jobs.run("first", spec(MAP).packed(), cells)
-    assert (made.counts[:, 0] == 1).all()
+    buffers = jobs.run("first", spec(MAP).packed(), cells)
+    assert (buffers.counts[:, 0] == 1).all()
     again = jobs.run("first", None, cells)
-    np.testing.assert_array_equal(made.end, again.end)
+    np.testing.assert_array_equal(buffers.end, again.end)
     assert jobs.run("second", spec(MAP).packed(), cells) is not None
     assert jobs.run("first", None, cells) is None
     jobs.forget("second")
@@ -204,8 +198,8 @@ def cluster():
     distributed = pytest.importorskip("distributed", reason="the extra dask is not installed")
     with distributed.LocalCluster(
         n_workers=3, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
-    ) as made:
-        yield made
+    ) as caught:
+        yield caught
 
 
 @pytest.mark.long

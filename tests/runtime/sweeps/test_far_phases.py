@@ -35,10 +35,10 @@ def test_phases_at_high_frequency_move_as_in_the_frame_that_turns_along(method: 
     phases = sc.Field({"th": "omega"}, parameters={"omega": 0.0})
     push = sc.Rates({"th": "k*W*sin(th_j - th_i)"}, {"k": 0.5})
     common = FREE | {"initial": {"th": [0.0, 1.0, 2.5, 4.0]}, "window": 2, "integrator": method, "rtol": 1e-6}
-    own = np.array([-0.5, 0.25, 0.125, 0.75])
+    frequencies = np.array([-0.5, 0.25, 0.125, 0.75])
     ends = [
         sc.run(
-            sc.Scene(phases, push, sc.ring(4), parameters={"omega": list(own + shift)}, **common)
+            sc.Scene(phases, push, sc.ring(4), parameters={"omega": list(frequencies + shift)}, **common)
         ).end.values.reshape(-1)
         for shift in (0.0, 1e7)
     ]

@@ -9,14 +9,9 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from synchain.models import Section, chain, mean, nodes, ring
+from synchain.models import Scene, Section, chain, mean, nodes, ring
 from synchain.models.mechanics.components import TIME
-from synchain.models.scenes.scene import Scene
-from synchain.runtime.results.open import open_result
-from synchain.runtime.results.result import Result
-from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.stream import stream
+from synchain.runtime import Result, Status, open_result, run, stream
 
 x, v, x_1, x_2 = sp.symbols("x v x_1 x_2")
 TIMES = {"transient": 2.0, "window": 20.0, "time_unit": "time"}

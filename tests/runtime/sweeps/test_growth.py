@@ -71,9 +71,9 @@ def clock(**values: float) -> np.ndarray:
 
 def control(steps: float) -> np.ndarray:
     """A budget."""
-    found = np.zeros(clock_slots.FURTHER)
-    found[clock_slots.MAX_STEPS] = steps
-    return found
+    clock = np.zeros(clock_slots.FURTHER)
+    clock[clock_slots.MAX_STEPS] = steps
+    return clock
 
 
 # The doubling that ends at step 4096 took 1 unit of time, the one before 0.95; the state has grown 600-fold.

@@ -48,11 +48,11 @@ def test_loops_and_lines_agree_in_a_large_network():
 
 def test_equal_oscillators_stay_equal_with_and_without_the_quotient():
     scene = pair(initial={"x": 0.3, "v": 0.0}, samples=41, integrator="taylor")  # the kernel of the records
-    whole = run(scene, show_progress=False, reduce=False).states()
+    full = run(scene, show_progress=False, reduce=False).states()
     merged = run(scene.replace(record=()), show_progress=False).states()
-    assert whole[0] == whole[1]
-    assert whole[2] == whole[3]
-    assert np.abs(whole - merged).max() < 1e-12
+    assert full[0] == full[1]
+    assert full[2] == full[3]
+    assert np.abs(full - merged).max() < 1e-12
 
 
 def test_circuits_with_kinks_are_those_of_another_method():

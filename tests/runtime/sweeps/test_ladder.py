@@ -10,8 +10,7 @@ from catalogue import VAN_DER_POL
 from scipy.integrate import solve_ivp
 
 from synchain.models import Field, Scene, chain
-from synchain.runtime import Result, run
-from synchain.runtime.support.status import Status
+from synchain.runtime import Result, Status, run
 
 QUIET: dict[str, Any] = {"show_progress": False}
 SHORT: dict[str, Any] = {"transient": 0.0, "time_unit": "time"}

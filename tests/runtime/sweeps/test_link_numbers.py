@@ -54,15 +54,15 @@ def edges_of(graph: Topology) -> list[tuple[int, int]]:
 def lagging(n: int) -> tuple[Scene, Callable[[float, np.ndarray], np.ndarray]]:
     """Phases with a lag of each link, there and back another one."""
     graph = erdos_renyi(n, p=0.6, seed=4)
-    lags, own, start = DICE.uniform(-1, 1, len(graph.links)), DICE.normal(size=n), DICE.uniform(-3, 3, n)
+    lags, frequencies, start = DICE.uniform(-1, 1, len(graph.links)), DICE.normal(size=n), DICE.uniform(-3, 3, n)
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
-        rates = own.copy()
+        rates = frequencies.copy()
         for (a, b, _), lag in zip(graph.links, lags, strict=True):
             rates[a] += np.sin(y[b] - y[a] - lag)
         return rates
 
-    values = {"omega": own, "lag": lags}
+    values = {"omega": frequencies, "lag": lags}
     return Scene(PHASE, LAGGING, graph, parameters=values, initial={"theta": start}, **EXACT), rhs
 
 
@@ -70,12 +70,12 @@ def springs(n: int) -> tuple[Scene, Callable[[float, np.ndarray], np.ndarray]]:
     """Springs with a strength and a rest length of each edge, and dampers with a number of each link of another graph."""
     first, second = erdos_renyi(n, p=0.6, seed=4), ring(n)
     pairs = edges_of(first)
-    k, rest, c = DICE.uniform(0.1, 1, len(pairs)), DICE.uniform(-1, 1, len(pairs)), DICE.uniform(0, 0.3, 2 * n)
+    k, lengths, c = DICE.uniform(0.1, 1, len(pairs)), DICE.uniform(-1, 1, len(pairs)), DICE.uniform(0, 0.3, 2 * n)
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
         x, v = y[:n], y[n:]
         rates = -x
-        for (a, b), strength, length in zip(pairs, k, rest, strict=True):
+        for (a, b), strength, length in zip(pairs, k, lengths, strict=True):
             gap = x[a] - x[b]
             pull = strength * (gap - length * np.sin(gap))
             rates[a] -= pull
@@ -85,7 +85,7 @@ def springs(n: int) -> tuple[Scene, Callable[[float, np.ndarray], np.ndarray]]:
         return np.concatenate([v, rates])
 
     start = {"x": DICE.normal(size=n), "v": DICE.normal(size=n)}
-    values = {"K": k, "rest": rest, "c": c}
+    values = {"K": k, "rest": lengths, "c": c}
     layers = [(RESTING, first), (DAMPED, second)]
     return Scene("harmonic", links=layers, parameters=values, initial=start, **EXACT), rhs
 
@@ -146,8 +146,8 @@ def test_numbers_are_given_in_several_forms(tmp_path: Path) -> None:
     matrix = np.diag(values, 1) + np.diag(values, -1)
     weighted = from_edges([(k, k + 1, number) for k, number in enumerate(values)])
     single = {"sigma": 0.1, "sigma_2_3": 0.2, "sigma_3_4": 0.3}
-    for given in ([0.1, 0.1, 0.2, 0.2, 0.3, 0.3], matrix, matrix.tolist(), weighted):
-        assert scene.replace(parameters={"sigma": given}) == scene
+    for weights in ([0.1, 0.1, 0.2, 0.2, 0.3, 0.3], matrix, matrix.tolist(), weighted):
+        assert scene.replace(parameters={"sigma": weights}) == scene
     assert scene.replace(parameters=single).parameters == scene.parameters
     assert scene.replace(sigma=0.5) == scene.replace(parameters={"sigma": 0.5})
     assert scene.replace(sigma_2_3=0.7).parameters["sigma_2_3"] == 0.7
@@ -278,14 +278,16 @@ def members(scene: Scene) -> list[dict[tuple[int, int], float]]:
 def test_members_of_random_families_are_drawn(text: str, edges: int | None) -> None:
     """Each realisation has a member of its own, which `rng` and its number alone decide."""
     scene = drawn(text)
-    found = members(scene)
-    assert len({tuple(sorted(links)) for links in found}) > 1
-    assert {len(links) for links in found} == {edges} or edges is None
-    assert set().union(*(links.values() for links in found)) == ({0.25} if text.startswith("weighted") else {1.0})
-    assert members(drawn(text, 6, x=normal(0, 1)))[:4] == found
-    assert members(drawn(text, rng=4)) != found
+    graphs_drawn = members(scene)
+    assert len({tuple(sorted(links)) for links in graphs_drawn}) > 1
+    assert {len(links) for links in graphs_drawn} == {edges} or edges is None
+    assert set().union(*(links.values() for links in graphs_drawn)) == (
+        {0.25} if text.startswith("weighted") else {1.0}
+    )
+    assert members(drawn(text, 6, x=normal(0, 1)))[:4] == graphs_drawn
+    assert members(drawn(text, rng=4)) != graphs_drawn
     graphs = scene.draws["topology"].graphs(4, 3).graphs
-    assert [{(i, j) for i, j, _ in graph.links if i < j} for graph in graphs] == [set(links) for links in found]
+    assert [{(i, j) for i, j, _ in graph.links if i < j} for graph in graphs] == [set(links) for links in graphs_drawn]
 
 
 def test_the_number_of_edges_is_that_of_the_family() -> None:

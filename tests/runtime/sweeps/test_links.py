@@ -11,10 +11,9 @@ import sympy as sp
 from catalogue import BODY, ROTOR
 from scipy.integrate import solve_ivp
 
-from synchain.models import Field, Potential, Rates, Scene, Topology, complete, ends, ring, star
+from synchain.models import Field, Oscillator, Parameter, Potential, Rates, Scene, Topology, complete, ends, ring, star
 from synchain.models.inputs.frozen import FrozenDict
-from synchain.models.mechanics.oscillator import FieldModel, Oscillator
-from synchain.models.mechanics.parameter import Parameter
+from synchain.models.mechanics.oscillator import FieldModel
 from synchain.runtime import run
 
 K, LAG, OMEGA, G, VS, LAM, TH, GE = sp.symbols("K lag Omega g V_s lam Theta g_el")
@@ -42,10 +41,10 @@ NEURON = Oscillator(
 
 
 def weights(graph: Topology) -> np.ndarray:
-    found = np.zeros((graph.n, graph.n))
+    matrix = np.zeros((graph.n, graph.n))
     for target, source, weight in graph.links:
-        found[target, source] = float(weight)
-    return found
+        matrix[target, source] = float(weight)
+    return matrix
 
 
 def kuramoto(n: int) -> tuple[Scene, Rhs]:
@@ -53,12 +52,12 @@ def kuramoto(n: int) -> tuple[Scene, Rhs]:
     i, j, w = ends(ROTOR)
     pumped = (1 + 0.5 * sp.cos(OMEGA * sp.Symbol("t"))) * K * w * sp.sin(j.theta - i.theta - LAG)
     coupling = Rates({i.theta: pumped}, {K: 1.3, LAG: 0.2, OMEGA: 2})
-    own, felt = np.linspace(-0.5, 0.5, n), weights(ring(n))
+    frequencies, felt = np.linspace(-0.5, 0.5, n), weights(ring(n))
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
-        return own + 1.3 * (1 + 0.5 * np.cos(2 * t)) * (felt * np.sin(y[None] - y[:, None] - 0.2)).sum(1)
+        return frequencies + 1.3 * (1 + 0.5 * np.cos(2 * t)) * (felt * np.sin(y[None] - y[:, None] - 0.2)).sum(1)
 
-    return Scene(oscillator=ROTOR, coupling=coupling, topology=ring(n), parameters={"p": list(own)}), rhs
+    return Scene(oscillator=ROTOR, coupling=coupling, topology=ring(n), parameters={"p": list(frequencies)}), rhs
 
 
 def neurons(n: int) -> tuple[Scene, Rhs]:
@@ -143,7 +142,7 @@ def test_time_in_links_costs_a_rosenbrock_method_no_steps(n: int) -> None:
     settings = {"oscillator": clock, "coupling": Rates({i.theta: pumped}, {K: 1.3, LAG: 0.2, OMEGA: 2})}
     start = {"theta": scene.initial["theta"], "s": 0.0}
     changed = scene.replace(**settings, initial=start, parameters={"p": list(np.linspace(-0.5, 0.5, n))})
-    steps = [int(run(made.replace(integrator="rodas5p", rtol=1e-9)).data.steps) for made in (scene, changed)]
+    steps = [int(run(each.replace(integrator="rodas5p", rtol=1e-9)).data.steps) for each in (scene, changed)]
     assert abs(steps[0] - steps[1]) <= 1
 
 

@@ -58,9 +58,9 @@ def test_the_synchronisation_error_is_that_of_listed_links() -> None:
     field = scene(FEW + 1, integrator="dop853", record=("sync_error",))
     listed = field.replace(topology=sc.from_matrix(field.topology.matrix))
     assert (len(field.equations.fields), len(listed.equations.fields)) == (1, 0)
-    found, expected = (float(sc.run(each, width=1).data.sync_error) for each in (field, listed))
-    assert found == pytest.approx(expected, rel=1e-9)
-    assert found > 0.1
+    error, expected = (float(sc.run(each, width=1).data.sync_error) for each in (field, listed))
+    assert error == pytest.approx(expected, rel=1e-9)
+    assert error > 0.1
 
 
 def test_small_complete_graphs_list_their_links() -> None:

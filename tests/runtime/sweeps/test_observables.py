@@ -13,15 +13,10 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 from scipy.special import ive
 
-from synchain.models import Field, chain, complete, end, maximum, mean, minimum, nodes, rate, ring, variance
+from synchain.models import Field, Scene, chain, complete, end, maximum, mean, minimum, nodes, rate, ring, variance
 from synchain.models.mechanics.components import TIME
-from synchain.models.scenes.scene import Scene
+from synchain.runtime import Result, Status, open_result, run, stream
 from synchain.runtime.cells.reduce import as_reduction
-from synchain.runtime.results.open import open_result
-from synchain.runtime.results.result import Result
-from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.stream import stream
 
 x, v, x_1, v_1, theta, t = sp.symbols("x v x_1 v_1 theta t")
 T = np.linspace(0.0, 20.0, 2_000_001)
@@ -83,8 +78,8 @@ def of_duffing(n: int) -> np.ndarray:
     energy = sum(a**2 / 2 + b**2 / 2 for a, b in zip(xs, vs, strict=True)) / n
     power = sum(b * sp.cos(t) * sp.Symbol(f"beta_{i + 1}") for i, b in enumerate(vs))
     spread = sp.sqrt(sum((a - average) ** 2 for a in xs) / n)
-    own = [a * sum(vs) / n + sp.exp(-(xs[1] ** 2)) for a in xs]
-    return integrals(duffing(n), [energy, power, spread, *own])
+    rates = [a * sum(vs) / n + sp.exp(-(xs[1] ** 2)) for a in xs]
+    return integrals(duffing(n), [energy, power, spread, *rates])
 
 
 @pytest.mark.parametrize(
@@ -174,8 +169,8 @@ def test_short_excursions_inside_long_steps_are_seen(group: dict[str, Callable],
 
 
 def test_short_excursions_inside_reductions_are_seen() -> None:
-    whole = means("nodes.sum(max(0, x - 0.999))")["nodes.sum(max(0, x - 0.999))"]
-    np.testing.assert_allclose(whole, 2 * means("max(0, x - 0.999)")["max(0, x - 0.999)"][0], rtol=1e-7)
+    mean_of_all = means("nodes.sum(max(0, x - 0.999))")["nodes.sum(max(0, x - 0.999))"]
+    np.testing.assert_allclose(mean_of_all, 2 * means("max(0, x - 0.999)")["max(0, x - 0.999)"][0], rtol=1e-7)
 
 
 @pytest.mark.parametrize(("group", "text"), [(EDGED, "sign(x - 0.999)"), (SMOOTH, "exp(200*(x - 1))")])

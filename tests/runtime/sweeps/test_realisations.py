@@ -9,12 +9,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import chain, end, lorentzian, mean, nodes, normal, rate, ring, uniform
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, chain, end, lorentzian, mean, nodes, normal, rate, ring, uniform
 from synchain.models.sweeps.distribution import Draw
-from synchain.runtime.results.open import open_result
-from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.stream import stream
+from synchain.runtime import open_result, run, stream
 
 x = sp.Symbol("x")
 SCENE = Scene(

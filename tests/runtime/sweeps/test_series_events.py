@@ -9,8 +9,7 @@ from synchain.codegen.driver.columns import Count
 from synchain.codegen.kernels.observable_text import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.machine_code.compile import load
-from synchain.models import chain
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, chain
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.engines.scene_kernels import chosen_integrator
 from synchain.runtime.sweeps.run import run
@@ -38,7 +37,7 @@ def test_loops_have_the_events_of_steps_that_are_written_out() -> None:
     )  # both limits of static friction are reached
     ends = [run_cells(kernel, scene) for kernel in (written, looped)]
     assert "closing" in looped.source
-    np.testing.assert_allclose(*(found.end for found in ends), rtol=0, atol=1e-11)
+    np.testing.assert_allclose(*(result.end for result in ends), rtol=0, atol=1e-11)
     assert abs(ends[0].counts[0, Count.ACCEPTED] - ends[1].counts[0, Count.ACCEPTED]) < 3
 
 
@@ -49,6 +48,6 @@ def test_a_load_that_dips_below_the_limit_within_a_step_sets_the_body_free() -> 
         time_unit="time", initial={"x": [0.0], "v": [1e-9]}, integrator="taylor",
         parameters={"epsilon": 1.0, "mu": 1.0, "theta_b": 1e-9, "u": 1.001, "omega": 1.0},
     )  # fmt: skip
-    found, close = (run(each, width=WIDTH) for each in (scene, scene.replace(integrator="dop853", rtol=1e-12)))
-    assert found.steps.item() < 12
-    np.testing.assert_allclose(found.end, close.end, rtol=0, atol=1e-9)
+    result, close = (run(each, width=WIDTH) for each in (scene, scene.replace(integrator="dop853", rtol=1e-12)))
+    assert result.steps.item() < 12
+    np.testing.assert_allclose(result.end, close.end, rtol=0, atol=1e-9)

@@ -9,14 +9,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from synchain.models import Field
-from synchain.models.graphs.families import topology
-from synchain.models.scenes.scene import Scene
+from synchain.models import Field, Scene, topology
+from synchain.runtime import Result, open_result, run
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.results.labels import DRIVE_PHASE
-from synchain.runtime.results.open import open_result
-from synchain.runtime.results.result import Result
-from synchain.runtime.sweeps.run import run
 
 DRIVEN = Scene(
     oscillator="duffing",
@@ -184,8 +180,8 @@ def test_a_continued_sweep_refuses_a_drive_amid_its_period() -> None:
         ValueError, match=r"continuation: the drive is 0\.183099 into a period at the end of a cell; expected"
     ):
         run(amid, show_progress=False)
-    whole = amid.replace(window=3 * driven.period)
+    uncut = amid.replace(window=3 * driven.period)
     counted = amid.replace(time_unit="period", window=3.0)
-    ends = [run(each, show_progress=False).states("end") for each in (whole, counted)]
+    ends = [run(each, show_progress=False).states("end") for each in (uncut, counted)]
     np.testing.assert_allclose(*ends, rtol=1e-12)
     run(amid.replace(continuation="none"), show_progress=False)

@@ -8,11 +8,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import end, mean, nodes, rate, ring
-from synchain.models.scenes.scene import Scene
-from synchain.runtime.results.open import open_result
-from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps.run import run
+from synchain.models import Scene, end, mean, nodes, rate, ring
+from synchain.runtime import Status, open_result, run
 
 x, v, x_1, t = sp.symbols("x v x_1 t")
 START = {"x": [1.0], "v": [0.0]}
@@ -40,10 +37,10 @@ def test_the_end_is_where_the_function_is_zero(integrator: str, width: int) -> N
     assert float(result.square[0]) == pytest.approx((last / 2 - np.sin(2 * last) / 4) / last, abs=near)
     assert float(result.data["speed"][0]) == float(result.states()[1])
     assert float(result.slope[0]) == pytest.approx(float(result.states()[1]), abs=1e-6)
-    kept = np.isfinite(result.states("trajectory")[:, 0])
-    assert kept.sum() == 21  # samples 0.1 apart: the last one is at 2.0
-    times = result.time.values[kept]
-    np.testing.assert_allclose(result.states("trajectory")[kept, 0], np.cos(times), rtol=0, atol=1e-8)
+    finite = np.isfinite(result.states("trajectory")[:, 0])
+    assert finite.sum() == 21  # samples 0.1 apart: the last one is at 2.0
+    times = result.time.values[finite]
+    np.testing.assert_allclose(result.states("trajectory")[finite, 0], np.cos(times), rtol=0, atol=1e-8)
     assert int(result.turn_count) == 0  # cos t = -sin t at 3 pi/4, which is later
 
 

@@ -19,19 +19,14 @@ import pytest
 from streams import MAP, PAIR, UP, kill_again_and_again, partial, warm
 from test_skip import MIRRORED
 
-from synchain.models.inputs.plugins import allow_code
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene, allow_code
+from synchain.runtime import Status, SweepFailed, SweepInterrupted, open_result, run, stream
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.commands.run import stopped_by_signals
 from synchain.runtime.plots.result_plot import draw_result
 from synchain.runtime.results.block_log import HEAD, BlockLog
-from synchain.runtime.results.open import open_result
 from synchain.runtime.support.netcdf import Sheet
-from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps.errors import SweepFailed, SweepInterrupted
-from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.stream import stream
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and limits of Unix")
 
@@ -124,11 +119,11 @@ def test_a_large_variable_is_laid_out_past_four_gigabytes(tmp_path):
 
 
 def block(cells: int, value: float) -> Buffers:
-    made = Buffers.empty(cells, 2, 3, 1)
-    made.end[:], made.sums[:], made.samples[:] = value, value, value
-    made.counts[:, 0], made.counts[:, 3] = 1, np.arange(cells) % 4
-    made.points[np.arange(3) < made.counts[:, 3:4]] = value
-    return made
+    buffers = Buffers.empty(cells, 2, 3, 1)
+    buffers.end[:], buffers.sums[:], buffers.samples[:] = value, value, value
+    buffers.counts[:, 0], buffers.counts[:, 3] = 1, np.arange(cells) % 4
+    buffers.points[np.arange(3) < buffers.counts[:, 3:4]] = value
+    return buffers
 
 
 ABOUT = {"blocks": 4, "dimension": 2, "samples": 1, "observed": 0, "kept": 2}
@@ -180,9 +175,9 @@ def test_a_damaged_block_is_none(store):
 
 def test_each_copy_of_the_first_line_stands_in_for_the_other(store):
     contents = store.read_bytes()
-    for place in (0, 4096):
+    for offset in (0, 4096):
         for damage in (lambda old: b"\0" * len(old), lambda old: bytes([old[0] ^ 1]) + old[1:]):
-            for begin in (place, place + 17, place + 40):
+            for begin in (offset, offset + 17, offset + 40):
                 store.write_bytes(contents[:begin] + damage(contents[begin : begin + 20]) + contents[begin + 20 :])
                 assert open_result_or_refusal(store) != "no store"
                 assert BlockLog.open(store).done.tolist() == [True, True, True, False]
@@ -202,8 +197,8 @@ def open_result_or_refusal(path: Path) -> str:
 
 def test_a_damaged_first_line_is_an_error_that_says_so(store):
     contents = bytearray(store.read_bytes())
-    for place in (40, 4096 + 40):
-        contents[place] ^= 1
+    for offset in (40, 4096 + 40):
+        contents[offset] ^= 1
     for content, words in (
         (bytes(contents), "both copies of its first line are damaged"),
         (b"something else", "no unfinished run"),
@@ -482,8 +477,8 @@ def restore_interrupt() -> None:
 
 @pytest.mark.long
 def test_five_kills(tmp_path):
-    kept, _ = kill_again_and_again(MAP, tmp_path, 5, seed=1)
-    assert kept > 0
+    resumed, _ = kill_again_and_again(MAP, tmp_path, 5, seed=1)
+    assert resumed > 0
 
 
 # -- files that are there already ----------------------------------------------------------------------------
@@ -645,9 +640,9 @@ def test_every_flipped_byte_of_a_result_is_noticed(tmp_path):
     stream(small, path, width=8, show_progress=False)
     assert open_result(path).success
     contents = path.read_bytes()
-    for place in [*range(0, 400), *range(400, len(contents), 37)]:
+    for offset in [*range(0, 400), *range(400, len(contents), 37)]:
         damaged = bytearray(contents)
-        damaged[place] ^= 1 << place % 8
+        damaged[offset] ^= 1 << offset % 8
         path.write_bytes(damaged)
         noticed = 0
         for look in (lambda: open_result(path), lambda: stream(small, path, width=8, show_progress=False)):
@@ -659,7 +654,7 @@ def test_every_flipped_byte_of_a_result_is_noticed(tmp_path):
                     pass
                 except (OSError, ValueError, RuntimeWarning):
                     noticed += 1
-        assert noticed == 2, place
+        assert noticed == 2, offset
         assert path.read_bytes() == damaged
 
 

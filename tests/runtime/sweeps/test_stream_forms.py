@@ -16,17 +16,13 @@ import pytest
 import xarray as xr
 from streams import MAP, PAIR, UP, contents, die_at_the_copy, forking, kill_again_and_again, partial, warm
 
-from synchain.models.scenes.scene import Scene
+from synchain.models import Scene
+from synchain.runtime import Status, SweepFailed, SweepInterrupted, open_result, run, stream
 from synchain.runtime.cli import main
 from synchain.runtime.commands.run import FORMATS
 from synchain.runtime.results import store
-from synchain.runtime.results.open import open_result
 from synchain.runtime.results.store import FORMS, chunk, opened, pieces
 from synchain.runtime.support.netcdf import DIGEST
-from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps.errors import SweepFailed, SweepInterrupted
-from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.stream import stream
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of Unix")
 
@@ -146,8 +142,8 @@ def test_a_kill_while_the_result_is_written_loses_nothing(ending: str, tmp_path:
 
 @pytest.mark.parametrize("ending", FURTHER)
 def test_kills_between_blocks(ending: str, tmp_path: Path) -> None:
-    kept, done = kill_again_and_again(MAP, tmp_path, 3, seed=2, ending=ending)
-    assert kept + done > 0
+    resumed, done = kill_again_and_again(MAP, tmp_path, 3, seed=2, ending=ending)
+    assert resumed + done > 0
 
 
 @pytest.mark.parametrize("name", [".a-1x2y.nc", ".a-1x2y.partial"])
@@ -218,9 +214,9 @@ def test_what_is_no_result_is_refused_before_anything_runs(ending: str, tmp_path
     "shape", [(), (0,), (5,), (70_000,), (3, 40_000), (200, 300, 2), (7, 2, 5, 3), (3, 0, 2)], ids=str
 )
 def test_pieces_cover_an_array_once_and_in_order(shape: tuple[int, ...]) -> None:
-    numbers = np.arange(np.prod(shape, dtype=int)).reshape(shape)
-    parts = [numbers[piece].reshape(-1) for piece in pieces(shape)]
-    np.testing.assert_array_equal(np.concatenate([*parts, np.zeros(0, int)]), numbers.reshape(-1))
+    values = np.arange(np.prod(shape, dtype=int)).reshape(shape)
+    parts = [values[piece].reshape(-1) for piece in pieces(shape)]
+    np.testing.assert_array_equal(np.concatenate([*parts, np.zeros(0, int)]), values.reshape(-1))
     assert max(map(len, parts), default=0) <= 2**15
     assert len(chunk(shape)) == len(shape)
 

@@ -10,5 +10,5 @@ pytestmark = pytest.mark.long
 
 @pytest.mark.parametrize(("scene", "times"), [(MAP, 70), (UP, 30)], ids=["map", "continued"])
 def test_a_hundred_kills(scene, times, tmp_path):
-    kept, _ = kill_again_and_again(scene, tmp_path, times, seed=2)
-    assert kept > times // 3
+    resumed, _ = kill_again_and_again(scene, tmp_path, times, seed=2)
+    assert resumed > times // 3

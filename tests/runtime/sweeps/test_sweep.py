@@ -10,22 +10,16 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from synchain.models import chain
+from synchain.models import Scene, chain
 from synchain.models.dynamics.reduction import without_drive
-from synchain.models.scenes.scene import Scene
+from synchain.runtime import Status, SweepInterrupted, kernel, open_result, run, stream
 from synchain.runtime.cells.plan import plan
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.engines.control import tolerances
-from synchain.runtime.engines.scene_kernels import kernel
-from synchain.runtime.results.open import open_result
 from synchain.runtime.support.execution import Execution
 from synchain.runtime.support.progress import Reporter
-from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps.errors import SweepInterrupted
 from synchain.runtime.sweeps.memory import Memory
 from synchain.runtime.sweeps.prepare import prepare
-from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.stream import stream
 
 PAIR = Scene(topology=chain(2), transient=5, window=10, parameters={"sigma": 0.1})
 SECTIONS = PAIR.replace(record=("sync_error", "section", "trajectory"), samples=2)

@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 
 import benchmarks
-from synchain.models.graphs.families import topology
-from synchain.models.graphs.topology import from_matrix
-from synchain.models.scenes.scene import Scene
-from synchain.runtime.stability.exponents import Exponents, exponents
-from synchain.runtime.sweeps.run import run
+from synchain.models import Scene, from_matrix, topology
+from synchain.runtime import Criterion, Exponents, exponents, run
 from synchain.runtime.synchronisation.agreement import (
     CAUSES,
     OUTCOMES,
@@ -20,7 +17,6 @@ from synchain.runtime.synchronisation.agreement import (
     agreement,
     strengths,
 )
-from synchain.runtime.synchronisation.criterion import Criterion
 
 pytestmark = pytest.mark.long
 

@@ -11,12 +11,9 @@ import numpy as np
 import pytest
 from kept_values import basin as kept_basin
 
-from synchain.models import Field, chain
-from synchain.models.scenes.scene import Scene
-from synchain.runtime.support.status import Status
-from synchain.runtime.synchronisation.basin import Basin, Fate, basin, random_starts
-from synchain.runtime.synchronisation.criterion import Criterion
-from synchain.runtime.synchronisation.probe import Probe, universal_probe
+from synchain.models import Field, Scene, chain
+from synchain.runtime import Basin, Criterion, Probe, Status, basin, universal_probe
+from synchain.runtime.synchronisation.basin import Fate, random_starts
 
 FREE = Scene(oscillator="harmonic", topology=chain(2), parameters={"sigma": 0.0})
 DAMPED = Scene(oscillator="harmonic", topology=chain(3), coupling="damper", parameters={"sigma": 0.5})
@@ -41,10 +38,10 @@ def test_share_of_free_pairs_is_that_of_two_points_in_a_square(free):
     Source: Solomon, Geometric Probability (SIAM, 1978), ch. 2.  The square has the side 2 here, so that s = 1/2.
     """
     s = 0.5
-    known = math.pi * s**2 - 8 * s**3 / 3 + s**4 / 2
-    assert free.share == pytest.approx(known, abs=4 * math.sqrt(known * (1 - known) / free.samples))
+    volume = math.pi * s**2 - 8 * s**3 / 3 + s**4 / 2
+    assert free.share == pytest.approx(volume, abs=4 * math.sqrt(volume * (1 - volume) / free.samples))
     low, high = free.interval
-    assert low < known < high
+    assert low < volume < high
     assert free.count == np.count_nonzero(free.synchronous) == round(free.share * 1000)
 
 
@@ -262,6 +259,6 @@ def test_the_mode_of_a_contact_is_no_random_number():
 @pytest.mark.parametrize("synchronous", [True, False])
 def test_starts_have_not_left_an_unstable_state_only_if_they_came_to_it(synchronous: bool) -> None:
     fate = np.full(3, tuple(Fate).index(Fate.SYNCHRONOUS if synchronous else Fate.OTHER))
-    found = dataclasses.replace(kept_basin(), exponent=0.1, fate=fate)
-    assert "the synchronous state is unstable" in found.message
-    assert ("have not left it yet" in found.message) == synchronous
+    basin_with_fate = dataclasses.replace(kept_basin(), exponent=0.1, fate=fate)
+    assert "the synchronous state is unstable" in basin_with_fate.message
+    assert ("have not left it yet" in basin_with_fate.message) == synchronous

@@ -9,15 +9,11 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import chain
+from synchain.models import Scene, chain, from_matrix
 from synchain.models.dynamics.equations import Equations
-from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import Edge, Node
-from synchain.models.scenes.scene import Scene
-from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps.run import run
-from synchain.runtime.synchronisation.criterion import Criterion
-from synchain.runtime.synchronisation.probe import MODE_ALPHA, MODE_BETA, ring_of_three, universal_probe
+from synchain.runtime import Criterion, Status, run, universal_probe
+from synchain.runtime.synchronisation.probe import MODE_ALPHA, MODE_BETA, ring_of_three
 from synchain.runtime.synchronisation.threshold import probe
 
 FRICTION = Scene(topology=chain(2), parameters={"omega": 1.15})
@@ -31,17 +27,19 @@ DAMPERS = Scene(oscillator="harmonic", topology=chain(2), coupling="damper")
 @pytest.mark.parametrize(("scene", "column"), [(SPRINGS, 0), (DAMPERS, 3)])
 def test_the_ring_has_the_two_conjugate_eigenvalues_exactly(scene, column):
     """-gamma = alpha ± i beta and 0, from the derivatives of the links' forces (rows v_1 … v_3)."""
-    found = sp.zeros(3, 3)
+    jacobian = sp.zeros(3, 3)
     for (row, place), entry in ring_of_three(scene.equations).link_jacobian():
         assert row >= 3
         assert column <= place < column + 3
-        found[row - 3, place - column] += entry
+        jacobian[row - 3, place - column] += entry
     z = sp.Symbol("z")
     expected = z * ((z + MODE_ALPHA) ** 2 + MODE_BETA**2)
-    assert sp.expand(found.charpoly(z).as_expr() - expected) == 0
-    assert found * sp.ones(3, 1) == sp.zeros(3, 1)
-    assert (found * found.T - found.T * found).applyfunc(sp.expand) == sp.zeros(3, 3)  # normal: no transient growth
-    a, b = found[0, 1], found[1, 0]
+    assert sp.expand(jacobian.charpoly(z).as_expr() - expected) == 0
+    assert jacobian * sp.ones(3, 1) == sp.zeros(3, 1)
+    assert (jacobian * jacobian.T - jacobian.T * jacobian).applyfunc(sp.expand) == sp.zeros(
+        3, 3
+    )  # normal: no transient growth
+    a, b = jacobian[0, 1], jacobian[1, 0]
     assert sp.simplify(sp.Rational(3, 2) * (a + b) - MODE_ALPHA) == 0
     assert sp.simplify(sp.sqrt(3) / 2 * (a - b) - MODE_BETA) == 0
 
@@ -162,22 +160,22 @@ def test_cells_that_do_not_finish_are_not_synchronous():
 
 def model(edge_rhs="sigma*weight*(x_j - x_i)", node_parameters=("c",)) -> Equations:
     """One node x' = -c x … with links of a given rate."""
-    x, x_i, x_j, weight, *rest = sp.symbols(("x", "x_i", "x_j", "weight", *node_parameters), real=True)
+    x, x_i, x_j, weight, *node_symbols = sp.symbols(("x", "x_i", "x_j", "weight", *node_parameters), real=True)
     rhs = sp.sympify(
         edge_rhs, locals={s.name: s for s in (x_i, x_j, weight)} | {"sigma": sp.Symbol("sigma", real=True)}
     )
     used = tuple(sorted(rhs.free_symbols - {x_i, x_j, weight}, key=str))
     return Equations.of_equal_nodes(
-        Node((x,), (-sum(rest) * x,), tuple(rest)), Edge((x_i,), (x_j,), weight, (rhs,), used), 2
+        Node((x,), (-sum(node_symbols) * x,), tuple(node_symbols)), Edge((x_i,), (x_j,), weight, (rhs,), used), 2
     )
 
 
 def test_nonlinear_couplings_keep_their_form():
-    made = ring_of_three(model("sigma*weight*((x_j - x_i) + (x_j - x_i)**3)"))
-    assert made.parameters == ("c", "mode_alpha", "mode_beta")
-    assert len(made.links) == 6
-    x_i, x_j = made.edge.here[0], made.edge.there[0]
-    one_way = made.edge.rhs[0].xreplace({made.edge.weight: sp.S.One})
+    ring = ring_of_three(model("sigma*weight*((x_j - x_i) + (x_j - x_i)**3)"))
+    assert ring.parameters == ("c", "mode_alpha", "mode_beta")
+    assert len(ring.links) == 6
+    x_i, x_j = ring.edge.here[0], ring.edge.there[0]
+    one_way = ring.edge.rhs[0].xreplace({ring.edge.weight: sp.S.One})
     assert sp.expand(one_way / (MODE_ALPHA / 3 + MODE_BETA / sp.sqrt(3)) - (x_j - x_i) - (x_j - x_i) ** 3) == 0
 
 
@@ -215,5 +213,5 @@ def test_what_the_scene_observes_changes_nothing():
     """The ring of three is another network, whose kernel has no room for observed values."""
     criterion = Criterion(starts=2, transient=5, window=2)
     watched = SPRINGS.replace(observe={"e": "mean(nodes.mean(v**2))"})
-    found, plain = (universal_probe(s, [0.1, 0.2], 0.1, criterion=criterion) for s in (watched, SPRINGS))
-    np.testing.assert_array_equal(found.error, plain.error)
+    probed, plain = (universal_probe(s, [0.1, 0.2], 0.1, criterion=criterion) for s in (watched, SPRINGS))
+    np.testing.assert_array_equal(probed.error, plain.error)

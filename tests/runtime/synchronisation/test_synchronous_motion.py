@@ -7,15 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from synchain.models import Field, Rates, chain, ends
-from synchain.models.graphs.topology import from_matrix
-from synchain.models.scenes.scene import Scene
+from synchain.models import Field, Rates, Scene, chain, ends, from_matrix
+from synchain.runtime import Criterion, basin, thresholds, universal_probe
 from synchain.runtime.support.execution import Execution
 from synchain.runtime.synchronisation.agreement import agreement
-from synchain.runtime.synchronisation.basin import Fate, basin
-from synchain.runtime.synchronisation.criterion import AppliedCriterion, Criterion
-from synchain.runtime.synchronisation.probe import universal_probe
-from synchain.runtime.synchronisation.threshold import fitted, simulate, thresholds
+from synchain.runtime.synchronisation.basin import Fate
+from synchain.runtime.synchronisation.criterion import AppliedCriterion
+from synchain.runtime.synchronisation.threshold import fitted, simulate
 
 QUIET = Execution(1, show_progress=False)
 VDP = Field(

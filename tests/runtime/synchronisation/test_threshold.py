@@ -10,18 +10,13 @@ import numpy as np
 import pytest
 
 from synchain.codegen.driver.columns import Count, SumColumn
-from synchain.models import Field, chain, complete, star
-from synchain.models.graphs.topology import from_matrix
-from synchain.models.scenes.scene import Scene
+from synchain.models import Field, Scene, chain, complete, from_matrix, star
+from synchain.runtime import MSF, Criterion, Exponents, ExponentWindows, Status, exponents, thresholds
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.plots.style import GREEN
-from synchain.runtime.stability.exponents import Exponents, exponents
-from synchain.runtime.stability.msf import MSF
 from synchain.runtime.support.execution import Execution
-from synchain.runtime.support.status import Status
 from synchain.runtime.synchronisation import threshold
-from synchain.runtime.synchronisation.criterion import PAPER, Criterion, offsets
-from synchain.runtime.synchronisation.exponent_windows import ExponentWindows
+from synchain.runtime.synchronisation.criterion import PAPER, offsets
 from synchain.runtime.synchronisation.threshold import (
     PROBES,
     Sweep,
@@ -33,7 +28,6 @@ from synchain.runtime.synchronisation.threshold import (
     probe,
     project,
     simulate,
-    thresholds,
     wu_chua,
 )
 from synchain.runtime.synchronisation.trials import mean_errors
@@ -199,9 +193,9 @@ def test_negative_sigma_is_predicted_as_it_is_simulated(swept, monkeypatch):
 
 def test_the_criterion_is_that_of_the_published_table():
     """docs/thresholds.md rests on it: 8 starts, 1000 periods and 100 more, a mean error below 1e-3."""
-    found = PAPER
-    assert (found.tolerance, found.starts, found.reach) == (1e-3, 8, 0.4)
-    assert (found.transient, found.window, found.rtol, found.seed) == (1000.0, 100.0, 1e-8, 0)
+    criterion = PAPER
+    assert (criterion.tolerance, criterion.starts, criterion.reach) == (1e-3, 8, 0.4)
+    assert (criterion.transient, criterion.window, criterion.rtol, criterion.seed) == (1000.0, 100.0, 1e-8, 0)
 
 
 def test_at_least_half_of_the_starts_must_fall_below_the_tolerance():
@@ -302,10 +296,10 @@ def test_direct_range_of_a_star_lies_where_the_probe_says():
     assert high == pytest.approx(0.4653 / 4, abs=1e-4)
     assert 0.0 == low_error < high_error < 1e-6  # the motion is periodic
     assert result.direct.intervals[0][1] == pytest.approx(high, abs=0.01)
-    numbers = result.as_dict()
+    answer = result.as_dict()
     kinds = {"intervals", "probe", "predicted", "exponents", "exponent_errors", "no_exponents", "warnings"}
-    assert set(numbers) == kinds
-    assert numbers["intervals"][0][1] == result.direct.intervals[0][1]
+    assert set(answer) == kinds
+    assert answer["intervals"][0][1] == result.direct.intervals[0][1]
 
 
 def test_failed_cells_never_count_as_synchronous():
