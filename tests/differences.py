@@ -64,7 +64,7 @@ def slopes(expressions: Sequence[sp.Expr], along: Mapping[sp.Symbol, mpmath.mpf]
         return [(a - b) / (2 * step) for a, b in zip(there, back, strict=True)]
 
 
-def close(found: Sequence[mpmath.mpf], expected: Sequence[mpmath.mpf], digits: int = 25) -> bool:
+def close(values: Sequence[mpmath.mpf], expected: Sequence[mpmath.mpf], digits: int = 25) -> bool:
     """True where all numbers agree to `digits` digits, relative to the larger of 1 and the number."""
-    pairs = zip(found, expected, strict=True)
+    pairs = zip(values, expected, strict=True)
     return all(abs(a - b) <= mpmath.mpf(10) ** -digits * max(1, abs(b)) for a, b in pairs)

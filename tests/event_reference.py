@@ -78,8 +78,8 @@ class Reference:
                 decays[i].append(p["a"] * self.slip[i] * folded / (k + 1))
         return xs, vs, drive
 
-    def gap(self, i: int, made: tuple, tau: mpf) -> mpf:
-        xs, vs, _ = made
+    def gap(self, i: int, series: tuple, tau: mpf) -> mpf:
+        xs, vs, _ = series
         if self.slip[i] != 0:
             return self.slip[i] * (self.p["theta_b"] - value(vs[i], tau))
         return self.hold - abs(self.load(i, [value(s, tau) for s in xs], self.t + tau))

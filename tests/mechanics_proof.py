@@ -161,9 +161,9 @@ def _loads(system: Whole, speeds: Iterable[sp.Expr], forces: Iterable[sp.Expr]) 
     return frame, loads
 
 
-def residual(system: Whole, found: tuple[sp.Matrix, sp.Matrix], ours: dict[str, sp.Expr]) -> list[sp.Expr]:
+def residual(system: Whole, matrices: tuple[sp.Matrix, sp.Matrix], ours: dict[str, sp.Expr]) -> list[sp.Expr]:
     """Their mass matrix times our accelerations, keyed by coordinate such as "phi_2", less their forcing."""
     plain = {r: sp.Symbol(f"rate_{x.func.__name__}", real=True) for r, x in zip(system.rates, system.q, strict=True)}
     plain |= {x: sp.Symbol(x.func.__name__, real=True) for x in system.q}
-    masses, forcing = (m.xreplace(plain).xreplace({T: TIME}) for m in found)
+    masses, forcing = (m.xreplace(plain).xreplace({T: TIME}) for m in matrices)
     return list(masses * sp.Matrix([ours[x.func.__name__] for x in system.q]) - forcing)

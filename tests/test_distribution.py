@@ -112,7 +112,7 @@ def test_the_wheel_says_what_pyproject_says(wheel: zipfile.Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "place"),
+    ("name", "path"),
     [
         ("models/scenes/scene.py", "synchain/models/scenes/scene.py"),
         ("runtime/py.typed", "synchain/runtime/py.typed"),
@@ -120,8 +120,8 @@ def test_the_wheel_says_what_pyproject_says(wheel: zipfile.Path) -> None:
         ("README.md", None),
     ],
 )
-def test_places_in_the_wheel_follow_package_dir(name: str, place: str | None) -> None:
-    assert packaged(name) == place
+def test_places_in_the_wheel_follow_package_dir(name: str, path: str | None) -> None:
+    assert packaged(name) == path
 
 
 def test_the_deepest_folder_of_package_dir_decides(monkeypatch: pytest.MonkeyPatch) -> None:

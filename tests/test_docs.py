@@ -46,9 +46,9 @@ def exists(name: str) -> bool:
 def commands(text: str) -> Iterator[list[str]]:
     """The words after `synchain` of every command line without placeholders."""
     for line in re.findall(r"^    (?:\$ )?synchain (\w.*)$", text, re.MULTILINE):
-        words = re.split(r"  #| \| | > ", line)[0]
-        if not re.search(r"[\[…|]|\b[A-Z]{4,}\b|^\w+:| N ", words):
-            yield shlex.split(words)
+        command = re.split(r"  #| \| | > ", line)[0]
+        if not re.search(r"[\[…|]|\b[A-Z]{4,}\b|^\w+:| N ", command):
+            yield shlex.split(command)
 
 
 @pages
@@ -71,14 +71,14 @@ def test_dotted_names_and_test_files_exist(page: Path) -> None:
 @pages
 def test_imports_can_be_made(page: Path) -> None:
     lines = re.findall(r"^ *from (synchain[\w.]*) import ([\w, ]+)", page.read_text(encoding="utf-8"), re.MULTILINE)
-    names = [f"{module}.{name.strip()}" for module, words in lines for name in words.split(",")]
+    names = [f"{module}.{name.strip()}" for module, names_of_line in lines for name in names_of_line.split(",")]
     assert not [name for name in names if not exists(name)]
 
 
 @pages
 def test_command_lines_can_be_read(page: Path) -> None:
-    for command, *words in commands(page.read_text(encoding="utf-8")):
-        parser(command).read(words)
+    for command, *arguments in commands(page.read_text(encoding="utf-8")):
+        parser(command).read(arguments)
 
 
 @pytest.mark.parametrize("page", RECIPES, ids=lambda path: path.stem)

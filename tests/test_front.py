@@ -60,9 +60,9 @@ def accepted(annotation: str) -> str:
     return " | ".join(TYPES.get(part, part) for part in annotation.split(" | "))
 
 
-def arguments(made: families.Family) -> tuple[str, ...]:
+def arguments(family: families.Family) -> tuple[str, ...]:
     """What a family takes."""
-    parameters = inspect.signature(made.edges).parameters.values()
+    parameters = inspect.signature(family.edges).parameters.values()
     options = [
         f"{p.name}: {accepted(p.annotation)} = {written(p.default)}"
         for p in parameters
@@ -127,13 +127,13 @@ def front_stub() -> str:
 
 
 @pytest.mark.parametrize(
-    ("place", "make"), [("models/__init__.pyi", models_stub), ("runtime/front/__init__.pyi", front_stub)]
+    ("path", "make"), [("models/__init__.pyi", models_stub), ("runtime/front/__init__.pyi", front_stub)]
 )
-def test_the_stubs_say_what_the_packages_offer(place: str, make: object, request: pytest.FixtureRequest) -> None:
+def test_the_stubs_say_what_the_packages_offer(path: str, make: object, request: pytest.FixtureRequest) -> None:
     text = make()  # type: ignore[operator]
     if request.config.getoption("--update"):
-        (ROOT / place).write_text(text, encoding="utf-8")
-    assert (ROOT / place).read_text("utf-8") == text, f"{place} is old; run: pytest tests/test_front.py --update"
+        (ROOT / path).write_text(text, encoding="utf-8")
+    assert (ROOT / path).read_text("utf-8") == text, f"{path} is old; run: pytest tests/test_front.py --update"
 
 
 def test_the_front_offers_every_name_of_both_packages_once() -> None:

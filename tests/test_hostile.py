@@ -90,8 +90,10 @@ PULL = """
 def test_a_coupling_that_does_not_vanish_between_equals_is_said(tmp_path: Path) -> None:
     pull = law(tmp_path, PULL, "pull.py")
     messages = Scene(topology=topology("chain", 4), coupling=pull).warnings
-    assert any("does not vanish between oscillators in equal states" in words for words in messages)
-    assert not any("does not vanish" in words for words in Scene(topology=topology("ring", 4), coupling=pull).warnings)
+    assert any("does not vanish between oscillators in equal states" in warning for warning in messages)
+    assert not any(
+        "does not vanish" in warning for warning in Scene(topology=topology("ring", 4), coupling=pull).warnings
+    )
     assert not edge(pull, Scene().equations.node, "friction").diffusive
     assert Scene(topology=topology("ring", 4)).warnings == ()
 
@@ -140,9 +142,9 @@ HUGE = {
 
 @pytest.mark.parametrize("name", HUGE)
 def test_too_much_is_refused_at_once(name: str, tmp_path: Path, monkeypatch, capsys) -> None:
-    words, part = HUGE[name]
-    top, _, sweep = words.partition("[sweep]")
-    first = top if "topology" in words or "sigma" not in words else "[topology]\nname = 'chain'\nn = 2\n" + top
+    text, part = HUGE[name]
+    top, _, sweep = text.partition("[sweep]")
+    first = top if "topology" in text or "sigma" not in text else "[topology]\nname = 'chain'\nn = 2\n" + top
     path = tmp_path / "scene.toml"
     path.write_text(first + (f"[sweep]{sweep}" if sweep else ""))
     (tmp_path / "evil.py").write_text("open('here', 'w')")

@@ -194,7 +194,7 @@ def test_no_modules_import_each_other() -> None:
 
 
 @pytest.mark.parametrize(
-    ("place", "text"),
+    ("path", "text"),
     [
         ("models/graphs", "from ..dynamics.equations import Equations"),
         ("models/algebra", "if TYPE_CHECKING:\n    from ..graphs.topology import Topology"),
@@ -214,8 +214,8 @@ def test_no_modules_import_each_other() -> None:
         ("runtime/commands", "from benchmarks import names"),
     ],
 )
-def test_a_wrong_import_is_seen(place: str, text: str) -> None:
-    assert wrong_imports(PROJECT / place / "planted.py", text) != []
+def test_a_wrong_import_is_seen(path: str, text: str) -> None:
+    assert wrong_imports(PROJECT / path / "planted.py", text) != []
 
 
 def test_every_room_says_what_it_may_know() -> None:

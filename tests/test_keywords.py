@@ -89,20 +89,20 @@ def calls(scene: Scene, path: Any) -> dict[str, Callable[..., object]]:
     """Each function with what it cannot do without."""
     first = runtime.PeriodicOrbit(scene, 1, np.zeros(2), np.zeros(2), 0.0, 0)
     return {
-        "run": lambda **words: runtime.run(scene, **words),
-        "stream": lambda **words: runtime.stream(scene, path, **words),
-        "basin": lambda **words: runtime.basin(scene, **words),
-        "thresholds": lambda **words: runtime.thresholds(scene, **words),
-        "universal_probe": lambda **words: runtime.universal_probe(scene, 0.1, 0.1, **words),
-        "exponents": lambda **words: runtime.exponents(scene, [0.1], **words),
-        "msf": lambda **words: runtime.msf(scene, [0.1, 0.2], **words),
-        "plane": lambda **words: runtime.plane(scene, [0.1, 0.2], [0.0, 0.1], **words),
-        "cluster_exponents": lambda **words: runtime.cluster_exponents(scene, [0, 0], **words),
-        "lyapunov_spectrum": lambda **words: runtime.lyapunov_spectrum(scene, **words),
-        "equilibrium": lambda **words: runtime.equilibrium(scene, **words),
-        "periodic_orbit": lambda **words: runtime.periodic_orbit(scene, **words),
-        "follow": lambda **words: runtime.follow(scene, "omega", [1.3], first, **words),
-        "skeleton": lambda **words: runtime.skeleton(scene, "omega", [1.3], **words),
+        "run": lambda **keywords: runtime.run(scene, **keywords),
+        "stream": lambda **keywords: runtime.stream(scene, path, **keywords),
+        "basin": lambda **keywords: runtime.basin(scene, **keywords),
+        "thresholds": lambda **keywords: runtime.thresholds(scene, **keywords),
+        "universal_probe": lambda **keywords: runtime.universal_probe(scene, 0.1, 0.1, **keywords),
+        "exponents": lambda **keywords: runtime.exponents(scene, [0.1], **keywords),
+        "msf": lambda **keywords: runtime.msf(scene, [0.1, 0.2], **keywords),
+        "plane": lambda **keywords: runtime.plane(scene, [0.1, 0.2], [0.0, 0.1], **keywords),
+        "cluster_exponents": lambda **keywords: runtime.cluster_exponents(scene, [0, 0], **keywords),
+        "lyapunov_spectrum": lambda **keywords: runtime.lyapunov_spectrum(scene, **keywords),
+        "equilibrium": lambda **keywords: runtime.equilibrium(scene, **keywords),
+        "periodic_orbit": lambda **keywords: runtime.periodic_orbit(scene, **keywords),
+        "follow": lambda **keywords: runtime.follow(scene, "omega", [1.3], first, **keywords),
+        "skeleton": lambda **keywords: runtime.skeleton(scene, "omega", [1.3], **keywords),
     }
 
 
@@ -121,9 +121,9 @@ def test_every_function_refuses_in_one_line_what_is_no_parameter(name: str, tmp_
     ]
     if "progress" in TAKEN[name]:
         refused.append(({"progres": print}, f"'progres' of {name}; .*did you mean 'progress'"))
-    for words, message in refused:
+    for keywords, message in refused:
         with pytest.raises((TypeError, ValueError), match=message) as caught:
-            call(**words)
+            call(**keywords)
         assert "\n" not in str(caught.value)
 
 
@@ -179,12 +179,12 @@ def test_a_stop_is_refused_where_nothing_stops(name: str, n: int, tmp_path: Any)
 
 
 def test_a_parameter_fixes_an_axis() -> None:
-    words: dict[str, Any] = {"starts": 1, "transient": 5, "periods": 5, "show_progress": False}
+    keywords: dict[str, Any] = {"starts": 1, "transient": 5, "periods": 5, "show_progress": False}
     swept = DRIVEN.replace(axes={"omega": [1.2, 1.4], "delta": [0.3, 0.7]})
     with pytest.raises(ValueError, match="found axes of delta;"):
         runtime.msf(swept, [0.1, 0.2], omega=1.4)
-    result = runtime.msf(swept, [0.1, 0.2], omega=1.4, delta=0.7, **words)
-    expected = runtime.msf(DRIVEN, [0.1, 0.2], omega=1.4, delta=0.7, **words)
+    result = runtime.msf(swept, [0.1, 0.2], omega=1.4, delta=0.7, **keywords)
+    expected = runtime.msf(DRIVEN, [0.1, 0.2], omega=1.4, delta=0.7, **keywords)
     assert result.scene == expected.scene
     np.testing.assert_array_equal(result.exponent, expected.exponent)
 

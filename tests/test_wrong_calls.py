@@ -240,12 +240,12 @@ def test_unknown_keywords_are_refused_with_those_that_are_known(value: Any) -> N
     parameter_names = [each.name for each in parameters if each.kind is not each.VAR_POSITIONAL]
     with pytest.raises(TypeError) as caught:
         value(**{f"{parameter_names[-1]}_" if parameter_names else "wrong": 1})
-    words = (
+    message = (
         f"known: {', '.join(parameter_names)}; did you mean '{parameter_names[-1]}'?"
         if parameter_names
         else "known: none"
     )
-    assert f" of {value.__name__}; {words}" in str(caught.value)
+    assert f" of {value.__name__}; {message}" in str(caught.value)
 
 
 @pytest.mark.parametrize("value", OFFERED, ids=lambda value: value.__name__)
@@ -259,8 +259,8 @@ def test_arguments_at_no_place_and_missing_ones_are_refused_in_words_of_ours(val
             TypeError, match=f"^{value.__name__}: found 99 arguments without a name; expected "
         ) as caught:
             value(*[None] * 99)
-        words = f"at most {len(places)}, {', '.join(places)}" if places else "none"
-        assert f"expected {words}" in str(caught.value)
+        message = f"at most {len(places)}, {', '.join(places)}" if places else "none"
+        assert f"expected {message}" in str(caught.value)
         for name in places[:1]:
             with pytest.raises(TypeError, match=f"^{value.__name__}: found '{name}' without a name and by name"):
                 value(None, **{name: None})

@@ -23,8 +23,8 @@ def function(*ranges: tuple[float, float], error: float = 0.0) -> SimpleNamespac
     )
 
 
-def sigma(found: SimpleNamespace, name: str, n: int) -> float:
-    return families.sigma_of(found, verdict(found.open_ranges, topology(name, n)))
+def sigma(function_of_alpha: SimpleNamespace, name: str, n: int) -> float:
+    return families.sigma_of(function_of_alpha, verdict(function_of_alpha.open_ranges, topology(name, n)))
 
 
 def test_sigma_is_the_middle_of_the_widest_window() -> None:

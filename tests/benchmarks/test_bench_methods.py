@@ -53,7 +53,7 @@ def test_time_is_per_period_and_cell(monkeypatch):
 
 def test_the_table_compares_every_choice_with_the_first(monkeypatch, rows):
     monkeypatch.setattr(methods, "CASES", {"friction, n = 2": (CHOICE,)})
-    monkeypatch.setattr(methods, "points", lambda *given: rows)
+    monkeypatch.setattr(methods, "points", lambda *arguments: rows)
     made = methods.measure(quick=True)
     assert {row[0] for row in made} == {"friction, n = 2"}
     assert all(len(row) == len(methods.COLUMNS) for row in made)

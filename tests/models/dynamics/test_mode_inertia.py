@@ -35,8 +35,8 @@ def stiff_and_heavy() -> Equations:
     return network(node, Edge((x, v), (x_2, v_2), w, (sp.S.Zero, push), (sigma,), inertia), GRAPH)
 
 
-def scene(**given: object) -> Scene:
-    return Scene(**{"oscillator": "duffing", "coupling": "inerter", "topology": chain(4), **given})
+def scene(**keywords: object) -> Scene:
+    return Scene(**{"oscillator": "duffing", "coupling": "inerter", "topology": chain(4), **keywords})
 
 
 def of_two_coordinates() -> Equations:
@@ -126,13 +126,13 @@ def test_what_has_no_modes() -> None:
         blocks = tuple(((zero, zero), (zero, e)) for e in (here, there))
         return network(single, Edge((x, v), (x_2, v_2), w, push, (sigma,), blocks), GRAPH)
 
-    for equations, words in (
+    for equations, message in (
         (joined(sigma * w, sigma * w), "inertia between nodes that move alike"),
         (joined(sigma**2 * w, -(sigma**2) * w), "the inertia of links is not proportional to sigma"),
         (joined(sigma * w * (1 + x**2), -sigma * w * (1 + x**2)), "masses that depend on the state"),
         (joined(sigma * w, -sigma * w, (sigma * w * (x_2 - x), zero)), "links push coordinates that their inertia"),
     ):
-        with pytest.raises(ValueError, match=words):
+        with pytest.raises(ValueError, match=message):
             mode(equations)
     made = scene(topology=chain(4)).equations
     with pytest.raises(ValueError, match="cluster states: found links with inertia"):

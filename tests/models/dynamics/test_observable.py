@@ -82,7 +82,7 @@ def test_complex_values_are_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("observables", "message"),
     [
         ({"r": "mean(y)"}, "observe r: unknown name 'y'; known: x, v, x_1"),
         ({"r": "mean(nodes[5](x))"}, "observe r: found node 5; expected 1 to 4"),
@@ -94,9 +94,9 @@ def test_complex_values_are_refused() -> None:
         ({"a b": "mean(x)"}, "expected letters"),
     ],
 )
-def test_scenes_refuse_what_their_model_does_not_know(given: dict[str, str], message: str) -> None:
+def test_scenes_refuse_what_their_model_does_not_know(observables: dict[str, str], message: str) -> None:
     with pytest.raises(ValueError, match=r"observe") as error:
-        Scene(topology=ring(4), observe=given)
+        Scene(topology=ring(4), observe=observables)
     assert message in str(error.value)
 
 

@@ -72,9 +72,10 @@ def test_unequal_sums_of_weights_have_no_synchronous_motion() -> None:
     with pytest.raises(NoSynchrony, match="the sums of weights differ from node to node"):
         mode(scene(chain(3)).equations)
     assert any(
-        "no solution of this network; expected a function of differences" in words for words in scene(chain(3)).warnings
+        "no solution of this network; expected a function of differences" in warning
+        for warning in scene(chain(3)).warnings
     )
-    assert not any("equal states" in words for words in scene(ring(3)).warnings)
+    assert not any("equal states" in warning for warning in scene(ring(3)).warnings)
 
 
 def test_a_link_that_is_not_proportional_to_its_weight_has_no_modes() -> None:
@@ -108,4 +109,4 @@ def test_a_link_without_a_value_between_equal_states_has_no_synchronous_motion()
     gravity = Rates({TARGET.x: G * W / (SOURCE.x - TARGET.x)}, {G: 0.3})
     with pytest.raises(NoSynchrony, match="has no value between equal states"):
         mode(scene(complete(3), gravity).equations)
-    assert any("has no value between equal states" in words for words in scene(complete(3), gravity).warnings)
+    assert any("has no value between equal states" in warning for warning in scene(complete(3), gravity).warnings)

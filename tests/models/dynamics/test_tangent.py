@@ -98,10 +98,10 @@ def spectrum_of(entries: dict, size: int, values: dict) -> list[mpmath.mpc]:
     return list(mpmath.eig(matrix, left=False, right=False))
 
 
-def matched(found: list, expected: list) -> bool:
+def matched(values: list, expected: list) -> bool:
     """True where both lists hold the same numbers, each as often, to 40 digits."""
     left = list(expected)
-    for number in found:
+    for number in values:
         nearest = min(left, key=lambda other: abs(other - number))
         if abs(nearest - number) > mpmath.mpf(10) ** -40 * max(1, abs(number)):
             return False

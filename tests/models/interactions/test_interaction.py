@@ -62,7 +62,7 @@ def test_decimals_are_exact() -> None:
 
 
 @pytest.mark.parametrize(
-    ("made", "message"),
+    ("make", "message"),
     [
         (lambda: Rates({}), "found none; expected one at least"),
         (lambda: Rates({1: W}), r"found the key 1 \(int\); expected a state of the target, e.g. i.x"),
@@ -92,9 +92,9 @@ def test_decimals_are_exact() -> None:
         (lambda: Potential(W * TARGET.theta**2), "of one end; expected a function of both"),
     ],
 )
-def test_wrong_definitions_are_refused_in_one_line(made: Callable[[], Any], message: str) -> None:
+def test_wrong_definitions_are_refused_in_one_line(make: Callable[[], Any], message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=message) as caught:
-        made()
+        make()
     assert "\n" not in str(caught.value)
 
 
@@ -172,7 +172,7 @@ def test_a_scene_with_a_table_goes_to_a_dictionary_and_back() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("table", "message"),
     [
         ({"rates": {"x": "W*x_j"}, "potential": "W"}, "expected either 'rates' or 'potential'"),
         ({"parameters": {}}, "expected either 'rates' or 'potential'"),
@@ -186,9 +186,9 @@ def test_a_scene_with_a_table_goes_to_a_dictionary_and_back() -> None:
         ({"rates": {"x": "K*W"}, "parameters": {"K": {"default": 1, "unit": 3}}}, "parameter K: unit: found 3"),
     ],
 )
-def test_wrong_tables_are_refused(given: dict[str, Any], message: str) -> None:
+def test_wrong_tables_are_refused(table: dict[str, Any], message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=message):
-        Scene(oscillator="rossler", coupling=given, topology=ring(3))  # type: ignore[arg-type]
+        Scene(oscillator="rossler", coupling=table, topology=ring(3))  # type: ignore[arg-type]
 
 
 # -- layers ---------------------------------------------------------------------------------------------------

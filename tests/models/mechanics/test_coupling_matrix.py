@@ -35,23 +35,23 @@ GAP = {name: sp.Symbol(f"{name}_j", real=True) - sp.Symbol(f"{name}_i", real=Tru
 # -- what is read --------------------------------------------------------------------------------------------
 
 
-def entries(words: str, state: tuple[str, ...]) -> dict[tuple[str, str], Fraction]:
+def entries(text: str, state: tuple[str, ...]) -> dict[tuple[str, str], Fraction]:
     """The entries of a text, whose components must be states."""
-    coupling = MatrixCoupling.parse(words)
+    coupling = MatrixCoupling.parse(text)
     if coupling is None:
         raise ValueError("coupling without an arrow")
     coupling.check(state)
     return {(source, target): factor for source, target, factor in coupling.entries}
 
 
-def canonical(words: str, state: tuple[str, ...]) -> str:
+def canonical(text: str, state: tuple[str, ...]) -> str:
     """The one spelling of a text."""
-    entries(words, state)
-    return str(MatrixCoupling.parse(words).canonical(state))  # type: ignore[union-attr]
+    entries(text, state)
+    return str(MatrixCoupling.parse(text).canonical(state))  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize(
-    ("text", "found"),
+    ("text", "expected"),
     [
         ("x->x", {("x", "x"): 1}),
         (" y -> x ", {("y", "x"): 1}),
@@ -65,9 +65,9 @@ def canonical(words: str, state: tuple[str, ...]) -> str:
         ("x->x, y->y, z->z", {("x", "x"): 1, ("y", "y"): 1, ("z", "z"): 1}),
     ],
 )
-def test_entries(text: str, found: dict) -> None:
-    assert entries(text, STATE) == found
-    assert entries(canonical(text, STATE), STATE) == found
+def test_entries(text: str, expected: dict) -> None:
+    assert entries(text, STATE) == expected
+    assert entries(canonical(text, STATE), STATE) == expected
 
 
 def test_a_component_that_looks_like_an_exponent_is_one() -> None:
@@ -75,8 +75,8 @@ def test_a_component_that_looks_like_an_exponent_is_one() -> None:
 
 
 def test_one_spelling() -> None:
-    for words in ("x->y,0.5z->x", "2/4*z->x , x->y", "+ 1 x -> y, 1/2 z->x"):
-        assert canonical(words, STATE) == "1/2 z->x, x->y"
+    for spelling in ("x->y,0.5z->x", "2/4*z->x , x->y", "+ 1 x -> y, 1/2 z->x"):
+        assert canonical(spelling, STATE) == "1/2 z->x, x->y"
     assert canonical("-1 x->x", STATE) == "-x->x"
 
 

@@ -24,7 +24,7 @@ def _rate_of(field: Any) -> tuple[sp.Symbol, sp.Expr]:
 
 
 @pytest.mark.parametrize(
-    ("given", "at", "right"),
+    ("expression", "at", "right"),
     [
         (sp.Mod(x, 3), -0.5, 2.5),
         (sp.Piecewise((2, sp.Ne(x, 1)), (5, True)), 1.0, 5.0),
@@ -37,8 +37,8 @@ def _rate_of(field: Any) -> tuple[sp.Symbol, sp.Expr]:
     ],
     ids=str,
 )
-def test_other_functions_are_written_by_those_of_kernels(given: sp.Expr | str, at: float, right: float) -> None:
-    assert sp.lambdify(*_rate_of(Field({"x": given})))(at) == pytest.approx(right, rel=1e-15)
+def test_other_functions_are_written_by_those_of_kernels(expression: sp.Expr | str, at: float, right: float) -> None:
+    assert sp.lambdify(*_rate_of(Field({"x": expression})))(at) == pytest.approx(right, rel=1e-15)
 
 
 @pytest.mark.parametrize("name", ["expm1", "exprel", "log1p"])
@@ -62,7 +62,7 @@ def test_eigenvalues_are_floats() -> None:
 
 
 @pytest.mark.parametrize(
-    ("made", "message"),
+    ("make", "message"),
     [
         (lambda: Rates({"x": "lambda*W*(x_j - x_i)"}, {}), "'lambda' is a word of Python"),
         (
@@ -80,14 +80,14 @@ def test_eigenvalues_are_floats() -> None:
         (lambda: from_edges([(1, 1), (1, 2)]), "to the rates of the node"),
     ],
 )
-def test_refusals_say_what_to_do(made: Callable[[], Any], message: str) -> None:
+def test_refusals_say_what_to_do(make: Callable[[], Any], message: str) -> None:
     with pytest.raises((ValueError, TypeError)) as caught:
-        made()
+        make()
     assert message in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    "made",
+    "make",
     [
         lambda name: Scene(NODE, None, **{name: 1}),
         lambda name: Field({"x": name}),
@@ -95,9 +95,9 @@ def test_refusals_say_what_to_do(made: Callable[[], Any], message: str) -> None:
         load_scene,
     ],
 )
-def test_messages_are_short_for_long_names(made: Callable[[str], Any]) -> None:
+def test_messages_are_short_for_long_names(make: Callable[[str], Any]) -> None:
     with pytest.raises((ValueError, TypeError)) as caught:
-        made("q" * 9000)
+        make("q" * 9000)
     assert len(str(caught.value)) < 1000
 
 

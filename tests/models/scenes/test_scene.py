@@ -557,9 +557,9 @@ def test_the_reference_run() -> None:
     assert (scene.transient, scene.window, scene.samples) == (0.0, 100.0, 10001)
 
 
-def write(folder: Path, words: str | bytes, name: str = "mine.toml") -> Path:
+def write(folder: Path, text: str | bytes, name: str = "mine.toml") -> Path:
     path = folder / name
-    path.write_bytes(words if isinstance(words, bytes) else words.encode())
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
     return path
 
 
@@ -734,8 +734,8 @@ def outcome(tree: dict) -> tuple[Scene | None, str]:
         return None, str(error)
 
 
-def is_one_clear_line(words: str) -> bool:
-    return 10 < len(words) < 1000 and "\n" not in words
+def is_one_clear_line(message: str) -> bool:
+    return 10 < len(message) < 1000 and "\n" not in message
 
 
 @settings(max_examples=250)
@@ -754,9 +754,9 @@ def test_any_mutated_scene_is_a_scene_or_one_clear_line(data: st.DataObject) -> 
                 branch[data.draw(st.text(max_size=6))] = branch.pop(last)
         except (LookupError, TypeError):
             pass  # an earlier change removed this place
-    scene, words = outcome(tree)
+    scene, message = outcome(tree)
     if scene is None:
-        assert is_one_clear_line(words)
+        assert is_one_clear_line(message)
     else:
         assert Scene.from_dict(json.loads(json.dumps(scene.as_dict()))) == scene
         assert hash(scene) == hash(Scene.from_dict(scene.as_dict()))
@@ -765,6 +765,6 @@ def test_any_mutated_scene_is_a_scene_or_one_clear_line(data: st.DataObject) -> 
 @settings(max_examples=200)
 @given(st.sampled_from(sorted(VALID)), ANYTHING)
 def test_any_value_of_any_key_is_a_scene_or_one_clear_line(key: str, value: object) -> None:
-    scene, words = outcome({key: value})
-    assert scene is not None or is_one_clear_line(words)
+    scene, message = outcome({key: value})
+    assert scene is not None or is_one_clear_line(message)
     assert scene is None or Scene.from_dict(scene.as_dict()) == scene

@@ -36,11 +36,11 @@ def mixed(**changes: object) -> Scene:
     return scene(**{**settings, **changes})
 
 
-def by_scipy(found: Scene, end: float) -> np.ndarray:
+def by_scipy(scene: Scene, end: float) -> np.ndarray:
     """The state at the end by SciPy from the exported source."""
     space: dict = {}
-    exec(compile(to_python(found.equations, found.parameters), "<export>", "exec"), space)
-    return solve_ivp(space["rhs"], (0, end), found.y0, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    exec(compile(to_python(scene.equations, scene.parameters), "<export>", "exec"), space)
+    return solve_ivp(space["rhs"], (0, end), scene.y0, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
 
 
 # -- scenes ----------------------------------------------------------------------------------------------------
@@ -77,7 +77,7 @@ def test_equal_numbers_are_equal_nodes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("keywords", "message"),
     [
         ({"delta": [0.1, 0.2]}, "parameter 'delta': found 2 values for 3 oscillators; expected 3 values or one number"),
         ({"delta": range(5)}, "found 5 values for 3 oscillators"),
@@ -91,9 +91,9 @@ def test_equal_numbers_are_equal_nodes() -> None:
         ({"omega": [1, -1, 2]}, "omega_2"),
     ],
 )
-def test_lists_that_fit_no_network(given: dict, message: str) -> None:
+def test_lists_that_fit_no_network(keywords: dict, message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=re.escape(message)):
-        scene(parameters=given)
+        scene(parameters=keywords)
 
 
 def test_states_that_numbers_make_alike_are_refused() -> None:
@@ -168,7 +168,9 @@ def test_what_needs_equal_nodes_says_so() -> None:
             refuse()
     with pytest.raises(ValueError, match="nodes of several kinds; expected equal nodes"):
         transversal_equations(mixed().equations)
-    assert any("differ in delta" in words and "no complete synchronisation" in words for words in network.warnings)
+    assert any(
+        "differ in delta" in warning and "no complete synchronisation" in warning for warning in network.warnings
+    )
 
 
 # -- nodes of several kinds ------------------------------------------------------------------------------------
@@ -250,9 +252,9 @@ def test_an_energy_of_a_state_that_both_oscillators_have_is_refused() -> None:
 
 def test_friction_laws_of_two_kinds() -> None:
     network = Scene(topology=chain(2), nodes=[{"oscillator": "friction", "friction": "coulomb", "at": [2]}])
-    words = text(network.equations)
-    assert "of node 1" in words
-    assert "of node 2" in words
+    formulas = text(network.equations)
+    assert "of node 1" in formulas
+    assert "of node 2" in formulas
     with pytest.raises(ValueError, match="nodes of several kinds: found set-valued friction"):
         Scene(topology=chain(2), contact="set-valued", nodes=network.nodes).equations  # noqa: B018
 

@@ -17,11 +17,11 @@ VANISHING = Rates({"x": "K*W*(x_j - x_i)"}, {"K": 0.1})
 ACTING = Rates({"x": "K*W*tanh(x_j)"}, {"K": 0.1})
 
 
-def told(made: Callable[[], Scene]) -> list[str]:
+def told(make: Callable[[], Scene]) -> list[str]:
     """The warnings while a scene is made, all of them at this file."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        made()
+        make()
     assert all(each.filename == __file__ for each in caught)
     return [str(each.message) for each in caught]
 

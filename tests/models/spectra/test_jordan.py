@@ -25,8 +25,8 @@ from synchain.runtime.prediction.mode_windows import defective_rows
 ONE = Fraction(1)
 
 
-def structure(found: Spectrum) -> dict[sp.Expr, Blocks | None]:
-    return {e.exact: e.blocks for e in found.eigenvalues}
+def structure(spectrum: Spectrum) -> dict[sp.Expr, Blocks | None]:
+    return {e.exact: e.blocks for e in spectrum.eigenvalues}
 
 
 def driven(lengths: tuple[int, ...]) -> Topology:

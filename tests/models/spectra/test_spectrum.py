@@ -41,8 +41,8 @@ def anonymous(graph: Topology) -> Topology:
     return Topology("matrix", graph.n, graph.links)
 
 
-def expanded(found: Spectrum) -> np.ndarray:
-    return np.repeat(found.values, found.multiplicities)
+def expanded(spectrum: Spectrum) -> np.ndarray:
+    return np.repeat(spectrum.values, spectrum.multiplicities)
 
 
 PUBLISHED = {2: "0, -2", 3: "0, -1, -3", 4: "0, -2 + sqrt(2), -2, -2 - sqrt(2)"}

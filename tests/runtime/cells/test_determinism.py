@@ -59,10 +59,10 @@ def chunks(size: int) -> list[tuple[int, int]]:
     return [(i, min(i + size, CELLS)) for i in range(0, CELLS, size)]
 
 
-def same(found: Outcome, expected: Outcome, order: np.ndarray | None = None) -> None:
+def same(outcome: Outcome, expected: Outcome, order: np.ndarray | None = None) -> None:
     rows = slice(None) if order is None else order
     for name, a, b in zip(
-        ("end", "sums", "counts", "points", "samples"), found.arrays[:5], expected.arrays[:5], strict=True
+        ("end", "sums", "counts", "points", "samples"), outcome.arrays[:5], expected.arrays[:5], strict=True
     ):
         np.testing.assert_array_equal(a.view(np.int64), np.ascontiguousarray(b[rows]).view(np.int64), err_msg=name)
 

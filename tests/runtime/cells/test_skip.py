@@ -186,8 +186,8 @@ def test_a_wrong_partition_is_caught(monkeypatch):
 def test_a_wrong_way_back_is_caught(monkeypatch):
     right = skip_module.NodeMerge.expand
 
-    def turned(self, found):
-        values = right(self, found)
+    def turned(self, states):
+        values = right(self, states)
         return replace(values, end=values.end[:, ::-1].copy()) if self.merges else values
 
     monkeypatch.setattr(skip_module.NodeMerge, "expand", turned)

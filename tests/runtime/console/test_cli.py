@@ -67,8 +67,8 @@ BUFFERED = {name: value for name, value in os.environ.items() if name != "PYTHON
 """The environment of a user, whose output waits in a buffer until the end."""
 
 
-def synchain(words: str, **options: Any) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "synchain.runtime", *words.split()]
+def synchain(command_line: str, **options: Any) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "synchain.runtime", *command_line.split()]
     return subprocess.run(command, capture_output=True, text=True, timeout=120, **options)
 
 
@@ -258,11 +258,11 @@ def test_a_figure_that_fails_says_that_the_result_is_complete(
 ) -> None:
     (tmp_path / "short.png").mkdir()
     assert main(["run", scene, "--out", str(tmp_path), "--set", "sigma=0:0.5:3"]) == 1
-    (words,) = capsys.readouterr().err.splitlines()
-    assert words.startswith(
+    (message,) = capsys.readouterr().err.splitlines()
+    assert message.startswith(
         f"synchain run: the result is complete: {tmp_path / 'short.nc'}; its figure was not drawn: "
     )
-    assert words.endswith("; the same command again draws it")
+    assert message.endswith("; the same command again draws it")
     assert open_result(tmp_path / "short.nc").success
     (tmp_path / "short.png").rmdir()
     assert main(["run", scene, "--out", str(tmp_path), "--set", "sigma=0:0.5:3"]) == 0
@@ -445,7 +445,7 @@ def test_thresholds_of_a_scene_of_a_matrix_and_of_other_graphs(
     monkeypatch.setattr(threshold, "thresholds", fake_thresholds(asked))
     path = matrix(tmp_path, "-2 2\n2 -2")
     (tmp_path / "ring.toml").write_text('topology = {name = "ring", n = 3}')
-    for words in (
+    for command in (
         "figure_6 --transient 50 --starts 3",
         "figure_6 --n 4 --topology ring --omega 1.2",
         f"--matrix {path} --omega 1.15",
@@ -453,7 +453,7 @@ def test_thresholds_of_a_scene_of_a_matrix_and_of_other_graphs(
         f"{tmp_path}/ring.toml --n 5",
         "figure_6 --topology ring",
     ):
-        assert main(["thresholds", *words.split(), "--json"]) == 0
+        assert main(["thresholds", *command.split(), "--json"]) == 0
     graphs = [(a["scene"].topology.name, a["scene"].n, a["scene"].angular_frequency) for a in asked]
     assert graphs == [
         ("chain", 3, 1.55),
@@ -470,8 +470,8 @@ def test_thresholds_of_a_scene_of_a_matrix_and_of_other_graphs(
 def test_thresholds_in_a_hurry(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     asked: list[dict[str, Any]] = []
     monkeypatch.setattr(threshold, "thresholds", fake_thresholds(asked))
-    for words in ("", "--quick", "--quick --starts 2 --sigma 0:1:3"):
-        assert main(["thresholds", "--n", "2", "--omega", "1.15", *words.split()]) == 0
+    for options in ("", "--quick", "--quick --starts 2 --sigma 0:1:3"):
+        assert main(["thresholds", "--n", "2", "--omega", "1.15", *options.split()]) == 0
     full, quick, set_by_user = (a["criterion"] for a in asked)
     assert full == threshold.Criterion()
     assert (quick.starts, quick.transient) == (5, 400.0)
@@ -496,7 +496,9 @@ def test_figures_are_made_by_their_names(
     from synchain.runtime.paper import make
 
     asked: list[Any] = []
-    monkeypatch.setattr(make, "written", lambda *words: asked.append(words) or [tmp_path / "out" / "figure_4b.png"])
+    monkeypatch.setattr(
+        make, "written", lambda *arguments: asked.append(arguments) or [tmp_path / "out" / "figure_4b.png"]
+    )
     assert main(["figures", "--quick", "4b", "--out", str(tmp_path / "out"), "thresholds", "--workers", "1"]) == 0
     assert capsys.readouterr().out == f"{tmp_path / 'out' / 'figure_4b.png'}\n"
     assert asked == [(["figure_4b", "thresholds"], tmp_path / "out", True, 1, None)]
@@ -507,7 +509,7 @@ def test_interrupted_figures_print_the_files_that_are_whole(
 ) -> None:
     from synchain.runtime.paper import make
 
-    def written(*words: object) -> Iterator[Path]:
+    def written(*arguments: object) -> Iterator[Path]:
         yield tmp_path / "figure_4a.png"
         raise KeyboardInterrupt
 
@@ -609,8 +611,8 @@ def test_wrong_use_is_one_or_two_lines_on_stderr_and_code_2(
 
 
 def test_an_empty_folder_name_is_refused(scene: str, capsys: pytest.CaptureFixture[str]) -> None:
-    for words in (["run", scene, "--out", ""], ["figures", "4b", "--out", " "]):
-        assert main(words) == 2
+    for command in (["run", scene, "--out", ""], ["figures", "4b", "--out", " "]):
+        assert main(command) == 2
         assert "expected a folder" in capsys.readouterr().err
 
 
@@ -626,15 +628,15 @@ def test_an_empty_folder_name_is_refused(scene: str, capsys: pytest.CaptureFixtu
 )
 def test_matrices_that_are_none(text: str, expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = matrix(tmp_path, text)
-    for words in (["spectrum", "--matrix", path], ["thresholds", "--matrix", path, "--omega", "1.15"]):
-        assert main(words) == 2
+    for command in (["spectrum", "--matrix", path], ["thresholds", "--matrix", path, "--omega", "1.15"]):
+        assert main(command) == 2
         assert expected in capsys.readouterr().err
 
 
 def test_a_scene_in_separate_parts_is_allowed_but_said(
     scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def stop(*words: Any, **options: Any) -> None:
+    def stop(*arguments: Any, **options: Any) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(stream, "stream", stop)

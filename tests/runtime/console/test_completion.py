@@ -39,8 +39,8 @@ def script(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
 def completed(script: tuple[str, Path], line: str) -> set[str]:
     """What the shell offers for the last word of a line."""
     shell, folder = script
-    words = shlex.split(line) + ([""] if line.endswith(" ") else [])
-    code = ASK[shell].format(line=shlex.quote(line), quoted=" ".join(map(shlex.quote, words)))
+    arguments = shlex.split(line) + ([""] if line.endswith(" ") else [])
+    code = ASK[shell].format(line=shlex.quote(line), quoted=" ".join(map(shlex.quote, arguments)))
     done = subprocess.run([shell, "-c", code], cwd=folder, capture_output=True, text=True, timeout=60)
     return {row.split("\t")[0] for row in done.stdout.splitlines() if row}
 

@@ -74,13 +74,13 @@ def test_compiling_is_told_and_loading_is_not(tmp_path, monkeypatch, caplog):
         for _ in range(2):
             loading.forget()
             loading.load(SOURCE)
-        assert [record.getMessage() for record in caplog.records] == [words + "kept for later runs" for words in said]
+        assert [record.getMessage() for record in caplog.records] == [begin + "kept for later runs" for begin in said]
         monkeypatch.setenv("SYNCHAIN_CACHE", __file__)
         loading.forget()
         with pytest.warns(RuntimeWarning, match="not kept on disk"):
             loading.load(SOURCE)
     assert [record.getMessage() for record in caplog.records[2:]] == [
-        words + "for this process alone" for words in said
+        begin + "for this process alone" for begin in said
     ]
 
 

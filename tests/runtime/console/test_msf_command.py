@@ -527,8 +527,8 @@ def test_equations_without_modes_are_refused_before_anything_is_computed(
 
     monkeypatch.setattr(orbits, "mode", mode)
     orbits._variation.cache_clear()
-    for words, plane in (("", False), ("--beta 0:1:3", True)):
-        assert main(["msf", "figure_8", *words.split()]) == 2
+    for options, plane in (("", False), ("--beta 0:1:3", True)):
+        assert main(["msf", "figure_8", *options.split()]) == 2
         assert f"no synchronous state, plane {plane}" in capsys.readouterr().err
     assert asked == []
 
@@ -536,7 +536,7 @@ def test_equations_without_modes_are_refused_before_anything_is_computed(
 def test_an_orbit_that_cannot_be_integrated_is_a_failed_run(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def msf(*given: Any, **options: Any) -> MSF:
+    def msf(*arguments: Any, **options: Any) -> MSF:
         raise FloatingPointError("the orbit cannot be integrated")
 
     monkeypatch.setattr(importlib.import_module("synchain.runtime.stability.msf"), "msf", msf)

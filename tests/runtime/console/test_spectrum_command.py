@@ -14,8 +14,8 @@ from synchain.models.graphs.families import family, names
 from synchain.runtime.cli import main
 
 
-def printed(capsys: pytest.CaptureFixture[str], *words: str) -> dict[float, int]:
-    assert main(["spectrum", "--json", *words]) == 0
+def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[float, int]:
+    assert main(["spectrum", "--json", *arguments]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["verified"] is True
     return {e["exact"]: e["multiplicity"] for e in answer["eigenvalues"]}

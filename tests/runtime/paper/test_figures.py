@@ -76,7 +76,7 @@ def test_every_figure_keeps_the_contract(name: str) -> None:
 def test_bars_of_figures_are_those_of_all_functions(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], simulation: Simulation
 ) -> None:
-    monkeypatch.setattr(maker, "produce", lambda *given: [])
+    monkeypatch.setattr(maker, "produce", lambda *arguments: [])
     for shown in (False, True):
         monkeypatch.setattr(sys.stderr, "isatty", lambda shown=shown: shown)
         make(["figure_1b", "figure_4b"], tmp_path)

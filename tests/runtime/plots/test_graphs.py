@@ -30,9 +30,9 @@ TWO_KINDS = Scene(
 )
 
 
-def closest(place: np.ndarray) -> float:
+def closest(points: np.ndarray) -> float:
     """Distance of the two closest nodes, in units of the radius of a node."""
-    apart = np.linalg.norm(place[:, None] - place[None], axis=2) + np.eye(len(place)) * 9
+    apart = np.linalg.norm(points[:, None] - points[None], axis=2) + np.eye(len(points)) * 9
     return float(apart.min())
 
 

@@ -25,8 +25,8 @@ from synchain.runtime.synchronisation.threshold import project
 ONE = Fraction(1)
 
 
-def pieces(found) -> list[tuple[float, float]]:
-    return [(w.low, w.high) for w in found]
+def pieces(windows) -> list[tuple[float, float]]:
+    return [(w.low, w.high) for w in windows]
 
 
 def weighted(n: int, seed: int) -> Topology:

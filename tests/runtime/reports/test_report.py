@@ -203,8 +203,8 @@ def test_formulas_axes_and_graph_are_seen(folder: Path, options: tuple[str, ...]
         assert int(np.any(np.abs(picture - other) > 0.2, axis=2).sum()) > least, name
     curve = np.all(np.abs(picture - np.array([0x00, 0x72, 0xB2]) / 255) < 0.1, axis=2)
     assert int(curve.sum()) > 500
-    words = np.abs(picture[: SIZE[1] // 12, 60:] - ground).max(axis=2)
-    assert words.max() > 0.7, "the heading stands out of the ground"
+    heading = np.abs(picture[: SIZE[1] // 12, 60:] - ground).max(axis=2)
+    assert heading.max() > 0.7, "the heading stands out of the ground"
 
 
 @needs_browser

@@ -45,8 +45,8 @@ def test_an_early_end_changes_nothing_but_the_time(both: tuple) -> None:
 
 def test_verdicts_and_exponents_of_cells(both: tuple) -> None:
     _, certified = both
-    words = [VERDICTS[k] for k in certified.data.verdict.values]
-    assert words == ["synchronous, certified by the exponent"] * 2 + ["not synchronous, the state is unstable"]
+    verdicts = [VERDICTS[k] for k in certified.data.verdict.values]
+    assert verdicts == ["synchronous, certified by the exponent"] * 2 + ["not synchronous, the state is unstable"]
     expected = exponents(scene(), 2 * SIGMA).exponent
     np.testing.assert_allclose(certified.data.transversal_exponent.values, expected, atol=1e-5)
     assert "certified" in certified.data.verdict.attrs["long_name"]

@@ -124,8 +124,8 @@ def test_a_result_comes_back_in_every_form(result: Any, ending: str, tmp_path: P
     path = tmp_path / f"a{ending}"
     result.save(path)
     before = path.stat().st_mtime_ns
-    for wrong, words in ((False, r"is there already; give overwrite=True to replace it"), (1, "overwrite")):
-        with pytest.raises((FileExistsError, TypeError), match=words):
+    for wrong, message in ((False, r"is there already; give overwrite=True to replace it"), (1, "overwrite")):
+        with pytest.raises((FileExistsError, TypeError), match=message):
             result.save(path, overwrite=wrong)
     assert path.stat().st_mtime_ns == before
     result.save(path, overwrite=True)
@@ -234,7 +234,7 @@ def test_an_absent_package_is_named_in_one_line_before_anything_runs(tmp_path: P
 def test_a_damaged_file_leaves_no_traceback(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     pytest.importorskip("h5netcdf")
     path, ignored = tmp_path / "a.nc4", []
-    monkeypatch.setattr(sys, "unraisablehook", lambda found: ignored.append(found.exc_value))
+    monkeypatch.setattr(sys, "unraisablehook", lambda problem: ignored.append(problem.exc_value))
     KINDS["Plane"].save(path)
     contents = path.read_bytes()
     index = contents.index(b"OHDR") + 20  # the object header of the root group, which has a checksum

@@ -20,9 +20,9 @@ SQUARE = (np.linspace(0.0, 1.2, 12)[:, None] + 1j * np.linspace(0.0, 0.6, 11)).r
 
 
 def settled(
-    strengths: np.ndarray, starts: int = 1, rtol: float = 1e-11, workers: int = 1, **given: object
+    strengths: np.ndarray, starts: int = 1, rtol: float = 1e-11, workers: int = 1, **keywords: object
 ) -> tuple[OrbitProblem, np.ndarray]:
-    scene = Scene(topology=topology("chain", 2), rtol=rtol, record=(), **given)  # type: ignore[arg-type]
+    scene = Scene(topology=topology("chain", 2), rtol=rtol, record=(), **keywords)  # type: ignore[arg-type]
     first = np.array([values[0] for values in scene.initial.values()])
     state = np.tile(first, (starts, 1))
     state[:, 0] += 0.1 * np.arange(starts)
@@ -165,12 +165,12 @@ def test_bodies_that_stick_have_few_nodes_integrated() -> None:
     assert len(chosen_march(*orbit).integrator.order) == 2 * 16
 
 
-@pytest.mark.parametrize("place", [-1, -13, -26, -39])
-def test_a_number_that_is_none_is_seen_in_the_error(place: int) -> None:
+@pytest.mark.parametrize("index", [-1, -13, -26, -39])
+def test_a_number_that_is_none_is_seen_in_the_error(index: int) -> None:
     """The last of the weights are those of the strengths for comparison, 13 for each."""
     orbit = settled(LINE, oscillator="duffing")
     march = march_of(*orbit, strength_interpolation(LINE, 13), 1.0)
-    march.deviations.registers.weights[place] = np.nan
+    march.deviations.registers.weights[index] = np.nan
     march.growths(np.array([1, 1]))
     assert np.isnan(march.deviations.error)
 

@@ -80,7 +80,7 @@ def test_a_mismatch_bursts_near_the_loss_of_stability() -> None:
     """
     strengths, starts = [0.15, 0.25, 0.295], np.linspace(0.25, 0.299, 8)
     unequal = pair(parameters={"omega": 1.4, "mu_k": [0.15, 0.15 + 1e-6]}, transient=300.0, window=400.0)
-    assert any("the nodes differ in mu_k" in words for words in unequal.warnings)
+    assert any("the nodes differ in mu_k" in warning for warning in unequal.warnings)
     result = run(unequal, sigma=strengths, x_2=starts, show_progress=False)
     largest = result.sync_error_max.values
     assert largest[0].max() < 1e-5

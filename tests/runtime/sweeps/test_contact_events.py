@@ -25,15 +25,15 @@ def scene(graph: Topology, x: list[float], v: list[float], window: float = 1.0, 
     return Scene(topology=graph, contact="set-valued", initial={"x": x, "v": v}, **settings)
 
 
-def ran(made: Scene, **more: Any) -> Result:
+def ran(scene: Scene, **more: Any) -> Result:
     """All cells, as they stand, to the end."""
-    result = run(made, show_progress=False, **{"reduce": False, "workers": 1, **more})
+    result = run(scene, show_progress=False, **{"reduce": False, "workers": 1, **more})
     assert np.all(result.status == Status.FINISHED)
     return result
 
 
-def ends(made: Scene, **more: Any) -> np.ndarray:
-    return np.asarray(ran(made, **more).states("end"))
+def ends(scene: Scene, **more: Any) -> np.ndarray:
+    return np.asarray(ran(scene, **more).states("end"))
 
 
 # -- events that only just happen ------------------------------------------------------------------------------

@@ -44,7 +44,9 @@ def test_data_are_labelled_when_they_are_read(monkeypatch):
     datasets = []
     built = xr.Dataset.__init__
     monkeypatch.setattr(
-        xr.Dataset, "__init__", lambda self, *rest, **more: (datasets.append(self), built(self, *rest, **more))[1]
+        xr.Dataset,
+        "__init__",
+        lambda self, *arguments, **more: (datasets.append(self), built(self, *arguments, **more))[1],
     )
     result = run(one_pendulum(), show_progress=False)
     assert not datasets

@@ -120,7 +120,7 @@ i, j, W = ends(load_oscillator("harmonic"))
 def test_the_sums_of_the_energy_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """They take 0.1 s at 9000 links."""
     built, rows = [], EnergyTerms.rows
-    monkeypatch.setattr(EnergyTerms, "rows", lambda own: built.append(own) or rows(own))
+    monkeypatch.setattr(EnergyTerms, "rows", lambda terms: built.append(terms) or rows(terms))
     kernel_source(Scene("harmonic", "spring", ring(3), observe={"e": "mean(energy)"}))
     assert len(built) == 1
 

@@ -107,7 +107,7 @@ def test_files_and_resumed_runs_keep_points(found: Result, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("keywords", "message"),
     [
         ({"gap": Section("x")}, "section gap: found x, which each node has"),
         ({"gap": Section("y_1")}, "section gap: unknown name 'y_1'"),
@@ -119,9 +119,9 @@ def test_files_and_resumed_runs_keep_points(found: Result, tmp_path: Path) -> No
         ({"status": Section("x_1")}, "found the name 'status'"),
     ],
 )
-def test_wrong_sections_are_refused(given: dict[str, object], message: str) -> None:
+def test_wrong_sections_are_refused(keywords: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=r"section") as error:
-        Scene(topology=ring(3), record=(), sections=given)
+        Scene(topology=ring(3), record=(), sections=keywords)
     assert message in str(error.value)
     assert "\n" not in str(error.value)
 

@@ -252,8 +252,8 @@ def test_graphs_are_realisations(oscillator: str, coupling: str, tmp_path: Path)
     assert open_result(tmp_path / "graphs.nc").scene == result.scene
 
 
-def drawn(text: str, count: int = 4, rng: int = 3, **given: Any) -> Scene:
-    return RANDOM.replace(realisations=count, rng=rng, draws={"topology": text, **given})
+def drawn(text: str, count: int = 4, rng: int = 3, **draws: Any) -> Scene:
+    return RANDOM.replace(realisations=count, rng=rng, draws={"topology": text, **draws})
 
 
 def members(scene: Scene) -> list[dict[tuple[int, int], float]]:

@@ -118,7 +118,7 @@ def test_auto_takes_explicit_steps_where_the_jacobian_cannot_be_listed() -> None
 
 def test_equal_starts_of_many_are_stepped_one_by_one() -> None:
     large = scene(LARGE, initial={"theta": 0.0}, parameters={"K": 1.0, "omega": 1.0})
-    assert any("too many to be listed" in words for words in reduce_scene(large).kept)
+    assert any("too many to be listed" in reason for reason in reduce_scene(large).kept)
     small = reduce_scene(scene(30, initial={"theta": 0.0}, parameters={"K": 1.0, "omega": 1.0}))
     assert small.equations.n == 1
 

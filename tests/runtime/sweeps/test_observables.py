@@ -210,7 +210,7 @@ def test_extremes_between_the_points_of_the_rule_are_found(integrator: str) -> N
     scene = Scene(
         oscillator="harmonic", integrator=integrator, rtol=1e-10, record=(), transient=0.0, window=20.0,
         time_unit="time", initial={"x": [1.0, 1.0], "v": [0.0, 0.0]}, topology=chain(2),
-        observe={name: words for name, (words, _) in closed.items()} | {"all": "maximum(nodes.sum(v))"},
+        observe={name: expression for name, (expression, _) in closed.items()} | {"all": "maximum(nodes.sum(v))"},
     )  # fmt: skip
     result = run(scene, show_progress=False)
     for name, (_, value) in closed.items():

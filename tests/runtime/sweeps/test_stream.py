@@ -199,14 +199,14 @@ def test_a_damaged_first_line_is_an_error_that_says_so(store):
     contents = bytearray(store.read_bytes())
     for offset in (40, 4096 + 40):
         contents[offset] ^= 1
-    for content, words in (
+    for content, message in (
         (bytes(contents), "both copies of its first line are damaged"),
         (b"something else", "no unfinished run"),
         (b"", "is empty"),
         (b"synchain blocks 1\n" + bytes(200), "another version"),
     ):
         store.write_bytes(content)
-        with pytest.raises(ValueError, match=words) as caught:
+        with pytest.raises(ValueError, match=message) as caught:
             BlockLog.open(store)
         assert "(--overwrite)" in str(caught.value)
 
@@ -519,8 +519,8 @@ def test_a_finished_run_is_resumed_by_its_result(tmp_path, monkeypatch):
     assert (again.progress.kept, again.progress.done, again.progress.total) == (2, 2, 2)
     assert again.data.identical(done.data)
     assert len(seen) == 1
-    for other, words in ((PAIR, "belongs to another scene"), (small, "was run with a certificate")):
-        with pytest.raises(ValueError, match=words):
+    for other, message in ((PAIR, "belongs to another scene"), (small, "was run with a certificate")):
+        with pytest.raises(ValueError, match=message):
             stream(other, path, resume=True, show_progress=False)
 
 
@@ -624,10 +624,10 @@ def test_another_kind_of_processor_does_not_go_on_with_a_run(tmp_path, interrupt
         f"abacus: {features}": "processor abacus; found ",
         f"{name}: {features} beads": f"{name} with beads; found ",
     }
-    for forged, words in kinds.items():
+    for forged, message in kinds.items():
         header["attributes"]["processor"] = forged
         BlockLog.create(partial(path), header)
-        with pytest.raises(ValueError, match=words) as caught:
+        with pytest.raises(ValueError, match=message) as caught:
             stream(MAP, path, resume=True, show_progress=False)
         assert "go on there, or replace it with overwrite (--overwrite)" in str(caught.value)
 

@@ -107,11 +107,11 @@ def test_a_finished_file_is_returned_and_another_is_refused(ending: str, tmp_pat
         patch.delattr("synchain.runtime.sweeps.stream.prepare")
         again = stream(scene, path, certified=True, resume=True, show_progress=False)
         assert (again.verdicts, again.progress.statuses) == (done.verdicts, done.progress.statuses)
-        for other, options, words in (
+        for other, options, message in (
             (scene.replace(omega=1.4), {"certified": True}, "belongs to another scene"),
             (scene, {}, "was run with a certificate"),
         ):
-            with pytest.raises(ValueError, match=words) as caught:
+            with pytest.raises(ValueError, match=message) as caught:
                 stream(other, path, resume=True, show_progress=False, **options)
             assert "\n" not in str(caught.value)
     assert contents(path) == before
@@ -157,7 +157,7 @@ def test_what_a_killed_writer_left_is_deleted(name: str, tmp_path: Path) -> None
 def test_a_disk_that_is_full_when_the_result_is_written(ending: str, tmp_path: Path, monkeypatch: Any) -> None:
     path = tmp_path / f"a{ending}"
 
-    def full(*rest: object) -> None:
+    def full(*arguments: object) -> None:
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
@@ -197,10 +197,10 @@ def test_an_unfinished_run_can_take_another_form(ending: str, tmp_path: Path) ->
 @pytest.mark.parametrize("ending", FURTHER)
 def test_what_is_no_result_is_refused_before_anything_runs(ending: str, tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.delattr("synchain.runtime.sweeps.stream.prepare")
-    words = "is no Zarr folder" if ending == ".zarr" else "is a pipe or device"
+    message = "is no Zarr folder" if ending == ".zarr" else "is a pipe or device"
     os.mkfifo(tmp_path / f"a{ending}")
     for options in ({}, {"resume": True}, {"overwrite": True}):
-        with pytest.raises(OSError, match=words):
+        with pytest.raises(OSError, match=message):
             stream(PAIR, tmp_path / f"a{ending}", show_progress=False, **options)
     with pytest.raises(OSError, match=r"is a pipe or device|the file is damaged"):
         open_result(tmp_path / f"a{ending}")

@@ -28,7 +28,7 @@ PAIR = Field({"x": "-x", "y": "-y"})
 )
 def test_modes_without_a_part_in_the_default_start_are_named(graph, hidden):
     modes = hidden_modes(Scene(PAIR, "x->y, y->x", graph, time_unit="time"))
-    assert [hidden in words for words in modes] == [True] * bool(hidden)
+    assert [hidden in mode_text for mode_text in modes] == [True] * bool(hidden)
 
 
 @pytest.mark.parametrize(

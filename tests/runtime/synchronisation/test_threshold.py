@@ -63,7 +63,7 @@ def test_network_in_parts_is_allowed_and_said():
     result = thresholds(
         Scene(topology=parts), omega=1.15, sigma=np.linspace(0, 0.3, 7), criterion=SHORT, resolution=0.05
     )
-    assert any("no complete synchronisation" in words for words in result.warnings)
+    assert any("no complete synchronisation" in warning for warning in result.warnings)
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def swept(monkeypatch):
         return Sweep(sigma, np.zeros(len(sigma)), np.ones(len(sigma)), ((0.1, 0.2),))
 
     monkeypatch.setattr(threshold, "simulate", fake)
-    monkeypatch.setattr(threshold, "fitted", lambda _, __, given, ___: SHORT if given == SHORT else PAPER)
+    monkeypatch.setattr(threshold, "fitted", lambda _, __, criterion, ___: SHORT if criterion == SHORT else PAPER)
     monkeypatch.setattr(threshold, "exponent_windows", lambda *_: ExponentWindows())
     return calls
 
@@ -387,12 +387,12 @@ def test_ends_that_come_of_the_transient_are_named(drive, unit):
     result = thresholds(scene, criterion=criterion, **asked)
     ((_, high),) = result.direct.intervals
     assert 0.3 < high < 0.45 < result.exponents.intervals[0][1] == pytest.approx(0.5)
-    assert [words[: words.index(" come of")] for words in result.warnings] == [
+    assert [warning[: warning.index(" come of")] for warning in result.warnings] == [
         f"the ends of what is {what} at sigma = {end:.4f} (exponent {2 * end - 1:.2g})"
         for what, end in (("simulated", high), ("predicted by the probe", result.predicted[0][1]))
     ]
-    assert all("20 units of time are given; trust the exponents" in words for words in result.warnings)
-    assert set(result.warnings) <= {words for name, words in result.summary if name == "warning"}
+    assert all("20 units of time are given; trust the exponents" in warning for warning in result.warnings)
+    assert set(result.warnings) <= {warning for name, warning in result.summary if name == "warning"}
     # an end of the grid is none of the transient
     assert thresholds(scene, criterion=criterion, **{**asked, "sigma": [0.0, 0.1, 0.2]}).warnings == ()
 
