@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from itertools import islice
-from math import lcm
 
 import pytest
 import sympy as sp
@@ -15,9 +13,8 @@ from family_sizes import size, sizes
 from synchain.models import Topology, chain, one_way_ring, ring, star
 from synchain.models.graphs.families import family, topology
 from synchain.models.graphs.products import cartesian, complement, kronecker, union, weighted
-from synchain.models.spectra.characteristic import characteristic
 from synchain.models.spectra.eigenvalue import ProofError
-from synchain.models.spectra.modular import _characteristic, _claimed, _powers, _primes, _unit, check_modulo
+from synchain.models.spectra.modular import check_modulo
 from synchain.models.spectra.solve import Proof, spectrum
 from synchain.models.spectra.spectrum import table
 from synchain.runtime.cli import main
@@ -73,36 +70,33 @@ def test_an_angle_of_another_ring_shows() -> None:
         check_modulo(topology("torus", 30), listed(topology("grid", 30)))
 
 
-def test_the_polynomial_modulo_a_prime_is_that_of_the_whole_numbers() -> None:
-    for graph in (chain(9), star(7), topology("wheel", 8), one_way_ring(6), weighted(topology("grid", 9), "2/3")):
-        (p,) = islice(_primes(8, "a"), 1)
-        polynomial = characteristic(graph)
-        expected = [int(c.p) * pow(int(c.q), -1, p) % p for c in polynomial.coeffs()]
-        assert [int(c) for c in _characteristic(graph, p).coeffs()] == expected
+def test_radicals_of_short_angles_agree() -> None:
+    """Eigenvalues 0, -2 and -2 ± sqrt(2) of the chain, 0, -2 and -1 ± I of the ring."""
+    numbers = [-2 + sp.sqrt(2), -2 - sp.sqrt(2), -1 + sp.I, -1 - sp.I]
+    pairs = [(sp.Integer(0), 2), (sp.Integer(-2), 2), *((number, 1) for number in numbers)]
+    chance = check_modulo(union(chain(4), one_way_ring(4)), pairs)
+    assert chance is not None
+    assert 0 < chance < 1e-40
 
 
-def test_a_claim_modulo_a_prime_is_that_of_the_whole_numbers() -> None:
-    """-2 ± sqrt(2), -2 and -1 ± I: z^5 + 8 z^4 + 24 z^3 + 36 z^2 + 28 z + 8, multiplied by hand."""
-    values = [-2 + sp.sqrt(2), -2 - sp.sqrt(2), sp.Integer(-2), -1 + sp.I, -1 - sp.I]
-    all_powers = [_powers(number) for number in values]
-    claims = [(powers, 1) for powers in all_powers if powers is not None]
-    m = lcm(*(t.denominator for (_, terms), _ in claims for t, _ in terms))
-    (p,) = islice(_primes(m, "b"), 1)
-    assert [int(c) for c in _claimed(claims, m, p).coeffs()] == [8, 28, 36, 24, 8, 1]
+def prime_of(graph: Topology) -> int:
+    """Return the prime at which a wrong closed form shows."""
+    (first, count), *others = listed(graph)
+    with pytest.raises(ProofError) as caught:
+        check_modulo(graph, [(first + 1, count), *others])
+    return int(str(caught.value).split("modulo ")[1].split(":")[0])
 
 
-@pytest.mark.parametrize("m", [1, 2, 7, 360, 2000])
-def test_primes_and_roots_of_unity(m: int) -> None:
-    primes = list(islice(_primes(m, "seed"), 3))
-    assert len(set(primes)) == 3
-    assert primes == list(islice(_primes(m, "seed"), 3))
-    assert primes != list(islice(_primes(m, "other"), 3))
-    for p in primes:
+def test_the_modulus_is_a_prime_with_roots_of_unity() -> None:
+    orders = {star(7): 1, topology("hypercube", 16): 1, ring(7): 7, ring(30): 30, ring(360): 360}
+    primes = {graph: prime_of(graph) for graph in orders}
+    assert len(set(primes.values())) == len(orders)
+    for graph, m in orders.items():
+        p = primes[graph]
+        assert prime_of(graph) == p
         assert sp.isprime(p)
         assert p % m == 1 % m
         assert 2**61 <= p < 2**62
-        z = _unit(m, p)
-        assert [k for k in range(1, m + 1) if pow(z, k, p) == 1] == [m]
 
 
 def test_numbers_that_are_no_sums_of_roots_of_unity_are_not_checked() -> None:
