@@ -227,8 +227,7 @@ def test_symbolic_weights_are_measured_before_they_are_multiplied_out(entry: str
 
 
 @pytest.mark.parametrize(
-    "claim",
-    ["erdos_renyi 2000: distinct = 3", "small_world 900000: distinct = 3", "random_regular 501: largest = -3"],
+    "claim", ["erdos_renyi 2000: distinct = 3", "small_world 900000: distinct = 3", "random_regular 501: largest = -3"]
 )
 def test_claims_about_large_graphs_without_a_closed_form_are_refused_unbuilt(claim: str, tmp_path: Path) -> None:
     path = tmp_path / "claims.txt"

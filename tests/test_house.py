@@ -75,10 +75,7 @@ ARROWS = {
 package, a package stands for all of its rooms.
 """
 
-DOORS = {
-    ("models/inputs/display.py", "runtime.plots"),
-    ("models/inputs/display.py", "runtime.reports"),
-}
+DOORS = {("models/inputs/display.py", "runtime.plots"), ("models/inputs/display.py", "runtime.reports")}
 """Files that call a room above them, inside a method: values draw and show themselves by what stands at the top."""
 
 FRONT = {"models", "codegen", "runtime"}

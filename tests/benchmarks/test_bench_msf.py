@@ -117,10 +117,7 @@ def test_ratios_are_those_of_the_same_strength_and_of_a_share_of_the_thousand() 
     ours = [row("synchain", "0.2", 1, 0.5), row("synchain", "1", 1, 0.25), row("synchain", "0 … 6", 1000, 4.0)]
     peer = [row("JiTCODE lsoda", "1", 1, 3.0), row("JiTCODE lsoda", "0.2", 1, 2.0)]
     lines = [line.strip("| ").split(" | ") for line in msf.summary([*ours, *peer]).splitlines()[2:]]
-    assert lines == [
-        ["s", "1", "3", "0.25", "12", "4", "750"],
-        ["s", "0.2", "2", "0.5", "4", "4", "500"],
-    ]
+    assert lines == [["s", "1", "3", "0.25", "12", "4", "750"], ["s", "0.2", "2", "0.5", "4", "4", "500"]]
     assert msf.summary(ours) == "No peer to compare with."
 
 

@@ -27,16 +27,7 @@ from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.scenes.file import load_scene, scene_names
 from synchain.models.scenes.scene import KEYWORDS
 
-TABLE_1 = {
-    "theta_b": 0.1,
-    "mu_s": 0.3,
-    "mu_k": 0.15,
-    "a": 2.5,
-    "epsilon": 2.0,
-    "u": 0.1,
-    "kappa": 1e5,
-    "omega": 1.15,
-}
+TABLE_1 = {"theta_b": 0.1, "mu_s": 0.3, "mu_k": 0.15, "a": 2.5, "epsilon": 2.0, "u": 0.1, "kappa": 1e5, "omega": 1.15}
 
 
 def two(**changes: object) -> Scene:
@@ -76,8 +67,7 @@ def test_two_oscillators_record_the_error_and_know_sigma() -> None:
 
 
 @pytest.mark.parametrize(
-    ("n", "x"),
-    [(1, (0.3,)), (4, (0.3, 0.28, 0.26, 0.24)), (5, (0.3, 0.285, 0.27, 0.255, 0.24)), (7, None)],
+    ("n", "x"), [(1, (0.3,)), (4, (0.3, 0.28, 0.26, 0.24)), (5, (0.3, 0.285, 0.27, 0.255, 0.24)), (7, None)]
 )
 def test_default_start(n: int, x: tuple[float, ...] | None) -> None:
     initial = Scene(topology=chain(n)).initial
@@ -474,12 +464,7 @@ def test_a_matrix_is_written_back_as_its_links() -> None:
     scene = Scene(topology=from_matrix([["-1/3", "1/3"], [2, -2]], name="odd"), section=Section("x_2", "both", 0.1))
     again = Scene.from_dict(json.loads(json.dumps(scene.as_dict())))
     assert again == scene
-    assert scene.as_dict()["topology"] == {
-        "name": "odd",
-        "n": 2,
-        "directed": True,
-        "edges": [[2, 1, "1/3"], [1, 2, 2]],
-    }
+    assert scene.as_dict()["topology"] == {"name": "odd", "n": 2, "directed": True, "edges": [[2, 1, "1/3"], [1, 2, 2]]}
     assert scene.as_dict()["section"] == "x_2 both 0.1"
 
 

@@ -374,8 +374,7 @@ def test_a_bracket_far_off_is_refined_as_well() -> None:
 
 
 @pytest.mark.parametrize(
-    ("polynomial", "reals"),
-    [((-2, 0, 0, 1), 1), ((1, 0, 1), 0), ((2, 0, -2, 0, 1), 0), ((1, -1, -3, 1, 1, 7), 1)],
+    ("polynomial", "reals"), [((-2, 0, 0, 1), 1), ((1, 0, 1), 0), ((2, 0, -2, 0, 1), 0), ((1, -1, -3, 1, 1, 7), 1)]
 )
 def test_real_and_complex_roots_are_told_apart(polynomial: tuple[int, ...], reals: int) -> None:
     kinds = [type(root) for root in roots(polynomial)]

@@ -68,10 +68,7 @@ PAIRS = {
         Scene(rubbing("set-valued"), topology=sc.chain(2), record=["section"], **SHORT),
         Scene(contact="set-valued", topology=sc.chain(2), record=["section"], **SHORT),
     ),
-    "duffing": (
-        Scene(duffing(), "spring", sc.chain(3), **SHORT),
-        Scene("duffing", "spring", sc.chain(3), **SHORT),
-    ),
+    "duffing": (Scene(duffing(), "spring", sc.chain(3), **SHORT), Scene("duffing", "spring", sc.chain(3), **SHORT)),
     "double pendulum": (
         Scene(double_pendulum(), "spring on phi", sc.chain(2)),
         Scene("double_pendulum", "spring on phi", sc.chain(2)),

@@ -66,10 +66,7 @@ def test_dots_follow_the_ends_of_a_grid_but_not_a_lower_end_at_zero():
 
 def test_compiling_is_told_and_loading_is_not(tmp_path, monkeypatch, caplog):
     monkeypatch.setenv("SYNCHAIN_CACHE", str(tmp_path / "kernels"))
-    said = (
-        "compiling the driver of sweeps, 1 lane, ",
-        "compiling a kernel for 1 oscillator (cash_karp), ",
-    )
+    said = ("compiling the driver of sweeps, 1 lane, ", "compiling a kernel for 1 oscillator (cash_karp), ")
     with caplog.at_level(logging.INFO, "synchain"):
         for _ in range(2):
             loading.forget()

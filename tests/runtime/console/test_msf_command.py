@@ -210,18 +210,10 @@ def test_the_option_omega_sets_the_frequency_of_the_drive_whatever_its_name(
 
 @pytest.mark.parametrize(
     ("wave", "message", "drive"),
-    [
-        ("cos(2 * Omega*t)", "2*Omega", ", 2*Omega = 2"),
-        ("cos(2*t)", "the frequency 2;", ", drive frequency 2"),
-    ],
+    [("cos(2 * Omega*t)", "2*Omega", ", 2*Omega = 2"), ("cos(2*t)", "the frequency 2;", ", drive frequency 2")],
 )
 def test_a_frequency_that_is_no_parameter_is_told_but_cannot_be_set(
-    wave: str,
-    message: str,
-    drive: str,
-    asked: list[dict[str, Any]],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    wave: str, message: str, drive: str, asked: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = own_drive(tmp_path, wave)
     assert main(["msf", str(file), "--omega", "1.4"]) == 2

@@ -76,16 +76,7 @@ def test_arcs_on_a_belt() -> None:
 
 def test_cycle_of_leine() -> None:
     """Leine et al., Nonlinear Dynamics 16, 41 (1998), fig. 5 and table: m = k = F_s = 1, v_dr = 0.2, delta = 3."""
-    scene = block(
-        "hyperbolic",
-        0.0,
-        0.2,
-        theta_b=0.2,
-        mu_s=1.0,
-        delta=3.0,
-        window=100.0,
-        section="v_1 falling",
-    )
+    scene = block("hyperbolic", 0.0, 0.2, theta_b=0.2, mu_s=1.0, delta=3.0, window=100.0, section="v_1 falling")
     data = finished(scene).data
     np.testing.assert_allclose(np.diff(data.section_time), 12.001031294831, rtol=0, atol=1e-10)
     top = finished(scene.replace(window=float(data.section_time[-1]))).states("end")

@@ -280,10 +280,7 @@ def test_a_grid_that_begins_inside_a_stable_range_shows_no_zero() -> None:
 
 @pytest.mark.parametrize(("force", "kind"), [("x**3 - x", "aperiodic"), ("x**3 + x", "periodic")])
 def test_a_large_constant_beside_a_motion_does_not_hide_it(force: str, kind: str) -> None:
-    node = Field(
-        {"x": "v", "v": f"-({force}) - 0.15*v + 0.3*cos(t)", "z": "Z - z"},
-        parameters={"Z": 1.0},
-    )
+    node = Field({"x": "v", "v": f"-({force}) - 0.15*v + 0.3*cos(t)", "z": "Z - z"}, parameters={"Z": 1.0})
     scenes = (Scene(node, "x->v", PAIR, initial={"x": 0.5, "z": z}, parameters={"Z": z}) for z in (1.0, 1e8))
     results = [exponents(each, [0.0], starts=1, transient=50, periods=50) for each in scenes]
     assert [a.kind for each in results for a in each.attractors] == [kind] * 2

@@ -15,11 +15,7 @@ ROSSLER = Field(
 )
 LORENZ = Field({"x": "k*10*(y - x)", "y": "k*(x*(28 - z) - y)", "z": "k*(x*y - 8*z/3)"}, parameters={"k": 1.0})
 NEURON = Field(
-    {
-        "x": "k*(y - s**-2*x**3 + 3*x**2/s - z + i*s)",
-        "y": "k*(s - 5*x**2/s - y)",
-        "z": "k*0.006*(4*(x + 1.6*s) - z)",
-    },
+    {"x": "k*(y - s**-2*x**3 + 3*x**2/s - z + i*s)", "y": "k*(s - 5*x**2/s - y)", "z": "k*0.006*(4*(x + 1.6*s) - z)"},
     parameters={"i": 3.2, "s": 1.0, "k": 1.0},
 )
 """Hindmarsh & Rose, Proc. R. Soc. Lond. B 221, 87 (1984), in units of s."""

@@ -268,16 +268,7 @@ def test_mpi(alone, tmp_path):
         pytest.skip("mpi4py or mpiexec is not installed")
     script = tmp_path / "sweep.py"
     script.write_text(MPI)
-    command = [
-        launcher,
-        "-n",
-        "3",
-        sys.executable,
-        "-m",
-        "mpi4py.futures",
-        str(script),
-        str(tmp_path / "a.nc"),
-    ]
+    command = [launcher, "-n", "3", sys.executable, "-m", "mpi4py.futures", str(script), str(tmp_path / "a.nc")]
     done = subprocess.run(
         command,
         capture_output=True,

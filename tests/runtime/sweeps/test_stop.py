@@ -69,8 +69,7 @@ def test_cells_stop_each_for_itself_in_any_lanes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("stop", "end_time"),
-    [("x_1 - 3/2", 20.0), ("1/2 - x_1", np.pi / 3), ("v_1", np.pi), ("v_1 - 1/2", 7 * np.pi / 6)],
+    ("stop", "end_time"), [("x_1 - 3/2", 20.0), ("1/2 - x_1", np.pi / 3), ("v_1", np.pi), ("v_1 - 1/2", 7 * np.pi / 6)]
 )
 def test_a_function_must_pass_zero_even_if_it_begins_there(stop: str, end_time: float) -> None:
     """x = cos t: as terminal events of SciPy do, one that touches zero or lies past it at the start ends nothing."""

@@ -263,12 +263,7 @@ def test_errors_of_tiny_states_are_not_lost_in_their_squares(size: float, n: int
     settings = {"transient": 0, "window": 10, "time_unit": "time", "rtol": 1e-8, "atol": 1e-16 * size}
     start = {"x": size, "v": 0.0}
     scene = Scene(
-        oscillator="harmonic",
-        coupling="spring",
-        topology=chain(n),
-        initial=start,
-        integrator="dop853",
-        **settings,
+        oscillator="harmonic", coupling="spring", topology=chain(n), initial=start, integrator="dop853", **settings
     )
     ends = run(scene, show_progress=False).states("end") / size
     expected = np.repeat([np.cos(10.0), -np.sin(10.0)], n).reshape(ends.shape)

@@ -8,15 +8,7 @@ import pytest
 import benchmarks
 from synchain.models import Scene, from_matrix, topology
 from synchain.runtime import Criterion, Exponents, exponents, run
-from synchain.runtime.synchronisation.agreement import (
-    CAUSES,
-    OUTCOMES,
-    Cell,
-    _cause,
-    _outcome,
-    agreement,
-    strengths,
-)
+from synchain.runtime.synchronisation.agreement import CAUSES, OUTCOMES, Cell, _cause, _outcome, agreement, strengths
 
 pytestmark = pytest.mark.long
 

@@ -67,8 +67,7 @@ def test_network_in_parts_is_allowed_and_said():
 
 
 @pytest.mark.parametrize(
-    ("ranges", "expected"),
-    [([(0.0, 0.0)], [(0.0, 0.0)]), ([(0.1, 0.2)], []), ([(0.0, 9.0)], [(0.0, 2.0)])],
+    ("ranges", "expected"), [([(0.0, 0.0)], [(0.0, 0.0)]), ([(0.1, 0.2)], []), ([(0.0, 9.0)], [(0.0, 2.0)])]
 )
 def test_parts_ask_for_stability_at_zero_ends_included(ranges, expected):
     assert project(ranges, PARTS.spectrum, 2.0) == expected
