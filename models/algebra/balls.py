@@ -98,10 +98,10 @@ def _decimal(x: Ball, digits: int) -> sp.Float:
     return sp.Float(arb(x).mid().str(digits + 5, radius=False), digits)
 
 
-def _part(part: arb, whole: acb, bits: int) -> arb:
+def _part(part: arb, number: acb, bits: int) -> arb:
     """Return a real or imaginary part, or 0 if it is smaller than 2**-bits of the modulus."""
     with precision(2 * bits):
-        return arb(0) if abs(part).upper() * arb(2) ** (bits - 4) < abs(whole).lower() else part.mid()
+        return arb(0) if abs(part).upper() * arb(2) ** (bits - 4) < abs(number).lower() else part.mid()
 
 
 def _ball(e: sp.Expr) -> Ball:

@@ -36,12 +36,12 @@ class AngleSum:
 
     @classmethod
     def rational(cls, value: Fraction | int) -> AngleSum:
-        """A rational number."""
+        """Return a rational number."""
         return cls(Fraction(value))
 
     @classmethod
     def cosine(cls, a: Fraction | int, b: Fraction | int, k: int, m: int) -> AngleSum:
-        """a + 2 b cos(2πk/m)."""
+        """Return a + 2 b cos(2πk/m)."""
         return _collected(Fraction(a), [(Fraction(k, m), Fraction(b))])
 
     def __add__(self, other: AngleSum) -> AngleSum:
@@ -90,7 +90,7 @@ class AngleSum:
         return lcm(*(t.denominator for t, _ in self.terms))
 
     def sign(self) -> int:
-        """-1, 0 or 1, decided exactly.
+        """Return -1, 0 or 1, decided exactly.
 
         Certified balls decide, and the cyclotomic polynomial if they hold 0.
         """
@@ -131,7 +131,7 @@ def _collected(shift: Fraction, parts: Iterable[tuple[Fraction, Fraction]]) -> A
 
 
 def folded_sum(shift: Fraction, parts: Iterable[tuple[int, Fraction]], unit: int) -> AngleSum:
-    """shift + Σ 2 b cos(2πr/unit) over (r, b), 0 <= r < unit."""
+    """Return shift + Σ 2 b cos(2πr/unit) over (r, b), 0 <= r < unit."""
     counts: dict[Fraction, Fraction] = {}
     for r, b in parts:
         t = Fraction(min(r, unit - r), unit)

@@ -40,11 +40,11 @@ class Disc:
 
     @property
     def ball(self) -> acb:
-        """A ball that holds the disc."""
+        """Return a ball that holds the disc."""
         return self.within(1)
 
     def within(self, times: int) -> acb:
-        """A ball that holds the disc enlarged by a factor."""
+        """Return a ball that holds the disc enlarged by a factor."""
         return acb(_wide(self.x, times * self.radius), _wide(self.y, times * self.radius))
 
 

@@ -167,9 +167,9 @@ def _sharpened(root: ComplexRoot, bits: int) -> acb:
 def _by_arb(f: fmpz_poly) -> list[Disc]:
     """Isolate the roots by Arb: a second at degree 100, minutes at degree 200."""
     with precision(128):
-        found = [root for root, _ in f.complex_roots()]
-        reals = sorted((ball for ball in found if ball.imag == 0), key=lambda ball: dyadic(ball.real))
-        others = [ball for ball in found if ball.imag != 0]
+        balls = [root for root, _ in f.complex_roots()]
+        reals = sorted((ball for ball in balls if ball.imag == 0), key=lambda ball: dyadic(ball.real))
+        others = [ball for ball in balls if ball.imag != 0]
         radii = [dyadic((ball.real.rad() + ball.imag.rad()).upper()) for ball in reals + others]
     return [
         Disc(dyadic(ball.real), dyadic(ball.imag), radius) for ball, radius in zip(reals + others, radii, strict=True)

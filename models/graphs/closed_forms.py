@@ -38,7 +38,7 @@ class Term:
     indices: tuple[Index, ...] = ()  # there is an eigenvalue for every value low … high of these indices
     vector: sp.Expr | None = None  # entry NODE of an eigenvector
     numbered: tuple[Index, ...] = ()  # numbers of the eigenvectors of a multiple eigenvalue
-    where: sp.Basic = sp.true  # the numbers that give independent eigenvectors obey it
+    where: sp.Basic = sp.true  # condition on `numbered` for independent eigenvectors
 
     @property
     def text(self) -> str:
@@ -102,12 +102,12 @@ class ClosedForm:
 
     terms: tuple[Term, ...]  # the eigenvalues
     size: sp.Expr = N  # the number of nodes
-    options: Mapping[str, object] = field(default_factory=dict)  # options of the family, in the symbols
+    options: Mapping[str, object] = field(default_factory=dict)  # options of the family, expressions in the symbols
     least: int = 1  # smallest number for each symbol that is not in `lowest`
-    note: str = ""  # what else a reader must know
-    blocks: str = ""  # the Jordan blocks that are larger than 1; it does not hold for products
+    note: str = ""  # further text for readers
+    blocks: str = ""  # text on Jordan blocks larger than 1; not valid for products
     degree: sp.Expr | None = None  # the in-degree of every node; None if it is not one for all
-    where: sp.Basic = sp.true  # what the numbers must obey
+    where: sp.Basic = sp.true  # condition on the numbers
     lowest: Mapping[sp.Symbol, int] = field(default_factory=dict)  # smallest numbers of single symbols
     name: str = ""  # name of the family with its options
     build: Callable[[Mapping[sp.Symbol, int]], Topology] | None = field(default=None, compare=False)  # makes a graph

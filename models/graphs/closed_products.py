@@ -55,7 +55,7 @@ def union(first: ClosedForm, second: ClosedForm) -> ClosedForm:
 
 
 def box(part: ClosedForm, sizes: Sequence[sp.Expr], indices: Sequence[sp.Symbol]) -> ClosedForm:
-    """Return the Cartesian product of chains or rings of these sizes."""
+    """Return the Cartesian product of chains or rings of these sizes, each with an index of its eigenvalues."""
     (n,) = part.symbols
     ((old, _, _),) = part.terms[0].indices
     parts = [renamed(part, {n: size, old: k}) for size, k in zip(sizes, indices, strict=True)]
@@ -96,6 +96,7 @@ def renamed(form: ClosedForm, new: Mapping[sp.Symbol, sp.Expr]) -> ClosedForm:
 
 def _apart(first: ClosedForm, second: ClosedForm) -> ClosedForm:
     """Return the second form with other letters for those of the first."""
+    # k becomes k2, k3, … until no symbol of the first form, nor the node, has that name
     taken = {str(s) for s in _letters(first)} | {str(NODE)}
     new = {}
     for symbol in sorted(_letters(second), key=str):

@@ -268,9 +268,10 @@ class FamilyRule:
     def links(self) -> tuple[Link, ...]:
         """Build the sorted links; ValueError if they are too many."""
         family, one = self.family, Fraction(1)
+        # Refuse by the count first; a family without one is cut off behind the limit, so that memory is bounded.
         family.limit_links(self.n, self.link_count or 0)
         edges = islice(family.edges(self.n, **dict(self.options)), family.link_limit // family.links_of_edge + 1)
-        links = [(i, j, one if weight == 1 else Fraction(weight)) for i, j, weight in edges]
+        links = [(i, j, one if weight == 1 else Fraction(weight)) for i, j, weight in edges]  # one object for all 1
         family.limit_links(self.n, family.links_of_edge * len(links))
         if not family.directed:
             links += [(j, i, weight) for i, j, weight in links]

@@ -50,6 +50,7 @@ def checked_name(what: str, graph: Topology) -> Topology:
     if graph.rule is not None or not (composed or graph.name in (*names(), *TOPOLOGY.also)):
         return graph
     text = graph.name if composed else f"{graph.name}({graph.n})"
+    # An operation that cannot be read means no graph, so its name is free; a family's name with a wrong size is not.
     try:
         named = read_graph(text, LARGEST)
         same = named.n == graph.n and named.links == graph.links
@@ -109,6 +110,7 @@ class _Graphs(_Composed[Topology]):
     expected = f"{', '.join((*PAIRS, *SIZED))}, e.g. cartesian(chain(4), ring(5))"
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[Topology] | None]:
+        # graphs are read by this algebra; sizes and factors stay text
         if function in PAIRS and count == 2 and not options:
             return self, self
         if function == "complement" and count == 1 and not options:

@@ -139,7 +139,7 @@ class _Size:
     below: int = 1
     degree: int = 0
 
-    def __add__(self, other: _Size) -> _Size:
+    def __add__(self, other: _Size) -> _Size:  # a/b + c/d = (a d + c b) / (b d)
         above = self.above * other.below + other.above * self.below
         below = self.below * other.below
         join = max if below == 1 else add
@@ -151,6 +151,7 @@ class _Size:
     def __pow__(self, power: int) -> _Size:
         if power < 0:
             return _Size(self.below, self.above, self.degree) ** -power
+        # a power of m terms has as many as there are multisets of `power` of them
         return _Size(comb(self.above + power - 1, power), comb(self.below + power - 1, power), self.degree * power)
 
 

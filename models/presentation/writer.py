@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TypeAlias
 
 import sympy as sp
 from sympy.printing.pretty.pretty_symbology import greek_unicode
@@ -37,60 +37,19 @@ LATEX_FUNCTIONS = {
 }
 
 
-class Style(Protocol):
-    """The way in which the pieces of a formula are put together; each method returns text."""
-
-    @property
-    def bars(self) -> bool:
-        """True if fractions have a bar, so that sums need no parentheses there."""
-
-    @property
-    def sum_over_j(self) -> str:
-        """The sum sign."""
-
-    @property
-    def dots(self) -> str:
-        """An ellipsis."""
-
-    def words(self, text: str) -> str:
-        """Words between formulae."""
-
-    def letter(self, name: str, index: str = "", primes: int = 0) -> str:
-        """A symbol: name with its own subscript after '_', an index, and primes."""
-
-    def product(self, factors: Sequence[str]) -> str:
-        """Factors side by side."""
-
-    def fraction(self, top: str, bottom: str, single: bool) -> str:
-        """A fraction; `single` if the bottom is one factor."""
-
-    def beside(self, fraction: str) -> str:
-        """A fraction as a factor in front of others."""
-
-    def power(self, base: str, exponent: str) -> str:
-        """A power."""
-
-    def root(self, inside: str) -> str:
-        """A square root."""
-
-    def function(self, name: str) -> str:
-        """The name of a function."""
-
-    def other(self, e: sp.Expr) -> str:
-        """Anything without a rule here, by SymPy's own printer."""
-
-
 class Latex:
     """LaTeX without \\left and \\right."""
 
-    bars = True
+    bars = True  # fractions have a bar, so that sums need no parentheses there
     sum_over_j = "\\sum_j "
     dots = "\\dots"
 
     def words(self, text: str) -> str:
+        """Write words between formulae."""
         return rf"\text{{{text}}}"
 
     def letter(self, name: str, index: str = "", primes: int = 0) -> str:
+        """Write a symbol: a name, a subscript after its first '_', an index and primes."""
         base, *subscripts = filter(None, re.sub(r"(?<=[A-Za-z])(?=\d+(_|$))", "_", name).split("_"))
         below = ",".join([*map(self._word, subscripts), *filter(None, [index])])
         head = self._word(base)
@@ -105,6 +64,7 @@ class Latex:
         return rf"\mathrm{{{name}}}" if len(name) > 1 and not name.isdigit() else name
 
     def product(self, factors: Sequence[str]) -> str:
+        """Write factors side by side."""
         text = ""
         for factor in factors:
             touching = re.search(r"\\[A-Za-z]+$", text) and factor[0].isalpha()
@@ -113,9 +73,11 @@ class Latex:
         return text
 
     def fraction(self, top: str, bottom: str, single: bool) -> str:
+        """Write a fraction; `single` if the bottom is one factor."""
         return rf"\frac{{{top}}}{{{bottom}}}"
 
     def beside(self, fraction: str) -> str:
+        """Write a fraction as a factor in front of others."""
         return fraction
 
     def power(self, base: str, exponent: str) -> str:
@@ -131,6 +93,7 @@ class Latex:
         return f"\\{name}" if name in LATEX_FUNCTIONS else rf"\operatorname{{{name}}}"
 
     def other(self, e: sp.Expr) -> str:
+        """Write anything without a rule here, by the printer of SymPy."""
         return str(sp.latex(e))
 
 
@@ -171,6 +134,10 @@ class Text:
 
     def other(self, e: sp.Expr) -> str:
         return str(sp.sstr(e))
+
+
+Style: TypeAlias = Latex | Text
+"""The way in which the pieces of a formula are put together."""
 
 
 @dataclass(frozen=True, slots=True)

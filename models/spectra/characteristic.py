@@ -34,10 +34,11 @@ Branch: TypeAlias = tuple[Polynomial, Polynomial]
 
 def characteristic(graph: Matrix) -> fmpq_poly:
     """Return the exact characteristic polynomial det(z - G)."""
-    numbers = graph.entries
-    scale = lcm(*(number.denominator for _, _, number in numbers))
+    # scale the matrix to whole numbers; the polynomial is scaled back below
+    fractions = graph.entries
+    scale = lcm(*(entry.denominator for _, _, entry in fractions))
     entries = {(i, i): 0 for i in range(graph.n)}
-    entries |= {(i, j): number.numerator * (scale // number.denominator) for i, j, number in numbers}
+    entries |= {(i, j): entry.numerator * (scale // entry.denominator) for i, j, entry in fractions}
     polynomial = sparse(graph.n, entries, fmpz_poly)
     if polynomial is None:
         rows = [[entries.get((i, j), 0) for j in range(graph.n)] for i in range(graph.n)]
@@ -54,7 +55,7 @@ def sparse(n: int, entries: Entries, polynomial: Callable[[list[int]], Polynomia
 
 
 def banded(n: int, entries: Entries) -> bool:
-    """True if all entries off the diagonal join neighbours of a chain, or its two ends; n >= 3."""
+    """Return whether all entries off the diagonal join neighbours of a chain, or its two ends; n >= 3."""
     return n >= 3 and all(abs(i - j) in (0, 1, n - 1) for i, j in entries)
 
 

@@ -75,11 +75,11 @@ class Eigenspace:
             yield nearest(partial(self._ratio, entry, top)) if any(entry) and top is not None else 0.0
 
     def _size(self, entry: Entry) -> Ball:
-        """The modulus of a number of Q(γ) other than 0, to 64 bits."""
+        """Return the modulus of a number of Q(γ) other than 0, to 64 bits."""
         return abs(accurate(partial(self._ratio, entry, None), 64))
 
     def _ratio(self, entry: Entry, other: Entry | None, bits: int) -> Ball:
-        """A ball around the quotient of two numbers of Q(γ), or around the first."""
+        """Return a ball around the quotient of two numbers of Q(γ), or around the first."""
         gamma = self.eigenvalue.enclosure(bits)
         with precision(bits):
             above, below = (

@@ -116,7 +116,7 @@ class Eigenvalue:
         return self._difference(other) >= 0
 
     def _difference(self, other: Eigenvalue | float) -> float:
-        """A number with the sign of the difference from another real number; exact where floats cannot decide."""
+        """Return a number with the sign of the difference from another real number; exact where floats cannot decide."""
         number = other if isinstance(other, Eigenvalue) else _number(other)
         if number is None:
             return float(self) - float(other)

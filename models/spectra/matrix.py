@@ -1,4 +1,4 @@
-"""What the spectra know of a matrix, whatever made it."""
+"""The interface of matrices that have a spectrum: graphs, and other matrices of graphs."""
 
 from __future__ import annotations
 

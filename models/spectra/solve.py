@@ -68,7 +68,7 @@ def spectrum(graph: Matrix, proof: Proof | None = None) -> Spectrum:
 
 
 def has_closed_form(graph: Matrix) -> bool:
-    """True if the eigenvalues of a graph are known without its characteristic polynomial."""
+    """Return whether the eigenvalues of a graph are known without its characteristic polynomial."""
     return graph.closed_form() is not None
 
 

@@ -129,12 +129,12 @@ class Spectrum(HasLatex, HasPlot):
 
         Each polynomial is written once; its roots have its number and their index as CRootOf.
         """
-        numbers: dict[tuple[int, ...], int] = {}
+        polynomial_index: dict[tuple[int, ...], int] = {}
         listed = []
         for e in self.eigenvalues:
             number, index, exact = None, None, None
             if isinstance(e.number, Root):
-                number, index = numbers.setdefault(e.number.polynomial, len(numbers)), e.number.index
+                number, index = polynomial_index.setdefault(e.number.polynomial, len(polynomial_index)), e.number.index
                 exact = f"CRootOf(p{number}, {index})"
             listed.append(
                 {
@@ -147,7 +147,7 @@ class Spectrum(HasLatex, HasPlot):
                     "jordan_blocks": None if e.blocks is None else [list(block) for block in e.blocks],
                 }
             )
-        polynomials = [[coefficient_text(c) for c in polynomial] for polynomial in numbers]
+        polynomials = [[coefficient_text(c) for c in polynomial] for polynomial in polynomial_index]
         return {
             "n": self.n,
             "polynomials": polynomials,
@@ -168,7 +168,7 @@ class Spectrum(HasLatex, HasPlot):
 
 
 def _farthest(eigenvalues: Sequence[Eigenvalue], way: int) -> sp.Expr:
-    """The first eigenvalue of largest modulus to 1024 bits; of smallest if `way` is -1."""
+    """Return the first eigenvalue of largest modulus to 1024 bits; of smallest if `way` is -1."""
     top = max(way * abs(e.value) for e in eigenvalues)
     bound = top - 1e-12 * abs(top)
     best, bits = [e for e in eigenvalues if not way * abs(e.value) < bound], 64  # all if infinite

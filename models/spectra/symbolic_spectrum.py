@@ -43,7 +43,7 @@ class SymbolicSpectrum:
         return "\n".join(rows)
 
     def as_dict(self) -> dict[str, object]:
-        """What `synchain spectrum --symbolic --matrix FILE --json` prints."""
+        """Return the JSON of `synchain spectrum --symbolic --matrix FILE --json`."""
         return {
             "n": self.polynomial.degree(),
             "polynomial": sp.sstr(self.polynomial.as_expr()),
