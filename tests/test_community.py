@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
@@ -76,3 +79,44 @@ def test_forms_of_issues_can_be_filled_in(path: Path) -> None:
 def test_the_code_of_conduct_is_the_covenant_and_is_linked() -> None:
     assert "contributor-covenant.org/version/2/1/" in (ROOT / "CODE_OF_CONDUCT.md").read_text("utf-8")
     assert "(CODE_OF_CONDUCT.md)" in (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+
+
+# -- workflows -------------------------------------------------------------------------------------------------
+
+WORKFLOWS = {
+    path.stem: yaml.safe_load(path.read_text("utf-8")) for path in (ROOT / ".github" / "workflows").glob("*.yml")
+}
+MATRIX = WORKFLOWS["tests"]["jobs"]["test"]["strategy"]["matrix"]
+
+
+def test_workflows_test_every_python_and_every_system() -> None:
+    pythons = [line.rpartition(" ")[2] for line in PROJECT["classifiers"] if re.search(r"Python :: 3\.\d", line)]
+    assert set(pythons) <= set(MATRIX["python"])
+    assert MATRIX["python"][0] == PROJECT["requires-python"].removeprefix(">=")
+    assert {name.partition("-")[0] for name in MATRIX["os"]} == {"ubuntu", "macos", "windows"}
+    legs = WORKFLOWS["tests"]["jobs"]["variants"]["strategy"]["matrix"]["include"]
+    assert {leg["install"] for leg in legs} == {"oldest", "newest", "usual"}
+    assert {leg["front_end"] for leg in legs} == {"", "numba"}
+
+
+def test_a_release_is_tested_and_published_without_a_password() -> None:
+    jobs = WORKFLOWS["release"]["jobs"]
+    assert set(jobs["publish"]["needs"]) == {"tests", "build"}
+    assert jobs["publish"]["permissions"] == {"id-token": "write"}
+    assert "secrets." not in (ROOT / ".github" / "workflows" / "release.yml").read_text("utf-8")
+
+
+def test_extras_and_folders_that_other_files_name_exist() -> None:
+    books = yaml.safe_load((ROOT / ".readthedocs.yaml").read_text("utf-8"))
+    (install,) = books["python"]["install"]
+    assert set(install["extra_requirements"]) <= set(PROJECT["optional-dependencies"])
+    assert (ROOT / books["sphinx"]["configuration"]).is_file()
+
+
+def test_the_oldest_versions_are_the_lower_bounds() -> None:
+    done = subprocess.run([sys.executable, ROOT / "tools" / "oldest.py"], capture_output=True, text=True, check=True)
+    pinned = [line for line in done.stdout.splitlines() if "==" in line]
+    assert len(pinned) == len(PROJECT["dependencies"])
+    for pin, line in zip(map(Requirement, pinned), map(Requirement, PROJECT["dependencies"]), strict=True):
+        (version,) = (part.version for part in pin.specifier)
+        assert (pin.name, line.specifier.contains(version)) == (line.name, True)
