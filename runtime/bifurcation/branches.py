@@ -233,11 +233,12 @@ def digits_of(values: Sequence[float]) -> str:
     return ", ".join(f"{value:.8g}" for value in values)
 
 
-def others(given: Given, scene: Scene, name: str) -> Scene:
+def others(keywords: Given, scene: Scene, name: str) -> Scene:
     """Return a scene with other parameters than the one along which a branch is followed."""
-    if name in given.values:
-        raise ValueError(f"{given.function.__name__}: {name!r} takes its values one after the other; expected others")
-    return given.scene(scene)
+    if name in keywords.values:
+        function = keywords.function.__name__
+        raise ValueError(f"{function}: {name!r} takes its values one after the other; expected others")
+    return keywords.scene(scene)
 
 
 def traced(scene: Scene, name: str, values: Iterable[float], first: PeriodicOrbit, span: float) -> Branch:

@@ -75,7 +75,7 @@ LONGEST = 10_000
 
 @dataclass(frozen=True, slots=True, repr=False)
 class PeriodicOrbit(Labelled):
-    """A motion that repeats itself, after some periods of the drive or, without a drive, after a time of its own.
+    """A motion that repeats itself: after some periods of the drive, or after the period of an undriven oscillator.
 
     Parameters
     ----------
@@ -259,8 +259,14 @@ def periodic_orbit(
     check_periods(periods)
     if not without_drive(scene.equations, scene.parameters).forced:
         return _limit_cycle(scene, periods, start)
-    state = _settled(scene) if start is None else _state(scene, start)
-    return _newton(scene, int(periods), state)
+    if start is not None:
+        return _newton(scene, int(periods), _state(scene, start))
+    # Newton's method starts from the state after the transient, in units of the drive's period.
+    first = _initial(scene)[None]
+    problem = OrbitProblem.of_modes(scene, np.zeros(1), first, 1)
+    units = scene.transient if scene.time_unit == "period" else math.ceil(scene.transient / problem.unit)
+    _, (settled,) = problem.settled(problem.with_slip_states(first), units)
+    return _newton(scene, int(periods), np.asarray(settled[: problem.components]))
 
 
 def _newton(scene: Scene, periods: int, start: np.ndarray) -> PeriodicOrbit:
@@ -285,7 +291,12 @@ def _newton(scene: Scene, periods: int, start: np.ndarray) -> PeriodicOrbit:
             # The ground carries the body along, so that I - M is singular: follow the motion until the body slips.
             best, state = np.inf, image[: len(state)]
         else:
-            state = state + _correction(matrix, gap)
+            try:
+                state = state + np.asarray(np.linalg.solve(np.eye(len(gap)) - matrix, gap))
+            except np.linalg.LinAlgError:
+                raise ArithmeticError(
+                    "Newton's method: a multiplier is 1 to rounding, so the orbit is not isolated"
+                ) from None
         steps += 1
         if not relative(state - start, extent) < ASTRAY:
             break
@@ -393,15 +404,15 @@ def strobe(
     return image[: len(state)], matrix
 
 
-def _driven(given: Given, scene: Scene) -> Scene:
+def _driven(keywords: Given, scene: Scene) -> Scene:
     """Return the scene with its parameters and the tolerance of orbits; ValueError if it has no drive."""
-    scene = given.scene(scene, rtol=TOLERANCE)
+    scene = keywords.scene(scene, rtol=TOLERANCE)
     unit_of_time(scene)
     if not scene.period:
         raise ValueError(
             "periodic orbits are looked for on the stroboscopic map of a drive; found an oscillator without one"
         )
-    return coupled_cell(Given(given.function), scene, TOLERANCE)
+    return coupled_cell(Given(keywords.function), scene, TOLERANCE)
 
 
 def _warn_of_different_starts(scene: Scene) -> None:
@@ -420,15 +431,6 @@ def _initial(scene: Scene) -> np.ndarray:
     return np.array([values[0] for values in scene.initial.values()], dtype=float)
 
 
-def _settled(scene: Scene) -> np.ndarray:
-    """Return the state (components,) after the scene's transient."""
-    first = _initial(scene)[None]
-    problem = OrbitProblem.of_modes(scene, np.zeros(1), first, 1)
-    units = scene.transient if scene.time_unit == "period" else math.ceil(scene.transient / problem.unit)
-    _, (state,) = problem.settled(problem.with_slip_states(first), units)
-    return np.asarray(state[: problem.components])
-
-
 def _state(scene: Scene, start: Sequence[float] | np.ndarray) -> np.ndarray:
     """Check a start and return it as the state (components,) of one oscillator, without a slip state."""
     names = tuple(name for name in scene.components if name != SLIP.name)
@@ -441,17 +443,30 @@ def _state(scene: Scene, start: Sequence[float] | np.ndarray) -> np.ndarray:
     return state[: len(names)]
 
 
-def _correction(matrix: np.ndarray, gap: np.ndarray) -> np.ndarray:
-    """Return the step of Newton's method; ArithmeticError if the orbit is not isolated."""
-    try:
-        return np.asarray(np.linalg.solve(np.eye(len(gap)) - matrix, gap))
-    except np.linalg.LinAlgError:
-        raise ArithmeticError("Newton's method: a multiplier is 1 to rounding, so the orbit is not isolated") from None
-
-
 def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:
-    """Find the strength at which the largest transversal multiplier has modulus 1, to rounding."""
+    """Find the strength at which the largest transversal multiplier has modulus 1, to rounding.
 
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+        Orbit of one oscillator.
+    low, high : float
+        Strengths alpha of a mode that grows at one of them and decays at the other.
+
+    Returns
+    -------
+    float
+        The strength.
+
+    Raises
+    ------
+    ValueError
+        If a strength is not finite, or if the mode grows, or decays, at both.
+
+    See Also
+    --------
+    periodic_orbit : Find the orbit.
+    """
     for name, value in (("low", low), ("high", high)):
         if not isinstance(value, Real) or not math.isfinite(value):
             raise ValueError(f"{name} = {short_repr(value)}; expected a finite strength alpha")

@@ -93,7 +93,7 @@ class Skeleton(Labelled):
         ]
         if not rows:
             return dataset({}, {})
-        numbers, values, orbits = zip(*rows, strict=True)
+        branch_numbers, values, orbits = zip(*rows, strict=True)
         return dataset(
             {
                 "state": (("orbit", "component"), [o.state for o in orbits], "state at the start of a period"),
@@ -102,7 +102,7 @@ class Skeleton(Labelled):
             },
             {
                 self.branches[0].name: ("orbit", np.array(values)),
-                "branch": ("orbit", np.array(numbers)),
+                "branch": ("orbit", np.array(branch_numbers)),
                 "periods": ("orbit", np.array([o.periods for o in orbits])),
                 "component": list(orbits[0].components),
             },
@@ -261,21 +261,23 @@ def _box(scene: Scene, ranges: Mapping[str, Range]) -> np.ndarray:
 
 def starts_of(scene: Scene, seed: int, box: np.ndarray | None = None) -> np.ndarray:
     """Return the starts (STARTS, components) of a search: the scene's own, and random ones around its motion, or in a box."""
-    own = _own_start(scene)
-    share = np.random.default_rng(seed).uniform(0.0, 1.0, (STARTS, len(own)))
+    first = _first_start(scene)
+    share = np.random.default_rng(seed).uniform(0.0, 1.0, (STARTS, len(first)))
     if box is None:
-        problem, (state,) = _problem(scene, own[None])
+        problem, (state,) = _problem(scene, first[None])
         try:
-            motion = np.concatenate([own[None], *(states[:, : len(own)] for states in driven_states(problem, state))])
+            motion = np.concatenate(
+                [first[None], *(states[:, : len(first)] for states in driven_states(problem, state))]
+            )
         except FloatingPointError:  # the motion escapes: of its start only the size is a scale of bounded motion
-            motion = np.array([own, -own])
+            motion = np.array([first, -first])
         extent = np.ptp(motion, axis=0)
         extent = np.where(extent > 0.0, extent, 1.0 if not extent.any() else 0.0)  # without any motion the scale is 1
         # One box for each start, of each size in turn: box (2, STARTS, components).
         sizes = np.resize(SCALES, STARTS)[:, None] * extent
         box = 0.5 * (motion.min(axis=0) + motion.max(axis=0)) + sizes * np.array([-0.5, 0.5])[:, None, None]
     starts = box[0] + (box[1] - box[0]) * share
-    starts[0] = own
+    starts[0] = first
     return np.asarray(starts)
 
 
@@ -341,19 +343,19 @@ def _returning(scene: Scene, path: np.ndarray, extent: np.ndarray, periods: int)
     # |x(j + periods) - x(j)| of each motion, the largest component in units of its extent.
     gap = np.abs((path[periods:] - path[:-periods]) / size).max(axis=2)
     # An angle is counted in the turn of the scene's own start: an orbit some turns away is the same orbit.
-    own = _own_start(scene)
+    first = _first_start(scene)
     starts: list[tuple[np.ndarray, np.ndarray]] = []
     for flat in np.argsort(gap, axis=None, kind="stable"):
         k, motion = np.unravel_index(flat, gap.shape)
         if gap[k, motion] > CLOSE or len(starts) == TRIES:
             break
-        state = path[k, motion] - whole_turns(scene, path[k, motion] - own)
+        state = path[k, motion] - whole_turns(scene, path[k, motion] - first)
         if all(relative(state - start, np.minimum(size[motion], its)) > APART for start, its in starts):
             starts.append((state, size[motion]))
     return [state for state, _ in starts]
 
 
-def _own_start(scene: Scene) -> np.ndarray:
+def _first_start(scene: Scene) -> np.ndarray:
     """Return the initial state (components,) of the first oscillator, without a slip state."""
     return np.array([values[0] for name, values in scene.initial.items() if name != SLIP.name], dtype=float)
 
