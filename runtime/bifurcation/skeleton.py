@@ -218,15 +218,16 @@ def skeleton(
     searched: list[np.ndarray] = []
 
     def take(k: int, orbit: PeriodicOrbit) -> None:
-        """Follow an orbit at grid[k] that is new, and what its branch turns into at its folds."""
+        """Follow an orbit at grid[k] that is new, and the other sheets at the folds of its branch."""
         if any(_passes(branch, grid[k], orbit) for branch in branches):
             return
         branches.append(_both_ways(scene, name, grid, k, orbit))
         for end, other in _other_sheets(scene, branches[-1]):
             take(grid.index(end), other)
 
+    # Search at evenly spread values: the middles of `count` equal parts of the grid.
     count = min(looks, len(grid))
-    looked_at = sorted({int((2 * j + 1) * len(grid) / (2 * count)) for j in range(count)})  # evenly spread indices
+    looked_at = sorted({int((2 * j + 1) * len(grid) / (2 * count)) for j in range(count)})
     transient, seed = check_number("transient", transient, 0.0), check_integer("seed", seed, 0)
     with Execution(1, None, show_progress, progress).reporter(len(looked_at), "value") as reporter:
         for k in reporter.each(looked_at):
@@ -236,6 +237,7 @@ def skeleton(
             for orbit in near_returns(one, periods, transient, states):
                 take(k, orbit)
     warn_of_lost("skeleton", branches)
+    # The box around all starts, by component.
     low, high = (of(np.concatenate(searched), axis=0).tolist() for of in (np.min, np.max))
     names = (component for component in scene.components if component != SLIP.name)
     return Skeleton(
