@@ -120,8 +120,8 @@ def ours(system: System) -> tuple[sc.Scene, list[str]]:
     texts = {"T": system.kinetic, "V": system.potential}
     velocities = {q: f"{q}_" for q in system.names}
     values = {name: round(0.9 - 0.07 * k, 2) for k, name in enumerate(system.parameters)}
-    words = {"coordinates": velocities, "parameters": values}
-    node = sc.Lagrangian(texts["T"], texts["V"], Q=dict(system.forces), **words)
+    keywords = {"coordinates": velocities, "parameters": values}
+    node = sc.Lagrangian(texts["T"], texts["V"], Q=dict(system.forces), **keywords)
     return sc.Scene(node, None), system.parameters
 
 
@@ -141,8 +141,8 @@ def reference(system: System) -> tuple[sp.Matrix, sp.Matrix, list[sp.Symbol]]:
     equations = method.form_lagranges_equations()
     accelerations = [x.diff(t, 2) for x in q]
     mass = equations.jacobian(accelerations)
-    rest = equations.xreplace(dict.fromkeys(accelerations, sp.S.Zero))
-    forcing = sp.Matrix([force.dot(frame.x) for _, force in forces]) - rest
+    remainder = equations.xreplace(dict.fromkeys(accelerations, sp.S.Zero))
+    forcing = sp.Matrix([force.dot(frame.x) for _, force in forces]) - remainder
     plain = {x.diff(t): sp.Symbol(f"{name}_") for name, x in zip(system.names, q, strict=True)}
     plain |= {x: sp.Symbol(name) for name, x in zip(system.names, q, strict=True)}
     mass, forcing = (matrix.subs(plain).subs(t, sp.Symbol("t")) for matrix in (mass, forcing))
@@ -156,9 +156,9 @@ def difference(name: str, points: int = 20) -> float:
     scene, _ = ours(system)
     mass, forcing, letters = reference(system)
     node = scene.equations.nodes[0]
-    known = {str(symbol) for symbol in letters}
+    names_allowed = {str(symbol) for symbol in letters}
     symbols = {str(s): s for rate in node.rhs for s in rate.free_symbols}
-    assert set(symbols) <= known, f"{name}: {set(symbols) - known}"
+    assert set(symbols) <= names_allowed, f"{name}: {set(symbols) - names_allowed}"
     arguments = [symbols.get(str(s), s) for s in letters]
     places = {str(s): k for k, s in enumerate(node.state)}
     rates = sp.lambdify(arguments, list(node.rhs), "numpy")

@@ -79,10 +79,10 @@ def digits(problem: Problem, **settings: Any) -> float:
     result = run(scene, show_progress=False)
     if int(result.data["status"]) != Status.FINISHED:
         return -np.inf
-    found = result.end.transpose("node", "component").values.ravel()
+    state = result.end.transpose("node", "component").values.ravel()
     start = np.array([scene.initial[name] for name in scene.components])
     floor = 0.1 * max(np.abs(expected).max(), np.abs(start).max())
-    error = np.abs(found - expected) / (floor + np.abs(expected))
+    error = np.abs(state - expected) / (floor + np.abs(expected))
     return float(-np.log10(max(error.max(), 1e-16)))
 
 
@@ -131,11 +131,11 @@ def _five_bodies() -> Problem:
         return f"({' + '.join(f'{d}**2' for d in apart)})**(3/2)"
 
     def pull(i: int, k: int) -> str:
-        own = f"-({sun} + {masses[i]})*{y(i, k)}/{cube(i)}"
+        pull_of_sun = f"-({sun} + {masses[i]})*{y(i, k)}/{cube(i)}"
         others = (
             f"{masses[j]}*(({y(j, k)} - {y(i, k)})/{cube(i, j)} - {y(j, k)}/{cube(j)})" for j in range(5) if j != i
         )
-        return f"{k2}*({own} + {' + '.join(others)})"
+        return f"{k2}*({pull_of_sun} + {' + '.join(others)})"
 
     slopes = tuple(pull(i, k) for i in range(5) for k in range(3))
     return Problem("C5", (*(f"y{16 + k}" for k in range(15)), *slopes), (*places, *speeds), 20.0)

@@ -21,21 +21,25 @@ from test_problems import DIGITS as OF_PROBLEMS
 def attempted(digits: Callable[[], float]) -> tuple[float, str]:
     """Digits, or minus infinity, and why there are none."""
     try:
-        found = digits()
+        number = digits()
     except Exception as error:
         return -np.inf, str(error).splitlines()[0][:80]
-    return found, "" if np.isfinite(found) else "the run did not end"
+    return number, "" if np.isfinite(number) else "the run did not end"
 
 
 def table(names: list[str], digits: Callable[[str], float], least: float) -> Iterator[str]:
     """A line for each name, then right, wrong and lost ones."""
-    found = {}
+    collected = {}
     yield "| name | digits | |"
     yield "|---|---:|---|"
     for name in names:
-        found[name], why = attempted(lambda name=name: digits(name))
-        yield f"| {name} | {found[name]:.1f} | {why} |" if np.isfinite(found[name]) else f"| {name} | lost | {why} |"
-    values = np.array(list(found.values()))
+        collected[name], why = attempted(lambda name=name: digits(name))
+        yield (
+            f"| {name} | {collected[name]:.1f} | {why} |"
+            if np.isfinite(collected[name])
+            else f"| {name} | lost | {why} |"
+        )
+    values = np.array(list(collected.values()))
     right, lost = int((values > least).sum()), int((~np.isfinite(values)).sum())
     ended = values[np.isfinite(values)]
     middle = f"; median {np.median(ended):.1f} digits" if len(ended) else ""

@@ -99,8 +99,8 @@ def test_exponents_of_a_flow(name: str) -> None:
     """The difference lies within four joint standard errors and the discretisation of the reference."""
     of = flow(name)
     expected, error = benettin(of)
-    found = lyapunov_spectrum(of.scene(), precision=BENETTIN[name] * expected[0])
-    allowed = 4.0 * np.hypot(error, found.stderr) + 2e-3 * np.abs(expected[0])
-    assert np.all(np.abs(found.exponent - expected) < allowed), (
-        f"{found.exponent} ± {found.stderr}; {expected} ± {error}"
+    result = lyapunov_spectrum(of.scene(), precision=BENETTIN[name] * expected[0])
+    allowed = 4.0 * np.hypot(error, result.stderr) + 2e-3 * np.abs(expected[0])
+    assert np.all(np.abs(result.exponent - expected) < allowed), (
+        f"{result.exponent} ± {result.stderr}; {expected} ± {error}"
     )

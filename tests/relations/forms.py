@@ -18,14 +18,14 @@ SETTINGS = ("transient", "window", "time_unit", "rtol", "atol")
 def rebuilt(scene: sc.Scene, node: sc.Field, coupling: sc.Rates | None = None, **changes: object) -> sc.Scene:
     """A scene with another text of its node, made anew; parameters that the text does not have are left out."""
     linked = scene.coupling is not None and scene.n > 1
-    known = {*map(str, node.parameters), "g"} if linked else set(map(str, node.parameters))
-    words = {
-        "parameters": {name: value for name, value in scene.parameters.items() if name in known},
+    names = {*map(str, node.parameters), "g"} if linked else set(map(str, node.parameters))
+    replacements = {
+        "parameters": {name: value for name, value in scene.parameters.items() if name in names},
         "initial": dict(zip(node.states, scene.initial.values(), strict=True)),
         **{name: getattr(scene, name) for name in SETTINGS},
     }
     return sc.Scene(
-        node, (coupling or PULL) if linked else None, scene.topology if linked else None, **(words | changes)
+        node, (coupling or PULL) if linked else None, scene.topology if linked else None, **(replacements | changes)
     )
 
 

@@ -118,12 +118,12 @@ def of_basin(units: Units, change: Change, path: Path) -> Answer:
     scene = change(pair(units))
     box = dict(zip(scene.components, map(tuple, units.put([-2, 2], [-2, 2]).values()), strict=True))
     times = {"transient": 36.0 / units.k, "window": 4.0 / units.k}
-    found = sc.basin(scene, samples=8, ranges=box, **times, **QUIET)
-    return {"share": np.array(found.share)}
+    result = sc.basin(scene, samples=8, ranges=box, **times, **QUIET)
+    return {"share": np.array(result.share)}
 
 
 def of_thresholds(units: Units, change: Change, path: Path) -> Answer:
-    found = sc.thresholds(
+    result = sc.thresholds(
         change(pair(units)),
         sigma=units.k * np.array([0.02, 0.3, 0.6]),
         resolution=0.1 * units.k,
@@ -133,58 +133,58 @@ def of_thresholds(units: Units, change: Change, path: Path) -> Answer:
         **QUIET,
     )
     return {
-        "exponents": edges(found.exponents.intervals) / units.k,
-        "probe": edges(found.probe.intervals) / units.k,
-        "direct": edges(found.direct.intervals) / units.k,
+        "exponents": edges(result.exponents.intervals) / units.k,
+        "probe": edges(result.probe.intervals) / units.k,
+        "direct": edges(result.direct.intervals) / units.k,
     }
 
 
 def of_probe(units: Units, change: Change, path: Path) -> Answer:
     strengths = units.k * np.array([-0.3, 0.3, 1.0])
-    found = sc.universal_probe(change(pair(units)), strengths, 0.0, criterion=criterion(units), **QUIET)
-    return {"synchronous": np.asarray(found.synchronous, float)}
+    result = sc.universal_probe(change(pair(units)), strengths, 0.0, criterion=criterion(units), **QUIET)
+    return {"synchronous": np.asarray(result.synchronous, float)}
 
 
 def of_exponents(units: Units, change: Change, path: Path) -> Answer:
-    found = sc.exponents(change(pair(units)), units.k * STRENGTHS, precision=3e-3 * units.k, **SHORT)
-    return {"exponent": found.exponent / units.k}
+    result = sc.exponents(change(pair(units)), units.k * STRENGTHS, precision=3e-3 * units.k, **SHORT)
+    return {"exponent": result.exponent / units.k}
 
 
 def of_msf(units: Units, change: Change, path: Path) -> Answer:
-    found = sc.msf(change(pair(units)), units.k * np.array([-0.3, 0.3, 1.0]), precision=3e-3 * units.k, **SHORT)
-    return {"exponent": found.exponent / units.k, "open": np.array(len(found.intervals), float)}
+    result = sc.msf(change(pair(units)), units.k * np.array([-0.3, 0.3, 1.0]), precision=3e-3 * units.k, **SHORT)
+    return {"exponent": result.exponent / units.k, "open": np.array(len(result.intervals), float)}
 
 
 def of_plane(units: Units, change: Change, path: Path) -> Answer:
     grid = units.k * np.array([0.3, 1.0])
-    found = sc.plane(change(pair(units)), grid, units.k * np.array([0.0, 0.5]), precision=3e-3 * units.k, **SHORT)
-    return {"exponent": found.exponent / units.k}
+    result = sc.plane(change(pair(units)), grid, units.k * np.array([0.0, 0.5]), precision=3e-3 * units.k, **SHORT)
+    return {"exponent": result.exponent / units.k}
 
 
 def of_clusters(units: Units, change: Change, path: Path) -> Answer:
-    found = sc.cluster_exponents(change(pair(units)), [0, 0], precision=3e-3 * units.k, **SHORT)
-    return {"exponent": np.sort(np.ravel(found.exponent)) / units.k}
+    result = sc.cluster_exponents(change(pair(units)), [0, 0], precision=3e-3 * units.k, **SHORT)
+    return {"exponent": np.sort(np.ravel(result.exponent)) / units.k}
 
 
 def of_spectrum(units: Units, change: Change, path: Path) -> Answer:
-    found = sc.lyapunov_spectrum(change(pair(units)), precision=3e-3 * units.k, **SHORT)
-    return {"exponent": found.exponent / units.k}
+    result = sc.lyapunov_spectrum(change(pair(units)), precision=3e-3 * units.k, **SHORT)
+    return {"exponent": result.exponent / units.k}
 
 
 def of_equilibrium(units: Units, change: Change, path: Path) -> Answer:
     scene = pair(units, REST, (0.5, 0.2), (0.1, 0.0))
-    found = sc.equilibrium(change(scene))
+    result = sc.equilibrium(change(scene))
     return {
-        "state": units.take(np.reshape(found.state, (2, -1))),
-        "real": np.sort(found.eigenvalues.real) / units.k,
-        "imaginary": np.sort(found.eigenvalues.imag) / units.k,
+        "state": units.take(np.reshape(result.state, (2, -1))),
+        "real": np.sort(result.eigenvalues.real) / units.k,
+        "imaginary": np.sort(result.eigenvalues.imag) / units.k,
     }
 
 
 def of_orbit(units: Units, change: Change, path: Path) -> Answer:
     scene = pair(units, x=(1.0, 1.0), v=(0.1, 0.1)).replace(transient=60.0)  # mean return times
-    found = sc.periodic_orbit(change(scene))
-    return {"period": np.array(found.period * units.k), "multipliers": np.sort(np.abs(found.multipliers))}
+    orbit = sc.periodic_orbit(change(scene))
+    return {"period": np.array(orbit.period * units.k), "multipliers": np.sort(np.abs(orbit.multipliers))}
 
 
 def _orbit_of_drive(units: Units, change: Change) -> tuple[sc.Scene, sc.PeriodicOrbit]:
@@ -199,9 +199,9 @@ def of_follow(units: Units, change: Change, path: Path) -> Answer:
 
 
 def of_skeleton(units: Units, change: Change, path: Path) -> Answer:
-    found = sc.skeleton(change(driven(units)), "w", [1.2, 1.25], (1,), 1, **QUIET)
-    states = [orbit.state for branch in found for orbit in branch.orbits]
-    return {"branches": np.array(len(found), float), "states": units.take(np.array(states).T)}
+    result = sc.skeleton(change(driven(units)), "w", [1.2, 1.25], (1,), 1, **QUIET)
+    states = [orbit.state for branch in result for orbit in branch.orbits]
+    return {"branches": np.array(len(result), float), "states": units.take(np.array(states).T)}
 
 
 ASKED: dict[str, Callable[[Units, Change, Path], Answer]] = {
@@ -279,10 +279,10 @@ def _answer(
 ) -> Answer:
     with warnings.catch_warnings(), bounded(seconds):
         warnings.simplefilter("ignore")
-        found = ASKED[name](units, change, path)
+        answer = ASKED[name](units, change, path)
     if save:
-        np.savez(path / "answer.npz", **found)
-    return found
+        np.savez(path / "answer.npz", **answer)
+    return answer
 
 
 @cache
@@ -291,13 +291,13 @@ def plain_answer(name: str, path: Path) -> Answer:
     return ask(name, path)
 
 
-def expect_equal(name: str, found: Answer, expected: Answer, times: float = 1.0) -> None:
+def expect_equal(name: str, answer: Answer, expected: Answer, times: float = 1.0) -> None:
     """Compare two answers within the tolerance of the function; same shapes, and no NaN."""
-    assert found.keys() == expected.keys()
+    assert answer.keys() == expected.keys()
     for what, value in expected.items():
         allowed = times * RESOLUTION.get(what, 0.0) if name == "thresholds" else times * TOLERANCE[name]
-        assert found[what].shape == value.shape, f"{name}: {what} is {found[what]}; expected {value}"
-        np.testing.assert_allclose(found[what], value, rtol=0.0, atol=allowed, err_msg=f"{name}: {what}")
+        assert answer[what].shape == value.shape, f"{name}: {what} is {answer[what]}; expected {value}"
+        np.testing.assert_allclose(answer[what], value, rtol=0.0, atol=allowed, err_msg=f"{name}: {what}")
 
 
 __all__ = ["ASKED", "PLAIN", "TOLERANCE", "Units", "ask", "expect_equal", "pair", "plain_answer", "replace"]

@@ -69,15 +69,15 @@ def test_the_default_of_a_swept_parameter_plays_no_part() -> None:
     np.testing.assert_array_equal(ends(fast, w=[0.7]), ends(PERIODIC, w=[0.7]))
 
 
-def other_width(scene: sc.Scene, values: list[float], **words: object) -> np.ndarray:
-    return sc.run(scene, m=values, show_progress=False, **words).end.values
+def other_width(scene: sc.Scene, values: list[float], **keywords: object) -> np.ndarray:
+    return sc.run(scene, m=values, show_progress=False, **keywords).end.values
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("words", [{"width": 1}, {"width": 2}, {"width": 8}, {"workers": 1}, {"workers": 3}])
-def test_width_and_workers_play_no_part(words: dict[str, int]) -> None:
+@pytest.mark.parametrize("text", [{"width": 1}, {"width": 2}, {"width": 8}, {"workers": 1}, {"workers": 3}])
+def test_width_and_workers_play_no_part(text: dict[str, int]) -> None:
     values = np.geomspace(0.1, 30.0, 11).tolist()
-    np.testing.assert_array_equal(other_width(AUTONOMOUS, values, **words), other_width(AUTONOMOUS, values))
+    np.testing.assert_array_equal(other_width(AUTONOMOUS, values, **text), other_width(AUTONOMOUS, values))
 
 
 @pytest.mark.long

@@ -65,7 +65,7 @@ KNOWN = {case: defect for defect, cases in DEFECTS.items() for case in cases}
 
 
 def cases() -> list[object]:
-    found = []
+    collected = []
     for name in ASKED:
         for relation in SAID:
             if (name in ONE_NODE and relation in BETWEEN_NODES) or (name, relation) in REFUSED:
@@ -73,8 +73,8 @@ def cases() -> list[object]:
             marks = [] if (name, relation) in QUICK else [pytest.mark.long]
             if (name, relation) in KNOWN:
                 marks.append(pytest.mark.xfail(strict=True, reason=KNOWN[name, relation]))
-            found.append(pytest.param(name, relation, marks=marks, id=f"{name}-{relation}"))
-    return found
+            collected.append(pytest.param(name, relation, marks=marks, id=f"{name}-{relation}"))
+    return collected
 
 
 @pytest.mark.parametrize(("name", "relation"), cases())
@@ -82,19 +82,19 @@ def test_the_same_motion_said_otherwise_has_the_same_answer(
     name: str, relation: str, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     said = SAID[relation]
-    found = said.back(ask(name, tmp_path, change=said.change))
-    expect_equal(name, found, plain_answer(name, tmp_path_factory.getbasetemp()))
+    answer = said.back(ask(name, tmp_path, change=said.change))
+    expect_equal(name, answer, plain_answer(name, tmp_path_factory.getbasetemp()))
 
 
 @pytest.mark.parametrize("name", ASKED)
-@pytest.mark.parametrize("kept", [*KEPT, "through its file"])
+@pytest.mark.parametrize("attribute", [*KEPT, "through its file"])
 def test_a_scene_that_was_kept_has_the_same_answer_in_bits(
-    name: str, kept: str, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+    name: str, attribute: str, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    change = KEPT.get(kept) or through_file(tmp_path)
-    found, expected = ask(name, tmp_path, change=change), plain_answer(name, tmp_path_factory.getbasetemp())
+    change = KEPT.get(attribute) or through_file(tmp_path)
+    answer, expected = ask(name, tmp_path, change=change), plain_answer(name, tmp_path_factory.getbasetemp())
     for what, value in expected.items():
-        np.testing.assert_array_equal(found[what], value, err_msg=f"{name}: {what}")
+        np.testing.assert_array_equal(answer[what], value, err_msg=f"{name}: {what}")
 
 
 COPIES = ("run", "stream", "equilibrium", "lyapunov_spectrum")
@@ -107,9 +107,9 @@ def test_two_copies_without_a_link_move_as_one_does(
     name: str, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     base = plain_answer(name, tmp_path_factory.getbasetemp())
-    found = ask(name, tmp_path, change=twice)
+    answer = ask(name, tmp_path, change=twice)
     expected = {what: np.sort(value)[::-1] if what not in ("end", "state") else value for what, value in base.items()}
-    expect_equal(name, halves(found), expected)
+    expect_equal(name, halves(answer), expected)
 
 
 TURNED = [pytest.param(name, marks=[] if name in ("run", "equilibrium") else [pytest.mark.long]) for name in ASKED]
@@ -120,5 +120,5 @@ TURNED = [pytest.param(name, marks=[] if name in ("run", "equilibrium") else [py
 def test_angles_may_be_shifted_by_turns(name: str, turns: int, tmp_path: Path) -> None:
     expected = ask(name, tmp_path, change=pendula)
     (tmp_path / "turned").mkdir()
-    found = ask(name, tmp_path / "turned", Units(offset=(2.0 * np.pi * turns, 0.0)), pendula)
-    expect_equal(name, found, expected, times=max(1.0, abs(turns) * 1e-6 / TOLERANCE[name]))
+    answer = ask(name, tmp_path / "turned", Units(offset=(2.0 * np.pi * turns, 0.0)), pendula)
+    expect_equal(name, answer, expected, times=max(1.0, abs(turns) * 1e-6 / TOLERANCE[name]))

@@ -50,5 +50,5 @@ def test_an_answer_does_not_depend_on_units(
     name: str, units: str, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     expected = plain_answer(name, tmp_path_factory.getbasetemp())
-    found = ask(name, tmp_path, UNITS[units], seconds=SECONDS)
-    expect_equal(name, found, expected, times=rounding(UNITS[units]) if name in ("run", "stream") else 1.0)
+    answer = ask(name, tmp_path, UNITS[units], seconds=SECONDS)
+    expect_equal(name, answer, expected, times=rounding(UNITS[units]) if name in ("run", "stream") else 1.0)

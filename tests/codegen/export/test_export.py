@@ -110,8 +110,8 @@ def ill_named(n: int) -> Equations:
 
 def heterogeneous(n: int) -> Equations:
     """Driven Duffing oscillators with dampings and frequencies of their own."""
-    numbers = {"delta": [0.1 * i for i in range(n)], "omega": [1 + 0.1 * i for i in range(n)]}
-    return Scene(oscillator="duffing", topology=ring(n), parameters=numbers).equations
+    values = {"delta": [0.1 * i for i in range(n)], "omega": [1 + 0.1 * i for i in range(n)]}
+    return Scene(oscillator="duffing", topology=ring(n), parameters=values).equations
 
 
 def clocks() -> Equations:
@@ -175,7 +175,7 @@ def exact_at(name: str, seed: int) -> Values:
     return exact(NETWORKS[name], *point(NETWORKS[name], seed))
 
 
-def exact(equations: Equations, t: float, state: list[float], numbers: list[float]) -> Values:
+def exact(equations: Equations, t: float, state: list[float], values: list[float]) -> Values:
     """The right-hand side that SymPy evaluates in 40 digits, and its central differences over a distance of 1e-15."""
     names = [sp.Symbol(name, real=True) for name in (*equations.state, *equations.parameters)]
     plain = {s: sp.Symbol(f"q{k}", real=True) for k, s in enumerate(names)}
@@ -187,7 +187,7 @@ def exact(equations: Equations, t: float, state: list[float], numbers: list[floa
         return list(mpmath.lu_solve(mass(*at), forces(*at))) if equations.inertial else forces(*at)
 
     with mpmath.workdps(40):
-        at, step = [mpmath.mpf(x) for x in (t, *state, *numbers)], mpmath.mpf(10) ** -15
+        at, step = [mpmath.mpf(x) for x in (t, *state, *values)], mpmath.mpf(10) ** -15
         columns = []
         for k in range(1, 1 + equations.dimension):
             above, below = (rhs(*[x + side * step * (i == k) for i, x in enumerate(at)]) for side in (1, -1))
@@ -195,40 +195,40 @@ def exact(equations: Equations, t: float, state: list[float], numbers: list[floa
         return np.array([float(x) for x in rhs(*at)]), np.array(columns).T
 
 
-def run_python(equations: Equations, folder: Path, t: float, state: list[float], numbers: list[float]) -> Values:
+def run_python(equations: Equations, folder: Path, t: float, state: list[float], values: list[float]) -> Values:
     space: dict[str, Any] = {}
     exec(compile(to_python(equations), "<export>", "exec"), space)
     small = equations.n <= 8 or equations.mixed
-    numbers = numbers if small else together(equations, numbers)
-    jacobian = space["jac"](t, state, *numbers)
+    values = values if small else together(equations, values)
+    jacobian = space["jac"](t, state, *values)
     matrix = jacobian if small else jacobian.toarray()
     inside = space["sparsity"]().toarray()
     assert set(np.unique(inside)) <= {0.0, 1.0}
     assert not matrix[inside == 0.0].any()
     assert space["STATE"] == list(portable(equations)[0].state)
-    return space["rhs"](t, state, *numbers), matrix
+    return space["rhs"](t, state, *values), matrix
 
 
-def together(equations: Equations, numbers: list[float]) -> list[Any]:
+def together(equations: Equations, values: list[float]) -> list[Any]:
     """The arguments of a text of many nodes: parameters that differ come as one list."""
-    found: dict[str, Any] = {}
-    for name, value in zip(equations.parameters, numbers, strict=True):
+    collected: dict[str, Any] = {}
+    for name, value in zip(equations.parameters, values, strict=True):
         node = name.rpartition("_")[0]
         base = node if node in equations.varied else node.rpartition("_")[0]
         if base in equations.differing:
-            found.setdefault(base, []).append(value)
+            collected.setdefault(base, []).append(value)
         else:
-            found[name] = value
-    return list(found.values())
+            collected[name] = value
+    return list(collected.values())
 
 
 def shared_library(text: str, folder: Path) -> ctypes.CDLL:
     source, library = folder / "network.c", folder / "network.so"
     source.write_text(text, encoding="utf-8")
-    made = subprocess.run(
+    done = subprocess.run(
         [str(COMPILER), *STRICT, str(source), "-o", str(library), "-lm"], capture_output=True, text=True
     )
-    assert made.returncode == 0, made.stderr
+    assert done.returncode == 0, done.stderr
     return ctypes.CDLL(str(library))
 
 
@@ -238,29 +238,29 @@ def array(size: int, values: Any = ()) -> Any:
 
 def run_c(equations: Equations, folder: Path, t: float, state: list[float], numbers: list[float]) -> Values:
     library, size = shared_library(to_c(equations), folder), equations.dimension
-    given = (ctypes.c_double(t), array(size, state), array(len(numbers), numbers))
+    arguments = (ctypes.c_double(t), array(size, state), array(len(numbers), numbers))
     rates = array(size)
-    library.rhs(*given, rates)
+    library.rhs(*arguments, rates)
     matrix = np.zeros((size, size))
     if equations.n <= 8 or equations.mixed:
         entries = array(size * size, [7.0] * (size * size))
-        library.jacobian(*given, entries)
+        library.jacobian(*arguments, entries)
         return np.array(rates), np.array(entries).reshape(size, size)
     count = int(to_c(equations).split("ENTRIES = ")[1].split(" }")[0])
     values, rows, columns = array(count), (ctypes.c_int * max(count, 1))(), (ctypes.c_int * max(count, 1))()
-    library.jacobian(*given, values)
+    library.jacobian(*arguments, values)
     library.jacobian_places(rows, columns)
     np.add.at(matrix, (list(rows)[:count], list(columns)[:count]), list(values)[:count])
     return np.array(rates), matrix
 
 
-def run_numba_text(equations: Equations, folder: Path, t: float, state: list[float], numbers: list[float]) -> Values:
+def run_numba_text(equations: Equations, folder: Path, t: float, state: list[float], values: list[float]) -> Values:
     """The text for Numba as plain Python, which has no Jacobian."""
     text = to_numba(equations).replace("from numba import cfunc, types", "from numba import types")
     space: dict[str, Any] = {"cfunc": lambda signature: lambda function: function}
     exec(compile(text, "<export>", "exec"), space)
     rates = [math.nan] * equations.dimension
-    space["rhs"](t, state, rates, numbers)
+    space["rhs"](t, state, rates, values)
     return np.array(rates), np.empty((0, 0))
 
 
@@ -279,8 +279,8 @@ def test_exported_text_computes_the_equations(name: str, language: str, tmp_path
     if language == "c" and COMPILER is None:
         pytest.skip("no C compiler")
     equations = NETWORKS[name]
-    t, state, numbers = point(equations, 3)
-    rates, matrix = RUNS[language](equations, tmp_path, t, state, numbers)
+    t, state, values = point(equations, 3)
+    rates, matrix = RUNS[language](equations, tmp_path, t, state, values)
     right, slopes = exact_at(name, 3)
     np.testing.assert_allclose(rates, right, rtol=1e-13, atol=1e-13 * max(1.0, abs(right).max()))
     if matrix.size:
@@ -293,10 +293,10 @@ def test_numba_compiles_the_text(n: int) -> None:
     space: dict[str, Any] = {}
     exec(compile(to_numba(equations, Scene(topology=chain(n)).parameters), "<export>", "exec"), space)
     t, state, _ = point(equations, 5)
-    rates, numbers = array(equations.dimension), list(space["PARAMETERS"])
-    space["rhs"].ctypes(t, array(len(state), state), rates, array(len(numbers), numbers))
-    assert numbers == list(Scene(topology=chain(n)).parameters.values())
-    np.testing.assert_allclose(np.array(rates), exact(equations, t, state, numbers)[0], rtol=1e-13, atol=1e-13)
+    rates, values = array(equations.dimension), list(space["PARAMETERS"])
+    space["rhs"].ctypes(t, array(len(state), state), rates, array(len(values), values))
+    assert values == list(Scene(topology=chain(n)).parameters.values())
+    np.testing.assert_allclose(np.array(rates), exact(equations, t, state, values)[0], rtol=1e-13, atol=1e-13)
 
 
 def test_the_signature_is_that_of_numbalsoda() -> None:
@@ -317,9 +317,9 @@ def test_the_module_integrates_with_scipy() -> None:
         mode = np.cos(math.pi * (np.arange(n) + 0.5) / n)  # of the chain, eigenvalue -4 sin^2(pi/2n)
         frequency = math.sqrt(1 + 0.3 * 4 * math.sin(math.pi / (2 * n)) ** 2)
         start = [*mode, *np.zeros(n)]
-        found = solve_ivp(space["rhs"], (0, 5), start, method="Radau", jac=space["jac"], rtol=1e-10, atol=1e-12)
-        assert found.success
-        np.testing.assert_allclose(found.y[:n, -1], mode * math.cos(5 * frequency), atol=1e-8)
+        solution = solve_ivp(space["rhs"], (0, 5), start, method="Radau", jac=space["jac"], rtol=1e-10, atol=1e-12)
+        assert solution.success
+        np.testing.assert_allclose(solution.y[:n, -1], mode * math.cos(5 * frequency), atol=1e-8)
 
 
 def test_large_networks_are_loops() -> None:
@@ -341,13 +341,13 @@ def test_names_are_unique_and_none_is_reserved() -> None:
     model, changed = portable(ill_named(2))
     edge = model.edge
     assert edge is not None
-    found = [s.name for s in (*model.node.state, *model.node.parameters)]
-    assert len(set(found)) == len(found)
-    assert not {*found, *(s.name for s in (*edge.here, *edge.there))} & RESERVED
+    names_of_symbols = [s.name for s in (*model.node.state, *model.node.parameters)]
+    assert len(set(names_of_symbols)) == len(names_of_symbols)
+    assert not {*names_of_symbols, *(s.name for s in (*edge.here, *edge.there))} & RESERVED
     assert changed["μ"] == "mu_2"
     assert changed["lambda"] == "lambda_"
     assert "mu" not in changed
-    assert len({*found, *(s.name for s in (*edge.here, *edge.there))}) == len(found) + 4
+    assert len({*names_of_symbols, *(s.name for s in (*edge.here, *edge.there))}) == len(names_of_symbols) + 4
     assert "Renamed: lambda is called lambda_" in to_c(ill_named(2))
 
 
@@ -402,9 +402,9 @@ def test_exported_functions_keep_the_names_of_mechanics(n: int, inertia: bool, l
         pytest.skip("no C compiler")
     equations = usual(n, inertia)
     assert portable(equations)[1] == {}
-    t, state, numbers = point(equations, 4)
-    rates, matrix = RUNS[language](equations, tmp_path, t, state, numbers)
-    right, slopes = exact(equations, t, state, numbers)
+    t, state, values = point(equations, 4)
+    rates, matrix = RUNS[language](equations, tmp_path, t, state, values)
+    right, slopes = exact(equations, t, state, values)
     np.testing.assert_allclose(rates, right, rtol=1e-12, atol=1e-12 * abs(right).max())
     if matrix.size:
         np.testing.assert_allclose(matrix, slopes, rtol=1e-12, atol=1e-12 * abs(slopes).max())
@@ -456,15 +456,15 @@ def test_text(text: str, c: str | None, numba: str | None) -> None:
         assert (write(e, C99), write(e, MATH)) == (c, numba)
     values = {"x": 0.37, "y": 1.91, "z": -2.3}
     for printer in (NUMPY, MATH):
-        found = eval(write(e, printer), {"np": np, "math": math, **values})
-        assert found == pytest.approx(float(e.subs({symbols[k]: v for k, v in values.items()})), rel=1e-15)
+        value = eval(write(e, printer), {"np": np, "math": math, **values})
+        assert value == pytest.approx(float(e.subs({symbols[k]: v for k, v in values.items()})), rel=1e-15)
 
 
 def test_what_cannot_be_written_is_refused() -> None:
     x = sp.Symbol("x", real=True)
-    for e, words in ((sp.gamma(x), "gamma"), (x + 0.5, "floating-point"), (sp.Piecewise((x, x > 0)), "no value"),
+    for e, message in ((sp.gamma(x), "gamma"), (x + 0.5, "floating-point"), (sp.Piecewise((x, x > 0)), "no value"),
                      (x * 10**400, "does not fit"), (sp.I * x, "does not fit")):  # fmt: skip
-        with pytest.raises(ValueError, match=words):
+        with pytest.raises(ValueError, match=message):
             write(e, C99)
 
 

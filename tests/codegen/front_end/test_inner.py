@@ -21,8 +21,8 @@ from synchain.codegen.simd.lane_types import Lane
 
 def _text(function: Any) -> tuple[str, Any]:
     function.compile((types.float64,))
-    made = function.overloads[(types.float64,)]
-    return made.library.get_llvm_str(), made.fndesc
+    overload = function.overloads[(types.float64,)]
+    return overload.library.get_llvm_str(), overload.fndesc
 
 
 @njit(error_model="numpy")
@@ -89,9 +89,9 @@ def test_the_signature_of_an_operator_is_resolved_once(monkeypatch: pytest.Monke
     asked = []
     context = cpu_target.typing_context
     context.refresh()
-    found = context.resolve_function_type
+    resolve = context.resolve_function_type
     monkeypatch.setattr(
-        context, "resolve_function_type", lambda *request: (asked.append(request[1]), found(*request))[1]
+        context, "resolve_function_type", lambda *request: (asked.append(request[1]), resolve(*request))[1]
     )
     reader, four = syntax_reader._TreeReader(context, {}), Lane(4)
     pairs = [(four, four), (types.float64, four), (four, four)]

@@ -165,11 +165,11 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize(("body", "found"), REFUSED.values(), ids=REFUSED)
-def test_what_is_not_read_is_refused(body: str, found: str) -> None:
+@pytest.mark.parametrize(("body", "problem"), REFUSED.values(), ids=REFUSED)
+def test_what_is_not_read_is_refused(body: str, problem: str) -> None:
     space: dict[str, Any] = {}
     syntax_trees.execute(_module({"one": body})[1], "<text>", space)
-    with pytest.raises(syntax_reader.UnreadError, match=re.escape(found)):
+    with pytest.raises(syntax_reader.UnreadError, match=re.escape(problem)):
         syntax_reader.read(cpu_target.typing_context, space["f0"].py_func, ARGUMENTS, types.void)
 
 
@@ -249,34 +249,34 @@ class _Author:
         )
 
     def statements(self, depth: int) -> list[str]:
-        found = []
+        collected = []
         for _ in range(self.random.randint(2, 5)):
             kind = self.random.random()
             if depth and kind < 0.2:
                 test = self.random.choice(["n > 3", "k < 2 or s > 0.0", "any_lane(a > b)", "not k == n", "YES", "NO"])
-                found += [f"if {test}:", *self.inner(depth), "else:", *self.inner(depth)]
+                collected += [f"if {test}:", *self.inner(depth), "else:", *self.inner(depth)]
             elif depth and kind < 0.35:
                 bounds = self.random.choice(["k % 4", "1, 5", "5, 0, -2"])
                 index = "ij"[depth % 2]
-                found += [f"for {index} in range({bounds}):", *self.inner(depth), f"    out[40 + {index}] = s"]
+                collected += [f"for {index} in range({bounds}):", *self.inner(depth), f"    out[40 + {index}] = s"]
             elif kind < 0.5:
-                found.append(f"s = {self.number()}")
+                collected.append(f"s = {self.number()}")
             elif kind < 0.6:
-                found.append(self.random.choice(["k = (k + 3) % 7", "k += 1", "k = min(k, n)"]))
+                collected.append(self.random.choice(["k = (k + 3) % 7", "k += 1", "k = min(k, n)"]))
             elif kind < 0.65:
-                found.append("a, b = b*c + a, a")
+                collected.append("a, b = b*c + a, a")
             elif kind < 0.8:
                 self.count += 1
-                found.append(f"d{self.count} = {self.lane(2)}*b")
+                collected.append(f"d{self.count} = {self.lane(2)}*b")
                 self.products.append(f"d{self.count}")
             else:
-                found.append(f"{self.random.choice('abc')} = {self.lane()} + 0.0*a")
-        return found
+                collected.append(f"{self.random.choice('abc')} = {self.lane()} + 0.0*a")
+        return collected
 
     def inner(self, depth: int) -> list[str]:
-        known = len(self.products)
+        before = len(self.products)
         lines = ["    " + line for line in self.statements(depth - 1)]
-        del self.products[known:]
+        del self.products[before:]
         return lines
 
     def body(self) -> str:

@@ -41,12 +41,12 @@ def trees(order: int) -> tuple[Tree, ...]:
 def forests(order: int, largest: int) -> tuple[tuple[Tree, ...], ...]:
     if order == 0:
         return ((),)
-    found = []
+    collected = []
     for size in range(min(order, largest), 0, -1):
         for count in range(1, order // size + 1):
             for many in itertools.combinations_with_replacement(trees(size), count):
-                found += [tuple(sorted((*many, *rest))) for rest in forests(order - count * size, size - 1)]
-    return tuple(found)
+                collected += [tuple(sorted((*many, *smaller))) for smaller in forests(order - count * size, size - 1)]
+    return tuple(collected)
 
 
 @functools.cache
@@ -161,8 +161,8 @@ def test_the_error_of_the_dense_output_in_the_stiff_limit(m):
     for power in range(1, m.dense_order + 1):
         k = limit @ (np.array(m.c) ** power + (np.array(m.d) if power == 1 else 0.0))
         rows = [np.dot(row, k[: len(row)]) for row in m.dense]
-        found = theta * np.dot(m.b, k) + theta * (1 - theta) * sum(theta**j * d for j, d in enumerate(rows))
-        error = np.abs(found - theta**power).max()
+        value = theta * np.dot(m.b, k) + theta * (1 - theta) * sum(theta**j * d for j, d in enumerate(rows))
+        error = np.abs(value - theta**power).max()
         assert (error < 1e-12) == (power < m.dense_order), power
     assert m.dense_error == pytest.approx(error / abs(rows[-1]), rel=1e-3)
 
@@ -289,8 +289,8 @@ def test_measured_order_of_the_dense_output(m):
         kernel, total = generated(m.name), mpf(0)
         for t, theta in itertools.product(STARTS, (mpf(1) / 5, mpf(1) / 2, mpf(5) / 6)):
             step = take_step(kernel, t, h, exact(t), DAMPING)
-            found = [kernel.inside(theta, c, step) for c in range(2)]
-            total += distance(found, exact(t + theta * h))
+            states = [kernel.inside(theta, c, step) for c in range(2)]
+            total += distance(states, exact(t + theta * h))
         return total
 
     assert slope(error, *steps(m)) == pytest.approx(m.dense_order + 1, abs=0.15)

@@ -64,7 +64,7 @@ def test_linear_models_compile_and_are_exact(name: str, model: str, linked: bool
         window=WINDOW, time_unit="time",
         initial=STARTS if linked else {key: values[0] for key, values in STARTS.items()},
     )  # fmt: skip
-    found = run(scene, show_progress=False)
+    result = run(scene, show_progress=False)
     count = 1 + linked
     matrix = np.kron(slopes, np.eye(count))  # states are in the order x_1, x_2, v_1, v_2
     if linked:
@@ -72,8 +72,8 @@ def test_linear_models_compile_and_are_exact(name: str, model: str, linked: bool
     start = np.array([value for values in STARTS.values() for value in values[:count]])
     expected = exact(matrix, np.repeat(rates, count), start)
     assert problems == []
-    assert found.status == Status.FINISHED
+    assert result.status == Status.FINISHED
     if name == "auto":
         stiff = model in ("diagonal", "triangular")
-        assert found.integrators.startswith("rodas5p" if stiff else "taylor")
-    np.testing.assert_allclose(found.states("end"), expected, rtol=0, atol=1e3 * rtol)
+        assert result.integrators.startswith("rodas5p" if stiff else "taylor")
+    np.testing.assert_allclose(result.states("end"), expected, rtol=0, atol=1e3 * rtol)

@@ -89,13 +89,13 @@ def tight() -> Outcome:
 
 @pytest.mark.parametrize(("rtol", "bound"), [(1e-6, 1e-5), (1e-7, 1e-6), (1e-9, 1e-8)])
 def test_section_points_are_as_good_as_the_integrator(tight, rtol, bound):
-    found = friction_run(2, rtol, [WINDOW], room=100).section(0)
+    points = friction_run(2, rtol, [WINDOW], room=100).section(0)
     expected = tight.section(0)
-    assert len(found) == len(expected) >= 10
-    error = np.abs(found - expected).max()
+    assert len(points) == len(expected) >= 10
+    error = np.abs(points - expected).max()
     step = (WINDOW[1] - WINDOW[0]) / friction_run(2, rtol, [WINDOW]).counts[0, 1]
     assert error <= bound < step**2, (error, step)
-    assert np.abs(found[:, 3]).max() < 1e-13, "the section function does not vanish at its points"
+    assert np.abs(points[:, 3]).max() < 1e-13, "the section function does not vanish at its points"
 
 
 def test_section_points_follow_the_tolerance(tight):
@@ -167,12 +167,12 @@ def test_synchronisation_error_is_integrated(method, bounds):
     values = distances(normal_modes(times))
     mean = np.average((values[1:] + values[:-1]) / 2)
     for rtol, bound in zip((1e-5, 1e-10), bounds, strict=True):
-        found = harmonic_run(method, rtol).sums[0]
-        assert abs(found[0] - mean) <= bound * mean
-        assert abs(found[1] - values.max()) <= 5e-3 * values.max()
-        assert found[1] <= values.max() * (1 + 10 * rtol)
-        assert abs(found[2] - values[-1]) <= 10 * rtol
-        assert found[3] == 45.0
+        sums = harmonic_run(method, rtol).sums[0]
+        assert abs(sums[0] - mean) <= bound * mean
+        assert abs(sums[1] - values.max()) <= 5e-3 * values.max()
+        assert sums[1] <= values.max() * (1 + 10 * rtol)
+        assert abs(sums[2] - values[-1]) <= 10 * rtol
+        assert sums[3] == 45.0
 
 
 def test_synchronisation_error_of_the_friction_scene(tight):
@@ -261,6 +261,6 @@ Taylor steps refuse these choices, which jump.
 def test_choices_by_states_and_parameters_end_where_scipy_says(method, width, n):
     equations, start = stopped(n), started(n)
     assert equations.parameters == ("gap", "stiff", "drag", "sigma")
-    found = drive(kernel(equations, method, width=width), [start] * 5, CELLS, [(0.0, 6.0)] * 5, 1e-8)
-    assert (found.counts[:, 0] == 1).all()
-    np.testing.assert_allclose(found.end, ends_by_scipy(n), rtol=0, atol=3e-6)
+    outcome = drive(kernel(equations, method, width=width), [start] * 5, CELLS, [(0.0, 6.0)] * 5, 1e-8)
+    assert (outcome.counts[:, 0] == 1).all()
+    np.testing.assert_allclose(outcome.end, ends_by_scipy(n), rtol=0, atol=3e-6)

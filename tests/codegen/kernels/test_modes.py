@@ -32,9 +32,9 @@ def scene(name: str, coupling: str, n: int = 2, **more: object) -> Scene:
 def integrator(
     s: Scene, variation: Variation, state: list[float], strengths: np.ndarray, rtol: float = 1e-10
 ) -> VariationalIntegrator:
-    numbers = np.array([[s.parameters[name] for name in variation.orbit.parameters]])
+    values = np.array([[s.parameters[name] for name in variation.orbit.parameters]])
     return VariationalIntegrator.make(
-        s.replace(rtol=rtol, atol=rtol * 1e-2), variation, np.array([state]), numbers, strengths, 1
+        s.replace(rtol=rtol, atol=rtol * 1e-2), variation, np.array([state]), values, strengths, 1
     )
 
 
@@ -49,19 +49,19 @@ ALPHA = np.array([3.0, 0.0, 0.4, 1.1, 25.0])
 
 def test_modes_of_a_linear_node_follow_the_matrix_exponential() -> None:
     s = scene("harmonic", "damper")
-    found = moved(integrator(s, mode(s.equations), [0.3, 0.1], ALPHA[None]), 2.0)
+    states = moved(integrator(s, mode(s.equations), [0.3, 0.1], ALPHA[None]), 2.0)
     for k, alpha in enumerate(ALPHA):
         exact = scipy.linalg.expm(2.0 * np.array([[0.0, 1.0], [-1.0, -alpha]])) @ (np.ones(2) / np.sqrt(2))
-        np.testing.assert_allclose(found[:, k], exact, rtol=0, atol=2e-9 * np.abs(exact).max())
+        np.testing.assert_allclose(states[:, k], exact, rtol=0, atol=2e-9 * np.abs(exact).max())
 
 
 def test_complex_strengths_of_a_linear_node() -> None:
     s = scene("harmonic", "spring")
     strengths = np.array([[0.5, 0.5, -0.2], [0.7, -0.7, 2.0]])
-    found = moved(integrator(s, mode(s.equations, plane=True), [0.3, 0.1], strengths), 2.0)
+    states = moved(integrator(s, mode(s.equations, plane=True), [0.3, 0.1], strengths), 2.0)
     for k, z in enumerate(strengths[0] + 1j * strengths[1]):
         exact = scipy.linalg.expm(2.0 * np.array([[0.0, 1.0], [-1.0 - z, 0.0]])) @ (np.full(2, 0.5 + 0.5j))
-        np.testing.assert_allclose(found[:2, k] + 1j * found[2:, k], exact, rtol=0, atol=1e-9 * np.abs(exact).max())
+        np.testing.assert_allclose(states[:2, k] + 1j * states[2:, k], exact, rtol=0, atol=1e-9 * np.abs(exact).max())
 
 
 @pytest.mark.parametrize(
@@ -75,21 +75,21 @@ def test_complex_strengths_of_a_linear_node() -> None:
 def test_modes_are_those_of_the_extended_system(name: str, coupling: str, state: list[float]) -> None:
     """Orbit and deviation as one state in an ordinary kernel, whose Jacobian SymPy derives anew."""
     s = scene(name, coupling)
-    made = transversal_equations(s.equations)
-    kernel = load(emit(made, "rodas5p", Recording(()), width=1))
+    transversal = transversal_equations(s.equations)
+    kernel = load(emit(transversal, "rodas5p", Recording(()), width=1))
     length = s.period or 6.0
     size = len(state)
     alphas = np.array([0.0, 0.3, 0.9])
-    numbers = np.array([[{**s.parameters, "alpha": a}[p] for p in made.parameters] for a in alphas])
+    values = np.array([[{**s.parameters, "alpha": a}[p] for p in transversal.parameters] for a in alphas])
     start = np.tile([*state, *([1.0 / np.sqrt(size)] * size)], (3, 1))
     buffers = Buffers.empty(3, 2 * size, room=0, samples=0)
     limit = 0.5 * (s.period or np.inf)
     spans = np.tile([0.0, length, s.period or 0.0, 0.0, 1e-4, limit, np.inf], (3, 1))
-    kernel.drive(0, 3, start, numbers, spans, control_array(1e-10, 1e-12, limit, 10**7), *buffers.arrays())
+    kernel.drive(0, 3, start, values, spans, control_array(1e-10, 1e-12, limit, 10**7), *buffers.arrays())
     c = integrator(s, mode(s.equations), state, alphas[None])
-    found = moved(c, length)
+    states = moved(c, length)
     np.testing.assert_allclose(c.state[0], buffers.end[0, :size], rtol=0, atol=1e-7)
-    np.testing.assert_allclose(found.T, buffers.end[:, size:], rtol=0, atol=2e-6 * np.abs(found).max())
+    np.testing.assert_allclose(states.T, buffers.end[:, size:], rtol=0, atol=2e-6 * np.abs(states).max())
 
 
 @pytest.mark.long
@@ -99,7 +99,7 @@ def test_the_whole_network_follows_differences_of_its_trajectories() -> None:
     variation = network_variation(s.equations)
     c = integrator(s, variation, list(y0), np.zeros((0, 4)))
     c.set_deviations(np.eye(4)[None])
-    found = moved(c, s.period or 0.0)
+    states = moved(c, s.period or 0.0)
     rhs = sp.lambdify([sp.Symbol(n, real=True) for n in ("t", *s.equations.state, *s.equations.parameters)],
                       list(s.equations.rhs()), "numpy")  # fmt: skip
     p = [s.parameters[name] for name in s.equations.parameters]
@@ -112,7 +112,7 @@ def test_the_whole_network_follows_differences_of_its_trajectories() -> None:
 
     for k in range(4):
         step = 1e-4 * np.eye(4)[k]
-        np.testing.assert_allclose(found[:, k], (flow(y0 + step) - flow(y0 - step)) / 2e-4, atol=2e-6)
+        np.testing.assert_allclose(states[:, k], (flow(y0 + step) - flow(y0 - step)) / 2e-4, atol=2e-6)
 
 
 def test_growth_over_any_number_of_decades_is_counted() -> None:

@@ -50,8 +50,8 @@ def written(text: str) -> str:
 
 
 def test_functions_in_all_places_read_what_is_defined() -> None:
-    for inner, place in product(INSIDE, PLACES):
-        text = place.format(inner)
+    for inner, outer in product(INSIDE, PLACES):
+        text = outer.format(inner)
         assert not undefined(written(text)), text
 
 
@@ -60,5 +60,5 @@ def test_functions_in_all_places_read_what_is_defined() -> None:
 )
 def test_functions_of_rates_and_states(function: str) -> None:
     for text in ("rate(v)*x", "rate(x)/3", "x*v/(5 + t)"):
-        whole = f"{function}({text})*v"
-        assert not undefined(written(whole)), whole
+        expression = f"{function}({text})*v"
+        assert not undefined(written(expression)), expression

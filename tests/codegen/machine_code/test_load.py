@@ -118,7 +118,7 @@ def reported(source) -> dict:
         warnings.simplefilter("always")
         k = loading.load(source)
     end = drive(k, [[1.0, 2.0]], [[]], [(0.0, 1.0)], 1e-9).end[0]
-    stats = [f.stats for made in (k.compiled, k.driver) for f in made.functions.values()]
+    stats = [f.stats for module in (k.compiled, k.driver) for f in module.functions.values()]
     return {
         "end": list(end), "hits": sum(sum(s.cache_hits.values()) for s in stats),
         "misses": sum(sum(s.cache_misses.values()) for s in stats), "path": k.path, "digest": k.digest,
@@ -140,12 +140,12 @@ def many() -> dict[str, object]:
     """Load and drop seventeen small kernels in turn; say which of them are alive, and how much memory more rounds take."""
 
     def kernels() -> list:
-        made = []
+        written = []
         for k in range(10, 27):
             kernel = loading.load(dataclasses.replace(SOURCE, code=TINY.replace("2.0", f"{k}.0")))
             step = kernel.compiled.functions["step"]
-            made.append([weakref.ref(o) for o in (kernel, step, step.overloads[step.signatures[0]].library)])
-        return made
+            written.append([weakref.ref(o) for o in (kernel, step, step.overloads[step.signatures[0]].library)])
+        return written
 
     def resident() -> float:
         gc.collect()
@@ -159,8 +159,8 @@ def many() -> dict[str, object]:
     last = kernels()
     grown = resident() - before
     alive = [
-        [sum(ref() is not None for ref in column) for column in zip(*made, strict=True)]
-        for made in (compiled, loaded, last)
+        [sum(ref() is not None for ref in column) for column in zip(*written, strict=True)]
+        for written in (compiled, loaded, last)
     ]
     return {"alive": alive, "grown": grown, "held": loading.load(SOURCE) is held}
 
@@ -199,17 +199,17 @@ class Other:
 @pytest.fixture(scope="module")
 def other() -> Iterator[Other]:
     """The process that the tests share; each gives it a folder of its own."""
-    made = Other()
-    yield made
-    made.end()
+    instance = Other()
+    yield instance
+    instance.end()
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch) -> Path:
     """An empty cache folder for this process."""
-    place = tmp_path / "kernels"
-    monkeypatch.setenv("SYNCHAIN_CACHE", str(place))
-    return place
+    path = tmp_path / "kernels"
+    monkeypatch.setenv("SYNCHAIN_CACHE", str(path))
+    return path
 
 
 def fresh(source=SOURCE):
@@ -223,8 +223,8 @@ def works(compiled) -> bool:
     return drive(compiled, [[1.0, 2.0]], [[]], [(0.0, 1.0)], 1e-9).end[0].tolist() == [2.0, 6.0]
 
 
-def machine_code(place: Path, module: str = "*") -> list[Path]:
-    return sorted(place.glob(f"{module}_*.code"))
+def machine_code(folder: Path, module: str = "*") -> list[Path]:
+    return sorted(folder.glob(f"{module}_*.code"))
 
 
 def from_cache(kernel: loading.Kernel) -> dict[str, bool]:
@@ -247,11 +247,11 @@ def both(name: str, values: list[str]) -> pytest.MarkDecorator:
 @pytest.fixture(scope="module")
 def reports(other, tmp_path_factory) -> dict[str, dict]:
     """What another process has told that loaded the small kernel and the real one into empty folders."""
-    found = {}
+    collected = {}
     for name in ("small", "real"):
         other.begin(name, tmp_path_factory.mktemp("shared") / "kernels")
-        found[name] = json.loads(other.line())
-    return found
+        collected[name] = json.loads(other.line())
+    return collected
 
 
 @pytest.fixture(scope="module")
@@ -304,15 +304,15 @@ def test_the_lock_of_a_process_that_was_killed_keeps_nobody_waiting(folder, modu
     holder = subprocess.Popen([sys.executable, "-c", HOLDER, str(folder), name], stdout=subprocess.PIPE, text=True)
     assert holder.stdout is not None
     assert holder.stdout.readline() == "held\n"
-    found: list[dict] = []
-    waiting = threading.Thread(target=lambda: found.append(reported(SOURCE)), daemon=True)
+    collected: list[dict] = []
+    waiting = threading.Thread(target=lambda: collected.append(reported(SOURCE)), daemon=True)
     waiting.start()
     waiting.join(3.0)
     assert waiting.is_alive()
     holder.kill()
     holder.communicate()
     waiting.join(120.0)
-    (report,) = found
+    (report,) = collected
     assert (report["from_cache"], report["driver_from_cache"]) == (False, False)
     assert not list(folder.glob("*.lock"))
 
@@ -458,7 +458,7 @@ def test_the_common_drivers_compile(folder, capsys):
 
 
 def test_a_fault_of_the_front_end_is_one_warning(folder, monkeypatch):
-    def fail(*given):
+    def fail(*arguments):
         raise AttributeError("renamed in the next version")
 
     monkeypatch.setattr(decorator, "front_end_problems", [])
@@ -501,12 +501,12 @@ def test_a_process_that_forks_while_a_kernel_compiles_has_a_child_that_runs(fold
 
 
 def test_a_loaded_kernel_waits_for_no_compilation(folder):
-    kernel, found = fresh(), []
+    kernel, collected = fresh(), []
     with loading._lock:
-        thread = threading.Thread(target=lambda: found.append(loading.load(SOURCE)), daemon=True)
+        thread = threading.Thread(target=lambda: collected.append(loading.load(SOURCE)), daemon=True)
         thread.start()
         thread.join(60)
-    assert found == [kernel]
+    assert collected == [kernel]
 
 
 # -- damage --------------------------------------------------------------------------------------------------
@@ -516,8 +516,8 @@ def test_a_loaded_kernel_waits_for_no_compilation(folder):
 def test_damaged_files_are_compiled_anew(compiled_folder, folder, damage, module):
     copied(compiled_folder, folder)
     (path,) = machine_code(folder, module)
-    whole = path.read_bytes()
-    path.write_bytes({"empty": b"", "half": whole[: len(whole) // 2], "noise": b"\x93noise" * 40}[damage])
+    contents = path.read_bytes()
+    path.write_bytes({"empty": b"", "half": contents[: len(contents) // 2], "noise": b"\x93noise" * 40}[damage])
     compiled = fresh()
     assert works(compiled)
     assert from_cache(compiled) == {**ALL_FROM_CACHE, module: False}
@@ -624,11 +624,11 @@ def shared_state() -> dict[tuple[str, ...], object]:
         for m in modules
         for inner, owner in [((), m), *(((k,), c) for k, c in vars(m).items() if isinstance(c, type))]
     }
-    found = {
+    fields_found = {
         (*path, k): f for path, owner in owners.items() for k, f in list(vars(owner).items()) if inspect.isfunction(f)
     }
     settings = {("config", k): value for k, value in vars(numba.config).items() if k.isupper()}
-    return {**found, **settings, ("gc",): gc.isenabled()}
+    return {**fields_found, **settings, ("gc",): gc.isenabled()}
 
 
 def test_what_threads_share_is_left_alone_while_kernels_compile(folder, tmp_path, monkeypatch):
@@ -638,7 +638,7 @@ def test_what_threads_share_is_left_alone_while_kernels_compile(folder, tmp_path
     monkeypatch.setattr(
         compiler.FrontEnd,
         "compile_extra",
-        lambda *given: (during.append(shared_state()), compile_extra(*given))[1],
+        lambda *arguments: (during.append(shared_state()), compile_extra(*arguments))[1],
     )
     assert works(fresh())
     before = shared_state()
@@ -807,14 +807,14 @@ def read_only(monkeypatch) -> None:
     """A file system that can only be read, for the superuser too."""
     opening, making = os.open, os.mkdir
 
-    def only_read(path, flags, *mode, **place):
+    def only_read(path, flags, *mode, **options):
         if flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT):
             raise OSError(errno.EROFS, "Read-only file system", path)
-        return opening(path, flags, *mode, **place)
+        return opening(path, flags, *mode, **options)
 
-    def make_nothing(path, *mode, **place):
+    def make_nothing(path, *mode, **options):
         if os.path.isdir(path):
-            return making(path, *mode, **place)
+            return making(path, *mode, **options)
         raise OSError(errno.EROFS, "Read-only file system", path)
 
     monkeypatch.setattr(os, "open", only_read)

@@ -40,12 +40,12 @@ def parameter_work(e: sp.Expr, moving: set[sp.Symbol]) -> list[sp.Expr]:
         return [part for argument in e.args for part in parameter_work(argument, moving)]
     if not e.free_symbols & moving:
         return [] if e == -next(iter(e.free_symbols)) else [e]
-    found = [part for argument in e.args for part in parameter_work(argument, moving)]
+    work = [part for argument in e.args for part in parameter_work(argument, moving)]
     if e.is_Add or e.is_Mul:
         still = [arg for arg in e.args if arg.free_symbols and not arg.free_symbols & moving]
         if len(still) > 1:
-            found.append(e.func(*still))
-    return found
+            work.append(e.func(*still))
+    return work
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -72,21 +72,21 @@ def test_blocks_put_together_are_the_equations(case):
     outer |= {s: e.xreplace(outer) for s, e in blocks.timed}
 
     def whole(body: StraightLine) -> list[sp.Expr]:
-        known = dict(outer)
+        values_by_name = dict(outer)
         for s, e in body.statements:
-            known[s] = e.xreplace(known)
-        return [e.xreplace(known) for e in body.results]
+            values_by_name[s] = e.xreplace(values_by_name)
+        return [e.xreplace(values_by_name) for e in body.results]
 
     entries = [e for row in node.jacobian() for e in row]
     everything = (*node.rhs, *entries, *node.time_derivative())
-    for found, expected in ((whole(blocks.rhs), node.rhs), (whole(blocks.linear), everything)):
-        assert len(found) == len(expected)
+    for rates, expected in ((whole(blocks.rhs), node.rhs), (whole(blocks.linear), everything)):
+        assert len(rates) == len(expected)
         dice = np.random.default_rng(3)
         symbols = [TIME, *node.state, *node.parameters]
         for values in dice.uniform(0.3, 1.4, (4, len(symbols))):
-            numbers = dict(zip(symbols, map(sp.Float, values), strict=True))
-            for p, q in zip(found, expected, strict=True):
-                assert abs(p.xreplace(numbers).evalf() - q.xreplace(numbers).evalf()) < 1e-9
+            parameter_values = dict(zip(symbols, map(sp.Float, values), strict=True))
+            for p, q in zip(rates, expected, strict=True):
+                assert abs(p.xreplace(parameter_values).evalf() - q.xreplace(parameter_values).evalf()) < 1e-9
 
 
 def test_time_by_itself_moves_from_stage_to_stage():
@@ -165,8 +165,8 @@ def numbers_of(eq: Equations, method: str, looped: bool) -> list[float]:
     kernel = Interpreted.of(
         emit(eq, method, Recording(("section",), section), width=1, unroll=0 if looped else 8), FLOATS
     )
-    made = sparse_plan(eq)
-    y, graph = [0.3, 0.1, -0.2, 0.5], (made.arrays, made.weights) if looped else ()
+    plan = sparse_plan(eq)
+    y, graph = [0.3, 0.1, -0.2, 0.5], (plan.arrays, plan.weights) if looped else ()
     step = take_step(kernel, 0.3, 0.2, y, VALUES, 0.0, 1.0, *graph)
     dense = [0.0 if d is None else d for d in step.dense]
     section_value = kernel.section(0.3, 0.3, 0.2, VALUES, replace(step, dense=dense))
@@ -190,8 +190,8 @@ def same_numbers(request):
 
     def check(eq: Equations) -> None:
         for method, looped in written:
-            found = numbers_of(eq, method, looped)
-            assert found == pytest.approx(plain_numbers(method, looped), rel=1e-12, abs=1e-13), (method, looped)
+            operations = numbers_of(eq, method, looped)
+            assert operations == pytest.approx(plain_numbers(method, looped), rel=1e-12, abs=1e-13), (method, looped)
 
     return check
 
@@ -209,9 +209,9 @@ m_v_1_x_1 l_v_1_x_1 inv_v_1 x_here v_there hoisted_0 fixed_0 _ __name__ __debug_
 @pytest.mark.parametrize("chunk", [0, *(pytest.param(k, marks=pytest.mark.long) for k in range(1, 6))])
 def test_parameters_may_have_any_name(chunk, same_numbers):
     size = len(WORDS) // 6 + 1
-    words = WORDS[chunk * size : (chunk + 1) * size]
-    for start in range(0, len(words), 7):
-        some = tuple((words[start : start + 7] + list(PLAIN))[:7])
+    part = WORDS[chunk * size : (chunk + 1) * size]
+    for start in range(0, len(part), 7):
+        some = tuple((part[start : start + 7] + list(PLAIN))[:7])
         same_numbers(network(some))
         same_numbers(network(some[3:] + some[:3]))
 

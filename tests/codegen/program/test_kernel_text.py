@@ -59,9 +59,9 @@ def test_golden_drivers(golden, name):
 def test_a_module_imports_what_its_code_names(name):
     """Words of its docstrings and comments bring nothing; attributes neither."""
     text = DRIVERS[name].text
-    found = {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
+    names_found = {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
     imported = re.search(r"^from synchain.codegen.simd import (.*)$", text, re.MULTILINE)[1].split(", ")
-    assert imported == sorted(found & set(simd.__all__))
+    assert imported == sorted(names_found & set(simd.__all__))
     assert imports("import math\n'sin'; \"cos\"  # exp\n\"\"\"tan\nlog\"\"\"\nmath.sqrt(atan(1.0))").splitlines() == [
         "import math", "", "from synchain.codegen.simd import atan"
     ]  # fmt: skip

@@ -80,12 +80,13 @@ def test_text_has_the_value_of_the_expression(expression, values):
     text = printed(expression)
     found = eval(text, {**FLOATS, **{s.name: v for s, v in zip(SYMBOLS, values, strict=True)}})
     with mpmath.workdps(50):
-        numbers = [mpmath.mpf(v) for v in values]
+        parameter_values = [mpmath.mpf(v) for v in values]
         value = sp.lambdify(SYMBOLS, expression, "mpmath")
-        exact = value(*numbers)
+        exact = value(*parameter_values)
         # how far a rounding of the values moves the result: what doubles can do at best
         steps = [
-            [v * (1 + mpmath.mpf(2) ** -45 * (i == j)) for j, v in enumerate(numbers)] for i in range(len(numbers))
+            [v * (1 + mpmath.mpf(2) ** -45 * (i == j)) for j, v in enumerate(parameter_values)]
+            for i in range(len(parameter_values))
         ]
         moved = [abs(value(*step) - exact) for step in steps]
         allowed = 100 * max(moved) + 1e-11 * (1 + abs(exact))

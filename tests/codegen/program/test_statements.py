@@ -127,31 +127,31 @@ def test_what_is_repeated_is_read_off_too() -> None:
 )
 def test_text_keeps_the_order_of_operations(e: Expression, text: str) -> None:
     assert LANES.text(e) == text
-    numbers = {"a": 0.3, "b": 0.7, "c": -1.9, "d": 2.3, "y": 0.1, "s": 1.7}
-    assert eval(text, dict(numbers)) == value(e, numbers)
+    values = {"a": 0.3, "b": 0.7, "c": -1.9, "d": 2.3, "y": 0.1, "s": 1.7}
+    assert eval(text, dict(values)) == value(e, values)
 
 
-def value(e: Expression, numbers: dict[str, float]) -> float:
+def value(e: Expression, values: dict[str, float]) -> float:
     """The value of an expression, operation by operation."""
     match e:
         case Name(text):
-            return numbers[text]
-        case Number(found):
-            return found
+            return values[text]
+        case Number(number):
+            return number
         case Negation(inner):
-            return -value(inner, numbers)
+            return -value(inner, values)
         case Quotient(top, bottom):
-            return value(top, numbers) / value(bottom, numbers)
+            return value(top, values) / value(bottom, values)
         case Sum(terms):
-            found = value(terms[0], numbers)
+            total = value(terms[0], values)
             for term in terms[1:]:
-                found = found + value(term, numbers)
-            return found
+                total = total + value(term, values)
+            return total
         case Product(factors):
-            found = value(factors[0], numbers)
+            total = value(factors[0], values)
             for factor in factors[1:]:
-                found = found * value(factor, numbers)
-            return found
+                total = total * value(factor, values)
+            return total
     raise TypeError(e)
 
 
@@ -165,12 +165,12 @@ def test_a_long_sum_of_lanes_is_broken_and_keeps_its_value() -> None:
     """A long call stands on one line."""
     terms = [Name(f"coefficient{k}") * B for k in range(9)]
     lines = LANES.lines([let("a", plus(*terms, Negation(C)))])
-    numbers = {"b": 0.7, "c": 0.1} | {f"coefficient{k}": 1.0 / (k + 3.0) for k in range(9)}
-    found = dict(numbers)
-    exec("\n".join(lines), found)
+    values = {"b": 0.7, "c": 0.1} | {f"coefficient{k}": 1.0 / (k + 3.0) for k in range(9)}
+    remaining = dict(values)
+    exec("\n".join(lines), remaining)
     assert len(lines) > 3
     assert max(map(len, lines)) <= 114
-    assert found["a"] == value(plus(*terms, Negation(C)), numbers)
+    assert remaining["a"] == value(plus(*terms, Negation(C)), values)
     assert len(LANES.lines([let("a", call("maximum", plus(*terms), C))])) == 1
     assert len(NUMPY.lines([let("a", plus(*terms))])) == 1
 
@@ -234,8 +234,8 @@ def test_lanes_load_and_store_registers() -> None:
         accumulate("dense", Name("K1") + "i", A - B),
         Return((A,), "a remark"),
     )
-    found = LANES.function(Function("f", ("y", "shared", "dense"), "What it does.", body, role=Role.ENTRY))
-    assert found.splitlines() == [
+    text = LANES.function(Function("f", ("y", "shared", "dense"), "What it does.", body, role=Role.ENTRY))
+    assert text.splitlines() == [
         "@njit(error_model='numpy', cache=True)",
         "def f(y, shared, dense):",
         '    """What it does."""',
@@ -270,8 +270,8 @@ def test_python_texts_run_and_agree() -> None:
     import numpy as np
 
     for printer in (NUMPY, MATH):
-        found = eval(printer.text(Library()(e)), {"np": np, "math": math, "x": 0.37})
-        assert found == pytest.approx(float(e.subs(x, 0.37)), rel=1e-15)
+        value = eval(printer.text(Library()(e)), {"np": np, "math": math, "x": 0.37})
+        assert value == pytest.approx(float(e.subs(x, 0.37)), rel=1e-15)
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")

@@ -57,9 +57,9 @@ def exactly(name: str, x: np.ndarray) -> np.ndarray:
 def error(name: str, x: np.ndarray) -> float:
     """The largest error in units of the last place of the result."""
     x = x if EXTENDED else x[:: len(x) // 500]
-    found, expected = at(x)[name], exactly(name, x)
+    values, expected = at(x)[name], exactly(name, x)
     unit = np.spacing(np.maximum(np.abs(expected.astype(float)), 2.3e-308))
-    return float((np.abs(found.astype(np.longdouble) - expected) / unit).max())
+    return float((np.abs(values.astype(np.longdouble) - expected) / unit).max())
 
 
 def spread(low: float, high: float) -> np.ndarray:
@@ -111,11 +111,11 @@ def test_circular_functions_near_their_zeros(name):
 def test_circular_functions_of_large_numbers():
     dice = np.random.default_rng(13)
     x = np.concatenate([dice.uniform(-1e15, 1e15, 400), dice.uniform(9e14, 1e15, 400)])
-    found = at(x)
+    values = at(x)
     with mpmath.workdps(60):
         for name in ("sin", "cos"):
             exact = [getattr(mpmath, name)(mpmath.mpf(float(v))) for v in x]
-            assert max(abs(mpmath.mpf(float(a)) - b) for a, b in zip(found[name], exact, strict=True)) < 2e-15
+            assert max(abs(mpmath.mpf(float(a)) - b) for a, b in zip(values[name], exact, strict=True)) < 2e-15
     sizes = 10.0 ** dice.uniform(15, 300, 5000)
     huge = at(np.concatenate([sizes, -sizes, [1.7e308, -1.7e308]]))
     assert max(np.abs(huge["sin"]).max(), np.abs(huge["cos"]).max()) <= 1.0
@@ -149,32 +149,32 @@ VALUES = {
 
 @pytest.mark.parametrize("name", VALUES)
 def test_special_values(name):
-    found, expected = at(SPECIAL)[name], np.array(VALUES[name])
-    np.testing.assert_allclose(found, expected, rtol=2.3e-16)
+    values, expected = at(SPECIAL)[name], np.array(VALUES[name])
+    np.testing.assert_allclose(values, expected, rtol=2.3e-16)
     good = ~np.isnan(expected)
-    np.testing.assert_array_equal(np.signbit(found[good]), np.signbit(expected[good]))
+    np.testing.assert_array_equal(np.signbit(values[good]), np.signbit(expected[good]))
 
 
 @pytest.mark.parametrize("name", ["sin", "cos"])
 def test_circular_functions_of_special_values(name):
-    found = at(SPECIAL)[name]
-    assert np.isnan(found[2:5]).all()
+    values = at(SPECIAL)[name]
+    assert np.isnan(values[2:5]).all()
     small = [0, 1, 5, 6, 7, 8]
-    np.testing.assert_array_equal(found[small], SPECIAL[small] if name == "sin" else np.ones(6))
+    np.testing.assert_array_equal(values[small], SPECIAL[small] if name == "sin" else np.ones(6))
     assert np.signbit(at(SPECIAL)["sin"][1])
 
 
 def test_nan_stays_nan_whatever_its_low_bits():
     # 2**k is made by adding to the bits: that must not turn a NaN into a number
     x = np.array([0x7FF8000000000FFF, 0x7FF80000000007A2, 0xFFF8000000000801, 0x7FFFFFFFFFFFFFFF], dtype=np.uint64)
-    for name, found in at(x.view(float)).items():
-        assert np.isnan(found).all(), name
+    for name, values in at(x.view(float)).items():
+        assert np.isnan(values).all(), name
 
 
 def test_expm1_of_special_values():
-    found = at(np.array([0.0, -0.0, NAN, 5e-324, -5e-324, -INF, -800.0]))["expm1"]
-    np.testing.assert_array_equal(found, [0.0, -0.0, NAN, 5e-324, -5e-324, -1.0, -1.0])
-    assert np.signbit(found[1])
+    values = at(np.array([0.0, -0.0, NAN, 5e-324, -5e-324, -INF, -800.0]))["expm1"]
+    np.testing.assert_array_equal(values, [0.0, -0.0, NAN, 5e-324, -5e-324, -1.0, -1.0])
+    assert np.signbit(values[1])
     high = at(np.array([700.0, 701.0, 1e300, INF]))["expm1"]
     assert (high == high[0]).all(), "clamped above 700, as its docstring says"
 
@@ -183,9 +183,9 @@ def test_edges_of_the_exponential():
     x = np.array(
         [709.782712893384, 709.7827128933841, 710.0, 1e300, -745.1332191019411, -745.1332191019412, -746.0, -1e300]
     )
-    found = at(x)["exp"]
-    assert found[0] == pytest.approx(1.797693134862273e308, rel=3e-16)
-    np.testing.assert_array_equal(found[1:], [INF, INF, INF, 5e-324, 0.0, 0.0, 0.0])
+    values = at(x)["exp"]
+    assert values[0] == pytest.approx(1.797693134862273e308, rel=3e-16)
+    np.testing.assert_array_equal(values[1:], [INF, INF, INF, 5e-324, 0.0, 0.0, 0.0])
 
 
 def test_seams_are_monotonic():
@@ -208,11 +208,11 @@ def test_odd_functions(name):
 @pytest.mark.parametrize("width", [1, pytest.param(2, marks=pytest.mark.long), 4])
 def test_the_same_bits_at_every_width(width):
     x = np.concatenate([SPECIAL, spread(-5.0, 5.0)[:5000], scaled(-308, 308)[:5000], spread(-746.0, 711.0)[:5000]])
-    for name, found in at(x, width).items():
+    for name, values in at(x, width).items():
         expected = at(x)[name]
         good = ~np.isnan(expected)
-        np.testing.assert_array_equal(np.isnan(found), ~good)
-        np.testing.assert_array_equal(found[good].view(np.int64), expected[good].view(np.int64), err_msg=name)
+        np.testing.assert_array_equal(np.isnan(values), ~good)
+        np.testing.assert_array_equal(values[good].view(np.int64), expected[good].view(np.int64), err_msg=name)
 
 
 def test_everything_is_tested():

@@ -50,9 +50,9 @@ FITS = {
 
 @pytest.mark.parametrize("name", FITS)
 def test_the_coefficients_come_from_the_fit(name):
-    found = getattr(elementary, name)
+    coefficients = getattr(elementary, name)
     with mpmath.workdps(DIGITS):
-        assert found == rounded_minimax(FITS[name].samples(120), len(found), FITS[name].held)
+        assert coefficients == rounded_minimax(FITS[name].samples(120), len(coefficients), FITS[name].held)
 
 
 @pytest.mark.parametrize("name", FITS)
@@ -60,8 +60,8 @@ def test_the_stated_error_is_the_error(name):
     fit = FITS[name]
     assert f" {fit.stated} of it" in inspect.getsource(elementary)
     with mpmath.workdps(DIGITS):
-        found = worst(getattr(elementary, name), fit.samples(1500))
-    assert 0.9 * float(fit.stated) < found <= float(fit.stated)
+        error = worst(getattr(elementary, name), fit.samples(1500))
+    assert 0.9 * float(fit.stated) < error <= float(fit.stated)
 
 
 @pytest.mark.parametrize("name", FITS)
@@ -75,5 +75,5 @@ def test_minimax_of_a_known_case():
     with mpmath.workdps(DIGITS):
         for power, expected in ((2, (0.5, 0.0)), (4, (-0.125, 0.0, 1.0, 0.0))):
             samples = [(x, x**power, mpf(1)) for x in chebyshev_points(mpf(-1), mpf(1), 129)]
-            found = minimax(samples, len(expected))
-            assert max(abs(a - b) for a, b in zip(found, expected, strict=True)) < 1e-3
+            fit = minimax(samples, len(expected))
+            assert max(abs(a - b) for a, b in zip(fit, expected, strict=True)) < 1e-3

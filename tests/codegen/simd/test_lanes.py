@@ -77,11 +77,11 @@ def on_all_rows(width: int) -> dict[str, np.ndarray]:
     return dict(zip(FUNCTIONS, out, strict=True))
 
 
-def same(found: np.ndarray, expected: np.ndarray) -> None:
+def same(values: np.ndarray, expected: np.ndarray) -> None:
     """Bit for bit, any NaN equal to any other."""
-    np.testing.assert_array_equal(np.isnan(found), np.isnan(expected))
+    np.testing.assert_array_equal(np.isnan(values), np.isnan(expected))
     good = ~np.isnan(expected)
-    np.testing.assert_array_equal(found[good].view(np.int64), expected[good].view(np.int64))
+    np.testing.assert_array_equal(values[good].view(np.int64), expected[good].view(np.int64))
 
 
 ARITHMETIC = {
@@ -186,8 +186,8 @@ def test_fma_rounds_once(width):
     # (1 + e)(1 - e) - 1 is -e**2, which two roundings lose
     e = 2.0 ** -np.arange(27, 51).astype(float)
     size = e.size
-    found = applied("fma", width, 1.0 + e, 1.0 - e, np.full(size, -1.0))
-    same(found, -(e * e))
+    values = applied("fma", width, 1.0 + e, 1.0 - e, np.full(size, -1.0))
+    same(values, -(e * e))
     exact = applied("fma", width)
     middle = slice(256, 768)
     wide = A[middle].astype(np.longdouble) * B[middle] + C[middle]
@@ -213,9 +213,9 @@ def test_products_of_numbers_are_rounded_by_themselves(width):
             store(b, 2 * i, load(a, i, width) + numbers[0] * numbers[1])
             store(b, 2 * i + 1, broadcast(numbers[0] * numbers[1], width) - load(a, i, width))
 
-    found = np.empty(16)
-    add(np.full(8, -0.01), found, np.array([0.1, 0.1]))
-    wide = found.reshape(-1, 2, width)
+    out = np.empty(16)
+    add(np.full(8, -0.01), out, np.array([0.1, 0.1]))
+    wide = out.reshape(-1, 2, width)
     assert set(wide[:, 0].ravel()) == {0.1 * 0.1 - 0.01}
     assert set(wide[:, 1].ravel()) == {0.1 * 0.1 + 0.01}
 
@@ -248,8 +248,8 @@ def test_split_binary(width):
     assert ((m >= 0.7071067811865476) & (m < 2 * 0.7071067811865476)).all()
     np.testing.assert_array_equal(k, np.round(k))
     with np.errstate(over="ignore"):
-        whole = np.ldexp(np.ldexp(m, (k // 2).astype(int)), (k - k // 2).astype(int))
-    same(whole, values)
+        scaled = np.ldexp(np.ldexp(m, (k // 2).astype(int)), (k - k // 2).astype(int))
+    same(scaled, values)
 
 
 # -- memory and masks -----------------------------------------------------------------------------------------

@@ -35,14 +35,14 @@ def test_sums_and_products_call_no_function(monkeypatch: pytest.MonkeyPatch) -> 
     out = np.zeros_like(a)
     computed(a, out)
     assert "fma" not in computed.inspect_llvm(computed.signatures[0])
-    (x, y, z), (plain, fused, rest) = a.reshape(-1, 3, 4).swapaxes(0, 1), out.reshape(-1, 3, 4).swapaxes(0, 1)
+    (x, y, z), (plain, fused, zeros) = a.reshape(-1, 3, 4).swapaxes(0, 1), out.reshape(-1, 3, 4).swapaxes(0, 1)
     np.testing.assert_array_equal(plain, x * y + z)
     exact = [Fraction(p) * Fraction(q) + Fraction(r) for p, q, r in zip(x.flat, y.flat, z.flat, strict=True)]
     assert (
         max(abs(Fraction(v) - e) / Fraction(np.spacing(abs(v))) for v, e in zip(fused.flat, exact, strict=True)) < 0.51
     )
     missed = [Fraction(p) * Fraction(q) - Fraction(p * q) for p, q in zip(x.flat, y.flat, strict=True)]
-    assert [*map(Fraction, rest.flat)] == missed
+    assert [*map(Fraction, zeros.flat)] == missed
     large = np.array([1e300, 2.0, -1e300, 1e200, 1e200, 0.0] * 4).reshape(2, 4, 3).swapaxes(1, 2).reshape(-1).copy()
     out = np.zeros_like(large)
     computed(large, out)
@@ -64,7 +64,7 @@ def test_elementary_functions_keep_their_accuracy() -> None:
         env=os.environ | {"NUMBA_CPU_NAME": "generic"}, capture_output=True, text=True, check=True,
     )  # fmt: skip
     errors = {
-        name: float(found) for name, found, finite in map(str.split, done.stdout.splitlines()) if finite == "True"
+        name: float(ratio) for name, ratio, finite in map(str.split, done.stdout.splitlines()) if finite == "True"
     }
     assert errors.keys() == WITHIN.keys()
     assert max(errors.values()) < 2.0, errors

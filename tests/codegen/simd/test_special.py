@@ -52,10 +52,10 @@ def test_errors_are_a_few_units_in_the_last_place(name):
     rng = np.random.default_rng(3)
     x = np.concatenate([rng.uniform(-size, size, 1500), rng.uniform(-1, 1, 500) * 10.0 ** rng.uniform(-12, 0, 500)])
     x = 1.0 + np.abs(x) if name == "acosh" else x
-    found = at(x)[name]
+    values = at(x)[name]
     with mpmath.workprec(120):
         exact = np.array([float(getattr(mpmath, name)(float(v))) for v in x])
-    assert (np.abs(found - exact) <= ULPS[name] * np.spacing(np.abs(exact))).all()
+    assert (np.abs(values - exact) <= ULPS[name] * np.spacing(np.abs(exact))).all()
 
 
 def test_powers_are_accurate_for_moderate_logarithms():
@@ -65,25 +65,25 @@ def test_powers_are_accurate_for_moderate_logarithms():
 
 
 def test_special_values():
-    found = at(np.array([0.0, -0.0, 1.0, -1.0, 2.0, INF, -INF, NAN]))
-    assert found["asin"][:4].tolist() == [0.0, -0.0, np.pi / 2, -np.pi / 2]
-    assert found["acos"][[2, 3]].tolist() == [0.0, np.pi]
-    assert np.isnan(found["asin"][4:]).all()
-    assert np.isnan(found["acos"][4:]).all()
-    assert found["erf"][5:7].tolist() == [1.0, -1.0]
-    assert found["cosh"][[0, 5, 6]].tolist() == [1.0, INF, INF]
-    assert found["sinh"][[0, 5, 6]].tolist() == [0.0, INF, -INF]
-    assert np.signbit(found["sinh"][1])
-    assert found["asinh"][[0, 5, 6]].tolist() == [0.0, INF, -INF]
-    assert np.signbit(found["asinh"][1])
-    assert found["acosh"][[2, 5]].tolist() == [0.0, INF]
-    assert np.isnan(found["acosh"][[0, 3, 6]]).all()
-    assert found["atanh"][[0, 2, 3]].tolist() == [0.0, INF, -INF]
-    assert np.isnan(found["atanh"][4:]).all()
-    assert found["ceiling"][:7].tolist() == [0.0, 0.0, 1.0, -1.0, 2.0, INF, -INF]
+    values = at(np.array([0.0, -0.0, 1.0, -1.0, 2.0, INF, -INF, NAN]))
+    assert values["asin"][:4].tolist() == [0.0, -0.0, np.pi / 2, -np.pi / 2]
+    assert values["acos"][[2, 3]].tolist() == [0.0, np.pi]
+    assert np.isnan(values["asin"][4:]).all()
+    assert np.isnan(values["acos"][4:]).all()
+    assert values["erf"][5:7].tolist() == [1.0, -1.0]
+    assert values["cosh"][[0, 5, 6]].tolist() == [1.0, INF, INF]
+    assert values["sinh"][[0, 5, 6]].tolist() == [0.0, INF, -INF]
+    assert np.signbit(values["sinh"][1])
+    assert values["asinh"][[0, 5, 6]].tolist() == [0.0, INF, -INF]
+    assert np.signbit(values["asinh"][1])
+    assert values["acosh"][[2, 5]].tolist() == [0.0, INF]
+    assert np.isnan(values["acosh"][[0, 3, 6]]).all()
+    assert values["atanh"][[0, 2, 3]].tolist() == [0.0, INF, -INF]
+    assert np.isnan(values["atanh"][4:]).all()
+    assert values["ceiling"][:7].tolist() == [0.0, 0.0, 1.0, -1.0, 2.0, INF, -INF]
     for name in ("erf", "cosh", "sinh", "tan", "power", "asinh", "acosh", "ceiling"):
-        assert np.isnan(found[name][7])
-    assert np.isnan(found["power"][3])
+        assert np.isnan(values[name][7])
+    assert np.isnan(values["power"][3])
 
 
 @functools.cache
@@ -115,8 +115,8 @@ def test_angles_on_axes_at_infinity_and_of_nothing_are_those_of_c():
     places = [0.0, -0.0, 1.0, -1.0, INF, -INF, NAN]
     y, x = (part.ravel() for part in np.meshgrid(places, places))
     np.testing.assert_array_max_ulp(angle(y, x), np.arctan2(y, x), 1)
-    known = ~(np.isnan(y) | np.isnan(x))
-    assert np.array_equal(np.signbit(angle(y, x))[known], np.signbit(np.arctan2(y, x))[known])
+    numeric = ~(np.isnan(y) | np.isnan(x))
+    assert np.array_equal(np.signbit(angle(y, x))[numeric], np.signbit(np.arctan2(y, x))[numeric])
 
 
 def test_whole_numbers_above():

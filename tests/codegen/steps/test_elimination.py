@@ -50,9 +50,9 @@ def mechanical(n: int, pairs: Links) -> set[tuple[int, int]]:
 def fill(size: int, pattern: set[tuple[int, int]]) -> int:
     """Entries of the factors that the matrix does not have, apart from the diagonal."""
     steps = plan(size, pattern)
-    made = {(r, k) for k, rows in zip(steps.order, steps.below, strict=True) for r in rows}
-    made |= {(k, c) for k, columns in zip(steps.order, steps.after, strict=True) for c in columns}
-    return len(made - {(r, c) for r, c in pattern if r != c})
+    entries = {(r, k) for k, rows in zip(steps.order, steps.below, strict=True) for r in rows}
+    entries |= {(k, c) for k, columns in zip(steps.order, steps.after, strict=True) for c in columns}
+    return len(entries - {(r, c) for r, c in pattern if r != c})
 
 
 # -- the numbers -----------------------------------------------------------------------------------------------
@@ -98,8 +98,8 @@ def test_statements_solve_the_system(shape, kinds, seed):
 @pytest.mark.parametrize("endless", [np.inf, -np.inf])
 def test_an_infinite_pivot_has_no_solution(endless):
     a = sp.Symbol("a", real=True)
-    found = solved(2, {(0, 0): a, (1, 1): -sp.S.One}, 30.0, {"a": endless}, np.ones(2))
-    np.testing.assert_array_equal(np.isnan(found), [True, False])
+    solution = solved(2, {(0, 0): a, (1, 1): -sp.S.One}, 30.0, {"a": endless}, np.ones(2))
+    np.testing.assert_array_equal(np.isnan(solution), [True, False])
 
 
 @settings(max_examples=100, deadline=None)
@@ -195,18 +195,18 @@ def test_the_program_solves_the_system(links, weighted):
     weight = {p: Fraction(int(dice.integers(1, 5)), 3) if weighted else Fraction(1) for p in links(n)}
     ends = sorted((*p, w) for (i, j), w in weight.items() for p in ((i, j), (j, i)))
     eq = Equations.of_equal_nodes(harmonic_chain(2).node, spring(), n, tuple(ends))
-    made = sparse_plan(eq)
-    arrays = dict(zip(driver_names(), made.arrays, strict=True))
+    plan = sparse_plan(eq)
+    arrays = dict(zip(driver_names(), plan.arrays, strict=True))
     matrix = np.zeros((2 * n, 2 * n))
     for (r, c), e in eq.jacobian().items():
         matrix[r, c] = float(e.subs({"sigma": 0.0}).xreplace({sp.Symbol("sigma", real=True): sp.Rational(2, 5)}))
     shifted = 3.0 * np.eye(2 * n) - matrix
     space = plain(driver.text("driver.sparse"), {**FLOATS, "NODES": n, "DIMENSION": 2 * n, "WIDTH": 1})
-    dense = [0.0] * (made.entries + 3 * 2 * n)
+    dense = [0.0] * (plan.entries + 3 * 2 * n)
     dense[: 2 * n] = np.diag(shifted).tolist()
     place(dense, shifted, arrays, n)
     right = dice.normal(size=2 * n)
-    x, scratch, other = (made.entries + k * 2 * n for k in range(3))
+    x, scratch, other = (plan.entries + k * 2 * n for k in range(3))
     dense[x:scratch] = right.tolist()
     names = ("order", "place", "row_start", "after_start", "column")
     space["factorise"](dense, 0, 0, scratch, *(arrays[name] for name in names))

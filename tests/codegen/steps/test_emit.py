@@ -212,10 +212,10 @@ def expected(case: str, method: str, seed: int) -> tuple:
     return h, explicit_reference(m, f, t, h, y)
 
 
-def close(found: list, expected: list, allowed=SMALL) -> bool:
+def close(values: list, expected: list, allowed=SMALL) -> bool:
     size = max(map(abs, expected), default=mpf(0)) + 1
-    return len(found) == len(expected) and all(
-        abs(a - b) <= allowed * size for a, b in zip(found, expected, strict=True)
+    return len(values) == len(expected) and all(
+        abs(a - b) <= allowed * size for a, b in zip(values, expected, strict=True)
     )
 
 
@@ -293,8 +293,8 @@ def test_equations_agree_with_differences(case):
         y, p = states(eq, seed)
         f, t = Right(rates, p), mpf(seed) / 3
         table = mpmath.matrix(len(y), len(y))
-        for place, e in zip(places, slopes(t, *y, *p), strict=True):
-            table[place] = e
+        for index, e in zip(places, slopes(t, *y, *p), strict=True):
+            table[index] = e
         expected = f.jacobian(t, y)
         assert max(abs(d) for d in table - expected) <= SMALL * (1 + mpmath.norm(expected))
         slope = drifts(t, *y, *p)
@@ -309,14 +309,14 @@ def test_node_functions_of_the_friction_oscillator(exact_numbers):
     space = plain(head + "    return locals()\n", EXACT)
     for seed in range(6):
         y, p = states(eq, seed)
-        found, f = space["step"](mpf(2), mpf(1) / 9, y, [*y, *p], [0, 0], [], 0, 1), Right.of(eq, p)
-        assert close([found["f_x_1"], found["f_v_1"]], f(mpf(2), y))
+        error, f = space["step"](mpf(2), mpf(1) / 9, y, [*y, *p], [0, 0], [], 0, 1), Right.of(eq, p)
+        assert close([error["f_x_1"], error["f_v_1"]], f(mpf(2), y))
         expected = f.jacobian(mpf(2), y)
-        assert abs(found["j_vv_1"] - expected[1, 1]) <= SMALL * abs(expected[1, 1])
-        passed = {name: found[name] for name in space["node"].__code__.co_varnames if name in found and name[0] != "z"}
+        assert abs(error["j_vv_1"] - expected[1, 1]) <= SMALL * abs(expected[1, 1])
+        passed = {name: error[name] for name in space["node"].__code__.co_varnames if name in error and name[0] != "z"}
         passed.update(x=y[0], v=y[1])
         arguments = space["node"].__code__.co_varnames[: space["node"].__code__.co_argcount]
-        assert abs(space["node"](*(passed[a] for a in arguments)) - found["f_v_1"]) <= SMALL
+        assert abs(space["node"](*(passed[a] for a in arguments)) - error["f_v_1"]) <= SMALL
 
 
 def test_a_section_function_is_evaluated_inside_the_step(exact_numbers):

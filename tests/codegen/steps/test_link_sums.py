@@ -29,8 +29,8 @@ RATES = {
 def network(name: str, n: int = 7) -> Equations:
     """A directed graph without symmetry, with weights that differ."""
     used = {s for e in RATES[name] for s in e.free_symbols}
-    own = ((OMEGA_J, OMEGA),) if OMEGA_J in used else ()
-    edge = Edge((X, V), (X_J, V_J), W, RATES[name], tuple(s for s in (K, A, OMEGA) if s in used), theirs=own)
+    pairs = ((OMEGA_J, OMEGA),) if OMEGA_J in used else ()
+    edge = Edge((X, V), (X_J, V_J), W, RATES[name], tuple(s for s in (K, A, OMEGA) if s in used), theirs=pairs)
     links = [(i, j, Fraction(1 + (3 * i + j) % 5, 4)) for i in range(n) for j in range(n) if i != j and (i * j + i) % 3]
     return Equations((NODE,), (0,) * n, (Layer((((0, 0), edge),), tuple(links)),), ("omega",))
 

@@ -61,21 +61,21 @@ def strong(equations, shift: float) -> np.ndarray:
     """shift - J for random entries of J between -1 and 1."""
     random = np.random.default_rng(1)
     matrix = shift * np.eye(equations.dimension)
-    for place in equations.jacobian():
-        matrix[place] -= random.uniform(-1, 1)
+    for entry in equations.jacobian():
+        matrix[entry] -= random.uniform(-1, 1)
     return matrix
 
 
-def solved(equations, made: SparsePlan, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+def solved(equations, plan: SparsePlan, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """The solution by the generated program, run by Python itself."""
     size = equations.dimension
-    arrays = dict(zip(NAMES, made.arrays, strict=True))
+    arrays = dict(zip(NAMES, plan.arrays, strict=True))
     space = plain(driver.text("driver.sparse"), {**FLOATS, "DIMENSION": size, "WIDTH": 1})
     rows = np.repeat(arrays["order"], np.diff(arrays["row_start"]))
-    apart = 0 if made.exact else made.entries
-    x = made.entries + apart
+    apart = 0 if plan.exact else plan.entries
+    x = plan.entries + apart
     work = np.full(x + 3 * size, np.nan)
-    work[: made.entries] = [*np.diag(matrix), *matrix[rows, arrays["column"]]]
+    work[: plan.entries] = [*np.diag(matrix), *matrix[rows, arrays["column"]]]
     work[x : x + size] = right
     both = ("row_start", "after_start", "column")
     space["factorise"](work, 0, apart, x + size, arrays["order"], arrays["place"], *(arrays[k] for k in both))
@@ -86,10 +86,10 @@ def solved(equations, made: SparsePlan, matrix: np.ndarray, right: np.ndarray) -
 @pytest.mark.parametrize("graph", GRAPHS, ids=lambda g: f"{g.name}{g.n}")
 def test_program_solves_like_numpy(graph):
     equations = Scene(topology=graph, parameters={"sigma": 0.1}).equations
-    made = sparse_plan(equations)
-    assert made.exact
+    plan = sparse_plan(equations)
+    assert plan.exact
     matrix, right = strong(equations, 6.0), np.random.default_rng(2).normal(size=equations.dimension)
-    np.testing.assert_allclose(solved(equations, made, matrix, right), np.linalg.solve(matrix, right), rtol=1e-12)
+    np.testing.assert_allclose(solved(equations, plan, matrix, right), np.linalg.solve(matrix, right), rtol=1e-12)
 
 
 def test_an_infinite_pivot_has_no_solution():
@@ -97,44 +97,44 @@ def test_an_infinite_pivot_has_no_solution():
     matrix = strong(equations, 8.0)
     matrix[-1, -1] = np.inf
     with np.errstate(invalid="ignore"):
-        found = solved(equations, sparse_plan(equations), matrix, np.ones(equations.dimension))
-    assert np.isnan(found[-1])
+        solution = solved(equations, sparse_plan(equations), matrix, np.ones(equations.dimension))
+    assert np.isnan(solution[-1])
 
 
 @pytest.mark.parametrize("shift", [8.0, 100.0, 1e6])
 @pytest.mark.parametrize("graph", [grid(30), random_cubic(20)], ids=lambda g: g.name)
 def test_incomplete_elimination_solves_to_rounding(graph, shift):
     equations = Scene(topology=graph).equations
-    made = sparse_plan(equations, INCOMPLETE)
-    assert not made.exact
+    plan = sparse_plan(equations, INCOMPLETE)
+    assert not plan.exact
     matrix, right = strong(equations, shift), np.random.default_rng(2).normal(size=equations.dimension)
-    found, expected = solved(equations, made, matrix, right), np.linalg.solve(matrix, right)
-    assert np.abs(found - expected).max() <= 4e-15 * np.abs(expected).max()
+    solution, expected = solved(equations, plan, matrix, right), np.linalg.solve(matrix, right)
+    assert np.abs(solution - expected).max() <= 4e-15 * np.abs(expected).max()
 
 
 def test_refinement_that_does_not_converge_says_so():
     equations = Scene(topology=grid(30)).equations
-    made = sparse_plan(equations, INCOMPLETE)
+    plan = sparse_plan(equations, INCOMPLETE)
     right = np.ones(equations.dimension)
-    assert np.isnan(solved(equations, made, strong(equations, 0.5), right)).all()
+    assert np.isnan(solved(equations, plan, strong(equations, 0.5), right)).all()
 
 
 def test_incomplete_factors_keep_the_first_level_of_fill():
     """Positions first: (v_j, v_i) for every link and (v_i, v_i), which is the diagonal; nothing else."""
     graph = grid(30)
-    made = sparse_plan(Scene(topology=graph).equations, INCOMPLETE)
+    plan = sparse_plan(Scene(topology=graph).equations, INCOMPLETE)
     links = len(graph.links)
-    assert made.entries == 2 * 30 + 2 * 30 + 2 * links
-    arrays = dict(zip(NAMES, made.arrays, strict=True))
+    assert plan.entries == 2 * 30 + 2 * 30 + 2 * links
+    arrays = dict(zip(NAMES, plan.arrays, strict=True))
     assert set(arrays["order"][:30].tolist()) == set(range(30))
 
 
 @pytest.mark.parametrize(("name", "n"), [("grid", 2500), ("random_cubic", 1000)])
 def test_large_fill_is_not_built(name, n):
     graph = topology(name, n)
-    made = sparse_plan(Scene(topology=graph).equations)
-    assert not made.exact
-    assert made.entries == 4 * n + 2 * len(graph.links)
+    plan = sparse_plan(Scene(topology=graph).equations)
+    assert not plan.exact
+    assert plan.entries == 4 * n + 2 * len(graph.links)
 
 
 @pytest.mark.long
@@ -163,11 +163,11 @@ def test_lanes_are_refined_independently():
 @pytest.mark.parametrize("graph", [chain(2000), star(2000), ring(2000), tree(2000)], ids=lambda g: g.name)
 def test_elimination_of_sparse_families_stays_sparse(graph):
     """Trees cause no fill between nodes; a ring adds at most one entry each way for every node."""
-    made = sparse_plan(Scene(topology=graph).equations)
+    plan = sparse_plan(Scene(topology=graph).equations)
     links = len(graph.links)
     # positions first: each link is one entry (v, x) and one (v, v) of fill; a node has (x, v) and (v, x)
     allowed = 2 * graph.n + 2 * graph.n + 2 * links + (4 * graph.n if graph.name == "ring" else 0)
-    assert made.entries <= allowed
+    assert plan.entries <= allowed
 
 
 def test_order_covers_every_unknown_once():

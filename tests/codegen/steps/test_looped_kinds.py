@@ -26,23 +26,25 @@ from synchain.runtime.sweeps.run import run
 def three_kinds() -> Equations:
     """Nodes of two and of three states in an order that is not that of their kinds; two kinds share a varied parameter."""
     kinds = [{"oscillator": "lorenz", "at": [2, 3]}, {"oscillator": "van_der_pol", "at": [4, 7]}]
-    own = {"b": [1, 2], "omega": [1, 2, 3, 4, 5], "delta": [0.1, 0.2, 0.3]}
-    return Scene(oscillator="duffing", nodes=kinds, topology=ring(7), coupling="x->x, y->y", parameters=own).equations
+    values = {"b": [1, 2], "omega": [1, 2, 3, 4, 5], "delta": [0.1, 0.2, 0.3]}
+    return Scene(
+        oscillator="duffing", nodes=kinds, topology=ring(7), coupling="x->x, y->y", parameters=values
+    ).equations
 
 
-def pairs(n: int, **given: object) -> Scene:
+def pairs(n: int, **keywords: object) -> Scene:
     """A ring of nodes in pairs, two of one kind and two of the other: all of a kind have the same surroundings."""
     kinds = [{"oscillator": "van_der_pol", "at": [i + 1 for i in range(n) if i % 4 > 1]}]
     common = {"transient": 0, "window": 20, "record": (), "time_unit": "time", "rtol": 1e-10}
-    return Scene(oscillator="duffing", nodes=kinds, topology=ring(n), coupling="spring", **{**common, **given})
+    return Scene(oscillator="duffing", nodes=kinds, topology=ring(n), coupling="spring", **{**common, **keywords})
 
 
-def hanging(n: int, **given: object) -> Scene:
+def hanging(n: int, **keywords: object) -> Scene:
     """Clocks of different swings on one beam."""
     swings = {"mass": 10, "drag": 20, "escapement": 0.02, "swing": np.linspace(0.3, 0.5, n)}
     start = {"x": 0, "theta": np.linspace(-0.5, 0.6, n), "theta_rate": 0}
     return load_scene("huygens").replace(
-        topology=star(n + 1), initial=start, parameters=swings, record=(), window=20, rtol=1e-10, **given
+        topology=star(n + 1), initial=start, parameters=swings, record=(), window=20, rtol=1e-10, **keywords
     )
 
 
@@ -80,11 +82,11 @@ def test_loops_do_what_the_written_statements_do(case: str, method: str) -> None
 def test_forty_nodes_of_two_kinds_move_as_their_exported_equations_say() -> None:
     """And from equal starts the nodes of a kind stay equal bit for bit, though each adds up its own links."""
     random = np.random.default_rng(1)
-    numbers = {"sigma": 0.3, "u": 0.3, "delta": 0.1, "omega": np.linspace(1.0, 1.2, 40)}
-    scene = pairs(40, integrator="dop853", parameters=numbers, initial={"x": random.uniform(-1, 1, 40), "v": 0})
-    found = run(scene, reduce=False)
-    assert found.success
-    np.testing.assert_allclose(found.states(), by_scipy(scene, 20), atol=3e-8)
+    values = {"sigma": 0.3, "u": 0.3, "delta": 0.1, "omega": np.linspace(1.0, 1.2, 40)}
+    scene = pairs(40, integrator="dop853", parameters=values, initial={"x": random.uniform(-1, 1, 40), "v": 0})
+    result = run(scene, reduce=False)
+    assert result.success
+    np.testing.assert_allclose(result.states(), by_scipy(scene, 20), atol=3e-8)
     first = [i for i in range(40) if i % 4 < 2]
     start = {"x": [0.7 if i in first else 0.2 for i in range(40)], "v": 0}
     frequencies = [1.0 if i in first else 1.3 for i in range(40)]
@@ -107,9 +109,9 @@ def kept(scene: Scene, drift: float) -> None:
 @pytest.mark.long  # steps of six clocks, in loops and written out, are compared above
 def test_forty_clocks_on_a_beam_move_as_their_exported_equations_say() -> None:
     scene = hanging(40, integrator="rodas5p")
-    found = run(scene)
-    assert found.success
-    np.testing.assert_allclose(found.states(), by_scipy(scene, 20), atol=3e-8)
+    result = run(scene)
+    assert result.success
+    np.testing.assert_allclose(result.states(), by_scipy(scene, 20), atol=3e-8)
     kept(scene.replace(escapement=0.0, drag=0.0), drift=3e-9)
 
 
@@ -130,7 +132,7 @@ def test_equations_and_elimination_of_a_thousand_nodes_cost_no_algebra(monkeypat
         return plain_subs(self, *rules, **options)
 
     monkeypatch.setattr(sp.Basic, "subs", counted)
-    made = hanging(1000).equations
-    assert made.dimension == 2002
-    assert sparse_plan(made).entries < 20 * 1000
+    equations = hanging(1000).equations
+    assert equations.dimension == 2002
+    assert sparse_plan(equations).entries < 20 * 1000
     assert len(calls) < 100

@@ -89,9 +89,9 @@ def test_differences_keep_their_digits_far_away(name: str, method: str) -> None:
 def test_two_fields_have_sums_of_their_own(method: str) -> None:
     one, other = (network(name, 6, False) for name in ("springs", "sine with a lag"))
     both = Equations(one.nodes, one.kind_of, (*one.layers, *other.layers), one.varied)
-    found = stepped(both, method)
-    assert abs(found - stepped(both.without_fields(), method)).max() < 1e-14
-    assert abs(found - stepped(Equations(both.nodes, both.kind_of, both.layers[:1], both.varied), method)).max() > 1e-4
+    end = stepped(both, method)
+    assert abs(end - stepped(both.without_fields(), method)).max() < 1e-14
+    assert abs(end - stepped(Equations(both.nodes, both.kind_of, both.layers[:1], both.varied), method)).max() > 1e-4
 
 
 def test_the_text_does_not_grow_and_lists_no_link() -> None:
@@ -115,10 +115,10 @@ def test_equations_of_many_nodes_list_no_link() -> None:
 
 
 def test_rosenbrock_steps_list_the_pairs_or_refuse() -> None:
-    found = emit(network("springs", 20, False), "rodas5p", Recording(()), width=1)
-    assert found.equations.fields == ()
-    assert found.elimination is not None
-    assert found.elimination.weights.size == 380
+    source = emit(network("springs", 20, False), "rodas5p", Recording(()), width=1)
+    assert source.equations.fields == ()
+    assert source.elimination is not None
+    assert source.elimination.weights.size == 380
     with pytest.raises(ValueError, match=r"rodas5p: found a mean field of 3000 nodes, .* use dop853 or taylor"):
         emit(network("springs", 3000, False), "rodas5p", Recording(()), width=1)
 

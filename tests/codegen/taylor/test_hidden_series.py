@@ -54,17 +54,17 @@ def test_a_soft_wall_turns_a_body_back():
     b, energy = 50.0, 0.5
     speed, nearest = math.sqrt(2.0 * energy), -math.log(b * energy) / b
     turn = (3.0 - nearest + 2.0 * math.log(2.0) / b) / speed
-    found = run(alone([X, V], [V, sp.exp(-50 * X)]), [3.0, -1.0], 6.0, 1e-8)
+    result = run(alone([X, V], [V, sp.exp(-50 * X)]), [3.0, -1.0], 6.0, 1e-8)
     exact = nearest + 2.0 / b * math.log(math.cosh(b * speed * (6.0 - turn) / 2.0))
-    assert found.tolist() == pytest.approx([exact, speed], abs=1e-6)
+    assert result.tolist() == pytest.approx([exact, speed], abs=1e-6)
 
 
 def test_a_pulse_beside_a_large_motion_counts():
     """x' = cos(a/3)/10 + exp(200 (cos a - 1)): what else moves the state hides nothing."""
     equations = alone([A, X], [sp.S.One, sp.cos(A / 3) / 10 + sp.exp(200 * (sp.cos(A) - 1))])
-    found = run(equations, [1.0, 0.0], 10 * math.pi + 1.0, 1e-9)[1]
+    steps = run(equations, [1.0, 0.0], 10 * math.pi + 1.0, 1e-9)[1]
     slow = 0.3 * (math.sin((10 * math.pi + 2.0) / 3) - math.sin(1.0 / 3))
-    assert found == pytest.approx(slow + 10 * math.pi * special.i0e(200.0), abs=3e-7)
+    assert steps == pytest.approx(slow + 10 * math.pi * special.i0e(200.0), abs=3e-7)
 
 
 def some(chosen: tuple, others: tuple) -> list:
@@ -157,8 +157,8 @@ def test_a_step_beside_a_factor_is_seen(case, looped):
 def test_a_choice_by_what_rests_passes_nothing():
     """The third state does not move: it is a constant of the step, as a parameter is."""
     chosen = sp.Piecewise((sp.sin(A), V > 0), (sp.cos(A), True))
-    found = run(alone([A, X, V], [sp.S.One, chosen, sp.S.Zero]), [0.0, 0.0, 2.0], 1.0, 1e-10)
-    assert found[1] == pytest.approx(1.0 - math.cos(1.0), abs=1e-9)
+    result = run(alone([A, X, V], [sp.S.One, chosen, sp.S.Zero]), [0.0, 0.0, 2.0], 1.0, 1e-10)
+    assert result[1] == pytest.approx(1.0 - math.cos(1.0), abs=1e-9)
 
 
 def test_a_kink_of_a_wave_is_found_where_the_state_rests():

@@ -313,8 +313,8 @@ def test_the_pair_of_springs_is_that_of_runge_and_kutta():
                 rate[c][i] += value
         return np.concatenate(rate)
 
-    found = solve_ivp(rhs, (0.0, 6.0), [0.5, -0.3, 0.0, 0.2], "DOP853", rtol=1e-13, atol=1e-15, max_step=0.02)
-    assert np.abs(state - found.y[:, -1]).max() < 1e-11
+    solution = solve_ivp(rhs, (0.0, 6.0), [0.5, -0.3, 0.0, 0.2], "DOP853", rtol=1e-13, atol=1e-15, max_step=0.02)
+    assert np.abs(state - solution.y[:, -1]).max() < 1e-11
 
 
 @pytest.mark.parametrize("looped", [False, True], ids=["lines", "loops"])

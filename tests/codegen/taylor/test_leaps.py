@@ -31,8 +31,8 @@ def preloaded(t: float, a: float) -> list[float]:
     with mpmath.workdps(30):
         half = 2 * mpmath.atan2(1, a)  # x = -a + a cos t + sin t is zero again
         turns = int(t / half)
-        sign, rest = (-1) ** turns, t - turns * half
-        x, v = -a + a * mpmath.cos(rest) + mpmath.sin(rest), -a * mpmath.sin(rest) + mpmath.cos(rest)
+        sign, within = (-1) ** turns, t - turns * half
+        x, v = -a + a * mpmath.cos(within) + mpmath.sin(within), -a * mpmath.sin(within) + mpmath.cos(within)
         return [float(sign * x), float(sign * v)]
 
 
@@ -75,11 +75,11 @@ def test_falling_to_and_fro(looped):
 
 @BOTH
 @pytest.mark.parametrize(
-    "whole", [sp.floor(X), -sp.ceiling(-X), -sp.floor(1 - X) + (1 - sp.Abs(sp.sign(X - sp.floor(X))))]
+    "floor", [sp.floor(X), -sp.ceiling(-X), -sp.floor(1 - X) + (1 - sp.Abs(sp.sign(X - sp.floor(X))))]
 )
-def test_steps_of_whole_numbers(whole, looped):
+def test_steps_of_whole_numbers(floor, looped):
     """v' = floor x with x = t - 7/2: the sum of -4/2, -3 … 2, 3/2."""
-    state, _ = march(alone([X, V], [sp.S.One, whole]), 8, [-3.5, 0.0], 7.0, 1e-10, looped=looped)
+    state, _ = march(alone([X, V], [sp.S.One, floor]), 8, [-3.5, 0.0], 7.0, 1e-10, looped=looped)
     assert state.tolist() == pytest.approx([3.5, -2.0 - 3.0 - 2.0 - 1.0 + 0.0 + 1.0 + 2.0 + 1.5], abs=3e-13)
 
 
@@ -167,11 +167,11 @@ def test_two_jumps_at_once_end_one_step():
     assert pair[:2].tolist() == pair[2:].tolist()
 
 
-@pytest.mark.parametrize("given", [X**2 * sp.sign(X), sp.sign(X) * sp.sin(X) ** 3])
-def test_a_jump_of_size_zero_costs_no_digits(given):
-    smooth = {X**2 * sp.sign(X): X * sp.Abs(X)}.get(given, sp.Abs(sp.sin(X)) * sp.sin(X) ** 2)
-    found, expected = (march(alone([X, V], [V, -X - e]), 16, [0.0, 1.0], 20.0, 1e-12)[0] for e in (given, smooth))
-    assert found == pytest.approx(expected, abs=1e-11)
+@pytest.mark.parametrize("jump", [X**2 * sp.sign(X), sp.sign(X) * sp.sin(X) ** 3])
+def test_a_jump_of_size_zero_costs_no_digits(jump):
+    smooth = {X**2 * sp.sign(X): X * sp.Abs(X)}.get(jump, sp.Abs(sp.sin(X)) * sp.sin(X) ** 2)
+    end, expected = (march(alone([X, V], [V, -X - e]), 16, [0.0, 1.0], 20.0, 1e-12)[0] for e in (jump, smooth))
+    assert end == pytest.approx(expected, abs=1e-11)
 
 
 # -- networks ---------------------------------------------------------------------------------------------------------
@@ -186,17 +186,17 @@ LINE = Scene(
 def stages(scene: Scene) -> tuple[np.ndarray, int]:
     """The end by SciPy, whose error is that of stages over which rates jump, and the number of steps."""
     rates = sp.lambdify([T, [sp.Symbol(name, real=True) for name in scene.equations.state]], scene.equations.rhs())
-    found = solve_ivp(rates, (0.0, scene.window), scene.y0, "DOP853", rtol=1e-13, atol=1e-14)
-    return found.y[:, -1], found.t.size - 1
+    solution = solve_ivp(rates, (0.0, scene.window), scene.y0, "DOP853", rtol=1e-13, atol=1e-14)
+    return solution.y[:, -1], solution.t.size - 1
 
 
 def test_a_network_is_that_of_another_method():
     """Two nodes as machine code; three run as Python below."""
     scene = LINE.replace(topology=chain(2), initial={"x": (0.0, 0.4), "v": (0.5, 0.0)})
     assert taylor_obstacle(scene.equations) is None
-    found, (end, steps) = run(scene, show_progress=False).data, stages(scene)
-    assert int(found.steps) < 0.1 * steps
-    assert np.abs(found.end.values.ravel() - end).max() < 1e-9
+    data, (end, steps) = run(scene, show_progress=False).data, stages(scene)
+    assert int(data.steps) < 0.1 * steps
+    assert np.abs(data.end.values.ravel() - end).max() < 1e-9
 
 
 def test_lines_and_loops_agree_on_the_network():

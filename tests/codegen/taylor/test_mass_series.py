@@ -29,14 +29,14 @@ def alone(links: int) -> Equations:
     return Scene(oscillator=pendulum(links), coupling=None, record=()).equations
 
 
-def rates_of(equations: Equations, numbers: list[float]):
+def rates_of(equations: Equations, values: list[float]):
     """The rates by SymPy's M and r, solved by NumPy."""
     symbols = [sp.Symbol(s, real=True) for s in (*equations.state, *equations.parameters)]
     size = equations.dimension
     mass = sp.lambdify(symbols, sp.Matrix(sp.SparseMatrix(size, size, equations.mass())))
     time = sp.Symbol("t", real=True)
     forces = sp.lambdify([time, *symbols], list(equations.rhs()))
-    return lambda t, y: np.linalg.solve(mass(*y, *numbers), np.array(forces(t, *y, *numbers), float))
+    return lambda t, y: np.linalg.solve(mass(*y, *values), np.array(forces(t, *y, *values), float))
 
 
 WAYS = pytest.mark.parametrize(
@@ -58,9 +58,9 @@ def end_of(
 
 @WAYS
 def test_a_pendulum_of_many_links_moves_as_its_matrices_say(looped, python):
-    found = end_of(alone(LINKS), 8, START, [1.3, 0.2], looped, python)
+    end = end_of(alone(LINKS), 8, START, [1.3, 0.2], looped, python)
     expected = solve_ivp(ByHand(LINKS, 1.3, 0.2).rates, (0, 0.5), START, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
-    assert np.abs(found - expected).max() < 2e-13
+    assert np.abs(end - expected).max() < 2e-13
 
 
 @pytest.mark.parametrize(
@@ -69,10 +69,10 @@ def test_a_pendulum_of_many_links_moves_as_its_matrices_say(looped, python):
 @pytest.mark.parametrize("equations", [clocks(), inertial()], ids=["masses of the state", "constant masses"])
 def test_links_with_inertia_take_series_too(equations, python):
     start = np.linspace(-0.4, 0.6, equations.dimension)
-    numbers = list(np.linspace(0.3, 0.9, len(equations.parameters)))
-    found = end_of(equations, 12, start, numbers, False, python)
-    expected = solve_ivp(rates_of(equations, numbers), (0, 0.5), start, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
-    assert np.abs(found - expected).max() < 2e-13
+    values = list(np.linspace(0.3, 0.9, len(equations.parameters)))
+    end = end_of(equations, 12, start, values, False, python)
+    expected = solve_ivp(rates_of(equations, values), (0, 0.5), start, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    assert np.abs(end - expected).max() < 2e-13
 
 
 def tubes(*forces: sp.Expr) -> Oscillator:
@@ -96,18 +96,18 @@ APART: dict[str, Equations] = {
 @pytest.mark.parametrize("equations", APART.values(), ids=APART)
 def test_nodes_move_as_their_masses_and_forces_say(equations, looped, python):
     start = np.linspace(-0.4, 0.6, equations.dimension)
-    numbers = list(np.linspace(0.3, 0.9, len(equations.parameters)))
-    found = end_of(equations, 12, start, numbers, looped, python)
-    expected = solve_ivp(rates_of(equations, numbers), (0, 0.5), start, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
-    assert np.abs(found - expected).max() < 2e-13
+    values = list(np.linspace(0.3, 0.9, len(equations.parameters)))
+    end = end_of(equations, 12, start, values, looped, python)
+    expected = solve_ivp(rates_of(equations, values), (0, 0.5), start, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    assert np.abs(end - expected).max() < 2e-13
 
 
 def test_inertia_of_links_alone_moves_no_node():
     """Free bodies with an inerter keep their velocities."""
     free = of_energies("free", 1, real("w", 1)[0] ** 2 / 2, sp.S.Zero, sp.S.Zero)
     equations = Scene(oscillator=free, coupling="inerter", topology=chain(2), record=()).equations
-    found, _ = compiled(equations, 8).run([0.1, 0.2, 0.5, -0.3], [0.7], 0.5, 1e-13)
-    assert found[0] == pytest.approx([0.35, 0.05, 0.5, -0.3], abs=1e-15)
+    end, _ = compiled(equations, 8).run([0.1, 0.2, 0.5, -0.3], [0.7], 0.5, 1e-13)
+    assert end[0] == pytest.approx([0.35, 0.05, 0.5, -0.3], abs=1e-15)
 
 
 def test_a_matrix_is_factorised_once_and_a_symmetric_one_by_half_the_operations():

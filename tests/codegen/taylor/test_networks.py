@@ -37,11 +37,11 @@ def values(eq: Equations) -> tuple[list[float], list[float]]:
 
 
 def reference(eq: Equations) -> np.ndarray:
-    start, numbers = values(eq)
+    start, parameters = values(eq)
     symbols = [sp.Symbol(name, real=True) for name in (*eq.state, *eq.parameters)]
     f = sp.lambdify([TIME, symbols], eq.rhs())
-    found = solve_ivp(lambda t, y: f(t, [*y, *numbers]), (0, END), start, method="DOP853", rtol=1e-13, atol=1e-14)
-    return found.y[:, -1]
+    solution = solve_ivp(lambda t, y: f(t, [*y, *parameters]), (0, END), start, method="DOP853", rtol=1e-13, atol=1e-14)
+    return solution.y[:, -1]
 
 
 def follows(eq: Equations, end: np.ndarray, steps: int) -> None:
@@ -53,8 +53,8 @@ def follows(eq: Equations, end: np.ndarray, steps: int) -> None:
 @pytest.mark.parametrize("name", CASES)
 def test_text_of_networks_follows_their_equations(name, looped):
     eq = CASES[name]
-    start, numbers = values(eq)
-    follows(eq, *march(eq, 14, start, END, 1e-12, numbers=numbers, looped=looped))
+    start, parameters = values(eq)
+    follows(eq, *march(eq, 14, start, END, 1e-12, numbers=parameters, looped=looped))
 
 
 SHORT = (("driven pendulum", False), ("lorenz ring", True))
@@ -89,19 +89,19 @@ def test_dense_output_of_loops_is_that_of_lines(name):
 def test_the_length_of_a_looped_step_is_that_of_the_largest_node_at_every_width():
     """Scalar loops that take a maximum over nodes are what LLVM vectorises; a lost node lets the step be too long."""
     scene = Scene("duffing", "spring", ring(9), parameters={"sigma": 0.3})
-    numbers = [scene.parameters[name] for name in scene.equations.parameters]
+    values = [scene.parameters[name] for name in scene.equations.parameters]
     single, many = (compiled(scene.equations, 8, width, looped=True) for width in (1, 8))
     dice = np.random.default_rng(3)
     for trial in range(25):
         starts, more = dice.normal(size=(8, 18)), {"t": float(trial), "scale": 2.0 ** (trial % 5 - 4)}
-        together, _, _ = many.step(starts, numbers, **more)
-        assert [single.step([start], numbers, **more)[0][0] for start in starts] == together.tolist()
+        together, _, _ = many.step(starts, values, **more)
+        assert [single.step([start], values, **more)[0][0] for start in starts] == together.tolist()
 
 
 def test_a_looped_step_without_numbers_has_no_length():
     eq = CASES["lorenz ring"]
-    start, numbers = values(eq)
-    assert np.isnan(compiled(eq, 14, looped=True).step([np.nan, *start[1:]], numbers)[0][0])
+    start, parameters = values(eq)
+    assert np.isnan(compiled(eq, 14, looped=True).step([np.nan, *start[1:]], parameters)[0][0])
 
 
 def test_the_text_of_loops_does_not_grow():

@@ -53,8 +53,8 @@ NODES = {
 def test_loops_have_the_series_of_a_step_that_is_written_out(name, order):
     equations, rng = NODES[name], np.random.default_rng(3)
     rolled, lines = (Text(equations, order, dense=True, rolled=way) for way in (True, False))
-    numbers = {"a": 0.3, "b": 1.7, "w": 2.0}
-    values = [numbers[p] for p in equations.parameters]
+    parameter_values = {"a": 0.3, "b": 1.7, "w": 2.0}
+    values = [parameter_values[p] for p in equations.parameters]
     for _ in range(5):
         start = np.array([*rng.uniform(0.2, 1.5, equations.dimension), *values])
         ways = [step.step(start, 0.4, 10.0, 0.5, 1e-9, 1e-12) for step in (rolled, lines)]

@@ -33,12 +33,12 @@ FUNCTIONS: dict[str, Any] = {
 def exact(text: str) -> str:
     """The text with every number as the short fraction, or the multiple of 1/sqrt(pi), that it stands for."""
 
-    def number(found: re.Match[str]) -> str:
+    def number(match: re.Match[str]) -> str:
         for unit, divisor in ((1.0, "1"), (float(mpmath.sqrt(mpmath.pi)), "sqrt(pi)")):
-            value = Fraction(float(found[0]) * unit).limit_denominator(10_000)
-            if abs(float(value) - float(found[0]) * unit) < 1e-15 * abs(float(value)):
+            value = Fraction(float(match[0]) * unit).limit_denominator(10_000)
+            if abs(float(value) - float(match[0]) * unit) < 1e-15 * abs(float(value)):
                 return f"(mpf({value.numerator})/({value.denominator}*{divisor}))"
-        return found[0]
+        return match[0]
 
     return re.sub(r"(?<![\w.])\d+\.\d+(e[-+]\d+)?", number, text)
 
@@ -58,10 +58,10 @@ def series(
     return [list(start), *([c * (scale / length) ** (k + 1) for c in row] for k, row in enumerate(rows))]
 
 
-def close(found: list, expected: list, digits: int = 40) -> bool:
+def close(coefficients: list, expected: list, digits: int = 40) -> bool:
     size = max(abs(e) for e in expected)
     return all(
-        abs(a - b) <= mpmath.mpf(10) ** -digits * max(size, abs(b)) for a, b in zip(found, expected, strict=True)
+        abs(a - b) <= mpmath.mpf(10) ** -digits * max(size, abs(b)) for a, b in zip(coefficients, expected, strict=True)
     )
 
 
@@ -94,8 +94,8 @@ def test_every_recurrence_is_the_series_of_mpmath(name, point):
         with mpmath.workdps(DIGITS + 60):
             expected = mpmath.taylor(lambda t: f(t, c, b), 0, ORDER - 1)
         equations = alone([X], [e], [A, B])
-        found = series(equations, [mpmath.mpf(0)], [c, b])
-        assert close([row[0] * k for k, row in enumerate(found)][1:], expected)
+        coefficients = series(equations, [mpmath.mpf(0)], [c, b])
+        assert close([row[0] * k for k, row in enumerate(coefficients)][1:], expected)
 
 
 @pytest.mark.parametrize("order", [8, 13, 24])
@@ -103,10 +103,10 @@ def test_states_solve_their_equations(order):
     """x = tan(t + c) from x' = 1 + x**2, at another time and scale."""
     with mpmath.workdps(DIGITS):
         c = mpmath.mpf("0.4")
-        found = series(alone([X], [1 + X**2]), [mpmath.tan(c)], [], t=5, order=order, scale=4)
+        coefficients = series(alone([X], [1 + X**2]), [mpmath.tan(c)], [], t=5, order=order, scale=4)
         with mpmath.workdps(DIGITS + 60):
             expected = mpmath.taylor(mpmath.tan, c, order)
-        assert close([row[0] / 4**k for k, row in enumerate(found)], expected)
+        assert close([row[0] / 4**k for k, row in enumerate(coefficients)], expected)
 
 
 LEAVES = st.sampled_from([X, V, T, A, sp.Integer(2), sp.Rational(-1, 3), sp.Integer(1)])
@@ -133,15 +133,17 @@ def test_random_equations_are_solved_term_by_term(first, second):
     order = 6
     equations = alone([X, V], [first, second], [A])
     with mpmath.workdps(DIGITS):
-        numbers = {X: mpmath.mpf("0.31"), V: mpmath.mpf("-0.27"), A: mpmath.mpf("0.6"), T: mpmath.mpf("0.2")}
-        found = series(equations, [numbers[X], numbers[V]], [numbers[A]], t=numbers[T], order=order)
+        values = {X: mpmath.mpf("0.31"), V: mpmath.mpf("-0.27"), A: mpmath.mpf("0.6"), T: mpmath.mpf("0.2")}
+        coefficients = series(equations, [values[X], values[V]], [values[A]], t=values[T], order=order)
         for c, state in enumerate((X, V)):
             e, factorial = state, 1
             for k in range(1, 5):
                 e = e.diff(X) * first + e.diff(V) * second + e.diff(T)
                 factorial *= k
-                value = sp.lambdify((X, V, A, T), e, "mpmath")(*(numbers[s] for s in (X, V, A, T)))
-                assert abs(found[k][c] - mpmath.mpf(value) / factorial) <= mpmath.mpf(10) ** -40 * (1 + abs(value))
+                value = sp.lambdify((X, V, A, T), e, "mpmath")(*(values[s] for s in (X, V, A, T)))
+                assert abs(coefficients[k][c] - mpmath.mpf(value) / factorial) <= mpmath.mpf(10) ** -40 * (
+                    1 + abs(value)
+                )
 
 
 def test_a_kink_of_parameters_is_no_kink():
@@ -154,8 +156,8 @@ def test_a_kink_of_parameters_is_no_kink():
 def test_constants_take_every_function(constant):
     with mpmath.workdps(DIGITS):
         a, b = mpmath.mpf("0.4"), mpmath.mpf("1.3")
-        found = series(alone([X], [-X * constant], [A, B]), [mpmath.mpf(1)], [a, b], order=6)
-        assert abs(found[1][0] + sp.lambdify((A, B), constant, "mpmath")(a, b)) < mpmath.mpf(10) ** -40
+        coefficients = series(alone([X], [-X * constant], [A, B]), [mpmath.mpf(1)], [a, b], order=6)
+        assert abs(coefficients[1][0] + sp.lambdify((A, B), constant, "mpmath")(a, b)) < mpmath.mpf(10) ** -40
 
 
 def test_unknown_functions_and_low_orders_are_refused():

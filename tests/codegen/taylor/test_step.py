@@ -305,9 +305,9 @@ def test_golden_steps(golden):
 
 def test_operations_are_those_of_the_text():
     """A written-out step has no indices to be computed; signs of numbers and arguments are no operations."""
-    made = step_of(alone([X, V], [V, A - sp.sin(X) - V**2 / 3], [A]), 8)
-    tree = ast.parse(made.text.split("@njit")[-1].partition("\n")[2])
-    assert made.operations == sum(isinstance(node, ast.BinOp) for node in ast.walk(tree)) > 100
+    source = step_of(alone([X, V], [V, A - sp.sin(X) - V**2 / 3], [A]), 8)
+    tree = ast.parse(source.text.split("@njit")[-1].partition("\n")[2])
+    assert source.operations == sum(isinstance(node, ast.BinOp) for node in ast.walk(tree)) > 100
 
 
 OWN_WORDS = {
@@ -332,13 +332,13 @@ def test_no_symbol_of_a_user_is_called_like_a_name_of_the_step(name, looped):
     symbols |= {s.name for edge in edges for s in (edge.weight, *edge.parameters)} | {*equations.state}
     symbols |= {*called(symbols).values()}
     symbols |= {f"{symbol}{end}" for symbol in symbols for end in ("_here", "_there", "_first")}
-    own = {
+    intermediates = {
         word
         for word in assigned - symbols - {"t"}
         if not re.fullmatch(r"[a-z_]+\d+(_\d+|_rest|_value)?|.+_\d+_\d+", word)
     }
-    assert own
-    for word in own:
+    assert intermediates
+    for word in intermediates:
         parameter = sp.Symbol(word, real=True)
         (renamed,) = tidy(alone([X], [parameter], [parameter])).node.parameters
         assert called([renamed.name])[renamed.name] != word, word
@@ -352,10 +352,10 @@ def test_a_step_brings_the_functions_that_it_calls():
 
 
 @pytest.mark.parametrize(
-    ("factor", "whole"), [(A + 2 * sp.exp(X), False), (A + sp.exp(X), True), (X - 1, True), (3 * X - 1, True)]
+    ("factor", "expanded"), [(A + 2 * sp.exp(X), False), (A + sp.exp(X), True), (X - 1, True), (3 * X - 1, True)]
 )
-def test_what_is_scaled_and_shifted_is_multiplied_out(factor, whole):
+def test_what_is_scaled_and_shifted_is_multiplied_out(factor, expanded):
     """Differences from a state stay whole: they may be exact where a product of each part is not."""
     text = step_of(alone([X], [factor * sp.sin(X)], [A]), 8).text
-    assert ("linear0_0 = " in text) == whole
+    assert ("linear0_0 = " in text) == expanded
     assert text.count("product0_3 = ") == 1

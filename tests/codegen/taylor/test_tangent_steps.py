@@ -36,15 +36,15 @@ def scene(name: str, coupling: str, n: int = 2, **more: object) -> Scene:
 
 def in_digits(variation: Variation, order: int, start: list[Any], numbers: list[Any], d: list[Any], alpha: Any) -> list:
     """The deviation after one step as long as its scale, by the texts of the kernel in 60 digits."""
-    made = write_tangent(variation, order)
+    source = write_tangent(variation, order)
     space: dict[str, Any] = {
         **FUNCTIONS, "mpf": mpmath.mpf, "pi": mpmath.pi, "math": math, "LANES": 1, "any_lane": bool,
         "load": lambda a, slot, width: a[slot],
     }  # fmt: skip
-    for text in (made.orbit.text, *made.modes):
+    for text in (source.orbit.text, *source.modes):
         exec(exact(text.replace("~(", "not (")), space)
     size = len(start)
-    y, shared, new = [*start, *numbers], [None] * made.shared, [None] * len(d)
+    y, shared, new = [*start, *numbers], [None] * source.shared, [None] * len(d)
     huge = mpmath.mpf("1e40")
     shared[1], _ = space["step"](0, 1, mpmath.mpf(1), y, y, [None] * size, [None] * size * order, huge, huge, shared)
     assert shared[1] == 1
@@ -73,9 +73,9 @@ def test_the_tangent_of_a_step_is_a_step_of_the_extended_system(name: str, coupl
 
 
 def carried(s: Scene, variation: Variation, state: list[float], strengths: np.ndarray, method: Integrator, rtol: float) -> VariationalIntegrator:  # fmt: skip
-    numbers = np.array([[s.parameters[name] for name in variation.orbit.parameters]])
+    values = np.array([[s.parameters[name] for name in variation.orbit.parameters]])
     tight = s.replace(rtol=rtol, atol=rtol)
-    return VariationalIntegrator.make(tight, variation, np.array([state]), numbers, strengths, 1, method=method)
+    return VariationalIntegrator.make(tight, variation, np.array([state]), values, strengths, 1, method=method)
 
 
 @pytest.mark.parametrize(
@@ -101,8 +101,8 @@ def test_volumes_shrink_as_liouville_says() -> None:
     c = carried(s, network_variation(s.equations), [1.0, 0.7, 0.1, -0.2], np.zeros((0, 4)), TAYLOR, 1e-12)
     c.set_deviations(np.eye(4)[None])
     growth = c.advance(s.period)[0]
-    found = np.linalg.slogdet(c.deviations[0])[1] + growth.sum()
-    assert found == pytest.approx(-2 * 0.2 * s.period, abs=1e-11)
+    log_volume = np.linalg.slogdet(c.deviations[0])[1] + growth.sum()
+    assert log_volume == pytest.approx(-2 * 0.2 * s.period, abs=1e-11)
 
 
 def test_all_multipliers_of_a_linear_chain_have_the_size_of_its_damping() -> None:
@@ -184,8 +184,8 @@ def test_floquet_multipliers_are_those_of_mpmath(alpha: float) -> None:
         x, v, matrix = duffing_monodromy(orbit.state, orbit.scene.parameters, alpha, period)
         assert max(abs(x - orbit.state[0]), abs(v - orbit.state[1])) < 1e-12
         expected = sorted((complex(z) for z in mpmath.eig(matrix)[0]), key=lambda z: z.imag)
-    found = sorted(orbit.transversal_multipliers(alpha), key=lambda z: z.imag)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11)
+    ordered = sorted(orbit.transversal_multipliers(alpha), key=lambda z: z.imag)
+    np.testing.assert_allclose(ordered, expected, rtol=0, atol=1e-11)
 
 
 def test_methods_without_modes_are_refused() -> None:

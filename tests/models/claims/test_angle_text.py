@@ -31,9 +31,9 @@ from synchain.models.graphs.families import topology
 )
 def test_the_number_is_that_of_sympy(text: str) -> None:
     for values in ({"n": 5, "k": 2}, {"n": 12, "k": 7}, {"n": 31, "k": 0}):
-        found = cosine_sum(text, values)
-        assert found is not None
-        assert equal(expression(found), exact_number(text, values))
+        number = cosine_sum(text, values)
+        assert number is not None
+        assert equal(expression(number), exact_number(text, values))
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_right_claims_need_no_separation_bounds(n: int, monkeypatch: pytest.Monk
     assert verify(claim).problems == ()
     assert len(compared) <= (0 if n == 61 else n)
     (wrong,) = _line(1, f"ring {n}: -4*sin(k*pi/(n+1))**2 for k=0..n-1", None)  # type: ignore[arg-type]
-    found = verify(wrong)
-    assert not found.right
-    assert "claimed -4*sin" in " ".join(found.problems) or n < 61
-    assert len(found.expected.split(",")) == len(topology("ring", n).spectrum)
+    verdict = verify(wrong)
+    assert not verdict.right
+    assert "claimed -4*sin" in " ".join(verdict.problems) or n < 61
+    assert len(verdict.expected.split(",")) == len(topology("ring", n).spectrum)

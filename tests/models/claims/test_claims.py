@@ -61,8 +61,8 @@ RIGHT = [
 
 @pytest.mark.parametrize("text", RIGHT)
 def test_right(text: str, tmp_path: Path) -> None:
-    found = verdicts(tmp_path, text)
-    assert [v.problems for v in found if not v.right] == []
+    verdict_list = verdicts(tmp_path, text)
+    assert [v.problems for v in verdict_list if not v.right] == []
 
 
 @pytest.mark.parametrize(
@@ -85,24 +85,24 @@ def test_right(text: str, tmp_path: Path) -> None:
     ],
 )
 def test_wrong(text: str, problems: list[str], tmp_path: Path) -> None:
-    (found,) = verdicts(tmp_path, text)
-    assert len(found.problems) == len(problems)
+    (verdict,) = verdicts(tmp_path, text)
+    assert len(verdict.problems) == len(problems)
     assert all(
-        problem.replace("-1-I/3", "-1 - I/3").startswith(words)
-        for problem, words in zip(found.problems, problems, strict=True)
-    ), found.problems
+        problem.replace("-1-I/3", "-1 - I/3").startswith(message)
+        for problem, message in zip(verdict.problems, problems, strict=True)
+    ), verdict.problems
 
 
 def test_a_difference_far_below_any_float_is_found(tmp_path: Path) -> None:
     tiny = "1/(10**29*10**29*10**29*10**29)"
-    found = verdicts(tmp_path, f"chain 4: 0, -2, -2+sqrt(2), -2-sqrt(2)+{tiny}")
-    assert [v.right for v in found] == [False]
+    verdict_list = verdicts(tmp_path, f"chain 4: 0, -2, -2+sqrt(2), -2-sqrt(2)+{tiny}")
+    assert [v.right for v in verdict_list] == [False]
 
 
 def test_a_family_is_wrong_only_where_it_is(tmp_path: Path) -> None:
     """-4 once and -n are one number for the star of 4."""
-    found = verdicts(tmp_path, "star n=3..6: 0, -1^(n-2), -4")
-    assert [v.claim.n for v in found if v.right] == [4]
+    verdict_list = verdicts(tmp_path, "star n=3..6: 0, -1^(n-2), -4")
+    assert [v.claim.n for v in verdict_list if v.right] == [4]
 
 
 @pytest.mark.parametrize(("name", "n"), cases(6, 8, 12))
@@ -117,10 +117,10 @@ def test_the_expected_spectrum_is_a_right_claim(name: str, n: int, tmp_path: Pat
 @given(st.data())
 def test_exchanging_two_multiplicities_is_noticed(data: st.DataObject) -> None:
     graph = data.draw(st.sampled_from([chain(5), ring(6), star(7), topology("hypercube", 8)]))
-    found = [(e.text, e.multiplicity) for e in graph.spectrum.eigenvalues]
-    place = data.draw(st.integers(0, len(found) - 1))
+    pairs = [(e.text, e.multiplicity) for e in graph.spectrum.eigenvalues]
+    index = data.draw(st.integers(0, len(pairs) - 1))
     change = data.draw(st.sampled_from([-1, 1]))
-    entries = [f"({text})^{m + change * (i == place)}" for i, (text, m) in enumerate(found)]
+    entries = [f"({text})^{m + change * (i == index)}" for i, (text, m) in enumerate(pairs)]
     line = f"{graph.name} {graph.n}: {', '.join(entries)}"
     from synchain.models.claims.language import _line
 
@@ -172,9 +172,9 @@ def test_sums_of_fractions_have_the_bound_of_their_common_denominator() -> None:
     ],
 )
 def test_numbers(text: str, value: sp.Expr) -> None:
-    found = exact_number(text)
-    assert found == value
-    assert not found.atoms(sp.Float)
+    number = exact_number(text)
+    assert number == value
+    assert not number.atoms(sp.Float)
 
 
 def test_letters() -> None:
@@ -185,7 +185,7 @@ def test_letters() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ("chain 4: -3.414, -2, -0.586, 0", "write ~ before a decimal"),
         ("chain 4: 1e3", "write ~ before a decimal"),
@@ -236,7 +236,7 @@ def test_letters() -> None:
     ],
 )
 def test_what_cannot_be_read_is_refused(
-    text: str, words: str, ready: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    text: str, message: str, ready: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "claims.txt"
     path.write_text(text)
@@ -245,7 +245,7 @@ def test_what_cannot_be_read_is_refused(
     assert calls < REFUSAL
     out, err = capsys.readouterr()
     assert out == ""
-    assert words in err
+    assert message in err
     assert "no claim" in err or "line 1" in err
     assert len(err.splitlines()) <= 2
 
@@ -295,10 +295,10 @@ def test_exit_codes_and_forms(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ]
     assert out[-2:] == ["  and so on: wrong for 6 of 7 sizes", "2 claims: 1 right, 1 wrong"]
     assert main(["check", str(path), "--json"]) == 1
-    found = json.loads(capsys.readouterr().out)
-    assert (found["right"], found["wrong"]) == (1, 1)
-    assert [(c["line"], c["right"], len(c["graphs"])) for c in found["claims"]] == [(2, True, 1), (4, False, 7)]
-    assert found["claims"][1]["graphs"][2] == {
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["right"], answer["wrong"]) == (1, 1)
+    assert [(c["line"], c["right"], len(c["graphs"])) for c in answer["claims"]] == [(2, True, 1), (4, False, 7)]
+    assert answer["claims"][1]["graphs"][2] == {
         "topology": "star",
         "n": 5,
         "options": {},
@@ -339,5 +339,5 @@ def test_claims_that_cannot_be_decided_do_not_hide_the_others(
     assert (suites.get("tests"), suites.get("failures"), suites.get("errors")) == ("3", "0", "2")
     assert [case.find("error") is None for case in suites.iter("testcase")] == [True, False, False]
     assert main(["check", str(path), "--json"]) == 2
-    found = json.loads(capsys.readouterr().out)
-    assert [u["line"] for u in found["undecided"]] == [1, 3]
+    answer = json.loads(capsys.readouterr().out)
+    assert [u["line"] for u in answer["undecided"]] == [1, 3]

@@ -65,9 +65,9 @@ def test_right(text: str, tmp_path: Path) -> None:
     ],
 )
 def test_wrong(text: str, problem: str, tmp_path: Path) -> None:
-    (found,) = verdicts(tmp_path, text)
-    assert len(found.problems) == 1
-    assert problem in found.problems[0]
+    (verdict,) = verdicts(tmp_path, text)
+    assert len(verdict.problems) == 1
+    assert problem in verdict.problems[0]
 
 
 def test_what_is_right_is_itself_a_claim(tmp_path: Path) -> None:
@@ -84,13 +84,13 @@ def test_what_is_right_is_itself_a_claim(tmp_path: Path) -> None:
 )
 def test_parts_of_large_products_are_those_of_floats(name: str, options: dict, tmp_path: Path) -> None:
     graph = topology(name, 720 if len(options.get("shape", ())) == 3 else 600, **options)
-    found = np.linalg.eigvalsh(np.array([[float(x) for x in row] for row in graph.rows]))
-    words = "".join(f" {key}={'x'.join(map(str, value))}" for key, value in options.items())
-    distinct = 1 + int(np.sum(np.diff(found) > 1e-9))
-    fourth = int(np.sum(abs(found + 4) < 1e-9))
+    eigenvalues = np.linalg.eigvalsh(np.array([[float(x) for x in row] for row in graph.rows]))
+    text = "".join(f" {key}={'x'.join(map(str, value))}" for key, value in options.items())
+    distinct = 1 + int(np.sum(np.diff(eigenvalues) > 1e-9))
+    fourth = int(np.sum(abs(eigenvalues + 4) < 1e-9))
     (verdict,) = verdicts(
         tmp_path,
-        f"{name} {graph.n}{words}: largest = ~{found[0]:.8f}, slowest = ~{found[-2]:.8f}, distinct = {distinct}, "
+        f"{name} {graph.n}{text}: largest = ~{eigenvalues[0]:.8f}, slowest = ~{eigenvalues[-2]:.8f}, distinct = {distinct}, "
         f"multiplicity(-4) = {fourth}",
     )
     assert verdict.problems == ()
@@ -114,13 +114,13 @@ def test_believed_closed_forms_are_called_so(tmp_path: Path, capsys: pytest.Capt
         "3 claims: 3 right, 0 wrong",
     ]
     assert main(["check", str(path), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)["claims"]
-    assert [claim["graphs"][0]["proved"] for claim in found] == [True, False, True]
-    assert found[2]["graphs"][0]["expected"] == "ratio = 2"
+    claims = json.loads(capsys.readouterr().out)["claims"]
+    assert [claim["graphs"][0]["proved"] for claim in claims] == [True, False, True]
+    assert claims[2]["graphs"][0]["expected"] == "ratio = 2"
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ("chain 4: ratio", "found 'ratio'; expected e.g. largest = -4"),
         ("chain 4: ratio 3 = 4", "found '3' behind ratio"),
@@ -138,8 +138,8 @@ def test_believed_closed_forms_are_called_so(tmp_path: Path, capsys: pytest.Capt
         ("erdos_renyi 501: largest < 0", "without a closed form; expected at most 500 nodes"),
     ],
 )
-def test_what_cannot_be_decided_is_refused(text: str, words: str, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=re.escape(words)):
+def test_what_cannot_be_decided_is_refused(text: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=re.escape(message)):
         verdicts(tmp_path, text)
 
 

@@ -121,17 +121,17 @@ def test_decimals_are_what_they_say() -> None:
     ["tan(pi/2 - x)", sp.tan(sp.pi / 2 - X), sp.cot(X), sp.sec(X), sp.csc(X), sp.coth(X), sp.sech(X), sp.csch(X)],
 )
 def test_functions_that_sympy_makes_of_others_are_known(rate: sp.Expr | str) -> None:
-    (found,) = Field({X: rate}).model.rates
-    assert Field({X: written(found)}).model.rates == (found,)
+    (derived,) = Field({X: rate}).model.rates
+    assert Field({X: written(derived)}).model.rates == (derived,)
     expected = sp.sympify(rate).subs(sp.Symbol("x"), 0.7)
-    assert float(found.subs(sp.Symbol("x", real=True), 0.7)) == pytest.approx(float(expected), rel=1e-14)
+    assert float(derived.subs(sp.Symbol("x", real=True), 0.7)) == pytest.approx(float(expected), rel=1e-14)
 
 
 @pytest.mark.parametrize("at_zero", [0, sp.Rational(1, 2), 1])
 def test_steps_of_heaviside_keep_their_value_at_zero(at_zero: sp.Expr) -> None:
     x = sp.Symbol("x", real=True)
     (rate,) = Field({x: sp.Heaviside(x, at_zero)}).model.rates
-    assert [rate.subs(x, place) for place in (-2, 0, 3)] == [0, at_zero, 1]
+    assert [rate.subs(x, position) for position in (-2, 0, 3)] == [0, at_zero, 1]
 
 
 def test_defaults_are_numbers_with_ranges_of_assumptions() -> None:
@@ -146,18 +146,20 @@ def test_defaults_are_numbers_with_ranges_of_assumptions() -> None:
 def test_friction_by_name_value_and_expression() -> None:
     N, belt, mu_s, mu_k, a = sp.symbols("N belt mu_s mu_k a")
     force = {x: N * friction(belt - v)}
-    numbers = {N: 2, belt: 0.1}
-    named = Lagrangian(v**2 / 2, x**2 / 2, force, friction="exponential", parameters=numbers)
+    values = {N: 2, belt: 0.1}
+    named = Lagrangian(v**2 / 2, x**2 / 2, force, friction="exponential", parameters=values)
     assert named.friction == load_friction_law("exponential")
     law = (mu_k + (mu_s - mu_k) * sp.exp(-a * sp.Abs(W))) * sp.sign(W)
-    own = Lagrangian(v**2 / 2, x**2 / 2, force, friction=law, parameters={**numbers, mu_s: 0.3, mu_k: 0.15, a: 2.5})
-    assert own.friction is not None
-    assert own.friction.force == load_friction_law("exponential").force
-    assert set(own.friction.parameters) == {"mu_s", "mu_k", "a"}
-    assert set(own.parameters) == {"N", "belt"}
-    given = Lagrangian(v**2 / 2, x**2 / 2, force, friction=own.friction, contact="set-valued", parameters=numbers)
-    assert given.contact == "set-valued"
-    assert replace(given, contact=own.contact) == own
+    written = Lagrangian(v**2 / 2, x**2 / 2, force, friction=law, parameters={**values, mu_s: 0.3, mu_k: 0.15, a: 2.5})
+    assert written.friction is not None
+    assert written.friction.force == load_friction_law("exponential").force
+    assert set(written.friction.parameters) == {"mu_s", "mu_k", "a"}
+    assert set(written.parameters) == {"N", "belt"}
+    oscillator = Lagrangian(
+        v**2 / 2, x**2 / 2, force, friction=written.friction, contact="set-valued", parameters=values
+    )
+    assert oscillator.contact == "set-valued"
+    assert replace(oscillator, contact=written.contact) == written
     sticky = friction_law("mu_k*sign(w)", {"mu_k": 0.2, "mu_s": 0.3}, static="mu_s", order=[("mu_k", "mu_s")])
     plug_in = load_friction_law("coulomb_static")
     assert (sticky.force, sticky.static, sticky.order) == (plug_in.force, plug_in.static, plug_in.order)
@@ -255,11 +257,11 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
 
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_model_is_refused_at_its_definition_in_one_line(name: str) -> None:
-    make, words = WRONG[name]
-    with pytest.raises((ValueError, TypeError), match=re.escape(words)) as found:
+    make, message = WRONG[name]
+    with pytest.raises((ValueError, TypeError), match=re.escape(message)) as caught:
         make()
-    assert "\n" not in str(found.value)
-    assert len(str(found.value)) < 600
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 600
 
 
 # -- expressions as text -----------------------------------------------------------------------------------------
@@ -285,9 +287,9 @@ HOSTILE = [
 
 @pytest.mark.parametrize("text", HOSTILE)
 def test_hostile_text_is_refused_in_one_line(text: str) -> None:
-    with pytest.raises(ValueError, match=r"^V: ") as found:
+    with pytest.raises(ValueError, match=r"^V: ") as caught:
         read("V", text, NAMES)
-    assert "\n" not in str(found.value)
+    assert "\n" not in str(caught.value)
 
 
 x_, v_, k_ = NAMES["x"], NAMES["v"], NAMES["k"]
@@ -328,12 +330,12 @@ def deeper(inner: st.SearchStrategy) -> st.SearchStrategy:
 @given(st.recursive(leaves, deeper, max_leaves=8))
 def test_what_is_written_is_read_as_the_same_expression(e: sp.Expr) -> None:
     try:
-        own = exact("e", e, NAMES)
+        expression = exact("e", e, NAMES)
     except ValueError:  # a constant that is not real, in one line as tested above
         return
-    assert read("e", written(own), NAMES) == own
-    assert exact("e", own, NAMES) == own
-    assert not own.atoms(sp.Float)
-    place = {s: sp.Rational(7 * i + 3, 5) for i, s in enumerate(NAMES.values())}
-    found, meant = sp.N(own.subs(place)), sp.N(e.subs(place))
-    assert abs(found - meant) <= 1e-9 * (1 + abs(meant)) or sp.zoo in (found, meant)
+    assert read("e", written(expression), NAMES) == expression
+    assert exact("e", expression, NAMES) == expression
+    assert not expression.atoms(sp.Float)
+    point = {s: sp.Rational(7 * i + 3, 5) for i, s in enumerate(NAMES.values())}
+    value, meant = sp.N(expression.subs(point)), sp.N(e.subs(point))
+    assert abs(value - meant) <= 1e-9 * (1 + abs(meant)) or sp.zoo in (value, meant)

@@ -101,13 +101,13 @@ def test_numbers_run_into_words_give_no_warning() -> None:
 @given(st.text("0123456789.eE+-*/() pisqrtexlogcn_", max_size=40))
 def test_any_text_is_a_finite_float_or_an_error(text: str) -> None:
     try:
-        value, words = constant(text), "a finite float"
+        value, message = constant(text), "a finite float"
     except ValueError as error:
-        value, words = 0.0, str(error)
+        value, message = 0.0, str(error)
     assert type(value) is float
     assert math.isfinite(value)
-    assert len(words) > 10
-    assert "\n" not in words
+    assert len(message) > 10
+    assert "\n" not in message
 
 
 @settings(deadline=None, max_examples=100)

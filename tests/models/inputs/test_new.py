@@ -62,10 +62,10 @@ def test_the_starting_files_conform(placed: str) -> None:
 
 
 def test_a_file_of_ones_own_comes_before_the_other_name_of_another(placed: str) -> None:
-    own = replace(TOPOLOGY, also={placed: "ring", "loop": "ring", "elsewhere": placed})
-    assert plugins.named(own, placed) == placed
-    assert plugins.named(own, "loop") == "ring"
-    assert plugins.load(own, "elsewhere") is plugins.load(TOPOLOGY, placed)
+    kind = replace(TOPOLOGY, also={placed: "ring", "loop": "ring", "elsewhere": placed})
+    assert plugins.named(kind, placed) == placed
+    assert plugins.named(kind, "loop") == "ring"
+    assert plugins.load(kind, "elsewhere") is plugins.load(TOPOLOGY, placed)
 
 
 def test_the_starting_files_work_together(placed: str) -> None:
@@ -98,7 +98,7 @@ def test_nothing_is_overwritten(kind: str, tmp_path: Path, capsys: pytest.Captur
 
 
 @pytest.mark.parametrize(
-    ("kind", "name", "words"),
+    ("kind", "name", "message"),
     [
         ("friction", "../x", "small letters"),
         ("friction", "lambda", "no word of Python"),
@@ -115,9 +115,9 @@ def test_nothing_is_overwritten(kind: str, tmp_path: Path, capsys: pytest.Captur
         ("graph", "x", "invalid"),
     ],
 )
-def test_wrong_names(kind: str, name: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_names(kind: str, name: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["new", kind, name, "--dir", str(tmp_path)]) == 2
-    assert words in capsys.readouterr().err
+    assert message in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 
@@ -156,7 +156,7 @@ def test_a_scene_file_runs_code_only_with_the_option(law: Path, capsys: pytest.C
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "words"),
+    ("old", "new", "message"),
     [
         ("from synchain", "1 +\nfrom synchain", "line 6: SyntaxError"),
         ("from synchain", "1/0\nfrom synchain", "line 6: ZeroDivisionError"),
@@ -178,10 +178,10 @@ def test_a_scene_file_runs_code_only_with_the_option(law: Path, capsys: pytest.C
         ("sign(w)", "sign(z)", "undeclared symbol 'z'"),
     ],
 )
-def test_an_error_names_file_and_line(law: Path, old: str, new: str, words: str) -> None:
+def test_an_error_names_file_and_line(law: Path, old: str, new: str, message: str) -> None:
     law.write_text(law.read_text("utf-8").replace(old, new), encoding="utf-8")
     plugins.allow_code(law)
-    with pytest.raises(ValueError, match=words) as caught:
+    with pytest.raises(ValueError, match=message) as caught:
         _ = Scene(friction=str(law)).equations
     assert "my_law" in str(caught.value)
 
@@ -189,17 +189,17 @@ def test_an_error_names_file_and_line(law: Path, old: str, new: str, words: str)
 @pytest.fixture
 def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[dict[str, str], str], None]]:
     """A function that installs a package: its modules by name, and its entry points."""
-    place = tmp_path / "site"
-    monkeypatch.syspath_prepend(place)
+    path = tmp_path / "site"
+    monkeypatch.syspath_prepend(path)
     added = []
 
     def install(modules: dict[str, str], entries: str) -> None:
-        record = place / "elsewhere-1.0.dist-info"
+        record = path / "elsewhere-1.0.dist-info"
         record.mkdir(parents=True)
         (record / "METADATA").write_text("Metadata-Version: 2.1\nName: elsewhere\nVersion: 1.0\n")
         (record / "entry_points.txt").write_text(entries)
         for name, text in modules.items():
-            (place / f"{name}.py").write_text(text, encoding="utf-8")
+            (path / f"{name}.py").write_text(text, encoding="utf-8")
             added.append(name)
 
     yield install
@@ -359,9 +359,9 @@ def test_another_process_has_the_model_that_a_scene_was_made_with_whatever_its_f
     path = written(tmp_path / "well.py", WELL)
     packed = tmp_path / "scene"
     packed.write_bytes(pickle.dumps(Scene(oscillator=path)))
-    words = f"import pickle\nprint(pickle.load(open({str(packed)!r}, 'rb')).equations.node.rhs)"
+    text = f"import pickle\nprint(pickle.load(open({str(packed)!r}, 'rb')).equations.node.rhs)"
     written(tmp_path / "well.py", WELL.replace("x**2", "x**4"))
-    done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, timeout=240, check=False)
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, timeout=240, check=False)
     assert done.stdout == "(v, -x)\n"
 
 
@@ -371,10 +371,10 @@ def test_another_process_has_the_model_that_a_scene_was_made_with_whatever_its_f
 def test_every_plug_in_of_the_package_has_its_name_and_a_summary() -> None:
     for kind in KINDS.values():
         for name in plugins.names(kind):
-            made = plugins.load(kind, name)
-            assert isinstance(made, kind.types())
-            assert made.name == name
-            assert made.summary
+            part = plugins.load(kind, name)
+            assert isinstance(part, kind.types())
+            assert part.name == name
+            assert part.summary
 
 
 def refusal(kind: str, path: Path, text: str) -> str:
@@ -396,10 +396,12 @@ OLD = {
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_file_without_the_value_is_told_what_to_write(kind: str, tmp_path: Path) -> None:
-    told = refusal(kind, tmp_path / "part.py", OLD[kind])
-    assert told.startswith(f"part.py: found no {kind.upper()}; expected {kind.upper()} = {KINDS[kind].example}; see: ")
-    told = refusal(kind, tmp_path / "part.py", f"{kind.upper()} = True\n")
-    assert told.startswith(f"part.py: found {kind.upper()} = True; expected {kind.upper()} = ")
+    message = refusal(kind, tmp_path / "part.py", OLD[kind])
+    assert message.startswith(
+        f"part.py: found no {kind.upper()}; expected {kind.upper()} = {KINDS[kind].example}; see: "
+    )
+    message = refusal(kind, tmp_path / "part.py", f"{kind.upper()} = True\n")
+    assert message.startswith(f"part.py: found {kind.upper()} = True; expected {kind.upper()} = ")
 
 
 SCALED = (
@@ -415,7 +417,7 @@ FAMILY = (
 
 
 @pytest.mark.parametrize(
-    ("kind", "text", "words"),
+    ("kind", "text", "message"),
     [
         ("oscillator", WELL.replace('"x**2/2"', '"x**2/2", forces={}'), "line 2: TypeError: unknown keyword 'forces'"),
         ("oscillator", WELL.replace("})", "}, parameters={'d': 1})"), "no expression has the parameter 'd'; use it or"),
@@ -461,19 +463,19 @@ FAMILY = (
         ("topology", FAMILY.replace("edges, 1", "edges, '1'"), "minimum is '1'; expected the smallest number of nodes"),
     ],
 )
-def test_a_wrong_value_is_refused_in_one_line(kind: str, text: str, words: str, tmp_path: Path) -> None:
-    assert words in refusal(kind, tmp_path / "part.py", text)
+def test_a_wrong_value_is_refused_in_one_line(kind: str, text: str, message: str, tmp_path: Path) -> None:
+    assert message in refusal(kind, tmp_path / "part.py", text)
 
 
 def test_wrong_answers_of_a_family_are_those_of_its_file(tmp_path: Path) -> None:
     spectrum = FAMILY.replace("1, settle", "1, spectrum=spectrum, settle")
-    for returned, words in (
+    for returned, message in (
         ("[(0, n)]", "family.py: spectrum of .*: correct the closed form"),
         ("[1, 2]", r"family.py: spectrum\(3\) has 1; expected a list of \(eigenvalue, multiplicity\)"),
         ("1 / 0", r"family.py, line 3: ZeroDivisionError"),
     ):
         path = written(tmp_path / "family.py", f"def spectrum(n, *, step=1):\n    return {returned}\n{spectrum}")
-        with pytest.raises(ValueError, match=words):
+        with pytest.raises(ValueError, match=message):
             _ = topology(path, 3).spectrum
     path = written(tmp_path / "family.py", FAMILY.replace("return {'step': step}", "return step.nothing"))
     with pytest.raises(ValueError, match=r"family.py, line 5: AttributeError"):

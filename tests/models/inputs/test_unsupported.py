@@ -13,7 +13,7 @@ PAIR = sc.Scene("van_der_pol", "x->x", sc.chain(2))
 
 
 @pytest.mark.parametrize(
-    ("call", "words"),
+    ("call", "message"),
     [
         (lambda: sc.Scene(delay=1), "delays are not supported; JiTCDDE"),
         (lambda: PAIR.replace(noise=0.1), "noise is not supported; JiTCSDE"),
@@ -26,10 +26,10 @@ PAIR = sc.Scene("van_der_pol", "x->x", sc.chain(2))
         (lambda: sc.Field({"z": "sqrt(-1)*z"}), "real and imaginary part are two states"),
     ],
 )
-def test_words_that_ask_for_other_things(call: Callable[[], object], words: str) -> None:
+def test_words_that_ask_for_other_things(call: Callable[[], object], message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=r"unknown|found|rate of") as error:
         call()
-    assert words in str(error.value)
+    assert message in str(error.value)
 
 
 @pytest.mark.parametrize("function", [sc.equilibrium, sc.periodic_orbit, sc.lyapunov_spectrum])

@@ -252,8 +252,8 @@ def test_latex_of_every_oscillator_balances(oscillator: str, n: int) -> None:
     law = "stribeck" if oscillator_of(oscillator).takes_friction else None
     coupling = "spring"
     if not is_lagrangian(oscillator):
-        own = [s.name for s in node(oscillator).state]
-        coupling = f"{own[0]}->{own[0]}, -1/2 {own[-1]}->{own[0]}"
+        states = [s.name for s in node(oscillator).state]
+        coupling = f"{states[0]}->{states[0]}, -1/2 {states[-1]}->{states[0]}"
     lines = body(made(topology("chain", n), oscillator, law, coupling=coupling if n > 1 else None))
     for line in lines:
         for left, right in ("()", "{}"):
@@ -289,10 +289,10 @@ def test_the_dictionary_is_read_back_exactly(contact: str) -> None:
     equations = made(topology("ring", 3), contact=contact)
     shown = json.loads(json.dumps(as_dict(equations)))
     assert list(shown) == ["state", "parameters", "rhs", "jacobian", "time_derivative", "digest"]
-    known = {name: sp.Symbol(name, real=True) for name in (*shown["state"], *shown["parameters"])} | {"t": TIME}
+    symbols = {name: sp.Symbol(name, real=True) for name in (*shown["state"], *shown["parameters"])} | {"t": TIME}
 
     def read(line: str) -> sp.Expr:
-        return sp.parse_expr(line, local_dict=known)
+        return sp.parse_expr(line, local_dict=symbols)
 
     modes = ["slip_1", "slip_2", "slip_3"] if contact == "set-valued" else []
     assert shown["state"] == ["x_1", "x_2", "x_3", "v_1", "v_2", "v_3", *modes]

@@ -69,13 +69,13 @@ GRAPHS = [
 
 @pytest.mark.parametrize("graph", GRAPHS, ids=repr)
 def test_automorphisms_are_those_that_networkx_finds(graph: Topology) -> None:
-    found = automorphisms(graph)
+    group = automorphisms(graph)
     same = nx.isomorphism.DiGraphMatcher(
         directed(graph), directed(graph), edge_match=lambda a, b: a["weight"] == b["weight"]
     )
     expected = sorted(tuple(g[i] for i in range(graph.n)) for g in same.isomorphisms_iter())
-    assert list(found) == expected
-    assert found[0] == tuple(range(graph.n))
+    assert list(group) == expected
+    assert group[0] == tuple(range(graph.n))
 
 
 @pytest.mark.parametrize(
@@ -96,11 +96,11 @@ def test_automorphisms_are_those_that_networkx_finds(graph: Topology) -> None:
     ids=repr,
 )
 def test_counts_known_by_hand(graph: Topology, count: int) -> None:
-    found = orbital_partitions(graph)
-    assert len(found) == count
-    assert found[0].classes == tuple(range(graph.n))
-    assert [len(c.members) for c in found] == sorted((len(c.members) for c in found), reverse=True)
-    assert len({c.classes for c in found}) == count
+    partitions = orbital_partitions(graph)
+    assert len(partitions) == count
+    assert partitions[0].classes == tuple(range(graph.n))
+    assert [len(c.members) for c in partitions] == sorted((len(c.members) for c in partitions), reverse=True)
+    assert len({c.classes for c in partitions}) == count
 
 
 @pytest.mark.parametrize(
@@ -118,9 +118,9 @@ def test_all_groups_of_symmetries_are_covered(graph: Topology) -> None:
 def test_orbits_of_many_generators_are_joined() -> None:
     """The hypercube of 16 has partitions that are no join of two cycles: joined with further cycles all stay in the list."""
     graph = topology("hypercube", 16)
-    found = {c.classes for c in orbital_partitions(graph)}
+    names_found = {c.classes for c in orbital_partitions(graph)}
     group = automorphisms(graph)
-    for classes in sorted(found)[::10]:
+    for classes in sorted(names_found)[::10]:
         last: dict[int, int] = {}
         turned = list(range(16))  # a permutation whose cycles are these classes
         for i, k in enumerate(classes):
@@ -128,17 +128,17 @@ def test_orbits_of_many_generators_are_joined() -> None:
                 turned[i], turned[last[k]] = turned[last[k]], i
             last[k] = i
         assert orbits(16, [turned]) == classes
-        assert all(orbits(16, [turned, g]) in found for g in group[::7])
+        assert all(orbits(16, [turned, g]) in names_found for g in group[::7])
 
 
 @pytest.mark.parametrize("graph", GRAPHS, ids=repr)
 def test_quotient_and_blocks_have_the_eigenvalues_of_the_network(graph: Topology) -> None:
     expected = np.poly(np.array(graph.rows, dtype=float))
     for state in orbital_partitions(graph):
-        made = np.poly(np.array(state.quotient.rows, dtype=float))
+        polynomial = np.poly(np.array(state.quotient.rows, dtype=float))
         for block in state.blocks:
-            made = np.polymul(made, np.poly(np.array(block.matrix, dtype=float)))
-        assert np.real(made) == pytest.approx(np.real(expected), rel=1e-8, abs=1e-6 * np.abs(expected).max())
+            polynomial = np.polymul(polynomial, np.poly(np.array(block.matrix, dtype=float)))
+        assert np.real(polynomial) == pytest.approx(np.real(expected), rel=1e-8, abs=1e-6 * np.abs(expected).max())
         assert sum(len(b.matrix) for b in state.blocks) == graph.n - state.quotient.n
 
 

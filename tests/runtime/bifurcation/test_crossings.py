@@ -146,9 +146,9 @@ def test_a_branch_that_is_lost_says_so(tmp_path: object) -> None:
 def test_a_skeleton_says_which_branches_are_lost() -> None:
     scene = Scene(NODE, topology=topology("chain", 1), parameters={"a": -0.2, "b": -0.3, "r": 1e9})
     with pytest.warns(RuntimeWarning, match="skeleton: found no orbit and no bifurcation beyond j = "):
-        found = skeleton(scene, "j", [-1.0, -0.5, 0.5, 1.0], (1,), 2)
-    assert [len(branch.lost) for branch in found] == [1, 1]
-    assert "lost at" in repr(found)
+        result = skeleton(scene, "j", [-1.0, -0.5, 0.5, 1.0], (1,), 2)
+    assert [len(branch.lost) for branch in result] == [1, 1]
+    assert "lost at" in repr(result)
 
 
 def test_doublings_of_a_parametric_oscillator_are_found_in_any_form_of_its_drive() -> None:

@@ -107,8 +107,8 @@ def test_a_period_doubling_is_found_where_the_double_period_is_born() -> None:
     first = periodic_orbit(scene(), 2, omega=1.2)
     branch = follow(scene(), "omega", np.linspace(1.2, 1.24, 5), first)
     (change,) = branch.bifurcations
-    at, words = change.value, change.kind
-    assert words == "period doubling"
+    at, kind = change.value, change.kind
+    assert kind == "period doubling"
     assert len(branch.orbits) == 5
     assert [orbit.stable for orbit in branch.orbits] == [bool(value < at) for value in branch.values]
     far = scene(transient=3000.0)
@@ -123,8 +123,8 @@ def test_a_period_doubling_is_found_where_the_double_period_is_born() -> None:
 
 def coulomb(drive: float) -> Scene:
     """The exponential law without a fall is Coulomb's; a block on ground at rest."""
-    numbers = {"theta_b": 0.0, "epsilon": 1.0, "mu_s": 0.3, "mu_k": 0.3, "omega": 1.4, "u": drive}
-    return scene(parameters=numbers, transient=100.0)
+    values = {"theta_b": 0.0, "epsilon": 1.0, "mu_s": 0.3, "mu_k": 0.3, "omega": 1.4, "u": drive}
+    return scene(parameters=values, transient=100.0)
 
 
 @pytest.mark.long
@@ -138,8 +138,8 @@ def test_stops_begin_where_den_hartogs_motion_ends() -> None:
     assert first.phases.slip_states == (-1, 1)
     branch = follow(coulomb(1.2 * last), "u", np.linspace(1.2 * last, 0.9 * last, 3), first)
     (change,) = branch.bifurcations
-    at, words = change.value, change.kind
-    assert words == "stick loss"
+    at, kind = change.value, change.kind
+    assert kind == "stick loss"
     assert at == pytest.approx(last, abs=1e-8)
     assert branch.bifurcations[0].residual < 1e-8
     assert [len(phases.slip_states) for phases in branch.phases] == [2, 2, 4]
@@ -151,8 +151,8 @@ def test_stops_begin_where_den_hartogs_motion_ends() -> None:
 def test_a_branch_goes_through_a_graze_to_its_fold() -> None:
     """omega = 0.7: as the drive grows the load in stick of period one comes up to the limit of static friction, at the rate
     at which its gap has fallen; beyond, the orbit lets go twice, and ends where it meets another one."""
-    made = scene(transient=60.0, parameters={"omega": 0.7, "u": 0.15})
-    branch = follow(made, "u", [0.15, 0.25, 0.35, 0.45, 0.5, 0.55], periodic_orbit(made))
+    network = scene(transient=60.0, parameters={"omega": 0.7, "u": 0.15})
+    branch = follow(network, "u", [0.15, 0.25, 0.35, 0.45, 0.5, 0.55], periodic_orbit(network))
     assert [each.kind for each in branch.bifurcations] == ["period doubling", "grazing", "period doubling", "fold"]
     assert len(branch.orbits) == 5
     gaps = [phases.gap for phases in branch.phases[-2:]]
@@ -161,18 +161,20 @@ def test_a_branch_goes_through_a_graze_to_its_fold() -> None:
     assert max(each.residual for each in branch.bifurcations) < 3e-12
     assert [len(each.orbit.phases.slip_states) for each in branch.bifurcations if each.orbit.phases] == [2, 2, 4, 4]
     edge, turn = branch.bifurcations[-1].value, branch.bifurcations[-1].orbit.state
-    here = follow(made, "u", [0.5, 0.53, edge - 1e-4], branch.orbits[-1]).orbits[-1]
-    other = periodic_orbit(made, 1, 2.0 * turn - here.state, u=edge - 1e-4)  # the sheets lie on both sides of the fold
+    here = follow(network, "u", [0.5, 0.53, edge - 1e-4], branch.orbits[-1]).orbits[-1]
+    other = periodic_orbit(
+        network, 1, 2.0 * turn - here.state, u=edge - 1e-4
+    )  # the sheets lie on both sides of the fold
     assert sum(orbit.multipliers[0].real > 1.0 for orbit in (here, other)) == 1
     with pytest.raises(ArithmeticError):
-        periodic_orbit(made, 1, turn, u=edge + 1e-4)
+        periodic_orbit(network, 1, turn, u=edge + 1e-4)
 
 
 @pytest.mark.long
 def test_the_skeleton_of_a_diagram_has_stable_and_unstable_orbits() -> None:
     """Period two loses its stability between 1.2 and 1.24 and lives on; the orbit of period one is followed both ways."""
-    found = skeleton(scene(transient=1000.0), "omega", [1.2, 1.22, 1.24], periods=(2,))
-    (branch,) = found
+    result = skeleton(scene(transient=1000.0), "omega", [1.2, 1.22, 1.24], periods=(2,))
+    (branch,) = result
     assert [orbit.periods for orbit in branch.orbits] == [2, 2, 2]
     assert [orbit.stable for orbit in branch.orbits] == [True, True, False]
     assert [each.kind for each in branch.bifurcations] == ["period doubling"]
@@ -233,9 +235,9 @@ def test_what_is_refused() -> None:
     ],
 )
 def test_misuse_is_answered_in_one_line(call: Callable[..., object], kind: type, message: str) -> None:
-    with pytest.raises(kind, match=message) as found:
+    with pytest.raises(kind, match=message) as caught:
         call(scene(), known())
-    assert "\n" not in str(found.value)
+    assert "\n" not in str(caught.value)
 
 
 @cache

@@ -21,8 +21,8 @@ NODE = sc.Field(
 
 def duffing(s: float = 1, c: float = 0, k: float = 1, r: float = 1) -> sc.Scene:
     """Duffing's oscillator with x -> s x + c, v -> r v and t -> t/k."""
-    numbers = {"s": s, "c": c, "k": k, "r": r}
-    return sc.Scene(DUFFING, None, None, parameters=numbers, initial={"x": c + 1.2 * s, "v": 0.0}, transient=50)
+    values = {"s": s, "c": c, "k": k, "r": r}
+    return sc.Scene(DUFFING, None, None, parameters=values, initial={"x": c + 1.2 * s, "v": 0.0}, transient=50)
 
 
 def in_units(state: np.ndarray, scene: sc.Scene) -> np.ndarray:
@@ -63,14 +63,14 @@ def test_the_search_of_a_skeleton_follows_the_units(units: tuple[float, float, f
 
 def test_a_stable_orbit_far_from_the_start_is_found_and_the_search_said() -> None:
     """Where the search went 0.4 from the start in x at its own v, it was missed."""
-    numbers = {"d": 0.21, "a": 0.16, "b": 0.48, "c": 0.94, "w": 1.94, "u": 1.0011}
-    found = sc.skeleton(sc.Scene(NODE, None, None, parameters=numbers), "u", [1.0011], (1,), 1, show_progress=False)
-    states = [branch.orbits[0].state for branch in found if branch.orbits[0].stable]
+    values = {"d": 0.21, "a": 0.16, "b": 0.48, "c": 0.94, "w": 1.94, "u": 1.0011}
+    result = sc.skeleton(sc.Scene(NODE, None, None, parameters=values), "u", [1.0011], (1,), 1, show_progress=False)
+    states = [branch.orbits[0].state for branch in result if branch.orbits[0].stable]
     assert any(np.allclose(state, [0.837, 3.854], atol=1e-3) for state in states)
-    assert found.searched["v"][1] > 3.0
-    assert dict(found.summary)["starts"].startswith("x from -")
+    assert result.searched["v"][1] > 3.0
+    assert dict(result.summary)["starts"].startswith("x from -")
     near = sc.skeleton(
-        sc.Scene(NODE, None, None, parameters=numbers),
+        sc.Scene(NODE, None, None, parameters=values),
         "u",
         [1.0011],
         (1,),
@@ -79,18 +79,18 @@ def test_a_stable_orbit_far_from_the_start_is_found_and_the_search_said() -> Non
         show_progress=False,
     )
     assert near.searched["v"] == (0.0, 0.0)
-    for wrong, words in (
+    for wrong, message in (
         ({"y": (0, 1)}, "unknown key 'y'"),
         ({"x": (1, 0)}, "expected two numbers, the lower one first"),
     ):
-        with pytest.raises(ValueError, match=words):
-            sc.skeleton(sc.Scene(NODE, None, None, parameters=numbers), "u", [1.0], (1,), ranges=wrong)
+        with pytest.raises(ValueError, match=message):
+            sc.skeleton(sc.Scene(NODE, None, None, parameters=values), "u", [1.0], (1,), ranges=wrong)
 
 
 def test_motions_that_escape_are_left_and_those_that_stay_are_found() -> None:
     """x'' = -x/2 + x^2 - x'/5 + u cos 2t escapes from x > 1/2."""
-    numbers = {"d": 0.2, "a": 0.5, "b": 1.0, "c": 0.0, "w": 2.0, "u": 0.05}
-    scene = sc.Scene(NODE, None, None, parameters=numbers)
+    values = {"d": 0.2, "a": 0.5, "b": 1.0, "c": 0.0, "w": 2.0, "u": 0.05}
+    scene = sc.Scene(NODE, None, None, parameters=values)
     (branch,) = (b for b in sc.skeleton(scene, "u", [0.05], (1,), 1, show_progress=False) if b.orbits[0].stable)
     assert np.abs(branch.orbits[0].state).max() < 0.1
     for call in (
@@ -155,8 +155,8 @@ def test_every_field_of_a_scene_is_obeyed_refused_or_of_no_matter(plain: tuple[s
     }
     for field, value in FIELDS["same"].items():
         more = {"samples": 9} if field == "record" else {}
-        found = calls["periodic_orbit"](duffing().replace(**{field: value}, **more))
-        np.testing.assert_allclose(found, orbit.state, rtol=1e-12)
+        answer = calls["periodic_orbit"](duffing().replace(**{field: value}, **more))
+        np.testing.assert_allclose(answer, orbit.state, rtol=1e-12)
     for field, value in FIELDS["refused"].items():
         for name, call in calls.items():
             if (field, name) not in {("axes", "follow"), ("axes", "skeleton")}:  # the parameter that they sweep
