@@ -49,7 +49,9 @@ def test_an_exponent_that_is_not_finite_leaves_a_gap() -> None:
     fine = parabola(1.4, alpha)
     fine.exponent[2] = -math.inf
     with style.context():
-        axes = exponent_figure.draw_exponent(style.new_figure((3, 2)).add_subplot(), MSF(Scene(), alpha, fine))
+        axes = exponent_figure.draw_exponent(
+            style.new_figure((3, 2)).add_subplot(), MSF(Scene(topology=chain(2)), alpha, fine)
+        )
     curve, dots = axes.lines[1:]
     for line in (curve, dots):
         assert np.isnan(line.get_ydata()).tolist() == [k == 2 for k in range(9)]
@@ -60,7 +62,9 @@ def test_few_strengths_are_marked_on_the_line_of_all(asked: int, marked: bool) -
     fine = parabola(1.4, np.linspace(0.0, 1.2, 289))
     with style.context():
         alpha = np.linspace(0.0, 1.2, asked)
-        axes = exponent_figure.draw_exponent(style.new_figure((3, 2)).add_subplot(), MSF(Scene(), alpha, fine))
+        axes = exponent_figure.draw_exponent(
+            style.new_figure((3, 2)).add_subplot(), MSF(Scene(topology=chain(2)), alpha, fine)
+        )
     _, curve, *dots = axes.lines
     np.testing.assert_array_equal(curve.get_xdata(), fine.alpha)
     assert [(line.get_linestyle(), len(line.get_xdata())) for line in dots] == ([("None", 4)] if marked else [])
