@@ -7,7 +7,8 @@ generated steps, accepts both.
 from __future__ import annotations
 
 import itertools
-from typing import Any
+import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from scipy.linalg import expm
 
 from synchain.codegen import integrators
 from synchain.codegen.front_end import decorator
-from synchain.codegen.machine_code import compile as loading
+from synchain.codegen.machine_code.cache import cache_folder
 from synchain.models import Field, Rates, Scene, chain
 from synchain.runtime import run
 from synchain.runtime.support.status import Status
@@ -39,15 +40,20 @@ def exact(slopes: np.ndarray, rates: np.ndarray, start: np.ndarray) -> np.ndarra
     return (expm(WINDOW * bordered) @ [*start, 1.0])[:size]
 
 
+@pytest.fixture(scope="module")
+def drivers(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a cache with the compiled drivers of this machine and no kernels."""
+    folder = tmp_path_factory.mktemp("cache") / "drivers"
+    if cache_folder().is_dir():
+        shutil.copytree(cache_folder(), folder, ignore=shutil.ignore_patterns("kernel_*"))
+    return folder
+
+
 @pytest.fixture
-def problems(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def problems(monkeypatch: pytest.MonkeyPatch, drivers: Path) -> list[str]:
     """Compile every kernel anew; return the problems of the front end, whose functions Numba then compiles."""
-    stored, problems = loading._stored, list[str]()
-
-    def stored_driver(text: str, name: str, *others: Any) -> Any:
-        return None if name.startswith("kernel") else stored(text, name, *others)
-
-    monkeypatch.setattr(loading, "_stored", stored_driver)
+    problems = list[str]()
+    monkeypatch.setenv("SYNCHAIN_CACHE", str(drivers))
     monkeypatch.setattr(decorator, "front_end_problems", problems)
     return problems
 
