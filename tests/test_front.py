@@ -241,6 +241,7 @@ def test_examples_of_docstrings_run(name: str) -> None:
         "models.scenes.file",
         "models.sweeps.axis",
         "models.sweeps.distribution",
+        "runtime.results.result",
         "runtime.sweeps.run",
     ],
 )

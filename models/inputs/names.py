@@ -18,8 +18,8 @@ TAKEN = frozenset(
 """Variables and coordinates of results."""
 
 ATTRIBUTES = frozenset(
-    {"animate", "as_dict", "belongs_to", "data", "integrators", "kind", "link", "message", "name", "names", "plot", "restore", "save", "scene", "state",
-     "states", "stepped", "success", "summary"}
+    {"animate", "as_dict", "belongs_to", "data", "integrators", "isel", "kind", "link", "message", "name", "names", "plot", "restore", "save", "scene",
+     "sel", "state", "states", "stepped", "success", "summary", "to_dataframe", "to_xarray"}
 )  # fmt: skip
 """Attributes of results and of their data, which would hide variables of these names."""
 

@@ -68,6 +68,22 @@ MEANINGS = {
 }
 
 
+CONVENTIONS = "CF-1.11"
+"""Conventions of the attributes `long_name`, `units`, `flag_values`, `flag_masks` and `flag_meanings` of a result."""
+
+DIMENSIONLESS = frozenset(
+    {
+        "steps", "rejected", "periods_skipped", "section_count", "method_steps", "end_time", "drive_phase",
+        "section_time", "time", "transversal_exponent", "transversal_stderr", "rtol_used",
+    }
+)  # fmt: skip
+"""Variables with the unit "1" in any model: counts, non-dimensional times and rates per unit of them.
+
+States and errors have the units of the model; only a model with a scaling makes them dimensionless."""
+
+SCALED = frozenset({"end", "section", "trajectory", "sync_error", "sync_error_max", "sync_error_end"})
+"""States, and distances of states."""
+
 COUNTS = {
     "status": Count.STATUS,
     "steps": Count.ACCEPTED,
@@ -182,12 +198,29 @@ def _masks(scene: Scene) -> np.ndarray:
 
 
 def _attributes(scene: Scene, name: str) -> dict[str, object]:
-    """Return the attributes of a variable."""
+    """Return the attributes of a variable by the CF conventions: section 3.1 on units, 3.5 on flags."""
     attributes: dict[str, object] = {"long_name": meaning(scene, name)}
-    if name == "methods":  # a set of flags: CF conventions 1.11, section 3.5
-        flags = {"flag_masks": _masks(scene).astype(np.int32), "flag_meanings": " ".join(method_names(scene))}
-        attributes.update(flags)
+    if name == "methods":  # a set of flags
+        attributes |= {"flag_masks": _masks(scene).astype(np.int32), "flag_meanings": " ".join(method_names(scene))}
+    elif name == "status":
+        attributes |= _flags({int(code): code.name.lower() for code in Status})
+    elif name == "verdict":
+        attributes |= _flags({code: text.replace(" ", "_") for code, text in enumerate(VERDICTS)})
+    elif name == "ended_early":
+        attributes |= _flags({0: "whole_window", 1: "ended_early"})
+    elif name in DIMENSIONLESS or (name in SCALED and _scaled(scene)):
+        attributes["units"] = "1"
     return attributes
+
+
+def _flags(meanings: Mapping[int, str]) -> dict[str, object]:
+    """Return the attributes of a variable of codes."""
+    return {"flag_values": np.array(list(meanings), dtype=np.int32), "flag_meanings": " ".join(meanings.values())}
+
+
+def _scaled(scene: Scene) -> bool:
+    """Return whether all oscillators are made non-dimensional by their scales."""
+    return all(getattr(kind.oscillator.model, "scaling", None) is not None for kind in scene.model.kinds)
 
 
 def meaning(scene: Scene, name: str) -> str:
@@ -251,7 +284,7 @@ def labelled(
         for name, more, values in arrays
     }
     coords |= {name: labelled_arrays.pop(name) for name in TIMES if name in labelled_arrays}
-    return xr.Dataset(labelled_arrays, coords, dict(attributes))
+    return xr.Dataset(labelled_arrays, coords, {"Conventions": CONVENTIONS, **attributes})
 
 
 def scene_of(attributes: Mapping[str, Any]) -> Scene:

@@ -40,8 +40,9 @@ from .store import read_data, write_data
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator, Sequence
 
+    import pandas as pd
     from matplotlib.axes import Axes
 
     from synchain.models.dynamics.equations import Equations
@@ -59,8 +60,11 @@ class _Deferred:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Result(_Deferred, HasAnimation, Labelled):
-    """Labelled arrays of a run; a variable `name` of the data is also an attribute:
-    `result.sync_error`.
+    """Labelled arrays of a run, which reads like its `xarray.Dataset`.
+
+    A variable is an item and an attribute: ``result["sync_error"]`` and ``result.sync_error`` are the
+    same array.  `sel`, `isel`, `to_dataframe`, iteration and ``in`` are those of the dataset; its other
+    methods are reached by `data`.
 
     Attributes
     ----------
@@ -68,14 +72,39 @@ class Result(_Deferred, HasAnimation, Labelled):
         Its dimensions are the names of the axes (or "cell" if the axes are zipped), then "sample" or
         "point" of a record, then "component" and "node" of a state: `result.end.sel(component="v",
         node=3)`.  A state that a node of another kind does not have is NaN.  The times of samples
-        and points are the coordinates `time` and `section_time`.  Its attributes say how the result
-        came about.
+        and points are the coordinates `time` and `section_time`.  Its attributes hold the scene, the
+        versions and the processor that made the result, those of a variable its meaning, its units
+        and the meanings of its codes by the CF conventions.
     scene : Scene
         The scene, with its axes.
+
+    See Also
+    --------
+    run : Computes a result.
+    open_result : Reads a result from a file.
 
     Notes
     -----
     Every cell has a `status`; `synchain.runtime.Status` names the codes.  Times are non-dimensional.
+
+    References
+    ----------
+    CF Metadata Conventions 1.11, sections 3.1 (units) and 3.5 (flags), https://cfconventions.org.
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> scene = sc.Scene("van_der_pol", "x->v", sc.ring(4), transient=5, window=10)
+    >>> result = sc.run(scene, sigma=[0.0, 0.5, 1.0], show_progress=False)
+    >>> result["sync_error"].dims
+    ('sigma',)
+    >>> result.sel(sigma=0.4, method="nearest").status.item() == sc.Status.FINISHED
+    True
+    >>> result["status"].attrs["flag_meanings"].split()[:2]
+    ['not_run', 'finished']
+    >>> result.mean  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    AttributeError: this result has no 'mean'; it has: ...; methods of its dataset: result.data.mean(…)
     """
 
     data: xr.Dataset
@@ -103,9 +132,156 @@ class Result(_Deferred, HasAnimation, Labelled):
             object.__setattr__(self, "_make", lambda: data)
             return data
         if name.startswith("_") or name not in self.data:
-            names = ", ".join(sorted(map(str, self.data.data_vars)))
-            raise AttributeError(f"this result has no {name!r}; it has: {names}")
+            raise AttributeError(self._refusal(name))
         return self.data[name]
+
+    def _refusal(self, name: object) -> str:
+        """Return the message about a name that is no variable."""
+        names = ", ".join(sorted(map(str, self.data.data_vars)))
+        text = f"this result has no {name!r}; it has: {names}"
+        method = isinstance(name, str) and not name.startswith("_") and hasattr(xr.Dataset, name)
+        return f"{text}; methods of its dataset: result.data.{name}(…)" if method else f"{text}; its dataset is .data"
+
+    def __getitem__(self, name: str | Sequence[str]) -> Any:
+        """Return the variable or coordinate of a name, or the dataset of several names."""
+        names = [name] if isinstance(name, str) else name
+        missing = next((each for each in names if each not in self.data), None)
+        if missing is not None:
+            raise KeyError(self._refusal(missing))
+        return self.data[name] if isinstance(name, str) else self.data[list(name)]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.data
+
+    def __iter__(self) -> Iterator[str]:
+        return map(str, self.data)
+
+    def sel(self, indexers: Mapping[str, Any] | None = None, **more: Any) -> xr.Dataset:
+        """Select cells, samples, components and nodes by their values; see `xarray.Dataset.sel`.
+
+        Parameters
+        ----------
+        indexers : mapping, optional
+            Values, lists or slices of values by the names of dimensions.
+        **more
+            The same as keywords; `method="nearest"` takes the nearest value, at most `tolerance` away.
+
+        Returns
+        -------
+        xarray.Dataset
+
+        Raises
+        ------
+        KeyError
+            If an axis does not have the value.
+
+        See Also
+        --------
+        isel : Selects by position.
+
+        Examples
+        --------
+        >>> import synchain as sc
+        >>> scene = sc.Scene("van_der_pol", "x->v", sc.ring(4), transient=0, window=1)
+        >>> result = sc.run(scene, sigma=[0.0, 0.5], show_progress=False)
+        >>> result.sel(sigma=0.5, component="x").end.shape
+        (4,)
+        """
+        return self.data.sel(indexers, **more)
+
+    def isel(self, indexers: Mapping[str, Any] | None = None, **more: Any) -> xr.Dataset:
+        """Select cells, samples, components and nodes by position; see `xarray.Dataset.isel`.
+
+        Parameters
+        ----------
+        indexers : mapping, optional
+            Integers, lists or slices of integers by the names of dimensions, counted from 0.
+        **more
+            The same as keywords.
+
+        Returns
+        -------
+        xarray.Dataset
+
+        Raises
+        ------
+        IndexError
+            If a position is out of range.
+
+        See Also
+        --------
+        sel : Selects by value.
+
+        Examples
+        --------
+        >>> import synchain as sc
+        >>> scene = sc.Scene("van_der_pol", "x->v", sc.ring(4), transient=0, window=1)
+        >>> result = sc.run(scene, sigma=[0.0, 0.5], show_progress=False)
+        >>> result.isel(sigma=-1).sigma.item()
+        0.5
+        """
+        return self.data.isel(indexers, **more)
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return the dataset, `data`.
+
+        Returns
+        -------
+        xarray.Dataset
+
+        See Also
+        --------
+        to_dataframe : Makes a table.
+
+        Examples
+        --------
+        >>> import synchain as sc
+        >>> scene = sc.Scene("van_der_pol", "x->v", sc.ring(4), transient=0, window=1)
+        >>> sc.run(scene, sigma=[0.0, 0.5], show_progress=False).to_xarray().sizes["sigma"]
+        2
+        """
+        return self.data
+
+    def to_dataframe(self, names: str | Sequence[str] | None = None) -> pd.DataFrame:
+        """Return a table with one row for each cell, or for each value of the named variables.
+
+        Parameters
+        ----------
+        names : str or sequence of str, optional
+            Variables; by default all with one number for each cell, without states and records.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Its index are the dimensions of the variables; a single cell is one row.
+
+        Raises
+        ------
+        KeyError
+            If the result has no such variable.
+
+        See Also
+        --------
+        to_xarray : Returns all variables with their dimensions.
+
+        Examples
+        --------
+        >>> import synchain as sc
+        >>> scene = sc.Scene("van_der_pol", "x->v", sc.ring(4), transient=0, window=1)
+        >>> result = sc.run(scene, sigma=[0.0, 0.5], show_progress=False)
+        >>> result.to_dataframe()["status"].tolist()
+        [1, 1]
+        >>> result.to_dataframe("end").index.names
+        FrozenList(['sigma', 'component', 'node'])
+        """
+        if names is None:
+            cells = set(dimensions(self.scene))
+            names = [str(name) for name, values in self.data.items() if set(values.dims) <= cells]
+        chosen: xr.Dataset = self[[names] if isinstance(names, str) else list(names)]
+        # Coordinates of records, such as the times of samples, would add their dimensions.
+        used = {str(dim) for values in chosen.values() for dim in values.dims}
+        chosen = chosen.drop_vars([name for name, values in chosen.coords.items() if not set(values.dims) <= used])
+        return (chosen if used else chosen.expand_dims("cell")).to_dataframe()
 
     @property
     def success(self) -> bool:
