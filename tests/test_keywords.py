@@ -26,10 +26,11 @@ SHARED = {
     "show_progress": None,
     "progress": None,
     "parameters": None,
-    "seed": 0,
+    "seed": None,
     "precision": 1e-3,
     "periods": 5000,
-    "transient": 300,
+    "transient": None,
+    "rtol": None,
 }
 """The defaults wherever a function has the keyword."""
 
@@ -54,15 +55,10 @@ TAKEN = {
 """What each function that computes takes of the shared keywords."""
 
 OTHER = {
-    ("basin", "transient"): None,  # of a cell, as in Criterion
-    ("basin", "seed"): None,  # that of the scene, as in Criterion
     ("periodic_orbit", "periods"): 1,  # of the orbit
     ("skeleton", "periods"): (1, 2),  # of the orbits
-    ("skeleton", "transient"): 20,  # of the search
 }
 """Defaults that have another value, as the same word has another task."""
-
-RTOL = {"exponents": 1e-6, "msf": 1e-6, "plane": 1e-6, "cluster_exponents": 1e-8, "lyapunov_spectrum": 1e-8}
 
 SHORT = Criterion(starts=1, transient=2, window=1)
 DRIVEN = Scene(oscillator="duffing", topology=chain(2), parameters={"omega": 1.3}, transient=20.0)
@@ -71,10 +67,9 @@ DRIVEN = Scene(oscillator="duffing", topology=chain(2), parameters={"omega": 1.3
 @pytest.mark.parametrize("name", sorted(TAKEN))
 def test_the_shared_keywords_have_the_same_names_and_defaults(name: str) -> None:
     parameters = inspect.signature(getattr(runtime, name)).parameters
-    assert {word for word in (*SHARED, "rtol") if word in parameters} == TAKEN[name]
-    for word in TAKEN[name] - {"rtol"}:
+    assert {word for word in SHARED if word in parameters} == TAKEN[name]
+    for word in TAKEN[name]:
         assert parameters[word].default == OTHER.get((name, word), SHARED[word])
-    assert "rtol" not in parameters or parameters["rtol"].default == RTOL[name]
     assert [p.name for p in parameters.values() if p.kind is p.VAR_KEYWORD] == [
         "axes" if name in ("run", "stream") else "more"
     ]
@@ -413,6 +408,85 @@ def test_simulations_obey_or_refuse_every_field_of_a_scene(name: str) -> None:
     plain = answer()
     assert answer(**RECORDED) == plain
     assert [field for field, value in OBEYED.items() if answer(**{field: value}) == plain] == []
+
+
+AVERAGES: dict[str, Callable[..., Any]] = {
+    "exponents": lambda scene, **w: runtime.exponents(scene, [0.1, 0.2], starts=2, **w).by_start,
+    "msf": lambda scene, **w: runtime.msf(scene, [0.1, 0.2], starts=2, **w).fine.by_start,
+    "plane": lambda scene, **w: runtime.plane(scene, [0.1, 0.2], [0.0, 0.1], starts=2, **w).exponent,
+    "cluster_exponents": lambda scene, **w: runtime.cluster_exponents(scene, [0, 0], **w).exponent,
+    "lyapunov_spectrum": lambda scene, **w: runtime.lyapunov_spectrum(scene, **w).exponent,
+}
+ROSSLER = Scene("rossler", "x->x", chain(2), parameters={"sigma": 0.1}, integrator="taylor", transient=10.0)
+GIVEN: dict[str, Any] = {
+    "rtol": 1e-5,
+    "atol": 1e-3,
+    "transient": 40.0,
+    "seed": 3,
+    "max_steps": 3,
+    "integrator": "rodas5p",
+    "time_unit": "time",
+    "initial": {"x": 1.5, "y": 0.5, "z": 0.5},
+}
+"""Fields that the motion depends on, each with a value of its own."""
+
+
+@pytest.mark.parametrize("name", AVERAGES)
+@pytest.mark.parametrize("field", [name for name in GIVEN if name != "time_unit"])
+def test_averages_obey_what_a_scene_was_given(name: str, field: str) -> None:
+    def answer(scene: Scene, **words: Any) -> Any:
+        try:
+            return AVERAGES[name](scene, periods=8, show_progress=False, **words).tolist()
+        except FloatingPointError as problem:
+            return str(problem)
+
+    changed = answer(ROSSLER.replace(**{field: GIVEN[field]}))
+    assert changed != answer(ROSSLER)
+    if field in ("rtol", "seed"):  # a keyword says the same, and beats the scene
+        assert answer(ROSSLER, **{field: GIVEN[field]}) == changed
+        assert answer(ROSSLER.replace(**{field: 7 if field == "seed" else 1e-7}), **{field: GIVEN[field]}) == changed
+
+
+def test_the_transient_of_a_scene_counts_in_its_own_unit() -> None:
+    """Periods of a drive, whole ones; units of time without a drive, in as many mean return times."""
+    words: dict[str, Any] = {"starts": 1, "periods": 4, "show_progress": False}
+    driven = DRIVEN.replace(transient=19.2)
+    expected = runtime.exponents(DRIVEN, [0.1], transient=20, **words).exponent
+    np.testing.assert_array_equal(runtime.exponents(driven, [0.1], **words).exponent, expected)
+    free = runtime.exponents(ROSSLER, [0.1], **words)
+    turn = float(free.unit.partition(",")[2].split()[0])
+    counted = runtime.exponents(ROSSLER, [0.1], transient=int(np.ceil(10.0 / turn)), **words)
+    np.testing.assert_array_equal(free.exponent, counted.exponent)
+    heard: list[Progress] = []
+    runtime.exponents(ROSSLER, [0.1], progress=heard.append, **words)
+    assert heard[0].total == np.ceil(10.0 / turn) + 4
+
+
+def test_defaults_of_functions_hold_where_a_scene_was_given_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = ROSSLER.replace(transient=300.0)
+    words: dict[str, Any] = {"starts": 1, "periods": 1, "show_progress": False}
+    heard: list[Progress] = []
+    found = runtime.exponents(plain, [0.1], progress=heard.append, **words)
+    assert heard[0].total == 301
+    same = runtime.exponents(plain, [0.1], transient=300, rtol=1e-6, seed=0, **words)
+    np.testing.assert_array_equal(found.exponent, same.exponent)
+
+
+def test_skeletons_obey_the_transient_and_the_seed_of_a_scene(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[float] = []
+    monkeypatch.setattr(skeletons, "starts_of", lambda scene, seed, box: asked.append(seed) or np.zeros((1, 2)))
+    monkeypatch.setattr(
+        skeletons, "near_returns", lambda scene, periods, transient, states: asked.append(transient) or []
+    )
+    for changes, expected in (
+        ({}, [0, 20.0]),
+        ({"transient": 7.0, "seed": 3}, [3, 7.0]),
+        ({"transient": 300.0}, [0, skeletons.DROPPED]),
+        ({"transient": 10.0, "time_unit": "time"}, [0, 10.0 / (2 * np.pi / 1.3)]),
+    ):
+        asked.clear()
+        runtime.skeleton(DRIVEN.replace(**changes), "omega", [1.3], (1,), 1, show_progress=False)
+        assert asked == pytest.approx(expected)
 
 
 def test_basins_end_where_a_scene_stops() -> None:

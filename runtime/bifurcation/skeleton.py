@@ -23,9 +23,10 @@ from synchain.models.dynamics.reduction import without_drive
 from synchain.models.inputs.checks import check_integer, check_keys, check_number, check_table, short_repr
 from synchain.models.inputs.frozen import FrozenDict
 from synchain.models.mechanics.contact import SLIP
+from synchain.models.scenes.defaults import TimeUnit
 from synchain.models.scenes.scene import Scene, check_scene
 
-from ..cells.run_keywords import Given, with_numbers
+from ..cells.run_keywords import Given, chosen, with_numbers
 from ..results.labelled import Labelled, dataset
 from ..stability.exponents import coupled_cell
 from ..stability.orbits import OrbitProblem, driven_states, within
@@ -131,8 +132,8 @@ def skeleton(
     looks: int = 8,
     *,
     ranges: Mapping[str, Range] | None = None,
-    transient: float = DROPPED,
-    seed: int = 0,
+    transient: float | None = None,
+    seed: int | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
     parameters: Mapping[str, float] | None = None,
@@ -160,10 +161,10 @@ def skeleton(
         Components and the ends of the initial values between which motions are searched; other components start as the
         scene does. By default all components start in boxes of 1, 2, 4 … 32 times the extent of the motion from the
         scene's own start, around it. `Skeleton.searched` holds the ranges that were searched.
-    transient : float
-        Drive periods before the search.
-    seed : int
-        Seed of the initial states of the search.
+    transient : float, optional
+        Drive periods before the search; by default those of the scene if it was given any, else 20.
+    seed : int, optional
+        Seed of the initial states of the search; by default that of the scene.
     show_progress : bool, optional
         Whether to show a bar; by default a bar on terminals and in notebooks, a line a minute elsewhere.
     progress : callable, optional
@@ -228,7 +229,7 @@ def skeleton(
     # Search at evenly spread values: the middles of `count` equal parts of the grid.
     count = min(looks, len(grid))
     looked_at = sorted({int((2 * j + 1) * len(grid) / (2 * count)) for j in range(count)})
-    transient, seed = check_number("transient", transient, 0.0), check_integer("seed", seed, 0)
+    transient, seed = _transient(scene, transient), check_integer("seed", chosen(scene, "seed", seed, 0), 0)
     with Execution(1, None, show_progress, progress).reporter(len(looked_at), "value") as reporter:
         for k in reporter.each(looked_at):
             one = with_numbers(scene, {name: grid[k]})
@@ -244,6 +245,15 @@ def skeleton(
         tuple(sorted(branches, key=lambda branch: (branch.orbits[0].periods, branch.values[0]))),
         FrozenDict({component: (a, b) for component, a, b in zip(names, low, high, strict=True)}),
     )
+
+
+def _transient(scene: Scene, transient: float | None) -> float:
+    """Return the drive periods before the search: those of the call, else of the scene, else DROPPED."""
+    if transient is not None:
+        return check_number("transient", transient, 0.0)
+    length = chosen(scene, "transient", None, None)
+    unit = 1.0 if scene.time_unit == TimeUnit.PERIOD else scene.period or 1.0
+    return DROPPED if length is None else length / unit
 
 
 def _box(scene: Scene, ranges: Mapping[str, Range]) -> np.ndarray:

@@ -150,6 +150,14 @@ class Given:
         return f"unknown parameter or keyword {name!r} of {of}; known: {listed(valid_names)}{hint}"
 
 
+def chosen(scene: Scene, name: str, keyword: Any, default: Any) -> Any:
+    """Return a keyword; else what the scene was given, a value other than Scene's default; else the function's default."""
+    if keyword is not None:
+        return keyword
+    value = getattr(check_scene(scene), name)
+    return default if value == inspect.signature(Scene).parameters[name].default else value
+
+
 def with_numbers(scene: Scene, values: Mapping[str, object], **settings: object) -> Scene:
     """Return a scene with some parameters changed, also those with names of keywords, and some settings."""
     if values:

@@ -45,15 +45,15 @@ EXAMPLES = (
 POINTS = 1_000_000
 """Most points of one plane."""
 
-LINE = (0.0, 1.2, 241)
-"""Ends and number of the strengths unless --alpha gives others."""
-
 
 def configure(parser: ArgumentParser) -> None:
     """Add oscillator, network, strengths and effort."""
     add_scene(parser, default="the oscillator of table 1")
     parser.add_argument(
-        "--alpha", metavar="LO:HI:N", type=spaced, help="strengths, -sigma times an eigenvalue (default: 0:1.2:241)"
+        "--alpha",
+        metavar="LO:HI:N",
+        type=spaced,
+        help="strengths, -sigma times an eigenvalue (default: 241 that reach all modes at the strengths of SCENE)",
     )
     parser.add_argument("--beta", metavar="LO:HI:N", type=spaced, help="imaginary parts: look at complex strengths")
     add_set(
@@ -78,13 +78,13 @@ def execute(arguments: Namespace) -> int:
     """Compute the function on a line or over a plane, print its summary, write its files."""
     import numpy as np
 
-    from ..stability.msf import msf, plane
+    from ..stability.msf import default_strengths, msf, plane
     from ..support.files import output_folder
 
     with wrong_use():
         constants, rows = _constants_and_rows(arguments)
         scene = _scene(arguments, constants, rows)
-        alpha = np.linspace(*LINE) if arguments.alpha is None else np.array(arguments.alpha)
+        alpha = default_strengths(scene) if arguments.alpha is None else np.array(arguments.alpha)
         complex_modes = _check(scene, arguments, rows, alpha)
         target = None if arguments.out is None else output_folder(arguments.out)
     warn([*scene.warnings, *complex_modes])
@@ -171,7 +171,11 @@ def _scene(arguments: Namespace, constants: dict[str, float], rows: Rows) -> Sce
     for name in parameters:
         if not cell.takes(name):
             raise WrongUse(f"--set: {cell.model.unknown(name, 'parameter', tuple(cell.parameters))}")
-    return with_numbers(cell, parameters)
+    # an axis of the strength stays: it says how far the strengths of the modes reach
+    axes = () if scene is None or layered else scene.axes
+    return with_numbers(
+        cell, parameters, axes=[a for a in axes if a.name in cell.strengths and a.name not in parameters]
+    )
 
 
 def _check(scene: Scene, arguments: Namespace, rows: Rows, alpha: np.ndarray) -> list[str]:

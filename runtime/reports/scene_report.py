@@ -18,7 +18,7 @@ from synchain.models.sweeps.axis import Axis
 
 from ..engines.job import versions
 from ..engines.scene_kernels import kernel_source
-from ..stability.msf import MSF, msf
+from ..stability.msf import MSF, default_strengths, msf
 from ..sweeps.run import run
 from .html import STYLE, body, figure, provenance_rows, rows_table
 
@@ -35,9 +35,6 @@ img{display:block}
 img,svg,table,math{break-inside:avoid}details{display:none}}
 """
 
-
-DEFAULT = 1.2
-"""Largest strength of the master stability function of a scene without coupling."""
 
 POLICY = (
     '<meta http-equiv="Content-Security-Policy" '
@@ -93,7 +90,7 @@ def _stability(scene: Scene, effort: Effort, workers: int | None, show_progress:
     try:
         function = msf(
             scene.replace(axes=()),
-            _strengths(scene, effort.strengths),
+            default_strengths(scene, effort.strengths),
             precision=effort.precision,
             periods=effort.periods,
             workers=workers,
@@ -103,15 +100,6 @@ def _stability(scene: Scene, effort: Effort, workers: int | None, show_progress:
         return f"{rows_table(function.summary[1:])}{picture}{_ends(function)}{_fixed(scene)}"
     except (ValueError, FloatingPointError) as problem:
         return f"<p>This scene has none: {escape(str(problem))}</p>"
-
-
-def _strengths(scene: Scene, count: int) -> np.ndarray:
-    """Return strengths that cover all modes over the sweep of sigma, and 0; 0 … 1.2 if sigma is 0 throughout."""
-    fixed = scene.parameters[scene.strength]
-    swept = next((axis.values for axis in scene.axes if axis.name == scene.strength), (2.0 * fixed,))
-    largest = max(abs(value) for value in scene.topology.spectrum.values)
-    low, high = (largest * end(0.0, *swept) for end in (min, max))
-    return np.linspace(low, high if high > low else DEFAULT, count)
 
 
 def _ends(function: MSF) -> str:

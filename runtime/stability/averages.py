@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import TypeVar
 
@@ -13,7 +13,10 @@ import numpy as np
 from scipy.special import ndtr, stdtrit
 
 from synchain.models.inputs.checks import check_integer, check_number, check_positive
+from synchain.models.scenes.defaults import TimeUnit
+from synchain.models.scenes.scene import Scene
 
+from ..cells.run_keywords import chosen
 from ..support.execution import Execution
 from ..support.progress import Reporter
 
@@ -30,6 +33,8 @@ FIRST, PART = 128, 0.5
 """Periods before the first look at the errors, and the part of the length estimated then that precedes the second look."""
 ROUNDING = 100.0 * float(np.finfo(float).eps)
 """Part of a sum of terms that may be rounding (a choice)."""
+TRANSIENT = 300.0
+"""Periods before an average unless a call or the scene says otherwise (a choice)."""
 TOLERANCE_RATIO, TRIED = 4.0, 8
 """The error of the steps is estimated by repeating TRIED blocks at TOLERANCE_RATIO times the tolerance (a choice)."""
 
@@ -40,17 +45,18 @@ precision : float
     Averaging stops if every standard error is below this value.
 periods : float
     Longest average, in periods of the drive, or in mean return times of undriven motion; a whole number.
-transient : float
-    Transient before the average, in the same units.
+transient : float, optional
+    Transient before the average, in the same units; by default that of the scene if it was given one, else 300.
 """,
     "starts": """
 starts : int
     Number of initial states: that of the scene's first oscillator, and copies displaced at random in the first
     component by up to 0.4 of the extent of the motion.
-rtol : float
-    Relative tolerance of the integration. The friction law may require a smaller one.
-seed : int
-    Seed of the displacements.
+rtol : float, optional
+    Relative tolerance of the integration; by default that of the scene if it was given one, else 1e-6. The friction law
+    may require a smaller one.
+seed : int, optional
+    Seed of the displacements; by default that of the scene.
 workers : int, optional
     Number of threads; all cores by default.
 """,
@@ -91,6 +97,7 @@ class Averaging:
     transient: float  # transient before the average, in the same units; a whole number
     seed: int  # seed of the random numbers that are drawn before the orbit begins
     execution: Execution  # threads, and where progress is reported
+    of_scene: bool = False  # whether the transient is that of the scene, whose unit of time may be another
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "precision", check_number("precision", self.precision, 0.0))
@@ -98,9 +105,35 @@ class Averaging:
         object.__setattr__(self, "transient", check_whole("transient", check_number("transient", self.transient, 0.0)))
         object.__setattr__(self, "seed", check_integer("seed", self.seed, 0))
 
+    @classmethod
+    def for_scene(
+        cls,
+        scene: Scene,
+        precision: float,
+        periods: float,
+        transient: float | None,
+        seed: int | None,
+        execution: Execution,
+    ) -> Averaging:
+        """Return the averaging of a public function's call; a transient and a seed that are None are those of the scene."""
+        seed = chosen(scene, "seed", seed, 0)
+        length = chosen(scene, "transient", transient, None)
+        if transient is not None or length is None:
+            return cls(precision, periods, TRANSIENT if length is None else length, seed, execution)
+        return cls(precision, periods, _whole(scene, scene.period or 2.0 * math.pi), seed, execution, True)
+
+    def in_units(self, scene: Scene, unit: float) -> Averaging:
+        """Return the averaging with the scene's transient counted in the unit of time of the motion, which is now known."""
+        return replace(self, transient=_whole(scene, unit)) if self.of_scene else self
+
     def reporter(self, orbits: int = 1) -> Reporter:
         """Return a reporter of transients and longest averages along orbits in turn; its clock starts now."""
-        return self.execution.reporter(round(orbits * (self.transient + self.periods)), "period")
+        return self.execution.reporter(orbits * self.length, "period")
+
+    @property
+    def length(self) -> int:
+        """Periods of a transient and the longest average."""
+        return round(self.transient + self.periods)
 
     def rounds(self, batches: Batches, error: Callable[[], np.ndarray], reporter: Reporter) -> Iterator[int]:
         """Yield the number of blocks that remain; the caller adds at least one of them, until the average is precise enough.
@@ -126,6 +159,12 @@ class Averaging:
                 batches.plan(part * (worst / self.precision) ** 2 if self.precision else math.inf, part == 1.0)
                 part = 1.0
         batches.planned = None
+
+
+def _whole(scene: Scene, unit: float) -> float:
+    """Return the scene's transient in whole units of time; a period of the drive is one."""
+    length = scene.transient if scene.time_unit == TimeUnit.PERIOD else scene.transient / unit
+    return float(math.ceil(length * (1.0 - ROUNDING)))
 
 
 def check_whole(name: str, periods: float) -> float:

@@ -174,9 +174,9 @@ def cluster_exponents(
     *,
     precision: float = 1e-3,
     periods: float = 5000,
-    transient: float = 300,
-    rtol: float = 1e-8,
-    seed: int = 0,
+    transient: float | None = None,
+    rtol: float | None = None,
+    seed: int | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
     parameters: Mapping[str, float] | None = None,
@@ -192,10 +192,10 @@ def cluster_exponents(
         Partition of the nodes, from `synchain.models.symmetries.clusters` or as the cluster of each
         node. Each cluster starts from the state of its first node.
     {average}
-    rtol : float
-        Relative tolerance of the integration. The friction law may require a smaller one.
-    seed : int
-        Seed of the initial deviations.
+    rtol : float, optional
+        Relative tolerance of the integration; by default that of the scene. The friction law may require a smaller one.
+    seed : int, optional
+        Seed of the initial deviations; by default that of the scene.
     {progress}
     {parameters}
 
@@ -218,11 +218,15 @@ def cluster_exponents(
         If clusters approach each other: their largest distance halves from the first to the second
         half of the motion after the first half of the transient.
     """
-    averaging = Averaging(precision, periods, transient, seed, Execution(1, None, show_progress, progress))
-    scene = Given(cluster_exponents, parameters, more, ONE_ORBIT).scene(scene, rtol=rtol)
+    execution = Execution(1, None, show_progress, progress)
+    averaging = Averaging.for_scene(scene, precision, periods, transient, seed, execution)
+    given = Given(cluster_exponents, parameters, more, ONE_ORBIT)
+    scene = given.scene(scene, rtol=scene.rtol if rtol is None else rtol)
     partition = _of_graph(scene, state)
     reporter = averaging.reporter()
     problem, integrator = _integrator(scene, partition, averaging.seed)
+    averaging = averaging.in_units(scene, problem.unit)
+    reporter.total = averaging.length
     batches, dropped = Batches(problem.unit), round(averaging.transient)
     gaps: list[np.ndarray] = []  # (clusters, clusters) after each unit of time: largest difference of a component
 

@@ -24,7 +24,7 @@ from synchain.models.inputs.checks import check_integer
 from synchain.models.inputs.keywords import warn
 from synchain.models.scenes.scene import Scene, check_scene
 
-from ..cells.run_keywords import ONE_CELL, ORBITS, Given
+from ..cells.run_keywords import ONE_CELL, ORBITS, Given, chosen
 from ..prediction.intervals import Interval
 from ..results.labelled import Labelled, dataset
 from ..support.arrays import numbers
@@ -42,6 +42,9 @@ from .transversal_modes import unused_axes
 
 APART = 5.0
 """Two starts are on two motions if their averages differ by more than APART errors at any strength (a choice)."""
+
+RTOL = 1e-6
+"""Relative tolerance unless a call or the scene says otherwise: averages have larger errors (a choice)."""
 
 ROUNDING = 1e-9
 """The exponent at the first strength is zero below this share of the largest one."""
@@ -274,10 +277,10 @@ def exponents(
     *,
     precision: float = 1e-3,
     periods: float = 5000,
-    transient: float = 300,
+    transient: float | None = None,
     starts: int = 4,
-    rtol: float = 1e-6,
-    seed: int = 0,
+    rtol: float | None = None,
+    seed: int | None = None,
     workers: int | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
@@ -310,7 +313,7 @@ def exponents(
     Notes
     -----
     Of the scene's fields the model, parameters, first initial state, `contact`, `integrator`, `atol` and `max_steps` are
-    used; `rtol`, `transient` and `seed` are keywords here.
+    used; its `rtol`, `transient` and `seed` if they are not those of a scene by default, and no keyword is given.
 
     Raises
     ------
@@ -322,7 +325,8 @@ def exponents(
         If an integration fails.
     """
     given = Given(exponents, parameters, more, ORBITS)
-    averaging = Averaging(precision, periods, transient, seed, Execution(workers, None, show_progress, progress))
+    execution = Execution(workers, None, show_progress, progress)
+    averaging = Averaging.for_scene(scene, precision, periods, transient, seed, execution)
     asked = numbers("alpha", alpha, complex_too=True)
     of_layers = asked.ndim == 2 and len(check_scene(scene).model.linked) > 1
     strengths = row_of("alpha", asked.ravel() if of_layers else asked, complex_too=True)
@@ -332,11 +336,14 @@ def exponents(
 
 
 def transversal(
-    given: Given, scene: Scene, strengths: np.ndarray, starts: int, rtol: float, averaging: Averaging
+    given: Given, scene: Scene, strengths: np.ndarray, starts: int, rtol: float | None, averaging: Averaging
 ) -> Exponents:
     """Compute the exponents at strengths (m,) or (m, layers) for a public function's call."""
     reporter = averaging.reporter()
-    problem, states = orbits_of(coupled_cell(given, scene, rtol), strengths, starts, averaging)
+    cell = coupled_cell(given, scene, chosen(scene, "rtol", rtol, RTOL))
+    problem, states = orbits_of(cell, strengths, starts, averaging)
+    averaging = averaging.in_units(cell, problem.unit)
+    reporter.total = averaging.length
     with reporter:
         return along(problem, states, strengths, averaging, reporter)
 

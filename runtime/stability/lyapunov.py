@@ -195,9 +195,9 @@ def lyapunov_spectrum(
     count: int | None = None,
     precision: float = 1e-3,
     periods: float = 5000,
-    transient: float = 300,
-    rtol: float = 1e-8,
-    seed: int = 0,
+    transient: float | None = None,
+    rtol: float | None = None,
+    seed: int | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
     parameters: Mapping[str, float] | None = None,
@@ -212,10 +212,11 @@ def lyapunov_spectrum(
     count : int, optional
         Number of largest exponents; all by default.
     {average}
-    rtol : float
-        Relative tolerance of the integration, at most 1e-5. The friction law may require a smaller one.
-    seed : int
-        Seed of the initial directions.
+    rtol : float, optional
+        Relative tolerance of the integration, at most 1e-5; by default that of the scene. The friction law may require a
+        smaller one.
+    seed : int, optional
+        Seed of the initial directions; by default that of the scene.
     {progress}
     {parameters}
 
@@ -231,8 +232,10 @@ def lyapunov_spectrum(
     FloatingPointError
         If the integration fails.
     """
-    averaging = Averaging(precision, periods, transient, seed, Execution(1, None, show_progress, progress))
-    scene = Given(lyapunov_spectrum, parameters, more, ONE_ORBIT).scene(scene, rtol=rtol)
+    execution = Execution(1, None, show_progress, progress)
+    averaging = Averaging.for_scene(scene, precision, periods, transient, seed, execution)
+    given = Given(lyapunov_spectrum, parameters, more, ONE_ORBIT)
+    scene = given.scene(scene, rtol=scene.rtol if rtol is None else rtol)
     reporter = averaging.reporter()
     dimension = scene.n * len(scene.equations.nodes[0].continuous)
     if count is not None and not 1 <= check_integer("count", count, -dimension) <= dimension:
@@ -243,6 +246,8 @@ def lyapunov_spectrum(
             f"rtol: found {frame.rtol:g}; expected at most {LARGEST_RTOL:g} for a whole spectrum, whose directions must "
             "stand out of the error of a block"
         )
+    averaging = averaging.in_units(scene, frame.unit)
+    reporter.total = averaging.length
     with reporter:
         for _ in range(round(averaging.transient)):
             frame.advance()

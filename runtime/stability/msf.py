@@ -32,8 +32,9 @@ from synchain.models.inputs.display import HasPlot
 from synchain.models.inputs.keywords import warn
 from synchain.models.inputs.names import expect_free
 from synchain.models.scenes.scene import Scene, check_scene
+from synchain.models.sweeps.axis import Axis
 
-from ..cells.run_keywords import ORBITS, Given, with_numbers
+from ..cells.run_keywords import ORBITS, Given, chosen, with_numbers
 from ..prediction.intervals import Interval
 from ..prediction.mode_windows import NetworkMode, defective_rows
 from ..prediction.mode_windows import transversal_modes as network_modes
@@ -44,7 +45,7 @@ from ..support.error_text import range_text, with_error
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .averages import Averaging, document_keywords
-from .exponents import Exponents, along, coupled_cell, exponent_rows, orbits_of, transversal, with_partner
+from .exponents import RTOL, Exponents, along, coupled_cell, exponent_rows, orbits_of, transversal, with_partner
 from .transversal_modes import SharedOrbit, shared_orbits, still_strengths, transversal_modes
 
 if TYPE_CHECKING:
@@ -66,6 +67,10 @@ LOOKED_UP = 2001
 
 FINE = 1001
 """Least number of strengths of a master stability function; ends of ranges are interpolated between them (a choice)."""
+
+
+STRENGTH_COUNT, TOP = 241, 1.2
+"""Strengths of a function by default, and the last one if the scene says none: twelve tenths, as in the paper's figures."""
 
 
 class StabilityClass(StrEnum):
@@ -483,14 +488,14 @@ class Plane(Labelled):
 @document_keywords
 def msf(
     scene: Scene,
-    alpha: Sequence[float] | np.ndarray,
+    alpha: Sequence[float] | np.ndarray | None = None,
     *,
     precision: float = 1e-3,
     periods: float = 5000,
-    transient: float = 300,
+    transient: float | None = None,
     starts: int = 4,
-    rtol: float = 1e-6,
-    seed: int = 0,
+    rtol: float | None = None,
+    seed: int | None = None,
     workers: int | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
@@ -503,8 +508,9 @@ def msf(
     ----------
     scene : Scene
         Source of the oscillator and the coupling.
-    alpha : array_like, shape (m,)
-        Increasing real strengths alpha = -sigma gamma.
+    alpha : array_like, shape (m,), optional
+        Increasing real strengths alpha = -sigma gamma. By default 241 that reach from 0 to all modes of the network at the
+        strengths that the scene sweeps, or at twice its strength; to 1.2 if that is 0.
     {average}
     {starts}
     {progress}
@@ -520,12 +526,30 @@ def msf(
         If the strengths do not increase, and as in `exponents`.
     FloatingPointError
         If an integration fails.
+
+    See Also
+    --------
+    plane : Takes complex strengths, or parameters as axes.
+    exponents : Computes the exponents of given modes.
+
+    Examples
+    --------
+    >>> import synchain as sc
+    >>> function = sc.msf(sc.Scene("duffing", "spring", sc.chain(4), parameters={"sigma": 0.1}), periods=50)
+    >>> float(function.alpha[0]), round(float(function.alpha[-1]), 10)
+    (0.0, 0.69)
     """
-    expect_vanishing("msf", check_scene(scene).equations)
-    line = row("alpha", alpha, 2, rising=True)
-    fine = np.union1d(line, np.linspace(line[0], line[-1], FINE))
     given = Given(msf, parameters, more, ORBITS)
-    averaging = Averaging(precision, periods, transient, seed, Execution(workers, None, show_progress, progress))
+    expect_vanishing("msf", check_scene(scene).equations)
+    line = row(
+        "alpha",
+        default_strengths(_with_parameters(given, scene, scene.axes)) if alpha is None else alpha,
+        2,
+        rising=True,
+    )
+    fine = np.union1d(line, np.linspace(line[0], line[-1], FINE))
+    execution = Execution(workers, None, show_progress, progress)
+    averaging = Averaging.for_scene(scene, precision, periods, transient, seed, execution)
     return MSF(_with_parameters(given, scene), line, transversal(given, scene, fine, starts, rtol, averaging))
 
 
@@ -537,10 +561,10 @@ def plane(
     *,
     precision: float = 1e-3,
     periods: float = 5000,
-    transient: float = 300,
+    transient: float | None = None,
     starts: int = 4,
-    rtol: float = 1e-6,
-    seed: int = 0,
+    rtol: float | None = None,
+    seed: int | None = None,
     workers: int | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
@@ -587,7 +611,8 @@ def plane(
     Several layers: Sorrentino, New J. Phys. 14, 033035 (2012); links that act between equal states: Belykh, de Lange &
     Hasler, Phys. Rev. Lett. 94, 188101 (2005).
     """
-    averaging = Averaging(precision, periods, transient, seed, Execution(workers, None, show_progress, progress))
+    execution = Execution(workers, None, show_progress, progress)
+    averaging = Averaging.for_scene(scene, precision, periods, transient, seed, execution)
     call = Given(plane, parameters, more, ORBITS)
     call.checked(with_partner(scene))
     rows, fixed = call.parted()
@@ -632,7 +657,7 @@ def _over_parameters(
     axes: Mapping[str, np.ndarray],
     strengths: tuple[str, ...],
     starts: int,
-    rtol: float,
+    rtol: float | None,
     averaging: Averaging,
 ) -> Plane:
     """Exponents over two axes, `strengths` of them strengths, along one synchronous orbit after the other."""
@@ -645,7 +670,7 @@ def _over_parameters(
         call.expect_one_cell(scene)
     _, fixed = call.parted()
     at_first = {**fixed.values, **{name: values[0] for name, values in rows.items()}}
-    cell = coupled_cell(replace(fixed, table=at_first), scene, rtol)
+    cell = coupled_cell(replace(fixed, table=at_first), scene, chosen(scene, "rtol", rtol, RTOL))
     still = still_strengths(cell)
     orbit_parameters = mode(cell.equations).orbit.parameters
     for name, values in rows.items():
@@ -675,14 +700,15 @@ def _over_parameters(
         for done, orbit in enumerate(orbits, start=1):
             at = np.unravel_index(orbit.cells, shape)
             problem, states = orbits_of(with_numbers(cell, orbit.parameters), orbit.strengths, starts, averaging)
-            found = along(problem, states, orbit.strengths, averaging, reporter)
+            of_orbit = averaging.in_units(cell, problem.unit)
+            found = along(problem, states, orbit.strengths, of_orbit, reporter)
             # at each point the mode with the largest exponent counts
             table, points_of_orbit = found.exponent[orbit.place], np.arange(len(orbit.cells))
             worst[at] = largest = table.argmax(axis=1)
             exponent[at] = table[points_of_orbit, largest]
             stderr[at] = found.stderr[orbit.place][points_of_orbit, largest]
             kinds[at], longest = _kinds(found), max(longest, found.time)
-            reporter.advance(reporter.total * done / len(orbits) - reporter.done)
+            reporter.advance(max(reporter.total * done / len(orbits) - reporter.done, 0.0))
     unmoved = still if modes else strengths
     attractors = kinds[tuple(slice(1) if name in unmoved else slice(None) for name in axes)].astype(str)
     (across, up), index = axes.values(), worst if modes else None
@@ -699,9 +725,32 @@ def _kinds(exponents: Exponents) -> np.ndarray:
     return np.array([attractor.kind for attractor in exponents.attractors])
 
 
-def _with_parameters(given: Given, scene: Scene) -> Scene:
-    """The scene with its parameters, which fix its axes; a lone oscillator has none of the links."""
-    return with_numbers(scene, {name: value for name, value in given.values.items() if scene.takes(name)}, axes=())
+def _with_parameters(given: Given, scene: Scene, axes: Sequence[Axis] = ()) -> Scene:
+    """The scene with its parameters, and the axes that they do not fix; a lone oscillator has none of the links."""
+    values = {name: value for name, value in given.values.items() if scene.takes(name)}
+    return with_numbers(scene, values, axes=[axis for axis in axes if axis.name not in values])
+
+
+def default_strengths(scene: Scene, count: int = STRENGTH_COUNT) -> np.ndarray:
+    """Return strengths (count,) from 0 to all modes of a network, at the strengths that its scene sweeps or at twice its own.
+
+    They end at TOP without links and if the strength is 0.
+    """
+    low = high = 0.0
+    if len(scene.model.linked) == 1:
+        swept = next((axis.values for axis in scene.axes if axis.name == scene.strength), None)
+        sigma = (2.0 * scene.parameters[scene.strength],) if swept is None else swept
+        largest = max(abs(value) for value in scene.topology.spectrum.values)
+        low, high = (_rounded_up(largest * end(0.0, *sigma)) for end in (min, max))
+    return np.linspace(low, high if high > low else TOP, count)
+
+
+def _rounded_up(value: float) -> float:
+    """Return a number rounded away from zero to two digits."""
+    if value == 0.0:
+        return 0.0
+    unit = 10.0 ** (math.floor(math.log10(abs(value))) - 1)
+    return float(f"{math.copysign(math.ceil(abs(value) / unit * (1.0 - 1e-12)) * unit, value):.2g}")
 
 
 def classify(intervals: Sequence[Interval], end: float, begin: float = 0.0) -> StabilityClass:

@@ -16,7 +16,7 @@ from synchain.models import Field, Scene, load_scene, topology
 from synchain.runtime import msf, run
 from synchain.runtime.cli import main
 from synchain.runtime.reports.html import provenance_rows
-from synchain.runtime.reports.scene_report import Effort, _ends, _strengths, report
+from synchain.runtime.reports.scene_report import Effort, _ends, report
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed")
@@ -115,21 +115,6 @@ def test_a_file_that_is_no_scene_is_said_to_be_one(
     Path("result.nc").write_bytes(b"CDF")
     assert main(["report", "result.nc", "--out", "page.html"]) == 2
     assert "found a file of another kind; expected a scene, whose name ends in .toml" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("changes", "ends"),
-    [
-        ({"sigma": 0.1}, (0.0, 0.6)),
-        ({"sigma": -0.1}, (-0.6, 0.0)),
-        ({"sigma": 0.0}, (0.0, 1.2)),
-        ({"axes": {"sigma": [0.2, 0.5]}}, (0.0, 1.5)),
-        ({"axes": {"omega": [1.0, 2.0], "sigma": [-0.2, 0.1]}}, (-0.6, 0.3)),
-    ],
-)
-def test_strengths_are_those_of_the_sweep(changes: dict[str, object], ends: tuple[float, float]) -> None:
-    line = _strengths(Scene("duffing", "x->v", topology("chain", 3)).replace(**changes), 5)
-    assert (line[0], line[-1], len(line)) == (*map(pytest.approx, ends), 5)
 
 
 def test_the_function_of_a_swept_scene_is_that_of_its_own_values() -> None:

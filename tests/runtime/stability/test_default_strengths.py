@@ -1,0 +1,47 @@
+"""The strengths of a master stability function that is asked for without any: one rule for Python, commands and reports."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from synchain.models import Scene, chain
+from synchain.models.scenes.file import load_scene
+from synchain.runtime import msf
+from synchain.runtime.cli import main
+from synchain.runtime.stability.msf import default_strengths
+
+SHORT: dict[str, Any] = {"starts": 1, "transient": 2, "periods": 2, "show_progress": False}
+
+
+@pytest.mark.parametrize(
+    ("changes", "ends"),
+    [
+        ({"sigma": 0.1}, (0.0, 0.6)),
+        ({"sigma": -0.1}, (-0.6, 0.0)),
+        ({"sigma": 0.0}, (0.0, 1.2)),
+        ({"sigma": 1234.0}, (0.0, 7500.0)),
+        ({"axes": {"sigma": [0.2, 0.5]}}, (0.0, 1.5)),
+        ({"axes": {"omega": [1.0, 2.0], "sigma": [-0.2, 0.1]}}, (-0.6, 0.3)),
+        ({"topology": chain(1), "parameters": None}, (0.0, 1.2)),
+    ],
+)
+def test_strengths_reach_all_modes_of_the_sweep(changes: dict[str, object], ends: tuple[float, float]) -> None:
+    line = default_strengths(Scene("duffing", "x->v", chain(3)).replace(**changes), 5)
+    assert (line[0], line[-1], len(line)) == (*map(pytest.approx, ends), 5)
+
+
+def test_a_function_without_strengths_takes_them() -> None:
+    scene = Scene("duffing", "spring", chain(3), axes={"sigma": [0.1, 0.2]})
+    np.testing.assert_array_equal(msf(scene, **SHORT).alpha, np.linspace(0.0, 0.6, 241))
+    np.testing.assert_array_equal(msf(scene, sigma=0.05, **SHORT).alpha, np.linspace(0.0, 0.3, 241))
+    assert msf(scene, [0.0, 0.1], **SHORT).alpha[-1] == 0.1
+
+
+def test_the_command_takes_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["msf", "figure_8", "--periods", "1", "--starts", "1", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["alpha"] == default_strengths(load_scene("figure_8")).tolist()
+    assert default_strengths(load_scene("figure_8"))[-1] == 1.2
