@@ -22,7 +22,7 @@ __all__ = ["main", "parser"]
 
 ABOUT = "Networks of coupled oscillators: exact equations and spectra, generated kernels, sweeps, thresholds, figures."
 EXAMPLES = (
-    "synchain figures --quick --out figures",
+    "synchain paper --quick --out figures",
     "synchain spectrum chain 4",
     "synchain run figure_4a --out results",
 )

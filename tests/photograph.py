@@ -894,10 +894,9 @@ def _() -> Quantities:
         "equations figure_7 --c",
         "equations huygens --python",
         "equations figure_1b --numba",
-        "topologies",
-        "scenes",
     )
-    return {line: printed(*line.split()) for line in lines}
+    lists = {"topologies": printed("list", "graphs"), "scenes": printed("list", "scenes")}
+    return {line: printed(*line.split()) for line in lines} | lists
 
 
 # -- by hand ---------------------------------------------------------------------------------------------------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ..console.outcome import FINE, Failed, sentence
+from ..console.outcome import FINE, Failed, WrongUse, print_json, sentence
 from ..support.error_text import counted
 
 SUMMARY = "show, empty or fill the folder of compiled kernels"
@@ -19,17 +19,22 @@ def configure(parser: ArgumentParser) -> None:
         help="info: folder, number of kernels and size; clear: delete the kernels and drivers; they are compiled again "
         "when needed; warm: compile the drivers and recorders that most scenes share",
     )
+    parser.add_argument("--json", action="store_true", help="info: print JSON: folder, kernels, drivers, bytes")
 
 
 def execute(arguments: Namespace) -> int:
     """Describe, empty or fill the cache."""
+    if arguments.json and arguments.action != "info":
+        raise WrongUse(f"found --json with {arguments.action}; expected it with info; leave it out")
     if arguments.action == "warm":
         return _warm()
     from synchain.codegen.machine_code.cache import clear, describe
 
     try:
         info = describe()
-        if arguments.action == "info":
+        if arguments.json:
+            print_json({**info, "folder": str(info["folder"])})
+        elif arguments.action == "info":
             print(f"folder   {info['folder']}\nkernels  {info['kernels']}\ndrivers  {info['drivers']}")
             print(f"size     {_size(int(info['bytes']))}")
         else:

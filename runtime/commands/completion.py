@@ -66,7 +66,7 @@ def _parser_of_all() -> ArgumentParser:
     from ..paper import names as figures
     from . import command, names
 
-    paths = {"DIR": shtab.DIRECTORY, "FILE": shtab.FILE, "XML": shtab.FILE, "SCENE": SCENES}
+    paths = {"DIR": shtab.DIRECTORY, "FILE": shtab.FILE, "PICTURE": shtab.FILE, "XML": shtab.FILE, "SCENE": SCENES}
     choices = {"TOPOLOGY": families(), "FIGURE": figures(extra=True)}
     all_commands = ArgumentParser(prog="synchain")
     all_commands.add_argument("--version", action="store_true", help="print the version")

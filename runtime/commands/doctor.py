@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import platform
 import sys
 import warnings
 from argparse import ArgumentParser, Namespace
@@ -93,6 +92,7 @@ def examine(checks: Mapping[str, Callable[[], Answer]] | None = None) -> Iterato
 
 def _packages() -> Answer:
     import importlib.metadata
+    import platform
 
     from packaging.requirements import Requirement
 
@@ -130,6 +130,8 @@ def _cache() -> Answer:
 
 
 def _processor() -> Answer:
+    import platform
+
     import llvmlite.binding as llvm
 
     from synchain.codegen.simd.lane_types import has_fma, native_width

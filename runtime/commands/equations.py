@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ..console.arguments import add_scene
 from ..console.outcome import FINE, print_json, warn, wrong_use
+from ..console.scene_arguments import add_changed_scene, changed_scene
 
 SUMMARY = "print the equations of motion that a scene integrates"
 EXAMPLES = (
@@ -23,7 +23,7 @@ SOURCES = {
 
 def configure(parser: ArgumentParser) -> None:
     """Add the scene and the form."""
-    add_scene(parser)
+    add_changed_scene(parser)
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--latex", action="store_true", help="print LaTeX")
     form.add_argument("--json", action="store_true", help="print JSON: states, parameters, right-hand sides")
@@ -34,10 +34,9 @@ def configure(parser: ArgumentParser) -> None:
 def execute(arguments: Namespace) -> int:
     """Print the equations as text, LaTeX, JSON or source."""
     from synchain.models.presentation.equations_text import as_dict, latex, text
-    from synchain.models.scenes.file import load_scene
 
     with wrong_use():
-        scene = load_scene(arguments.scene)
+        scene = changed_scene(arguments)
     source = next((name for name in SOURCES if getattr(arguments, name)), None)
     if source is not None:
         from synchain.codegen import export

@@ -85,6 +85,7 @@ def execute(arguments: Namespace) -> int:
         constants, rows = _constants_and_rows(arguments)
         scene = _scene(arguments, constants, rows)
         alpha = default_strengths(scene) if arguments.alpha is None else np.array(arguments.alpha)
+        scene = scene.replace(axes=())  # an axis of the strength has said how far the modes reach
         complex_modes = _check(scene, arguments, rows, alpha)
         target = None if arguments.out is None else output_folder(arguments.out)
     warn([*scene.warnings, *complex_modes])
@@ -171,7 +172,7 @@ def _scene(arguments: Namespace, constants: dict[str, float], rows: Rows) -> Sce
     for name in parameters:
         if not cell.takes(name):
             raise WrongUse(f"--set: {cell.model.unknown(name, 'parameter', tuple(cell.parameters))}")
-    # an axis of the strength stays: it says how far the strengths of the modes reach
+    # an axis of the strength stays, for the strengths of the modes
     axes = () if scene is None or layered else scene.axes
     return with_numbers(
         cell, parameters, axes=[a for a in axes if a.name in cell.strengths and a.name not in parameters]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import keyword
 import re
 from argparse import ArgumentParser, Namespace
+from pathlib import Path
 
 from ..console.arguments import folder
 from ..console.outcome import FINE, WrongUse, wrong_use
@@ -21,28 +22,14 @@ def configure(parser: ArgumentParser) -> None:
     """Add the kind, the name and the folder."""
     parser.add_argument("kind", metavar="KIND", choices=tuple(HOMES), help=", ".join(HOMES))
     parser.add_argument("name", metavar="NAME", help="small letters, digits and underscores, e.g. my_law")
-    parser.add_argument("--dir", metavar="DIR", type=folder, default=".", help="where to write (default: this folder)")
+    add_directory(parser)
 
 
 def execute(arguments: Namespace) -> int:
     """Write the file; one that exists is left as it is."""
-    from importlib import resources
-
-    from ..support.files import output_folder
-
     kind, name = arguments.kind, arguments.name
     _check(kind, name)
-    template = resources.files("synchain.models").joinpath("templates", f"{kind}.txt")
-    text = template.read_text(encoding="utf-8").replace("NAME", name)
-    with wrong_use():
-        path = output_folder(arguments.dir) / f"{name}.py"
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        raise WrongUse(f"{path} exists; expected a new file: choose another name, or remove it") from None
-    except OSError as problem:
-        raise WrongUse(f"cannot write {path}: {problem.strerror}; choose another --dir") from problem
+    path = write_template(kind, name, arguments.dir, ".py")
     # Say how the file is used.
     shown = path.as_posix() if path.is_absolute() else f"./{path.as_posix()}"
     use = f"topology({shown!r}, 6)" if kind == "topology" else f"Scene({kind}={shown!r}, …)"
@@ -53,6 +40,31 @@ def execute(arguments: Namespace) -> int:
     print("anywhere else:")
     print(f"  plugins.allow_code({shown!r}); {use}")
     return FINE
+
+
+def write_template(kind: str, name: str, directory: str, ending: str) -> Path:
+    """Write the template of a kind under a name; raise WrongUse if the file exists or cannot be written."""
+    from importlib import resources
+
+    from ..support.files import output_folder
+
+    template = resources.files("synchain.models").joinpath("templates", f"{kind}.txt")
+    text = template.read_text(encoding="utf-8").replace("NAME", name)
+    with wrong_use():
+        path = output_folder(directory) / f"{name}{ending}"
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise WrongUse(f"{path} exists; expected a new file: choose another name, or remove it") from None
+    except OSError as problem:
+        raise WrongUse(f"cannot write {path}: {problem.strerror}; choose another --dir") from problem
+    return path
+
+
+def add_directory(parser: ArgumentParser) -> None:
+    """Add --dir."""
+    parser.add_argument("--dir", metavar="DIR", type=folder, default=".", help="where to write (default: this folder)")
 
 
 def _check(kind: str, name: str) -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ..console.arguments import add_scene, add_workers
+from ..console.arguments import add_workers
 from ..console.outcome import FINE, WrongUse, warn, wrong_use
+from ..console.scene_arguments import add_changed_scene, changed_scene
 
 SUMMARY = "write one page on a scene: equations, graph, spectrum, stability, a sweep (HTML)"
 EXAMPLES = (
@@ -16,7 +17,7 @@ EXAMPLES = (
 
 def configure(parser: ArgumentParser) -> None:
     """Add the scene, the file and the effort."""
-    add_scene(parser)
+    add_changed_scene(parser, more="a,b,c or LO:HI:N sweeps a parameter or an initial state")
     parser.add_argument("--out", metavar="FILE", required=True, help="the page, which ends in .html")
     parser.add_argument("--quick", action="store_true", help="coarse grids: at most 25 values of each axis")
     add_workers(parser)
@@ -26,13 +27,11 @@ def execute(arguments: Namespace) -> int:
     """Compute what there is to say and write the page."""
     from pathlib import Path
 
-    from synchain.models.scenes.file import load_scene
-
     from ..reports.scene_report import QUICK, Effort, report
     from ..support.files import check_replaceable, output_folder, write_text
 
     with wrong_use():
-        scene = load_scene(arguments.scene)
+        scene = changed_scene(arguments)
         target = Path(arguments.out)
         check_replaceable(target)
         if target.suffix.lower() not in (".html", ".htm"):

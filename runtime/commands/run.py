@@ -12,15 +12,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..console.arguments import add_scene, add_set, add_workers, folder, part, settings, tolerance
+from ..console.arguments import add_workers, folder, part, settings, tolerance
 from ..console.outcome import FAILED, FINE, Failed, WrongUse, sentence, warn, wrong_use
+from ..console.scene_arguments import add_changed_scene, changed_scene
 from ..support.error_text import counted
-from ..support.files import output_folder, whole_file
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
-
-    from synchain.models.scenes.scene import Scene
 
     from ..cells.reduce import ReducedScene
     from ..sweeps.errors import SweepFailed, SweepInterrupted
@@ -37,9 +35,6 @@ EXAMPLES = (
     "synchain run figure_4a --explain",
 )
 
-SETTINGS = ("transient", "window", "samples", "atol", "max_steps")
-"""Numbers of a scene besides parameters and initial states that --set can change."""
-
 FORMATS = ("nc", "nc4", "zarr")
 """Endings of results (`synchain.runtime.results.store.FORMS`, which is not loaded for a help)."""
 
@@ -55,15 +50,10 @@ def configure(parser: ArgumentParser) -> None:
         "                    [--certify] [--no-skip] [--explain]\n"
         "       synchain run SCENE --explain [--rtol X] [--set NAME=VALUE ...] [--no-skip]"
     )
-    add_scene(parser)
+    add_changed_scene(parser, more="a,b,c or LO:HI:N sweeps a parameter or an initial state")
     parser.add_argument("--out", metavar="DIR", type=folder, help="folder for the files, made where it is missing")
     parser.add_argument(
         "--rtol", metavar="X", type=tolerance, help="relative tolerance of one step, above 0, at most 0.1"
-    )
-    add_set(
-        parser,
-        f"set a parameter, an initial state (x_1) or one of {', '.join(SETTINGS)}; a,b,c or LO:HI:N sweeps a parameter "
-        "or an initial state",
     )
     parser.add_argument(
         "--format",
@@ -99,13 +89,17 @@ def execute(arguments: Namespace) -> int:
     """Explain the scene with --explain; run it to a file, draw it, and print how the cells ended."""
     from ..cells.reduce import explain, reduce_scene
     from ..engines.scene_kernels import kernel
+    from ..support.files import output_folder
     from ..sweeps.errors import SweepFailed, SweepInterrupted
     from ..sweeps.stream import claim, stream
 
     if arguments.out is None and (arguments.resume or arguments.overwrite or not arguments.explain):
         raise WrongUse("the following arguments are required: --out\nsee: synchain run --help")
     with wrong_use():
+        if arguments.rtol is not None and "rtol" in settings(arguments):
+            raise WrongUse("found --rtol beside --set rtol; expected one of them")
         scene = changed_scene(arguments)
+        scene = scene if arguments.rtol is None else scene.replace(rtol=arguments.rtol)
         skip = reduce_scene(scene, not arguments.no_skip)
         name = Path(arguments.scene).stem if arguments.scene.endswith(".toml") else arguments.scene
         if arguments.explain:
@@ -152,43 +146,6 @@ def _target(path: Path) -> Path:
     except ModuleNotFoundError as problem:
         raise Failed(sentence(problem)) from problem
     return path
-
-
-def changed_scene(arguments: Namespace) -> Scene:
-    """Return the scene with the changes of --set and --rtol; raise ValueError if they do not fit."""
-    from synchain.models.scenes.file import load_scene
-
-    from ..cells.run_keywords import Given
-    from ..sweeps.run import run
-
-    scene = load_scene(arguments.scene)
-    changes = {name: _fitting(scene, name, value) for name, value in settings(arguments).items()}
-    fields = {name: changes[name] for name in SETTINGS if name in changes and not scene.takes(name)}
-    keywords = {name: value for name, value in changes.items() if name not in fields}
-    scene = Given(run, keywords).sweep(scene.replace(**fields))
-    if changes:
-        scene = scene.replace(title=f"{scene.title or arguments.scene}, changed: {', '.join(changes)}")
-    return scene if arguments.rtol is None else scene.replace(rtol=arguments.rtol)
-
-
-def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[str, object]) -> object:
-    """Return the value of a setting in the type of the scene's field; raise WrongUse if it does not fit."""
-    from synchain.models.inputs.names import NodeName
-
-    if scene.takes(name) or name in scene.equations.state:
-        return value
-    if name == "rtol":
-        raise WrongUse("--set cannot change rtol; use --rtol")
-    if (parts := NodeName.parse(name)) is not None and parts.base in scene.components:
-        scene.model.check_state(name, "initial state")
-    if name not in SETTINGS:
-        equations = scene.model.unlinked
-        states = [str(NodeName(c, equations.holders(c)[0])) for c in equations.components]
-        raise WrongUse(f"--set: {scene.model.unknown(name, 'parameter', (*scene.parameters, *states, *SETTINGS))}")
-    if isinstance(value, tuple | dict):
-        count = value["count"] if isinstance(value, dict) else len(value)
-        raise WrongUse(f"--set {name}: found {count} values; only parameters and initial states can be swept")
-    return int(value) if name in ("samples", "max_steps") and value.is_integer() else value
 
 
 def _check(skip: ReducedScene, arguments: Namespace) -> None:
@@ -283,6 +240,7 @@ def _drawn(target: Path) -> Path:
         from ..results.labels import scene_of
         from ..results.result import Result
         from ..results.store import opened
+        from ..support.files import whole_file
 
         with opened(target) as data, context():  # read as far as it is drawn
             figure = new_figure(SIZE)

@@ -42,7 +42,7 @@ CHECKED = 1000
 def configure(parser: ArgumentParser) -> None:
     """Add topology, size and options, or a file."""
     parser.add_argument(
-        "topology", metavar="TOPOLOGY", nargs="?", help="a family of graphs (see: synchain topologies), or a product"
+        "topology", metavar="TOPOLOGY", nargs="?", help="a family of graphs (see: synchain list graphs), or a product"
     )
     parser.add_argument("n", metavar="N", nargs="?", type=whole, help="number of nodes")
     parser.add_argument(
@@ -50,7 +50,7 @@ def configure(parser: ArgumentParser) -> None:
         metavar="NAME=VALUE",
         action="append",
         default=[],
-        help="an option of the family, e.g. offsets=1,3 or p=1/10 (see: synchain topologies); may be repeated",
+        help="an option of the family, e.g. offsets=1,3 or p=1/10 (see: synchain list graphs); may be repeated",
     )
     parser.add_argument(
         "--matrix",

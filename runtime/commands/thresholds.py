@@ -6,9 +6,10 @@ from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..console.arguments import above_zero, add_scene, add_workers, positive, spaced
+from ..console.arguments import above_zero, add_workers, positive, settings, spaced
 from ..console.network_arguments import add_network, named_network, scene_on
-from ..console.outcome import FINE, WrongUse, print_json, warn, wrong_use
+from ..console.outcome import FINE, WrongUse, warn, wrong_use
+from ..console.scene_arguments import add_changed_scene, print_value, with_settings
 
 if TYPE_CHECKING:
     from synchain.models.scenes.scene import Scene
@@ -30,7 +31,7 @@ COARSE = 2e-3
 
 def configure(parser: ArgumentParser) -> None:
     """Add network, drive, grid and criterion."""
-    add_scene(parser, default="oscillators of table 1")
+    add_changed_scene(parser, default="oscillators of table 1")
     add_network(parser)
     parser.add_argument(
         "--sigma",
@@ -77,10 +78,7 @@ def execute(arguments: Namespace) -> int:
         criterion=criterion,
         workers=arguments.workers,
     )
-    if arguments.json:
-        print_json(result.as_dict())
-    else:
-        print(result)
+    print_value(result, arguments.json)
     return FINE
 
 
@@ -104,4 +102,4 @@ def _scene(arguments: Namespace) -> Scene:
         if scene is None:
             raise WrongUse("expected a network, e.g. --n 4, --matrix FILE or a SCENE")
         network = scene.topology
-    return scene_on(network, scene, arguments)
+    return with_settings(scene_on(network, scene, arguments, settings(arguments)), arguments)

@@ -1,14 +1,11 @@
-"""Values on the command line, read strictly: whole numbers, finite numbers, grids and settings."""
+"""Values on the command line, read strictly: whole numbers, finite numbers, grids and settings.
+
+Readers of values import the models when they are called, so that `synchain --help` does not.
+"""
 
 from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-
-from synchain.models.inputs.arithmetic import MAGNITUDE, constant
-from synchain.models.inputs.checks import short_repr
-from synchain.models.inputs.options import integer_option
-from synchain.models.sweeps.axis import LIMIT as AXIS_LIMIT
-from synchain.models.sweeps.axis import Axis
 
 from .outcome import WrongUse
 
@@ -22,6 +19,8 @@ FILES = (".csv", ".html", ".json", ".nc", ".nc4", ".pdf", ".png", ".svg", ".toml
 
 def whole(text: str, least: int = -NODES, most: int = NODES) -> int:
     """Read a whole number from `least` to `most`."""
+    from synchain.models.inputs.options import integer_option
+
     try:
         return integer_option("number", text, least, most)
     except (TypeError, ValueError) as error:
@@ -35,6 +34,8 @@ def positive(text: str, most: int = NODES) -> int:
 
 def folder(text: str) -> str:
     """Read the name of a folder, which may not exist yet."""
+    from synchain.models.inputs.checks import short_repr
+
     if not text.strip():
         raise ArgumentTypeError("found an empty name; expected a folder, e.g. results")
     if text.endswith(FILES):
@@ -44,6 +45,9 @@ def folder(text: str) -> str:
 
 def number(text: str) -> float:
     """Read a finite number, or a constant such as 2*pi/5, of at most MAGNITUDE in size."""
+    from synchain.models.inputs.arithmetic import MAGNITUDE, constant
+    from synchain.models.inputs.checks import short_repr
+
     try:
         return constant(text)
     except ValueError:
@@ -86,6 +90,9 @@ def tolerance(text: str) -> float:
 
 def span(text: str) -> dict[str, object]:
     """Read LO:HI:N as the table from, to and count of an axis, without its values."""
+    from synchain.models.inputs.checks import short_repr
+    from synchain.models.sweeps.axis import LIMIT as AXIS_LIMIT
+
     parts = text.split(":")
     if len(parts) != 3:
         raise ArgumentTypeError(f"found {short_repr(text)}; expected LO:HI:N, e.g. 0:0.6:241")
@@ -97,11 +104,15 @@ def span(text: str) -> dict[str, object]:
 
 def spaced(text: str) -> tuple[float, ...]:
     """Read LO:HI:N as N equally spaced numbers."""
+    from synchain.models.sweeps.axis import Axis
+
     return Axis.from_table("grid", span(text)).values
 
 
 def setting(text: str) -> tuple[str, float | tuple[float, ...] | dict[str, object]]:
     """Read name=value, name=a,b,c or name=LO:HI:N."""
+    from synchain.models.inputs.checks import short_repr
+
     name, equals, value = text.partition("=")
     if not (name.isidentifier() and equals and value):
         raise ArgumentTypeError(
@@ -140,7 +151,7 @@ def add_set(parser: ArgumentParser, text: str) -> None:
 
 def add_scene(parser: ArgumentParser, default: str = "") -> None:
     """Add the argument SCENE; it may be left out if there is a default."""
-    text = "a shipped name (see: synchain scenes) or a path to a .toml file"
+    text = "a shipped name (see: synchain list scenes) or a path to a .toml file"
     if default:
         parser.add_argument("scene", metavar="SCENE", nargs="?", help=f"{text} (default: {default})")
     else:

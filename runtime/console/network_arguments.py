@@ -23,7 +23,7 @@ def add_network(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--topology",
         metavar="TOPOLOGY",
-        help="family of graphs (see: synchain topologies; default: the scene's, else chain)",
+        help="family of graphs (see: synchain list graphs; default: the scene's, else chain)",
     )
     parser.add_argument(
         "--matrix", metavar="FILE", help="connectivity matrix in a text file, in place of --n and --topology"

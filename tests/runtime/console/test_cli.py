@@ -77,7 +77,7 @@ def test_help_names_every_command_and_is_fast_because_nothing_heavy_is_loaded(
 ) -> None:
     assert main(["--help"]) == 0
     out = capsys.readouterr().out
-    assert {"figures", "spectrum", "equations", "kernel", "run", "thresholds", "cache"} <= set(commands.names())
+    assert {"paper", "spectrum", "equations", "kernel", "run", "thresholds", "cache"} <= set(commands.names())
     assert all(f"\n  {name} " in out for name in commands.names())
     assert not loaded_after()["--help"] & {"sympy", "numpy", "numba", "matplotlib", "flint", "scipy", "tqdm"}
 
@@ -95,8 +95,8 @@ def test_every_command_has_a_help_with_an_example(name: str, capsys: pytest.Capt
 
 LOADS = {
     "--version": {"sympy", "numpy", "numba", "matplotlib", "argparse.py"},
-    "scenes": {"sympy", "numpy", "numba", "matplotlib"},
-    "topologies": {"sympy", "numpy", "numba", "matplotlib"},
+    "list scenes": {"sympy", "numpy", "numba", "matplotlib"},
+    "list graphs": {"sympy", "numpy", "numba", "matplotlib"},
     "schema": {"numpy", "numba", "matplotlib", "scipy", "xarray"},
     "spectrum star 6 --json": {"numpy", "numba", "matplotlib", "scipy", "xarray"},
     "equations figure_4a": {"numpy", "numba", "matplotlib", "scipy", "xarray"},
@@ -179,12 +179,12 @@ def test_several_parts_are_said_with_negative_weights_as_well(
     assert captured.err.startswith("warning: zero is an eigenvalue of multiplicity 2: the graph falls into 2 parts")
 
 
-def test_scenes_and_topologies_list_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["scenes"]) == 0
+def test_scenes_and_graphs_list_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list", "scenes"]) == 0
     listed = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
     assert set(listed) == set(scene_names())
     assert load_scene("figure_4b").title in listed["figure_4b"]
-    assert main(["topologies"]) == 0
+    assert main(["list", "graphs"]) == 0
     listed = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
     assert {"chain", "complete", "ring", "star"} <= set(listed)
     assert "3 or more" in listed["ring"]
@@ -499,7 +499,7 @@ def test_figures_are_made_by_their_names(
     monkeypatch.setattr(
         make, "written", lambda *arguments: asked.append(arguments) or [tmp_path / "out" / "figure_4b.png"]
     )
-    assert main(["figures", "--quick", "4b", "--out", str(tmp_path / "out"), "thresholds", "--workers", "1"]) == 0
+    assert main(["paper", "--quick", "4b", "--out", str(tmp_path / "out"), "thresholds", "--workers", "1"]) == 0
     assert capsys.readouterr().out == f"{tmp_path / 'out' / 'figure_4b.png'}\n"
     assert asked == [(["figure_4b", "thresholds"], tmp_path / "out", True, 1, None)]
 
@@ -514,8 +514,8 @@ def test_interrupted_figures_print_the_files_that_are_whole(
         raise KeyboardInterrupt
 
     monkeypatch.setattr(make, "written", written)
-    assert main(["figures", "4a", "4b", "--out", str(tmp_path)]) == 1
-    assert capsys.readouterr() == (f"{tmp_path / 'figure_4a.png'}\n", "synchain figures: interrupted\n")
+    assert main(["paper", "4a", "4b", "--out", str(tmp_path)]) == 1
+    assert capsys.readouterr() == (f"{tmp_path / 'figure_4a.png'}\n", "synchain paper: interrupted\n")
 
 
 def test_the_cache_is_described_and_emptied(
@@ -571,7 +571,8 @@ WRONG = [
     ("run {scene} --out {folder}/o --set omega=0", "omega"),
     ("run {scene} --out {folder}/o --set omga=1", "did you mean 'omega'?"),
     ("run {scene} --out {folder}/o --set x_3=1", "unknown initial state 'x_3'"),
-    ("run {scene} --out {folder}/o --set rtol=1e-7", "use --rtol"),
+    ("run {scene} --out {folder}/o --set rtol=1e-7 --rtol 1e-8", "found --rtol beside --set rtol"),
+    ("run {scene} --out {folder}/o --set rtol=0", "rtol"),
     ("run {scene} --out {folder}/o --set window=1,2", "can be swept"),
     ("run {scene} --out {folder}/o --set max_steps=1.5", "whole number"),
     ("run {scene} --out {folder}/o --set omega=1 omega=2", "omega twice"),
@@ -611,7 +612,7 @@ def test_wrong_use_is_one_or_two_lines_on_stderr_and_code_2(
 
 
 def test_an_empty_folder_name_is_refused(scene: str, capsys: pytest.CaptureFixture[str]) -> None:
-    for command in (["run", scene, "--out", ""], ["figures", "4b", "--out", " "]):
+    for command in (["run", scene, "--out", ""], ["paper", "4b", "--out", " "]):
         assert main(command) == 2
         assert "expected a folder" in capsys.readouterr().err
 
@@ -725,7 +726,7 @@ def test_warnings_are_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.C
     "text",
     [
         *(pytest.param(text, marks=pytest.mark.long) for text in
-          ("topologies", "kernel two_oscillators", "equations figure_4a")),
+          ("list graphs", "kernel two_oscillators", "equations figure_4a")),
         "spectrum chain 40", "spectrum chain 200",
     ],
 )  # fmt: skip
@@ -739,10 +740,10 @@ def test_a_reader_that_leaves_early_ends_it_quietly(text: str) -> None:
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
 def test_output_that_cannot_be_written_is_a_failure() -> None:
     with open("/dev/full", "w") as full:
-        command = [sys.executable, "-m", "synchain.runtime", "scenes"]
+        command = [sys.executable, "-m", "synchain.runtime", "list", "scenes"]
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, env=BUFFERED)
     assert done.returncode == 1
-    assert done.stderr == "synchain scenes: No space left on device\n"
+    assert done.stderr == "synchain list: No space left on device\n"
 
 
 def test_exit_codes_and_streams_of_the_real_program() -> None:

@@ -61,7 +61,7 @@ def test_the_script_has_all_names(script: tuple[str, Path]) -> None:
 
 CASES = [
     ("synchain ", set(commands()), {"figure_4a"}),
-    ("synchain th", {"thresholds"}, {"topologies"}),
+    ("synchain th", {"thresholds"}, {"spectrum"}),
     ("synchain run figure_4", {f"figure_4{k}" for k in "abcdef"}, {"figure_5", "mine.toml"}),
     ("synchain run mi", {"mine.toml"}, {"mine.txt"}),
     ("synchain spectrum s", {"star", "small_world"}, {"chain"}),
@@ -72,8 +72,11 @@ CASES = [
     ("synchain msf --s", {"--set", "--starts"}, {"--alpha"}),
     ("synchain cache ", {"info", "clear", "warm"}, {"figure_4a"}),
     ("synchain new ", {"friction", "topology", "oscillator", "coupling"}, set()),
+    ("synchain list ", {"oscillators", "couplings", "frictions", "graphs", "scenes"}, set()),
+    ("synchain orbit figure_4", {"figure_4a"}, {"figure_5"}),
+    ("synchain show mi", {"mine.toml", "mine.txt"}, {"figure_4a"}),
     ("synchain check mi", {"mine.toml", "mine.txt"}, {"figure_4a"}),
-    ("synchain figures figure_4 figure_5", {"figure_5"}, {"figure_4a"}),
+    ("synchain paper figure_4 figure_5", {"figure_5"}, {"figure_4a"}),
 ]
 
 

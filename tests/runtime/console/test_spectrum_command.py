@@ -1,4 +1,4 @@
-"""`synchain spectrum` with options of families and files of edges, `synchain topologies` with the
+"""`synchain spectrum` with options of families and files of edges, `synchain list graphs` with the
 options.
 """
 
@@ -92,7 +92,7 @@ def test_wrong_words(text: str, message: str, tmp_path: Path, capsys: pytest.Cap
 
 
 def test_topologies_name_their_options(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["topologies"]) == 0
+    assert main(["list", "graphs"]) == 0
     lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
     assert set(lines) == set(names())
     assert lines["small_world"].endswith("; options: neighbours, p, seed")

@@ -1,4 +1,4 @@
-"""`synchain figures`: every figure and threshold of the paper, and the master stability function
+"""`synchain paper`: every figure and threshold of the paper, and the master stability function
 beside them.
 """
 
@@ -11,7 +11,7 @@ from ..console.arguments import add_workers, folder
 from ..console.outcome import FINE, wrong_use
 
 SUMMARY = "make the paper's figures, those of the exponents, and the table of thresholds"
-EXAMPLES = ("synchain figures --out figures", "synchain figures 4b 5 --quick", "synchain figures msf msf_plane --quick")
+EXAMPLES = ("synchain paper --out figures", "synchain paper 4b 5 --quick", "synchain paper msf msf_plane --quick")
 
 
 def configure(parser: ArgumentParser) -> None:
