@@ -88,6 +88,9 @@ class Kernel:
     driver: Compiled = field(repr=False)
     scene_arguments: tuple[Any, ...] = field(repr=False)  # of the driver: functions, sizes, links
 
+    def __repr__(self) -> str:
+        return f"Kernel({self.origin.equations.n} nodes, {self.origin.method.name}, {self.origin.driver})"
+
     @functools.cached_property
     def entry(self) -> EntryPoint:
         """The function of the driver that runs cells."""

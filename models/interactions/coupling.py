@@ -21,7 +21,7 @@ from ..inputs.checks import check_text, short_repr, suggestion
 from ..inputs.expression_text import MAGNITUDE
 from ..inputs.frozen import FrozenDict
 from ..mechanics.components import Node
-from ..mechanics.parameter import Parameter
+from ..mechanics.parameter import Parameter, defaults_text
 from .ends import WEIGHT, Pair, Terms, directed, has_velocities
 from .interaction import Potential, Rates, from_table
 
@@ -241,6 +241,9 @@ class LagrangianCoupling:
 
     def __str__(self) -> str:
         return self.name if self.coordinates is None else f"{self.name} on {', '.join(self.coordinates)}"
+
+    def __repr__(self) -> str:
+        return f"LagrangianCoupling({str(self)!r}{defaults_text(self.parameters)})"
 
 
 Coupling = MatrixCoupling | LagrangianCoupling | Rates | Potential

@@ -15,7 +15,7 @@ import sympy as sp
 from ..inputs.frozen import FrozenDict
 from ..inputs.words import Word
 from .jumps import rough_at
-from .parameter import Parameter
+from .parameter import Parameter, defaults_text
 
 
 class ContactModel(Word):
@@ -87,6 +87,9 @@ class FrictionLaw:
 
     def __str__(self) -> str:
         return self.name
+
+    def __repr__(self) -> str:
+        return f"FrictionLaw({self.name!r}{defaults_text(self.parameters)})"
 
     @property
     def jumps(self) -> bool:

@@ -10,7 +10,7 @@ import sympy as sp
 
 from ..inputs.frozen import FrozenDict
 from .contact import ContactModel, FrictionLaw
-from .parameter import Parameter
+from .parameter import Parameter, defaults_text
 
 FRICTION = sp.Function("f", real=True)
 """The friction coefficient as an unknown function of the sliding velocity, which a friction law replaces."""
@@ -132,6 +132,9 @@ class Oscillator:
 
     def __str__(self) -> str:
         return self.name
+
+    def __repr__(self) -> str:
+        return f"Oscillator({self.name!r}, states {', '.join(self.states)}{defaults_text(self.parameters)})"
 
     @property
     def takes_friction(self) -> bool:

@@ -130,3 +130,9 @@ def dimension(unit: str) -> Dimension:
         times = int(power or 1) * (-1 if sign == "/" else 1)
         total = [sum_of + times * exponent for sum_of, exponent in zip(total, UNITS[name], strict=True)]
     return (total[0], total[1], total[2])
+
+
+def defaults_text(parameters: Mapping[str, Parameter]) -> str:
+    """Return "; a = 1, b = 2" of parameters with their defaults; empty without any."""
+    values = ", ".join(f"{name} = {each.default:g}" for name, each in parameters.items())
+    return f"; {values}" if values else ""

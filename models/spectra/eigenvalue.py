@@ -138,6 +138,10 @@ class Eigenvalue:
             )
         return self.value
 
+    def __repr__(self) -> str:
+        times = f", multiplicity {self.multiplicity}" if self.multiplicity > 1 else ""
+        return f"Eigenvalue({self}{times})"
+
     def __str__(self) -> str:
         text = self.text
         if len(text) <= 60 or not isinstance(self.number, Root):

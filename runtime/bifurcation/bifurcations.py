@@ -76,6 +76,9 @@ class Bifurcation:
     residual: float
     orbit: PeriodicOrbit = field(repr=False)  # nearest orbit to the bifurcation
 
+    def __repr__(self) -> str:
+        return f"Bifurcation({self.kind} at {self.value:.8g}, residual {self.residual:.1e})"
+
     @property
     def located(self) -> bool:
         """Whether the residual is small enough for a bifurcation."""

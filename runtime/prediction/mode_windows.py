@@ -22,6 +22,9 @@ class NetworkMode:
     number: int  # position in the spectrum, counted with multiplicities; 0 is the synchronous motion
     eigenvalue: Eigenvalue  # eigenvalue gamma
 
+    def __repr__(self) -> str:
+        return f"NetworkMode({self.number}, gamma = {self.eigenvalue})"
+
     @property
     def size(self) -> float:
         """|gamma| as a float."""

@@ -79,6 +79,9 @@ class Window:
     low_mode: NetworkMode | None
     high_mode: NetworkMode | None
 
+    def __repr__(self) -> str:
+        return f"Window(sigma {self.text()})"
+
     def text(self, errors: bool = True) -> str:
         """Return the ends, with their errors, and the modes lost there; dots follow an end of a grid, where none is lost."""
         ends = ((self.low, self.low_mode, "below"), (self.high, self.high_mode, "above"))
@@ -105,6 +108,9 @@ class Verdict:
     slowest: NetworkMode | None  # modes of smallest and largest |gamma|
     fastest: NetworkMode | None
     windows: tuple[Window, ...]  # windows for the ranges as stated
+
+    def __repr__(self) -> str:
+        return f"Verdict({self.text})"
 
     @property
     def text(self) -> str:
