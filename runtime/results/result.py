@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Iterable, Iterator, Sequence
 
-    import pandas as pd  # type: ignore[import-untyped]
     from matplotlib.axes import Axes
 
     from synchain.models.dynamics.equations import Equations
@@ -242,7 +241,7 @@ class Result(_Deferred, HasAnimation, Labelled):
         """
         return self.data
 
-    def to_dataframe(self, names: str | Sequence[str] | None = None) -> pd.DataFrame:
+    def to_dataframe(self, names: str | Sequence[str] | None = None) -> Any:
         """Return a table with one row for each cell, or for each value of the named variables.
 
         Parameters
