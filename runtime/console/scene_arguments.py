@@ -38,16 +38,17 @@ def changed_scene(arguments: Namespace) -> Scene:
 
 def with_settings(scene: Scene, arguments: Namespace) -> Scene:
     """Return a scene with the changes of --set: numbers fix, lists and ranges sweep parameters and initial states."""
-    from ..cells.run_keywords import Given
-    from ..sweeps.run import run
-
     changes = {name: _fitting(scene, name, value) for name, value in settings(arguments).items()}
     if not changes:
         return scene
+    from ..cells.run_keywords import Given
+    from ..sweeps.run import run
+
     fields = {name: changes[name] for name in SETTINGS if name in changes and not scene.takes(name)}
     keywords = {name: value for name, value in changes.items() if name not in fields}
     scene = Given(run, keywords).sweep(scene.replace(**fields))
-    return scene.replace(title=f"{scene.title or arguments.scene or scene!r}, changed: {', '.join(changes)}")
+    title = scene.title or arguments.scene or repr(scene)
+    return scene.replace(title=f"{title}, changed: {', '.join(changes)}")
 
 
 def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[str, object]) -> object:

@@ -590,8 +590,8 @@ WRONG = [
     ("thresholds --n 2 --matrix {own} --omega 1.15", "the matrix alone"),
     ("thresholds figure_3", "--omega"),
     ("thresholds harmonic_chain --omega 1", "not driven"),
-    ("figures nope", "unknown figure 'nope'"),
-    ("figures 4b --out {scene}", "the name of a file; expected a folder"),
+    ("paper nope", "unknown figure 'nope'"),
+    ("paper 4b --out {scene}", "the name of a file; expected a folder"),
     ("cache empty", "invalid choice"),
 ]
 
