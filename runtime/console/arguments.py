@@ -137,6 +137,8 @@ def settings(arguments: Namespace) -> dict[str, float | tuple[float, ...] | dict
 
 def part(text: str) -> tuple[int, int]:
     """Read K/N, part K of N."""
+    from synchain.models.inputs.checks import short_repr
+
     k, slash, parts = text.partition("/")
     if not slash:
         raise ArgumentTypeError(f"found {short_repr(text)}; expected K/N, e.g. 3/8")
