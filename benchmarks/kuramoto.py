@@ -24,8 +24,8 @@ from synchain.models.interactions.ends import ends
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.cells.plan import Planner
-from synchain.runtime.engines.control import control_of
 from synchain.runtime.engines.scene_kernels import kernel
+from synchain.runtime.engines.step_control import control_of
 
 from .scaling import apart, peak_memory
 

@@ -35,8 +35,8 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.cells.plan import plan
 from synchain.runtime.cells.run_keywords import Given
-from synchain.runtime.engines.control import control_array, tolerances
 from synchain.runtime.engines.scene_kernels import kernel
+from synchain.runtime.engines.step_control import control_array, tolerances
 from synchain.runtime.stability.averages import Averaging, Batches
 from synchain.runtime.stability.exponents import average, coupled_cell, exponents
 from synchain.runtime.stability.interpolation import exact_interpolation

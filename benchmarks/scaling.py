@@ -25,8 +25,8 @@ from synchain.models.graphs.families import family, topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.cells.plan import plan
-from synchain.runtime.engines.control import control_array
 from synchain.runtime.engines.scene_kernels import kernel
+from synchain.runtime.engines.step_control import control_array
 from synchain.runtime.sweeps.run import run
 
 if TYPE_CHECKING:

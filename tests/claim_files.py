@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from synchain.models.claims.language import read_claims
-from synchain.models.claims.verdict import Verdict, verify
+from synchain.models.claims.verdict import ClaimVerdict, verify
 
 __all__ = ["verdicts"]
 
@@ -16,7 +16,7 @@ WEIGHTS = "-3 1 2\n1 -6 5\n2 5 -7\n"
 """W.txt, three nodes with weights."""
 
 
-def verdicts(folder: Path, *lines: str) -> list[Verdict]:
+def verdicts(folder: Path, *lines: str) -> list[ClaimVerdict]:
     """What is said of the lines of a file; two matrices lie beside it."""
     (folder / "G.txt").write_text(MATRIX)
     (folder / "W.txt").write_text(WEIGHTS)

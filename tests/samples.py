@@ -18,7 +18,7 @@ from pendula import pendulum, telescope
 from synchain import one_way_ring
 from synchain.codegen import driver
 from synchain.codegen.driver.columns import COUNTS
-from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import SweepKernel, emit
 from synchain.codegen.machine_code.compile import Kernel, load
 from synchain.models import Potential, Rates, Scene, chain, ends, from_matrix, ring, star
@@ -26,7 +26,7 @@ from synchain.models.definitions.loader import load_oscillator
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.runtime.cells.plan import plan
-from synchain.runtime.engines.control import control_array, tolerances
+from synchain.runtime.engines.step_control import control_array, tolerances
 
 TABLE = {"theta_b": 0.1, "mu_s": 0.3, "mu_k": 0.15, "a": 2.5, "kappa": 1e5, "epsilon": 2.0, "u": 0.1, "omega": 1.15,
          "sigma": 0.1}  # fmt: skip

@@ -17,8 +17,8 @@ from synchain.runtime.cells.drive_times import longest_steps
 from synchain.runtime.cells.initial_modes import with_modes
 from synchain.runtime.cells.plan import FIRST_STEP
 from synchain.runtime.cells.reduce import as_reduction
-from synchain.runtime.engines.control import control_array
 from synchain.runtime.engines.scene_kernels import chosen_integrator, kernel
+from synchain.runtime.engines.step_control import control_array
 
 from .cases import Case
 from .clock import Point, best_time, timed_periods

@@ -9,7 +9,7 @@ import math
 import numpy as np
 import sympy as sp
 
-from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.machine_code.compile import load
 from synchain.models.dynamics.equations import Equations
@@ -19,7 +19,7 @@ from synchain.models.networks.energy_terms import EnergyTerms
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.cells.plan import plan
-from synchain.runtime.engines.control import control_array, tolerances
+from synchain.runtime.engines.step_control import control_array, tolerances
 from synchain.runtime.results.energy_of_states import energy_function
 from synchain.runtime.support.status import Status
 

@@ -117,7 +117,7 @@ def drive(functions, dims, multiplicity, rule, network, first, last, inputs, out
 
     functions: those of the scene and the recorders.  dims: `Dimensions`; the recorder of a size that is 0 is not called.
     multiplicity (nodes): oscillators that each node represents.  rule (points, 4 + points): rule of the panels of a step
-    (codegen/kernels/observable_text.py).  network: of steps in loops, the arrays of the elimination program
+    (codegen/kernels/observable_functions.py).  network: of steps in loops, the arrays of the elimination program
     (codegen/steps/sparse_plan.py) and the weights of the links, else ().  inputs: the fields of `Rows` as a tuple.
     outputs: the fields of `Results` as a tuple; a cell whose status is PAUSED continues from its saved lane.
     """

@@ -11,7 +11,7 @@ from synchain.models.dynamics.equations import Equations
 from ..program.expressions import Name, call
 from ..program.printers import NUMPY
 from ..program.statements import Array, Return, Statement, called, let
-from .arrays import entry_tables, jacobian_arrays, mass_arrays, rhs_arrays
+from .array_statements import entry_tables, jacobian_arrays, mass_arrays, rhs_arrays
 from .body import is_unrolled, wrapped
 from .header import Exported
 from .loops import jacobian_statements, mass_statements, rhs_statements

@@ -21,7 +21,7 @@ from synchain.models.mechanics.components import TIME
 
 from ..driver.dimensions import ModeDimensions
 from ..integrators import Integrator, integrator
-from ..program.expressions import ZERO, Expression, Load, Name, Number, Product, Value, call, linear, plus
+from ..program.expressions import ZERO, Expression, Load, Name, Number, ProductExpr, Value, call, linear, plus
 from ..program.lowering import lower
 from ..program.passes import Names, real, share
 from ..program.printers import LANES
@@ -323,7 +323,7 @@ def _mode_stage(parts: Parts, method: Integrator, i: int, size: int) -> list[Sta
         summands = [lower(sp.Add(*terms, evaluate=False) if len(terms) > 1 else terms[0])] if terms else []
         if i > 0:
             carried = linear(method.big_c[i], [f"k{j + 1}_d{r}" for j in range(i)])
-            summands.append(Product((Name("rate"), carried)))
+            summands.append(ProductExpr((Name("rate"), carried)))
         body.append(let(f"r{r}", plus(*summands) if summands else call("broadcast", ZERO, "LANES")))
     return body
 

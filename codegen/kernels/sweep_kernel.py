@@ -42,7 +42,7 @@ from ..steps.unrolled_step import UnrolledStep
 from ..taylor import is_large, write_looped, write_rolled, write_step
 from .driver import RECORDERS, Driver, KernelKind, Recorder
 from .kernel_text import KernelSource, NamedEquations, describe, module
-from .observable_text import SYNC_ERROR, Recording, count_of, rule_of
+from .observable_functions import SYNC_ERROR, Recording, count_of, rule_of
 
 AUTO = "rodas5p"
 """The integrator for "auto"."""

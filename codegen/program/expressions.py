@@ -39,11 +39,11 @@ class Expression:
     def __sub__(self, other: Value) -> Sum:
         return Sum((*terms_of(self), Negation(as_expression(other))))
 
-    def __mul__(self, other: Value) -> Product:
-        return Product((*factors_of(self), as_expression(other)))
+    def __mul__(self, other: Value) -> ProductExpr:
+        return ProductExpr((*factors_of(self), as_expression(other)))
 
-    def __rmul__(self, other: Value) -> Product:
-        return Product((as_expression(other), self))
+    def __rmul__(self, other: Value) -> ProductExpr:
+        return ProductExpr((as_expression(other), self))
 
     def __truediv__(self, other: Value) -> Quotient:
         return Quotient(self, as_expression(other))
@@ -74,7 +74,7 @@ class Sum(Expression):
 
 
 @dataclass(frozen=True, slots=True)
-class Product(Expression):
+class ProductExpr(Expression):
     """Factors, multiplied from left to right."""
 
     factors: tuple[Expression, ...]
@@ -89,7 +89,7 @@ class Quotient(Expression):
 
 
 @dataclass(frozen=True, slots=True)
-class Power(Expression):
+class PowerExpr(Expression):
     """A power, for languages with a mathematical library; lanes have products and roots."""
 
     base: Expression
@@ -186,7 +186,7 @@ def plus(first: Expression, *others: Expression) -> Expression:
 
 def product(factors: Sequence[Expression]) -> Expression:
     """Return the product of the factors, one if there are none."""
-    return Product(tuple(factors)) if len(factors) > 1 else factors[0] if factors else ONE
+    return ProductExpr(tuple(factors)) if len(factors) > 1 else factors[0] if factors else ONE
 
 
 def negative(e: Expression) -> Expression:
@@ -203,7 +203,7 @@ def scaled(factor: Value, e: Expression) -> Expression:
             return Negation(scaled(factor, value))
         case Quotient(top, bottom):
             return Quotient(scaled(factor, top), bottom)
-    return Product((as_expression(factor), *factors_of(e)))
+    return ProductExpr((as_expression(factor), *factors_of(e)))
 
 
 def linear(row: Iterable[float], values: Iterable[Value], start: Value | None = None) -> Expression:
@@ -224,4 +224,4 @@ def terms_of(e: Expression) -> tuple[Expression, ...]:
 
 def factors_of(e: Expression) -> tuple[Expression, ...]:
     """Return the factors of a product, or the expression itself."""
-    return e.factors if isinstance(e, Product) else (e,)
+    return e.factors if isinstance(e, ProductExpr) else (e,)

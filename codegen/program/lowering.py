@@ -25,8 +25,8 @@ from .expressions import (
     Negation,
     Not,
     Number,
-    Power,
-    Product,
+    PowerExpr,
+    ProductExpr,
     Quotient,
     Sum,
     call,
@@ -93,7 +93,7 @@ class Lowering:
         if exponent == sp.Rational(1, 2):
             return call("sqrt", self(base))
         if exponent.is_Rational and exponent.q == 2:
-            return Product((self(base ** (exponent - sp.Rational(1, 2))), call("sqrt", self(base))))
+            return ProductExpr((self(base ** (exponent - sp.Rational(1, 2))), call("sqrt", self(base))))
         return self.general_power(base, exponent)
 
     def general_power(self, base: sp.Expr, exponent: sp.Expr) -> Expression:
@@ -104,7 +104,7 @@ class Lowering:
             raise UnprintableError(
                 f"no printing rule for the power {base**exponent}; expected whole exponents up to {LARGEST_POWER}"
             )
-        return Product((self(base),) * int(exponent))
+        return ProductExpr((self(base),) * int(exponent))
 
     def function(self, e: sp.Expr) -> Expression:
         """Return the call of a function; Max and Min of several arguments are nested pairs."""
@@ -177,8 +177,8 @@ class Library(Lowering):
     def general_power(self, base: sp.Expr, exponent: sp.Expr) -> Expression:
         """Return a power; small ones of a variable are products."""
         if exponent.is_Integer and base.is_Symbol and exponent <= 4:
-            return Product((self(base),) * int(exponent))
-        return Power(self(base), Number(int(exponent)) if exponent.is_Integer else self(exponent))
+            return ProductExpr((self(base),) * int(exponent))
+        return PowerExpr(self(base), Number(int(exponent)) if exponent.is_Integer else self(exponent))
 
 
 lower = Lowering()
@@ -200,7 +200,7 @@ def number(e: sp.Expr | Fraction) -> Number:
 
 
 def _flat(factors: Sequence[Expression]) -> list[Expression]:
-    return [part for f in factors for part in (f.factors if isinstance(f, Product) else (f,))]
+    return [part for f in factors for part in (f.factors if isinstance(f, ProductExpr) else (f,))]
 
 
 def _is_negative(e: sp.Expr) -> bool:

@@ -20,8 +20,8 @@ from .expressions import (
     Negation,
     Not,
     Number,
-    Power,
-    Product,
+    PowerExpr,
+    ProductExpr,
     Quotient,
     Slice,
     Sum,
@@ -93,14 +93,14 @@ class Printer:
                 return text, SUM
             case Negation(value):
                 return f"-{self.text(value, TERM)}", SUM
-            case Product(factors):
+            case ProductExpr(factors):
                 # a negative number needs no parentheses in front
                 first, *others = factors
                 start = repr(first.value) if isinstance(first, Number) else self.text(first, TERM)
                 return "*".join([start, *(self.text(f, POWER) for f in others)]), TERM
             case Quotient(top, bottom):
                 return f"{self.text(top, TERM)}/{self.text(bottom, ATOM)}", TERM
-            case Power(base, exponent):
+            case PowerExpr(base, exponent):
                 return self.power.format(self.text(base, ATOM), self.text(exponent, ATOM)), POWER
             case Call(function, arguments):
                 name = self.functions.get(function, function)
@@ -229,7 +229,7 @@ class Lanes(Printer):
     def statement(self, s: Statement) -> list[str]:
         """Return the lines of one statement; long sums and products are broken between words."""
         lines = super().statement(s)
-        is_long = isinstance(s, Assign) and isinstance(s.value, Sum | Product) and len(lines[0]) > WIDEST
+        is_long = isinstance(s, Assign) and isinstance(s.value, Sum | ProductExpr) and len(lines[0]) > WIDEST
         return broken(lines[0]) if is_long else lines
 
     def function(self, f: Function) -> str:
@@ -285,9 +285,9 @@ class C(Printer):
     def piece(self, e: Expression) -> tuple[str, int]:
         """Return the text of an expression; a power is a call of pow, which takes doubles."""
         match e:
-            case Power(base, Number(value)):
+            case PowerExpr(base, Number(value)):
                 return super().piece(call("pow", base, float(value)))
-            case Power(base, exponent):
+            case PowerExpr(base, exponent):
                 return super().piece(call("pow", base, exponent))
         return super().piece(e)
 

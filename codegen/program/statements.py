@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TypeAlias
 
-from .expressions import Call, Expression, Load, Name, Power, Product, Quotient, Sum, Value, as_expression
+from .expressions import Call, Expression, Load, Name, PowerExpr, ProductExpr, Quotient, Sum, Value, as_expression
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,8 +214,8 @@ def _cost(e: Expression) -> int:
     match e:
         case Load():
             return 0
-        case Sum(parts) | Product(parts):
+        case Sum(parts) | ProductExpr(parts):
             cost = len(parts) - 1
         case _:
-            cost = int(isinstance(e, Quotient | Power))
+            cost = int(isinstance(e, Quotient | PowerExpr))
     return cost + sum(map(_cost, e.parts))

@@ -12,7 +12,7 @@ from ..driver.clock_slots import ATOL, RTOL, WIDTH
 from ..simd.lanes import absolute, broadcast, load, maximum, minimum, select
 
 # --- kernel text below ---
-# Columns of the rule (codegen/kernels/observable_text.py), which has a row for each point; behind TOP and NEXT stand the weights
+# Columns of the rule (codegen/kernels/observable_functions.py), which has a row for each point; behind TOP and NEXT stand the weights
 # of lower Legendre coefficients, and a square matrix is the last.
 POINT, WEIGHT, TOP, NEXT = 0, 1, 2, 3
 # What a polynomial misses is taken to be less than MARGIN times the sum of the upper half of its Legendre coefficients.

@@ -23,7 +23,7 @@ from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.mechanics.events import Event
 
-from ..program.expressions import ZERO, Compare, Expression, Load, Name, Number, Product, call, plus
+from ..program.expressions import ZERO, Compare, Expression, Load, Name, Number, ProductExpr, call, plus
 from ..program.lowering import lower
 from ..program.passes import Hoist, Names, real, share
 from ..program.statements import Assign, Function, If, Role, Statement, accumulate, let, store
@@ -161,7 +161,7 @@ def _release(events: Events, variation: Variation, names: Names) -> Function:
             # row = sum over columns of entry*deviation
             rows: dict[int, list[Expression]] = {}
             for ((row, column), _), e in zip(entries, gained.results, strict=True):
-                rows.setdefault(row, []).append(Product((lower(e), register("modes", size, column))))
+                rows.setdefault(row, []).append(ProductExpr((lower(e), register("modes", size, column))))
             stores = [store("modes", size * Name("which") + row, plus(*terms)) for row, terms in rows.items()]
             after.append(If(Compare(sign, Name("after"), ZERO), (*assigned(gained), *stores)))
         body.append(If(Compare("==", Name("i"), Number(i)), tuple(after)))

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ..program.expressions import ONE, ZERO, Expression, Name, Negation, Product, negative, plus
+from ..program.expressions import ONE, ZERO, Expression, Name, Negation, ProductExpr, negative, plus
 from ..program.lowering import lower
 from ..program.statements import Statement, let
 
@@ -160,7 +160,7 @@ def write_solve(
         value: Expression = Name(right[k])
         for c in after:
             value = less(value, factors.upper[k, c], Name(result[c]))
-        statements.append(let(result[k], Product((value, factors.inverse[k]))))
+        statements.append(let(result[k], ProductExpr((value, factors.inverse[k]))))
     return statements
 
 

@@ -24,7 +24,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import Block
 
 from ..integrators import Integrator
-from ..program.expressions import Expression, Load, Name, Product, Value, call, linear, negative, plus, scaled
+from ..program.expressions import Expression, Load, Name, ProductExpr, Value, call, linear, negative, plus, scaled
 from ..program.lowering import lower
 from ..program.passes import real
 from ..program.statements import (
@@ -442,7 +442,7 @@ class LoopMass:
 
         For `carried`, STATE keeps `total` where M is constant (M F = f is no product), F + rate*total where M varies.
         """
-        terms = [slope, Product((Name("rate"), total))]
+        terms = [slope, ProductExpr((Name("rate"), total))]
         if not self.inertial:
             return [], terms
         if self.constant:
@@ -457,7 +457,7 @@ class LoopMass:
             terms = []
             for a, b in block_pattern(block):
                 load = load_from("STATE", places.place(b, "j" if end else "i"))
-                value = Product((*rate, lower(block[a][b].xreplace(swap)), load))
+                value = ProductExpr((*rate, lower(block[a][b].xreplace(swap)), load))
                 terms.append(add_to(f"K{i + 1}", places.place(a), value))
             return terms
 

@@ -20,7 +20,7 @@ import sympy as sp
 from synchain.models.mechanics.calculus import derivative
 from synchain.models.mechanics.components import Block, Edge, Node
 
-from ..program.expressions import Expression, Name, Product, call
+from ..program.expressions import Expression, Name, ProductExpr, call
 from ..program.lowering import lower
 from ..program.passes import Names, real
 from ..program.statements import Assign, Function, Return, Statement, let
@@ -160,10 +160,10 @@ class Mass:
             self.solve("u", "f", "g")
         # the vector that M multiplies: sum c k where M F = f, F + rate sum c k otherwise
         for name in self.names:
-            w.let(f"g_{name}", sums[name] if self.constant else Name(f"g_{name}") + Product((rate, sums[name])))
+            w.let(f"g_{name}", sums[name] if self.constant else Name(f"g_{name}") + ProductExpr((rate, sums[name])))
         terms: dict[str, Expression] = {}
         for row, name in zip(self.rows, self.names, strict=True):
             products = [e * sp.Symbol(f"g_{w.state[c]}") for (r, c), e in self.entries.items() if r == row]
             product = lower(sp.Add(*products))
-            terms[name] = Name(f"f_{name}") + Product((rate, product)) if self.constant else product
+            terms[name] = Name(f"f_{name}") + ProductExpr((rate, product)) if self.constant else product
         return terms

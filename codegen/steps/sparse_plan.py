@@ -55,7 +55,7 @@ class SparsePlan:
 
 
 @dataclass(frozen=True, slots=True)
-class _Network:
+class _NetworkPattern:
     """The structure of the matrix; equations that differ in symbols or numbers share it, and the plan.
 
     size: the most states of a node. kinds, joints: blocks of each kind of node and of each joint, and their counts.
@@ -87,7 +87,7 @@ def sparse_plan(equations: Equations, fill: float = FILL_LIMIT, solves: bool = T
     of_links = [_link_patterns(edge) if solves else ((), ()) for edge in edges]
     numbers = {i: k for k, i in enumerate(by_kind(equations))}
     joints = joint_numbers(equations)
-    network = _Network(
+    network = _NetworkPattern(
         equations.n,
         max(len(node.state) for node in equations.nodes),
         tuple((pattern, equations.kind_of.count(k)) for k, pattern in enumerate(of_nodes)),
@@ -117,7 +117,7 @@ def _link_patterns(edge: Edge) -> tuple[Pattern, Pattern]:
 
 
 @lru_cache(maxsize=4)
-def _plan(network: _Network, fill: float) -> SparsePlan:
+def _plan(network: _NetworkPattern, fill: float) -> SparsePlan:
     """Plan the elimination of one structure."""
     n, size, where = network.n, network.size, np.array(network.where, np.int64)
     # (size, n) number of each state in the whole state, -1 where a node has fewer

@@ -12,7 +12,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
 from ..integrators import Integrator
-from ..program.expressions import ZERO, Expression, Load, Name, Negation, Number, Product, Value, call, linear
+from ..program.expressions import ZERO, Expression, Load, Name, Negation, Number, ProductExpr, Value, call, linear
 from ..program.lowering import lower
 from ..program.passes import StraightLine, real
 from ..program.statements import Assign, Comment, Function, Return, Role, Statement, let, operations
@@ -193,12 +193,12 @@ class StepWriter(ABC):
     def increment(self, row: Sequence[float], values: Sequence[str]) -> Expression:
         """Return sum row_j k_j, times h for explicit methods, as their stages are rates and not increments."""
         total = linear(row, values)
-        return total if self.method.implicit else Product((Name("h"), total))
+        return total if self.method.implicit else ProductExpr((Name("h"), total))
 
     def dense_value(self, row: Sequence[float], values: Sequence[str]) -> Expression:
         """Return a coefficient of the dense output as a register; it may be the number zero."""
         value = lane(linear(row, values))
-        return value if self.method.implicit else Product((Name("h"), value))
+        return value if self.method.implicit else ProductExpr((Name("h"), value))
 
     def embedded(self, values: Sequence[str]) -> list[Statement]:
         """Compute the two error estimates of methods that have two."""
@@ -228,7 +228,7 @@ class StepWriter(ABC):
             return []
         if isinstance(slope, Negation):
             weight, slope = -weight, slope.value
-        term = Product((Number(abs(weight)), Name("h"), slope))
+        term = ProductExpr((Number(abs(weight)), Name("h"), slope))
         return [Negation(term) if weight < 0 else term]
 
     # -- nodes and time ---------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ import sympy as sp
 
 from synchain.models.dynamics.angles import periods_of_states
 
-from ..program.expressions import ZERO, Expression, Load, Name, Number, Product, call, linear, plus
+from ..program.expressions import ZERO, Expression, Load, Name, Number, ProductExpr, call, linear, plus
 from ..program.lowering import lower
 from ..program.passes import real
 from ..program.statements import If, Return, let, store
@@ -162,7 +162,7 @@ class UnrolledStep(StepWriter):
         for slot, name in enumerate(self.state):
             terms = [coupled.get(name, Name(f"f_{name}"))]
             if i > 0 and name not in coupled:
-                terms.append(Product((Name("rate"), sums[name])))
+                terms.append(ProductExpr((Name("rate"), sums[name])))
             self.let(f"r_{name}", plus(*terms, *self.time_slope(i, self.time_slopes[slot])))
         rights, results = ({k: f"{p}_{name}" for k, name in enumerate(self.state)} for p in ("r", f"k{i + 1}"))
         self.put(*write_solve(self.steps, self.factors, rights, results))

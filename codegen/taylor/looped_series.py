@@ -37,7 +37,7 @@ from .series_graph import SeriesGraph, Template
 from .series_writer import Gaps, SeriesWriter
 from .simplify import absolute, add, times, within
 from .step_length import SEEN, last_orders
-from .taylor_step import StepWriter, TaylorStep
+from .taylor_step import TaylorStep, TaylorStepWriter
 
 CONVOLUTION = '''
 @njit(error_model='numpy')
@@ -321,7 +321,7 @@ def symbols_in(expressions: Iterable[sp.Expr]) -> set[sp.Symbol]:
     return {s for e in expressions for s in e.free_symbols}
 
 
-class LoopedSeries(StepWriter):
+class LoopedSeries(TaylorStepWriter):
     """Writes loops around the recurrences, with a section for what each of them makes."""
 
     functions: Sequence[str] = (CONVOLUTION,)

@@ -20,7 +20,7 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation
 
-from ..program.expressions import ZERO, Compare, Expression, Junction, Load, Name, Not, Number, Power, call, plus
+from ..program.expressions import ZERO, Compare, Expression, Junction, Load, Name, Not, Number, PowerExpr, call, plus
 from ..program.lowering import lower
 from ..program.passes import Names
 from ..program.printers import LANES
@@ -175,7 +175,7 @@ class ModeWriter(Lines):
         self.put(*(let(f"size_{k}", times(largest(last[k]), Name("weight"))) for k in orders))
         self.put(let("ratio", Name("longest") / "scale"), let("length", "longest"))
         if orders:
-            terms = (Name(f"size_{k}") * Power(Name("ratio"), Number(k)) for k in orders)
+            terms = (Name(f"size_{k}") * PowerExpr(Name("ratio"), Number(k)) for k in orders)
             far = Not(Junction("and", tuple(Compare("<=", term, Number(1.0)) for term in terms)))
             shorter = (
                 Comment("not all of them go so far"),

@@ -81,7 +81,7 @@ class TaylorStep:
         return operations(self.function.body)
 
 
-class StepWriter(ABC):
+class TaylorStepWriter(ABC):
     """Writes the step of some order for tidy equations.
 
     `parts` are the series that it makes together; `exact` is True if the tolerance alone decides how exact loads of contacts

@@ -29,7 +29,7 @@ from .series_graph import SeriesGraph, Template
 from .series_writer import Gaps, SeriesWriter
 from .simplify import absolute, add, largest, times
 from .step_length import SEEN, bounded, last_orders, reach
-from .taylor_step import StepWriter, TaylorStep, check_order
+from .taylor_step import TaylorStep, TaylorStepWriter, check_order
 
 SQUARE = let("square", Name("ratio") * "ratio")
 
@@ -150,7 +150,7 @@ class Lines(SeriesWriter):
         self.make(self.graph.behind([*self.graph.kinks, *gaps]) if k == self.order else self.graph.series, k == 0)
 
 
-class UnrolledSeries(StepWriter):
+class UnrolledSeries(TaylorStepWriter):
     """Writes everything out, with one part of all series."""
 
     def __init__(self, equations: Equations, order: int) -> None:

@@ -23,7 +23,7 @@ from .parts import verify_parts
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class ClaimVerdict:
     """The result of the comparison of a claim."""
 
     claim: Claim
@@ -47,17 +47,17 @@ class Verdict:
         return self.parts or ", ".join(entry(e) for e in self.eigenvalues)
 
 
-def verify(claim: Claim) -> Verdict:
+def verify(claim: Claim) -> ClaimVerdict:
     """Compare a claim with the proved spectrum of its graph."""
     if claim.parts:
-        return Verdict(claim, *verify_parts(claim.graph, claim.parts))
+        return ClaimVerdict(claim, *verify_parts(claim.graph, claim.parts))
     # a right claim about sums of cosines costs no roots: its numbers multiply out to det(x - G)
     sums = [(claimed.sum, claimed.count) for claimed in claim.numbers]
     known = [(number, count) for number, count in sums if number is not None]
     complete = sum(count for _, count in sums) == claim.graph.n and len(known) == len(sums)
     if complete and multiplied(known) == characteristic(claim.graph):
-        return Verdict(claim, ())
-    return Verdict(claim, tuple(_problems(claim)))
+        return ClaimVerdict(claim, ())
+    return ClaimVerdict(claim, tuple(_problems(claim)))
 
 
 def _problems(claim: Claim) -> Iterator[str]:

@@ -18,7 +18,7 @@ from ..inputs.checks import short_repr
 from ..inputs.words import Word
 
 
-class Window(Word):
+class ObservedWindow(Word):
     """Reductions of a value over the window."""
 
     MEAN = "mean"
@@ -80,13 +80,13 @@ class AtNode(Reduction):
 
 
 class RowSum(Reduction):
-    """The sum of a value over the `Rows` whose index is its argument."""
+    """The sum of a value over the `ObservableRows` whose index is its argument."""
 
     spelling = "rows.sum"
 
 
 @dataclass(frozen=True, slots=True)
-class Rows:
+class ObservableRows:
     """A value at each of some nodes or links."""
 
     value: sp.Expr  # an expression of the symbols in `at`, of parameters that all share, and of t
@@ -95,7 +95,7 @@ class Rows:
     count: int  # the number of rows
 
     @classmethod
-    def of(cls, value: sp.Expr, substitutions: Sequence[Mapping[sp.Symbol, sp.Expr]]) -> Rows:
+    def of(cls, value: sp.Expr, substitutions: Sequence[Mapping[sp.Symbol, sp.Expr]]) -> ObservableRows:
         """Return the rows of a value; a substitution for each row gives a symbol of the network or a number."""
         used = sorted(value.free_symbols & set(substitutions[0]), key=lambda s: s.name)
         columns = {s: tuple(row[s] for row in substitutions) for s in used}
@@ -242,11 +242,11 @@ class Observable:
         If the value is no real expression.
     """
 
-    window: Window
+    window: ObservedWindow
     value: sp.Expr
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "window", Window.parse("observable", self.window))
+        object.__setattr__(self, "window", ObservedWindow.parse("observable", self.window))
         object.__setattr__(self, "value", real(self.value))
 
     def __str__(self) -> str:
@@ -255,24 +255,24 @@ class Observable:
 
 def mean(value: object) -> Observable:
     """Observe the mean of a value over the window, an integral as exact as the dense output of the steps."""
-    return Observable(Window.MEAN, value)
+    return Observable(ObservedWindow.MEAN, value)
 
 
 def maximum(value: object) -> Observable:
     """Observe the largest of the values at the points of the quadrature, which hold both ends of every step."""
-    return Observable(Window.MAXIMUM, value)
+    return Observable(ObservedWindow.MAXIMUM, value)
 
 
 def minimum(value: object) -> Observable:
     """Observe the smallest of the values at the points of the quadrature, which hold both ends of every step."""
-    return Observable(Window.MINIMUM, value)
+    return Observable(ObservedWindow.MINIMUM, value)
 
 
 def end(value: object) -> Observable:
     """Observe a value at the end of the window."""
-    return Observable(Window.END, value)
+    return Observable(ObservedWindow.END, value)
 
 
 def variance(value: object) -> Observable:
     """Observe the mean over the window of the square of a value's distance from its mean."""
-    return Observable(Window.VARIANCE, value)
+    return Observable(ObservedWindow.VARIANCE, value)

@@ -12,7 +12,7 @@ import sympy as sp
 from ..inputs.checks import check_text, short_repr
 from ..inputs.expression_text import COMPOSED, FUNCTIONS, Expressions
 from ..inputs.reader import Algebra, NoMeaning, ParsedText, parse, unpaired
-from .observable import Observable, Window, nodes, rate, real
+from .observable import Observable, ObservedWindow, nodes, rate, real
 
 LENGTH = 4000
 """Most characters of a text (a choice)."""
@@ -62,9 +62,9 @@ def as_value(what: str, value: object) -> sp.Expr:
 def _read(what: str, text: str) -> Observable:
     expression = _parsed(what, text, "mean(x_1 - x_2)")
     match expression.tree:
-        case ast.Call(func=ast.Name(id=name), args=[value], keywords=[]) if name in tuple(Window):
-            return Observable(Window(name), _real(what, ParsedText(expression.text, value)))
-    windows = ", ".join(Window)
+        case ast.Call(func=ast.Name(id=name), args=[value], keywords=[]) if name in tuple(ObservedWindow):
+            return Observable(ObservedWindow(name), _real(what, ParsedText(expression.text, value)))
+    windows = ", ".join(ObservedWindow)
     raise ValueError(f"{what}: found {short_repr(text)}; expected one of {windows} of an expression outermost")
 
 
@@ -121,7 +121,7 @@ class _OfNodes(Expressions):
             raise NoMeaning(_reason(error)) from None
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[sp.Basic]]:
-        if function in tuple(Window):
+        if function in tuple(ObservedWindow):
             raise NoMeaning(
                 f"found {function} inside; expected values of an instant: over the window one is reduced once, outermost"
             )

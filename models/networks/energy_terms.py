@@ -13,7 +13,7 @@ from functools import lru_cache
 import sympy as sp
 
 from ..dynamics.equations import Equations
-from ..dynamics.observable import Rows, RowSum
+from ..dynamics.observable import ObservableRows, RowSum
 from ..graphs.links import Link
 from ..graphs.topology import Topology
 from ..interactions.coupling import Coupling, LagrangianCoupling, Potential
@@ -67,9 +67,11 @@ class EnergyTerms:
         energy = sp.Add(*(share.energy.xreplace(values) for share, values in shares))
         return energy, sp.Add(*(share.power.xreplace(values) for share, values in shares))
 
-    def rows(self) -> tuple[sp.Expr, tuple[Rows, ...]]:
+    def rows(self) -> tuple[sp.Expr, tuple[ObservableRows, ...]]:
         """Return the energy of the whole network as sums over nodes of each kind and links of each edge, for observables."""
-        rows = [Rows.of(share.energy, places) for share, places in self._shares() if places and share.energy != 0]
+        rows = [
+            ObservableRows.of(share.energy, places) for share, places in self._shares() if places and share.energy != 0
+        ]
         return sp.Add(*(RowSum(sp.Integer(k)) for k in range(len(rows)))), tuple(rows)
 
     def _shares(self) -> list[tuple[Share, list[dict[sp.Symbol, sp.Expr]]]]:

@@ -81,7 +81,7 @@ def as_dict(equations: Equations) -> dict[str, object]:
 
 def lines(equations: Equations, style: Style) -> Iterator[str]:
     """Yield equation by equation, then the laws, then the meaning of the indices of a large network."""
-    network = _Network(_in_slip(equations), style)
+    network = _NetworkText(_in_slip(equations), style)
     generic = network.equations.n > LARGEST and not network.equations.mixed
     if generic:
         yield from network.generic()
@@ -144,7 +144,7 @@ def _with_law(e: sp.Expr, law: sp.Expr, state: tuple[sp.Symbol, ...]) -> sp.Expr
     return e
 
 
-class _Network:
+class _NetworkText:
     """Writes the equations of a network in one style."""
 
     def __init__(self, equations: Equations, style: Style) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 import sympy as sp
 
 from synchain.codegen.driver.columns import SumColumn, Tally
-from synchain.codegen.kernels.observable_text import Recording, with_rows
-from synchain.models.dynamics.observable import ENERGY, Window
+from synchain.codegen.kernels.observable_functions import Recording, with_rows
+from synchain.models.dynamics.observable import ENERGY, ObservedWindow
 from synchain.models.dynamics.observable_text import as_value
 from synchain.models.scenes.energy import energy as exact_energy
 from synchain.models.scenes.observables import has_own_energy
@@ -158,14 +158,18 @@ def _kept(section: Section) -> tuple[str, ...]:
     return section.keep or ()
 
 
-def _over_window(window: Window, tallies: np.ndarray, length: np.ndarray) -> np.ndarray:
+def _over_window(window: ObservedWindow, tallies: np.ndarray, length: np.ndarray) -> np.ndarray:
     """Return a reduction (cells, rows) of tallies (cells, rows, len(Tally)) over a window; NaN where a value was undefined."""
     gap = tallies[:, :, Tally.SUM] / length
     defined = np.where(np.isfinite(gap), 0.0, np.nan)
     match window:
-        case Window.MEAN:
+        case ObservedWindow.MEAN:
             return np.asarray(tallies[:, :, Tally.FIRST] + gap)
-        case Window.VARIANCE:
+        case ObservedWindow.VARIANCE:
             return np.asarray(np.maximum(tallies[:, :, Tally.SQUARES] / length - gap * gap, 0.0))
-    column = {Window.MAXIMUM: Tally.LARGEST, Window.MINIMUM: Tally.LEAST, Window.END: Tally.LATEST}[window]
+    column = {
+        ObservedWindow.MAXIMUM: Tally.LARGEST,
+        ObservedWindow.MINIMUM: Tally.LEAST,
+        ObservedWindow.END: Tally.LATEST,
+    }[window]
     return np.asarray(tallies[:, :, column] + defined)

@@ -16,7 +16,7 @@ import numpy as np
 import sympy as sp
 
 from synchain.codegen.driver.columns import PointColumn, SumColumn
-from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.observable_functions import Recording
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.reduction import NoQuotient, quotient, substitute_constants
 from synchain.models.inputs.checks import check_flag

@@ -12,7 +12,7 @@ from ..console.outcome import FAILED, FINE, WrongUse, discard_output, print_json
 from ..support.error_text import counted
 
 if TYPE_CHECKING:
-    from synchain.models.claims.verdict import Verdict
+    from synchain.models.claims.verdict import ClaimVerdict
 
 SUMMARY = "check claims about exact eigenvalues, one a line of a file"
 EXAMPLES = (
@@ -46,7 +46,7 @@ def execute(arguments: Namespace) -> int:
 
     with wrong_use():
         lines = read_claims(arguments.file)
-    judged: list[list[Verdict]] = []
+    judged: list[list[ClaimVerdict]] = []
     undecided: list[Undecided] = []
     for line in lines:
         try:
@@ -69,12 +69,12 @@ def execute(arguments: Namespace) -> int:
     return code
 
 
-def _wrong(judged: Sequence[Sequence[Verdict]]) -> int:
+def _wrong(judged: Sequence[Sequence[ClaimVerdict]]) -> int:
     """Return the number of lines with a wrong claim."""
     return sum(not all(v.right for v in line) for line in judged)
 
 
-def _print(arguments: Namespace, judged: Sequence[Sequence[Verdict]], undecided: Sequence[Undecided]) -> None:
+def _print(arguments: Namespace, judged: Sequence[Sequence[ClaimVerdict]], undecided: Sequence[Undecided]) -> None:
     """Print all claims as JSON or text."""
     wrong = _wrong(judged)
     if arguments.json:
@@ -93,7 +93,7 @@ def _print(arguments: Namespace, judged: Sequence[Sequence[Verdict]], undecided:
         sys.stdout.flush()
 
 
-def _name(line: Sequence[Verdict]) -> str:
+def _name(line: Sequence[ClaimVerdict]) -> str:
     """Return the family of graphs of a line, its sizes and its options."""
     first, last = line[0].claim, line[-1].claim
     if "(" in first.graph.name and first.n is None:
@@ -103,7 +103,7 @@ def _name(line: Sequence[Verdict]) -> str:
     return f"{first.graph.name} {sizes}" + "".join(f" {key}={','.join(map(str, values))}" for key, values in options)
 
 
-def _problems(line: Sequence[Verdict]) -> list[str]:
+def _problems(line: Sequence[ClaimVerdict]) -> list[str]:
     """Return what is wrong with a line and what is right, indented."""
     wrong = [v for v in line if not v.right]
     rows = []
@@ -116,7 +116,7 @@ def _problems(line: Sequence[Verdict]) -> list[str]:
     return rows
 
 
-def _as_dict(line: Sequence[Verdict]) -> dict[str, object]:
+def _as_dict(line: Sequence[ClaimVerdict]) -> dict[str, object]:
     graphs = [
         {
             "topology": v.claim.graph.name,
@@ -133,7 +133,9 @@ def _as_dict(line: Sequence[Verdict]) -> dict[str, object]:
     return {"line": first.line, "claim": first.text, "right": all(v.right for v in line), "graphs": graphs}
 
 
-def _write_junit(path: str, file: str, judged: Sequence[Sequence[Verdict]], undecided: Sequence[Undecided]) -> None:
+def _write_junit(
+    path: str, file: str, judged: Sequence[Sequence[ClaimVerdict]], undecided: Sequence[Undecided]
+) -> None:
     from xml.etree import ElementTree as Tree
 
     from ..support.files import write_text

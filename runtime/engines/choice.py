@@ -33,7 +33,7 @@ from ..cells.paces import Paces, Templates
 from ..cells.plan import CellRows
 from ..cells.stiffness_rates import eigenvalue_rates, mode_rates
 from ..support.status import Status
-from .control import first_step, scale_of_atol, tolerances
+from .step_control import first_step, scale_of_atol, tolerances
 
 STIFF = 30.0
 """Ratio of decay to turning and to change of a motion from which on Rosenbrock steps are faster, as measured

@@ -17,7 +17,7 @@ import numpy as np
 
 from synchain.codegen.driver.columns import Control, SpanColumn
 from synchain.codegen.integrators import Integrator
-from synchain.codegen.kernels.observable_text import SYNC_ERROR, Recording
+from synchain.codegen.kernels.observable_functions import SYNC_ERROR, Recording
 from synchain.codegen.kernels.sweep_kernel import SweepKernel, emit
 from synchain.codegen.machine_code.compile import Kernel, load
 from synchain.codegen.machine_code.installation import InstallationError

@@ -21,8 +21,8 @@ from ..cells.plan import FIRST_STEP, CellRows
 from ..cells.reduce import ReducedScene
 from ..support.status import Status
 from .choice import Ladder
-from .control import control_of
 from .scene_kernels import ladder_of, write_kernel
+from .step_control import control_of
 
 LARGEST_ROOM = 2**25
 """Numbers of the first room for section points of a block, 268 MB: a choice."""

@@ -27,7 +27,7 @@ from ..cells.drive_times import by_place, half_swing, periods
 from ..cells.initial_modes import local_clock
 from ..cells.stiffness_rates import mode_rates
 from ..engines.choice import chosen_for_modes, warn_of_stiff_modes
-from ..engines.control import control_array, first_step, tolerances
+from ..engines.step_control import control_array, first_step, tolerances
 from ..support.status import Status
 from ..support.threads import worker_count
 from .averages import TOLERANCE_RATIO, TRIED, error_of_steps

@@ -78,7 +78,7 @@ def merge(
     form_of(target).check(target)
     if target.exists() and not overwrite:
         raise FileExistsError(f"{target} is there already; give overwrite (--overwrite) to replace it")
-    found = _Parts.read([check_path("parts", part) for part in parts])
+    found = _PartFiles.read([check_path("parts", part) for part in parts])
     reporter = Execution().reporter(found.scene.cells)
     reporter.start(found.counts)
     verdicts = write_result(found.logs(), target, found.scene, found.most)
@@ -86,7 +86,7 @@ def merge(
 
 
 @dataclass(frozen=True, slots=True)
-class _Parts:
+class _PartFiles:
     """The paths of all parts of a sweep in order, and the sums over their logs."""
 
     paths: tuple[Path, ...]
@@ -95,7 +95,7 @@ class _Parts:
     most: int  # section points of the cell that has most
 
     @classmethod
-    def read(cls, paths: list[Path]) -> _Parts:
+    def read(cls, paths: list[Path]) -> _PartFiles:
         """Check that the files are the finished parts of one sweep, each of them once."""
         if not paths:
             raise ValueError("parts: found none; expected the files .kofN.partial of all parts")

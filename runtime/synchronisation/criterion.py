@@ -15,7 +15,7 @@ from synchain.models.inputs.checks import check_instance, check_integer, check_n
 from synchain.models.scenes.defaults import TimeUnit
 from synchain.models.scenes.scene import Scene
 
-from ..engines.control import scale_of_atol
+from ..engines.step_control import scale_of_atol
 from .synchronous_motion import SynchronousMotion, columns_of
 from .trials import Outcome
 

@@ -30,8 +30,8 @@ from synchain.models.scenes.scene import Scene
 from ..cells.plan import CellRows, Planner
 from ..cells.run_keywords import Given
 from ..engines.choice import chosen_for_rows
-from ..engines.control import control_of
 from ..engines.job import RowsSpec
+from ..engines.step_control import control_of
 from ..results.labelled import Labelled, dataset, scene_text
 from ..stability.transversal_modes import unused_axes
 from ..support.arrays import numbers

@@ -18,9 +18,9 @@ from ..cells.layout import block_size
 from ..cells.plan import CellRows
 from ..cells.reduce import ReducedScene
 from ..engines.choice import chosen_for_rows
-from ..engines.control import control_of
 from ..engines.job import JobSpec, RowsSpec
 from ..engines.scene_kernels import write_kernel
+from ..engines.step_control import control_of
 from ..support.execution import Execution
 from ..support.status import CODES, Status, tally
 from ..sweeps.errors import SweepFailed, SweepInterrupted, worker_lost

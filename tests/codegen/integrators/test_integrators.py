@@ -15,7 +15,7 @@ from samples import DIGITS, Interpreted, take_step, waving
 
 from synchain.codegen import integrators
 from synchain.codegen.integrators import Integrator
-from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.models.scenes import defaults
 

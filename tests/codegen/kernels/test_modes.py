@@ -10,7 +10,7 @@ import sympy as sp
 from variational_reference import transversal_equations
 
 from synchain.codegen.kernels.mode_kernel import emit_modes
-from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.machine_code.compile import load
 from synchain.models.dynamics.equations import Equations
@@ -19,7 +19,7 @@ from synchain.models.graphs.families import topology
 from synchain.models.mechanics.components import Node
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
-from synchain.runtime.engines.control import control_array
+from synchain.runtime.engines.step_control import control_array
 from synchain.runtime.stability.variational_integrator import VariationalIntegrator
 
 OMEGA = 1.4

@@ -10,7 +10,7 @@ import pytest
 
 import synchain as sc
 from synchain.codegen.kernels.kernel_text import NamedEquations
-from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.program.functions import LANES
 from synchain.codegen.program.printers import Lanes
 from synchain.models.dynamics.observable_text import VALUE_FUNCTIONS, as_observable

@@ -33,7 +33,7 @@ from synchain.codegen.front_end import compiler, decorator, syntax_reader
 from synchain.codegen.kernels import driver
 from synchain.codegen.kernels.driver import Driver, KernelKind
 from synchain.codegen.kernels.mode_kernel import emit_modes
-from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.machine_code import cache
 from synchain.codegen.machine_code import compile as loading

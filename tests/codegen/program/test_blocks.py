@@ -13,7 +13,7 @@ from samples import CASES, FLOATS, TABLE, Interpreted, friction_chain, path, rea
 from sympy.functions.elementary.piecewise import ExprCondPair
 
 from synchain.codegen import integrators
-from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.program.passes import Hoist, Names, StraightLine
 from synchain.codegen.steps.blocks import analyse

@@ -17,7 +17,7 @@ from synchain.codegen import simd
 from synchain.codegen.integrators import integrator
 from synchain.codegen.kernels.driver import RECORDERS, Driver, KernelKind, Recorder, imports
 from synchain.codegen.kernels.mode_kernel import emit_modes
-from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.program.lowering import UnprintableError
 from synchain.codegen.steps.safe_names import tidy

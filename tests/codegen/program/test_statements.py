@@ -25,8 +25,8 @@ from synchain.codegen.program.expressions import (
     Negation,
     Not,
     Number,
-    Power,
-    Product,
+    PowerExpr,
+    ProductExpr,
     Quotient,
     Slice,
     Sum,
@@ -147,7 +147,7 @@ def value(e: Expression, values: dict[str, float]) -> float:
             for term in terms[1:]:
                 total = total + value(term, values)
             return total
-        case Product(factors):
+        case ProductExpr(factors):
             total = value(factors[0], values)
             for factor in factors[1:]:
                 total = total * value(factor, values)
@@ -182,7 +182,7 @@ PROGRAM = (
     Array("v", Number(3)),
     Identity("m", Number(2)),
     whole("k", Number(1)),
-    let("w", Power(Name("x"), Number(3)) + 0.5),
+    let("w", PowerExpr(Name("x"), Number(3)) + 0.5),
     Loop(
         "i", Number(0), Number(3), (store("v", Name("i"), call("absolute", "x")), accumulate("v", Name("i"), Name("w")))
     ),

@@ -10,7 +10,7 @@ from turning import NETWORKS, network, starts
 
 import synchain as sc
 from synchain.codegen.integrators import integrator, names
-from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.steps.places import by_joint
 from synchain.codegen.steps.sparse_plan import sparse_plan

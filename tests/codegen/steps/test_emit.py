@@ -31,7 +31,7 @@ from samples import (
 )
 
 from synchain.codegen import integrators
-from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.program import lowering
 from synchain.codegen.program.expressions import Expression, call

@@ -10,7 +10,7 @@ import sympy as sp
 from samples import FLOATS, Interpreted, real, take_step
 
 from synchain.codegen.integrators import integrator
-from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.models.dynamics.equations import Equations, Layer
 from synchain.models.mechanics.components import Edge, Node

@@ -11,7 +11,7 @@ from samples import FLOATS, Interpreted, clocks, take_step
 from scipy.integrate import solve_ivp
 
 from synchain.codegen.export.python import to_python
-from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.steps.places import by_joint
 from synchain.codegen.steps.sparse_plan import sparse_plan

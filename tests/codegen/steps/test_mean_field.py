@@ -12,7 +12,7 @@ import sympy as sp
 from samples import FLOATS, Interpreted, plain, real, take_step
 
 from synchain.codegen.integrators import integrator
-from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.program.printers import LANES
 from synchain.codegen.steps.fields import compensated

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from samples import FLOATS, Interpreted
 
-from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene

@@ -10,7 +10,7 @@ from samples import TABLE, Outcome, blank, friction_chain, friction_scene, kerne
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.periodicity import angular_frequency, common
 from synchain.models.mechanics.components import TIME, Node
-from synchain.runtime.engines.control import control_array
+from synchain.runtime.engines.step_control import control_array
 
 PERIOD = 2 * np.pi / 1.15
 

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from variational_reference import transversal_equations
 
 from synchain.codegen.export.python import to_python
-from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.models import Field, Lagrangian, Scene, chain, from_matrix, link_energy, load_scene, ring, star, text
 from synchain.models.dynamics.equations import Equations

@@ -6,7 +6,7 @@ import numpy as np
 from samples import run_cells
 
 from synchain.codegen.driver.columns import Count
-from synchain.codegen.kernels.observable_text import Recording
+from synchain.codegen.kernels.observable_functions import Recording
 from synchain.codegen.kernels.sweep_kernel import emit
 from synchain.codegen.machine_code.compile import load
 from synchain.models import Scene, chain

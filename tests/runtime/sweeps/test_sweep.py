@@ -15,7 +15,7 @@ from synchain.models.dynamics.reduction import without_drive
 from synchain.runtime import Status, SweepInterrupted, kernel, open_result, run, stream
 from synchain.runtime.cells.plan import plan
 from synchain.runtime.cells.reduce import reduce_scene
-from synchain.runtime.engines.control import tolerances
+from synchain.runtime.engines.step_control import tolerances
 from synchain.runtime.support.execution import Execution
 from synchain.runtime.support.progress import Reporter
 from synchain.runtime.sweeps.memory import Memory

@@ -12,7 +12,7 @@ import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
 
-from ..program.expressions import Expression, Load, Name, Number, Product, Slice, call, plus
+from ..program.expressions import Expression, Load, Name, Number, ProductExpr, Slice, call, plus
 from ..program.passes import real
 from ..program.printers import NUMPY
 from ..program.statements import Do, Statement, Store, let, whole
@@ -58,7 +58,7 @@ def mass_arrays(model: Equations) -> list[Statement]:
         columns.append(column)
         name = f"mass_{len(values)}_"
         values.append(Name(name))
-        return let(name, Product((value, call("np.ones", call("len", "TARGET")))))
+        return let(name, ProductExpr((value, call("np.ones", call("len", "TARGET")))))
 
     statements = ExportBody.of(link_mass(model)).statements(_loads(model)[1], store)
     entries, row, column = (NUMPY.text(_joined(part)) for part in (values, rows, columns))

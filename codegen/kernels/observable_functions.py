@@ -18,9 +18,9 @@ from synchain.models.dynamics.observable import (
     NodeMean,
     NodeMinimum,
     NodeSum,
+    ObservableRows,
     Rate,
     Reduction,
-    Rows,
     RowSum,
     node_symbols,
 )
@@ -91,7 +91,7 @@ class Recording:
     # section functions, each followed by the values that are stored where it passes zero
     sections: tuple[tuple[sp.Expr, ...], ...] = ()
     stop: sp.Expr | None = None  # a function that ends a cell when it passes zero
-    sums: tuple[Rows, ...] = ()  # the rows that the `RowSum`s of these functions add up
+    sums: tuple[ObservableRows, ...] = ()  # the rows that the `RowSum`s of these functions add up
     multiplicity: tuple[int, ...] | None = None  # oscillators that each node represents in the synchronisation error
 
     def check(self, equations: Equations) -> None:
@@ -213,7 +213,7 @@ SYNC_ERROR = Recording()
 class _LoopWriter:
     """Writes the loops over nodes, those of inner reductions first."""
 
-    def __init__(self, named: NamedEquations, sums: Sequence[Rows]) -> None:
+    def __init__(self, named: NamedEquations, sums: Sequence[ObservableRows]) -> None:
         equations, plain = named.original, named.plain
         self.n, self.sums, self.state = plain.n, sums, frozenset(equations.state)
         # tables: name -> (name in the function, index in a bank). `at_node` has the components that all nodes have and
