@@ -77,14 +77,17 @@ class Streamed(Labelled):
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Scene, file, time, how cells ended, verdicts."""
         done, scene = self.progress, self.scene
-        times = f"{done.running:.1f} s, after {done.compiling:.1f} s for the kernel"
-        earlier = f", {done.kept} of them in an earlier run" if done.kept else ""
+        times = f" in {done.running:.1f} s, after {done.compiling:.1f} s for the kernel"
+        if done.total and done.kept == done.total:  # a result that was there, or merged parts
+            times = ", run earlier"
+        elif done.kept:
+            times += f", {done.kept} of them in an earlier run"
         if self.part is not None:
-            earlier += "; part {} of {}: {:.0f} cells".format(*self.part, done.total)
+            times = "; part {} of {}: {:.0f} cells{}".format(*self.part, done.total, times)
         verdicts, certain = self.verdicts.items(), ", certain to stay synchronous"
         return (
             ("scene", scene.title or repr(scene)),
-            ("cells", f"{counted(scene.cells, 'cell')} of {counted(scene.n, 'oscillator')} in {times}{earlier}"),
+            ("cells", f"{counted(scene.cells, 'cell')} of {counted(scene.n, 'oscillator')}{times}"),
             *(("ended", f"{counted(count, 'cell')}: {status.message}") for status, count in done.statuses.items()),
             *(("verdict", f"{counted(n, 'cell')} {name}{certain * (name == 'ended early')}") for name, n in verdicts),
             ("file", str(self.path)),
