@@ -300,7 +300,13 @@ class Topology(Exact, HasDrawing):
 
     def __repr__(self) -> str:
         options = "".join(f", {key}={value!r}" for key, value in self.options)
-        return f"Topology({self.name!r}, n={self.n}{options}, {self.link_count} links)"
+        return f"Topology({self.name!r}, n={self.n}{options}, {edges_text(self)})"
+
+
+def edges_text(graph: Topology) -> str:
+    """Return "4 edges" of an undirected graph, in which two links in opposite directions are one edge; else "4 links"."""
+    count, word = (graph.link_count // 2, "edge") if graph.undirected else (graph.link_count, "link")
+    return f"{count} {word}{'s' * (count != 1)}"
 
 
 def from_matrix(rows: Iterable[Iterable[object]] | sp.MatrixBase, name: str = "matrix") -> Topology:

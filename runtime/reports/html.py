@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.graphs.topology import Topology
+from synchain.models.graphs.topology import Topology, edges_text
 from synchain.models.presentation.equations_text import latex as latex_of
 from synchain.models.presentation.equations_text import lines
 from synchain.models.presentation.mathml import formula
@@ -190,8 +190,7 @@ def _beside(first: str, second: str) -> str:
 
 def _graph_text(graph: Topology) -> str:
     options = "".join(f", {key} = {value}" for key, value in graph.options)
-    links = f"{graph.link_count} links" if graph.link_count != 1 else "1 link"
-    return f"{graph.name}: {graph.n} node{'s' * (graph.n > 1)}, {links}{options}"
+    return f"{graph.name}: {graph.n} node{'s' * (graph.n > 1)}, {edges_text(graph)}{options}"
 
 
 def _oscillators(scene: Scene) -> str:

@@ -301,7 +301,8 @@ def test_options_are_stored_in_one_form() -> None:
 
 
 def test_the_options_are_part_of_what_a_graph_says() -> None:
-    assert repr(topology("circulant", 10, offsets=(1, 3))) == "Topology('circulant', n=10, offsets=(1, 3), 40 links)"
+    assert repr(topology("circulant", 10, offsets=(1, 3))) == "Topology('circulant', n=10, offsets=(1, 3), 20 edges)"
+    assert repr(topology("one_way_ring", 4)) == "Topology('one_way_ring', n=4, 4 links)"
     a, b = topology("circulant", 10, offsets=(1, 3)), topology("circulant", 10, offsets=(1, 2))
     assert a != b
     assert a.spectrum != b.spectrum
