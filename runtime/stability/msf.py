@@ -269,7 +269,7 @@ class MSF(Labelled):
         ax : matplotlib axes, optional
             By default pyplot's current ones, or those of a new figure.
         sigma : float, optional
-            Coupling strength for which the modes are marked, at sigma |gamma|; by default that of the scene.
+            Coupling strength for which the modes are marked, at ``sigma |gamma|``; by default that of the scene.
         **style
             Keywords of the curve, such as `color` and `linewidth`.
 
