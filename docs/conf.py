@@ -23,6 +23,7 @@ extensions = [
     "families",
     "package_words",
     "recipes",
+    "offline_animations",
 ]
 exclude_patterns = ["gallery/README.rst", "tutorial/README.rst", "sg_execution_times.rst"]
 
