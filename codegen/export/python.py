@@ -90,7 +90,7 @@ def to_python(equations: Equations, values: Mapping[str, float] | None = None) -
 def _defaults(model: Equations, numbers: Mapping[str, float]) -> dict[str, str]:
     """Return the parameters that a function takes, with their values or "".
 
-    Those of many nodes, or of their links, that differ come as one sequence.
+    In a large network, parameters that differ between nodes or links come as one sequence.
     """
     if is_unrolled(model):
         return {name: repr(numbers[name]) if numbers else "" for name in model.parameters}

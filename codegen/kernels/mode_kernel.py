@@ -66,7 +66,7 @@ class ModeKernel(KernelSource):
     """A kernel that carries the deviations of modes along orbits."""
 
     dimensions: ModeDimensions = field(repr=False)
-    # contact whose velocity a component of a deviation is, -1 for other components
+    # for each component of a deviation, the contact whose velocity it is; -1 if none
     owners: tuple[int, ...] = field(repr=False)
 
     @property

@@ -19,7 +19,7 @@ from numba.extending import NativeValue, models, register_model, unbox
 
 
 class FunctionsType(types.Type):
-    """Numba type of `Functions`: its attributes are first-class functions of these signatures."""
+    """Numba type of `Functions`: its attributes are first-class functions of the signatures that it is made with."""
 
     def __init__(self, signatures: Mapping[str, Any]) -> None:
         self.types = {name: types.FunctionType(signature) for name, signature in signatures.items()}

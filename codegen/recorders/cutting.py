@@ -1,4 +1,4 @@
-"""The record of section points: states, or what a section on a function keeps."""
+"""Record section points: the states, or the expressions that a section on a function lists."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 """One step of a Runge-Kutta or Rosenbrock method for given equations, as statements.
 
+Values stand between the arrows; the words on an arrow are modules of this room.
+
     Equations ─safe_names─▶ Equations with usable names ─blocks─▶ NodeBlocks, one for each kind of node
               ─places, fields─▶ layout and sums of large networks ─sparse_plan─▶ SparsePlan
               ─UnrolledStep | LoopedStep─▶ statements and functions of one step

@@ -33,7 +33,7 @@ def _moved(part: Node | Edge) -> list[bool]:
 
 def solved(graph: SeriesGraph, masses: Mapping[Entry, Series], right: Mapping[int, Series]) -> dict[int, Series]:
     """Return the series of the rates by state, from the entries of M and the right-hand sides."""
-    # factor and series of each entry that is not zero; a constant entry is all factor
+    # each nonzero entry as factor times series; a constant has the series 1
     entries = {key: (s.value, UNIT) if isinstance(s, Constant) else split(s) for key, s in masses.items()}
     entries = {key: e for key, e in entries.items() if e[0] != ZERO}
     # rows and columns that differ from those of the identity, renumbered; the other rates are their right-hand sides

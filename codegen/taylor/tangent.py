@@ -219,6 +219,6 @@ def write_tangent(variation: Variation, order: int) -> TangentStep:
 
 
 def _register(size: int, k: int) -> Expression:
-    """Return the register of an array that holds number k of the `size` registers of one group of modes."""
+    """Return the index of register k of a group of modes, in an array with `size` registers for each group."""
     group = Name("which") if size == 1 else size * Name("which")
     return group + k if k else group

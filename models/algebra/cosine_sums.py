@@ -339,7 +339,7 @@ def minimal_polynomial(number: AngleSum) -> fmpq_poly:
 
 
 def _conjugate(number: AngleSum, unit: int, scale: int) -> Ball:
-    """Return a ball around scale times the conjugate with all angles multiplied by `unit`."""
+    """Return a ball that holds scale times the Galois conjugate with all angles multiplied by `unit`."""
     total = arb(to_flint(number.shift * scale))
     for t, b in number.terms:
         total += 2 * arb(to_flint(b * scale)) * arb.cos_pi_fmpq(to_flint(2 * unit * t))

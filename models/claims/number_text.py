@@ -1,6 +1,6 @@
 """Exact numbers written as text, as SymPy expressions.
 
-Accepted: whole numbers, the letters that have values, ``pi`` and ``I``, ``+ - * / **``,
+Accepted: whole numbers, the letters given in `values` such as n, ``pi`` and ``I``, ``+ - * / **``,
 parentheses, ``sqrt``, and ``sin cos exp`` of rational multiples of pi (of I*pi for exp).  Decimals
 are refused: they are no exact numbers.
 """

@@ -298,7 +298,7 @@ def topology(name: str, n: int, **options: object) -> Topology:
     n : int
         Number of nodes.
     **options
-        Options of the family; weights are those of the family.
+        Options of the family; the family sets the weights.
 
     Returns
     -------

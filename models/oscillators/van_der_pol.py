@@ -1,4 +1,4 @@
-"""Self-excited oscillator whose damping is negative for |x| < 1; a harmonic force where u is not 0.
+"""Self-excited oscillator whose damping is negative for |x| < 1; an optional harmonic force has the amplitude u.
 
 Van der Pol's oscillator, non-dimensional; the damping feeds the motion near x = 0.
 """

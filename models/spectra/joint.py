@@ -172,7 +172,7 @@ def _joined(modes: Modes, combined: Matrix, graph: Matrix) -> tuple[Modes, Matri
         raise ProofError(
             f"joint spectrum of {graph.name}({graph.n}): found equal sums for {TRIED} factors; expected one"
         )
-    # each eigenvalue of A + t B lies in the ball of one pair (a, b)
+    # each eigenvalue of A + t B lies in the ball around a + t b of exactly one pair (a, b)
     combined = _Combination(combined, graph, factor)
     extended = []
     for number in spectrum(combined):

@@ -1,4 +1,4 @@
-"""The interface of matrices that have a spectrum: graphs, and other matrices of graphs."""
+"""What `spectrum` needs of a matrix; graphs and other matrices of graphs offer it."""
 
 from __future__ import annotations
 

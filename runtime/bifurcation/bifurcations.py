@@ -123,7 +123,7 @@ def bifurcations_at_end(arc: Arc, beyond: float, final: bool) -> list[Bifurcatio
 
 
 def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
-    """Locate the period doubling of half the periods from which a branch is born, None if there is none."""
+    """Locate the period doubling at which a branch is born from an orbit of half its periods; None if there is none."""
     half, last = arc.periods // 2, arc.orbits[-1]
     if arc.periods % 2:
         return None

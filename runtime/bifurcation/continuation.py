@@ -118,7 +118,10 @@ class Arc:
         return np.asarray((self.image(point + step)[0] - self.image(point - step)[0]) / (2.0 * step[-1]))
 
     def tangent(self, value: float, orbit: PeriodicOrbit) -> np.ndarray:
-        """Return dx/dp (components,) of an orbit in units of its extent: the solution of (I - M) dx/dp = P_p."""
+        """Solve (I - M) dx/dp = dP/dp for dx/dp (components,) of an orbit, in units of its extent.
+
+        P is the map over its period and M the Jacobian of P.
+        """
         key = (value, orbit.state.tobytes())
         if key not in self.tangents:
             point, units = np.append(orbit.state, value), _units(orbit)

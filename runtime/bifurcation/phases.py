@@ -46,7 +46,7 @@ class Phases:
     # 0 for stick, +1 and -1 for slip, in the order of time; of all rotations the first in lexicographic order
     slip_states: tuple[int, ...]
     gap: float  # least minimum of the margin inside a phase; inf if there is none
-    landing: float  # margin at the end of slip, of the landing nearest to zero; positive if it sticks; inf if slip never ends
+    landing: float  # smallest margin at an end of slip; > 0: it sticks, < 0: it turns at once; inf: slip never ends
 
     @property
     def words(self) -> str:

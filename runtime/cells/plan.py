@@ -80,7 +80,7 @@ class Planner:
         return columns | {name: values[indices[-1]] for name, values in self.drawn.items()}
 
     def rows(self, cells: np.ndarray, near: np.ndarray | None = None) -> CellRows:
-        """Return the rows of these cells; `near` (cells,) is the last column of their spans (default: 0)."""
+        """Return the rows of these cells; `near` (cells,) is the column `SpanColumn.NEAR` of their spans (default: 0)."""
         columns = self.columns(cells)
         parameters = self._parameters(columns, len(cells))
         start = np.empty((len(cells), len(self.scene.y0)))

@@ -77,7 +77,7 @@ class FigureRuns:
         return future.result()
 
     def run(self, scene: Scene) -> Result:
-        """Run a scene on its own axes, thinned to the quality."""
+        """Run a scene over its axes, with as few values as the chosen quality allows."""
         scene = thin(scene, self.quality.points).replace(title="")
         return self.once(("run", scene), lambda: run(scene, **self.options))
 

@@ -179,7 +179,7 @@ class OrbitProblem:
         return integrator
 
     def observed(self, state: np.ndarray) -> OrbitProblem:
-        """Return the problem with the extent of driven motion from a state (components,) on."""
+        """Return the problem with its extent measured on driven motion that begins at this state (components,)."""
         if not self.forced:
             return self
         states = [state[None], *driven_states(self, state)]

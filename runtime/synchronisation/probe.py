@@ -63,7 +63,7 @@ class Probe(Labelled):
 
     @property
     def data(self) -> xr.Dataset:
-        """Verdicts over the common shape of alpha and beta, which are coordinates."""
+        """Verdicts on the grid of alpha and beta, its coordinates."""
         dims = tuple(f"dim_{k}" for k in range(self.alpha.ndim))
         return dataset(
             {
