@@ -7,13 +7,13 @@ import signal
 import sys
 import threading
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..console.arguments import add_workers, folder, part, settings, tolerance
-from ..console.outcome import FAILED, FINE, Failed, WrongUse, sentence, warn, wrong_use
+from ..console.outcome import FAILED, FINE, Failed, WrongUse, print_json, sentence, warn, wrong_use
 from ..console.scene_arguments import add_changed_scene, changed_scene
 from ..support.error_text import counted
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from ..cells.reduce import ReducedScene
+    from ..support.status import Status
     from ..sweeps.errors import SweepFailed, SweepInterrupted
     from ..sweeps.stream import Streamed
 
@@ -47,7 +48,7 @@ def configure(parser: ArgumentParser) -> None:
     parser.usage = (
         "synchain run SCENE --out DIR [--rtol X] [--workers N] [--set NAME=VALUE ...]\n"
         "                    [--format FORMAT] [--resume | --overwrite] [--part K/N] [--dask ADDRESS]\n"
-        "                    [--certify] [--no-skip] [--explain]\n"
+        "                    [--certify] [--no-skip] [--json] [--explain]\n"
         "       synchain run SCENE --explain [--rtol X] [--set NAME=VALUE ...] [--no-skip]"
     )
     add_changed_scene(parser, more="a,b,c or LO:HI:N sweeps a parameter or an initial state")
@@ -76,6 +77,7 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--explain", action="store_true", help="print what is left out of the scene and why; runs only with --out"
     )
+    parser.add_argument("--json", action="store_true", help="print JSON: file, figure, number of cells by their status")
     parser.add_argument("--no-skip", action="store_true", help="leave nothing out: integrate the scene as it stands")
     parser.add_argument(
         "--certify",
@@ -102,6 +104,8 @@ def execute(arguments: Namespace) -> int:
         scene = scene if arguments.rtol is None else scene.replace(rtol=arguments.rtol)
         skip = reduce_scene(scene, not arguments.no_skip)
         name = Path(arguments.scene).stem if arguments.scene.endswith(".toml") else arguments.scene
+        if arguments.json and arguments.explain:
+            raise WrongUse("found --json with --explain, which prints sentences; expected one of them")
         if arguments.explain:
             print(f"{name}: {counted(scene.cells, 'cell')} of {counted(scene.n, 'oscillator')}\n{explain(skip)}")
         target = None if arguments.out is None else _target(Path(arguments.out, f"{name}.{arguments.format}"))
@@ -111,7 +115,7 @@ def execute(arguments: Namespace) -> int:
         options: dict[str, Any] = {"resume": arguments.resume, "overwrite": arguments.overwrite}
         options |= {"certified": arguments.certify, "part": arguments.part}
         if claim(skip, target, **options) == "complete":
-            return _nothing_to_do(target)
+            return _nothing_to_do(target, arguments.json)
         output_folder(target.parent)
     warn(scene.warnings)
     if arguments.dask:
@@ -121,13 +125,16 @@ def execute(arguments: Namespace) -> int:
             done = stream(scene, target, reduce=skip, workers=arguments.workers, executor=executor, **options)
         except (SweepInterrupted, SweepFailed) as stop:
             raise _stopped(stop, target, arguments) from None
-    return print_run(done, "run")
+    return print_run(done, "run", arguments.json)
 
 
-def print_run(done: Streamed, name: str) -> int:
+def print_run(done: Streamed, name: str, json: bool = False) -> int:
     """Print how the cells of a finished run ended, draw its figure if it has all cells, and return the exit code."""
     from ..support.status import Status
 
+    if json:
+        _print_json(done.path, done.progress.statuses, _drawn(done.path) if done.part is None else None)
+        return FINE if done.success else FAILED
     print(done)
     for status, count in done.progress.statuses.items():
         if status != Status.FINISHED:
@@ -135,6 +142,12 @@ def print_run(done: Streamed, name: str) -> int:
     if done.part is None:
         print(f"  {_drawn(done.path)}")
     return FINE if done.success else FAILED
+
+
+def _print_json(path: Path, statuses: Mapping[Status, int], figure: Path | None) -> None:
+    """Print the files of a run and the number of cells that ended with each status, as JSON."""
+    counts = {status.name.lower(): int(count) for status, count in statuses.items()}
+    print_json({"file": str(path), "figure": None if figure is None else str(figure), "statuses": counts})
 
 
 def _target(path: Path) -> Path:
@@ -162,11 +175,17 @@ def _check(skip: ReducedScene, arguments: Namespace) -> None:
         check_certifiable(skip.scene)
 
 
-def _nothing_to_do(target: Path) -> int:
+def _nothing_to_do(target: Path, json: bool) -> int:
     """Print that the result is complete already; return the exit code of its run."""
     from ..results.result import read_result
+    from ..support.status import Status, tally
 
     result = read_result(target)
+    if json:
+        counts = tally(result.data.status.values.ravel())
+        figure = target.with_suffix(".png")
+        _print_json(target, {s: counts[s] for s in Status if counts[s]}, figure if figure.exists() else _drawn(target))
+        return FINE if result.success else FAILED
     print(f"{target} holds the result of this scene already; nothing was run (--overwrite runs it again)")
     print(f"  made with {result.data.attrs['versions']}\n  {result.message}")
     if not target.with_suffix(".png").exists():

@@ -152,3 +152,19 @@ def test_settings_change_equations_and_kernels(folder: Path, capsys: pytest.Capt
     assert "1.75" in source
     assert printed(capsys, "kernel", scene, "--set", "sigma=0.2") != ""
     assert isinstance(open_result(folder / "pair.nc"), Result)
+
+
+def test_a_run_prints_json_when_it_ran_and_when_it_was_there(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["run", folder / "pair.toml", "--out", tmp_path, "--set", "sigma=0.1,0.2", "--json"]
+    first, again = (json.loads(printed(capsys, *words)) for _ in range(2))
+    assert first == again
+    assert first == {
+        "file": str(tmp_path / "pair.nc"), "figure": str(tmp_path / "pair.png"), "statuses": {"finished": 2},
+    }  # fmt: skip
+    failed = [*words, "max_steps=3", "--overwrite"]
+    failed.remove("--json")
+    assert main([*map(str, failed), "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["statuses"] == {"step_budget": 2}
+    assert "found --json with --explain" in refused(capsys, *words, "--explain")
