@@ -36,7 +36,7 @@ from synchain.models.scenes.scene import Scene
 from ..cells.run_keywords import Given
 from ..results.labelled import Labelled, dataset, scene_text
 from ..results.labels import STATE, States
-from ..sweeps.continued_start import Start, started
+from ..sweeps.continued_start import started
 from .linearised import Linearised
 
 MOST_STEPS, HALVINGS = 100, 40

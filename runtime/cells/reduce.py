@@ -158,7 +158,7 @@ def as_reduction(scene: Scene, reduce: bool | ReducedScene, starts: np.ndarray |
     if not isinstance(reduce, ReducedScene):
         return reduce_scene(scene, check_flag("reduce", reduce), starts=starts)
     if starts is not None:
-        raise ValueError("reduce: found a Reduction beside a start of several cells; expected True or False")
+        raise ValueError("reduce: found a ReducedScene beside a start of several cells; expected True or False")
     if reduce.scene != scene:
         raise ValueError("reduce: found the reductions of another scene; make them with reduce_scene(scene)")
     return reduce

@@ -27,7 +27,7 @@ def kernel(scene: Scene, width: int | None = None, reduce: bool | ReducedScene =
     scene : Scene
     width : int, optional
         Number of lanes: 1, 2, 4, 8 or 16 (default: what the processor has, one for a single cell).
-    reduce : bool or Reduction
+    reduce : bool or ReducedScene
         Whether to leave out what the scene does not need (docs/skips.md); as for `run`.
 
     Raises

@@ -19,7 +19,7 @@ from ..results.labels import DRIVE_PHASE, END_TIME, STATE, States, coordinates, 
 from ..results.result import Result
 from ..support.arrays import row
 
-Start: TypeAlias = Result | xr.DataArray | Mapping[str, object] | Sequence[float] | np.ndarray
+StartValue: TypeAlias = Result | xr.DataArray | Mapping[str, object] | Sequence[float] | np.ndarray
 """Types of the argument `start`."""
 
 START_TIME = "start_time"
@@ -32,7 +32,7 @@ CELLS = 65536
 """Cells of a continued sweep whose periods are computed together, which bounds the memory."""
 
 
-def started(scene: Scene, start: Start) -> tuple[Scene, float]:
+def started(scene: Scene, start: StartValue) -> tuple[Scene, float]:
     """Return the scene with the states of one cell as its start, and the time at which they were reached."""
     if isinstance(start, Mapping):
         return scene.replace(initial=start), 0.0
@@ -56,7 +56,7 @@ def started(scene: Scene, start: Start) -> tuple[Scene, float]:
     return scene.replace(initial=initial), time
 
 
-def several(start: Start) -> TypeGuard[Result | xr.DataArray]:
+def several(start: StartValue) -> TypeGuard[Result | xr.DataArray]:
     """True for a result, or states, of several cells."""
     end = _end(start)
     return isinstance(end, xr.DataArray) and set(STATE) < set(end.dims)
@@ -111,7 +111,7 @@ def with_start_times(result: Result, times: float | np.ndarray) -> Result:
     return Result(result.data.assign_coords({START_TIME: (dimensions(result.scene), times)}), result.scene)
 
 
-def _end(start: Start) -> object:
+def _end(start: StartValue) -> object:
     """Return the final states of a result, of which all cells finished; any other start unchanged."""
     if not isinstance(start, Result):
         return start

@@ -32,7 +32,7 @@ from ..results.result import Result
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .certify import certified as with_certificate
-from .continued_start import Start, several, started, starts_of_cells, with_start_times
+from .continued_start import several, started, starts_of_cells, with_start_times
 from .memory import Memory
 from .prepare import prepare
 
@@ -72,9 +72,9 @@ def run(
         a coordinate if there were several cells, is that time of the earlier run.
     width : int, optional
         Number of lanes: 1, 2, 4, 8 or 16 (default: what the processor has, one for a single cell).
-    reduce : bool or Reduction
+    reduce : bool or ReducedScene
         Whether to leave out, exactly, what the scene does not need (docs/skips.md).  False
-        integrates all of it; a Reduction of this scene is used unchanged.
+        integrates all of it; a ReducedScene of this scene is used unchanged.
     certified : bool
         Add the transversal exponent of every cell and a verdict on its synchronisation, and end
         cells early that are certain to stay synchronous (see `synchain.runtime.sweeps.certify`).
