@@ -36,7 +36,7 @@ from synchain.models.scenes.scene import Scene
 from ..cells.run_keywords import Given
 from ..results.labelled import Labelled, dataset, scene_text
 from ..results.labels import STATE, States
-from ..sweeps.continued_start import started
+from ..sweeps.continued_start import StartValue, started
 from .linearised import Linearised
 
 MOST_STEPS, HALVINGS = 100, 40
@@ -206,7 +206,7 @@ class Equilibrium(Labelled):
 
 def equilibrium(
     scene: Scene,
-    start: Start | None = None,
+    start: StartValue | None = None,
     *,
     count: int | None = None,
     parameters: Mapping[str, float] | None = None,

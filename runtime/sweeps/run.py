@@ -32,7 +32,7 @@ from ..results.result import Result
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .certify import certified as with_certificate
-from .continued_start import several, started, starts_of_cells, with_start_times
+from .continued_start import StartValue, several, started, starts_of_cells, with_start_times
 from .memory import Memory
 from .prepare import prepare
 
@@ -41,7 +41,7 @@ def run(
     scene: Scene,
     *,
     resume: Result | None = None,
-    start: Start | None = None,
+    start: StartValue | None = None,
     width: int | None = None,
     reduce: bool | ReducedScene = True,
     certified: bool = False,
