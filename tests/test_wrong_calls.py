@@ -185,7 +185,7 @@ CALLS = [
     (lambda: runtime.thresholds(PAIR, executor=3), "executor: found 3"),
     (lambda: runtime.basin(PAIR, progress=3), "progress: found 3"),
     (lambda: runtime.msf("a", [0, 1]), A_SCENE),
-    (lambda: runtime.msf(PAIR, None), "alpha: found None"),
+    (lambda: runtime.msf(PAIR, "x"), "alpha: found 'x'"),
     (lambda: runtime.plane(PAIR, [0, 1], 3), "beta: found an array of shape"),
     (lambda: runtime.lyapunov_spectrum("a"), A_SCENE),
     (lambda: runtime.lyapunov_spectrum(PAIR, count=1.5), r"count = 1\.5"),
