@@ -1,6 +1,6 @@
 """Count the frame of the source: code, docstrings, comments, bodies of functions, double names.
 
-    python tools/frame.py [folder]
+    python tools/frame.py [root of a checkout]
 
 A name is public if the reference shows it, or if it is a public attribute of a class that it shows.
 """
@@ -110,7 +110,10 @@ def count(root: Path) -> dict[str, float]:
 
 def main() -> None:
     """Print the counts as a table."""
-    for name, number in count(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT).items():
+    root = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT
+    if missing := [package for package in PACKAGES if not (root / package).is_dir()]:
+        sys.exit(f"{root}: found no folder {missing[0]}; expected the root of a checkout")
+    for name, number in count(root).items():
         print(f"{name:40} {number:>8}")
 
 
