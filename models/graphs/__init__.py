@@ -1,5 +1,5 @@
-"""Graphs: families, products, readers, other matrices, closed forms. It imports nothing of oscillators.
+"""Graphs: families, products, readers, Laplacians, closed forms. Independent of oscillators.
 
-A topology is a graph with exact weights; a family makes topologies of any size; a rule, of a family or an
-operation, makes the links of a topology on first use and gives closed forms of its spectrum.
+A topology is a graph with exact weights.  A family is a function that makes topologies of any size.  The rule of a
+topology (its family, or an operation on other graphs) makes its links on first use and its spectrum in closed form.
 """

@@ -1,7 +1,7 @@
 """Spectra of whole families in closed form, with symbols for the sizes, and simple eigenvectors.
 
-A family's file may have `formula()`, which returns a ClosedForm of the symbols below.  The tests
-prove each one for all sizes up to 30 against the exact characteristic polynomial.
+The `formula` of a family returns a ClosedForm in the symbols below.  Tests prove each closed form
+for all sizes up to 30 against the exact characteristic polynomial.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ m: number of an eigenvector; i: number of a node, from 0."""
 Index = tuple[sp.Symbol, sp.Expr, sp.Expr]
 
 _ENTRY = re.compile(r"[0-9]{1,9}|[a-hj-wyz][0-9]?")
-"""A whole number or a letter other than i, the node, and x, which stands between sizes."""
+"""A whole number or a letter, except i (the node) and x (the separator of sizes, as in pxq)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """Eigenvalues of one form: one for each value of the indices, e.g. -4 sin²(kπ/n), k = 0 … n - 1."""
+    """A formula for eigenvalues, one for each value of its indices: -4 sin²(kπ/n), k = 0 … n - 1."""
 
     value: sp.Expr  # the eigenvalue
     times: sp.Expr = sp.S.One  # its multiplicity
-    indices: tuple[Index, ...] = ()  # there is an eigenvalue for every value low … high of these indices
+    indices: tuple[Index, ...] = ()  # (k, low, high): one eigenvalue for each k = low … high
     vector: sp.Expr | None = None  # entry NODE of an eigenvector
-    numbered: tuple[Index, ...] = ()  # numbers of the eigenvectors of a multiple eigenvalue
+    numbered: tuple[Index, ...] = ()  # indices that number the eigenvectors of a multiple eigenvalue
     where: sp.Basic = sp.true  # condition on `numbered` for independent eigenvectors
 
     @property
     def text(self) -> str:
-        """The term as text: value, multiplicity times for k = low … high."""
+        """Text such as "-2*k, binomial(d, k) times for k = 0 … d"."""
         times = "" if self.times == 1 else f", {sp.sstr(self.times)} times"
         return f"{sp.sstr(self.value)}{times}{_ranges(self.indices)}"
 
@@ -53,12 +53,12 @@ class Term:
 
     @property
     def symbols(self) -> set[sp.Symbol]:
-        """All symbols but that of the node."""
+        """All symbols of the term, except NODE."""
         ends = [end for index in (*self.indices, *self.numbered) for end in index]
         return set().union(*(sp.S(part).free_symbols for part in (self.value, self.times, self.where, *ends)))
 
     def at(self, sizes: Mapping[sp.Symbol, int]) -> Iterator[tuple[sp.Expr, int, dict[sp.Symbol, int]]]:
-        """Yield (eigenvalue, multiplicity > 0, sizes and indices) for numbers in place of the sizes."""
+        """Yield (eigenvalue, multiplicity > 0, values of sizes and indices) for numeric sizes."""
         for values in _with_indices(self.indices, dict(sizes)):
             count = int(self.times.subs(values))
             if count:
@@ -72,7 +72,7 @@ class Term:
                     yield self.vector.subs(all_values).doit()
 
     def replaced(self, new: Mapping[sp.Symbol, sp.Expr]) -> Term:
-        """Return the term with other expressions for some of its symbols, all at once."""
+        """Substitute expressions for symbols, all at once."""
 
         def put(part: object) -> object:
             return sp.S(part).xreplace(dict(new))
@@ -90,7 +90,7 @@ def _ranges(indices: tuple[Index, ...]) -> str:
 
 
 def _with_indices(indices: tuple[Index, ...], values: dict[sp.Symbol, int]) -> Iterator[dict[sp.Symbol, int]]:
-    """Yield the values of the symbols with all values of the indices, whose ends depend on them."""
+    """Extend `values` by every combination of the indices; ends of an index may depend on earlier values."""
     ranges = [range(int(low.subs(values)), int(high.subs(values)) + 1) for _, low, high in indices]
     for numbers in product(*ranges):
         yield values | {index[0]: k for index, k in zip(indices, numbers, strict=True)}
@@ -102,19 +102,19 @@ class ClosedForm:
 
     terms: tuple[Term, ...]  # the eigenvalues
     size: sp.Expr = N  # the number of nodes
-    options: Mapping[str, object] = field(default_factory=dict)  # options of the family, expressions in the symbols
+    options: Mapping[str, object] = field(default_factory=dict)  # option of the family -> expression in the symbols
     least: int = 1  # smallest number for each symbol that is not in `lowest`
     note: str = ""  # further text for readers
     blocks: str = ""  # text on Jordan blocks larger than 1; not valid for products
-    degree: sp.Expr | None = None  # the in-degree of every node; None if it is not one for all
-    where: sp.Basic = sp.true  # condition on the numbers
-    lowest: Mapping[sp.Symbol, int] = field(default_factory=dict)  # smallest numbers of single symbols
+    degree: sp.Expr | None = None  # common in-degree of all nodes; None if they differ
+    where: sp.Basic = sp.true  # condition on the sizes
+    lowest: Mapping[sp.Symbol, int] = field(default_factory=dict)  # smallest number for particular symbols
     name: str = ""  # name of the family with its options
-    build: Callable[[Mapping[sp.Symbol, int]], Topology] | None = field(default=None, compare=False)  # makes a graph
+    build: Callable[[Mapping[sp.Symbol, int]], Topology] | None = field(default=None, compare=False)  # numbers -> graph
 
     @property
     def symbols(self) -> tuple[sp.Symbol, ...]:
-        """The symbols that take numbers, sorted by name."""
+        """The symbols that `at` replaces by numbers, sorted by name."""
         return tuple(sorted(self.size.free_symbols | self.where.free_symbols, key=str))
 
     def least_of(self, symbol: sp.Symbol) -> int:
@@ -130,11 +130,11 @@ class ClosedForm:
         return [(value, count) for term in self.terms for value, count, _ in term.at(sizes)]
 
     def graph(self, **numbers: int) -> Topology:
-        """Return the graph for numbers as of `at`."""
+        """Return the graph for numbers such as n=5; see `at`."""
         return self.graph_of(self.by_symbol(numbers))
 
     def graph_of(self, numbers: Mapping[sp.Symbol, int]) -> Topology:
-        """Return the graph for numbers by symbols."""
+        """Return the graph for a mapping symbol -> number."""
         if self.build is None:
             raise ValueError("this closed form has no graph; expected one made by closed_form or a product of such")
         return self.build(numbers)
@@ -160,12 +160,12 @@ class ClosedForm:
 
     @property
     def words(self) -> str:
-        """The note and the Jordan blocks."""
+        """The text on particularities: note and Jordan blocks."""
         return "; ".join(filter(None, (self.note, self.blocks)))
 
     @property
     def text(self) -> str:
-        """The form as lines."""
+        """The closed form as lines of text."""
         rows = [f"{self.name}, n = {sp.sstr(self.size)} nodes" if self.size != N else f"{self.name} of n nodes"]
         for term in self.terms:
             rows.append(f"  {term.text}")
@@ -174,7 +174,7 @@ class ClosedForm:
         return "\n".join([*rows, *([f"  {self.words}"] if self.words else [])])
 
     def by_symbol(self, numbers: Mapping[str, int]) -> dict[sp.Symbol, int]:
-        """Return numbers by symbols instead of names; ValueError as `at`."""
+        """Replace names by symbols in a mapping to numbers; ValueError for a wrong name or a number out of range."""
         symbols = {str(symbol): symbol for symbol in self.symbols}
         if set(numbers) != set(symbols):
             raise ValueError(f"found numbers for {sorted(numbers)}; expected them for {sorted(symbols)}")
@@ -188,7 +188,7 @@ class ClosedForm:
 
 
 def entries(what: str, sizes: str | Iterable[object]) -> tuple[sp.Expr, ...]:
-    """Return the whole numbers and symbols of a list or a text such as "pxq"; else ValueError."""
+    """Read whole numbers and symbols from a list or a text such as "pxq"; ValueError for any other entry."""
     parts = re.split("[,x]", sizes.replace(" ", "")) if isinstance(sizes, str) else list(sizes)
     wrong = next((part for part in parts if not _ENTRY.fullmatch(str(part))), None)
     if wrong is not None or not parts:
@@ -200,7 +200,7 @@ def entries(what: str, sizes: str | Iterable[object]) -> tuple[sp.Expr, ...]:
 
 
 def formulas() -> tuple[str, ...]:
-    """Return the names of the families that have a closed form with symbols."""
+    """Return the names of the families with a closed form."""
     return tuple(name for name in names() if family(name).formula is not None)
 
 

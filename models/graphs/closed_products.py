@@ -1,7 +1,7 @@
 """Closed forms of products and unions of families, with symbols for all sizes.
 
-The rules are those of `products.py`; eigenvectors are products of those of the factors, in its
-numbering of the nodes.
+`products.py` states the rules and the numbering of the nodes.  Each eigenvector of a product is the
+Kronecker product of eigenvectors of the factors.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Joined = Callable[[Topology, Topology], Topology]
 
 
 def cartesian(first: ClosedForm, second: ClosedForm) -> ClosedForm:
-    """Return all sums of an eigenvalue of each; common symbols get a number in the second form."""
+    """Return all sums a + b of eigenvalues of the factors; symbols common to both are renamed in the second."""
     second = _apart(first, second)
     degree = None if first.degree is None or second.degree is None else first.degree + second.degree
     return _joined(products.cartesian, first, second, _pairs(first, second, lambda a, b: a + b), degree)
@@ -39,7 +39,7 @@ def kronecker(first: ClosedForm, second: ClosedForm) -> ClosedForm:
 
 
 def union(first: ClosedForm, second: ClosedForm) -> ClosedForm:
-    """Return the eigenvalues of both; eigenvectors are zero on the nodes of the other graph."""
+    """Return the eigenvalues of both graphs; each eigenvector is zero on the nodes of the other graph."""
     second = _apart(first, second)
     n = first.size
     terms: list[Term] = []
@@ -55,7 +55,7 @@ def union(first: ClosedForm, second: ClosedForm) -> ClosedForm:
 
 
 def box(part: ClosedForm, sizes: Sequence[sp.Expr], indices: Sequence[sp.Symbol]) -> ClosedForm:
-    """Return the Cartesian product of chains or rings of these sizes, each with an index of its eigenvalues."""
+    """Return the Cartesian product of chains or rings; `indices` number the eigenvalues of each direction."""
     (n,) = part.symbols
     ((old, _, _),) = part.terms[0].indices
     parts = [renamed(part, {n: size, old: k}) for size, k in zip(sizes, indices, strict=True)]
@@ -63,7 +63,7 @@ def box(part: ClosedForm, sizes: Sequence[sp.Expr], indices: Sequence[sp.Symbol]
 
 
 def counters(sizes: Sequence[sp.Expr]) -> tuple[sp.Symbol, ...]:
-    """Return an index for each direction: j and k of two, else k, k1 …; none is a size."""
+    """Choose an index for each direction, j and k for two, else k, k1 …, distinct from the letters of sizes."""
     taken = {str(size) for size in sizes}
     letters = ["j", "k"] if len(sizes) == 2 else ["k", *(f"k{i}" for i in range(1, 2 * len(sizes)))]
     free = [letter for letter in [*letters, "l", "m", "k0"] if letter not in taken]
@@ -71,7 +71,7 @@ def counters(sizes: Sequence[sp.Expr]) -> tuple[sp.Symbol, ...]:
 
 
 def renamed(form: ClosedForm, new: Mapping[sp.Symbol, sp.Expr]) -> ClosedForm:
-    """Return the form with other symbols, or numbers, for some of its symbols."""
+    """Replace symbols of a form by other symbols or by numbers."""
 
     def put(part: sp.Expr | None) -> sp.Expr | None:
         return None if part is None else sp.S(part).xreplace(dict(new))
@@ -95,7 +95,7 @@ def renamed(form: ClosedForm, new: Mapping[sp.Symbol, sp.Expr]) -> ClosedForm:
 
 
 def _apart(first: ClosedForm, second: ClosedForm) -> ClosedForm:
-    """Return the second form with other letters for those of the first."""
+    """Rename the symbols of the second form that the first form uses too."""
     # k becomes k2, k3, … until no symbol of the first form, nor the node, has that name
     taken = {str(s) for s in _letters(first)} | {str(NODE)}
     new = {}
@@ -110,13 +110,13 @@ def _apart(first: ClosedForm, second: ClosedForm) -> ClosedForm:
 
 
 def _letters(form: ClosedForm) -> set[sp.Symbol]:
-    """Return all symbols of a form but that of the node."""
+    """Return all symbols of a form, except NODE."""
     indices = {s for term in form.terms for s, _, _ in (*term.indices, *term.numbered)}
     return set(form.symbols).union(indices, *(term.symbols for term in form.terms))
 
 
 def _pairs(first: ClosedForm, second: ClosedForm, combine: Callable[[sp.Expr, sp.Expr], sp.Expr]) -> tuple[Term, ...]:
-    """Return a term for each pair; node i is i // n of the first graph and i mod n of the second."""
+    """Combine each pair of terms; node i is the pair (i // n, i mod n), n the size of the second graph."""
     n, terms = second.size, []
     for a, b in product(first.terms, second.terms):
         vector = None
@@ -136,14 +136,14 @@ def _pairs(first: ClosedForm, second: ClosedForm, combine: Callable[[sp.Expr, sp
 
 
 def _at(term: Term, node: sp.Expr) -> sp.Expr:
-    """Return the entry of the eigenvector of a term at another node."""
+    """Return the entry of a term's eigenvector at the node with the number `node`."""
     return sp.S(term.vector).xreplace({NODE: node})
 
 
 def _joined(
     operation: Joined, first: ClosedForm, second: ClosedForm, terms: tuple[Term, ...], degree: sp.Expr | None
 ) -> ClosedForm:
-    """Return the form of an operation of `products` with these terms, of first.size * second.size nodes."""
+    """Build the closed form of an operation of `products` from its terms; it has first.size * second.size nodes."""
     defective = " and ".join(dict.fromkeys(form.name for form in (first, second) if form.blocks))
     return ClosedForm(
         terms,

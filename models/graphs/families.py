@@ -1,4 +1,4 @@
-"""Families of graphs as values, and the graphs that they make."""
+"""Families of graphs: `Family`, `topology` and the rule of a graph that a family made."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class _Signature:
     """The signature of a call of a family: n, and the options with their defaults."""
 
     def __get__(self, instance: Family | None, owner: type[Family]) -> inspect.Signature:
-        if instance is None:  # `inspect.signature(Family)` is that of the constructor
+        if instance is None:  # inspect.signature(Family) is the constructor's
             raise AttributeError("__signature__")
         kind = inspect.Parameter
         options = (kind(name, kind.KEYWORD_ONLY, default=value) for name, value in instance.options.items())
@@ -80,28 +80,29 @@ def _options(edges: Edges) -> Mapping[str, object]:
 class Family:
     """A family of graphs: a function of the number of nodes and of the options of the family.
 
-    A plug-in file assigns one to TOPOLOGY.  Families are equal if their names are; the name of a file outside the package
-    includes the digest of its text.  A family pickles as its name.
+    A plug-in file assigns a family to TOPOLOGY.  Two families are equal if their names are equal; the name of a file
+    outside the package includes the digest of its text.  A family is pickled by name.
 
     Parameters
     ----------
     edges : callable
-        ``edges(n, **options)`` yields (i, j, weight) once for each edge, nodes from 0; of a directed family (target, source,
-        weight) once for each link.  Weights are whole numbers, Fractions or texts such as "1/2".  Its keyword-only
-        arguments are the options of the family with their defaults; None for an option that is stored only if it is set.
+        ``edges(n, **options)`` yields (i, j, weight) once for each edge, with nodes counted from 0.  In a directed
+        family it yields (target, source, weight) once for each link.  Weights are whole numbers, Fractions or texts
+        such as "1/2".  The keyword-only arguments are the options of the family with their defaults; an option with
+        the default None is stored only if it is set.
     minimum : int
         Smallest number of nodes.
     too_small : str
-        What to do if n is below the minimum.
+        Advice in the error message for n below the minimum.
     settle : callable, optional
-        ``settle(n, **options)`` checks the options, and n if the family has not all numbers of nodes, and returns the
-        options as a graph stores them.  Needed if there are options.
+        ``settle(n, **options)`` checks the options, and n if not every number of nodes is possible.  It returns the
+        options in the form that a graph stores.  Required if the family has options.
     count, expected : callable, optional
-        ``count(n, **options)`` is the number of edges, so that large graphs need not be built to be counted;
-        ``expected(n, **options)`` their mean number if chance decides.
+        ``count(n, **options)`` is the number of edges, computed without building the graph.
+        ``expected(n, **options)`` is the mean number of edges of a random graph.
     spectrum : callable, optional
-        ``spectrum(n, **options)`` is a sequence of (eigenvalue of adjacency minus degree, multiplicity) without
-        repetition, or None for an n without a closed form.  It is proved before it is used.
+        ``spectrum(n, **options)`` is a sequence of (eigenvalue of adjacency minus degree, multiplicity) with distinct
+        eigenvalues, or None for an n without a closed form.  The sequence is proved before use.
     formula : callable, optional
         The closed form with symbols for the sizes, a `ClosedForm`.
     sides : callable, optional
@@ -109,18 +110,18 @@ class Family:
     directed : bool
         True if links are one-way.
     connected : bool
-        False if a graph may fall into parts.
+        False if a graph of the family may have several components.
     all_to_all : bool
-        True if every pair of nodes is joined by an edge of weight 1, on which mean fields rest.
+        True if an edge of weight 1 joins every pair of nodes; such graphs are computed with mean fields.
     source : str
-        Where the graph comes from.
+        Publication that defines the graph.
     name, summary : str
-        The name of the plug-in and one line for lists; the file gives them.
+        Name of the plug-in, and one line for lists; both are taken from the plug-in file.
 
     Raises
     ------
     ValueError
-        If the options of the functions differ, or one has no default.
+        If the functions have different options, or an option has no default.
 
     Examples
     --------
@@ -145,7 +146,7 @@ class Family:
     source: str = ""
     name: str = ""
     summary: str = ""
-    link_limit: int = LINK_LIMIT  # greatest number of links of a graph
+    link_limit: int = LINK_LIMIT  # most links of a graph
     __signature__ = _Signature()
 
     def __post_init__(self) -> None:
@@ -158,7 +159,7 @@ class Family:
             raise ValueError(
                 f"found no settle for the options {', '.join(self.options)}; expected one that checks them"
             )
-        # all functions take n, the same options, and perhaps further arguments with defaults
+        # Each function takes n and all options of `edges`; further arguments must have defaults.
         for name in ("settle", "count", "expected", "spectrum"):
             if (function := getattr(self, name)) is not None:
                 parameters = dict(list(inspect.signature(function).parameters.items())[1:])
@@ -189,7 +190,7 @@ class Family:
         if size < self.minimum:
             raise ValueError(f"topology {self.name}: n = {size}; expected at least {self.minimum}: {self.too_small}")
         settled = self._settled(size, options)
-        # Graphs by chance are drawn to be used at once: refuse too many links now, others when links are listed.
+        # Refuse a random graph with too many links now; refuse other graphs only when their links are listed.
         edge_count = self.count if self.expected is None and "seed" in self.options else self.expected
         if edge_count is not None:
             self.limit_links(size, self.links_of_edge * edge_count(size, **dict(settled)))
@@ -221,7 +222,7 @@ class Family:
             )
 
     def _settled(self, n: int, options: Mapping[str, object]) -> Options:
-        """Return the options as a graph stores them, checked by `settle`."""
+        """Check the options with `settle` and return them in the form that a graph stores."""
         for key in options:
             if key not in self.options:
                 remedy = f"known: {', '.join(self.options)}" if self.options else "this family has none: remove it"
@@ -232,7 +233,7 @@ class Family:
             settled = self.settle(n, **{**self.options, **options})
         except (ValueError, TypeError) as error:
             raise type(error)(f"topology {self.name}: {error}") from None
-        except Exception as error:  # a mistake in a file from outside
+        except Exception as error:  # a mistake in a plug-in file
             raise plugins.located(error, self.settle) from error
         if not isinstance(settled, Mapping):
             raise ValueError(
@@ -243,7 +244,7 @@ class Family:
 
 @dataclass(frozen=True, slots=True)
 class FamilyRule:
-    """The rule of a graph that a family made."""
+    """Links and spectrum of a graph that a family made; see `Rule`."""
 
     family: Family
     n: int
@@ -257,21 +258,21 @@ class FamilyRule:
 
     @property
     def undirected(self) -> bool:
-        """True if the family joins nodes both ways."""
+        """True if the family is undirected."""
         return not self.family.directed
 
     @property
     def all_to_all(self) -> Fraction | None:
-        """1 if the family joins all pairs of nodes."""
+        """1, the weight of all links, if the family joins all pairs of nodes; else None."""
         return Fraction(1) if self.family.all_to_all else None
 
     def links(self) -> tuple[Link, ...]:
-        """Build the sorted links; ValueError if they are too many."""
+        """Build the sorted links; ValueError for more than `link_limit`."""
         family, one = self.family, Fraction(1)
-        # Refuse by the count first; a family without one is cut off behind the limit, so that memory is bounded.
+        # Check the count first.  A family without `count` is read up to the limit only, to bound the memory.
         family.limit_links(self.n, self.link_count or 0)
         edges = islice(family.edges(self.n, **dict(self.options)), family.link_limit // family.links_of_edge + 1)
-        links = [(i, j, one if weight == 1 else Fraction(weight)) for i, j, weight in edges]  # one object for all 1
+        links = [(i, j, one if weight == 1 else Fraction(weight)) for i, j, weight in edges]  # share one Fraction
         family.limit_links(self.n, family.links_of_edge * len(links))
         if not family.directed:
             links += [(j, i, weight) for i, j, weight in links]
@@ -281,7 +282,7 @@ class FamilyRule:
     def eigenvalues(self) -> Sequence[tuple[sp.Expr, int]] | None:
         """List the eigenvalues of G with multiplicities; None if the family has no closed form."""
         pairs = None if self.family.spectrum is None else self.family.spectrum(self.n, **dict(self.options))
-        if not isinstance(pairs, list | tuple):  # a sequence that computes its items is one of SymPy's numbers
+        if not isinstance(pairs, list | tuple):  # a lazy sequence already has SymPy numbers
             return pairs
         from sympy import Integer
 
@@ -303,7 +304,7 @@ def topology(name: str, n: int, **options: object) -> Topology:
     Returns
     -------
     Topology
-        The graph.  Its links are built when they are first asked for.
+        The graph.  Its links are built on first use.
 
     Raises
     ------
@@ -311,8 +312,8 @@ def topology(name: str, n: int, **options: object) -> Topology:
         If n is no integer.
     ValueError
         On an unknown name or option, on n below the family's minimum, and on more than LINK_LIMIT
-        links before any is built: at once if the graph is drawn by chance, else when they are
-        first asked for.
+        links.  Links are counted before any is built: in this call for a random graph, for other
+        graphs on first use of their links.
     """
     return family(name)(n, **options)
 
@@ -331,7 +332,7 @@ def family(name: str) -> Family:
     if plugins.is_shipped(TOPOLOGY, canonical):
         return loaded
 
-    # Of a file from outside, errors in functions name file and line, and what the functions return is checked.
+    # Wrap the functions of a plug-in file: errors name file and line, and returned values are checked.
     def blamed(function: Callable[..., Any] | None) -> Callable[..., Any] | None:
         return None if function is None else plugins.blamed(function)(function)
 

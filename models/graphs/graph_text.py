@@ -1,6 +1,6 @@
-"""Products and unions of families written as text: cartesian(chain(4), torus(12, shape=(3, 4))), or without sizes.
+"""Read operations on families of graphs from text: cartesian(chain(4), torus(12, shape=(3, 4))), or without sizes.
 
-Such texts are the names that `products` gives its graphs.
+`products` names its graphs by such texts.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 V = TypeVar("V")
 
 LENGTH, DEPTH = 300, 8
-"""Most characters of a text and most nested operations, a choice."""
+"""Most characters of a text, and most nested operations; both are choices."""
 
 LARGEST = 1_000_000
 """Most nodes of a graph whose name `checked_name` reads, a choice."""
 
 PAIRS = ("cartesian", "kronecker", "union")
-"""Operations on two graphs; they act on closed forms too."""
+"""Operations on two graphs or on two closed forms."""
 
 SIZED = ("complement", "weighted")
-"""Operations on one graph, which have no closed form without sizes."""
+"""Operations on one graph; none has a closed form without sizes."""
 
 
 def is_composed(text: str) -> bool:
@@ -40,22 +40,22 @@ def is_composed(text: str) -> bool:
 
 
 def read_graph(text: str, largest: int | None = None, seeds: Iterator[int] | None = None) -> Topology:
-    """Return the graph of a text; families have their size as first argument, then their options by name."""
+    """Return the graph of a text; the arguments of a family are its size, then its options by name."""
     return _value(_Graphs(text, largest, seeds))
 
 
 def checked_name(what: str, graph: Topology) -> Topology:
-    """Return a graph; ValueError if its name means a graph of a family or operation that has other links."""
+    """Return the graph unchanged; ValueError if `read_graph` would read its name as a graph with other links."""
     composed = is_composed(graph.name)
     if graph.rule is not None or not (composed or graph.name in (*names(), *TOPOLOGY.also)):
         return graph
     text = graph.name if composed else f"{graph.name}({graph.n})"
-    # An operation that cannot be read means no graph, so its name is free; a family's name with a wrong size is not.
+    # A name that cannot be read as an operation is free; the name of a family with a wrong size is not.
     try:
         named = read_graph(text, LARGEST)
         same = named.n == graph.n and named.links == graph.links
     except (ValueError, TypeError):
-        same = composed  # parentheses in a name that means no graph
+        same = composed  # unreadable: parentheses that are part of a free name
     if not same:
         raise ValueError(
             f"{what}: found the name {short_repr(graph.name)} and links other than those of {text}; expected a graph by "
@@ -65,13 +65,13 @@ def checked_name(what: str, graph: Topology) -> Topology:
 
 
 def read_form(text: str) -> ClosedForm:
-    """Return the closed form of a text without sizes: cartesian, kronecker and union of families, options with letters."""
+    """Return the closed form of a text without sizes: cartesian, kronecker and union of families, with letters."""
     return _value(_Forms(text))
 
 
 @dataclass(frozen=True, slots=True)
 class _Composed(Algebra[V]):
-    """Values of texts of operations; a text without a value is refused as a whole."""
+    """Base of the algebras for graphs and closed forms; an error quotes the whole text."""
 
     text: str
     deepest = DEPTH
@@ -80,7 +80,7 @@ class _Composed(Algebra[V]):
 
     @property
     def unreadable(self) -> ValueError:
-        """The error for any other text."""
+        """The error for a text that is no operation."""
         return ValueError(
             f"unreadable {self.what} {short_repr(self.text)}{unpaired(self.text)}; expected {self.expected}"
         )
@@ -93,7 +93,7 @@ class _Composed(Algebra[V]):
 
 
 def _value(composed: _Composed[V]) -> V:
-    """Return the value of the text; ValueError if it is too long or has none."""
+    """Evaluate the text; ValueError if it is too long or cannot be read."""
     expression = parse(composed.text) if len(composed.text) <= LENGTH else None
     if expression is None:
         raise composed.unreadable
@@ -110,7 +110,7 @@ class _Graphs(_Composed[Topology]):
     expected = f"{', '.join((*PAIRS, *SIZED))}, e.g. cartesian(chain(4), ring(5))"
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[Topology] | None]:
-        # graphs are read by this algebra; sizes and factors stay text
+        # evaluate graphs with this algebra; pass sizes and factors on as text
         if function in PAIRS and count == 2 and not options:
             return self, self
         if function == "complement" and count == 1 and not options:

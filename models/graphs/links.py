@@ -1,4 +1,4 @@
-"""Links of a graph, listed or between all pairs; sums of their weights, and the parts that they join."""
+"""Links of a graph, as a list or as all pairs of nodes; in-degrees and connected components."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from itertools import islice
 from typing import TypeAlias
 
 LINK_LIMIT = 4_000_000
-"""Greatest number of links of a graph, a choice: these take about 600 MB as tuples of Python."""
+"""Most links of a graph, a choice: 4 million tuples take about 600 MB in Python."""
 
 Link: TypeAlias = tuple[int, int, Fraction]
 """(target, source, weight): node `target` feels node `source`; indices start at 0."""
@@ -17,7 +17,7 @@ Link: TypeAlias = tuple[int, int, Fraction]
 
 @dataclass(frozen=True, slots=True)
 class AllPairs:
-    """The links between each node and every other one, all of one weight, sorted; they take no memory."""
+    """The sorted links between all pairs of nodes, with one common weight; computed on iteration, not stored."""
 
     n: int  # number of nodes
     weight: Fraction  # the weight of every link
@@ -37,16 +37,16 @@ class AllPairs:
         return ((i, j, self.weight) for i in range(self.n) for j in range(self.n) if i != j)
 
     def first(self, count: int) -> tuple[Link, ...]:
-        """Return the first `count` links, however many there are."""
+        """Return the first `count` links."""
         return tuple(islice(self._all(), count))
 
 
 Links: TypeAlias = tuple[Link, ...] | AllPairs
-"""Links in a list, or those of all pairs."""
+"""Links as a tuple, or the links between all pairs of nodes."""
 
 
 def one_degree(n: int, links: Iterable[Link]) -> Fraction | None:
-    """Return the in-degree of n nodes, the sum of the weights that each feels; None if they differ."""
+    """Return the common in-degree of n nodes, the sum of the weights that a node feels; None if nodes differ."""
     sums = [Fraction(0)] * n
     for target, _, weight in links:
         sums[target] += weight
@@ -58,7 +58,7 @@ def join(n: int, pairs: Iterable[tuple[int, int]]) -> tuple[int, ...]:
 
     References
     ----------
-    R. E. Tarjan, J. Assoc. Comput. Mach. 22, 215 (1975): sets as trees, with short paths.
+    R. E. Tarjan, J. Assoc. Comput. Mach. 22, 215 (1975): union-find with path compression.
     """
     parent = list(range(n))
 
@@ -75,6 +75,6 @@ def join(n: int, pairs: Iterable[tuple[int, int]]) -> tuple[int, ...]:
 
 
 def numbered(classes: Iterable[Hashable]) -> tuple[int, ...]:
-    """Return the class of each node as a number from 0, in the order of the first members."""
+    """Number the classes from 0 by their first members; return the number of each node's class."""
     order: dict[Hashable, int] = {}
     return tuple(order.setdefault(label, len(order)) for label in classes)

@@ -1,8 +1,8 @@
-"""The other matrices of a graph: adjacency, Laplacians; their spectra are proved as that of G is.
+"""Matrices of a graph beside G: adjacency matrix and Laplacians, with proved spectra.
 
 F. R. K. Chung, Spectral Graph Theory (American Mathematical Society, 1997), chapter 1; A. E. Brouwer,
-W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.1.  A matrix costs no algebra: only its
-eigenvalues, its eigenvectors and `matrix` load SymPy.
+W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.1.  Only eigenvalues, eigenvectors and
+`matrix` load SymPy.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Exact:
-    """Rows, exact spectrum and eigenvectors of a matrix by its entries; a mixin of `Topology` and `GraphMatrix`."""
+    """Mixin of `Topology` and `GraphMatrix`: compute rows, exact spectrum and eigenvectors from the entries."""
 
     __slots__ = ()
 
@@ -66,7 +66,7 @@ class Exact:
 
 
 class MatrixKind(StrEnum):
-    """Matrices of a graph with the weights W, in which row i feels column j, and their row sums D."""
+    """Matrices of a graph: W holds the weights with which node i (row) feels node j (column), D the row sums of W."""
 
     ADJACENCY = "adjacency matrix"
     """W."""
@@ -75,14 +75,14 @@ class MatrixKind(StrEnum):
     SIGNLESS = "signless Laplacian"
     """D + W; of undirected graphs."""
     RANDOM_WALK = "random-walk Laplacian"
-    """1 - W/D, with a row of zeros for a node without links; of undirected graphs.  It is similar to
-    the normalised Laplacian 1 - D^(-1/2) W D^(-1/2), whose entries are roots: it has its
-    eigenvalues, and D^(1/2) times its eigenvectors are those of the other.
+    """1 - W/D, with a row of zeros for a node without links; of undirected graphs.  The matrix is rational and
+    similar to the normalised Laplacian L = 1 - D^(-1/2) W D^(-1/2), whose entries are square roots.  Both have the
+    same eigenvalues; v is an eigenvector of 1 - W/D if D^(1/2) v is one of L.
     """
 
 
 class GraphMatrices(Matrix, Protocol):
-    """A graph, which is its matrix G, with the links of its other matrices; a `Topology` is one."""
+    """Protocol of a graph (its matrix G and its links) from which a `GraphMatrix` is made; `Topology` fulfils it."""
 
     @property
     def links(self) -> tuple[Link, ...]:
@@ -94,7 +94,7 @@ class GraphMatrices(Matrix, Protocol):
 
     @property
     def asymmetry(self) -> str:
-        """Text on the first links that do not act both ways with one weight; "" if all do."""
+        """Message on the first links that differ from their mirror image; "" if the graph is undirected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,7 @@ class GraphMatrix(Exact):
 
     @property
     def name(self) -> str:
-        """What messages call the matrix."""
+        """Name of the matrix in messages."""
         return f"{self.graph.name}, {self.kind}"
 
     @property
@@ -136,12 +136,12 @@ class GraphMatrix(Exact):
 
     @property
     def diagonalisable(self) -> bool:
-        """True if it is known that eigenvectors are a basis: the matrix, or one similar to it, is symmetric."""
+        """True if the matrix is known to be similar to a symmetric one, so that eigenvectors form a basis."""
         return self.graph.undirected
 
     @property
     def _degrees(self) -> dict[int, Fraction]:
-        """The sum of the weights that a node feels, of each node that feels one."""
+        """Node -> sum of the weights that the node feels; nodes without links are left out."""
         return {i: total(weight for _, _, weight in row) for i, row in groupby(self.graph.links, itemgetter(0))}
 
     @property
@@ -157,11 +157,11 @@ class GraphMatrix(Exact):
         return (*((i, j, sign * weight) for i, j, weight in links), *((i, i, d) for i, d in degrees.items() if d))
 
     def closed_form(self) -> Sequence[tuple[sp.Expr, int]] | None:
-        """List the eigenvalues with multiplicities, each once, if they follow from those of G; else None."""
+        """List the distinct eigenvalues with multiplicities if they follow from the eigenvalues of G; else None."""
         from ..algebra.cosine_sums import AngleSum, expressions
         from ..spectra.angle_sums import angle_sums
 
-        # The matrix is a G + b if it is the Laplacian, or if all nodes have one in-degree d.
+        # The matrix equals a G + b (a, b numbers) for the Laplacian, and for a common in-degree d of all nodes.
         d = one_degree(self.n, self.graph.links) if self.kind is not MatrixKind.LAPLACIAN else Fraction(0)
         if d is None or self.graph.closed_form() is None or (gammas := angle_sums(self.graph)) is None:
             return None

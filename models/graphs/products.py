@@ -1,9 +1,10 @@
-"""Graphs from graphs: products, unions, complements and scaled weights, with closed spectra.
+"""Make graphs from graphs: products, unions, complements and scaled weights, with spectra in closed form.
 
 The rules: A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), sections 1.3.6 (union),
-1.3.8 (complement), 1.4.6 (Cartesian product) and 1.4.7 (Kronecker product).  Sums and products of
-eigenvalues are merged exactly if all of them are rational, cosines or their short radicals; other
-spectra come from the matrix itself.  A product costs no algebra: only `eigenvalues` loads SymPy.
+1.3.8 (complement), 1.4.6 (Cartesian product) and 1.4.7 (Kronecker product).  A spectrum has a closed
+form if all eigenvalues of the factors are rational, cosines of rational angles, or short radicals of
+such cosines; equal sums and products are then merged exactly.  All other spectra are computed from
+the matrix.  Only `eigenvalues` loads SymPy.
 """
 
 from __future__ import annotations
@@ -30,10 +31,10 @@ Closed: TypeAlias = "list[tuple[sp.Expr, int]] | None"
 
 
 def cartesian(first: Topology, second: Topology) -> Topology:
-    """Return the Cartesian product: every eigenvalue is a sum of one of each graph.
+    """Return the Cartesian product; its eigenvalues are all sums a + b of eigenvalues of the two graphs.
 
-    Node (i, k) is number i n + k, n the nodes of `second`; a link changes one of the two as in its
-    graph.
+    Node (i, k) has the number i n + k, where n is the number of nodes of `second`.  A link of
+    `first` changes i alone, a link of `second` changes k alone.
 
     Raises
     ------
@@ -46,8 +47,9 @@ def cartesian(first: Topology, second: Topology) -> Topology:
 def kronecker(first: Topology, second: Topology) -> Topology:
     """Return the tensor product of the adjacency matrices.
 
-    Node (i, k) feels (j, m) if i feels j and k feels m; weights multiply.  If all nodes of each
-    graph have one in-degree, d and e, the eigenvalues are (a + d)(b + e) - d e.
+    Node (i, k) feels (j, m) if i feels j and k feels m; weights multiply.  If all nodes of the first
+    graph have the in-degree d and all nodes of the second e, the eigenvalues are (a + d)(b + e) - d e
+    for eigenvalues a and b of the two graphs.
 
     Raises
     ------
@@ -58,7 +60,7 @@ def kronecker(first: Topology, second: Topology) -> Topology:
 
 
 def union(first: Topology, second: Topology) -> Topology:
-    """Return both graphs side by side, without links between them: the eigenvalues of both.
+    """Return both graphs side by side, without links between them; the spectrum is the union of both spectra.
 
     Raises
     ------
@@ -69,7 +71,9 @@ def union(first: Topology, second: Topology) -> Topology:
 
 
 def complement(graph: Topology) -> Topology:
-    """Return the graph that joins exactly the pairs that this one does not: 0 and -(n + γ).
+    """Return the complement, which joins exactly the pairs that `graph` does not join.
+
+    Its eigenvalues are 0 and -(n + γ), γ the eigenvalues of `graph` without the 0 of equal states.
 
     Raises
     ------
@@ -88,7 +92,7 @@ def complement(graph: Topology) -> Topology:
 
 
 def weighted(graph: Topology, factor: object) -> Topology:
-    """Return the graph with all weights times a rational number; a float is its shortest decimal.
+    """Multiply all weights by a rational number; a float stands for its shortest decimal.
 
     Raises
     ------
@@ -103,7 +107,7 @@ def weighted(graph: Topology, factor: object) -> Topology:
 
 
 def factors(graph: Topology) -> tuple[Topology, Topology] | None:
-    """Return the two graphs of which `cartesian` made a graph; None for any other."""
+    """Return the two factors of a graph that `cartesian` made; None for any other graph."""
     if not isinstance(graph.rule, Cartesian):
         return None
     first, second = graph.rule.graphs
@@ -112,13 +116,13 @@ def factors(graph: Topology) -> tuple[Topology, Topology] | None:
 
 @dataclass(frozen=True, slots=True)
 class _Operation:
-    """The rule of a graph made of others; a subclass counts and lists its links, and its eigenvalues."""
+    """Base of the rules below; a subclass counts links, lists links and lists eigenvalues."""
 
     graphs: tuple[Topology, ...]
 
     @property
     def n(self) -> int:
-        """The number of nodes: one for each pair of nodes of two graphs."""
+        """Number of nodes of the result, by default of a product."""
         return prod(graph.n for graph in self.graphs)
 
     @property
@@ -132,7 +136,7 @@ class _Operation:
 
     @property
     def all_to_all(self) -> Fraction | None:
-        """None unless a subclass joins all pairs of nodes alike."""
+        """None, unless a subclass joins all pairs of nodes with one weight."""
         return None
 
     def links(self) -> tuple[Link, ...]:
@@ -143,7 +147,7 @@ class _Operation:
 
 
 def _eigenvalues(graphs: tuple[Topology, ...], combine: Callable[..., Sums]) -> Closed:
-    """List the eigenvalues that `combine` makes of those of the graphs; None if some are no sums of cosines."""
+    """Apply `combine` to the eigenvalues of the graphs; None if an eigenvalue is no sum of cosines."""
     from ..algebra.cosine_sums import expressions
     from ..spectra.angle_sums import angle_sums
 
@@ -153,7 +157,7 @@ def _eigenvalues(graphs: tuple[Topology, ...], combine: Callable[..., Sums]) -> 
 
 @dataclass(frozen=True, slots=True)
 class Cartesian(_Operation):
-    """The rule of a Cartesian product (Brouwer & Haemers 1.4.6): eigenvalues a + b."""
+    """Rule of a Cartesian product (Brouwer & Haemers 1.4.6): eigenvalues a + b."""
 
     @property
     def link_count(self) -> int:
@@ -173,7 +177,7 @@ class Cartesian(_Operation):
 
 @dataclass(frozen=True, slots=True)
 class Kronecker(_Operation):
-    """The rule of a tensor product (1.4.7): eigenvalues (a + d)(b + e) - d e if d and e are all in-degrees."""
+    """Rule of a tensor product (1.4.7): eigenvalues (a + d)(b + e) - d e for common in-degrees d and e."""
 
     @property
     def link_count(self) -> int:
@@ -191,7 +195,7 @@ class Kronecker(_Operation):
         first, second = (one_degree(graph.n, graph.links) for graph in self.graphs)
         if first is None or second is None:
             return None
-        # weights W = G + degree have the eigenvalues a + d and b + e, and those of the product multiply
+        # The weights W = G + degree have eigenvalues a + d and b + e; those of a tensor product multiply.
         d, e = AngleSum.rational(first), AngleSum.rational(second)
         return _eigenvalues(
             self.graphs, lambda a, b: [((x + d) * (y + e) + -(d * e), m * k) for (x, m), (y, k) in product(a, b)]
@@ -200,7 +204,7 @@ class Kronecker(_Operation):
 
 @dataclass(frozen=True, slots=True)
 class Union(_Operation):
-    """The rule of two graphs side by side (1.3.6): the eigenvalues of both."""
+    """Rule of two graphs side by side (1.3.6): the eigenvalues of both."""
 
     @property
     def n(self) -> int:
@@ -220,7 +224,7 @@ class Union(_Operation):
 
 @dataclass(frozen=True, slots=True)
 class Complement(_Operation):
-    """The rule of a complement (1.3.8): the 0 of the vector of ones stays, each other γ becomes -(n + γ)."""
+    """Rule of a complement (1.3.8): the vector of ones keeps the eigenvalue 0, each other γ becomes -(n + γ)."""
 
     @property
     def link_count(self) -> int:
@@ -233,7 +237,7 @@ class Complement(_Operation):
 
     @property
     def all_to_all(self) -> Fraction | None:
-        """1 for the complement of a graph without links."""
+        """1 for the complement of a graph without links; else None."""
         return None if self.graphs[0].link_count else Fraction(1)
 
     def links(self) -> tuple[Link, ...]:
@@ -254,7 +258,7 @@ class Complement(_Operation):
 
 @dataclass(frozen=True, slots=True)
 class Weighted(_Operation):
-    """The rule of a graph with all weights times one number, and so all eigenvalues."""
+    """Rule of a graph with all weights multiplied by one factor: eigenvalues are multiplied by it too."""
 
     factor: Fraction
 
@@ -264,7 +268,7 @@ class Weighted(_Operation):
 
     @property
     def all_to_all(self) -> Fraction | None:
-        """The weight of the graph's links times the factor, if it joins all pairs alike."""
+        """The common weight of the links between all pairs, times the factor; None for any other graph."""
         weight = self.graphs[0].all_to_all
         return None if weight is None else weight * self.factor
 
@@ -285,13 +289,13 @@ def _of_two(operation: type[_Operation], first: object, second: object) -> Topol
 
 
 def _call(graph: Topology) -> str:
-    """Return the text that `graph_text` reads as the graph: ring(5), torus(12, shape=(3, 4)), or a text that is one."""
+    """Return the text from which `graph_text` reads the graph: ring(5), torus(12, shape=(3, 4)), union(…)."""
     options = "".join(f", {key}={value}" for key, value in graph.options)
     return graph.name if "(" in graph.name else f"{graph.name}({graph.n}{options})"
 
 
 def _graph(name: str, rule: _Operation) -> Topology:
-    if rule.all_to_all is None:  # links of all pairs are not listed
+    if rule.all_to_all is None:  # links between all pairs take no memory
         _check_link_count(name, rule.link_count)
     return Topology(name, rule.n, rule=rule)
 

@@ -1,7 +1,7 @@
 """Graphs from lists of edges, networkx graphs, sparse matrices, edge lists and GraphML files.
 
-Objects are known by their methods, so that none of those packages is needed here.  An edge from u
-to v means that v feels u: it becomes the link v <- u.
+Objects of networkx and SciPy are recognised by their methods, so that neither package is imported.  An
+edge from u to v means that v feels u; the edge becomes a link with target v and source u.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .topology import Topology, from_matrix
 
 
 def as_topology(what: str, value: object) -> Topology:
-    """Return the graph that a value is, or stands for."""
+    """Convert a Topology, a networkx graph, a sparse matrix or an array to a Topology."""
     if isinstance(value, Topology):
         return value
     if is_graph(value):
@@ -43,20 +43,20 @@ def from_edges(
     Parameters
     ----------
     edges : iterable of (i, j) or (i, j, weight)
-        Nodes are labels of any kind that can be hashed, numbers too; the weight is 1 without.  Whole numbers are put in
-        ascending order, other labels in that of their first mention: the first one has the first state, such as
-        ``x_1``.  Results and drawings name nodes by their labels.
+        Nodes are hashable labels, such as numbers or texts; the weight is 1 if it is left out.  Whole numbers are
+        sorted; other labels keep the order of their first mention.  The first node has the state ``x_1``.  Results
+        and drawings name nodes by their labels.
     n : int, optional
-        Number of nodes, which are 0 … n - 1 then, those without edges too.
+        Number of nodes.  If given, the nodes are 0 … n - 1, and some may have no edge.
     directed : bool, optional
         True if j feels i, but i does not feel j.
     name : str, optional
-        What the graph is called.
+        Name of the graph.
 
     Raises
     ------
     ValueError
-        On a loop, a repeated edge, a weight that is not rational or 0, and on a node outside 0 … n - 1.
+        On a loop, a repeated edge, a weight that is 0 or not rational, and on a node outside 0 … n - 1.
     TypeError
         On nodes that cannot be hashed.
     """
@@ -65,7 +65,7 @@ def from_edges(
 
 
 def edge_graph(edges: object, nodes: Sequence[Hashable] | None, directed: object, name: str) -> Topology:
-    """Return the graph of a list of edges between the given nodes, or between those that the edges name."""
+    """Return the graph of a list of edges; `nodes` None takes the labels in the edges as nodes."""
     if isinstance(edges, str | bytes | Mapping) or not isinstance(edges, Iterable):
         raise TypeError(f"{name}: found {typed_repr(edges)}; expected a list of edges, e.g. [(0, 1), (1, 2, 0.5)]")
     one_way = check_flag("directed", directed)
@@ -93,7 +93,7 @@ def edge_graph(edges: object, nodes: Sequence[Hashable] | None, directed: object
 
 
 def from_graph(graph: Any, weight: str | None = "weight", name: str = "graph") -> Topology:
-    """Return the graph of a networkx graph, nodes in its order and with its labels.
+    """Convert a networkx graph; nodes keep their order and their labels.
 
     Edges of a directed graph act from their first node on their second; parallel edges of a
     multigraph add up.
@@ -103,17 +103,18 @@ def from_graph(graph: Any, weight: str | None = "weight", name: str = "graph") -
     graph : networkx graph
         An object with nodes, edges and is_directed.
     weight : str or None, optional
-        The edge attribute that holds the weight, read through its decimal text; an edge without it has weight 1, and
-        every edge for None.
+        The edge attribute that holds the weight; a float stands for its shortest decimal.  An edge without the
+        attribute has weight 1.  With None every edge has weight 1.
     name : str, optional
-        What the graph is called.
+        Name of the graph.
 
     Raises
     ------
     TypeError
         On another object.
     ValueError
-        On loops, on weights that are not rational, and if no edge has an attribute that was named.
+        On loops, on weights that are not rational, and if no edge has the attribute `weight` (the default is
+        allowed to be missing).
     """
     if not is_graph(graph):
         raise TypeError(f"{name} is a {type(graph).__name__}; expected a networkx graph (nodes, edges, is_directed)")
@@ -136,24 +137,24 @@ def is_graph(value: object) -> bool:
 
 
 def from_sparse(matrix: object, adjacency: bool = False, name: str = "matrix") -> Topology:
-    """Return the graph of a SciPy sparse matrix.
+    """Convert a SciPy sparse matrix to a graph.
 
     Parameters
     ----------
     matrix : SciPy sparse matrix
         The connectivity matrix G with row sums of zero.
     adjacency : bool, optional
-        True if the matrix holds the weights with which j acts on i instead.
+        True if entry (i, j) is instead the weight with which node j acts on node i.
     name : str, optional
-        What the graph is called.
+        Name of the graph.
 
     Raises
     ------
     TypeError
         If the matrix has no `tocoo`.
     ValueError
-        If it is not square, a row sum is not zero (beyond 1e-12 of its entries), or an adjacency
-        matrix has a diagonal.
+        If the matrix is not square, if a row sum of G exceeds 1e-12 of the row's entries, or if an adjacency
+        matrix has a non-zero diagonal.
     """
     if not hasattr(matrix, "tocoo"):
         raise TypeError(f"{name} is a {type(matrix).__name__}; expected a SciPy sparse matrix (one that has tocoo)")
@@ -184,17 +185,17 @@ def from_sparse(matrix: object, adjacency: bool = False, name: str = "matrix") -
 
 
 def read_edges(path: str | Path, directed: bool = False) -> Topology:
-    """Return the graph of a text file with an edge a line: two nodes and perhaps a weight.
+    """Read a graph from a text file with one edge a line: two nodes and an optional weight.
 
-    Nodes are any words; whole numbers are put in ascending order, other names in that of their
-    first mention.  A line with one word is a node without edges; `#` starts a comment.
+    Nodes are words.  If all nodes are whole numbers, they are sorted; otherwise nodes keep the order of
+    their first mention.  A line with one word is a node without edges; `#` starts a comment.
 
     Raises
     ------
     FileNotFoundError
         If there is no such file.
     ValueError
-        On what `from_edges` refuses.
+        As `from_edges` raises.
     """
     text, name = file_text(path, "edge file")
     one, most = Fraction(1), LINK_LIMIT if directed else LINK_LIMIT // 2
@@ -219,28 +220,28 @@ def read_edges(path: str | Path, directed: bool = False) -> Topology:
 
 
 def read_graphml(path: str | Path, weight: str = "weight") -> Topology:
-    """Return the graph of a GraphML file, nodes in its order.
+    """Read a graph from a GraphML file; nodes keep the order of the file.
 
     Parameters
     ----------
     path : str or Path
         The file.
     weight : str, optional
-        The name of the edge data that holds the weight; 1 without.
+        The name of the edge data that holds the weight; an edge without such data has weight 1.
 
     Raises
     ------
     FileNotFoundError
         If there is no such file.
     ValueError
-        On a document type, nested graphs, hyperedges, unknown nodes and what `from_edges` refuses.
+        On a document type, nested graphs, hyperedges or unknown nodes, and as `from_edges` raises.
 
     References
     ----------
     U. Brandes et al., Graph Drawing 2001, LNCS 2265, 501.
     """
     text, name = file_text(path, "GraphML file")
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:  # anywhere: what looks like a comment may be none
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:  # even inside a comment, whose limits are unsure
         raise ValueError(f"{name} declares a document type or entities; expected plain GraphML: remove <!DOCTYPE …>")
     try:
         root = ElementTree.fromstring(text)
@@ -250,7 +251,7 @@ def read_graphml(path: str | Path, weight: str = "weight") -> Topology:
     if _tag(root) != "graphml" or len(graphs) != 1:
         raise ValueError(f"{name} holds {len(graphs)} graphs in <{_tag(root)}>; expected one, not nested, in <graphml>")
 
-    # keys of the weight, one for each type of number, and the default of the last one
+    # collect the ids of the weight (one <key> for each number type), and the default weight
     keys, default = set[str](), "1"
     for element in root:
         for_edges = _tag(element) == "key" and element.get("for", "all") in ("edge", "all")
@@ -291,7 +292,7 @@ def _tag(element: ElementTree.Element) -> str:
 
 
 class _Graph:
-    """A graph that is being read: its nodes, and the weights of its links by (target, source)."""
+    """Builder of a graph: nodes, and the weight of each link (target, source)."""
 
     def __init__(self, name: str, nodes: Sequence[Hashable], shown: Callable[[object], str] = str) -> None:
         for node in nodes if shown is str and not isinstance(nodes, range) else ():
@@ -301,7 +302,7 @@ class _Graph:
         self.weights: dict[tuple[int, int], Fraction] = {}
 
     def add(self, u: Hashable, v: Hashable, weight: Fraction, directed: bool, parallel: bool = False) -> None:
-        """Add an edge from u to v; weights add up if edges may be parallel."""
+        """Add an edge from u to v; add weights of parallel edges, or raise ValueError if `parallel` is false."""
         source, target = self.index[u], self.index[v]
         links = ((target, source),) if directed else ((target, source), (source, target))
         problem = ""
@@ -320,7 +321,7 @@ class _Graph:
             self.weights[link] = self.weights[link] + weight if link in self.weights else weight
 
     def topology(self, labels: Sequence[object] | None) -> Topology:
-        """Return the graph; parallel weights that cancel leave no link."""
+        """Return the graph without the links whose parallel weights cancel."""
         if len(self.weights) > LINK_LIMIT:
             raise ValueError(f"{self.name}: {len(self.weights)} links; expected at most {LINK_LIMIT}")
         links = tuple((i, j, self.weights[i, j]) for i, j in sorted(self.weights) if self.weights[i, j])
@@ -328,7 +329,7 @@ class _Graph:
 
 
 def _label(node: object, what: str) -> Hashable:
-    """Return a label of a node; a number that is whole, 1.0 or one of NumPy, becomes the int that it is equal to."""
+    """Return the label of a node; convert a whole number of another type, such as 1.0 or numpy.int64(1), to int."""
     if node is None or not isinstance(node, Hashable):
         raise TypeError(f"{what}: found {typed_repr(node)}; expected a label: a number, a text or a tuple")
     if not isinstance(node, Number) or isinstance(node, bool):

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def ground_set(n: int, k: int) -> int:
-    """Return the number of elements of a set that has n subsets of k elements."""
+    """Find m with C(m, k) = n, the size of a set with n subsets of k elements."""
     # C(m, k) rises with m: double, then bisect to two neighbours C(low, k) < n <= C(high, k)
     low, high = k, k + 1
     while comb(high, k) < n:
@@ -29,7 +29,7 @@ def ground_set(n: int, k: int) -> int:
 
 
 def numbered(m: int, k: int) -> dict[tuple[int, ...], int]:
-    """Return the k-subsets of 0 … m - 1 in the order of the dictionary, with their numbers."""
+    """Number the k-subsets of 0 … m - 1 in lexicographic order."""
     return {subset: i for i, subset in enumerate(combinations(range(m), k))}
 
 

@@ -1,7 +1,7 @@
-"""Graphs whose weights are rational functions of symbols; nothing in a text is run.
+"""Graphs whose weights are rational functions of symbols; text is parsed, not run.
 
-Their spectrum holds for symbols as such (`synchain.models.spectra.symbolic_spectrum`); `SymbolicTopology.at` gives the graph for
-particular numbers, with its own proved spectrum.
+The spectrum holds for generic symbols (`synchain.models.spectra.symbolic_spectrum`).  `SymbolicTopology.at` returns
+the graph for particular numbers; its spectrum is computed and proved anew.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from ..spectra.symbolic_spectrum import SymbolicSpectrum, Z, symbolic_spectrum
 from .topology import Topology, from_matrix
 
 LARGEST, LENGTH, DEPTH, EXPONENT = 30, 200, 20, 12
-"""Most nodes, characters of a weight, nested operations and highest power, a choice."""
+"""Limits, all choices: nodes, characters of a weight, nested operations, exponent."""
 
 DEGREE, TERMS, BITS = 60, 2000, 10_000
-"""Largest degree, number of terms and bits of a number that a weight may have once it is multiplied out, a choice."""
+"""Limits of an expanded weight, all choices: degree, number of terms, bits of a number."""
 
 _LETTERS = re.compile(r"[A-Za-z0-9_+\-*/(). ]*", re.ASCII)
 _EXPECTED = "expected whole numbers, fractions, letters, + - * / **, e.g. a/2 or 1/(1+b)"
@@ -36,7 +36,7 @@ _EXPECTED = "expected whole numbers, fractions, letters, + - * / **, e.g. a/2 or
 
 @dataclass(frozen=True, slots=True)
 class SymbolicTopology:
-    """`n` nodes and links (target, source, weight), the weights rational functions of symbols; made by `from_symbols`."""
+    """A graph of `n` nodes with links (target, source, weight); weights are rational functions. See `from_symbols`."""
 
     name: str
     n: int
@@ -49,7 +49,7 @@ class SymbolicTopology:
 
     @property
     def matrix(self) -> sp.ImmutableDenseMatrix:
-        """G, every row of which sums to zero."""
+        """The connectivity matrix G; every row sums to zero."""
         rows = sp.zeros(self.n)
         for target, source, w in self.links:
             rows[target, source] = w
@@ -62,7 +62,7 @@ class SymbolicTopology:
         return symbolic_spectrum(self.matrix, self.name)
 
     def at(self, **values: object) -> Topology:
-        """Return the graph with rational numbers for all symbols, without the links whose weights become 0.
+        """Substitute rational numbers for all symbols; links whose weights become 0 are left out.
 
         Raises ValueError on a missing or unknown symbol, a number that is not rational and a division by zero.
         """
@@ -104,13 +104,13 @@ def from_symbols(rows: Iterable[Iterable[object]] | sp.MatrixBase, name: str = "
 
 
 def read_symbols(path: str | Path) -> SymbolicTopology:
-    """Return the graph of a text file as `topology.read_matrix` does, with letters in its entries; nothing in it is run."""
+    """Read a graph from a text file like `topology.read_matrix`, with letters in entries; the text is not run."""
     text, name = file_text(path, "matrix file")
     return from_symbols(parse_rows(text, name), name)
 
 
 def weight(entry: object, where: str) -> sp.Expr:
-    """Return a rational function in lowest terms; ValueError on anything else, and on the letter z."""
+    """Return a rational function in lowest terms; ValueError for any other entry, and for the letter z."""
     if isinstance(entry, str):
         text = entry.strip()
         if len(text) > LENGTH or not _LETTERS.fullmatch(text):
@@ -133,7 +133,7 @@ def weight(entry: object, where: str) -> sp.Expr:
 
 @dataclass(frozen=True, slots=True)
 class _Size:
-    """Bounds on an expression that is multiplied out: terms above and below the line, and the degree."""
+    """Upper bounds for an expanded rational function: terms of numerator and denominator, and degree."""
 
     above: int = 1
     below: int = 1
@@ -151,12 +151,12 @@ class _Size:
     def __pow__(self, power: int) -> _Size:
         if power < 0:
             return _Size(self.below, self.above, self.degree) ** -power
-        # a power of m terms has as many as there are multisets of `power` of them
+        # (m terms)**power has C(m + power - 1, power) terms: multisets of `power` out of m
         return _Size(comb(self.above + power - 1, power), comb(self.below + power - 1, power), self.degree * power)
 
 
 def _size(expr: sp.Expr, where: str) -> _Size:
-    """Return bounds on an expression before it is multiplied out; ValueError if it is too large."""
+    """Bound the size of an expression before expansion; ValueError if it exceeds the limits."""
     if expr.is_Symbol:
         return _Size(degree=1)
     if expr.is_Pow and expr.exp.is_Integer:
@@ -176,7 +176,7 @@ def _size(expr: sp.Expr, where: str) -> _Size:
 
 @dataclass(frozen=True, slots=True)
 class _Weights(Algebra[sp.Expr]):
-    """Rational functions of symbols, as they are written: nothing is multiplied out."""
+    """Read rational functions of symbols without expanding them."""
 
     text: str
     where: str

@@ -1,8 +1,8 @@
-"""Who feels whom: a graph with exact weights, by name, from a matrix or from a file.
+"""`Topology`, a graph with exact weights, and its construction from a matrix or a file.
 
 The connectivity matrix is G = weighted adjacency minus in-degree: every row sums to zero, and the
-coupling term is sigma * G * x.  Building a graph costs no algebra: only `matrix` and `spectrum`
-load SymPy.  A graph with a rule builds its links when they are first asked for.
+coupling term is sigma * G * x.  Only `matrix` and `spectrum` load SymPy.  A graph with a rule
+builds its links on first use.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ if TYPE_CHECKING:
 
 
 class Rule(Protocol):
-    """The family or operation that made a graph: its links, and facts about it that need no links.
+    """Protocol of the family or operation that made a graph: compute links, and facts that need no links.
 
     Equal rules make equal graphs.
     """
 
     @property
     def link_count(self) -> int | None:
-        """The number of links; None if it is not known without building them."""
+        """The number of links; None if only building the links can tell."""
 
     @property
     def undirected(self) -> bool:
@@ -43,7 +43,7 @@ class Rule(Protocol):
 
     @property
     def all_to_all(self) -> Fraction | None:
-        """The weight of every link if each node is known to feel every other one alike; else None."""
+        """The common weight if each node is known to feel every other node with one weight; else None."""
 
     def links(self) -> tuple[Link, ...]:
         """Build the sorted links."""
@@ -59,25 +59,25 @@ class Topology(Exact, HasDrawing):
     Parameters
     ----------
     name : str
-        What the graph is called.
+        Name of the graph.
     n : int
         Number of nodes.
     links : tuple of (int, int, Fraction), optional
-        Target, source and weight of each link, sorted.  A graph with a `rule` builds them when they
-        are first asked for.
+        Target, source and weight of each link, sorted.  Leave the links out for a graph with a `rule`,
+        which builds them on first use.
     options : tuple of (str, value)
-        Keywords with which its family made the graph.
+        Keywords with which the family made the graph.
     rule : Rule, optional
         The family or operation that made the graph.
     labels : sequence, optional
-        What the nodes are called: different numbers, texts or other values, such as those of networkx.  Whole numbers
-        are kept as they are; if one label is none, the texts of all are kept.  Without, nodes are called 1 … n.
+        Distinct names of the nodes: numbers, texts or other values, such as the nodes of a networkx graph.  If all
+        labels are whole numbers, they stay numbers; otherwise all are converted to text.  The default is 1 … n.
 
     Raises
     ------
     ValueError, TypeError
-        If labels are not n different ones, if a link is outside the nodes, joins a node to itself, is repeated, out of order or without
-        weight.
+        If there are not n distinct labels, or if a link refers to an unknown node, joins a node to itself, is repeated,
+        out of order or without weight.
     """
 
     name: str
@@ -116,7 +116,7 @@ class Topology(Exact, HasDrawing):
 
     @property
     def labels(self) -> Sequence[int] | Sequence[str]:
-        """What the nodes are called, in their order: labels of the edges that made the graph, else 1 … n."""
+        """Names of the nodes in order: the labels given to the graph, else 1 … n."""
         return range(1, self.n + 1) if self._labels is None else self._labels
 
     @property
@@ -135,7 +135,7 @@ class Topology(Exact, HasDrawing):
 
     @property
     def link_count(self) -> int:
-        """The number of links, counted without building them if the graph has a rule that can."""
+        """The number of links; a rule may count links without building them."""
         count = None if self.rule is None else self.rule.link_count
         return len(self.links) if count is None else count
 
@@ -146,9 +146,9 @@ class Topology(Exact, HasDrawing):
 
     @property
     def all_to_all(self) -> Fraction | None:
-        """The weight of every link if the rule says that each node feels every other one alike; else None.
+        """The common weight if, by the rule, each node feels every other node with one weight; else None.
 
-        No link is listed for the answer; mean fields rest on it (docs/links.md).
+        No links are built.  Such graphs are computed with mean fields (docs/links.md).
         """
         return None if self.rule is None else self.rule.all_to_all
 
@@ -163,7 +163,7 @@ class Topology(Exact, HasDrawing):
 
     @property
     def asymmetry(self) -> str:
-        """The first pair of nodes whose links there and back differ, as text of a message; "" on a symmetric graph."""
+        """Message on the first pair of nodes whose links in the two directions differ; "" for a symmetric graph."""
         weights = {} if self.all_to_all is not None else {link[:2]: link[2] for link in self.links}
         for (target, source), weight in weights.items():
             back = weights.get((source, target))
@@ -184,11 +184,13 @@ class Topology(Exact, HasDrawing):
     def leading_groups(self) -> int:
         """Number of groups of nodes that reach one another and feel no other node; at least 1.
 
-        They are the source components of the graph of influence; with one, G has the eigenvalue 0 once.
+        The groups are the source components of the directed graph.  If there is one group, 0 is a simple
+        eigenvalue of G.
         """
         if self.all_to_all is not None:
             return 1
-        # Node 0 reaches all nodes if each later one feels an earlier one, as in most families; links are sorted.
+        # Shortcut for most families: if each node but 0 feels a node with a smaller number, node 0 reaches all.
+        # Links are sorted, so the reversed loop ends with the smallest source of each target.
         earliest = {target: source for target, source, _ in reversed(self.links)}
         if all(earliest.get(i, i) < i for i in range(1, self.n)):
             return 1
@@ -197,7 +199,7 @@ class Topology(Exact, HasDrawing):
             followers[source].append(target)
 
         def starts(order: Iterable[int]) -> list[int]:
-            """Search depth first from each node not yet reached; return these nodes."""
+            """Search depth first from each node not yet reached; return the nodes where searches started."""
             roots, reached = [], [False] * self.n
             for start in order:
                 if not reached[start]:
@@ -210,8 +212,8 @@ class Topology(Exact, HasDrawing):
                         waiting += new
             return roots
 
-        # All nodes are reached from `first`, and no start from an earlier one.  Searched backwards, a start
-        # that no later one reaches lies in a source component, and each component has one.
+        # The starts in `first` reach all nodes, and no start is reached from an earlier start.  Search from the
+        # starts in reverse: a start not reached from a later start lies in a source component, one in each.
         first = starts(range(self.n))
         return len(starts(reversed(first))) if len(first) > 1 else 1
 
@@ -222,7 +224,7 @@ class Topology(Exact, HasDrawing):
 
     @property
     def entries(self) -> tuple[tuple[int, int, Fraction], ...]:
-        """The entries of G other than 0 as (row, column, entry): the links, then the diagonal."""
+        """The non-zero entries of G as (row, column, entry): the links, then the diagonal."""
         degrees = ((i, total(weight for _, _, weight in row)) for i, row in groupby(self.links, itemgetter(0)))
         return (*self.links, *((i, i, -degree) for i, degree in degrees if degree))
 
@@ -245,8 +247,8 @@ class Topology(Exact, HasDrawing):
     def random_walk_laplacian(self) -> GraphMatrix:
         """The random-walk Laplacian 1 - W/D; ValueError if links are one-way or a degree is not positive.
 
-        It has the eigenvalues of the normalised Laplacian 1 - D^(-1/2) W D^(-1/2), to which it is
-        similar, and rational entries.
+        The matrix is rational and similar to the normalised Laplacian 1 - D^(-1/2) W D^(-1/2), so both have
+        the same eigenvalues.
         """
         return GraphMatrix(self, MatrixKind.RANDOM_WALK)
 
@@ -268,14 +270,14 @@ class Topology(Exact, HasDrawing):
         return kirchhoff_index(self)
 
     def to_networkx(self) -> Any:
-        """Return the graph as one of networkx, which must be installed.
+        """Convert the graph to a networkx graph; networkx must be installed.
 
         Returns
         -------
         networkx.Graph or networkx.DiGraph
-            Nodes have their labels, or 0 … n - 1 if they were given none; the edge attribute `weight` is an int, or a Fraction.  A graph that is
-            not symmetric is directed: an edge from j to i means that i feels j.  `from_graph` makes
-            the same links of it.
+            Nodes are the labels, or 0 … n - 1 without labels.  The edge attribute `weight` is an int or a Fraction.
+            A graph that is not symmetric becomes a DiGraph: an edge from j to i means that i feels j.
+            `from_graph` converts back to the same links.
 
         Raises
         ------
@@ -293,7 +295,7 @@ class Topology(Exact, HasDrawing):
         nodes = self.labels if self.labelled else range(self.n)
         graph.add_nodes_from(nodes)
         for target, source, weight in self.links:
-            if not symmetric or source < target:  # an edge of a Graph is both links
+            if not symmetric or source < target:  # one edge stands for both links
                 value = int(weight) if weight.denominator == 1 else weight
                 graph.add_edge(nodes[source], nodes[target], weight=value)
         return graph
@@ -304,7 +306,7 @@ class Topology(Exact, HasDrawing):
 
 
 def edges_text(graph: Topology) -> str:
-    """Return "4 edges" of an undirected graph, in which two links in opposite directions are one edge; else "4 links"."""
+    """Return "4 edges" for an undirected graph (two opposite links are one edge), else "4 links"."""
     count, word = (graph.link_count // 2, "edge") if graph.undirected else (graph.link_count, "link")
     return f"{count} {word}{'s' * (count != 1)}"
 
@@ -316,11 +318,11 @@ def from_matrix(rows: Iterable[Iterable[object]] | sp.MatrixBase, name: str = "m
     ----------
     rows : iterable of rows, or SymPy matrix
         Square, rational, every row sum zero.  Entries are integers, fractions, decimals, floats
-        (read through their shortest decimal text: 0.1 is 1/10), texts such as "1/2", or SymPy
-        rationals.  A row with floats whose sum is zero but for rounding (1e-12 of its entries) gets
-        the diagonal entry that makes it exactly zero.
+        (a float stands for its shortest decimal: 0.1 is 1/10), texts such as "1/2", or SymPy
+        rationals.  If the sum of a row with floats is zero to 1e-12 of the row's entries, the diagonal
+        entry is adjusted so that the sum is exactly zero.
     name : str, optional
-        What the graph is called.
+        Name of the graph.
 
     Returns
     -------
@@ -340,7 +342,7 @@ def from_matrix(rows: Iterable[Iterable[object]] | sp.MatrixBase, name: str = "m
         excess = total(row)
         if not excess:
             continue
-        # Floats, and texts with decimals, can be rounded numbers; an iterator is used up, so its entries count as exact.
+        # Floats and decimal texts may be rounded.  An iterator is already consumed, so its entries count as exact.
         rounded = isinstance(entries, list | tuple) and any(
             isinstance(entry, float) or (isinstance(entry, str) and not set(entry).isdisjoint(".eE"))
             for entry in entries[i]
@@ -358,25 +360,24 @@ def from_matrix(rows: Iterable[Iterable[object]] | sp.MatrixBase, name: str = "m
 
 
 def read_matrix(path: str | Path) -> Topology:
-    """Return the graph of a connectivity matrix in a text file, one row a line.
+    """Read a graph from a text file with a connectivity matrix, one row a line.
 
     Entries such as 1/2, -3 or 0.25 are separated by blanks or commas; `#` starts a comment; empty
-    lines are skipped.  Nothing in the file is evaluated.
+    lines are skipped.  Text is parsed, not run.
 
     Raises
     ------
     FileNotFoundError
         If there is no such file.
     ValueError
-        On a folder, on more than FILE_LIMIT bytes, on text that is no number and on what
-        `from_matrix` refuses.
+        On a folder, on more than FILE_LIMIT bytes or on text that is no number, and as `from_matrix` raises.
     """
     text, name = file_text(path, "matrix file", "a text file of rows")
     return from_matrix(parse_rows(text, name), name)
 
 
 def _check_size(name: object, n: object) -> None:
-    """Raise TypeError or ValueError if a name or a number of nodes is wrong."""
+    """Raise TypeError or ValueError for a name that is no text or a wrong number of nodes."""
     what = f"topology {check_printable('topology name', check_instance('topology name', name, str, 'text'))}"
     size = check_integer(f"{what}: n", n, -(10**18))
     if size < 1:
@@ -384,13 +385,13 @@ def _check_size(name: object, n: object) -> None:
 
 
 def _node_labels(name: str, n: int, labels: Sequence[object]) -> tuple[int, ...] | tuple[str, ...]:
-    """Return the labels as whole numbers if all are, else as texts; ValueError unless they are n different ones."""
+    """Return the labels, as texts unless all are whole numbers; ValueError if there are not n distinct labels."""
     if all(type(label) is int for label in labels):
         integers = tuple(label for label in labels if isinstance(label, int))
         if len(integers) == n == len(set(integers)):
             return integers
     texts = tuple(label if isinstance(label, str) else str(label) for label in labels)
-    if len(set(texts)) < len(texts):  # 1 and "1" are different labels
+    if len(set(texts)) < len(texts):  # tell 1 and "1" apart by their repr
         texts = tuple(map(repr, labels))
     if len(texts) != n or len(set(texts)) < n:
         raise ValueError(f"topology {name}: found the labels {short_repr(texts)}; expected {n} different ones")
@@ -400,7 +401,7 @@ def _node_labels(name: str, n: int, labels: Sequence[object]) -> tuple[int, ...]
 
 
 def _check_links(name: str, n: int, links: object) -> None:
-    """Raise TypeError or ValueError if the links of n nodes are not sorted and sound."""
+    """Raise TypeError or ValueError unless the links of n nodes are valid and sorted."""
     if not isinstance(links, tuple):
         raise TypeError(
             f"topology {name}: links: found {typed_repr(links)}; expected a tuple of (target, source, weight)"
@@ -410,7 +411,7 @@ def _check_links(name: str, n: int, links: object) -> None:
         if not isinstance(link, tuple) or len(link) != 3:
             raise TypeError(f"topology {name}: found the link {short_repr(link)}; expected (target, source, weight)")
         target, source, weight = link
-        # one condition for the millions of links that are sound
+        # One fast test accepts nearly all valid links; the tests below choose the message for an invalid link.
         typed = type(target) is int and type(source) is int and type(weight) is Fraction
         if typed and weight and 0 <= target < n and 0 <= source < n and target != source and before < link[:2]:
             before = link[:2]
@@ -428,4 +429,4 @@ def _check_links(name: str, n: int, links: object) -> None:
             raise ValueError(
                 f"{where} has weight {weight!r}; expected a Fraction other than 0: leave the link out or give it a weight"
             )
-        before = (target, source)  # booleans and subclasses of Fraction pass
+        before = (target, source)  # a valid link with a boolean node or a subclass of Fraction

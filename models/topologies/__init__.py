@@ -1,1 +1,1 @@
-"""Families of graphs, one file each; `synchain.models.graphs.families.Family` lists the parts."""
+"""Families of graphs, one file each; `synchain.models.graphs.families.Family` describes the contents of a file."""

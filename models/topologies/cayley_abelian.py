@@ -16,7 +16,7 @@ _Element = tuple[int, ...]
 
 
 def settle(n: int, shape: object, generators: object) -> dict[str, object]:
-    """Orders of 2 or more, n in all; elements other than the neutral one, no inverse of another."""
+    """Check the orders (2 or more, product n) and the generators (not neutral, one of each pair of inverses)."""
     orders = (n,) if shape is None else integers_option("shape", shape, 2)
     if prod(orders) != n:
         raise ValueError(f"shape = {orders} has {prod(orders)} elements; expected n = {n}")
@@ -34,7 +34,7 @@ def settle(n: int, shape: object, generators: object) -> dict[str, object]:
 
 
 def _elements(generators: object, orders: _Element) -> list[_Element]:
-    """The elements of a list of them, or of their numbers one after another, one number for each cyclic group."""
+    """Read group elements from a list of elements, or from a flat list with one number for each cyclic group."""
     if isinstance(generators, list | tuple) and any(isinstance(part, list | tuple) for part in generators):
         wrong = next(
             (part for part in generators if not isinstance(part, list | tuple) or len(part) != len(orders)), None
@@ -55,7 +55,7 @@ def _inverse(element: _Element, orders: _Element) -> _Element:
 
 
 def _group(n: int, shape: _Element | None, generators: tuple[int, ...] | None) -> tuple[_Element, list[_Element]]:
-    """The orders, and the generators, one of each pair of inverses."""
+    """Return orders and generators, with defaults: one cyclic group, the unit of each group."""
     orders = shape or (n,)
     if generators is None:
         return orders, [tuple(int(i == k) for i in range(len(orders))) for k in range(len(orders))]
@@ -65,7 +65,7 @@ def _group(n: int, shape: _Element | None, generators: tuple[int, ...] | None) -
 def edges(
     n: int, *, shape: tuple[int, ...] | None = None, generators: tuple[int, ...] | None = None
 ) -> Iterator[tuple[int, int, int]]:
-    """Each element and its sums with the generators; the last number varies fastest."""
+    """Join each element to its sums with the generators; the last component of an element varies fastest."""
     orders, chosen = _group(n, shape, generators)
     steps = [(g, g == _inverse(g, orders)) for g in chosen]
     for i, here in enumerate(product(*map(range, orders))):
@@ -78,13 +78,13 @@ def edges(
 
 
 def count(n: int, *, shape: tuple[int, ...] | None = None, generators: tuple[int, ...] | None = None) -> int:
-    """Number of edges: n for each generator, half of it for one that is its own inverse."""
+    """Return the number of edges: n for each generator, n/2 for a generator that is its own inverse."""
     orders, chosen = _group(n, shape, generators)
     return sum(n // 2 if g == _inverse(g, orders) else n for g in chosen)
 
 
 def spectrum(n: int, *, shape: tuple[int, ...] | None = None, generators: tuple[int, ...] | None = None) -> Eigenvalues:
-    """Sums over the generators g of -4 sin²(π Σ k g/m) over the orders m, half of it for g = -g."""
+    """Sum -4 sin²(π Σ_j k_j g_j/m_j) over the generators g, half of it if g = -g; m_j are the orders."""
     from ..algebra.cosine_sums import AngleSum, expressions
 
     orders, chosen = _group(n, shape, generators)

@@ -12,7 +12,7 @@ from ..inputs.options import integers_option
 
 
 def settle(n: int, rotations: object, reflections: object) -> dict[str, object]:
-    """An even number of nodes; rotations of 1 … n/4 corners, reflections of 0 … n/2 - 1, each once."""
+    """Check that n is even, and that rotations (1 … n/4) and reflections (0 … n/2 - 1) are distinct."""
     if n % 2:
         raise ValueError(f"found n = {n}; expected an even number, such as {n - 1} or {n + 1}")
     m, turns, mirrors = n // 2, _numbers("rotations", rotations), _numbers("reflections", reflections)
@@ -29,14 +29,14 @@ def settle(n: int, rotations: object, reflections: object) -> dict[str, object]:
 
 
 def _numbers(what: str, value: object) -> tuple[int, ...]:
-    """Whole numbers from 0 on; none of an empty list or text."""
+    """Read whole numbers from 0 on; an empty list or text gives none."""
     return () if isinstance(value, str | list | tuple) and not value else integers_option(what, value, 0)
 
 
 def edges(
     n: int, *, rotations: tuple[int, ...] = (1,), reflections: tuple[int, ...] = (0,)
 ) -> Iterator[tuple[int, int, int]]:
-    """Node i is the rotation by i corners, node n/2 + i the same before the first reflection."""
+    """Node i is the rotation by i corners; node n/2 + i is that rotation combined with a fixed reflection."""
     m = n // 2
     for start in (0, m):
         for a in rotations:
@@ -47,14 +47,15 @@ def edges(
 
 
 def count(n: int, *, rotations: tuple[int, ...] = (1,), reflections: tuple[int, ...] = (0,)) -> int:
-    """Number of edges: n for each rotation, half of it for one by half a turn and for each reflection."""
+    """Return the number of edges: n for each rotation, n/2 for a half turn and for each reflection."""
     return sum(n // 2 if 4 * a == n else n for a in rotations) + n // 2 * len(reflections)
 
 
 def spectrum(n: int, *, rotations: tuple[int, ...] = (1,), reflections: tuple[int, ...] = (0,)) -> Eigenvalues:
-    """Sums of -4 sin²(πka/m) over the rotations, less r, plus or minus |Σ exp(2πikb/m)| over the r reflections, m = n/2.
+    """Return Σ_a -4 sin²(πka/m) - r ± |Σ_b exp(2πikb/m)| over rotations a and the r reflections b, m = n/2.
 
-    The modulus is a cosine for two reflections; for more the characteristic polynomial is factored.
+    The term of a half turn a = m/2 counts half.  For two reflections the modulus is a cosine; for more
+    than two return None.
     """
     from ..algebra.cosine_sums import AngleSum, expressions
 

@@ -29,7 +29,7 @@ def formula() -> ClosedForm:
 
 
 TOPOLOGY = Family(
-    # Node i and node i + 1.
+    # Join node i to node i + 1.
     lambda n: ((i, i + 1, 1) for i in range(n - 1)),
     minimum=1,
     count=lambda n: n - 1,

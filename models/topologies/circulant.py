@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def settle(n: int, offsets: object) -> dict[str, object]:
-    """Distances of 1 … n/2, each once; n - s is s."""
+    """Check the distances: 1 … n/2, distinct; n - s stands for s."""
     distances = integers_option("offsets", offsets, 1)
     for s in distances:
         if s % n == 0:
@@ -23,7 +23,7 @@ def settle(n: int, offsets: object) -> dict[str, object]:
 
 
 def edges(n: int, *, offsets: tuple[int, ...] = (1, 2)) -> Iterator[tuple[int, int, int]]:
-    """Each node and those that are further by an offset; by n/2, half of the nodes only."""
+    """Join each node i to i + s for every offset s; for s = n/2 only the first half of the nodes."""
     for s in offsets:
         for i in range(n // 2 if 2 * s == n else n):
             j = (i + s) % n

@@ -12,14 +12,14 @@ if TYPE_CHECKING:
 
 
 def settle(n: int) -> dict[str, object]:
-    """An even number of nodes."""
+    """Check that the number of nodes is even."""
     if n % 2:
         raise ValueError(f"found n = {n}; expected an even number, such as {n - 1} or {n + 1}")
     return {}
 
 
 def edges(n: int) -> Iterator[tuple[int, int, int]]:
-    """Nodes 0, 2, 4 … are one rail, 1, 3, 5 … the other."""
+    """Yield the edges; nodes 0, 2, 4 … are one ring, nodes 1, 3, 5 … the other."""
     for i in range(n):
         j = (i + 2) % n
         yield min(i, j), max(i, j), 1
@@ -28,14 +28,14 @@ def edges(n: int) -> Iterator[tuple[int, int, int]]:
 
 
 def spectrum(n: int) -> Eigenvalues:
-    """-4 sin²(2kπ/n) and that less 2, k = 0 … n/2 - 1."""
+    """-4 sin²(2kπ/n) and -2 - 4 sin²(2kπ/n), k = 0 … n/2 - 1."""
     from ..algebra.cosine_sums import box
 
     return box((2, n // 2), (False, True))
 
 
 def formula() -> ClosedForm:
-    """-4 sin²(kπ/p), and 2 less; both rails move alike, or against each other."""
+    """-4 sin²(kπ/p), in which both rings move alike, and -2 - 4 sin²(kπ/p), in which they move against each other."""
     from sympy import I, Integer, S, exp, floor, pi, sin
 
     from ..graphs.closed_forms import NODE, ClosedForm, K, P, Term

@@ -23,7 +23,7 @@ def formula() -> ClosedForm:
 
 
 TOPOLOGY = Family(
-    # Each pair once.
+    # Join each pair of nodes.
     lambda n: ((i, j, 1) for i, j in combinations(range(n), 2)),
     minimum=1,
     count=lambda n: n * (n - 1) // 2,

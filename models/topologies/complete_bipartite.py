@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def settle(n: int, left: object) -> dict[str, object]:
-    """1 … n - 1 nodes on the left."""
+    """Check that 1 … n - 1 nodes are on the left."""
     if left is None:
         return {}
     size = integer_option("left", left, 1)
@@ -23,19 +23,19 @@ def settle(n: int, left: object) -> dict[str, object]:
 
 
 def edges(n: int, *, left: int | None = None) -> Iterator[tuple[int, int, int]]:
-    """Each node of the first group and each of the second."""
+    """Join each node of the first group to each node of the second."""
     p = left or n // 2
     return ((i, j, 1) for i in range(p) for j in range(p, n))
 
 
 def count(n: int, *, left: int | None = None) -> int:
-    """Number of edges."""
+    """Return the number of edges: left times right."""
     p = left or n // 2
     return p * (n - p)
 
 
 def spectrum(n: int, *, left: int | None = None) -> Eigenvalues:
-    """0, -p q - 1 times, -q p - 1 times, -(p + q), for groups of p and q."""
+    """0; -p, q - 1 times; -q, p - 1 times; -(p + q): for groups of p and q nodes."""
     p = left or n // 2
     counts = {0: 1}
     for value, times in ((p, n - p - 1), (n - p, p - 1), (n, 1)):

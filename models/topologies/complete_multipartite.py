@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def settle(n: int, parts: object) -> dict[str, object]:
-    """Two or more groups of one or more nodes, n in all."""
+    """Check the sizes: two or more groups, each of one or more nodes, n nodes in total."""
     if parts is None:
         return {}
     sizes = integers_option("parts", parts, 1)
@@ -25,12 +25,12 @@ def settle(n: int, parts: object) -> dict[str, object]:
 
 
 def _sizes(n: int, parts: tuple[int, ...] | None) -> tuple[int, ...]:
-    """The sizes of the groups; three without, the larger ones last, but two of two nodes."""
+    """Return the sizes of the groups; by default three nearly equal ones, the larger last (two groups if n = 2)."""
     return parts or tuple((n + k) // 3 for k in range(3) if n + k > 2)
 
 
 def edges(n: int, *, parts: tuple[int, ...] | None = None) -> Iterator[tuple[int, int, int]]:
-    """Each node of a group and all nodes of the later ones."""
+    """Join each node of a group to all nodes of later groups."""
     end = 0
     for size in _sizes(n, parts):
         start, end = end, end + size
@@ -38,7 +38,7 @@ def edges(n: int, *, parts: tuple[int, ...] | None = None) -> Iterator[tuple[int
 
 
 def spectrum(n: int, *, parts: tuple[int, ...] | None = None) -> Eigenvalues:
-    """0 once, -n once less than there are groups, and p - n p - 1 times for each group of p."""
+    """0, once; -n, once less than there are groups; p - n, p - 1 times for each group of p nodes."""
     sizes = _sizes(n, parts)
     counts = {-n: len(sizes) - 1}
     for size in sizes:

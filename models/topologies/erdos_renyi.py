@@ -12,12 +12,12 @@ from ..inputs.options import integer_option, probability_option
 
 
 def settle(n: int, p: object, seed: object) -> dict[str, object]:
-    """A probability and a whole number."""
+    """Check the probability and the seed."""
     return {"p": probability_option("p", p), "seed": integer_option("seed", seed, 0)}
 
 
 def edges(n: int, *, p: str = "1/2", seed: int = 0) -> Iterator[tuple[int, int, int]]:
-    """Each pair with probability p: a draw for each edge gives the pairs left out before it."""
+    """Join each pair with probability p; draw the number of pairs skipped before the next edge (geometric law)."""
     stream = random.Random(seed)
     top, _, bottom = p.partition("/")
     chance = int(top) / int(bottom or 1)
@@ -27,7 +27,7 @@ def edges(n: int, *, p: str = "1/2", seed: int = 0) -> Iterator[tuple[int, int, 
         i, j, scale, pairs = -1, 1, log1p(-chance), n * (n - 1) // 2
         while j < n:
             left_out = log1p(-stream.random()) / scale
-            if left_out >= pairs:  # infinite for the smallest probabilities
+            if left_out >= pairs:  # left_out may be infinite for tiny p
                 return
             i += 1 + int(left_out)
             while i >= j and j < n:
@@ -40,7 +40,7 @@ TOPOLOGY = Family(
     edges,
     minimum=1,
     settle=settle,
-    # Mean number of edges.
+    # The mean number of edges.
     expected=lambda n, *, p="1/2", seed=0: int(Fraction(p) * (n * (n - 1) // 2)),
     connected=False,
     source="E. N. Gilbert, Ann. Math. Stat. 30, 1141 (1959); P. Erdős, A. Rényi, Publ. Math. Debrecen 6, 290 (1959); "

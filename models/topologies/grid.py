@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def settle_shape(n: int, shape: object, least: int) -> dict[str, object]:
-    """At least `least` nodes in each direction, n in all."""
+    """Check the shape: at least `least` nodes in each direction, n nodes in total."""
     if shape is None:
         return {}
     sizes = integers_option("shape", shape, least)
@@ -28,13 +28,13 @@ def settle_shape(n: int, shape: object, least: int) -> dict[str, object]:
 
 
 def sides(n: int) -> tuple[int, int]:
-    """Rows and columns: the two factors of n that are closest to each other, rows <= columns."""
+    """Return (rows, columns), the two factors of n closest to each other, rows <= columns."""
     rows = next(r for r in range(isqrt(n), 0, -1) if n % r == 0)
     return rows, n // rows
 
 
 def edges(n: int, *, shape: tuple[int, ...] | None = None) -> Iterator[tuple[int, int, int]]:
-    """Row by row: each node with the next in every direction; the last direction varies fastest."""
+    """Join each node to the next node in every direction; the index of the last direction varies fastest."""
     sizes = shape or sides(n)
     for i in range(n):
         step = 1
@@ -45,7 +45,7 @@ def edges(n: int, *, shape: tuple[int, ...] | None = None) -> Iterator[tuple[int
 
 
 def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> Eigenvalues:
-    """Sums of -4 sin²(kπ/2m), one for each direction of m nodes, k = 0 … m - 1."""
+    """Sum -4 sin²(kπ/2m), k = 0 … m - 1, over the directions; m is the number of nodes in a direction."""
     from ..algebra.cosine_sums import box
 
     sizes = shape or sides(n)
@@ -53,7 +53,7 @@ def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> Eigenvalues:
 
 
 def box_formula(one: ClosedForm, shape: str | Iterable[object]) -> ClosedForm:
-    """Sums of the eigenvalues of one direction, sizes as letters or numbers; the last varies fastest."""
+    """Sum the eigenvalues of the directions; sizes are letters or numbers, the last direction varies fastest."""
     from ..graphs.closed_forms import entries
     from ..graphs.closed_products import box, counters
 

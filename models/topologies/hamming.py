@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def _letters(n: int, d: int) -> int:
-    """The number of letters q with n = q**d words; ValueError if there is none."""
+    """Find q with n = q**d, the number of letters; ValueError if there is none."""
     if n == 1:
         return 1
     low, high = 1, 2
@@ -30,14 +30,14 @@ def _letters(n: int, d: int) -> int:
 
 
 def settle(n: int, d: object) -> dict[str, object]:
-    """A number of words of d letters."""
+    """Check that n is a power q**d."""
     length = integer_option("d", d, 1)
     _letters(n, length)
     return {"d": length}
 
 
 def edges(n: int, *, d: int = 2) -> Iterator[tuple[int, int, int]]:
-    """Each word, its letters as digits of its number, and those that are larger in one."""
+    """Join each word to the words with one larger letter; the letters are the digits of the node's number to base q."""
     q = _letters(n, d)
     for i in range(n):
         for value in (q**k for k in range(d)):
@@ -51,7 +51,7 @@ def spectrum(n: int, *, d: int = 2) -> Eigenvalues:
 
 
 def formula() -> ClosedForm:
-    """-q j, C(d, j) (q - 1)^j times, with the characters of the group of words."""
+    """-q j, C(d, j) (q - 1)^j times; eigenvectors are the characters of the group of words."""
     from sympy import Eq, I, KroneckerDelta, Mod, Product, S, Sum, binomial, exp, floor, pi
 
     from ..graphs.closed_forms import NODE, ClosedForm, D, J, K, M, Q, Term

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def _radices(n: int) -> list[int]:
-    """The prime factors of n, ascending: the base of each digit of a node's place."""
+    """Return the prime factors of n, ascending; each is the base of one digit of a node's number."""
     factors, p = [], 2
     while p * p <= n:
         if n % p:
@@ -28,7 +28,7 @@ def _radices(n: int) -> list[int]:
 
 
 def edges(n: int) -> Iterator[tuple[int, int, int]]:
-    """Each node and those that are larger in one digit."""
+    """Join each node to the nodes with one larger digit."""
     bases = _radices(n)
     for i in range(n):
         index, value = i, 1
@@ -52,7 +52,7 @@ def spectrum(n: int) -> Eigenvalues:
 
 
 def formula() -> ClosedForm:
-    """-2 k, C(d, k) times, with the Walsh functions (J. L. Walsh, Am. J. Math. 45, 5, 1923)."""
+    """-2 k, C(d, k) times; eigenvectors are Walsh functions (J. L. Walsh, Am. J. Math. 45, 5, 1923)."""
     from sympy import Eq, Mod, Product, S, Sum, binomial, floor
 
     from ..graphs.closed_forms import NODE, ClosedForm, D, J, K, M, Term

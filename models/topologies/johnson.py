@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 
 def settle(n: int, k: object) -> dict[str, object]:
-    """A number of k-subsets."""
+    """Check that n is a number of k-subsets of a set."""
     chosen = integer_option("k", k, 1)
     ground_set(n, chosen)
     return {"k": chosen}
 
 
 def edges(n: int, *, k: int = 2) -> Iterator[tuple[int, int, int]]:
-    """Each subset and those with one of its elements replaced by a larger one."""
+    """Join each subset to the subsets with one element replaced by a larger one."""
     m = ground_set(n, k)
     index = numbered(m, k)
     for subset, i in index.items():
@@ -32,7 +32,7 @@ def edges(n: int, *, k: int = 2) -> Iterator[tuple[int, int, int]]:
 
 
 def spectrum(n: int, *, k: int = 2) -> Eigenvalues:
-    """-j (m + 1 - j), C(m, j) - C(m, j - 1) times, j = 0 … the smaller of k and m - k."""
+    """-j (m + 1 - j), C(m, j) - C(m, j - 1) times, j = 0 … min(k, m - k), for the k-subsets of m elements."""
     m = ground_set(n, k)
     return [(0, 1), *((-j * (m + 1 - j), comb(m, j) - comb(m, j - 1)) for j in range(1, min(k, m - k) + 1))]
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def settle(n: int, k: object) -> dict[str, object]:
-    """A number of k-subsets of a set of 2k or more."""
+    """Check that n is the number of k-subsets of a set with 2k or more elements."""
     chosen = integer_option("k", k, 1)
     m = ground_set(n, chosen)
     if m < 2 * chosen:
@@ -26,17 +26,17 @@ def settle(n: int, k: object) -> dict[str, object]:
 
 
 def edges(n: int, *, k: int = 2) -> Iterator[tuple[int, int, int]]:
-    """Each subset and the later ones that have none of its elements."""
+    """Join each subset to the later subsets that are disjoint from it."""
     m = ground_set(n, k)
     index = numbered(m, k)
     for subset, i in index.items():
-        # In the order of the dictionary the later ones of all disjoint subsets begin with a larger element.
+        # In lexicographic order a later disjoint subset begins with a larger element.
         larger = [e for e in range(subset[0] + 1, m) if e not in subset]
         yield from ((i, index[other], 1) for other in combinations(larger, k))
 
 
 def spectrum(n: int, *, k: int = 2) -> Eigenvalues:
-    """(-1)^j C(m - k - j, k - j) - C(m - k, k), C(m, j) - C(m, j - 1) times, j = 0 … k."""
+    """(-1)^j C(m - k - j, k - j) - C(m - k, k), C(m, j) - C(m, j - 1) times, j = 0 … k, m the size of the set."""
     m = ground_set(n, k)
     counts: dict[int, int] = {}
     for j in range(k + 1):

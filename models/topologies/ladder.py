@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def edges(n: int) -> Iterator[tuple[int, int, int]]:
-    """Nodes 0, 2, 4 … are one rail, 1, 3, 5 … the other."""
+    """Yield the edges; nodes 0, 2, 4 … are one rail, nodes 1, 3, 5 … the other."""
     for i in range(n):
         if i % 2 == 0 and i + 1 < n:
             yield i, i + 1, 1
@@ -21,7 +21,7 @@ def edges(n: int) -> Iterator[tuple[int, int, int]]:
 
 
 def spectrum(n: int) -> Eigenvalues:
-    """-4 sin²(kπ/n) and that less 2, k = 0 … n/2 - 1; none for odd n."""
+    """-4 sin²(kπ/n) and -2 - 4 sin²(kπ/n), k = 0 … n/2 - 1; None for odd n."""
     if n % 2:
         return None
     from ..algebra.cosine_sums import box
@@ -30,7 +30,7 @@ def spectrum(n: int) -> Eigenvalues:
 
 
 def formula() -> ClosedForm:
-    """-4 sin²(kπ/2p), and 2 less; both rails move alike, or against each other."""
+    """-4 sin²(kπ/2p), in which both rails move alike, and -2 - 4 sin²(kπ/2p), in which they move against each other."""
     from sympy import S, cos, floor, pi, sin
 
     from ..graphs.closed_forms import NODE, ClosedForm, K, P, Term

@@ -28,7 +28,7 @@ def formula() -> ClosedForm:
 
 
 TOPOLOGY = Family(
-    # Node i feels node i + 1, the last one the first.
+    # Node i feels node i + 1; the last node feels the first.
     lambda n: ((i, (i + 1) % n, 1) for i in range(n)),
     minimum=2,
     count=lambda n: n,

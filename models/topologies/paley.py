@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def _prime_power(n: int) -> tuple[int, int] | None:
-    """The prime p and the exponent e of n = p**e; None of any other number."""
+    """Return the prime p and the exponent e of n = p**e; None if n is no prime power."""
     from flint import fmpz
 
     if not (fmpz(n).is_perfect_power() or fmpz(n).is_prime()):
@@ -23,7 +23,7 @@ def _prime_power(n: int) -> tuple[int, int] | None:
 
 
 def settle(n: int) -> dict[str, object]:
-    """A prime power that leaves 1 on division by 4: else -1 is no square, and joining is one-way."""
+    """Check that n is a prime power with n = 1 mod 4; otherwise -1 is no square, and links would be one-way."""
     if n % 4 != 1 or _prime_power(n) is None:
         below = next(m for m in range(n - 1, 4, -1) if m % 4 == 1 and _prime_power(m))
         above = next(m for m in range(n + 1, 2 * n) if m % 4 == 1 and _prime_power(m))
@@ -34,9 +34,9 @@ def settle(n: int) -> dict[str, object]:
 
 
 def _squares(p: int, e: int) -> set[tuple[int, ...]]:
-    """The squares other than 0 of the field of p**e elements, as digits, the constant first.
+    """Return the non-zero squares of the field of p**e elements as coefficients, the constant first.
 
-    Elements are polynomials over the whole numbers modulo p, modulo the first irreducible one.
+    Elements are polynomials over the integers mod p, reduced by the first irreducible polynomial of degree e.
     """
     from flint import nmod_poly
 
@@ -50,7 +50,7 @@ def _squares(p: int, e: int) -> set[tuple[int, ...]]:
 
 
 def edges(n: int) -> Iterator[tuple[int, int, int]]:
-    """Element i has the digits of i to the base p, the constant last."""
+    """Yield the edges; the coefficients of element i are the digits of i to base p, the constant last."""
     power = _prime_power(n)
     if power is None:
         raise ValueError(f"found n = {n}; expected a prime power")

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def settle(n: int, step: object) -> dict[str, object]:
-    """An even number of nodes, and a step below a quarter of it."""
+    """Check that n is even and that the step is below n/4."""
     if n % 2:
         raise ValueError(f"found n = {n}; expected an even number, such as {n - 1} or {n + 1}")
     most = (n // 2 - 1) // 2
@@ -21,7 +21,7 @@ def settle(n: int, step: object) -> dict[str, object]:
 
 
 def edges(n: int, *, step: int = 2) -> Iterator[tuple[int, int, int]]:
-    """Nodes 0 … n/2 - 1 are the ring, those from n/2 on are inside, each joined to its own."""
+    """Yield the edges; nodes 0 … n/2 - 1 are the ring, node i + n/2 of the star polygon is joined to node i."""
     m = n // 2
     for i in range(m):
         j, k = (i + 1) % m, (i + step) % m

@@ -14,22 +14,21 @@ _SEED = 1988
 
 
 def edges(n: int) -> Iterator[tuple[int, int, int]]:
-    """The ring, then the pairs."""
+    """Yield the edges of the ring, then the random pairs."""
     yield from ((i, i + 1, 1) for i in range(n - 1))
     yield 0, n - 1, 1
     yield from ((min(pair), max(pair), 1) for pair in _pairs(n))
 
 
 def _pairs(n: int) -> list[tuple[int, int]]:
-    """A random perfect matching (n odd: of all but one node) without edges of the ring.
+    """Draw a perfect matching of the nodes (all but one if n is odd) without edges of the ring.
 
-    Pairs that are neighbours in the ring swap their second nodes with those of random pairs until
-    none is left.
+    While a pair consists of neighbours in the ring, swap its second node with that of a random pair.
     """
     stream = random.Random(_SEED)
 
     def below(count: int) -> int:
-        return int(stream.random() * count)  # Python never changes the numbers of this method
+        return int(stream.random() * count)  # reproducible: Python guarantees the values of random()
 
     nodes = list(range(n))
     for i in range(n - 1, 0, -1):

@@ -10,13 +10,13 @@ from ..graphs.families import Family
 from ..inputs.options import integer_option
 
 _ATTEMPTS = 1000
-"""Attempts at a pairing; at the highest degree drawn, half of the nodes, one in five succeeds."""
+"""Most attempts at a pairing; at the highest degree that is drawn, n/2, one attempt in five succeeds."""
 
 _Edges = set[tuple[int, int]]
 
 
 def settle(n: int, degree: object, seed: object) -> dict[str, object]:
-    """A degree below n, and n times the degree even."""
+    """Check that the degree is below n and that n times the degree is even."""
     neighbours = integer_option("degree", degree, 1)
     if neighbours >= n or n * neighbours % 2:
         raise ValueError(f"degree = {neighbours} with n = {n}; expected less than n, and n times degree even")
@@ -24,9 +24,9 @@ def settle(n: int, degree: object, seed: object) -> dict[str, object]:
 
 
 def edges(n: int, *, degree: int = 4, seed: int = 0) -> Iterator[tuple[int, int, int]]:
-    """Pair free ends at random until none is left; start again if the rest cannot be paired.
+    """Pair free ends of edges at random; start again if the remaining ends cannot be paired.
 
-    Of a degree above n/2 the pairs that are not joined are drawn in place of those that are.
+    For a degree above n/2 draw the complement, whose degree is smaller.
     """
     stream = random.Random(seed)
     dense = 2 * degree > n
@@ -37,7 +37,7 @@ def edges(n: int, *, degree: int = 4, seed: int = 0) -> Iterator[tuple[int, int,
 
 
 def _drawn(n: int, degree: int, stream: random.Random) -> _Edges:
-    """The edges of the first attempt that succeeds."""
+    """Return the edges of the first successful attempt."""
     for _ in range(_ATTEMPTS):
         joined = _paired(n, degree, stream)
         if joined is not None:
@@ -48,7 +48,7 @@ def _drawn(n: int, degree: int, stream: random.Random) -> _Edges:
 
 
 def _paired(n: int, degree: int, stream: random.Random) -> _Edges | None:
-    """The edges of one attempt; None if the ends that are left form no pair."""
+    """Pair all ends in one attempt; None if no two of the remaining ends can be joined."""
     ends = [i for i in range(n) for _ in range(degree)]
     joined: _Edges = set()
     while ends:
@@ -69,7 +69,7 @@ def _paired(n: int, degree: int, stream: random.Random) -> _Edges | None:
 
 
 def _possible(ends: list[int], joined: _Edges) -> bool:
-    """True if two of the free ends can still be joined."""
+    """Return whether two of the free ends can still be joined."""
     nodes = sorted(set(ends))
     return any((a, b) not in joined for k, a in enumerate(nodes) for b in nodes[k + 1 :])
 

@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 
 
 def edges(n: int) -> Iterator[tuple[int, int, int]]:
-    """Node i and node i + 1, and the last with the first."""
+    """Join node i to node i + 1, and the first node to the last."""
     yield from ((i, i + 1, 1) for i in range(n - 1))
     yield 0, n - 1, 1
 
 
 def spectrum(n: int) -> Eigenvalues:
-    """-4 sin²(kπ/n), k = 0 … n/2: twice each, but once for k = 0 and k = n/2."""
+    """-4 sin²(kπ/n), k = 0 … n/2: once for k = 0 and k = n/2, else twice."""
     from ..algebra.cosines import minus_four_sine_squared
     from ..algebra.lazy import LazyEigenvalues
 

@@ -10,11 +10,11 @@ from ..graphs.families import Family
 from ..inputs.options import integer_option, probability_option
 
 _DRAWS = 10**7
-"""Most random numbers of a graph: a node that is joined to nearly all others takes many."""
+"""Most random numbers drawn for a graph; a node joined to nearly all others rejects most draws."""
 
 
 def settle(n: int, neighbours: object, p: object, seed: object) -> dict[str, object]:
-    """An even number of neighbours below n, a probability, a whole number; few draws."""
+    """Check the number of neighbours (even, below n), the probability, the seed, and the expected number of draws."""
     count = integer_option("neighbours", neighbours, 2)
     if count % 2 or count >= n:
         raise ValueError(f"neighbours = {count} with n = {n}; expected an even number below n")
@@ -29,7 +29,7 @@ def settle(n: int, neighbours: object, p: object, seed: object) -> dict[str, obj
 
 
 def edges(n: int, *, neighbours: int = 4, p: str = "1/10", seed: int = 0) -> Iterator[tuple[int, int, int]]:
-    """Lap by lap, nearest first: each edge keeps its first node and may get another second one."""
+    """Replace the second node of each ring edge with probability p, edges to nearest neighbours first."""
     stream = random.Random(seed)
     top, _, bottom = p.partition("/")
     chance = int(top) / int(bottom or 1)
@@ -59,7 +59,7 @@ TOPOLOGY = Family(
     edges,
     minimum=5,
     settle=settle,
-    # Number of edges: those that are led elsewhere are not lost.
+    # Rewiring keeps the number of edges.
     count=lambda n, *, neighbours=4, p="1/10", seed=0: n * neighbours // 2,
     connected=False,
     source="D. J. Watts, S. H. Strogatz, Nature 393, 440 (1998)",

@@ -23,7 +23,7 @@ def formula() -> ClosedForm:
 
 
 TOPOLOGY = Family(
-    # The hub and each leaf.
+    # Join the hub to each leaf.
     lambda n: ((0, i, 1) for i in range(1, n)),
     minimum=1,
     count=lambda n: n - 1,

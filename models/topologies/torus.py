@@ -13,13 +13,13 @@ from .ring import formula as ring_formula
 
 
 def sides(n: int) -> tuple[int, ...]:
-    """The two closest factors of n that are 3 or more; n alone, a ring, if there are none."""
+    """Return the two closest factors of n, each 3 or more; (n,), a ring, if there are none."""
     rows = next((r for r in range(isqrt(n), 2, -1) if n % r == 0), None)
     return (n,) if rows is None else (rows, n // rows)
 
 
 def edges(n: int, *, shape: tuple[int, ...] | None = None) -> Iterator[tuple[int, int, int]]:
-    """Each node and the next one in every direction; the last direction varies fastest."""
+    """Join each node to the next node in every direction; the index of the last direction varies fastest."""
     for i in range(n):
         step = 1
         for size in reversed(shape or sides(n)):
@@ -30,7 +30,7 @@ def edges(n: int, *, shape: tuple[int, ...] | None = None) -> Iterator[tuple[int
 
 
 def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> Eigenvalues:
-    """Sums of -4 sin²(kπ/m), one for each direction of m nodes, k = 0 … m - 1."""
+    """Sum -4 sin²(kπ/m), k = 0 … m - 1, over the directions; m is the number of nodes in a direction."""
     from ..algebra.cosine_sums import box
 
     sizes = shape or sides(n)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..graphs.families import Family
 
 TOPOLOGY = Family(
-    # Each node and the one that it hangs on: of nodes 1 … n, node i on node i/2 rounded down.
+    # Join each node to its parent: counted from 1, node i has the parent floor(i/2).
     lambda n: (((i - 1) // 2, i, 1) for i in range(1, n)),
     minimum=1,
     count=lambda n: n - 1,

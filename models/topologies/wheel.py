@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 
 
 def edges(n: int) -> Iterator[tuple[int, int, int]]:
-    """The spokes, then the rim."""
+    """Yield the spokes, then the rim."""
     spokes = ((0, i, 1) for i in range(1, n))
     return chain(spokes, ((i, i + 1, 1) for i in range(1, n - 1)), [(1, n - 1, 1)])
 
 
 def spectrum(n: int) -> Eigenvalues:
-    """0, -1 - 4 sin²(kπ/(n - 1)) for k = 1 … n - 2, and -n, which the rim has too up to 5 nodes."""
+    """0, -n, and -1 - 4 sin²(kπ/(n - 1)) for k = 1 … n - 2; for n <= 5 some of the last equal -n."""
     from sympy import Integer
 
     from ..algebra.cosine_sums import AngleSum, expression
