@@ -19,18 +19,18 @@ Periods = tuple[float | None, ...]
 
 @lru_cache(maxsize=64)
 def periods_of_kinds(equations: Equations) -> tuple[Periods, ...]:
-    """Return the periods in which the equations repeat themselves, by kind of node and by state.
+    """Return the period of each state of each kind of node, in which the equations repeat themselves.
 
-    A state is an angle if it occurs only as q*state + … within sines, cosines and tangents, with rational numbers q: in the
-    equations of its node, and in those of all links as the state of the target and as that of the source.  Expressions are
-    not simplified before.
+    A state is an angle if it occurs only inside sines, cosines and tangents, as q*state + … with a rational number q.
+    This must hold in the equations of its node and of all links, at the target and at the source.  Expressions are
+    not simplified first.
     """
-    # The expressions that the states of a kind of node enter, with the symbols of these states there.
+    # For each kind of node: expressions that contain its states, and the symbols of the states in these expressions.
     uses = [(kind, node.expressions, node.state) for kind, node in enumerate(equations.nodes)]
     for (target, source), edge in equations.edge_of:
         uses += [(target, edge.expressions, edge.here), (source, edge.expressions, edge.there)]
 
-    # Periods (in units of pi) of the terms that hold a state, and the states that occur outside of such terms.
+    # For each state: periods of the waves that contain it, in units of pi; `bare`: states that occur outside of waves.
     bare = [set[int]() for _ in equations.nodes]
     turns = [[set[sp.Rational]() for _ in node.state] for node in equations.nodes]
     for kind, expressions, symbols in uses:
@@ -63,7 +63,7 @@ def periods_of_states(equations: Equations) -> Periods:
 def _occurrences(
     expressions: Iterable[sp.Expr], symbols: Collection[sp.Symbol]
 ) -> Iterator[tuple[sp.Symbol, sp.Rational | None]]:
-    """Yield each symbol where it occurs, with the period of that term in units of pi, None outside of such terms."""
+    """Yield each occurrence of a symbol with its period in units of pi; the period is None outside of sin, cos, tan."""
     waiting: list[sp.Basic] = list(expressions)
     seen = set[sp.Basic]()
     while waiting:
@@ -77,7 +77,7 @@ def _occurrences(
         elif (half_turns := HALF_TURNS.get(e.func)) is None:
             waiting += e.args
         else:
-            # In sin(q x + …) the term q x makes x an angle of period 2 pi/|q|; other terms are searched.
+            # In sin(q x + …) the term q x gives x the period 2 pi/|q|; search the other terms for further waves.
             for term in sp.Add.make_args(e.args[0]):
                 factor, inner = term.as_coeff_Mul()
                 if inner in symbols and factor.is_Rational:

@@ -1,7 +1,7 @@
 """Equations of motion of a network: templates of its nodes and links, and the list of its links.
 
-Printing, code generation, spectra and variational equations read `Equations` alone.  Templates do not depend on the size
-of the network, so a large network costs no algebra.
+Printing, code generation, spectra and variational equations read only `Equations`.  A template holds the equations of
+one node or one link in symbols.  It does not depend on the size of the network, so a large network costs no algebra.
 """
 
 from __future__ import annotations
@@ -28,11 +28,14 @@ Ends = tuple[int, int]
 Entry = tuple[tuple[int, int], sp.Expr]
 
 DIGEST_LIMIT = 10_000
-"""Most links of all pairs that a digest lists, so that it equals the digest of the same links in a list (a choice)."""
+"""Most links of a complete graph that a digest lists one by one (a choice).
+
+Up to this number a complete graph and a list of the same links have equal digests.
+"""
 
 
 class _Cached:
-    """Give a value with slots a dictionary for its cached properties, which pickles omit."""
+    """Give a dataclass with slots a dictionary for cached properties; pickles omit this dictionary."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,14 +43,14 @@ class Layer:
     """The links of one coupling on one graph."""
 
     edge_of: tuple[tuple[Ends, Edge], ...]  # the templates of the links, by the kinds of their targets and sources
-    # Target and source (0-based) and weight of each link. Links of all pairs make a mean field of an edge that
-    # separates (`synchain.models.interactions.separation`).
+    # Target and source (0-based) and weight of each link. `AllPairs` stands for all links of a complete graph, which
+    # act by mean fields (`synchain.models.interactions.separation`).
     links: Links
-    varied: tuple[str, ...] = ()  # parameters with a value for each link, k_1_2 where node 1 feels node 2
-    mutual: bool = False  # True if a link and the one that runs back share these values
+    varied: tuple[str, ...] = ()  # parameters with a value for each link: k_1_2 for the link from node 2 to node 1
+    mutual: bool = False  # True if the links i -> j and j -> i share the values of `varied`
 
     def map(self, change: Callable[[Edge], Edge], renamed: Mapping[sp.Symbol, sp.Symbol] | None = None) -> Layer:
-        """Return the same links with changed templates; `varied` keeps the parameters that templates still have."""
+        """Return the same links with changed templates; drop names of `varied` that no template has any more."""
         edge_of = tuple((ends, change(edge)) for ends, edge in self.edge_of)
         names = {s.name for _, edge in edge_of for s in edge.parameters}
         varied = tuple(name for name in _renamed(self.varied, renamed) if name in names)
@@ -68,8 +71,8 @@ class Layer:
 class Equations(_Cached, HasLatex):
     """The equations of motion of a network, M d(state)/dt = rhs.
 
-    M is the identity unless nodes or links have inertia.  The state is ordered by components, x_1 … x_n,
-    v_1 … v_n; components that all kinds of nodes have come first.
+    M is the identity unless nodes or links have inertia.  The state is ordered by components: x_1 … x_n, v_1 … v_n.
+    Components that all kinds of nodes have come first.
     """
 
     nodes: tuple[Node, ...]  # the templates of the nodes, by kind; one for equal nodes
@@ -195,7 +198,7 @@ class Equations(_Cached, HasLatex):
         """Raise ValueError unless the nodes are equal, the links are of one layer and M is the identity."""
         if not varied_too:
             self.expect_exact_links(what)
-        # The first problem that holds becomes the message.
+        # Each message with its condition; the first condition that is true is raised.
         problems = {
             "nodes of several kinds": self.mixed,
             f"nodes that differ in {', '.join(self.varied)}": bool(self.varied) and not varied_too,
@@ -209,7 +212,7 @@ class Equations(_Cached, HasLatex):
             raise ValueError(f"{what}: found {problem}; expected equal nodes with {expected}")
 
     def expect_exact_links(self, what: str) -> None:
-        """Raise ValueError if links differ in more than the weights of their graph; the message begins with `what`."""
+        """Raise ValueError if a parameter differs from link to link; the message begins with `what`."""
         if self.numbered:
             raise ValueError(
                 f"{what}: found links that differ in {', '.join(self.numbered)}; expected links that differ in the weights of "
@@ -248,7 +251,10 @@ class Equations(_Cached, HasLatex):
 
     @cached_property
     def parameters(self) -> tuple[str, ...]:
-        """Names of all parameters, nodes first; with a value for each node a_1 … a_n, for each link k_1_2 …"""
+        """Names of all parameters, nodes first.
+
+        A parameter with a value for each node is a_1 … a_n; one with a value for each link is k_1_2 …
+        """
         names: list[str] = []
         for name in dict.fromkeys(s.name for node in self.nodes for s in node.parameters):
             names += [f"{name}_{i + 1}" for i in self.holders(name)] if name in self.varied else [name]
@@ -260,7 +266,7 @@ class Equations(_Cached, HasLatex):
 
     @cached_property
     def numbered(self) -> Mapping[str, Layer]:
-        """The parameters with a value for each link, and their layers."""
+        """The layer of each parameter that has a value for each link."""
         return {name: layer for layer in self.layers for name in layer.varied}
 
     @property
@@ -293,7 +299,7 @@ class Equations(_Cached, HasLatex):
 
     @property
     def compared(self) -> tuple[str, ...]:
-        """The components whose distances between nodes make the synchronisation error."""
+        """The components that are compared between nodes in the synchronisation error."""
         return tuple(s.name for s in self.nodes[0].continuous if s.name in self.common)
 
     @cached_property
@@ -342,11 +348,12 @@ class Equations(_Cached, HasLatex):
         links = [pair for pair in self.linked() if pair[0][0] == i]
         force = sp.Add(*(edge.rhs[1].xreplace(self.at_link(link, edge)) for link, edge in links))
         events = (event.map(lambda e: e.xreplace(at_node)) for event in node.events)
-        # Links act on a body in slip, mode**2 times their force; on the held body they act with the whole force.
+        # Rates of links contain mode**2, so that links move only a body in slip. For the load on a body in stick the
+        # mode is set to 1.
         return tuple(e.under(force.xreplace({e.mode: sp.S.One, velocity: e.target})) for e in events)
 
     def rhs(self) -> tuple[sp.Expr, ...]:
-        """Return the right-hand side in state order.  The algebra grows with n: meant for small n."""
+        """Return the right-hand side in state order; meant for small n, since the algebra grows with n."""
         rates = self._of_nodes([node.rhs for node in self.nodes])
         for link, edge in self.linked():
             values = self.at_link(link, edge)
@@ -370,7 +377,7 @@ class Equations(_Cached, HasLatex):
         entries: dict[tuple[int, int], sp.Expr] = {}
         for i, rows in enumerate(places):
             inertia = self.node_at(i).inertia
-            # Where some nodes have inertia and others none, M is the identity for the latter.
+            # M is the identity in the rows of nodes without inertia.
             entries |= _block(inertia, rows, rows, self.at_node(i)) if inertia else {(k, k): sp.S.One for k in rows}
         for link, edge in self.linked():
             values = self.at_link(link, edge)
@@ -417,7 +424,7 @@ class Equations(_Cached, HasLatex):
     @cached_property
     def digest(self) -> str:
         """Hexadecimal SHA-256 of the equations; equal equations have equal digests."""
-        # Parts are added only where a feature occurs, so that digests of other equations stay the same.
+        # A feature adds its part only to equations that have it, so that digests of all other equations stay the same.
         first, *others = self.nodes
         large = any(len(pairs) > DIGEST_LIMIT for _, pairs in self.fields)
         links = repr([layer.links for layer in self.layers] if large else tuple(self.links))
@@ -425,7 +432,7 @@ class Equations(_Cached, HasLatex):
         parts += ["; ".join(map(sp.srepr, event.expressions)) for event in first.events]
         parts += [sp.srepr(sp.Matrix(node.inertia)) for node in self.nodes if node.inertia]
         parts += [f"varied {' '.join(self.varied)}"] if self.varied else []
-        if others:  # a single kind adds nothing
+        if others:  # several kinds of nodes
             parts += [repr(self.kind_of), *(_text(node.state, node.rhs, node.parameters) for node in others)]
             parts += [repr(ends) for layer in self.layers for ends, _ in layer.edge_of]
         parts += [f"layers {[len(layer.links) for layer in self.layers]}"] if len(self.layers) > 1 else []
@@ -438,14 +445,14 @@ class Equations(_Cached, HasLatex):
 
 
 def _renamed(names: Iterable[str], renamed: Mapping[sp.Symbol, sp.Symbol] | None) -> Iterator[str]:
-    """Yield the names of parameters after their symbols are renamed."""
+    """Yield the names of parameters under a renaming of symbols."""
     for name in names:
         s = sp.Symbol(name, real=True)
         yield name if renamed is None else renamed.get(s, s).name
 
 
 def _numbered(s: sp.Symbol, i: int) -> sp.Symbol:
-    """Return the symbol of a template at node `i` (0-based)."""
+    """Return the symbol of the network for a symbol of the node template at node `i` (0-based)."""
     return sp.Symbol(f"{s.name}_{i + 1}", real=True)
 
 
@@ -533,7 +540,7 @@ def _check_links(eq: Equations) -> None:
 
 
 def _check_numbered(eq: Equations) -> None:
-    """Raise ValueError for parameters with a value for each link that no link has, or links of two layers."""
+    """Raise ValueError for a link parameter that no link has, that two layers have, or that lacks a link back."""
     for name, layer in eq.numbered.items():
         if sum(name in each.varied for each in eq.layers) > 1 or isinstance(layer.links, AllPairs):
             raise ValueError(f"{name!r} has a number for each link of two layers, or of all pairs; expected one list")
@@ -541,7 +548,7 @@ def _check_numbered(eq: Equations) -> None:
             raise ValueError(f"{name!r} has a number for each link, but no link of its layer has it as a parameter")
     for layer in (layer for layer in eq.layers if layer.mutual):
         pairs = {link[:2] for link in layer.links}
-        # A value of an edge needs a link in either direction.
+        # A value that both directions share needs a link in each direction.
         back = next(((i, j) for i, j in pairs if (j, i) not in pairs), None)
         if back is not None:
             raise ValueError(f"numbers of edges: link {back[0]} <- {back[1]} has none that runs back")

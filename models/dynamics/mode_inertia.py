@@ -1,8 +1,8 @@
 """Transversal modes of links with inertia: one strength for their stiffness and their inertia.
 
-A mode of strength alpha = -sigma gamma obeys (1 + alpha B) d' = (J - alpha H) d, with the inertia B of a link over sigma
-at equal states.  If B B = b B and B H = b H with a number b (forces and inertia of a link act on the same coordinates),
-then d' = (J - tau (H + B J)) d with tau = alpha/(1 + b alpha), which is linear in one strength again.
+A mode of strength alpha = -sigma gamma obeys (1 + alpha B) d' = (J - alpha H) d.  B is the inertia of a link at equal
+states, divided by sigma.  Let B B = b B and B H = b H with a number b: forces and inertia of a link act on the same
+coordinates.  Then d' = (J - tau (H + B J)) d with tau = alpha/(1 + b alpha), which is linear in the one strength tau.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from .equations import Equations
 
 
 def inertia_of_modes(equations: Equations) -> tuple[sp.Matrix, sp.Expr]:
-    """Return B and b of the links, both 0 without inertia; raise ValueError if there is no such b."""
+    """Return B and b of the links, both 0 without inertia; raise ValueError unless B B = b B and B H = b H."""
     node = equations.node
     size = len(node.state)
     edge = equations.edge if equations.inertial_links else None

@@ -1,7 +1,7 @@
 """Equations of networks from oscillators, friction laws and couplings.
 
-The Lagrangian of a network is a sum over nodes and edges, T = sum T_i and V = sum V_i + sum V_edge, so the Euler-Lagrange
-equations of a node are those of the single oscillator plus one force for each edge that meets it.
+The Lagrangian of a network is a sum over nodes and edges: T = sum T_i and V = sum V_i + sum V_edge.  The Euler-Lagrange
+equations of a node are therefore those of the single oscillator plus one force for each edge at the node.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def parameters(
         )
     if friction is not None and not oscillator.takes_friction:
         raise ValueError(f"oscillator {oscillator.name!r} takes no friction law, found {friction.name!r}; leave it out")
-    # Of the oscillator, of its friction law, of the smoothing of contacts, of couplings.
+    # In this order: parameters of the oscillator, its friction law, the smoothing of contacts, the couplings.
     table: dict[str, Parameter] = dict(oscillator.parameters)
     if friction is not None:
         _join(table, friction.parameters, f"friction law {friction.name!r}")
@@ -61,7 +61,7 @@ def parameters(
 
 @lru_cache(maxsize=64)
 def node(oscillator: Oscillator, friction: FrictionLaw | None = None, contact: str = ContactModel.ATAN) -> Node:
-    """Derive the equations of one oscillator: for a Lagrangian x' = v and v' from the Euler-Lagrange equations.
+    """Derive the equations of one oscillator; for a Lagrangian, x' = v and the Euler-Lagrange equations for v'.
 
     Raises ValueError as `parameters` does.
     """
@@ -70,7 +70,7 @@ def node(oscillator: Oscillator, friction: FrictionLaw | None = None, contact: s
         state = tuple(sp.Symbol(name, real=True) for name in oscillator.model.state)
         return Node(state, oscillator.model.rates, symbols)
 
-    # M dv/dt = r, solved in symbols unless too many coordinates are coupled; M then has rows for coordinates too.
+    # Solve M dv/dt = r in symbols. With too many coupled coordinates keep M, with identity rows for the coordinates.
     system = nondimensional(oscillator)
     positions, velocities = system.coordinates, system.velocities
     r, masses = system.balance()
@@ -98,7 +98,7 @@ def node(oscillator: Oscillator, friction: FrictionLaw | None = None, contact: s
 
 
 def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str, remedy: str = "rename it") -> None:
-    """Add the parameters of another part; refuse a name that two parts have, which would be one number."""
+    """Add the parameters of another part of the model; raise ValueError for a name that the table already has."""
     for name, parameter in more.items():
         if name in table:
             raise ValueError(f"{what}: its parameter {name!r} has the name of one of another part; {remedy}")
@@ -106,7 +106,7 @@ def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str,
 
 
 def _free_spelling(coupling: Coupling, oscillator: Oscillator) -> str:
-    """Return the remedy for a coupling whose parameter has the name of another one."""
+    """Return the remedy if a parameter of a coupling has the name of another parameter."""
     if isinstance(coupling, MatrixCoupling):
         rates: dict[str, str] = {}
         for source, target, factor in coupling.entries:
@@ -116,7 +116,7 @@ def _free_spelling(coupling: Coupling, oscillator: Oscillator) -> str:
         return f"write Rates({rates}, {{'k': 1}}), whose parameter may have any name"
     if not isinstance(coupling, LagrangianCoupling) or not isinstance(oscillator.model, LagrangianModel):
         return "rename it"
-    # The energies of a link are those of the coordinates that it joins, each by itself.
+    # Write the energies of the link once for each coordinate that it joins, with names of parameters that are free.
     joined = [c for c in oscillator.model.coordinates if coupling.coordinates is None or c.name in coupling.coordinates]
     if coupling.name == "spring":
         energy = " + ".join(f"k*W*({c.name}_j - {c.name}_i)**2/2" for c in joined)
@@ -137,7 +137,7 @@ def network(single: Node, link: Edge | None, graph: Topology, varied: tuple[str,
 
     Notes
     -----
-    If a link tells its ends apart, its weight becomes the sign of its direction
+    The weight of an oriented link, whose energy changes if its ends are exchanged, is the sign of its direction
     (`synchain.models.interactions.link`).
     """
     apart = Equations.of_equal_nodes(single, None, graph.n, (), varied)
@@ -147,14 +147,14 @@ def network(single: Node, link: Edge | None, graph: Topology, varied: tuple[str,
 def _layer(
     apart: Equations, link: Edge, graph: Topology, numbered: tuple[str, ...] = (), mutual: bool = False
 ) -> Layer:
-    """Return the links of a graph between equal nodes: all pairs, if these make a mean field, or a list.
+    """Return the links of a graph between equal nodes: `AllPairs` if they act by a mean field, else a list.
 
-    Each link has a value of the parameters in `numbered`; links that act on both ends are `mutual`.
+    Each link has a value of the parameters in `numbered`.  `mutual`: both directions of a link share these values.
     """
     shared = link.with_shared(apart.varied)
     if numbered:
         return _listed_layer((((0, 0), shared),), graph, numbered, mutual)
-    # All pairs with one weight: a mean field if the link separates, else a list as long as it is short enough.
+    # A complete graph of one weight becomes a mean field if the link separates, else a list, if not too long.
     weight = None if graph.n <= FEW or apart.sticks else graph.all_to_all
     if weight is not None and separated(shared, apart.varied) is not None:
         return Layer((((0, 0), shared),), AllPairs(graph.n, weight))
@@ -188,8 +188,8 @@ def layered_network(
     layers: Layers,
     varied: tuple[str, ...] = (),
 ) -> Equations:
-    """Return the equations of nodes of one or several kinds that layers of links join."""
-    # A varied parameter belongs to nodes or to links, by its name.
+    """Return the equations of nodes of one or several kinds, joined by one or several layers of links."""
+    # Split the varied parameters into those of nodes and those of links.
     names = {s.name for single in singles for s in single.parameters}
     apart = Equations(tuple(singles), tuple(kinds), (), tuple(name for name in varied if name in names))
     of_links = [name for name in varied if name not in names]
@@ -224,8 +224,8 @@ def _mixed_layer(
 def oriented_links(graph: Topology) -> tuple[Link, ...]:
     """Return the links of a graph with the sign of their direction as weight.
 
-    A link runs from the smaller to the larger number.  On a circulant graph, such as a ring, it runs the shorter way round,
-    so the last link runs from the last node to the first.
+    A link runs from the smaller to the larger number of a node.  On a circulant graph, such as a ring, a link runs the
+    shorter way round, so the last link runs from the last node to the first.
     """
     if not graph.symmetric or any(weight != 1 for _, _, weight in graph.links):
         raise ValueError(
@@ -234,7 +234,7 @@ def oriented_links(graph: Topology) -> tuple[Link, ...]:
         )
     n = graph.n
     pairs = {(i, j) for i, j, _ in graph.links}
-    # Shifting all nodes by one maps links onto links.
+    # A graph is circulant if shifting all nodes by one maps links onto links.
     circulant = all(((i + 1) % n, (j + 1) % n) in pairs for i, j in pairs)
     links = []
     for i, j, _ in graph.links:

@@ -1,7 +1,8 @@
 """Observables of a run: expressions of the states, reduced over the nodes and then over the window.
 
-Symbols inside ``nodes.mean(…)`` and other reductions, and those of a value for each node, are states and parameters of one
-node: ``x``.  The states of the network, ``x_1`` … ``x_n``, may occur everywhere.
+A symbol such as ``x`` is a state or a parameter of one node.  It occurs inside ``nodes.mean(…)`` and other reductions
+over the nodes, and in an observable that has a value for each node.  The states of the network, ``x_1`` … ``x_n``,
+may occur everywhere.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ class ObservedWindow(Word):
 
 
 class _Real(sp.Function):
-    """A function of real values."""
+    """A SymPy function with real values."""
 
     is_real = True
     spelling: ClassVar[str]
@@ -80,23 +81,23 @@ class AtNode(Reduction):
 
 
 class RowSum(Reduction):
-    """The sum of a value over the `ObservableRows` whose index is its argument."""
+    """The sum of a value over the rows of an `ObservableRows`; the argument is the index of that object."""
 
     spelling = "rows.sum"
 
 
 @dataclass(frozen=True, slots=True)
 class ObservableRows:
-    """A value at each of some nodes or links."""
+    """One expression, evaluated at each of several nodes or links."""
 
-    value: sp.Expr  # an expression of the symbols in `at`, of parameters that all share, and of t
-    # For a symbol its value in each row: names of states or parameters, or numbers.
+    value: sp.Expr  # an expression of the symbols in `at`, of parameters with one value for all rows, and of t
+    # For each symbol of a row its value in every row: names of states or parameters, or numbers.
     at: tuple[tuple[sp.Symbol, tuple[str, ...] | tuple[float, ...]], ...]
     count: int  # the number of rows
 
     @classmethod
     def of(cls, value: sp.Expr, substitutions: Sequence[Mapping[sp.Symbol, sp.Expr]]) -> ObservableRows:
-        """Return the rows of a value; a substitution for each row gives a symbol of the network or a number."""
+        """Return the rows of a value; each substitution replaces its symbols by symbols of the network or numbers."""
         used = sorted(value.free_symbols & set(substitutions[0]), key=lambda s: s.name)
         columns = {s: tuple(row[s] for row in substitutions) for s in used}
         fixed = {s: column[0] for s, column in columns.items() if len(set(column)) == 1}
@@ -109,7 +110,7 @@ class ObservableRows:
 
     @property
     def names(self) -> frozenset[str]:
-        """The names of states and parameters that occur."""
+        """The names of all states and parameters in the rows."""
         entries = (entry for _, row in self.at for entry in row if isinstance(entry, str))
         return frozenset({s.name for s in self.value.free_symbols}.union(entries))
 
@@ -122,7 +123,7 @@ energy = Energy("energy", real=True)
 """The energy of the whole network, of its nodes and its links."""
 
 ENERGY = sp.Symbol(energy.name, real=True)
-"""The plain symbol of the energy in values."""
+"""The plain symbol that replaces `energy` in expressions."""
 
 
 class Nodes:
@@ -145,12 +146,12 @@ class Nodes:
         return NodeMinimum(real(value))
 
     def std(self, value: object) -> sp.Expr:
-        """Return the standard deviation of a value over the nodes, of n and not of n - 1 of them."""
+        """Return the standard deviation of a value over the nodes; the divisor is n, not n - 1."""
         e = real(value)
         return sp.sqrt(NodeMean((e - NodeMean(e)) ** 2))
 
     def __getitem__(self, number: int) -> Callable[[object], sp.Expr]:
-        """Return the function that takes the value of one node, counted from 1."""
+        """Return a function that evaluates an expression at one node, counted from 1."""
         if isinstance(number, bool) or not isinstance(number, int) or number < 1:
             raise ValueError(f"nodes: found the number {short_repr(number)}; expected a whole number from 1")
         return partial(_linear, AtNode, number=sp.Integer(number))
@@ -161,7 +162,7 @@ nodes = Nodes()
 
 
 def _linear(kind: type[Reduction], value: object, **more: sp.Expr) -> sp.Expr:
-    """Reduce the real and the imaginary part."""
+    """Apply a linear reduction to the real and the imaginary part of a value separately."""
     e = _made_real(value)
     if not e.has(sp.I):
         return kind(e, *more.values())
@@ -170,9 +171,10 @@ def _linear(kind: type[Reduction], value: object, **more: sp.Expr) -> sp.Expr:
 
 
 def rate(state: object) -> sp.Expr:
-    """Return the derivative of a state by time: that of the dense output, which is one order less exact than the state.
+    """Return the derivative of a state by time.
 
-    Its mean is the difference of the states at the ends of the window, over the length of the window.
+    The derivative of the dense output is taken, which is one order less exact than the state.  The mean of a rate is
+    the difference of the states at the ends of the window, divided by the length of the window.
     """
     e = real(state)
     if not e.is_Symbol:
@@ -181,7 +183,7 @@ def rate(state: object) -> sp.Expr:
 
 
 def _made_real(value: object) -> sp.Expr:
-    """Return an expression with real symbols and exact numbers; functions of time become states, derivatives rates."""
+    """Return an expression with real symbols and exact numbers; theta(t) becomes a state, its derivative a `Rate`."""
     if isinstance(value, bool) or not isinstance(value, int | float | sp.Expr):
         kind = type(value).__name__
         raise TypeError(f"observable: found {short_repr(value)} ({kind}); expected an expression of states")
@@ -216,7 +218,7 @@ def real(value: object) -> sp.Expr:
 
 
 def node_symbols(e: sp.Expr) -> Iterator[sp.Symbol]:
-    """Yield the symbols of an expression outside reductions: with a state of a node, it has one value for each node."""
+    """Yield the symbols outside of reductions; if one is a state of a node, the value differs from node to node."""
     if e.is_Symbol:
         yield e
     elif not isinstance(e, Reduction):
@@ -254,17 +256,17 @@ class Observable:
 
 
 def mean(value: object) -> Observable:
-    """Observe the mean of a value over the window, an integral as exact as the dense output of the steps."""
+    """Observe the mean of a value over the window; the integral is as exact as the dense output of the steps."""
     return Observable(ObservedWindow.MEAN, value)
 
 
 def maximum(value: object) -> Observable:
-    """Observe the largest of the values at the points of the quadrature, which hold both ends of every step."""
+    """Observe the largest value at the points of the quadrature; both ends of every step are among these points."""
     return Observable(ObservedWindow.MAXIMUM, value)
 
 
 def minimum(value: object) -> Observable:
-    """Observe the smallest of the values at the points of the quadrature, which hold both ends of every step."""
+    """Observe the smallest value at the points of the quadrature; both ends of every step are among these points."""
     return Observable(ObservedWindow.MINIMUM, value)
 
 
@@ -274,5 +276,5 @@ def end(value: object) -> Observable:
 
 
 def variance(value: object) -> Observable:
-    """Observe the mean over the window of the square of a value's distance from its mean."""
+    """Observe the variance of a value over the window: the mean square of its deviation from its mean."""
     return Observable(ObservedWindow.VARIANCE, value)

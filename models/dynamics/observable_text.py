@@ -1,4 +1,4 @@
-"""Observables as text: ``mean(nodes.mean(v**2/2))``, parsed without running it."""
+"""Observables as text, such as ``mean(nodes.mean(v**2/2))``; the text is parsed and never executed."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ VALUE_FUNCTIONS: Mapping[str, Callable[..., sp.Expr]] = {
 """The functions of observables, by their names in text."""
 
 SPELLINGS = {"Abs": "abs", "Max": "max", "Min": "min", "Mod": "mod"}
-"""Names of functions in texts that SymPy prints, and in `VALUE_FUNCTIONS`."""
+"""SymPy's printed names of functions, with the corresponding names of `VALUE_FUNCTIONS`."""
 
 _ONE_NODE = re.compile(r"nodes\[(\d+)\]")
 
 
 def as_observable(what: str, value: object) -> Observable:
-    """Return an observable in the form that its text reproduces, from an observable or from a text."""
+    """Return an observable, from an observable or a text, in the form that survives printing and reading."""
     if isinstance(value, Observable):
         return _read(what, str(value))
     if not isinstance(value, str):
@@ -45,9 +45,9 @@ def as_observable(what: str, value: object) -> Observable:
 
 
 def as_value(what: str, value: object) -> sp.Expr:
-    """Return an expression of states in the form that its text reproduces, from an expression or from a text.
+    """Return an expression of states, from an expression or a text, in the form that survives printing and reading.
 
-    Parameters and errors are those of `as_observable`, without a window.
+    Parameters and errors are those of `as_observable`, but there is no reduction over the window.
     """
     if isinstance(value, str):
         text = check_text(what, value, LENGTH)
@@ -81,7 +81,7 @@ def _parsed(what: str, text: str, example: str) -> ParsedText:
 
 
 def _real(what: str, expression: ParsedText) -> sp.Expr:
-    """Return the value of an expression, of real symbols."""
+    """Return a parsed expression as a SymPy expression with real symbols."""
     try:
         return real(_OfNodes(what).read(expression))
     except ValueError as error:
@@ -94,7 +94,7 @@ def _reason(error: ValueError) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _OfNodes(Expressions):
-    """Expressions of states, of any names; constants may be complex, as in abs(nodes.mean(exp(sqrt(-1)*theta)))."""
+    """Read expressions with arbitrary names; constants may be complex, as in abs(nodes.mean(exp(sqrt(-1)*theta)))."""
 
     deepest = 60
     functions = VALUE_FUNCTIONS

@@ -17,30 +17,30 @@ from ..mechanics.jumps import JUMPING, KINKED, gaps_of
 from .equations import Equations
 
 HIGHEST, MOST_TIMES = 8, 64
-"""Highest power of waves that is written as a sum, and most fractions of a period that are tried (choices)."""
+"""Highest power of sines and cosines that is expanded into a sum, and largest divisor of a period (choices)."""
 
 LARGEST, ROUNDING = 1000, 1e-14
-"""Largest denominator of a ratio of two frequencies, and the relative error at which two values have it (choices)."""
+"""Largest denominator of a ratio of two frequencies, and the relative rounding error of such a ratio (choices)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
     """The drive of a network, derived from its equations."""
 
-    waves: tuple[sp.Expr, ...] = ()  # angular frequencies of the sines and cosines of time, of the parameters
-    # The right-hand side has the least period 2 pi/|frequency|; None if it has none. If that depends on the values of
-    # parameters, the frequency is their function `common`.
+    waves: tuple[sp.Expr, ...] = ()  # angular frequencies of the sines and cosines of time, in the parameters
+    # The right-hand side has the least period 2 pi/|frequency|; None if it is not periodic. If the values of the
+    # parameters decide on periodicity, the frequency is the function `common` of the waves.
     frequency: sp.Expr | None = None
-    problem: str = ""  # the reason for no period, or none at some values, as a predicate of the oscillator
-    # pi over the lengths in which other functions of time rise and fall again: sqrt(pi)/w for exp(-(t/w)**2).
+    problem: str = ""  # the reason for no period (at all or at some values), as a predicate of "the oscillator …"
+    # pi over the time in which other functions of time rise and fall again: sqrt(pi)/w for exp(-(t/w)**2).
     bends: tuple[sp.Expr, ...] = ()
     gaps: tuple[sp.Expr, ...] = ()  # expressions of time at whose zeros the drive jumps or has a kink
-    # Expressions at whose zeros a part of the drive, such as tanh, rises once while the expression changes by about one.
+    # Arguments of functions such as tanh, which rise once near the zero of the argument, while it changes by about one.
     rises: tuple[sp.Expr, ...] = ()
 
     @property
     def paces(self) -> tuple[sp.Expr, ...]:
-        """pi over each of the lengths in which the drive rises and falls again."""
+        """pi over each of the times in which the drive rises and falls again: all of `waves` and `bends`."""
         return (*self.waves, *self.bends)
 
     @property
@@ -56,7 +56,7 @@ class common(sp.Function):
 
 
 def _common(*waves: float) -> float:
-    """Return the value of `common`, from ratios of small integers that agree to rounding."""
+    """Return the value of `common`; ratios of frequencies count as rational if small integers match to rounding."""
     moving = [abs(wave) for wave in waves if wave]
     if not moving:
         return 0.0
@@ -82,8 +82,8 @@ def drive_of(templates: tuple[Node | Edge, ...], varied: tuple[str, ...] = ()) -
 
 
 def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Drive:
-    """Return the waves of a driven network and the largest frequency of which all are integer multiples."""
-    # All frequencies, as the rates are written. Time must occur in sines and cosines alone.
+    """Return the waves of a driven network and the largest frequency that divides all of them."""
+    # Collect the frequencies of the unchanged rates. Time must occur only in sines and cosines.
     frequencies: set[sp.Expr] = set()
     without = [_without_waves(e, _local(template), frequencies) for template in templates for e in template.rhs]
     waves = tuple(sorted(frequencies, key=sp.default_sort_key))
@@ -94,7 +94,7 @@ def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Dr
         problem = f"is driven at a frequency that differs from node to node or link to link ({', '.join(differing)})"
         return Drive(waves, problem=problem)
 
-    # Products and powers as sums of waves: cos(w t)**2 has the frequency 2 w alone.
+    # Write products and powers as sums of waves: cos(w t)**2 has only the frequency 2 w.
     rates = [(_sum_of_waves(e), _local(template)) for template in templates for e in template.rhs if e.has(TIME)]
     summed: set[sp.Expr] = set()
     for e, states in rates:
@@ -107,7 +107,7 @@ def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Dr
     share = sp.Rational(math.gcd(*(int(r.p) for r in ratios)), math.lcm(*(int(r.q) for r in ratios)))
     frequency = share * paces[0]
 
-    # Rates may repeat themselves earlier, as |sin(w t)| does; products of 2, 3 and 5 are tried.
+    # Rates such as |sin(w t)| have a shorter period: divide the period by 2, 3 and 5 as often as they repeat.
     times = 1
     for k in (2, 3, 5):
         while times < MOST_TIMES and all(_repeats(e, states, frequency, k * times) for e, states in rates):
@@ -144,7 +144,10 @@ def _repeats(e: sp.Expr, states: set[sp.Symbol], frequency: sp.Expr, parts: int)
 
 
 def _ordered(e: sp.Expr) -> sp.Expr:
-    """Write choices between two cases with the condition that SymPy sorts first; at isolated times they may differ."""
+    """Write a choice of two cases with the condition that SymPy sorts first: c, or not c with the cases exchanged.
+
+    At isolated times the result may differ.
+    """
 
     def chosen(*cases: tuple[sp.Expr, sp.Basic]) -> sp.Expr:
         if len(cases) != 2 or cases[1][1] != sp.true or not isinstance(cases[0][1], Relational):
@@ -158,7 +161,7 @@ def _ordered(e: sp.Expr) -> sp.Expr:
 
 
 def _local(template: Node | Edge) -> set[sp.Symbol]:
-    """Return the symbols that are no constants of a network: states, weights and parameters of sources."""
+    """Return the symbols of a template that are not constant over a network: states, weights, source parameters."""
     if isinstance(template, Node):
         return set(template.state)
     return {*template.here, *template.there, template.weight, *(s for s, _ in template.theirs)}
@@ -187,7 +190,7 @@ def _slope(wave: sp.Expr, states: set[sp.Symbol]) -> sp.Expr | None:
 
 
 def _bends(templates: tuple[Node | Edge, ...]) -> set[sp.Expr]:
-    """Return pi over the lengths in which functions of time alone rise and fall again, without sines and cosines."""
+    """Return pi over the times in which functions of time other than sines and cosines rise and fall again."""
     bends: set[sp.Expr] = set()
     for template in templates:
         states = _local(template)
@@ -200,7 +203,7 @@ def _bends(templates: tuple[Node | Edge, ...]) -> set[sp.Expr]:
 
 
 def _bent(part: sp.Basic) -> Iterator[tuple[sp.Expr, int]]:
-    """Yield the arguments of a nonlinear function, each with the power to which it is raised."""
+    """Yield the arguments of a nonlinear function, each with the power to which the function raises the argument."""
     if isinstance(part, Relational):
         yield part.lhs - part.rhs, 1
     elif isinstance(part, sp.Pow):
@@ -211,22 +214,22 @@ def _bent(part: sp.Basic) -> Iterator[tuple[sp.Expr, int]]:
 
 
 def gaps(template: Node | Edge) -> set[sp.Expr]:
-    """Return the expressions that pass zero at jumps and kinks of functions of time alone in the rates of a template."""
+    """Return expressions of time that pass zero where the rates of a template jump or have a kink."""
     parts = {part for e in template.rhs for part in e.atoms(*KINKED, *JUMPING, Relational)}
     return _of_time(template, (gap for part in parts for gap in gaps_of(part)))
 
 
 def rises(template: Node | Edge) -> set[sp.Expr]:
-    """Return expressions that pass zero where functions of time alone rise once and stay; two of them make a window.
+    """Return expressions of time that pass zero where a part of the rates, such as tanh, rises once and stays.
 
-    A function that rises and falls again at one place, such as tanh**2, tanh tanh or exp(-|t|), counts as two.
+    A part that rises and falls again near one time, such as tanh**2, tanh tanh or exp(-|t|), gives two expressions.
     """
     rising: set[sp.Expr] = set()
     for e in template.rhs:
         bases = [p.base for p in e.atoms(sp.Pow) if p.exp.is_number and p.exp > 1]
         for part in e.atoms(*RISING):
             zeros = set(_risen(part))
-            # tanh**2, tanh*tanh and exp(-|t|) fall again behind their rise: a second zero stands for the fall.
+            # tanh**2, tanh*tanh and exp(-|t|) fall again after their rise: add a second expression for the fall.
             squared = any(base.has(part) for base in bases)
             multiplied = zeros and any(sum(f.has(part) for f in product.args) > 1 for product in e.atoms(sp.Mul))
             falling = {zero + 2 for zero in zeros} if part.has(sp.Abs) or squared or multiplied else set()
@@ -240,17 +243,17 @@ def _of_time(template: Node | Edge, expressions: Iterable[sp.Expr]) -> set[sp.Ex
 
 
 RISING = (sp.tanh, sp.erf, sp.exp, sp.Pow)
-"""Functions that rise once: exp counts within 1/(c + d exp), and of an absolute value."""
+"""Functions that rise once; exp counts only in 1/(c + d exp(x)) and in exp(-|x|)."""
 
 
 def _risen(part: sp.Expr) -> Iterator[sp.Expr]:
-    """Yield the argument of tanh and erf, and for 1/(c + d exp(x)) the distance of x from c = d exp(x), without Abs."""
+    """Yield the argument of tanh or erf, and x - log(c/d) for 1/(c + d exp(x)); without absolute values."""
     if isinstance(part, sp.Pow):
         waves = [a for a in sp.Add.make_args(part.base) if isinstance(a.as_coeff_Mul()[1], sp.exp)]
         if part.exp.is_negative and len(waves) == 1:
             factor, wave = waves[0].as_coeff_Mul()
             constant = part.base - waves[0]
-            # 1/(c + d exp(x)) falls where c = d exp(x), at x = log(c/d).
+            # 1/(c + d exp(x)) is halfway where c = d exp(x), at x = log(c/d).
             if factor.is_positive and constant.is_number and constant.is_positive:
                 yield wave.args[0] - sp.log(constant / factor)
     elif not isinstance(part, sp.exp) or part.has(sp.Abs):
@@ -258,10 +261,10 @@ def _risen(part: sp.Expr) -> Iterator[sp.Expr]:
 
 
 def _paces(inner: sp.Expr, power: int, even: bool) -> Iterator[sp.Expr]:
-    """Yield pi over the lengths in which a function bends, for arguments of waves and polynomials in time.
+    """Yield pi over the times in which a function with the argument `inner` bends.
 
-    In that length waves leave their crests by pi, and a polynomial of second or higher degree, or of the first in an
-    `even` function, changes by pi.
+    In such a time the phase of a wave in `inner` changes by pi.  So does a polynomial in time of degree two or more,
+    or of degree one in an `even` function.
     """
     slopes = {wave: slope for wave in inner.atoms(sp.sin, sp.cos) if (slope := _slope(wave, set())) is not None}
     sizes = {wave: sp.Abs(inner.coeff(wave)) for wave in slopes}
@@ -280,7 +283,7 @@ def as_function(frequency: sp.Expr) -> Callable[..., float]:
     names = [sp.Symbol(name, real=True) for name in names_in(frequency)]
     evaluate = sp.lambdify(names, frequency, [{"common": _common}, "math"])
 
-    # Values outside the domain of a frequency, such as sqrt(-1), have none.
+    # Return nan outside the domain of the frequency, such as for the square root of -1.
     def value(*parameters: float) -> float:
         try:
             return float(evaluate(*parameters))

@@ -1,4 +1,4 @@
-"""What can be recorded of a network's motion beside its final state."""
+"""Kinds of records that a run stores beside the final state of the network."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from ..inputs.words import Word
 
 
 class Record(Word):
-    """What a cell of a sweep records, and what its kernel therefore computes."""
+    """A record of each cell of a sweep; the kernel computes only the chosen records."""
 
     SYNC_ERROR = "sync_error"
     SECTION = "section"

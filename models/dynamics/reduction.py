@@ -1,8 +1,9 @@
 """Exact reductions of a network: constants in place of parameters, one node in place of equal ones.
 
-Nodes of a class that start equal stay equal if the partition is balanced: all nodes of a class feel every other class with
-the same total weight.  The quotient network has one node for each class and the same solutions.  Links inside a class drop
-out, because they are zero between equal states; such partitions are also called external equitable partitions.
+A partition of the nodes into classes is balanced if all nodes of a class feel every other class with the same total
+weight.  Nodes of a class that start equal then stay equal.  The quotient network has one node for each class and the
+same solutions.  Links inside a class drop out, because they are zero between equal states; such partitions are also
+called external equitable partitions.
 
 References
 ----------
@@ -45,7 +46,7 @@ def substitute_constants(equations: Equations, values: Mapping[str, int | Fracti
             raise ValueError(f"fold: a right-hand side of the {what} is undefined at {at}; leave it a parameter")
         return value
 
-    # Parameters of nodes that only links use stay, if they differ from node to node.
+    # Keep parameters of nodes that only links use, if they differ from node to node.
     of_links = {s for edge in equations.edges for s in (*edge.parameters, *(of for _, of in edge.theirs))}
     needed = {s for s in of_links if s.name in equations.varied}
     reduced = equations.map_templates(
@@ -67,7 +68,7 @@ def without_drive(equations: Equations, values: Mapping[str, float]) -> Equation
 
 @lru_cache(maxsize=64)
 def _without_drive(equations: Equations, zeros: tuple[str, ...]) -> Equations:
-    """Set parameters of the drive to 0; cached, since Newton's method on an orbit calls it at every step."""
+    """Set parameters of the drive to 0; cached, since Newton's method for orbits calls this function at every step."""
     rates = [*(e for node in equations.nodes for e in node.rhs), *(e for edge in equations.edges for e in edge.rhs)]
     # Only parameters in terms with time can remove the drive.
     timed = {s.name for e in rates for term in sp.Add.make_args(e) if term.has(TIME) for s in term.free_symbols}
@@ -76,7 +77,7 @@ def _without_drive(equations: Equations, zeros: tuple[str, ...]) -> Equations:
 
 
 def _check_constants(equations: Equations, values: Mapping[str, int | Fraction]) -> None:
-    """Raise TypeError or ValueError for numbers that cannot take the places of parameters."""
+    """Raise TypeError or ValueError for names or numbers that cannot replace parameters."""
     for name, value in values.items():
         if isinstance(value, bool) or not isinstance(value, (int, Fraction)):
             raise TypeError(f"fold {name}: found {value!r} ({type(value).__name__}); expected an int or a Fraction")
@@ -91,7 +92,7 @@ def _check_constants(equations: Equations, values: Mapping[str, int | Fraction])
 
 
 def quotient(equations: Equations, colours: Sequence[Hashable]) -> tuple[Equations, tuple[int, ...]]:
-    """Return the smallest network with the same motion if nodes of equal colour start equal."""
+    """Return the smallest network with the same motion if nodes of equal colour start equal, and each node's class."""
     if any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
         raise NoQuotient(f"quotient: the {equations.link_count} links of all pairs are too many to be listed")
     classes = _balanced(equations, colours)

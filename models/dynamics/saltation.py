@@ -1,10 +1,11 @@
 """Saltation: jumps of small deviations from an orbit at the events of set-valued friction.
 
-At an event h = 0 a deviation d is multiplied by the saltation matrix S = I + (F+ - F-) n / (n F- + dh/dt), with the rates
-F- and F+ before and after it and n = grad h.  Landing in stick makes the velocity of d zero, and a turn without stick
-multiplies it by the ratio of the accelerations.  At the start of slip F+ = F- and S = I, unless static friction exceeds
-that of slow slip: the velocity of d is then the jump of the acceleration times the time by which slip begins earlier.
-The matrices change velocities by positions, so those of contacts that change at the same instant commute.
+At an event h = 0 a deviation d is multiplied by the saltation matrix S = I + (F+ - F-) n / (n F- + dh/dt).  F- and F+
+are the rates before and after the event, and n = grad h.  Landing in stick makes the velocity of d zero.  A turn
+without stick multiplies the velocity of d by the ratio of the accelerations.  At the start of slip F+ = F- and S = I,
+unless static friction exceeds the friction of slow slip.  In that case the velocity of d becomes the jump of the
+acceleration times the time by which slip begins earlier.  These matrices add multiples of positions to velocities, so
+the matrices of contacts that change at the same instant commute.
 
 References
 ----------
@@ -33,9 +34,9 @@ Entry = tuple[tuple[int, int], sp.Expr]
 
 @dataclass(frozen=True, slots=True)
 class Events:
-    """The rows of a deviation that are velocities, and their saltation at the start of slip."""
+    """The rows of a deviation that are velocities of contacts, and the saltation matrices at the start of slip."""
 
-    owners: tuple[int, ...]  # for each row the contact that it is a velocity of, -1 for a position
+    owners: tuple[int, ...]  # for each row the contact whose velocity the row is, -1 for a position
     # For each contact the rows of S at the start of slip with w > 0, and with w < 0; empty if S = I.
     exits: tuple[tuple[tuple[Entry, ...], tuple[Entry, ...]], ...] = ()
 
@@ -54,13 +55,13 @@ class Events:
 class _Release:
     """The start of slip of one contact in one direction, in the symbols of a network."""
 
-    gradient: tuple[sp.Expr, ...]  # derivatives of the limit of the load by the positions
-    alone: sp.Expr  # derivative of the limit without links by the position of the contact
-    lead: sp.Expr  # change of the velocity for each unit by which the limit is ahead
+    gradient: tuple[sp.Expr, ...]  # derivatives by the positions of the limit h of the load, at which slip begins
+    alone: sp.Expr  # derivative by the position of the contact of the limit h without links
+    lead: sp.Expr  # change of the velocity of a deviation divided by the change of h
 
 
 def _releases(orbit: Equations) -> tuple[tuple[_Release, _Release], ...]:
-    """Return slip with w > 0 and with w < 0 for each contact; empty if slip begins without a jump.
+    """Return the starts of slip with w > 0 and with w < 0 of each contact; empty if slip begins without a jump.
 
     Raises ValueError for links that act on velocities.
     """
@@ -88,8 +89,8 @@ def _releases(orbit: Equations) -> tuple[tuple[_Release, _Release], ...]:
 def _check_springs(edges: Iterable[Edge]) -> None:
     """Raise ValueError for links that act on velocities.
 
-    Bodies that let go at the same instant then accelerate each other, and a deviation after the event depends on the
-    order in which they let go.
+    With such links, bodies that begin to slip at the same instant accelerate each other.  A deviation after the event
+    then depends on the order in which the bodies begin to slip.
     """
     if any(edge.rhs[1].has(ends[1]) for edge in edges for ends in (edge.here, edge.there)):
         raise ValueError(
@@ -99,14 +100,14 @@ def _check_springs(edges: Iterable[Edge]) -> None:
 
 
 def _force_slope(slope: sp.Matrix) -> sp.Expr:
-    """Return the derivative of the force of a link by a position in slip, from H of `source_slopes`."""
+    """Return the derivative by a position of the force of a link in slip, read from H of `source_slopes`."""
     return slope[1, 0].xreplace({SLIP: sp.S.One})
 
 
 def of_mode(
     equations: Equations, orbit: Equations, slope: sp.Matrix, strength: tuple[sp.Symbol, sp.Symbol], plane: bool
 ) -> Events | None:
-    """Return the events of a mode; on the synchronous orbit the forces of links vanish."""
+    """Return the events of a mode of the synchronous orbit, on which the forces of links vanish."""
     if not orbit.sticks:
         return None
     releases = _releases(orbit)
@@ -116,7 +117,7 @@ def of_mode(
     turned = _force_slope(slope).xreplace(orbit.at_node(0))
 
     def entries(side: _Release) -> tuple[Entry, ...]:
-        # The gradient of a mode is that of the node alone minus strength times the slope of the link force.
+        # The gradient of a mode is the gradient of one node minus strength times the slope of the link force.
         real = side.lead * (side.alone - alpha * turned)
         aside = side.lead * beta * turned
         return (((1, 0), real), ((1, 2), aside), ((3, 0), -aside), ((3, 2), real)) if plane else (((1, 0), real),)
@@ -140,7 +141,7 @@ def of_network(equations: Equations) -> Events | None:
 def of_blocks(
     equations: Equations, blocks: Sequence[Block], orbit: Equations, slope: sp.Matrix, strength: sp.Symbol
 ) -> Events | None:
-    """Return the events of the contacts of clusters, which change differences within clusters too."""
+    """Return the events of the contacts of clusters; these events also change differences within clusters."""
     of_clusters = of_network(orbit)
     if of_clusters is None:
         return None
@@ -148,7 +149,7 @@ def of_blocks(
     if releases:
         _check_springs(equations.edges)
     owners, exits = list(of_clusters.owners), [[list(up), list(down)] for up, down in of_clusters.exits]
-    # Rows of a block: positions, then velocities, one for each of its coordinates.
+    # Rows of a block: first a position for each coordinate of the block, then a velocity for each.
     for block in blocks:
         first, size = len(owners), len(block.nodes)
         owners += [*[-1] * size, *block.nodes]

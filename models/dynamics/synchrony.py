@@ -14,14 +14,14 @@ from .equations import Equations, Layer
 
 
 class NoSynchrony(ValueError):
-    """Raised where equal motion of all nodes is no solution of a network."""
+    """Equal motion of all nodes is no solution of the network."""
 
 
 def synchronous_node(equations: Equations) -> Node:
-    """Return the equations of each node while all are equal, s' = F(s) + sum of the links h(s, s).
+    """Return the equations of a node while all nodes are equal: s' = F(s) + sum of the links h(s, s).
 
-    Links that vanish between equal states add nothing.  Others add k h(s, s), with the sum k of weights at a node, which
-    must be equal for all nodes.
+    Links that vanish between equal states add nothing.  Other links add k h(s, s), where k is the sum of the weights at
+    a node; k must be equal for all nodes.
     """
     apart = replace(equations, layers=())
     apart.expect_alike("complete synchronisation")
@@ -34,9 +34,9 @@ def synchronous_node(equations: Equations) -> Node:
 
 
 def expect_vanishing(what: str, equations: Equations) -> None:
-    """Raise ValueError if a link acts between equal states, is not proportional to its weight, or has numbers of its own.
+    """Raise ValueError if a link acts between equal states, is not proportional to its weight, or has own parameters.
 
-    One synchronous motion for all strengths, and modes of the graph, need links without these properties.
+    Otherwise the synchronous motion is the same for all strengths, and deviations split into modes of the graph.
     """
     equations.expect_exact_links(what)
     if not all(edge.diffusive for edge in equations.edges):
@@ -64,7 +64,7 @@ def _with_links(node: Node, layer: Layer, edge: Edge, n: int) -> Node:
     differing = [name for name in layer.varied if any(e.has(sp.Symbol(name, real=True)) for e in felt)]
     if differing:
         raise _no_solution(f"a link acts between equal states and {', '.join(differing)} differs from link to link")
-    # Each node must feel the same weights; where the weight is a factor, the same sum of weights.
+    # All nodes must feel the same weights, or the same sum of weights if the weight is a factor of the link.
     if _proportional(felt, edge.weight):
         weights = [[sum(of_node, Fraction(0))] for of_node in weights]
     if len({tuple(sorted(of_node)) for of_node in weights}) > 1:

@@ -1,7 +1,7 @@
 """Variational equations: the linear equations of small deviations along an orbit.
 
-`mode`, `network_variation` and `clustered` return the orbit and the linear equation of deviations apart, so that one orbit
-carries any number of deviations.
+`mode`, `network_variation` and `clustered` return the equations of the orbit and of the deviations separately, so that
+any number of deviations are integrated along one orbit.
 """
 
 from __future__ import annotations
@@ -26,16 +26,19 @@ if TYPE_CHECKING:
     from ..symmetries.clusters import Block, Clusters
 
 MODE = (sp.Symbol("mode_alpha", real=True), sp.Symbol("mode_beta", real=True))
-"""Real and imaginary part of the strength of a mode, alpha + i beta = -sigma gamma; of layer l, mode_alpha_l, mode_beta_l."""
+"""Real and imaginary part of the strength of a mode, alpha + i beta = -sigma gamma.
+
+With several layers of links, the strength of layer l is mode_alpha_l + i mode_beta_l.
+"""
 
 STRENGTH = sp.Symbol("mode_sigma", real=True)
 """Coupling strength sigma in the variational equation of a cluster state."""
 
 PHASE = sp.Symbol("phase", real=True)
-"""Time at which the clock of shifted equations shows 0."""
+"""Shift of time in the equations of `phase_shifted`: t is replaced by t + phase."""
 
 LOG_VOLUME = sp.Symbol("log_volume", real=True)
-"""Share of one oscillator in the logarithm of a volume of states that moves with the flow."""
+"""Integral of the divergence of one oscillator; summed over all oscillators: logarithm of a phase-space volume."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +46,10 @@ class Variation:
     """A linear system d' = A d of small deviations along an orbit."""
 
     orbit: Equations
-    size: int  # the number of deviations; slip states of contacts do not deviate
-    # The non-zero entries of A by (row, column), in the symbols of the orbit (x_1 …), its parameters, t and `parameters`.
+    size: int  # the number of deviations; the modes of contacts have none
+    # The non-zero entries ((row, column), expression) of A, in the states and parameters of the orbit, t, `parameters`.
     matrix: tuple[Entry, ...]
-    parameters: tuple[sp.Symbol, ...] = ()  # numbers that differ from mode to mode; A is linear in them
+    parameters: tuple[sp.Symbol, ...] = ()  # strengths, which differ from mode to mode; A is linear in the strengths
     events: Events | None = None  # saltation by stick and slip; None for smooth equations
 
     def __post_init__(self) -> None:
@@ -63,21 +66,24 @@ class Variation:
             unknown = {s.name for s in e.free_symbols} - names - {s.name for s in self.parameters}
             if unknown:
                 raise ValueError(f"variation: unknown symbol {min(unknown)!r} in entry ({row}, {column})")
-            # Linear in the strengths, so that one evaluation serves all modes.
+            # Entries must be linear in the strengths: their coefficients are then evaluated once for all modes.
             slopes = [e.diff(s) for s in self.parameters]
             if any(slope.has(*self.parameters) for slope in slopes):
                 raise ValueError(f"variation: entry ({row}, {column}) is not linear in the strengths of a mode: {e}")
 
     def parts(self, e: sp.Expr) -> list[tuple[sp.Expr, sp.Expr]]:
-        """Return an entry of A as coefficients that are not zero, each with the strength that it multiplies, or 1."""
+        """Return the non-zero terms of an entry of A as pairs of a coefficient and its factor, a strength or 1."""
         constant = e.xreplace(dict.fromkeys(self.parameters, sp.S.Zero))
         parts = [(constant, sp.S.One), *((e.diff(s), s) for s in self.parameters)]
         return [(coefficient, strength) for coefficient, strength in parts if coefficient != 0]
 
 
 def expect_continuous(orbit: Equations) -> None:
-    """Raise ValueError for rates that jump in the state; the rate of `LOG_VOLUME` may, since no rate depends on it."""
-    # Modes of events jump at events alone, which saltation covers.
+    """Raise ValueError for rates that jump as functions of the state.
+
+    The rate of `LOG_VOLUME` may jump, since no rate depends on this state.
+    """
+    # Jumps of the modes of contacts are allowed: saltation treats them at the events.
     templates = [(node.state, node.rhs, node.continuous) for node in orbit.nodes]
     templates += [(edge.here, edge.rhs, (*edge.here, *edge.there)) for edge in orbit.edges]
     for states, rates, moving in templates:
@@ -93,12 +99,14 @@ def expect_continuous(orbit: Equations) -> None:
 def mode(equations: Equations, plane: bool = False) -> Variation:
     """Return the variational equation of one transversal mode along the synchronous orbit.
 
-    A deviation along an eigenvector of G with eigenvalue gamma obeys d' = (J - alpha H) d, alpha = -sigma gamma; J is
-    the Jacobian of one node and H is that of `source_slopes`.  Several layers with a common eigenvector have a strength
-    each, d' = (J - sum of alpha_l H_l) d.  For links with inertia the strength is tau = alpha/(1 + b alpha)
-    (`synchain.models.dynamics.mode_inertia`).  Links h(s, s) that act between equal states move the synchronous orbit,
-    s' = F(s) + sigma k h(s, s) with k the sum of weights at every node, and J is the Jacobian of that: the deviation obeys
-    d' = (DF + sigma k D1h + sigma lambda D2h) d with the eigenvalue lambda = gamma + k of the matrix of weights.
+    A deviation along an eigenvector of G with eigenvalue gamma obeys d' = (J - alpha H) d with alpha = -sigma gamma.
+    J is the Jacobian of one node; `source_slopes` returns H.
+
+    * Several layers l of links with a common eigenvector: d' = (J - sum of alpha_l H_l) d, one strength for each layer.
+    * Links with inertia: the strength is tau = alpha/(1 + b alpha) (`synchain.models.dynamics.mode_inertia`).
+    * Links h that act between equal states: the synchronous orbit is s' = F(s) + sigma k h(s, s), where k is the sum of
+      the weights at every node.  J is the Jacobian of this equation: d' = (DF + sigma k D1h + sigma lambda D2h) d with
+      the eigenvalue lambda = gamma + k of the matrix of weights.
 
     References
     ----------
@@ -142,8 +150,8 @@ def network_variation(equations: Equations) -> Variation:
 def clustered(equations: Equations, clusters: Clusters) -> Variation:
     """Return the variational equation of a cluster state.
 
-    The orbit is that of the quotient network.  Coordinate k of a block lives on the orbit of its
-    cluster c and obeys d_k' = J(s_c) d_k + sigma sum_l B_kl H d_l; B is the matrix of the block.
+    The orbit is a solution of the quotient network.  Coordinate k of a block is a deviation from the orbit s_c of its
+    cluster c and obeys d_k' = J(s_c) d_k + sigma sum_l B_kl H d_l, where B is the matrix of the block.
 
     References
     ----------
@@ -189,7 +197,7 @@ def _constant_slope(equations: Equations) -> sp.Matrix:
         raise ValueError("these equations have no coupling; differences within clusters need links")
     (slope,) = source_slopes(equations)
     size = len(equations.node.continuous)
-    # Links of set-valued friction act in slip: the mode is 1.
+    # With set-valued friction links move a body only in slip: set the mode to 1.
     slips = dict.fromkeys(edge.here[size:], sp.S.One)
     here, there = (
         sp.Matrix(block)[:size, :size].xreplace(slips) for block in (edge.jacobian_here(), edge.jacobian_there())
@@ -203,7 +211,7 @@ def _constant_slope(equations: Equations) -> sp.Matrix:
 
 
 def phase_shifted(variation: Variation) -> Variation:
-    """Return the same equations with a clock that shows 0 at the time `PHASE`, a new parameter."""
+    """Return the same equations with t + `PHASE` in place of the time t; `PHASE` is a new parameter."""
 
     def later(e: sp.Expr) -> sp.Expr:
         return e.xreplace({TIME: TIME + PHASE})
@@ -223,8 +231,8 @@ def phase_shifted(variation: Variation) -> Variation:
 def with_volume(equations: Equations) -> Equations:
     """Return the equations with one more state of each node, the integral of its divergence.
 
-    The sum of `LOG_VOLUME` over the nodes is the logarithm of a volume of states that moves with the
-    flow (Liouville's formula).
+    The sum of `LOG_VOLUME` over the nodes is the logarithm of a volume in phase space that moves with the flow
+    (Liouville's formula).
     """
     if equations.sticks:
         raise ValueError("volumes of states: found set-valued friction, whose stick makes them zero")
@@ -250,9 +258,9 @@ def _entries(matrix: sp.Matrix) -> tuple[Entry, ...]:
 
 
 def source_slopes(equations: Equations) -> tuple[sp.Matrix, ...]:
-    """Return H of each layer, the derivative of a link of weight 1 by the state at its source, over the strength of the links.
+    """Return H of each layer: the derivative of a link of weight 1 by the state at its source, divided by the strength.
 
-    The strength is sigma, or the one parameter that is a factor of the whole link.
+    The strength is sigma, or the only parameter that is a factor of the whole link.
     """
     several = len(equations.layers) > 1
     equations.expect_alike("transversal modes of complete synchronisation", inertia_too=not several, layers_too=True)
@@ -271,7 +279,7 @@ def _source_slope(edge: Edge, node: Node) -> sp.Matrix:
         raise ValueError(
             f"small deviations: found {part}, by which a link jumps or has a kink between equal states; expected a derivative there"
         )
-    # The slope must be sigma W H(s), with W the weight: then sigma gamma is the strength of a mode.
+    # The derivative must be sigma W H(s), where W is the weight: then sigma gamma is the strength of a mode.
     weighted = sp.Matrix(edge.jacobian_there()).xreplace(equal)
     matrix = weighted.xreplace({edge.weight: sp.S.One})
     zero = sp.zeros(*matrix.shape)

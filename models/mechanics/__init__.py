@@ -1,1 +1,1 @@
-"""One node: energies, forces, friction and units become rates of states. Knows no graph."""
+"""Derive the equations of one node from energies, forces, friction and units. Imports no graph."""

@@ -1,7 +1,7 @@
 """Derivatives of expressions that contain kinks and jumps, taken on either side of them.
 
-``sympy.diff`` turns ``sign(w)`` into ``2*DiracDelta(w)``.  A dry-friction law multiplies its kinks by functions
-that vanish there, or is used away from them; in both cases the one-sided derivative is the right one.
+``sympy.diff`` turns ``sign(w)`` into ``2*DiracDelta(w)``.  A dry-friction law either multiplies each kink by a function
+that vanishes at the kink, or is used only away from the kink.  In both cases the one-sided derivative is correct.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ from functools import lru_cache
 import sympy as sp
 
 LARGEST_CANCELLED = 200
-"""Most operations of an expression that is cancelled (a choice): longer ones are products of minors, which grow."""
+"""Most operations of an expression that is cancelled (a choice); products of minors exceed this number."""
 
 MOST_TERMS = 5000
-"""Most terms, when multiplied out, of an expression that is cancelled or expanded (a choice): both multiply out."""
+"""Most terms of an expression after multiplying out; longer expressions are not cancelled or expanded (a choice)."""
 
 
 def operations(expressions: Sequence[sp.Expr]) -> int:
-    """Return the number of operations that evaluate expressions together, common subexpressions once."""
+    """Return the number of operations that evaluate all expressions, with common subexpressions counted once."""
     shared, reduced = sp.cse(expressions)
     return sum(int(sp.count_ops(e)) for e in (*(e for _, e in shared), *reduced))
 
 
 def cancelled(expressions: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
-    """Return expressions as fractions without common factors, if that saves operations; else unchanged."""
+    """Cancel common factors of numerators and denominators if this saves operations; else return the expressions."""
     # sp.cancel multiplies out, which takes minutes for long expressions.
     if any(sp.count_ops(e) > LARGEST_CANCELLED or expanded_terms(e) > MOST_TERMS for e in expressions):
         return tuple(expressions)
@@ -35,12 +35,12 @@ def cancelled(expressions: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
 
 
 def expanded(expressions: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
-    """Multiply out each expression that gets shorter by it."""
+    """Multiply out each expression that becomes shorter by multiplying out."""
     return tuple(e if expanded_terms(e) > MOST_TERMS else min(e, sp.expand(e), key=sp.count_ops) for e in expressions)
 
 
 def expanded_terms(e: sp.Expr) -> int:
-    """Return a bound on the number of terms of an expression that is multiplied out."""
+    """Return an upper bound on the number of terms of an expression after multiplying out."""
     if isinstance(e, sp.Add):
         return sum(map(expanded_terms, e.args))
     if isinstance(e, sp.Mul):
@@ -55,17 +55,18 @@ def expanded_terms(e: sp.Expr) -> int:
 def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
     """Return d(expression)/d(symbol) with d|w| = sign(w) dw and d sign(w) = 0, exact wherever w != 0.
 
-    Derivatives of Max and Min are choices, those of floor and ceiling 0: exact wherever there is no kink and no jump.
+    A derivative of Max or Min is a `Piecewise`, a derivative of floor or ceiling is 0; both are exact wherever there is
+    no kink and no jump.
     """
     expression = sp.sympify(expression)
     if symbol not in expression.free_symbols:
         return sp.S.Zero
-    # Replace each kink by a constant; xreplace works from the outside in: of |a + |b|| only the outer one is replaced.
+    # Replace each kink by a constant. xreplace works from the outside in: of |a + |b|| it replaces only the outer kink.
     kinks = sorted(expression.atoms(sp.Abs, sp.sign), key=sp.default_sort_key)
     hidden = {kink: sp.Dummy(f"kink{i}", real=True) for i, kink in enumerate(kinks)}
     smooth = expression.xreplace(hidden)
     shown = {dummy: kink for kink, dummy in hidden.items()}
-    # SymPy differentiates all terms of a sum, also those without the symbol, in tenths of a millisecond each.
+    # Skip terms without the symbol: SymPy would spend a tenth of a millisecond on each.
     moving = [term for term in sp.Add.make_args(smooth) if symbol in term.free_symbols]
     total = sp.Add(*(term.diff(symbol) for term in moving)).xreplace(shown)
     # Chain rule through the kinks: d|w| = sign(w) dw; d sign(w) = 0 adds nothing.
@@ -78,8 +79,8 @@ def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
 
 
 def _joined_powers(e: sp.Expr) -> sp.Expr:
-    """Join the powers of each base: w sign(w) |w|**p/|w| becomes |w|**p, which is a number at w = 0."""
-    # Powers with integer exponents alone are joined by SymPy already.
+    """Join the powers of each base: w sign(w) |w|**p/|w| becomes |w|**p, which has a value at w = 0."""
+    # SymPy has already joined powers if all exponents are integers.
     powers = [p for p in e.atoms(sp.Pow) if p.base.free_symbols and not p.exp.is_Integer]
     if not any(p.exp.free_symbols or p.base.has(sp.Abs, sp.Max, sp.Min) for p in powers):
         return e
@@ -97,7 +98,7 @@ def _joined_powers(e: sp.Expr) -> sp.Expr:
 
 
 def _without_distributions(e: sp.Expr) -> sp.Expr:
-    """Replace what SymPy makes of derivatives of Max, Min, floor and ceiling by choices and zeros."""
+    """Replace Heaviside functions from derivatives of Max and Min by `Piecewise`, derivatives of floor, ceiling by 0."""
     if not e.has(sp.Heaviside, sp.Derivative, sp.Subs):
         return e
     e = e.replace(lambda part: isinstance(part, sp.Derivative) and part.has(sp.floor, sp.ceiling), lambda _: sp.S.Zero)
@@ -107,7 +108,7 @@ def _without_distributions(e: sp.Expr) -> sp.Expr:
 
 
 def _without_steps(product: sp.Mul) -> sp.Expr:
-    """Drop steps beside a factor that is zero below them: Max(0, x) Heaviside(x) is Max(0, x)."""
+    """Drop a step function beside a factor that is zero below the step: Max(0, x) Heaviside(x) is Max(0, x)."""
     bases = {factor.as_base_exp()[0] for factor in product.args}
     needless = [
         factor

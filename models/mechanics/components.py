@@ -1,4 +1,4 @@
-"""The equations of one oscillator and of one link: the templates that a network is made of."""
+"""The equations of one oscillator and of one link: the templates from which a network is built."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ Block: TypeAlias = tuple[tuple[sp.Expr, ...], ...]
 """The entries of a matrix that belong to one node or to one end of a link, row by row."""
 
 WEIGHT_NUMBER = sp.Symbol("W", real=True)
-"""The weight of a link as a parameter, a number of the run in place of an exact one of the graph."""
+"""The weight of a link as a parameter: a number set for each run, in place of the exact weight from the graph."""
 
 
 @dataclass(frozen=True, slots=True)
 class Node:
     """One uncoupled oscillator: M d(state)/dt = rhs(state, t; parameters)."""
 
-    state: tuple[sp.Symbol, ...]  # moving states, and behind them the mode of an event, which only events change
+    state: tuple[sp.Symbol, ...]  # continuous states, then the mode of an event, which changes only at events
     rhs: tuple[sp.Expr, ...]  # the right-hand side of each state: its rate where M is the identity
     parameters: tuple[sp.Symbol, ...]
     events: tuple[Event, ...] = ()  # set-valued friction has one; a node has at most one
-    law: sp.Expr | None = field(default=None, compare=False)  # friction coefficient of `SLIDING`, for printing alone
+    law: sp.Expr | None = field(default=None, compare=False)  # friction coefficient in terms of `SLIDING`, for printing
     inertia: Block = ()  # m(state; parameters), a row and a column for each state; empty if M is the identity
 
     def __post_init__(self) -> None:
@@ -79,7 +79,7 @@ class Node:
         """Return the node with every symbol and expression changed."""
         state, rhs, parameters = (tuple(map(change, part)) for part in (self.state, self.rhs, self.parameters))
         events = tuple(event.map(change) for event in self.events)
-        # A parameter that became a number is one no longer.
+        # Drop parameters that `change` replaced by numbers.
         return Node(
             state, rhs, tuple(p for p in parameters if p.is_Symbol), events, inertia=_mapped(self.inertia, change)
         )
@@ -100,16 +100,16 @@ class Node:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """What one link adds to the right-hand side of its target: rhs(here, there, t; weight, parameters)."""
+    """The term that one link adds to the right-hand side of its target: rhs(here, there, t; weight, parameters)."""
 
     here: tuple[sp.Symbol, ...]  # states of the target and of the source, both in the order of Node.state
     there: tuple[sp.Symbol, ...]
     weight: sp.Symbol  # of an oriented edge: the sign of the link's direction
     rhs: tuple[sp.Expr, ...]
     parameters: tuple[sp.Symbol, ...]  # of the link and of the target
-    # Empty, or what the link adds to the rows of M of its target: the columns of the target, and those of the source.
+    # Two blocks that the link adds to M in the rows of its target: columns of target and of source. Empty without inertia.
     inertia: tuple[Block, ...] = ()
-    theirs: tuple[tuple[sp.Symbol, sp.Symbol], ...] = ()  # symbols for parameters of the source, and these parameters
+    theirs: tuple[tuple[sp.Symbol, sp.Symbol], ...] = ()  # pairs: symbol in `rhs`, parameter of the source
     oriented: bool = False
 
     def __post_init__(self) -> None:
@@ -178,7 +178,7 @@ class Edge:
         return replace(self, parameters=_occurring(self.parameters, self.expressions), theirs=theirs)
 
     def with_shared(self, varied: Iterable[str]) -> Edge:
-        """Return the edge with one symbol for a parameter of both ends, unless it is `varied` from node to node."""
+        """Return the edge with one symbol for equal parameters of both ends; `varied` parameters differ and stay."""
         shared = {s: parameter for s, parameter in self.theirs if parameter.name not in varied}
         if not shared:
             return self
@@ -215,7 +215,7 @@ def _jacobian(rhs: tuple[sp.Expr, ...], symbols: tuple[sp.Symbol, ...]) -> Block
 
 def _vanishes(e: sp.Expr) -> bool:
     """Return True if an expression is 0."""
-    # An expression that is not 0 at one point needs no simplification, which may take minutes.
+    # Evaluate at one point first: a value other than 0 saves the simplification, which may take minutes.
     point = {s: sp.Rational(13 + 7 * k, 17) for k, s in enumerate(sorted(e.free_symbols, key=str))}
     value = e.xreplace(point).evalf(30)
     if value.is_number and value.is_finite and abs(value) > 1e-12:

@@ -1,9 +1,10 @@
 """Friction laws f(w), odd functions of the sliding velocity w, and the treatment of their jump at w = 0.
 
-Smoothed, f is a function of w.  Set-valued, f(0) is any number between -f_s and f_s, with f_s the static coefficient: the
-body sticks as long as one of these numbers balances the load (Leine, van Campen, de Kraker & van den Steen, Nonlinear
-Dynamics 16, 41 (1998)).  The sign of w is then a state of the oscillator, its mode `slip`: +1 and -1 in slip, 0 in stick;
-`synchain.models.mechanics.events` derives the equations and the conditions under which the mode changes.
+A smoothed law is a function of w.  In a set-valued law f(0) is any number between -f_s and f_s, where f_s is the static
+coefficient: the body sticks as long as one of these numbers balances the load (Leine, van Campen, de Kraker & van den
+Steen, Nonlinear Dynamics 16, 41 (1998)).  The sign of w is then a state of the oscillator, the mode `slip`: +1 and -1
+in slip, 0 in stick.  `synchain.models.mechanics.events` derives the equations and the conditions under which the mode
+changes.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ from .parameter import Parameter, defaults_text
 
 
 class ContactModel(Word):
-    """How the jump of a friction law at rest is treated."""
+    """Treatments of the jump of a friction law at rest."""
 
     ATAN = "atan"
     """Smoothed by the arcus tangent."""
     SIGN = "sign"
-    """Unchanged, with sign(0) = 0."""
+    """The unchanged law, with sign(0) = 0."""
     SET_VALUED = "set-valued"
     """Stick and slip."""
 
@@ -38,7 +39,7 @@ SLIP = sp.Symbol("slip", real=True)
 """The mode of an oscillator: +1 or -1 while it slips, 0 while it sticks."""
 
 TINY, SMALL = sp.Rational(1, 10**30), 1e-6
-"""A sliding velocity close to zero, and a difference of coefficients that only a jump exceeds (choices)."""
+"""A sliding velocity close to zero; a change of the coefficient around w = 0 that only a jump exceeds (choices)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +60,7 @@ class FrictionLaw:
     order : tuple of (str, str)
         Pairs of parameters of which the first must not exceed the second under set-valued contact.
     self_exciting : bool
-        True if the law is meant to feed energy.
+        True if the law may feed energy, w f(w) < 0.
     summary, source : str
         A description, and the publication.
 
@@ -118,17 +119,17 @@ def _jump(e: sp.Expr, argument: sp.Symbol) -> bool:
 
 
 def in_slip(law: sp.Expr, argument: sp.Symbol) -> sp.Expr:
-    """Return the law in slip, with the mode for the sign of its argument.
+    """Return the law in slip, with the mode `SLIP` in place of the sign of its argument.
 
     Raises ValueError for a law that is not odd, or that is not smooth on either side of zero.
     """
     what, speed = f"set-valued contact: the law {law.xreplace({argument: SLIDING})}", sp.Dummy("w", positive=True)
-    # f(-w) = -f(w), so that one law serves both directions of slip.
+    # Require f(-w) = -f(w): one expression then holds for both directions of slip.
     both = sp.simplify(law.xreplace({argument: speed}) + law.xreplace({argument: -speed}))
     if both != 0:
         raise ValueError(f"{what} has f(w) + f(-w) = {both.xreplace({speed: SLIDING})}; expected 0, an odd law")
     moving = _by_mode(law, argument)
-    # Past its jump the law must be smooth at w = 0: series and derivatives are taken there.
+    # Apart from the jump the law must be smooth at w = 0, where series and derivatives are computed.
     slipping = moving.xreplace({SLIP: sp.S.One})
     if coefficient_at_rest(slipping, argument).has(sp.nan, sp.zoo, sp.oo, -sp.oo):
         raise ValueError(f"{what} has no finite value at w = 0; expected one for slow slip")
@@ -139,7 +140,7 @@ def in_slip(law: sp.Expr, argument: sp.Symbol) -> sp.Expr:
 
 def coefficient_at_rest(moving: sp.Expr, argument: sp.Symbol) -> sp.Expr:
     """Return the limit of a law in slip as w falls to zero."""
-    # Powers of w with a symbol as exponent, which is positive, go to zero.
+    # Powers w**p with a symbol p > 0 tend to zero.
     speed = sp.Dummy("w", positive=True)
     above = moving.xreplace({argument: speed, SLIP: sp.S.One})
     powers = {p: sp.S.Zero for p in _powers_from_zero(above, speed) if not p.exp.is_number}
@@ -147,25 +148,25 @@ def coefficient_at_rest(moving: sp.Expr, argument: sp.Symbol) -> sp.Expr:
 
 
 def _powers_from_zero(e: sp.Expr, argument: sp.Symbol) -> list[sp.Pow]:
-    """Return the powers of an expression that are no polynomials and whose base is zero with the argument."""
+    """Return the non-integer powers in an expression whose base vanishes with the argument."""
     powers = (p for p in e.atoms(sp.Pow) if not p.exp.is_integer and p.base.has(argument))
     return [p for p in powers if p.base.xreplace({argument: sp.S.Zero}) == 0]
 
 
 def beyond_rest(moving: sp.Expr, argument: sp.Symbol) -> sp.Expr:
-    """Write |w|**p for (s w)**p in a law in slip: trial steps go past rest, where s w < 0 has no power p."""
+    """Write |w|**p for (s w)**p in a law in slip; trial steps overshoot w = 0, where s w < 0 has no real power p."""
     powers = _powers_from_zero(moving, argument)
     return moving.xreplace({p: sp.Abs(p.base.xreplace({SLIP: sp.S.One})) ** p.exp for p in powers})
 
 
 def _by_mode(e: sp.Basic, argument: sp.Symbol) -> sp.Basic:
-    """Write the mode for each sign of an expression that follows the sign of its argument."""
+    """Replace the sign of each factor by the mode if this sign follows the sign of the argument."""
     if not isinstance(e, sp.Abs | sp.sign):
         return e.func(*(_by_mode(part, argument) for part in e.args)) if e.args else e
     speed = sp.Dummy("w", positive=True)
     product = []
     for factor in sp.Mul.make_args(sp.factor_terms(e.args[0])):
-        # By the mode if SymPy finds the sign of the factor on either side of zero.
+        # Possible if SymPy finds the sign of the factor on both sides of zero.
         above, below = (sp.sign(factor.xreplace({argument: w})) for w in (speed, -speed))
         inner = _by_mode(factor, argument)
         if above.is_number and below.is_number:

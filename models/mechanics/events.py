@@ -1,13 +1,13 @@
-"""Events: surfaces at which the rates of a node jump, and on which its motion can be held.
+"""Events: surfaces at which the rates of a node jump, and on which the motion can be held.
 
-The sign of a level h(state, t) enters the rate of one state y.  The mode of an event, a state that changes at events alone,
-is that sign: +1 or -1 off the surface h = 0, where all rates are smooth, and 0 while y is held on it.  The motion is held
-as long as the rates on both sides push towards the surface (Filippov's sliding mode).  Set-valued friction is such an
-event: h is the sliding velocity w and y the velocity of the body, which sticks to the ground until the load exceeds static
-friction.
+The rate of one state y contains the sign of a level h(state, t).  The mode of an event is a further state that changes
+only at events.  Off the surface h = 0 the mode is the sign of h, +1 or -1, and all rates are smooth.  While y is held
+on the surface the mode is 0.  The motion is held as long as the rates on both sides push towards the surface
+(Filippov's sliding mode).  Set-valued friction is such an event: h is the sliding velocity w and y the velocity of the
+body, which sticks to the ground until the load exceeds static friction.
 
-Sources: Filippov, Differential Equations with Discontinuous Righthand Sides (Kluwer, 1988), chapter 2; Leine & Nijmeijer,
-Dynamics and Bifurcations of Non-Smooth Mechanical Systems (Springer, 2004), chapter 5.
+Sources: Filippov, Differential Equations with Discontinuous Righthand Sides (Kluwer, 1988), chapter 2; Leine &
+Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (Springer, 2004), chapter 5.
 """
 
 from __future__ import annotations
@@ -22,17 +22,18 @@ from .contact import SLIDING, SLIP, beyond_rest, coefficient_at_rest, in_slip
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """A surface level = 0 that holds one state of a node, in the symbols of the node.
+    """A surface level = 0 on which one state of a node can be held, in the symbols of the node.
 
-    Rates are those of the held state on the surface; pairs are those of the sides level > 0 and level < 0.
+    Limits and departures are rates of this state on the surface; the first of a pair belongs to level > 0, the second
+    to level < 0.
     """
 
-    mode: sp.Symbol  # the state that is the sign of the level, and 0 while the motion is held
+    mode: sp.Symbol  # the further state: the sign of the level, or 0 while the motion is held
     level: sp.Expr  # friction: the sliding velocity w; it falls with the held state
     target: sp.Expr  # value of the held state on the surface; friction: the velocity of the ground
-    limits: tuple[sp.Expr, sp.Expr]  # under static friction; the motion is held while limits[1] <= 0 <= limits[0]
-    departures: tuple[sp.Expr, sp.Expr]  # at the start of slip; equal to the limits if static friction is kinetic
-    shown: sp.Expr  # the rate off the surface with the sign of the level written out, for printing
+    limits: tuple[sp.Expr, sp.Expr]  # rates under static friction; motion is held while limits[1] <= 0 <= limits[0]
+    departures: tuple[sp.Expr, sp.Expr]  # rates at the start of slip; equal to `limits` if f_s = f(0+)
+    shown: sp.Expr  # the rate off the surface with sign(level) in place of the mode, for printing
 
     def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Event:
         """Return the event with every symbol and expression changed."""
@@ -40,7 +41,7 @@ class Event:
         return Event(change(self.mode), change(self.level), change(self.target), limits, departures, change(self.shown))
 
     def under(self, force: sp.Expr) -> Event:
-        """Return the event of a node on which a further force acts (unit mass)."""
+        """Return the event with a further force on the held body, which has unit mass."""
         limits, departures = ((above + force, below + force) for above, below in (self.limits, self.departures))
         return replace(self, limits=limits, departures=departures, shown=self.shown + force)
 
@@ -48,7 +49,7 @@ class Event:
     def gaps(self) -> tuple[sp.Expr, sp.Expr]:
         """Two expressions that are positive while the mode lasts.
 
-        Off the surface both are the size of the level, on it the distances of zero from the two limits.
+        Off the surface both are |level|; on the surface they are the distances of 0 from the two limits.
         """
         size, held = self.mode * self.level, 1 - self.mode**2
         return size + held * self.limits[0], size - held * self.limits[1]
@@ -60,7 +61,7 @@ class Event:
 
     @property
     def jumps(self) -> bool:
-        """True if the rate jumps at the start of slip: static friction exceeds that of slow slip."""
+        """True if the rate jumps at the start of slip, because static friction exceeds the friction of slow slip."""
         return any(sp.simplify(a - b) != 0 for a, b in zip(self.limits, self.departures, strict=True))
 
 
@@ -73,7 +74,7 @@ def set_valued(
     position: sp.Symbol,
     velocity: sp.Symbol,
 ) -> tuple[sp.Expr, Event]:
-    """Return the acceleration in slip and the event of set-valued friction, for friction(w) in an acceleration."""
+    """Return the acceleration in slip and the event of set-valued friction for an acceleration with friction(w)."""
     applied = sorted(acceleration.atoms(friction), key=str)
     if len(applied) != 1:
         raise ValueError(f"set-valued contact: friction acts {len(applied)} times in {acceleration}; expected once")

@@ -1,7 +1,8 @@
-"""Expressions of models as text, and back: the form in which scene files and results store a model.
+"""Print and read expressions of models: the text in which scene files and results store a model.
 
-`written` prints the functions that a model may have and refuses all others; `read` parses the text without running
-it and returns the same expression.  `exact` brings any expression into the form that its own text reproduces.
+`written` prints an expression and refuses functions that a model may not contain.  `read` parses the text without
+executing it and returns the same expression.  `exact` converts an expression to a form that survives printing and
+reading.
 """
 
 from __future__ import annotations
@@ -27,13 +28,13 @@ LENGTH = 20_000
 """Most characters of a text (a choice)."""
 
 _FORMS = 6
-"""Most rounds of writing and reading until an expression reproduces itself (a choice; nearly all need one)."""
+"""Most rounds of printing and reading until an expression no longer changes (a choice; nearly all need one)."""
 
 DIGITS = 10**1000
-"""Largest numerator and denominator (a choice)."""
+"""Largest numerator and denominator of a number (a choice)."""
 
 FRICTION_NAME = "friction"
-"""Name of the friction coefficient as a function of the sliding velocity, in text."""
+"""Name in texts of the function that returns the friction coefficient at a sliding velocity."""
 
 RESERVED = frozenset({"pi", TIME.name, FRICTION_NAME})
 """Names with a fixed meaning, which states and parameters cannot have."""
@@ -53,7 +54,7 @@ _REWRITTEN: Mapping[type, Callable[..., sp.Basic]] = {
     sp.Ne: lambda a, b: sp.Or(a < b, a > b),
     sp.Eq: lambda a, b: sp.And(a <= b, a >= b),
 }
-"""Functions and relations that SymPy produces, as cot(x) from tan(pi/2 - x), by those that a model may have."""
+"""Replacements for functions and relations that SymPy produces and a model may not have: cot(x) from tan(pi/2 - x)."""
 _SIGNS: Mapping[type, str] = {
     sp.StrictLessThan: "<",
     sp.LessThan: "<=",
@@ -66,13 +67,13 @@ _RELATIONS = {**{sign: relation for relation, sign in _SIGNS.items()}, "==": sp.
 
 
 def exact(what: str, value: object, names: Mapping[str, sp.Symbol]) -> sp.Expr:
-    """Return an expression in the form that a model keeps: real symbols, rational numbers, known functions."""
+    """Return an expression with real symbols, rational numbers and allowed functions that survives printing."""
     if isinstance(value, str):
         return _settled(what, read(what, value, names), names)
     if isinstance(value, bool) or not isinstance(value, int | float | Fraction | sp.Expr):
         kind = type(value).__name__
         raise TypeError(f"{what}: found {short_repr(value)} ({kind}); expected an expression")
-    # Known functions, declared real symbols and exact numbers; then the form that its text reproduces.
+    # Rewrite functions, declare symbols as real, make numbers exact; then iterate printing and reading.
     e = _rewritten(sp.sympify(value).replace(sp.Heaviside, _unit_step))
     undeclared = sorted({s.name for s in e.free_symbols} - {*names})
     if undeclared:
@@ -87,8 +88,8 @@ def exact(what: str, value: object, names: Mapping[str, sp.Symbol]) -> sp.Expr:
 
 
 def _settled(what: str, e: sp.Expr, names: Mapping[str, sp.Symbol]) -> sp.Expr:
-    """Return the form of an expression that its own text reproduces; ValueError if there is none."""
-    # SymPy may reorder or evaluate what it reads, so iterate to a fixed point.
+    """Return the form of an expression that survives printing and reading; ValueError if there is none."""
+    # SymPy may reorder or evaluate an expression while reading, so iterate to a fixed point.
     for _ in range(_FORMS):
         try:
             again = read(what, written(e), names)
@@ -111,7 +112,7 @@ def _rewritten(e: sp.Expr) -> sp.Expr:
 
 
 def _with_limit(product: sp.Mul) -> sp.Expr:
-    """Write x/sqrt(|x|) as sign(x) sqrt(|x|), and other products x**k |x|**a of positive degree, which are 0/0 at x = 0."""
+    """Write x/sqrt(|x|) as sign(x) sqrt(|x|), and so every product x**k |x|**a with a < 0 < k + a: 0/0 at x = 0."""
     for size in product.args:
         # A factor |x|**degree with degree < 0, and a factor (c x)**k that outweighs it.
         base, degree = size.as_base_exp()
@@ -128,7 +129,7 @@ def _with_limit(product: sp.Mul) -> sp.Expr:
 
 
 def _unit_step(x: sp.Expr, at_zero: sp.Expr = sp.S.Half) -> sp.Expr:
-    """Write Heaviside's function as a sign or a choice, by its value at zero; keep it unless that is 0, 1/2 or 1."""
+    """Write Heaviside's function by sign or Piecewise if its value at zero is 0, 1/2 or 1; else keep it."""
     if at_zero == sp.S.Half:
         return (1 + sp.sign(x)) / 2
     if at_zero in (0, 1):
@@ -141,7 +142,7 @@ def _undeclared(name: str, names: Mapping[str, sp.Symbol]) -> str:
 
 
 def _rational(what: str, number: sp.Float) -> sp.Rational:
-    """Return a decimal as a fraction: the shortest decimal of a double, all digits of a longer one."""
+    """Return a decimal as a fraction: the shortest decimal of a double, all digits of a longer number."""
     if not number.is_finite:
         raise ValueError(f"{what}: found {number}; expected finite real numbers")
     return sp.Rational(repr(float(number)) if number._prec <= 53 else str(number))
@@ -153,11 +154,11 @@ _CHOICE, _OR, _AND, _NOT, _COMPARE, _SUM, _PRODUCT, _POWER, _ATOM = range(9)
 """Precedence of operators, loosest first."""
 
 _LONGEST = 8
-"""Most terms or factors in a row (a choice): longer rows are halved by parentheses, so that the parser nests little."""
+"""Most terms or factors in a row (a choice); parentheses halve longer rows, to limit the depth of the parser."""
 
 
 def written(e: sp.Basic) -> str:
-    """Return an expression as text that `read` turns into it again."""
+    """Return an expression as text from which `read` returns the same expression."""
     return _inside(e, _CHOICE)
 
 
@@ -185,7 +186,7 @@ def _text(e: sp.Basic) -> tuple[str, int]:
         return f"{_inside(e.args[0], _SUM)} {_SIGNS[type(e)]} {_inside(e.args[1], _SUM)}", _COMPARE
     if isinstance(e, sp.Not):
         return f"not {_inside(e.args[0], _NOT)}", _NOT
-    if isinstance(e, sp.ITE):  # SymPy's form of a comparison with a choice
+    if isinstance(e, sp.ITE):  # if-then-else between conditions, from a comparison with a Piecewise
         condition, yes, no = e.args
         return _text(sp.Or(sp.And(condition, yes), sp.And(sp.Not(condition), no)))
     if isinstance(e, sp.And | sp.Or):
@@ -208,7 +209,7 @@ def _number(e: sp.Expr) -> tuple[str, int]:
 
 
 def _signed(term: sp.Expr) -> tuple[str, str]:
-    """Return the sign of a term and the text of its size."""
+    """Return the sign of a term, and the text of the term without the sign."""
     if term.as_coeff_Mul()[0].is_negative:
         return "-", _inside(_negated(term), _PRODUCT)
     return "+", _inside(term, _PRODUCT)
@@ -242,7 +243,7 @@ def _product(e: sp.Mul) -> tuple[str, int]:
     below = [factor for factor in factors if isinstance(factor, sp.Pow) and factor.exp.is_Rational and factor.exp < 0]
     above = [_inside(factor, _POWER) for factor in factors if factor not in below]
     divisors = [_inside(1 / factor, _POWER) for factor in below]
-    last = any(isinstance(factor, sp.Add) for factor in factors)  # SymPy multiplies a number in front into a sum
+    last = any(isinstance(factor, sp.Add) for factor in factors)  # print the number last: in front, SymPy expands it
     if number.p != 1 and not last:
         above.insert(0, str(number.p))
     text = "/".join([_factors(above) if above else "1", *divisors])
@@ -290,7 +291,7 @@ def _call(e: sp.Basic) -> tuple[str, int]:
 
 
 def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
-    """Return the expression of a text without running it."""
+    """Parse a text into an expression without executing it."""
     if len(text) > LENGTH:
         raise ValueError(f"{what}: found {len(text)} characters; expected at most {LENGTH}")
     # Python's parser reads the text; reserved words have a separate message.
@@ -312,7 +313,7 @@ def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
 
 @dataclass(frozen=True, slots=True)
 class _OfModels(Expressions):
-    """Expressions of some symbols, with friction and conditions."""
+    """Read expressions in declared symbols, with the friction function and conditions."""
 
     names: Mapping[str, sp.Symbol]
     whole = DIGITS
@@ -351,7 +352,7 @@ class _OfModels(Expressions):
         return Expressions.fits(self, number) and bool(number.is_Rational or sp.N(number).is_real)
 
     def condition(self, e: sp.Basic) -> Boolean:
-        """Return a condition; refuse a value."""
+        """Return `e` if it is a condition; raise ValueError for a value."""
         if not isinstance(e, Boolean) or isinstance(e, sp.Expr):
             raise NoMeaning(f"found {short_repr(e)}, which is no condition; expected one such as x > 0")
         return e

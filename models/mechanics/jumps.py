@@ -1,4 +1,4 @@
-"""Jumps and kinks of expressions: Taylor series end there, and small deviations from an orbit jump there."""
+"""Jumps and kinks of expressions, at which Taylor series end and small deviations from an orbit jump."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ KINKED = (sp.Abs, sp.Max, sp.Min)
 """Functions with a kink where an argument, or the difference of two, is zero."""
 
 INEQUALITIES = (sp.StrictGreaterThan, sp.GreaterThan, sp.StrictLessThan, sp.LessThan)
-"""Conditions lhs < rhs of pieces, which can be compared at lhs = rhs."""
+"""Conditions such as lhs < rhs; the pieces on both sides can be compared at lhs = rhs."""
 
 SIDES = {sp.sign: (sp.S.One, sp.S.NegativeOne), sp.Heaviside: (sp.S.One, sp.S.Zero)}
 """The values of a function above and below the zero of its argument."""
 
 
 def gaps_of(part: sp.Basic) -> Iterator[sp.Expr]:
-    """Yield expressions that pass zero where a part jumps or has a kink."""
+    """Yield expressions that pass zero where `part` jumps or has a kink."""
     if isinstance(part, Piecewise):
         yield from (gap for _, condition in part.args for r in condition.atoms(Relational) for gap in gaps_of(r))
     elif isinstance(part, Relational):
@@ -40,9 +40,9 @@ def gaps_of(part: sp.Basic) -> Iterator[sp.Expr]:
 
 
 def jumps(expressions: Iterable[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:
-    """Return the parts that jump where `moving` symbols pass some value, in a fixed order.
+    """Return the subexpressions that jump as the `moving` symbols change, in a fixed order.
 
-    Pieces that are proved to agree where they meet do not jump.
+    A `Piecewise` is left out if its pieces are proved to be equal where they meet.
     """
     parts = {part for e in expressions for part in e.atoms(*JUMPING, Piecewise) if part.free_symbols & moving}
     jumping = [part for part in parts if not (isinstance(part, Piecewise) and _joins(part, moving))]
@@ -50,9 +50,9 @@ def jumps(expressions: Iterable[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Exp
 
 
 def discontinuity(expressions: Iterable[sp.Expr], moving: Set[sp.Symbol]) -> sp.Expr | None:
-    """Return a part by which one of the expressions jumps; None if all are proved to be continuous.
+    """Return a subexpression that makes one of the expressions jump; None if all are proved to be continuous.
 
-    A part may jump in an expression that is continuous: sign(v) in sign(v)*v**2.
+    A continuous expression may contain subexpressions that jump, such as sign(v) in sign(v)*v**2.
     """
     for e in expressions:
         for part in jumps([e], moving):
@@ -63,7 +63,10 @@ def discontinuity(expressions: Iterable[sp.Expr], moving: Set[sp.Symbol]) -> sp.
 
 
 def _sides(part: sp.Expr) -> tuple[sp.Expr | None, sp.Expr, sp.Expr]:
-    """Return the expression that passes zero where a part jumps, and the part above and below; None for many pieces."""
+    """Return the expression whose zero is the jump of a part, and the values of the part above and below the zero.
+
+    The expression is None for a part without a single zero, such as a `Piecewise` with more than two pieces.
+    """
     if isinstance(part, sp.Abs):
         return part.args[0], part.args[0], -part.args[0]
     if type(part) in SIDES:
@@ -76,7 +79,7 @@ def _sides(part: sp.Expr) -> tuple[sp.Expr | None, sp.Expr, sp.Expr]:
 
 
 def _joins(choice: Piecewise, moving: Set[sp.Symbol]) -> bool:
-    """Return True if the pieces of a choice are proved to agree where they meet."""
+    """Return True if the pieces of a `Piecewise` are proved to be equal where they meet."""
     pieces = list(choice.args)
     for k, (piece, condition) in enumerate(pieces[:-1]):
         if not isinstance(condition, INEQUALITIES):
@@ -88,7 +91,7 @@ def _joins(choice: Piecewise, moving: Set[sp.Symbol]) -> bool:
 
 def _agree(one: sp.Expr, other: sp.Expr, gap: sp.Expr, moving: Set[sp.Symbol]) -> bool:
     """Return True if two expressions are proved to be equal where `gap` is zero."""
-    # A gap with kinks is taken on both sides of each of them.
+    # If the gap has kinks itself, prove the equality on both sides of each kink.
     gap = gap.replace(sp.Max, _larger).replace(sp.Min, _smaller)
     kink = min(
         (part for part in gap.atoms(sp.Abs) if part.free_symbols & moving), key=sp.default_sort_key, default=None
@@ -97,20 +100,20 @@ def _agree(one: sp.Expr, other: sp.Expr, gap: sp.Expr, moving: Set[sp.Symbol]) -
         (inner,) = kink.args
         sides = ({kink: sign * inner, sp.sign(inner): sign} for sign in (sp.S.One, sp.S.NegativeOne))
         return all(_agree(one.xreplace(side), other.xreplace(side), gap.xreplace(side), moving) for side in sides)
-    # Solve gap = 0 for a symbol in which it is linear, and put the solution into the difference.
+    # Solve gap = 0 for a symbol that occurs linearly, and insert the solution into the difference.
     slopes = ((s, gap.diff(s)) for s in sorted(gap.free_symbols & moving, key=str))
     at = next((s for s, slope in slopes if slope != 0 and not slope.free_symbols & moving), None)
     return at is not None and bool(sp.simplify((one - other).subs(at, sp.solve(gap, at)[0])) == 0)
 
 
 def rough_at(e: sp.Expr, point: Mapping[sp.Symbol, sp.Expr], symbols: Iterable[sp.Symbol]) -> sp.Expr | None:
-    """Return a part by which an expression, or a derivative of it by `symbols`, jumps at a point; None if there is none."""
+    """Return a subexpression that makes `e`, or a derivative of `e` by `symbols`, jump at a point; else None."""
     e, symbols = e.replace(sp.Max, _larger).replace(sp.Min, _smaller), tuple(symbols)
     for part in sorted(e.atoms(sp.Abs, *SIDES, Piecewise), key=sp.default_sort_key):
         argument, above, below = _sides(part)
         if argument is None or sp.expand(argument.xreplace(point)) != 0:
             continue
-        # Compare the expression and its derivatives with the part on either side of its jump.
+        # Compare the expression and its derivatives for the two values of the part beside its jump.
         sides = [e.xreplace({part: value}) for value in (above, below)]
         slopes = [[side, *(derivative(side, s) for s in symbols)] for side in sides]
         if any(sp.simplify((one - other).xreplace(point)) != 0 for one, other in zip(*slopes, strict=True)):

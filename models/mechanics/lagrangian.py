@@ -16,9 +16,9 @@ from .components import TIME
 Symbols = Sequence[sp.Symbol]
 
 LARGEST_BY_MINORS = 3
-"""Most coupled rows for which M is inverted in symbols (a choice): the minors of three rows are short.
+"""Most coupled rows for which M is inverted in symbols (a choice); the minors of three rows are short.
 
-Of more rows elimination makes fractions within fractions, and kernels solve M dv/dt = r by numbers.
+With more rows, elimination makes nested fractions; kernels then solve M dv/dt = r numerically.
 """
 
 
@@ -46,7 +46,7 @@ class Mechanics:
         at_rest = [sp.S.Zero] * len(self.coordinates)
         r = []
         for x, v, force in zip(self.coordinates, self.velocities, self.forces, strict=True):
-            # d/dt dL/dv has M dv/dt and terms without accelerations, which belong to r.
+            # d/dt dL/dv is M dv/dt plus terms without accelerations, which move to r.
             momentum_rate = total_derivative(derivative(lagrangian, v), self.coordinates, self.velocities, at_rest)
             r.append(derivative(lagrangian, x) + force - momentum_rate)
         return r, mass_matrix(lagrangian, self.velocities)
@@ -57,7 +57,7 @@ class Mechanics:
         return solve_masses(masses, r, self.velocities)
 
     def energy_rate(self) -> tuple[sp.Expr, sp.Expr]:
-        """Return dE/dt along the motion and its value by theory, sum v Q - (partial) dL/dt; their difference vanishes.
+        """Return dE/dt along the motion and its theoretical value sum v Q - (partial) dL/dt; the two are equal.
 
         E = sum v dL/dv - L is the energy function, T + V for ordinary kinetic energies.
         """
@@ -80,13 +80,13 @@ def mass_matrix(kinetic: sp.Expr, v: Symbols) -> sp.Matrix:
 
 
 def coupled(masses: sp.Matrix) -> list[int]:
-    """Return the rows of a mass matrix with entries beside the diagonal."""
+    """Return the rows of a mass matrix that have off-diagonal entries."""
     size = masses.rows
     return [i for i in range(size) if any(masses[i, j] != 0 for j in range(size) if j != i)]
 
 
 def check_masses_exist(masses: sp.Matrix, velocities: Symbols) -> None:
-    """Raise ValueError if a symmetric mass matrix is singular: some velocity, which names it, has no kinetic energy."""
+    """Raise ValueError if a mass matrix is singular; the message names a velocity that has no kinetic energy."""
     rows = coupled(masses)
     idle = [str(velocities[i]) for i in range(masses.rows) if i not in rows and masses[i, i] == 0]
     if idle:
@@ -97,9 +97,9 @@ def check_masses_exist(masses: sp.Matrix, velocities: Symbols) -> None:
 
 
 def solve_masses(masses: sp.Matrix, forces: Sequence[sp.Expr], velocities: Symbols) -> tuple[sp.Expr, ...]:
-    """Solve M a = r for the accelerations a, with a symmetric mass matrix M; `velocities` name its rows in errors.
+    """Solve M a = r for the accelerations a, with a symmetric mass matrix M and one of `velocities` for each row.
 
-    Raises ValueError if the matrix is singular: some velocity then has no kinetic energy.
+    Raises ValueError if M is singular; the message names a velocity that has no kinetic energy.
     """
     check_masses_exist(masses, velocities)
     rows = coupled(masses)
@@ -122,7 +122,7 @@ def _determinant(masses: sp.Matrix) -> sp.Expr:
 
 
 def _is_singular(masses: sp.Matrix) -> bool:
-    """Return True if the determinant is zero at three points, compared with the product of the diagonal."""
+    """Return True if, at three points, the determinant is zero relative to the product of the diagonal."""
     symbols, evaluated = sorted(masses.free_symbols, key=str), False
     for k in range(3):
         point = {s: sp.Rational(7 * i + 3 * k + 5, 11 + 2 * i) for i, s in enumerate(symbols)}
@@ -132,5 +132,5 @@ def _is_singular(masses: sp.Matrix) -> bool:
             if abs(value) > sp.Float("1e-40") * abs(size):
                 return False
             evaluated = True
-    # Undefined functions have no values at points: ask SymPy for a proof.
+    # Undefined functions have no values at points: let SymPy prove that the determinant is zero.
     return evaluated or bool(_determinant(masses).equals(0))

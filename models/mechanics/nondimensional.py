@@ -1,7 +1,7 @@
-"""Non-dimensional equations from a physical Lagrangian, by substitution: no scaled equation is typed in.
+"""Derive non-dimensional equations from a physical Lagrangian by substitution; nobody types scaled equations.
 
-Every physical quantity of unit kg^a m^b s^c is written as its non-dimensional value times M^a L^b T^c, where M, L and T are
-the oscillator's units of mass, length and time.  In energies and forces M, L and T must cancel.
+Every physical quantity of unit kg^a m^b s^c is replaced by its non-dimensional value times M^a L^b T^c.  M, L and T are
+the units of mass, length and time of the oscillator.  M, L and T must cancel in the scaled energies and forces.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ MASS, LENGTH, DURATION = sp.symbols("M L T", positive=True)
 
 
 def magnitude(unit: str) -> sp.Expr:
-    """Return the amount M^a L^b T^c of a quantity with the non-dimensional value 1."""
+    """Return the physical amount M^a L^b T^c of the non-dimensional value 1."""
     mass, length, duration = dimension(unit)
     return MASS**mass * LENGTH**length * DURATION**duration
 
 
 def scale(oscillator: Oscillator, unit: str) -> sp.Expr:
-    """Return the amount of a quantity with the value 1, in the physical symbols of an oscillator."""
+    """Return the physical amount of the non-dimensional value 1, in the physical symbols of an oscillator."""
     scaling = oscillator.model.scaling if isinstance(oscillator.model, LagrangianModel) else None
     if scaling is None:
         return sp.S.One
@@ -59,7 +59,7 @@ def nondimensional(oscillator: Oscillator) -> Mechanics:
     if not isinstance(model, LagrangianModel) or model.scaling is None:
         return system
     scale(oscillator, "1")  # raises ValueError unless the scales turn every quantity of UNITS into 1
-    # Each physical symbol as its non-dimensional value times its amount.
+    # Substitute for each physical symbol: its non-dimensional value times M^a L^b T^c.
     amounts = {sp.Symbol(name, positive=True): magnitude(unit) for name, unit in model.scaling.units.items()}
     for name, parameter in oscillator.parameters.items():
         amounts[_real(model.scaling.physical[name])] = _real(name) * magnitude(parameter.unit)
@@ -90,8 +90,8 @@ def nondimensional(oscillator: Oscillator) -> Mechanics:
 def friction_coefficient(law: FrictionLaw, contact: str) -> Callable[[sp.Expr], sp.Expr]:
     """Return f(w), the friction coefficient as a function of the non-dimensional sliding velocity.
 
-    The parameters of a law have units too: a rate of decay a = 2.5 of unit s/m decays with 2.5 |w| only when w is
-    measured in L/T.  If no parameter has a unit, w has none.
+    Parameters of a law may have units.  A rate of decay a = 2.5 of unit s/m multiplies |w| in the unit L/T of velocity.
+    If no parameter has a unit, w has none either.
     """
     treatment = ContactModel.parse("contact", contact)
     w = sp.Dummy("w", real=True)
@@ -104,14 +104,14 @@ def friction_coefficient(law: FrictionLaw, contact: str) -> Callable[[sp.Expr], 
 
 
 def static_coefficient(law: FrictionLaw) -> sp.Expr | None:
-    """Return the static friction coefficient of a law; None if the law names none."""
+    """Return the static friction coefficient of a law; None if the law has none."""
     if law.static is None:
         return None
     return _cancel(law.static.xreplace(_amounts(law.parameters)), f"friction law {law}: static")
 
 
 def _amounts(parameters: Mapping[str, Parameter]) -> dict[sp.Symbol, sp.Expr]:
-    """Return each parameter as its non-dimensional value times its magnitude."""
+    """Return for each parameter its symbol times its `magnitude`."""
     return {_real(name): _real(name) * magnitude(parameter.unit) for name, parameter in parameters.items()}
 
 
@@ -120,7 +120,7 @@ def _real(name: str) -> sp.Symbol:
 
 
 def _cancel(expression: sp.Expr, what: str) -> sp.Expr:
-    """Take out common factors; raise ValueError if a unit does not cancel."""
+    """Cancel M, L and T in an expression; raise ValueError if one of them remains."""
     result = sp.factor_terms(sp.sympify(expression))
     for symbol, unit in {MASS: "kg", LENGTH: "m", DURATION: "s"}.items():
         if result.has(symbol):

@@ -13,7 +13,7 @@ from .contact import ContactModel, FrictionLaw
 from .parameter import Parameter, defaults_text
 
 FRICTION = sp.Function("f", real=True)
-"""The friction coefficient as an unknown function of the sliding velocity, which a friction law replaces."""
+"""An undefined function of the sliding velocity, which the expression of a friction law replaces."""
 
 
 def friction(velocity: sp.Expr) -> sp.Expr:
@@ -27,7 +27,7 @@ def friction(velocity: sp.Expr) -> sp.Expr:
     Returns
     -------
     Expr
-        An unknown function of the velocity; the friction law of the node takes its place.
+        An undefined function of the velocity; the friction law of the node replaces this function.
 
     Examples
     --------
@@ -51,10 +51,10 @@ class Coordinate:
 
 @dataclass(frozen=True, slots=True)
 class Scaling:
-    """How the physical quantities of a Lagrangian become numbers."""
+    """Units and scales that make the physical quantities of a Lagrangian non-dimensional."""
 
     units: FrozenDict[str]  # unit of each quantity that fixes the scales
-    physical: FrozenDict[str]  # physical quantity behind each parameter
+    physical: FrozenDict[str]  # physical quantity that belongs to each parameter
     scales: FrozenDict[
         sp.Expr
     ]  # units of mass, length, time (keys kg, m, s) in positive symbols of the names in `units`
@@ -62,10 +62,10 @@ class Scaling:
 
 @dataclass(frozen=True, slots=True)
 class LagrangianModel:
-    """A mechanical system: energies and forces as expressions, `FRICTION` for a friction law.
+    """A mechanical system: energies and forces as expressions, in which `FRICTION` stands for a friction law.
 
-    Coordinates, velocities and parameters are real symbols.  With a `scaling` all quantities are physical and the
-    parameters go by their physical names; without one they are the numbers of the non-dimensional equations.
+    Coordinates, velocities and parameters are real symbols.  With a `scaling` all quantities are physical, and the
+    parameters have their physical names.  Without a `scaling` the expressions are non-dimensional.
     """
 
     coordinates: tuple[Coordinate, ...]  # the generalised coordinates
@@ -107,9 +107,9 @@ class Oscillator:
     model : LagrangianModel or FieldModel
         The equations: energies and forces, or rates.
     initial : mapping of str to float, optional
-        The state around which oscillators start, 0 for the states left out.
+        The state around which oscillators start; states that are left out are 0.
     friction : FrictionLaw, optional
-        The law of its friction unless another is given.
+        The friction law of the oscillator unless a scene gives another law.
     contact : ContactModel
         Default treatment of the jump of a law at rest.
     summary, source : str
@@ -118,7 +118,7 @@ class Oscillator:
     Attributes
     ----------
     states : tuple of str
-        Names of the states.  Each is an attribute too, its symbol: ``node.x``.
+        Names of the states.  The symbol of each state is an attribute: ``node.x``.
     """
 
     name: str
@@ -138,7 +138,7 @@ class Oscillator:
 
     @property
     def takes_friction(self) -> bool:
-        """True if the forces hold a friction coefficient, for which a law must be named."""
+        """True if the forces contain a friction coefficient, so that the oscillator needs a friction law."""
         return any(e.has(FRICTION) for e in self.model.expressions)
 
     def __getattr__(self, name: str) -> sp.Symbol:
@@ -151,12 +151,12 @@ class Oscillator:
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Names of the states: coordinates and their velocities, or those of a vector field."""
+        """Names of the states: the coordinates and their velocities, or the states of a vector field."""
         if isinstance(self.model, FieldModel):
             return self.model.state
         return (*self.coordinates, *(c.velocity for c in self.model.coordinates))
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the coordinates, none of a vector field."""
+        """Names of the coordinates; empty for a vector field."""
         return tuple(c.name for c in self.model.coordinates) if isinstance(self.model, LagrangianModel) else ()

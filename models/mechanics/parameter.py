@@ -13,14 +13,14 @@ from ..inputs.checks import check_flag, check_keys, check_number, check_text, sh
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A number of the non-dimensional equations that gets its value at run time.
+    """A parameter of the non-dimensional equations, whose value is set for each run.
 
     Parameters
     ----------
     default : float
-        The non-dimensional value that it has unless another is given.
+        The non-dimensional value if a scene gives no other.
     unit : str
-        The SI unit of the physical quantity behind the number, such as "N/m"; "1" if it is a number by itself.
+        The SI unit of the physical quantity of the parameter, such as "N/m"; "1" without a physical quantity.
     meaning : str
         A short description.
     minimum, maximum : float, optional
@@ -28,8 +28,8 @@ class Parameter:
     positive : bool
         True if zero and negative values are not allowed.
     scale : str
-        The amount of the quantity with the value 1, in the physical symbols of the oscillator: a belt speed 0.1
-        with unit m/s and scale g*sqrt(m)/sqrt(k) is 0.1 g sqrt(m/k) metres per second.
+        The physical amount of the value 1, in the physical symbols of the oscillator.  For example, a belt speed 0.1
+        with the unit m/s and the scale g*sqrt(m)/sqrt(k) is 0.1 g sqrt(m/k) metres per second.
 
     Raises
     ------
@@ -53,10 +53,10 @@ class Parameter:
 
     @classmethod
     def of_table(cls, what: str, table: Mapping[Any, object], keys: Sequence[str], **usual: object) -> Parameter:
-        """Return the parameter of a table of arguments, of which `usual` ones may be missing.
+        """Return the parameter from a table of arguments; arguments in `usual` may be missing.
 
-        Raises ValueError or TypeError, beginning with `what`, for names outside `keys`, values of a wrong type, and a
-        table without a default.
+        Raises ValueError or TypeError for names outside `keys`, for values of a wrong type and for a table without a
+        default; the message begins with `what`.
         """
         check_keys(what, table, keys)
         if "default" not in table:
@@ -67,7 +67,7 @@ class Parameter:
         return cls(**{key: _CHECKS.get(key, check_text)(f"{what}: {key}", value) for key, value in arguments.items()})
 
     def check(self, name: str, value: float) -> float:
-        """Return `value` as a float, or raise ValueError (TypeError: no number) that names it and the range."""
+        """Return `value` as a float; raise ValueError outside the range, TypeError for no number."""
         if isinstance(value, bool) or not hasattr(value, "__float__"):
             raise TypeError(f"{name} = {value!r} is no number; expected {self.range}")
         number = float(value)
@@ -96,7 +96,7 @@ _CHECKS: Mapping[str, Callable[[str, object], Any]] = {
     "maximum": check_number,
     "positive": check_flag,
 }
-"""Checks of the arguments that are no text."""
+"""Check functions of the arguments that are not texts."""
 
 Dimension = tuple[int, int, int]
 """Powers of (kg, m, s)."""
@@ -114,7 +114,8 @@ UNITS: dict[str, Dimension] = {
 def dimension(unit: str) -> Dimension:
     """Return the powers of (kg, m, s) in a unit such as ``N/m``, ``kg*m/s^2`` or ``1``.
 
-    Raises ValueError on a name outside kg, m, s, N, rad, 1 and on a power that is not an integer, TypeError on no text.
+    Raises ValueError for a name other than kg, m, s, N, rad, 1 and for a power that is not an integer.  Raises
+    TypeError for a value that is no text.
     """
     if not isinstance(unit, str):
         raise TypeError(f"unit {unit!r} is a {type(unit).__name__}; expected text such as 'N/m' or '1'")

@@ -13,11 +13,11 @@ from .nondimensional import friction_coefficient, nondimensional
 from .oscillator import FieldModel, Oscillator
 
 SPEEDS = tuple(side * 10.0 ** (k / 4) for k in range(-24, 9) for side in (1.0, -1.0))
-"""Sliding velocities at which a law is checked (a choice): four a decade from 1e-6 to 100, both ways."""
+"""Sliding velocities at which a law is checked (a choice): four per decade from 1e-6 to 100, in both directions."""
 
 
 def check_power(law: FrictionLaw, values: Mapping[str, float]) -> None:
-    """Raise ValueError if friction pushes against the ground's motion, w f(w) < 0, and so feeds energy."""
+    """Raise ValueError if friction feeds energy, w f(w) < 0, and the law does not declare it."""
     if law.self_exciting:
         return
     coefficient, names = _coefficient(law)
@@ -25,7 +25,7 @@ def check_power(law: FrictionLaw, values: Mapping[str, float]) -> None:
     for w in SPEEDS:
         try:
             f = coefficient(w, *parameters)
-        except (ArithmeticError, ValueError):  # a pole or an overflow is for the integration to report
+        except (ArithmeticError, ValueError):  # skip: the integration reports poles and overflows
             continue
         if w * f < 0.0:
             raise ValueError(
@@ -58,7 +58,7 @@ def check_masses(oscillator: Oscillator, values: Mapping[str, float]) -> None:
 
 @lru_cache(maxsize=1024)
 def _check_masses(oscillator: Oscillator, values: tuple[tuple[str, float], ...]) -> None:
-    """Check the masses at values of their parameters; nodes that differ in other parameters share one check."""
+    """Check the masses at given parameters, cached: nodes that differ only in other parameters share one check."""
     masses, velocities = _masses(oscillator)
     matrix = masses.subs({sp.Symbol(name, real=True): sp.Float(value) for name, value in values})
     if matrix.free_symbols:
