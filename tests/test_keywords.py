@@ -500,3 +500,13 @@ def test_an_executor_runs_the_cells_of_the_probe_and_parameters_reach_it() -> No
             DRIVEN, [0.1], [0.0], criterion=SHORT, executor=pool, parameters={"delta": 0.7}, show_progress=False
         )
     assert result.scene.parameters["delta"] == 0.7
+
+
+def test_a_scene_that_records_from_its_start_still_gives_averages_a_transient() -> None:
+    """A transient of 0 is for the records of a run; the average would count the way to the attractor."""
+    from synchain.runtime.stability.averages import TRANSIENT, Averaging
+    from synchain.runtime.support.execution import Execution
+
+    for length, expected in ((0.0, TRANSIENT), (30.0, 30.0)):
+        averaging = Averaging.for_scene(DRIVEN.replace(transient=length), 1e-3, 100, None, None, Execution())
+        assert averaging.transient == expected

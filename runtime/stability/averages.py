@@ -46,7 +46,7 @@ precision : float
 periods : float
     Longest average, in periods of the drive, or in mean return times of undriven motion; a whole number.
 transient : float, optional
-    Transient before the average, in the same units; by default that of the scene if it was given one, else 300.
+    Transient before the average, in the same units; by default that of the scene if it was given one above 0, else 300.
 """,
     "starts": """
 starts : int
@@ -118,8 +118,10 @@ class Averaging:
         """Return the averaging of a public function's call; a transient and a seed that are None are those of the scene."""
         seed = chosen(scene, "seed", seed, 0)
         length = chosen(scene, "transient", transient, None)
-        if transient is not None or length is None:
-            return cls(precision, periods, TRANSIENT if length is None else length, seed, execution)
+        if transient is not None:
+            return cls(precision, periods, transient, seed, execution)
+        if not length:  # a scene without a transient records from its start on; an average needs the attractor
+            return cls(precision, periods, TRANSIENT, seed, execution)
         return cls(precision, periods, _whole(scene, scene.period or 2.0 * math.pi), seed, execution, True)
 
     def in_units(self, scene: Scene, unit: float) -> Averaging:
