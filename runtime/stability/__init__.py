@@ -1,1 +1,1 @@
-"""Lyapunov and transversal exponents along orbits: may know kernels and one cell, no sweeps."""
+"""Compute Lyapunov and transversal exponents along orbits. Modules here use kernels and single cells, but no sweeps."""

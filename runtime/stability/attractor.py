@@ -1,6 +1,7 @@
-"""Classification of the motion that an orbit has settled on.
+"""Classify the motion of an orbit after its transient.
 
-The motion is a fixed point, a periodic orbit locked to the drive, a limit cycle of an undriven oscillator, or none of these.
+The motion is a fixed point, a periodic orbit locked to the drive, a limit cycle of an undriven oscillator, or
+aperiodic.
 """
 
 from __future__ import annotations
@@ -17,28 +18,33 @@ from .motion import rests
 from .orbits import FAR, OrbitProblem, within
 
 LONGEST = 32
-"""Longest cycle that is looked for, in periods of the drive (a choice)."""
+"""Largest number of drive periods in a cycle for which the search looks (a choice)."""
 
 ROUNDS = 3
-"""Most searches for a cycle, each after one more transient."""
+"""Largest number of searches for a cycle. A further transient runs before each new search."""
 
 RETURN = 1e-9
-"""Largest distance of a closed cycle in each component, relative to the extent of its motion; at least 0.1 rtol."""
+"""A cycle is closed if its end is nearer to its start than RETURN times the extent of the motion, in each component.
+The limit is at least 0.1 rtol."""
 
 CLOSE = 1e-3
-"""Largest distance of a return that may still close, and least motion of a component, relative to the extent (a choice)."""
+"""A return may become a closed cycle if it ends nearer to its start than CLOSE times the extent of the motion (a
+choice).
+CLOSE times the extent is also the least motion of a component."""
 
 TOLERANCE_RATIO = 10.0
-"""Ratio of the tolerances of two integrations of a cycle, from which the error of its exponents is seen."""
+"""Ratio of the tolerances of two integrations of one cycle; their difference estimates the error of the exponents."""
 
 ALIKE = 1e-5
-"""Largest distance of two starts' exponents on one attractor, relative to the rates of its linearised equations."""
+"""Two starts are on one attractor if their exponents differ by less than ALIKE times the rates of the linearised
+equations."""
 
 
 class Motion(StrEnum):
-    """Kind of motion on an attractor; of linear equations every motion, bounded or not, has the same exponents.
+    """Kind of motion on an attractor.
 
-    An unbounded motion is that of a further start that left every bound; it has no exponents.
+    LINEAR: the equations are linear, so every motion, bounded or not, has the same exponents.
+    UNBOUNDED: the orbit of a further start grew without bound; it has no exponents.
     """
 
     LINEAR = "linear"
@@ -59,12 +65,12 @@ class Attractor:
     # the variational equation. None for aperiodic motion
     propagators: np.ndarray | None = field(default=None, repr=False)
     periods: int = 1  # drive periods of one cycle; 1 without a drive
-    # (3, m): logarithms of the factors that the propagators of a cycle lack
+    # (3, m): logarithms of the factors by which the propagators of a cycle were divided
     logarithms: np.ndarray | float = field(default=0.0, repr=False)
 
     @property
     def kind(self) -> str:
-        """Name of the motion, with the drive periods of its cycle if there are several."""
+        """Name of the motion; a cycle of several drive periods is named with their number."""
         return str(self.motion) if self.periods == 1 else f"{self.motion}, {self.periods} drive periods"
 
     def exponents(self) -> tuple[np.ndarray, np.ndarray]:
@@ -82,7 +88,10 @@ class Attractor:
         return exponents[1], apart.max(axis=0)
 
     def resolution(self) -> np.ndarray:
-        """Return the largest distance (m,) of the exponents of two starts on this attractor: errors, and where the starts end."""
+        """Return the largest difference (m,) between the exponents of two starts on this attractor.
+
+        The difference comes from errors, and from the different states at which the starts end.
+        """
         _, error = self.exponents()
         if self.propagators is None or self.cycle:
             return error + ALIKE / self.cycle
@@ -90,9 +99,10 @@ class Attractor:
 
 
 def find_attractor(problem: OrbitProblem, state: np.ndarray, patience: float) -> tuple[Attractor, np.ndarray]:
-    """Look for a fixed point or a cycle of 1 … LONGEST drive periods on which a settled state (components,) is.
+    """Look for a fixed point, or a cycle of 1 … LONGEST drive periods, at a state (components,) after the transient.
 
-    Return it with the state that was reached, from which an average may begin. `patience`: units of time before a new search.
+    Return the attractor, and the state at the end of the search, from which an average may begin.
+    `patience`: units of time before a new search.
     """
     if problem.linear:
         timed = any(e.has(sp.Symbol("t", real=True)) for _, e in problem.variation.matrix)
@@ -107,7 +117,7 @@ def find_attractor(problem: OrbitProblem, state: np.ndarray, patience: float) ->
         return _periodic(problem, cycle.state, Motion.PERIODIC, unit=cycle.period), state
     integrator = problem.integrator(state[None], problem.strengths[:1])
     for _ in range(ROUNDS):
-        # the distances of the states at the beginning of periods from the last of them, the latest first
+        # compare the last state with the states one, two … periods before
         states = [integrator.state[0]]
         for _ in range(LONGEST):
             integrator.advance(problem.unit)
@@ -128,10 +138,11 @@ def find_attractor(problem: OrbitProblem, state: np.ndarray, patience: float) ->
 def _periodic(
     problem: OrbitProblem, state: np.ndarray, motion: Motion, periods: int = 1, unit: float | None = None
 ) -> Attractor:
-    """Motion along which the variational equation repeats itself after some drive periods, or other units."""
+    """Return the attractor of a periodic orbit, whose variational equation repeats after `periods` times `unit`."""
     unit = problem.unit if unit is None else unit
     block = unit / problem.unit
-    # the first cycle shows how far the motion has settled, looser steps over the second one show their error
+    # two successive cycles differ if the transient is not over; a third run with looser steps shows the error of the
+    # steps
     *first, settled = cycle_propagators(problem, state, periods, block)
     *second, _ = cycle_propagators(problem, settled, periods, block)
     *looser, _ = cycle_propagators(problem, settled, periods, block, TOLERANCE_RATIO)
@@ -142,9 +153,11 @@ def _periodic(
 def cycle_propagators(
     problem: OrbitProblem, state: np.ndarray, cycle: int, block: float = 1.0, tolerance_ratio: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Integrate the propagators of all modes from a state (components,) over a number of blocks, with looser tolerances.
+    """Integrate the propagators of all modes from a state (components,) over `cycle` blocks of time.
 
-    Shapes: returns propagators (1, m, p, p), logarithms of the factors they lack (1, m), the state after them (components,).
+    `tolerance_ratio`: factor of the tolerances.
+    Shapes: returns propagators (1, m, p, p), the logarithms (1, m) of the factors by which the propagators were
+    divided, and the state at the end (components,).
     """
     integrator = problem.integrator(state[None])
     integrator.loosen(tolerance_ratio)
@@ -152,7 +165,7 @@ def cycle_propagators(
     for _ in range(cycle - 1):
         propagators, more = problem.propagators(integrator, block)
         total = propagators @ total
-        # a product that leaves the range of numbers is divided by its largest entry
+        # divide a product by its largest entry before it overflows or underflows
         size = np.abs(total).max(axis=(-2, -1))
         factor = np.where((size > math.exp(FAR)) | ((size < math.exp(-FAR)) & (size > 0.0)), size, 1.0)
         total, logarithms = total / factor[..., None, None], logarithms + more + np.log(factor)
@@ -160,7 +173,10 @@ def cycle_propagators(
 
 
 def _steady(problem: OrbitProblem, state: np.ndarray, motion: Motion) -> Attractor:
-    """Motion along which the variational equation is constant: its matrices (m, p, p) at a state, for each strength."""
+    """Return the attractor of a motion along which the variational equation is constant.
+
+    Its propagators are the matrices (m, p, p) of the variational equation at `state`, one for each strength.
+    """
     variation, strengths = problem.variation, problem.strengths
     symbols = [sp.Symbol(name, real=True) for name in (*variation.orbit.state, *variation.orbit.parameters, "t")]
     values = [*state, *(problem.scene.parameters[name] for name in variation.orbit.parameters), 0.0]
@@ -169,7 +185,7 @@ def _steady(problem: OrbitProblem, state: np.ndarray, motion: Motion) -> Attract
     matrices = np.zeros((len(strengths), p, p), dtype=strengths.dtype)
     for (r, c), e in variation.matrix:
         if r < p and c < p:
-            # an entry is linear in the strengths of the layers
+            # each entry is linear in the strengths of the layers: find its coefficients from the unit strengths
             at = sp.lambdify([*symbols, *alphas], e, "numpy")
             base = at(*values, *np.zeros(len(alphas)))
             matrices[:, r, c] = base

@@ -1,4 +1,4 @@
-"""Averages over batches of a long run, with their standard errors."""
+"""Average over batches of a long run, and estimate the standard errors."""
 
 from __future__ import annotations
 
@@ -21,18 +21,20 @@ from ..support.execution import Execution
 from ..support.progress import Reporter
 
 BATCHES, TOGETHER = 64, 8
-"""Most batches in memory, and most that are added in one call: Ctrl-C is noticed between calls."""
+"""BATCHES: most batches in memory. TOGETHER: most batches added in one call; Ctrl-C acts between calls."""
 FEWEST, MOST = 2, 8
-"""Fewest frequencies that give an error, and most that are used; each has two degrees of freedom."""
+"""Fewest and most frequencies from which an error is estimated. Each frequency has two degrees of freedom."""
 NARROW = 0.1
 """An error is estimated from NARROW n^(2/3) frequencies after n periods.
 
-Lazarus et al. take twice as many for noise that is correlated over a few samples; chaos is over several periods.
+Lazarus et al. take twice as many, for noise with correlations over a few samples. Correlations of chaotic motion last
+several periods.
 """
 FIRST, PART = 128, 0.5
-"""Periods before the first look at the errors, and the part of the length estimated then that precedes the second look."""
+"""The errors are first estimated after FIRST periods, and again after the part PART of the length that follows from the
+first estimate."""
 ROUNDING = 100.0 * float(np.finfo(float).eps)
-"""Part of a sum of terms that may be rounding (a choice)."""
+"""Largest rounding error of a sum, relative to the mean size of its terms (a choice)."""
 TRANSIENT = 300.0
 """Periods before an average unless a call or the scene says otherwise (a choice)."""
 TOLERANCE_RATIO, TRIED = 4.0, 8
@@ -73,13 +75,13 @@ parameters : mapping of str to float, optional
     Parameters of the scene to set.
 """,
 }
-"""Keywords that several public functions take, as their docstrings describe them."""
+"""Descriptions of keywords that are common to several public functions, for their docstrings."""
 
 F = TypeVar("F", bound=Callable[..., object])
 
 
 def document_keywords(function: F) -> F:
-    """Replace `{average}` and the like in a docstring by the text of KEYWORDS."""
+    """Replace `{average}` and other names of KEYWORDS in a docstring by their descriptions."""
     text = inspect.cleandoc(function.__doc__ or "")
     for name, described in KEYWORDS.items():
         text = text.replace(f"{{{name}}}", described.strip())
@@ -89,7 +91,7 @@ def document_keywords(function: F) -> F:
 
 @dataclass(frozen=True, slots=True)
 class Averaging:
-    """How long to average along an orbit; checked."""
+    """Settings that determine for how long an orbit is averaged; values are checked."""
 
     precision: float  # the average ends if every standard error is below this value
     # longest average, in periods of the drive, or in mean return times of undriven motion; a whole number
@@ -97,7 +99,7 @@ class Averaging:
     transient: float  # transient before the average, in the same units; a whole number
     seed: int  # seed of the random numbers that are drawn before the orbit begins
     execution: Execution  # threads, and where progress is reported
-    of_scene: bool = False  # whether the transient is that of the scene, whose unit of time may be another
+    of_scene: bool = False  # True if the transient is the scene's and counts in the scene's unit of time
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "precision", check_number("precision", self.precision, 0.0))
@@ -115,7 +117,10 @@ class Averaging:
         seed: int | None,
         execution: Execution,
     ) -> Averaging:
-        """Return the averaging of a public function's call; a transient and a seed that are None are those of the scene."""
+        """Return the averaging for the keywords of a public function.
+
+        If `transient` or `seed` is None, use the scene's.
+        """
         seed = chosen(scene, "seed", seed, 0)
         length = chosen(scene, "transient", transient, None)
         if transient is not None:
@@ -125,24 +130,25 @@ class Averaging:
         return cls(precision, periods, _whole(scene, scene.period or 2.0 * math.pi), seed, execution, True)
 
     def in_units(self, scene: Scene, unit: float) -> Averaging:
-        """Return the averaging with the scene's transient counted in the unit of time of the motion, which is now known."""
+        """Return the averaging with the scene's transient converted into the unit of time of the motion."""
         return replace(self, transient=_whole(scene, unit)) if self.of_scene else self
 
     def reporter(self, orbits: int = 1) -> Reporter:
-        """Return a reporter of transients and longest averages along orbits in turn; its clock starts now."""
+        """Return a progress reporter for `orbits` transients and longest averages; its clock starts now."""
         return self.execution.reporter(orbits * self.length, "period")
 
     @property
     def length(self) -> int:
-        """Periods of a transient and the longest average."""
+        """Return the number of periods of a transient and the longest average together."""
         return round(self.transient + self.periods)
 
     def rounds(self, batches: Batches, error: Callable[[], np.ndarray], reporter: Reporter) -> Iterator[int]:
-        """Yield the number of blocks that remain; the caller adds at least one of them, until the average is precise enough.
+        """Yield the number of remaining blocks until the average is precise enough; the caller adds at least one block.
 
-        Triple sampling: the errors after FIRST periods choose half of the length, those after it the whole. The average
-        ends there if the errors still are below `precision`, and else continues for the length that they imply. Few looks,
-        and errors that are no smaller than the planned one, leave no chance to end where an error is small by chance.
+        Triple sampling: the errors after FIRST periods determine half of the length; the errors after this half
+        determine the full length. The average ends there if the errors are below `precision`. Otherwise it continues
+        for the length that the new errors imply. The errors are estimated only a few times and never below the planned
+        error, so that an average does not end because an error is small by chance.
 
         References
         ----------
@@ -153,7 +159,7 @@ class Averaging:
             before = batches.blocks
             yield math.ceil(self.periods / batches.block) - before
             reporter.advance(batches.block * (batches.blocks - before))
-            # the second look may come where the first one was
+            # the second estimate may be due at once after the first one
             while batches.due:
                 worst = float(np.fmax.reduce(error(), initial=0.0))
                 if worst <= self.precision:
@@ -164,13 +170,13 @@ class Averaging:
 
 
 def _whole(scene: Scene, unit: float) -> float:
-    """Return the scene's transient in whole units of time; a period of the drive is one."""
+    """Return the scene's transient in units of time of the motion, rounded up to a whole number."""
     length = scene.transient if scene.time_unit == TimeUnit.PERIOD else scene.transient / unit
     return float(math.ceil(length * (1.0 - ROUNDING)))
 
 
 def check_whole(name: str, periods: float) -> float:
-    """Return a number of periods; ValueError if it is not whole."""
+    """Return `periods`; raise ValueError if the number is not whole."""
     if not periods.is_integer():
         raise ValueError(f"{name}: found {periods:g}; expected a whole number of periods")
     return periods
@@ -179,10 +185,10 @@ def check_whole(name: str, periods: float) -> float:
 def error_of_steps(
     usual: Sequence[np.ndarray] | np.ndarray, looser: Sequence[np.ndarray] | np.ndarray, length: float
 ) -> np.ndarray:
-    """Return the error of growth rates that is due to the steps: their change at TOLERANCE_RATIO times the tolerance.
+    """Return the error of growth rates due to the steps: their change at TOLERANCE_RATIO times the tolerance.
 
-    The change is averaged over single blocks, each repeated from the same state and deviations, and its standard error is
-    added: chaos magnifies a small difference within a block at random.
+    The change is averaged over single blocks, each repeated from the same state and deviations. Its standard error is
+    added, as chaos magnifies a small difference within a block at random.
     """
     with np.errstate(invalid="ignore"):
         change = np.subtract(usual, looser)
@@ -192,16 +198,17 @@ def error_of_steps(
 
 @dataclass(slots=True)
 class Batches:
-    """Means of growth rates over batches of blocks, and their standard errors.
+    """Compute means of growth rates over batches of blocks, and their standard errors.
 
-    Full BATCHES batches are joined in pairs, so that memory does not grow.
+    If there are BATCHES batches, they are joined in pairs, so that memory does not grow.
 
-    The error of a mean over a time T is sqrt(S/T), where S is the spectral density of the rate at frequency 0. The
-    periodogram of the batch means at the lowest few of the frequencies 1/T, 2/T … estimates S, with two degrees of freedom
-    for each. Their number grows as n^(2/3) with n periods: the band narrows, and correlations of any finite length enter
-    in the end. Few squares may be small together by chance; Student's quantile corrects for it, so that the mean lies
-    within two errors of the truth as often as a normal variable, in 95 of 100 runs. An error from fewer than FEWEST
-    frequencies is infinite: it has no variance.
+    The error of a mean over a time T is sqrt(S/T), where S is the spectral density of the rate at frequency 0. S is
+    estimated by the periodogram of the batch means at the lowest few of the frequencies 1/T, 2/T …, with two degrees of
+    freedom for each frequency. The number of frequencies grows as n^(2/3) with n periods. The highest of them therefore
+    falls with n, and correlations of any finite length are counted in a long enough run. A periodogram of few
+    frequencies may be too small by chance; Student's quantile corrects for this chance, so that the mean lies within
+    two errors of the truth in 95 of 100 runs, as often as a normal variable. An error from fewer than FEWEST
+    frequencies is infinite.
 
     References
     ----------
@@ -216,8 +223,8 @@ class Batches:
     # (BATCHES, starts, m): growth over each batch; only the first `count` are used
     sums: np.ndarray = field(default_factory=lambda: np.zeros((BATCHES, 0, 0)))
     count: int = 0  # number of batches, the last of which may be incomplete
-    enough: float = field(init=False)  # blocks before the next look at the errors
-    # (starts, m): errors times the root of the blocks at the look that chose the length of the average
+    enough: float = field(init=False)  # number of blocks at which the errors are estimated next
+    # (starts, m): errors times the square root of the number of blocks, when the length of the average was chosen
     planned: np.ndarray | None = None
 
     def __post_init__(self) -> None:
@@ -225,32 +232,38 @@ class Batches:
 
     @property
     def periods(self) -> float:
-        """Number of periods averaged over."""
+        """Number of periods in the average."""
         return self.blocks * self.block
 
     @property
     def time(self) -> float:
-        """Non-dimensional time averaged over."""
+        """Non-dimensional time of the average."""
         return self.blocks * (self.block * self.unit)
 
     @property
     def frequencies(self) -> int:
-        """Number of frequencies that the standard errors are estimated from, at most half of the batches."""
+        """Number of frequencies from which the standard errors are estimated; at most half of the number of batches."""
         return min(_frequencies(self.periods), (self.blocks // self.per_batch - 1) // 2)
 
     @property
     def due(self) -> bool:
-        """True if enough batches are complete for the next look at the errors."""
+        """True if enough batches are complete for the next estimate of the errors."""
         return self.blocks >= self.enough and self.blocks % self.per_batch == 0
 
     def plan(self, ratio: float, final: bool) -> None:
-        """Postpone the next look at the errors to a multiple of the present length; `final` stores the errors as a lower bound."""
+        """Postpone the next estimate of the errors until the length is `ratio` times the present one.
+
+        `final`: store the present errors as a lower bound of later ones.
+        """
         if final:
             self.planned = self.error_by_start() * math.sqrt(self.blocks)
         self.enough = self.blocks * max(1.0, ratio)
 
     def ahead(self, most: int) -> np.ndarray:
-        """Return the blocks (batches,) of the next batches: TOGETHER of them, or fewer until the next look at the errors."""
+        """Return the number of blocks (batches,) in each of the next batches.
+
+        There are at most TOGETHER batches, and fewer if the errors are due before.
+        """
         blocks, count, per_batch, parts = self.blocks, self.count, self.per_batch, list[int]()
         while most > 0 and len(parts) < TOGETHER and not (parts and blocks >= self.enough):
             count, per_batch = _with_room(count, per_batch)
@@ -259,7 +272,7 @@ class Batches:
         return np.array(parts, dtype=np.int64)
 
     def add(self, growth: np.ndarray) -> None:
-        """Add the growth over a further block. Shapes: growth (starts, m)."""
+        """Add the growth over one further block. Shapes: growth (starts, m)."""
         if self.blocks % self.per_batch:
             self.sums[self.count - 1] += growth
             self.blocks += 1
@@ -267,13 +280,16 @@ class Batches:
             self.extend(growth[None], np.ones(1, dtype=np.int64))
 
     def extend(self, growths: np.ndarray, parts: np.ndarray) -> None:
-        """Add the growth (b, starts, m) over further batches, with the blocks (b,) that `ahead` returned."""
+        """Add the growth (b, starts, m) over further batches.
+
+        `parts` (b,) are their numbers of blocks, from `ahead`.
+        """
         if self.blocks == 0:
             self.sums = np.empty((BATCHES, *growths.shape[1:]))
         while len(growths):
             full = self.count
             self.count, self.per_batch = _with_room(self.count, self.per_batch)
-            if self.count < full:
+            if self.count < full:  # no room: the batches were joined in pairs
                 self.sums[: self.count] = self.sums[::2] + self.sums[1::2]
             new = min(BATCHES - self.count, len(growths))
             self.sums[self.count : self.count + new] = growths[:new]
@@ -282,11 +298,11 @@ class Batches:
         self.blocks += int(parts.sum())
 
     def mean(self) -> np.ndarray:
-        """Return the growth per unit of time, an ndarray of shape (starts, m)."""
+        """Return the growth (starts, m) per unit of time."""
         return np.asarray(np.sum(self.sums[: self.count], axis=0) / self.time)
 
     def error_by_start(self) -> np.ndarray:
-        """Estimate the standard error (starts, m) of each start: the mean lies within two of them in 95 of 100 runs."""
+        """Return the standard error (starts, m) of each start; in 95 of 100 runs the truth is within two errors."""
         complete, frequencies = self.blocks // self.per_batch, self.frequencies
         sums = self.sums[:complete]
         if frequencies < FEWEST:
@@ -295,7 +311,7 @@ class Batches:
         freedom = 2 * frequencies
         waves = _waves(frequencies, complete) @ sums.reshape(complete, -1)
         spread = np.sqrt(np.einsum("ij,ij->j", waves, waves) / (freedom * complete)).reshape(sums.shape[1:])
-        # a sum of equal terms has no scatter, but rounding
+        # equal terms have no scatter, but their sum has a rounding error
         error = np.maximum(_wide(freedom) * spread, ROUNDING * np.abs(sums).mean(axis=0))
         error /= self.per_batch * self.block * self.unit
         return np.asarray(error if self.planned is None else np.maximum(error, self.planned / math.sqrt(self.blocks)))
@@ -307,25 +323,29 @@ class Batches:
 
 
 def _with_room(count: int, per_batch: int) -> tuple[int, int]:
-    """Number of batches and of blocks in each when a further one begins: BATCHES are joined in pairs."""
+    """Return the numbers of batches and of blocks per batch before a further batch.
+
+    BATCHES batches are joined in pairs.
+    """
     return (BATCHES // 2, 2 * per_batch) if count == BATCHES else (count, per_batch)
 
 
 def _frequencies(periods: float) -> int:
-    """Number of frequencies that an error is estimated from after some periods."""
+    """Return the number of frequencies from which an error is estimated after some periods."""
     return min(round(NARROW * periods ** (2.0 / 3.0)), MOST)
 
 
 @lru_cache(maxsize=MOST)
 def _wide(freedom: int) -> float:
-    """Half of Student's quantile by which a mean lies within two errors of the truth as often as a normal variable."""
+    """Return the factor that widens an error: half of Student's quantile at the level of two normal deviations."""
     return float(stdtrit(freedom, ndtr(2.0)) / 2.0)
 
 
 def errors_for(gaussian: float, periods: float) -> float:
-    """Return the multiple of an average's error that is as certain as `gaussian` standard deviations of a normal variable.
+    """Return how many errors of an average are as certain as `gaussian` standard deviations of a normal variable.
 
-    The few squares of a short average have the long tails of Student's distribution.
+    The multiple is larger than `gaussian` in a short average: its few frequencies give the long tails of Student's
+    distribution.
     """
     freedom = 2 * max(1, _frequencies(periods))
     return float(stdtrit(freedom, ndtr(gaussian))) / _wide(freedom)
@@ -333,6 +353,6 @@ def errors_for(gaussian: float, periods: float) -> float:
 
 @lru_cache(maxsize=8)
 def _waves(count: int, batches: int) -> np.ndarray:
-    """Cosines and sines (2 count, batches) of the lowest frequencies of some batches, orthonormal."""
+    """Return orthonormal cosines and sines (2 count, batches) of the `count` lowest frequencies."""
     angles = np.outer(np.arange(1, count + 1), np.arange(batches)) * (2.0 * math.pi / batches)
     return math.sqrt(2.0 / batches) * np.concatenate([np.cos(angles), np.sin(angles)])

@@ -1,7 +1,7 @@
-"""Stability of cluster states: transversal exponents of a network, block by block.
+"""Compute the stability of cluster states: transversal exponents of a network, block by block.
 
-One orbit of the quotient network carries a deviation for each block and one for the motion of the
-clusters themselves: an `OrbitProblem` whose strengths are all sigma, and one integrator.
+Along one orbit of the quotient network, one deviation is integrated for each block, and one for the motion of the
+clusters themselves. The `OrbitProblem` has sigma as the strength of all deviations.
 
 Source: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014).
 """
@@ -31,14 +31,14 @@ from .orbits import OrbitProblem
 from .variational_integrator import VariationalIntegrator
 
 MERGED = 1e-9
-"""Distance below which two clusters count as one (a choice)."""
+"""Two clusters count as one if they are never further apart than this distance (a choice)."""
 
 APPROACH = 0.5
 """Two clusters approach each other if their largest distance falls below this part of its earlier value (a choice)."""
 
 
 class BlockVerdict(StrEnum):
-    """Stability of one block of a cluster state."""
+    """Verdict on the stability of one block of a cluster state."""
 
     STABLE = "stable"
     UNDECIDED = "undecided within the error"
@@ -62,12 +62,12 @@ class ClusterExponents(Labelled):
     motion_error : float
         Standard error of `motion`.
     separation : ndarray, shape (clusters, clusters)
-        Largest difference between the states of two clusters at the ends of blocks of time. It is 0
-        if the clusters have merged; then the exponents are those of a coarser state.
+        Largest difference between the states of two clusters at the ends of blocks of time. A separation of 0
+        means that the clusters have merged; the exponents are then those of a coarser state.
     time : float
-        Time averaged over.
+        Length of the average.
     approaching : tuple of (int, int)
-        Pairs of clusters that have not merged and whose distance still falls; the exponents may be
+        Pairs of clusters that have not merged, but have a falling distance; the exponents may be
         those of a coarser state.
     unit : str
         Unit in which transient and average are counted.
@@ -119,19 +119,19 @@ class ClusterExponents(Labelled):
 
     @property
     def verdicts(self) -> tuple[BlockVerdict, ...]:
-        """Verdict on each block, decided if the exponent exceeds two standard errors."""
+        """Verdict on each block; a sign is certain if the exponent is more than two standard errors from zero."""
         signs = np.where(np.abs(self.exponent) > 2.0 * self.stderr, np.sign(self.exponent), 0.0)
         verdicts = {-1: BlockVerdict.STABLE, 0: BlockVerdict.UNDECIDED, 1: BlockVerdict.UNSTABLE}
         return tuple(verdicts[int(sign)] for sign in signs)
 
     @property
     def intertwined(self) -> tuple[tuple[int, ...], ...]:
-        """The clusters of each block; they lose their synchrony together."""
+        """The clusters of each block; the clusters of one block lose their synchrony together."""
         return tuple(block.clusters for block in self.state.blocks)
 
     @property
     def merged(self) -> tuple[tuple[int, int], ...]:
-        """Pairs of clusters that never were more than 1e-9 apart; the motion is that of fewer clusters."""
+        """Pairs of clusters that were never more than 1e-9 apart, and so count as one cluster."""
         return _pairs(self.separation < MERGED)
 
     def as_dict(self) -> dict[str, object]:
@@ -208,15 +208,15 @@ def cluster_exponents(
     ValueError
         If the partition is not balanced or belongs to another graph, if the coupling is not linear
         in the difference of states, if there are more than eight clusters, or if time enters
-        without a known period.
+        in the equations without a known period.
     FloatingPointError
         If the integration fails.
 
     Warns
     -----
     RuntimeWarning
-        If clusters approach each other: their largest distance halves from the first to the second
-        half of the motion after the first half of the transient.
+        If clusters approach each other. The first half of the transient is dropped; then the largest distance in the
+        second half of the motion is at most half of that in the first half.
     """
     execution = Execution(1, None, show_progress, progress)
     averaging = Averaging.for_scene(scene, precision, periods, transient, seed, execution)
@@ -244,7 +244,7 @@ def cluster_exponents(
             batches.add(advance())
         steps = integrator.error_of_steps(problem.unit)
 
-    # distances that halve in the second half of the motion after the first half of the transient
+    # drop the first half of the transient, then compare the largest distances in the two halves of the motion
     apart, settled = np.max(gaps[dropped:], axis=0), np.array(gaps[dropped // 2 :])
     half = len(settled) // 2
     early, late = (part.max(axis=0, initial=0.0) for part in (settled[:half], settled[half:]))
@@ -275,7 +275,10 @@ def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
 
 
 def _integrator(scene: Scene, partition: Clusters, seed: int) -> tuple[OrbitProblem, VariationalIntegrator]:
-    """The quotient's orbit with one random deviation along it and one in each block."""
+    """Return the problem and the integrator of the quotient's orbit.
+
+    The integrator carries a random deviation of the clusters, and one in each block.
+    """
     variation = clustered(without_drive(scene.equations, scene.parameters), partition)
     firsts = [members[0] for members in partition.members]
     start = np.array([[values[i] for values in scene.initial.values() for i in firsts]])
@@ -297,7 +300,7 @@ def _integrator(scene: Scene, partition: Clusters, seed: int) -> tuple[OrbitProb
 
 
 def _pairs(table: np.ndarray) -> tuple[tuple[int, int], ...]:
-    """The pairs of clusters for which a symmetric table is true."""
+    """Return the pairs of clusters for which a symmetric table is true."""
     first, second = np.nonzero(np.triu(table, 1))
     return tuple((int(a), int(b)) for a, b in zip(first, second, strict=True))
 

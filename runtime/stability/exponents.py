@@ -1,9 +1,9 @@
-"""Transversal Lyapunov exponents of the synchronous state: the master stability function.
+"""Compute transversal Lyapunov exponents of the synchronous state: the master stability function.
 
-One orbit carries the modes of all strengths alpha + i beta = -sigma gamma at once. On a fixed point or a
-cycle the exponents follow from eigenvalues (`attractor`). Elsewhere they are the mean growth of a deviation
-(`march`), with an error from batch means (`averages`); propagators of most modes are interpolated in the
-strength (`interpolation`). `along` is the road from starts to `Exponents`.
+The modes of all strengths alpha + i beta = -sigma gamma are integrated along one orbit. On a fixed point or a
+cycle the exponents follow from eigenvalues (`attractor`). On other motion an exponent is the mean growth of a
+deviation (`march`), with an error from batch means (`averages`); the propagators of most modes are interpolated
+in the strength (`interpolation`). `along` computes `Exponents` from the initial states.
 
 Sources: Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); Benettin, Galgani, Giorgilli &
 Strelcyn, Meccanica 15, 9 (1980).
@@ -41,33 +41,34 @@ from .slow_motion import warn_of_slow_motion
 from .transversal_modes import unused_axes
 
 APART = 5.0
-"""Two starts are on two motions if their averages differ by more than APART errors at any strength (a choice)."""
+"""Two starts are on different attractors if their averages differ by more than APART errors at any strength (a
+choice)."""
 
 RTOL = 1e-6
-"""Relative tolerance unless a call or the scene says otherwise: averages have larger errors (a choice)."""
+"""Default relative tolerance, if neither the call nor the scene sets one; averages have larger errors (a choice)."""
 
 ROUNDING = 1e-9
-"""The exponent at the first strength is zero below this share of the largest one."""
+"""The exponent at the first strength counts as zero if its size is below this share of the largest exponent's."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Exponents(Labelled):
     """Largest transversal exponent at each strength.
 
-    The mean is over the scene's own start and the further ones that reached the same attractor.
+    Each exponent is the mean over the scene's own start and the other starts that reached the same attractor.
 
     Parameters
     ----------
     alpha : ndarray, shape (m,) or (m, layers)
-        Strengths, real or complex; of several layers of links one each.
+        Strengths, real or complex; with several layers of links, one column for each layer.
     exponent : ndarray, shape (m,)
         Exponents per unit of non-dimensional time.
     stderr : ndarray, shape (m,)
-        Standard errors. On fixed points and periodic orbits, the difference of two cycles, or of two tolerances;
-        elsewhere the mean lies within two of them in 95 of 100 runs; infinite below 59 periods; with the error of the
-        steps (docs/accuracy.md).
+        Standard errors. On fixed points and periodic orbits, an error is the difference between two cycles, or between
+        two tolerances. On other motion the mean lies within two errors of the truth in 95 of 100 runs; the error is
+        infinite below 59 periods, and contains the error of the steps (docs/accuracy.md).
     time : float
-        Time averaged over for each start.
+        Length of the average of each start.
     starts : int
         Number of starts.
     by_start : ndarray, shape (starts, m)
@@ -75,11 +76,11 @@ class Exponents(Labelled):
     attractors : tuple of Attractor
         Motion of each start.
     groups : tuple of tuple of int
-        Indices of the starts on each attractor; the first one is that of the scene's own start.
+        Indices of the starts on each attractor; the first group contains the scene's own start.
     unit : str
         Unit of time in which transients and averages are counted.
     precision : float
-        Standard error that the average had to reach.
+        Requested standard error.
     """
 
     alpha: np.ndarray
@@ -125,13 +126,13 @@ class Exponents(Labelled):
 
     @property
     def negative(self) -> str:
-        """Ranges of alpha with a negative exponent as text; dots where one ends with the grid."""
+        """Ranges of alpha with a negative exponent as text; dots mark an end of a range at an end of the grid."""
         errors = [(low, high) for (_, low), (_, high) in self.ranges]
         return interval_text(self.intervals, errors, (self.alpha.min(), self.alpha.max()))
 
     @property
     def accuracy(self) -> tuple[tuple[str, str], ...]:
-        """Undecided signs, the largest error if it exceeds the precision, and the unit of time, for a summary."""
+        """Rows of a summary: undecided signs, the largest error if it exceeds the precision, and the unit of time."""
         rows: list[tuple[str, str]] = []
         if self.undecided:
             rows.append(("undecided for alpha", interval_text(self.undecided)))
@@ -144,43 +145,43 @@ class Exponents(Labelled):
 
     @property
     def on_a_line(self) -> bool:
-        """True if the strengths are real, one for each mode."""
+        """True if every mode has a single strength, and all strengths are real."""
         return self.alpha.ndim == 1 and not np.iscomplexobj(self.alpha)
 
     @property
     def averaged(self) -> int:
-        """Number of starts in the mean."""
+        """Number of starts in the mean of the exponents."""
         return len(self.groups[0]) if self.groups else self.starts
 
     @property
     def intervals(self) -> tuple[Interval, ...]:
-        """Intervals of real strengths with a negative exponent; ends by linear interpolation."""
+        """Intervals of real strengths with a negative exponent; the ends are interpolated linearly."""
         return tuple((low, high) for (low, _), (high, _) in self.ranges)
 
     @property
     def ranges(self) -> tuple[tuple[Interval, Interval], ...]:
-        """The intervals as ((low, its uncertainty), (high, its uncertainty)).
+        """Intervals with the uncertainties of their ends, ((low, uncertainty), (high, uncertainty)).
 
-        The uncertainty is the standard error over the slope, and the effect of a bend between two strengths; 0 at
-        the ends of the grid.
+        An uncertainty is the standard error divided by the slope, plus the largest effect of a bend between two
+        strengths. At the ends of the grid the uncertainty is 0.
 
         Raises
         ------
         ValueError
-            If the strengths are complex, or those of several layers.
+            If the strengths are complex, or if there are several layers.
         """
         x, error = self.alpha, self.stderr
         if not self.on_a_line:
             kind = "complex" if np.iscomplexobj(x) else f"those of {x.shape[1]} layers"
             raise ValueError(f"strengths are {kind}; ranges need real ones of a single layer")
         y, stable, _ = self._judged
-        # an end beside a stretch of undecided signs lies anywhere within it
+        # where signs are undecided, the end of an interval may be anywhere in the undecided stretch
         blurred = np.zeros(len(x), dtype=bool)
         for first, last in _uncertain(y, error):
             blurred[max(first - 1, 0) : last + 1] = True
         ends: list[Interval] = [(float(x[0]), 0.0)] if stable[0] else []
         for i in map(int, np.flatnonzero(stable[1:] != stable[:-1])):
-            # the zero by the line through points i and i + 1, its slope by a fit to five points
+            # find the zero on the line through points i and i + 1, and the slope there by a fit to five points
             a, b = max(i - 2, 0), min(i + 3, len(x) - 1)
             step = y[i + 1] - y[i] if np.isfinite(y[i] * y[i + 1]) else np.inf  # an exponent of -inf has no slope
             smooth = b - a >= 3 and bool(np.all(np.isfinite(y[a:b])))
@@ -199,17 +200,20 @@ class Exponents(Labelled):
 
     @property
     def undecided(self) -> tuple[Interval, ...]:
-        """Ranges of real strengths where the exponent seems to change its sign, but by less than two errors."""
+        """Ranges of real strengths where the exponent changes its sign by less than two standard errors."""
         x, stretches = self.alpha, self._judged[2] if self.on_a_line else ()
         return tuple((float(x[first]), float(x[last])) for first, last in stretches)
 
     @property
     def _judged(self) -> tuple[np.ndarray, np.ndarray, tuple[tuple[int, int], ...]]:
-        """The exponents (m,) with the first set to zero within its error; True (m,) in an interval; the undecided stretches."""
+        """Return the exponents (m,), whether each is negative (m,), and the undecided stretches of indices.
+
+        The first exponent is set to zero if it is zero within its error.
+        """
         y, error = self.exponent, self.stderr
         rounding = ROUNDING * np.max(np.abs(y[np.isfinite(y)]), initial=0.0)
         if abs(y[0]) <= max(2.0 * error[0], rounding) < np.inf:
-            y = np.append(0.0, y[1:])  # zero to its error, such as that of a limit cycle at strength 0
+            y = np.append(0.0, y[1:])  # on a limit cycle, for example, the exponent at strength 0 is zero
         stable, changed = y < 0, list[tuple[int, int]]()
         for first, last in _uncertain(y, error):
             inside = slice(first, last + 1)
@@ -223,7 +227,7 @@ class Exponents(Labelled):
 def exponent_rows(
     exponent: np.ndarray, stderr: np.ndarray, attractors: Sequence[str], time: float, period: float | None = None
 ) -> tuple[tuple[str, str], ...]:
-    """Return the rows of a summary on the sizes of exponents, on the attractor of each start, and on the average."""
+    """Return rows of a summary: sizes of exponents, the attractor of each start, and the average."""
     kinds = (f"{kind} ({n} of {len(attractors)} starts)" for kind, n in Counter(attractors).most_common())
     drive = f" ({time / period:.0f} drive periods)" if period else ""
     length = f"{time:.6g} units of time{drive} for each start" if time else "not needed"
@@ -237,9 +241,10 @@ def exponent_rows(
 
 
 def _uncertain(y: np.ndarray, error: np.ndarray) -> list[tuple[int, int]]:
-    """First and last indices of stretches of runs of one sign in which no sign is certain.
+    """Return the first and last index of each stretch in which no sign of `y` is certain.
 
-    A sign is certain if one exponent of the run is two errors from zero, or if its error is unknown.
+    A stretch consists of runs, each of one sign. The sign of a run is certain if one exponent of the run is at least
+    two errors from zero, or if its error is unknown.
     """
     certain = ~np.isfinite(error) | (y + 2.0 * error < 0.0) | (y - 2.0 * error >= 0.0)
     runs = np.cumsum(np.append(0, (y[1:] < 0) != (y[:-1] < 0)))
@@ -249,11 +254,12 @@ def _uncertain(y: np.ndarray, error: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _bend(x: np.ndarray, y: np.ndarray, i: int, zero: float) -> float:
-    """Largest distance of the zero of a bent function from that of the line through points i and i + 1.
+    """Return an upper bound of the distance from the zero of a function to that of the line through points i and i + 1.
 
-    At the share z of the way, a function whose slope changes by J is at most J z (1 - z) times the gap
-    from the line, even if it has a kink.  The slopes beside the gap give J and the least slope at the
-    zero.  Without them, or if they differ in sign, the zero lies anywhere in the gap.
+    The gap is the distance x[i + 1] - x[i]. If the slope changes by J across the gap, the function differs from the
+    line by at most J z (1 - z) times the gap at the share z of the gap, even if the function has a kink. J and the
+    least slope at the zero follow from the slopes on both sides of the gap. If these slopes are missing, or differ in
+    sign, the zero may be anywhere in the gap.
     """
     if y[i] == 0.0 or y[i + 1] == 0.0:
         return 0.0
@@ -294,8 +300,8 @@ def exponents(
     scene : Scene
         Source of the oscillator and the coupling; a lone oscillator gets a partner.
     alpha : array_like, shape (m,) or (m, layers)
-        Strengths alpha + i beta = -sigma gamma, real or complex; of several layers of links one each, with the eigenvalues
-        of the layers on a common mode.
+        Strengths alpha + i beta = -sigma gamma, real or complex. With several layers of links, one column for each
+        layer; gamma is then the eigenvalue of the layer on a mode common to all layers.
     {average}
     {starts}
     {progress}
@@ -308,19 +314,21 @@ def exponents(
     Warns
     -----
     RuntimeWarning
-        If starts reach another motion than the scene's own: the exponents are those of the scene's own start.
+        If a start reaches another attractor than the scene's own start; the exponents are those of the scene's own
+        start.
 
     Notes
     -----
-    Of the scene's fields the model, parameters, first initial state, `contact`, `integrator`, `atol` and `max_steps` are
-    used; its `rtol`, `transient` and `seed` if they are not those of a scene by default, and no keyword is given.
+    The scene provides the model, the parameters, the first initial state, `contact`, `integrator`, `atol` and
+    `max_steps`. It also provides `rtol`, `transient` and `seed`, if they differ from the defaults of a scene and the
+    call has no such keyword.
 
     Raises
     ------
     ValueError
-        If the network has no coupling, if the coupling has no synchronous state, if time enters
-        without a known period, for a scene with a stop, and with draws, or axes that move the orbit; the
-        strength of links that vanish between equal states does not.
+        If the network has no coupling, if the coupling has no synchronous state, if time enters the equations
+        without a known period, or if the scene has a stop, draws, or axes that change the synchronous orbit. The
+        strength of links that vanish between equal states does not change the orbit.
     FloatingPointError
         If an integration fails.
     """
@@ -338,7 +346,7 @@ def exponents(
 def transversal(
     given: Given, scene: Scene, strengths: np.ndarray, starts: int, rtol: float | None, averaging: Averaging
 ) -> Exponents:
-    """Compute the exponents at strengths (m,) or (m, layers) for a public function's call."""
+    """Compute the exponents at strengths (m,) or (m, layers), for the arguments of a public function."""
     reporter = averaging.reporter()
     cell = coupled_cell(given, scene, chosen(scene, "rtol", rtol, RTOL))
     problem, states = orbits_of(cell, strengths, starts, averaging)
@@ -357,20 +365,23 @@ def orbits_of(
     problem = OrbitProblem.of_modes(scene, strengths, first[None], averaging.execution.size)
     if starts > 1 and not problem.linear:
         problem = problem.observed(problem.with_slip_states(first[None])[0])
-    # further starts are copies up to REACH extents away
+    # further starts are copies, displaced by at most REACH extents
     return problem, problem.with_slip_states(starts_near(first, problem.extent[: len(first)], starts, averaging.seed))
 
 
 def along(
     problem: OrbitProblem, states: np.ndarray, strengths: np.ndarray, averaging: Averaging, reporter: Reporter
 ) -> Exponents:
-    """Compute the exponents of all modes along orbits from states (starts, components). Shapes: strengths (m,) or (m, layers)."""
+    """Compute the exponents of all modes along orbits from states (starts, components).
+
+    Shapes: strengths (m,) or (m, layers).
+    """
     starts = len(states)
     bounded = np.ones(starts, dtype=bool)
     if not problem.linear:
         problem, states, bounded = _settled(problem, states, averaging.transient, reporter)
 
-    # exponents of fixed points and cycles are eigenvalues; a search for a cycle moves its state on
+    # exponents of fixed points and cycles follow from eigenvalues; the search for a cycle advances the state
     attractors, reached = [], states.copy()
     for row in range(starts):
         attractor = Attractor(Motion.UNBOUNDED, 0.0)
@@ -384,7 +395,7 @@ def along(
             by_start[row], error[row] = attractor.exponents()
     time = max(attractor.cycle for attractor in attractors)
 
-    # exponents of other motion are mean growth rates
+    # exponents of other motion are mean growth rates, averaged for all starts together
     aperiodic = [row for row, attractor in enumerate(attractors) if attractor.motion is Motion.APERIODIC]
     if aperiodic:
         begun = reached[aperiodic]
@@ -410,14 +421,17 @@ def along(
 def _settled(
     problem: OrbitProblem, states: np.ndarray, transient: float, reporter: Reporter
 ) -> tuple[OrbitProblem, np.ndarray, np.ndarray]:
-    """Run the transient of all starts; True (starts,) for each that stays bounded. FloatingPointError if the first does not."""
+    """Run the transient of all starts; return whether each start stays bounded (starts,).
+
+    Raise FloatingPointError if the first start does not.
+    """
     bounded = np.ones(len(states), dtype=bool)
     try:
         return *problem.settled(states, transient, reporter.advance), bounded
     except FloatingPointError:
         if len(states) == 1:
             raise
-    # one that fails stops all: run each alone
+    # a start that fails ends the common run: run each start alone
     problem, ends = problem.observed(states[0]), states.copy()
     for row in range(len(states)):
         try:
@@ -430,18 +444,19 @@ def _settled(
 
 
 def coupled_cell(given: Given, scene: Scene, rtol: float) -> Scene:
-    """Return a single cell with a coupling: a lone oscillator gets a partner, if there is a link for it.
+    """Return a single cell with a coupling; a lone oscillator gets a partner, if the scene has a link.
 
-    The scene may sweep strengths that do not move the synchronous orbit.
+    The scene may sweep strengths that do not change the synchronous orbit.
     """
     given.expect_one_cell(scene, unused_axes(scene))
     return given.scene(with_partner(scene), rtol=rtol)
 
 
 def with_partner(scene: Scene) -> Scene:
-    """Return a network that sweeps nothing: a lone oscillator gets a partner; ValueError if the link moves them both.
+    """Return a network without axes; a lone oscillator gets a partner.
 
-    One that its coupling cannot join stays alone: it has the mode of strength 0 (`OrbitProblem.of_modes`).
+    Raise ValueError if the link acts between equal states, and so changes the orbit. An oscillator that the coupling
+    cannot join to a partner stays alone, with a single mode of strength 0 (`OrbitProblem.of_modes`).
     """
     if check_scene(scene).model.linked:
         return scene.replace(**ONE_CELL)
@@ -454,17 +469,20 @@ def with_partner(scene: Scene) -> Scene:
 
 
 def initial_states(scene: Scene, starts: int, seed: int) -> np.ndarray:
-    """Return the first oscillator's initial state and others near it (starts, components), by the extent of its motion."""
+    """Return states (starts, components): the first oscillator's initial state, and displaced copies.
+
+    The displacements are relative to the extent of the motion from the first state.
+    """
     return orbits_of(scene, np.zeros(1), starts, Averaging(0.0, 1, 0, seed, Execution(1)))[1]
 
 
 def group_by_attractor(
     attractors: Sequence[Attractor], by_start: np.ndarray, error: np.ndarray
 ) -> tuple[tuple[int, ...], ...]:
-    """Group the starts by attractor, that of the first start first.
+    """Group the starts by attractor; the first group contains the first start.
 
-    Two attractors are the same if they are of one kind and their exponents (starts, m) agree, to their errors: those of
-    cycles and fixed points to `Attractor.resolution`, averages within APART errors.
+    Two starts are on one attractor if their motions are of one kind and their exponents `by_start` (starts, m) agree
+    within an error. The error is `Attractor.resolution` for cycles and fixed points, and APART errors for averages.
     """
     groups: list[list[int]] = []
     for row, attractor in enumerate(attractors):
@@ -485,9 +503,9 @@ def group_by_attractor(
 
 
 def average(march: March, averaging: Averaging, reporter: Reporter) -> tuple[np.ndarray, np.ndarray, float]:
-    """Average growth rates along a march from where it is.
+    """Average growth rates along a march, from its present states.
 
-    Shapes: returns mean, error (starts, m).
+    Return the mean (starts, m), the error (starts, m), and the length of the average.
     """
     batches, steps = Batches(march.problem.unit, march.block), np.zeros(())
     for left in averaging.rounds(batches, batches.error, reporter):

@@ -1,11 +1,11 @@
-"""Interpolation of the propagators of many modes from few, along one orbit.
+"""Interpolate the propagators of many modes from those of few modes, along one orbit.
 
-The propagator of a mode over a stretch of time is an entire function of its strength, so a short
-polynomial in the strength gives it for all modes. The strengths are divided into panels, pieces of
-the real line or squares of the plane; those of several layers into lines along which that of a
-single layer changes, and these into panels. On each panel the propagators of some nodes are integrated,
-and the others are interpolated from them. Every panel has further strengths that are integrated
-for comparison only.
+The propagator of a mode over a stretch of time is an entire function of the mode's strength, so that a
+polynomial of low degree in the strength approximates the propagators of all modes. The strengths are divided
+into panels, which are pieces of the real line or squares of the complex plane. With several layers of links,
+the strengths are first divided into lines, along which the strength of a single layer changes, and each line
+into panels. On each panel the propagators are integrated at some strengths (the nodes), and interpolated at
+all others. Every panel has further strengths at which propagators are integrated for comparison only.
 
 Sources: barycentric formula at Chebyshev points, Berrut & Trefethen, SIAM Review 46, 501 (2004);
 on a circle, Austin, Kravanja & Trefethen, SIAM J. Numer. Anal. 52, 1795 (2014).
@@ -22,7 +22,7 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """Strengths that are interpolated from the same nodes."""
+    """A set of strengths whose propagators are interpolated from the same nodes."""
 
     rows: np.ndarray  # (m,): indices of the strengths
     points: np.ndarray  # (k,) or (k, layers): strengths of the nodes
@@ -34,7 +34,7 @@ class Panel:
     def of(
         cls, strengths: np.ndarray, rows: np.ndarray, points: np.ndarray, signs: np.ndarray, extras: np.ndarray
     ) -> Panel:
-        """Return the panel of nodes with barycentric weights `signs`."""
+        """Return the panel with the nodes `points`, whose barycentric weights are `signs`."""
         weights, checks = (_barycentric(x, points, signs) for x in (strengths[rows], extras))
         return cls(rows, points, extras, weights, checks)
 
@@ -59,7 +59,7 @@ class Interpolation:
         return np.concatenate([part for panel in self.panels for part in (panel.points, panel.extras)])
 
     def registers(self, lanes: int) -> Registers:
-        """Return the strengths and the weights in groups of `lanes`, as kernels take them."""
+        """Return the strengths and the weights in groups of `lanes`, the layout that kernels read."""
         if self.is_exact:
             count = len(self.strengths)
             table = np.array([[0.0, -(-count // lanes), 0.0, 0.0, 0.0, 0.0, 0.0]])
@@ -71,7 +71,7 @@ class Interpolation:
             count, points = -(-len(panel.rows) // lanes), len(panel.points)
             where[panel.rows] = register * lanes + np.arange(len(panel.rows))
             table[k] = register, register + count, node, points, len(panel.extras), room, 0
-            # the weights of `lanes` strengths for one node are neighbours: one register
+            # the weights of `lanes` strengths for one node are adjacent in memory: they fill one register
             padded = np.zeros((count * lanes, points), dtype=panel.weights.dtype)
             padded[: len(panel.rows)] = panel.weights
             weights.append(_real(padded).reshape(count, lanes, points * kinds).transpose(0, 2, 1).reshape(-1))
@@ -83,23 +83,24 @@ class Interpolation:
 
 @dataclass(frozen=True, slots=True)
 class Registers:
-    """The weights of an interpolation as `synchain.codegen.driver.propagators` takes them."""
+    """The weights of an interpolation, in the layout that `synchain.codegen.driver.propagators` reads."""
 
-    # (panels, 7), whole numbers: first and last register, first node, nodes, strengths for comparison, first weight of
-    # the strengths, first weight of those for comparison
+    # (panels, 7), whole numbers: first and last register, first node, number of nodes, number of strengths for
+    # comparison,
+    # index of the first weight of the strengths, index of the first weight of the strengths for comparison
     panels: np.ndarray
     weights: np.ndarray  # (any,): the weights of the strengths, then those of the strengths for comparison
     where: np.ndarray  # (m,): position of each strength in the registers
-    room: int  # lanes of all registers
-    lanes: int  # lanes of one
+    room: int  # number of lanes of all registers
+    lanes: int  # number of lanes of one register
 
     def of_strengths(self, values: np.ndarray) -> np.ndarray:
-        """Return values (..., m) of the strengths, from values (..., room) in registers."""
+        """Return values (..., m) in the order of the strengths, from `values` (..., room) in registers."""
         return values[..., : len(self.where)] if len(self.panels) == 1 else values.take(self.where, axis=-1)
 
 
 def exact_interpolation(strengths: np.ndarray) -> Interpolation:
-    """Return the trivial map: every strength is integrated."""
+    """Return the map without interpolation: the propagator of every strength is integrated."""
     return Interpolation(strengths)
 
 
@@ -114,9 +115,10 @@ def strength_interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) ->
 
 
 def lines_of(strengths: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
-    """Return the fewest lines on which strengths (m, layers) differ in a single layer.
+    """Divide strengths (m, layers) into lines, along each of which the strength of only one layer changes.
 
-    Returns this layer, the strengths of the others (lines, layers - 1), and the line (m,) of each strength.
+    Choose the layer with the fewest lines. Return this layer, the strengths of the other layers (lines, layers - 1),
+    and the index (m,) of the line of each strength.
     """
     lines = []
     for moving in range(strengths.shape[1]):
@@ -126,7 +128,7 @@ def lines_of(strengths: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
 
 
 def _along_lines(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
-    """Yield the panels of every line; on a line of few strengths these are the nodes."""
+    """Yield the panels of every line; on a line of few strengths every strength is a node."""
     moving, fixed, line = lines_of(strengths)
     for k, others in enumerate(fixed):
         rows = np.flatnonzero(line == k)
@@ -149,7 +151,7 @@ def _on_a_line(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]
 
 
 def on_a_cache_line(values: np.ndarray) -> np.ndarray:
-    """Return a copy of a row of numbers that begins on a cache line: no register lies across two."""
+    """Return a copy of a row of numbers that begins on a cache line, so that no register crosses two cache lines."""
     block = np.empty(len(values) + 8)
     first = -block.ctypes.data // 8 % 8
     block[first : first + len(values)] = values
@@ -157,14 +159,14 @@ def on_a_cache_line(values: np.ndarray) -> np.ndarray:
 
 
 def _real(table: np.ndarray) -> np.ndarray:
-    """A matrix of complex numbers as pairs of real columns; a real one unchanged."""
+    """Return a complex matrix as pairs of real columns; a real matrix unchanged."""
     return np.ascontiguousarray(table).view(float)
 
 
 def _pieces(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
     """Yield equal pieces of the real line with Chebyshev points of the second kind.
 
-    The strengths for comparison lie between the outer points, and in the middle.
+    The strengths for comparison lie between the two outer points at each end, and in the middle.
     """
     edges = np.linspace(strengths.min(), strengths.max(), count + 1)
     piece = np.clip(np.searchsorted(edges, strengths, side="right") - 1, 0, count - 1)
@@ -182,7 +184,7 @@ def _pieces(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
 def _squares(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
     """Yield squares that cover the rectangle of the strengths.
 
-    The nodes of each lie on the circle through its corners.
+    The nodes of a square lie on the circle through its corners.
     """
     low = complex(strengths.real.min(), strengths.imag.min())
     size = complex(strengths.real.max(), strengths.imag.max()) - low
@@ -198,7 +200,7 @@ def _squares(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
 
 
 def _barycentric(x: np.ndarray, nodes: np.ndarray, signs: np.ndarray) -> np.ndarray:
-    """Interpolating polynomial as a matrix (len(x), len(nodes)); exact at the nodes."""
+    """Return the weights (len(x), len(nodes)) of the interpolating polynomial at `x`; exact at the nodes."""
     gaps = x[:, None] - nodes
     at = gaps == 0.0
     terms = signs / np.where(at, 1.0, gaps)

@@ -1,7 +1,8 @@
-"""Limit cycles of undriven oscillators: Newton's method for the state and the period.
+"""Find limit cycles of undriven oscillators by Newton's method for the state and the period.
 
-Unknown are the state x and the period T of flow(x, T) = x; the phase condition keeps the correction of x normal to the
-motion. Source: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), section 7.2.
+The unknowns are the state x and the period T, and the equation is flow(x, T) = x. A phase condition keeps the
+correction of x normal to the motion. Source: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed.
+(Springer, 2010), section 7.2.
 """
 
 from __future__ import annotations
@@ -20,37 +21,38 @@ from .orbits import OrbitProblem
 from .variational_integrator import VariationalIntegrator
 
 SAMPLES = 4096
-"""Most steps of a path in which returns are looked for (a choice)."""
+"""Largest number of steps of a path that is searched for returns (a choice)."""
 
 NEAR = 1e-3
-"""Largest distance of a return from which Newton's method begins, relative to the extent of the motion (a choice)."""
+"""Newton's method begins at a return only if the return is closer than NEAR times the extent of the motion (a
+choice)."""
 
 RETURNS = 32
-"""Most returns that are tried, and most parts of a period after which the state may be back (a choice)."""
+"""Largest number of returns that are tried, and largest n for which period / n is tested as a period (a choice)."""
 
 MOST_STEPS = 12
-"""Most steps of Newton's method: from a distance NEAR it needs four or five to rounding."""
+"""Largest number of Newton steps; from a distance NEAR, four or five steps reach rounding."""
 
 APART = 10.0
-"""Least distance of the other multipliers from the unit circle, in units of sqrt(rtol).
+"""A cycle attracts if all multipliers but one are further inside the unit circle than APART times sqrt(rtol).
 
-Conservative orbits have the multiplier 1 twice, which errors of size rtol split into 1 ± sqrt(rtol).
+A conservative orbit has a double multiplier 1, which errors of size rtol split into 1 ± sqrt(rtol).
 """
 
 
 class Cycle(NamedTuple):
     """A closed orbit."""
 
-    state: np.ndarray  # (p,): a state on it
-    period: float  # the time after which the state is back
-    matrix: np.ndarray  # (p, p): derivative of the state a period later by the state
-    steps: int  # steps of Newton's method
+    state: np.ndarray  # (p,): a state on the orbit
+    period: float  # the time after which the orbit returns to the state
+    matrix: np.ndarray  # (p, p): derivative of the state one period later with respect to the state
+    steps: int  # number of Newton steps
 
 
 def limit_cycle(problem: OrbitProblem, start: np.ndarray, closed: float) -> Cycle | None:
-    """Find the attracting cycle on which an undriven orbit has settled; None if there is none.
+    """Find the attracting cycle that an undriven orbit has reached; return None if there is no such cycle.
 
-    `closed`: largest distance of a cycle's end from its begin, relative to the extent of each component.
+    `closed`: largest distance between the start and the end of a cycle, relative to the extent of each component.
     """
     alone = replace(problem, strengths=np.zeros_like(problem.strengths[:1]))
     if rests(problem.rates, start, closed, problem.extent):
@@ -59,7 +61,8 @@ def limit_cycle(problem: OrbitProblem, start: np.ndarray, closed: float) -> Cycl
         cycle = _newton(alone, start, time, extent, closed)
         if cycle is not None:
             cycle = _least(alone, cycle, extent, closed)
-            # it attracts if all multipliers but that of the motion itself are well inside the unit circle
+            # the cycle attracts if all multipliers, except the multiplier 1 along the motion, are inside the unit
+            # circle
             multipliers = np.linalg.eigvals(cycle.matrix)
             others = np.delete(multipliers, np.abs(multipliers - 1.0).argmin())
             attracts = np.all(np.abs(others) < 1.0 - APART * math.sqrt(problem.scene.rtol))
@@ -68,9 +71,9 @@ def limit_cycle(problem: OrbitProblem, start: np.ndarray, closed: float) -> Cycl
 
 
 def _returns(problem: OrbitProblem, start: np.ndarray) -> Iterator[tuple[float, np.ndarray]]:
-    """Yield the times at which the orbit comes back through the plane normal to its motion, and its extent (p,) until then."""
+    """Yield each return of the orbit through the plane normal to its motion: the time, and the extent (p,) so far."""
     rates, integrator, time = problem.rates, _integrator(problem, start), 0.0
-    normal = rates.values(start) / _scale(problem.extent) ** 2  # normal if each component is measured by its extent
+    normal = rates.values(start) / _scale(problem.extent) ** 2  # normal in units of the extent of each component
 
     def side(state: np.ndarray) -> float:
         return float(normal @ (state[0] - start))
@@ -82,12 +85,12 @@ def _returns(problem: OrbitProblem, start: np.ndarray) -> Iterator[tuple[float, 
 
 
 def _scale(extent: np.ndarray) -> np.ndarray:
-    """The extents (p,), and 1 for a component that does not move."""
+    """Return the extents (p,), with 1 for a component that does not move."""
     return np.where(extent > 0.0, extent, 1.0)
 
 
 def _integrator(problem: OrbitProblem, state: np.ndarray) -> VariationalIntegrator:
-    """An integrator from a state that does not warn of short steps: its stretches are too short to have a mean."""
+    """Return an integrator from a state that never warns of short steps: its runs are too short for a mean."""
     integrator = problem.integrator(state[None])
     integrator.observes = True
     return integrator
@@ -96,7 +99,7 @@ def _integrator(problem: OrbitProblem, state: np.ndarray) -> VariationalIntegrat
 def _passage(
     integrator: VariationalIntegrator, before: np.ndarray, step: float, side: Callable[[np.ndarray], float]
 ) -> float:
-    """The time within the last step at which the orbit changed sides of a plane."""
+    """Return the time within the last step at which the orbit crossed a plane."""
     after = integrator.state
     ends = {0.0: side(before), step: side(after)}
 
@@ -113,12 +116,12 @@ def _passage(
 
 
 def _newton(problem: OrbitProblem, start: np.ndarray, time: float, extent: np.ndarray, closed: float) -> Cycle | None:
-    """The cycle near a state that is back after about some time; None if Newton's method leads elsewhere."""
+    """Return the cycle near a state, with a period near `time`; None if Newton's method leaves the neighbourhood."""
     state, period, near, rates, scale = start, time, NEAR * extent, problem.rates, _scale(extent)
     for steps in range(MOST_STEPS):
         try:
             image, matrix = _flow(problem, state, period)
-        except FloatingPointError:  # a correction that led far away
+        except FloatingPointError:  # the last correction led too far away
             return None
         gap = image - state
         if not np.all(np.abs(gap) <= near):
@@ -138,7 +141,7 @@ def _newton(problem: OrbitProblem, start: np.ndarray, time: float, extent: np.nd
 
 
 def _least(problem: OrbitProblem, cycle: Cycle, extent: np.ndarray, closed: float) -> Cycle:
-    """The cycle with its least period: one integration looks whether the state is back after a part of the period."""
+    """Return the cycle with its least period: test by one integration whether a fraction of the period is one."""
     integrator, time = _integrator(problem, cycle.state), 0.0
     near = math.sqrt(closed) * extent
     for parts in range(RETURNS, 1, -1):
@@ -152,7 +155,7 @@ def _least(problem: OrbitProblem, cycle: Cycle, extent: np.ndarray, closed: floa
 
 
 def _flow(problem: OrbitProblem, state: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
-    """The state a period later, and its derivative by the state."""
+    """Return the state one period later, and its derivative with respect to the state."""
     integrator = problem.integrator(state[None])
     propagators, logarithms = problem.propagators(integrator, period / problem.unit)
     return integrator.state[0], propagators[0, 0].real * float(np.exp(logarithms[0, 0]))

@@ -1,18 +1,18 @@
-"""Lyapunov exponents of a whole network, from its own start.
+"""Compute the Lyapunov exponents of a whole network, along the motion from its own start.
 
-Deviations are integrated over short blocks of time and made orthogonal after each. A block is short
-enough if every direction stands out of the error of the integration. Under a smoothed friction law,
-oscillators that stick lose their velocity deviations so fast that no block is short enough;
-exponents lost in this error are not reported as numbers. Their sum is known: the sum of all exponents
-is the mean divergence of the equations, which is integrated along the orbit. If one alone is lost, it
-is the difference.
+Deviations are integrated over short blocks of time and made orthogonal after each block. A block is short
+enough if every direction remains longer than the error of the integration. Under a smoothed friction law,
+the velocity deviations of oscillators that stick decay so fast that no block is short enough. The
+exponents of such lost directions are not reported as numbers. Only the sum of the lost exponents can be
+computed: the sum of all exponents is the mean divergence of the equations, which is integrated along the
+orbit. If a single exponent is lost, the difference gives it.
 
-`TangentFrame` holds the orbit (`orbits.OrbitProblem`, an integrator) and the orthogonal deviations;
-`lyapunov_spectrum` runs its transient, lets it choose the length of blocks, and averages the growth.
+`TangentFrame` holds the orbit (`orbits.OrbitProblem`, an integrator) and the orthogonal deviations.
+`lyapunov_spectrum` makes a frame, runs the transient, chooses the length of blocks, and averages the growth.
 
 Under set-valued friction, stick makes the velocity of a deviation zero, so that directions vanish
-within finite time. Their exponent is -inf by definition, and so is the sum. Such a direction comes
-out of a block with the length of a rounding error.
+within finite time. The exponent of a vanished direction is -inf by definition, and so is the sum. At the end
+of a block, a vanished direction has the length of a rounding error.
 
 Source: Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15, 9 (1980).
 """
@@ -50,39 +50,44 @@ PARTS = (1, 2, 4, 8, 16, 32, 64, 128, 256)
 """Numbers of blocks in a period that are tried, in ascending order."""
 
 ENOUGH = 64
-"""Blocks in a period beyond which more are tried only if the next direction is longer than ROUNDING (a choice)."""
+"""More than ENOUGH blocks in a period are tried only if the next direction is longer than ROUNDING (a choice)."""
 
 TRIAL = 4
-"""Periods of each trial, and periods that are dropped after the choice."""
+"""Number of periods of each trial, and number of periods that are dropped after the choice."""
 
 CLEAR, LOST = 1e4, 10.0
-"""Lengths of a direction after a block, in tolerances: above CLEAR it is clear of the error, below LOST it is lost (a choice)."""
+"""Lengths of a direction after a block, in units of rtol: a direction longer than CLEAR is resolved, one shorter than
+LOST
+is lost in the error (a choice)."""
 
 MOST_BLOCKS, FINE, FINEST = 32, 1e-7, 1e-10
-"""Most blocks between two orthogonalisations, and the least angle between directions before one: in trials, in averages."""
+"""MOST_BLOCKS: most blocks between two orthogonalisations. FINE, FINEST: least angle between directions before an
+orthogonalisation, in trials and in averages."""
 
 UNIT = 1024
-"""Factor between units of deviations: a power of two, and so large that components of usual sizes share a unit."""
+"""Units of deviations are powers of UNIT. UNIT is a power of two, so that no digit is lost, and so large that
+components
+of usual sizes share one unit."""
 
 LOOKED = 2
-"""Periods of the drive in which the extent of a motion is measured."""
+"""Number of drive periods in which the extent of a motion is measured."""
 
 LARGEST_RTOL = 1e-5
-"""Largest rtol: above it no direction is ever clear of the error."""
+"""Largest rtol that is accepted: with a larger one no direction is resolved."""
 
 ROUNDING = 1e-13
-"""Length of a direction that is rounding alone: only shorter blocks can show a longer one."""
+"""A direction of this length consists of rounding errors alone; only shorter blocks may resolve it."""
 
 GONE = 700.0
-"""A direction that shrinks by exp(-GONE) over a block is not integrated: floating-point numbers end at exp(-745)."""
+"""A direction that shrinks by more than exp(-GONE) over a block is not integrated: numbers underflow at exp(-745)."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Lyapunov(Labelled):
     """Lyapunov exponents of a network.
 
-    Exponents that differ by less than about 1/time are not separated yet: they share their sum, and
-    the errors do not include this.
+    Exponents that differ by less than about 1/time are not separated: only their sum is right. The
+    standard errors do not include this effect.
 
     Parameters
     ----------
@@ -91,20 +96,20 @@ class Lyapunov(Labelled):
     stderr : ndarray, shape (count,)
         Standard errors.
     resolved : ndarray of bool, shape (count,)
-        False if several directions decay too fast to be followed; their exponents are -inf. Their errors are 0 with
-        set-valued friction, where stick makes directions vanish, else nan.
+        False for a direction that decays too fast to be followed, if there are several; its exponent is -inf. Its
+        standard error is 0 under set-valued friction, where stick makes directions vanish, and nan otherwise.
     divergence : float
-        Mean divergence along the orbit: the sum of all exponents of the network. With set-valued
-        friction it is that sum itself, -inf if an oscillator has stuck, nan if not all exponents
-        are computed.
+        Mean divergence along the orbit, which is the sum of all exponents of the network. Under
+        set-valued friction, the computed exponents are added instead: the sum is -inf if an oscillator
+        has stuck, and nan if not all exponents are computed.
     divergence_error : float
         Standard error of `divergence`.
     time : float
-        Time averaged over.
+        Length of the average.
     block : float
         Time between two orthogonalisations.
     components : int
-        Number of all exponents.
+        Number of exponents of the network.
     unit : str
         Unit in which transient and average are counted.
     """
@@ -121,7 +126,7 @@ class Lyapunov(Labelled):
 
     @property
     def data(self) -> xr.Dataset:
-        """Exponents over their number, and the divergence."""
+        """Exponents over their index, and the divergence."""
         return dataset(
             {
                 "exponent": (("number",), self.exponent, "Lyapunov exponents per unit of time"),
@@ -151,15 +156,15 @@ class Lyapunov(Labelled):
 
     @property
     def rest(self) -> float:
-        """Sum of the exponents that are not resolved: the divergence less the resolved ones."""
+        """Sum of the exponents that are not resolved: the divergence minus the resolved exponents."""
         return self.divergence - float(self.exponent[self.resolved].sum())
 
     @property
     def dimension(self) -> float:
         """Kaplan-Yorke dimension; nan if it exceeds the number of computed exponents.
 
-        A negative exponent within its standard error counts as 0, as that along a periodic orbit is,
-        whose dimension is 1. `dimension_range` is the range within the errors.
+        A negative exponent within its standard error of 0 counts as 0. The exponent along a periodic orbit, for
+        example, is 0, and the dimension is 1. `dimension_range` is the range within the errors.
 
         References
         ----------
@@ -170,15 +175,15 @@ class Lyapunov(Labelled):
 
     @property
     def dimension_range(self) -> tuple[float, float]:
-        """Kaplan-Yorke dimension of the exponents less, and plus, two standard errors.
+        """Kaplan-Yorke dimensions of the exponents minus, and plus, two standard errors.
 
-        It rises with each exponent, so that all exponents within their errors give dimensions between.
+        The dimension rises with each exponent, so that all exponents within their errors give dimensions in this range.
         """
         errors = np.nan_to_num(2.0 * self.stderr, nan=0.0, posinf=math.inf)
         return self._dimension(self.exponent - errors), self._dimension(self.exponent + errors)
 
     def _dimension(self, exponent: np.ndarray) -> float:
-        """Kaplan-Yorke dimension of exponents in any order."""
+        """Return the Kaplan-Yorke dimension of exponents in any order."""
         exponent = -np.sort(-exponent)
         sums = np.cumsum(exponent)
         below = np.flatnonzero(sums < 0.0)
@@ -213,8 +218,8 @@ def lyapunov_spectrum(
         Number of largest exponents; all by default.
     {average}
     rtol : float, optional
-        Relative tolerance of the integration, at most 1e-5; by default that of the scene. The friction law may require a
-        smaller one.
+        Relative tolerance of the integration, at most 1e-5; by default that of the scene. The friction law may require
+        a smaller one.
     seed : int, optional
         Seed of the initial directions; by default that of the scene.
     {progress}
@@ -228,7 +233,7 @@ def lyapunov_spectrum(
     ------
     ValueError
         If there are more than eight oscillators, if `count` exceeds the number of exponents, if `rtol` is
-        too large, or if time enters without a known period.
+        too large, or if time enters the equations without a known period.
     FloatingPointError
         If the integration fails.
     """
@@ -266,14 +271,14 @@ def lyapunov_spectrum(
 
 
 def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray, steps: np.ndarray) -> Lyapunov:
-    """The result of an average; exponents after a lost direction are lost as well."""
+    """Return the result of an average; all exponents after a lost direction count as lost too."""
     resolved = ~np.logical_or.accumulate(lost)
     mean, error = batches.mean()[0], np.hypot(batches.error_by_start()[0], steps)
     unknown = np.nan if frame.variation.events is None else 0.0
     exponent, spread = np.where(resolved, mean[:-1], -np.inf), np.where(resolved, error[:-1], unknown)
     order = np.argsort(-exponent, kind="stable")
     time, volume = batches.time, (float(mean[-1]), float(error[-1]))
-    if frame.variation.events is not None:  # without volumes, the sum of all exponents takes their place
+    if frame.variation.events is not None:  # stick makes volumes zero: use the sum of all exponents
         complete = len(exponent) == frame.variation.size
         volume = (float(exponent.sum()), float(np.hypot.reduce(spread))) if complete else (math.nan, math.nan)
     return Lyapunov(
@@ -297,10 +302,10 @@ class TangentFrame:
     basis: np.ndarray  # (size, count): orthonormal deviations
     parts: int = 1  # blocks in a period
     phase: int = 0  # block within the period
-    group: int = 1  # blocks between two orthogonalisations, over which propagators are multiplied
-    # integrator of the propagator of the network, and the directions that it moves; made at the first call
+    group: int = 1  # number of blocks between two orthogonalisations
+    # integrator of the propagator of the network, and the directions that the propagator multiplies; made at first use
     carried: tuple[VariationalIntegrator, Deviations] | None = None
-    # matrix (size, size) of the variational equation at time 0, as a function of states and parameters
+    # function of states and parameters that returns the matrix (size, size) of the variational equation at time 0
     matrix: Callable[..., np.ndarray] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -314,10 +319,10 @@ class TangentFrame:
 
     @classmethod
     def make(cls, scene: Scene, count: int, seed: int) -> TangentFrame:
-        """Set up the frame at the scene's start, with random directions."""
+        """Return a frame at the scene's start, with random directions."""
         network = network_variation(without_drive(scene.equations, scene.parameters))
         sticks = network.events is not None
-        # the orbit carries the logarithms of volumes as its last states; stick makes volumes zero
+        # append the logarithms of volumes to the states of the orbit, unless stick makes volumes zero
         variation = network if sticks else Variation(with_volume(network.orbit), network.size, network.matrix)
         variation = phase_shifted(variation) if variation.orbit.forced else variation
         hidden = 0 if sticks else scene.n
@@ -326,7 +331,7 @@ class TangentFrame:
         state = problem.with_slip_states(start)
         basis = np.linalg.qr(np.random.default_rng(seed).normal(size=(network.size, count)))[0]
 
-        # measure the extent of the motion; in its units, deviations of all components are of like size
+        # measure the extent of the motion; in units of the extent, all components of a deviation have similar sizes
         if problem.forced:
             first = cls(problem, problem.integrator(state), basis, parts=LOOKS)
             states = [first.integrator.state[0]]
@@ -354,7 +359,7 @@ class TangentFrame:
 
     @property
     def volumes(self) -> int:
-        """Number of the last states that are logarithms of volumes."""
+        """Number of states, at the end of the state, that are logarithms of volumes."""
         return 0 if self.variation.events is not None else self.problem.scene.n
 
     @property
@@ -368,7 +373,10 @@ class TangentFrame:
         return float(self.integrator.control[0])
 
     def advance(self) -> tuple[np.ndarray, np.ndarray, float]:
-        """Advance by one block. Shapes: returns growth (count,), share (count,)."""
+        """Advance by one block; return growth (count,), remaining length (count,), and the growth of the volume.
+
+        The remaining length is the length of a direction after the block, before normalisation, at most 1.
+        """
         self._set_clock()
         self.phase = (self.phase + 1) % self.parts
         followed = self.followed()
@@ -395,9 +403,10 @@ class TangentFrame:
             self.integrator.parameter_values[:, names.index(PHASE.name)] = self.phase * (self.unit / self.parts)
 
     def followed(self) -> int:
-        """Number of directions that are integrated over the next block.
+        """Return the number of directions that are integrated over the next block.
 
-        Those that vanish long before its end are not: a relative tolerance follows them through every decade.
+        Directions that vanish long before the end of the block are not integrated: with a relative tolerance, the
+        integrator would resolve every decade of their decay.
         """
         matrix = self.matrix(*self.integrator.state[0], *self.integrator.parameter_values[0])
         length = self.unit / self.parts
@@ -407,7 +416,10 @@ class TangentFrame:
         return int((decay * length > -GONE).sum())
 
     def measure(self) -> tuple[np.ndarray, np.ndarray]:
-        """Advance by one block. Shapes: returns growth (count + 1,), lost (count,)."""
+        """Advance by one block.
+
+        Return the growth (count + 1,) of the directions and of the volume, and whether each direction is lost (count,).
+        """
         growth, share, volume = self.advance()
         lost = share < LOST * self.rtol
         if lost.sum() == 1 and self.count == self.variation.size and self.variation.events is None:
@@ -415,12 +427,15 @@ class TangentFrame:
         return np.append(np.where(np.isfinite(growth), growth, 0.0), volume), lost
 
     def measure_group(self, blocks: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Advance by several blocks; yield growth and lost directions of each, as `measure` does."""
+        """Advance by several blocks.
+
+        Yield the growth and the lost directions of each block, as `measure` returns them.
+        """
         begun, basis = self.integrator.state, self.basis
         if blocks > 1:
             growths, angles, volumes = self.advance_group(blocks)
             shares = growths - np.maximum(growths.max(axis=1, keepdims=True), 0.0)
-            # directions that stay apart and clear of the error; else the same blocks one by one
+            # accept the blocks if all directions stay apart and above the error; else repeat the blocks one by one
             if angles.min() > FINEST and shares.min() > math.log(LOST * self.rtol):
                 yield from zip(np.column_stack([growths, volumes]), np.zeros(growths.shape, dtype=bool), strict=True)
                 return
@@ -428,9 +443,9 @@ class TangentFrame:
         yield from (self.measure() for _ in range(blocks))
 
     def advance_group(self, blocks: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Advance by several blocks in one call, and make the directions orthogonal at the end.
+        """Advance by several blocks in one call; make the directions orthogonal only at the end.
 
-        Propagators of single blocks multiply the directions; they are as exact as the steps.
+        The propagator of each block multiplies the directions, and is as exact as the steps.
         Shapes: returns growths (blocks, count), angles (blocks, count), volumes (blocks,).
         """
         size, count = self.variation.size, self.count
@@ -438,7 +453,7 @@ class TangentFrame:
         self._set_clock()
         carrier.state, carrier.parameter_values = self.integrator.state, self.integrator.parameter_values
         carrier.set_deviations(np.eye(size)[None])
-        # the directions fill the lanes of the registers (registers, size, lanes), repeated in spare ones
+        # fill the lanes of the registers (registers, size, lanes) with the directions; repeat them in spare lanes
         lanes = deviations.registers.lanes
         registers = deviations.vectors.reshape(-1, size, lanes)
         directions = np.resize(self.basis.T, (len(registers) * lanes, size))
@@ -447,7 +462,7 @@ class TangentFrame:
         batch_starts = np.empty((1, blocks, states + registers.size))
         single = np.ones(blocks, dtype=np.int64)
         log_growth = carrier.follow(self.unit / self.parts, single, deviations, batch_starts)[:, 0]
-        # growth of the orthogonalised directions up to each block, and its change over the block
+        # compute the growth of the orthogonalised directions up to each block, and the change over each block
         ends = np.concatenate([batch_starts[0, 1:, states:].reshape(-1, *registers.shape), registers[None]])
         moved = ends.swapaxes(2, 3).reshape(blocks, -1, size)[:, :count].swapaxes(1, 2)
         bases, triangles = np.linalg.qr(moved)
@@ -463,7 +478,7 @@ class TangentFrame:
         return growths, angles, volumes
 
     def _carriers(self) -> tuple[VariationalIntegrator, Deviations]:
-        """An integrator of the propagator of the network, and the directions, which are all multiplied by it."""
+        """Return an integrator of the propagator of the network, and the directions that the propagator multiplies."""
         size, count, frame = self.variation.size, self.count, self.integrator
         carrier = frame
         if count < size:
@@ -474,7 +489,7 @@ class TangentFrame:
         return carrier, Deviations.make(registers, 1, size, size)
 
     def choose_group(self) -> None:
-        """Choose the most blocks between two orthogonalisations that keep all directions clear of rounding."""
+        """Choose the largest number of blocks between two orthogonalisations that keeps the directions apart."""
         self.group = 1
         phased = PHASE.name in self.variation.orbit.parameters and self.parts > 1
         if phased or self.followed() < self.count:
@@ -489,7 +504,7 @@ class TangentFrame:
             self.group *= 2
 
     def error_of_steps(self) -> np.ndarray:
-        """Advance by TRIED periods; return the error of all growth rates (count + 1,) by the steps."""
+        """Advance by TRIED periods; return the error of all growth rates (count + 1,) due to the steps."""
         usual, looser = [], []
         for _ in range(TRIED * self.parts):
             basis, phase = self.basis, self.phase
@@ -500,11 +515,11 @@ class TangentFrame:
         return error_of_steps(usual, looser, self.unit / self.parts)
 
     def choose_block(self) -> None:
-        """Choose the fewest blocks in a period that keep most directions clear of the error."""
+        """Choose the smallest number of blocks in a period for which most directions are resolved."""
         best, fewest = -1, 1
         for parts in PARTS:
             self.parts, self.phase = parts, 0
-            # a direction counts if it and all before it are clear of the error in every block
+            # a direction counts as resolved if it and all directions before it are longer than the error in every block
             shares = np.array([self.advance()[1] for _ in range(TRIAL * parts)])
             least = shares.min(axis=0)
             clear = np.logical_and.accumulate(least > CLEAR * self.rtol)
@@ -518,7 +533,7 @@ class TangentFrame:
 
 
 def _scaled(variation: Variation, extent: np.ndarray) -> Variation:
-    """The equation of deviations in units of the extent of each component, rounded to powers of UNIT."""
+    """Return the variational equation in units of the extent of each component, rounded to powers of UNIT."""
     moving = extent[: variation.size] > 0.0
     if not moving.any():
         return variation

@@ -1,14 +1,14 @@
-"""Mean growth of the deviations of many strengths along orbits, block by block.
+"""Compute the mean growth of the deviations of many strengths along orbits, block by block.
 
-1. `interpolation_for(problem, states, periods)` tries choices, the cheapest first, on the next blocks, and
-   returns a `BlockInterpolation`: the length of a block, and the few strengths (nodes) that are integrated; the
-   propagators of all others are interpolated from theirs.
-2. `March.begin(problem, states, interpolation)` sets an integrator of those few at the states, with one
-   deviation for each of all strengths.
-3. `March.growths(batches)` advances: in, blocks in each batch; out, the logarithm of the growth of every
-   deviation over each batch. `exponents.average` takes batches until the mean growth is precise.
+1. `interpolation_for(problem, states, periods)` tries choices on the next blocks, the cheapest first, and
+   returns a `BlockInterpolation`: the length of a block, and the few strengths (nodes) whose propagators are
+   integrated. The propagators of all other strengths are interpolated.
+2. `March.begin(problem, states, interpolation)` starts an integrator of the nodes at the states, with one
+   deviation for each strength.
+3. `March.growths(batches)` advances the orbits by the numbers of blocks in `batches`, and returns the logarithm
+   of the growth of every deviation over each batch. `exponents.average` adds batches until the mean is precise.
 
-The costs below count multiplications. They were fitted to timings of this package's kernels, and only rank the choices.
+The costs below count multiplications. The numbers were fitted to timings of the kernels, and only rank the choices.
 """
 
 from __future__ import annotations
@@ -24,44 +24,44 @@ from .orbits import OrbitProblem
 from .variational_integrator import NO_BATCH_STARTS, Deviations, VariationalIntegrator
 
 NODES, PARTS = (13, 21, 29, 37, 61), (1, 2, 4, 8, 16)
-"""Nodes of a panel of strengths, and panels on each side, that are tried; with three strengths for comparison, nodes fill
-registers of eight."""
+"""Numbers of nodes of a panel, and of panels on each side, that are tried. The nodes and three strengths for comparison
+together fill registers of eight lanes."""
 
 BLOCKS, FREE_BLOCKS = (8.0, 4.0, 2.0, 1.0), (1.0, 0.5, 0.25, 0.125)
 """Lengths of a block that are tried, in periods of a drive and in turns of undriven motion (a choice)."""
 
 STEP, BLOCK, STRENGTH, LANDINGS = 200, 60_000, 42, 5_000
-"""Costs in multiplications: a step of one deviation; a block without any deviation; a strength in a block, as a number of
-nodes; the landings within a unit of time."""
+"""Costs in multiplications. STEP: one step of one deviation. BLOCK: a block, apart from its deviations. STRENGTH: one
+strength in a block costs as much as STRENGTH further nodes. LANDINGS: all landings in a unit of time."""
 
 LONGEST_STICK = 4.0
 """Shortest block, in units of time, that is longer than most intervals between two landings."""
 
 ALLOWED = 1e-12
-"""Interpolation error that is accepted however small rtol is: rounding of a propagator and of its weights."""
+"""Interpolation errors below ALLOWED are accepted at any rtol: rounding of propagators and weights causes as much."""
 
 HOPELESS, FURTHER = 0.1, 1.45
-"""After an error above HOPELESS, choices with fewer than FURTHER times as many nodes are skipped: errors of polynomials
-fall geometrically with their number of nodes."""
+"""After an error above HOPELESS, choices with fewer than FURTHER times as many nodes are skipped: the error of a
+polynomial falls geometrically with the number of nodes."""
 
 TRIAL = 8
-"""Blocks on which an interpolation is tried (a choice)."""
+"""Number of blocks on which an interpolation is tried (a choice)."""
 
 MODE_TOLERANCE_RATIO = 10.0
-"""Ratio of the tolerance of the modes to that of the orbit if their growth is averaged.
+"""Ratio of the tolerance of the modes to that of the orbit, if the growth of the modes is averaged.
 
-It moves exponents by less than rtol, but more where a multiplier passes through zero: there the
-exponent dips towards -inf and magnifies every error.
+The larger tolerance changes exponents by less than rtol. The change is larger where a multiplier passes through
+zero: the exponent dips towards -inf there and magnifies every error.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class BlockInterpolation:
-    """The propagators of all strengths over a block, interpolated from those of few."""
+    """The length of a block, and the interpolation of the propagators of all strengths over a block."""
 
     block: float  # length of a block in units of time
     strengths: Interpolation  # from the nodes to all strengths
-    # of bodies that stick: from the strengths that are integrated from landing to landing to the nodes
+    # for bodies that stick: from the strengths that are integrated between landings, to the nodes of `strengths`
     stick_intervals: Interpolation | None = None
 
     @property
@@ -72,12 +72,12 @@ class BlockInterpolation:
 
 @dataclass(slots=True)
 class March:
-    """Orbits that advance by blocks, and the deviations of all strengths along them."""
+    """Orbits that advance block by block, with the deviations of all strengths along the orbits."""
 
     problem: OrbitProblem
     block: float  # length of a block in units of time
     integrator: VariationalIntegrator  # orbits with the propagators of the nodes
-    deviations: Deviations  # of all strengths, with the largest error of the interpolation so far
+    deviations: Deviations  # deviations of all strengths, with the largest interpolation error so far
 
     @classmethod
     def begin(
@@ -87,7 +87,7 @@ class March:
         interpolation: BlockInterpolation,
         tolerance_ratio: float = MODE_TOLERANCE_RATIO,
     ) -> March:
-        """Start deviations of all strengths along the orbits from states (starts, components)."""
+        """Return a march from states (starts, components), with deviations of all strengths."""
         nodes, intervals = interpolation.strengths, interpolation.stick_intervals
         if problem.lands and intervals is None:
             intervals = exact_interpolation(nodes.nodes)
@@ -104,18 +104,21 @@ class March:
         return cls(problem, interpolation.block, integrator, deviations)
 
     def growths(self, batches: np.ndarray, batch_starts: np.ndarray = NO_BATCH_STARTS) -> np.ndarray:
-        """Advance by batches (b,) of blocks; return the logarithm of the growth (b, starts, m) over each.
+        """Advance by batches (b,) of blocks; return the logarithm of the growth (b, starts, m) over each batch.
 
-        Orbits and deviations at the beginning of each batch go into `batch_starts` (starts, b, any).
+        The states and deviations at the beginning of each batch are stored in `batch_starts` (starts, b, any).
         """
         return self.integrator.follow(self.block * self.problem.unit, batches, self.deviations, batch_starts)
 
     def tried(self, most: int) -> tuple[np.ndarray, np.ndarray]:
-        """Advance by TRIED blocks, or by fewer; return their growth (blocks, starts, m) and its error by the steps (starts, m)."""
+        """Advance by TRIED blocks, at most `most`; return the growth, and the error due to the steps.
+
+        Shapes: returns growth (blocks, starts, m), error (starts, m).
+        """
         count, (starts, size), vectors = min(most, TRIED), self.integrator.state.shape, self.deviations.vectors
         begun = np.empty((starts, count, size + vectors.shape[1]))
         usual = self.growths(np.ones(count, dtype=np.int64), begun)
-        # each block once more with looser steps, from where it began: all blocks are cells of one call
+        # integrate each block again from its start with looser tolerances; all blocks are cells of one call
         begun = begun.swapaxes(0, 1).reshape(count * starts, -1)
         beside = self.integrator.beside(np.ascontiguousarray(begun[:, :size]), TOLERANCE_RATIO)
         deviations = replace(self.deviations, vectors=np.ascontiguousarray(begun[:, size:]))
@@ -125,11 +128,11 @@ class March:
 
 
 def interpolation_for(problem: OrbitProblem, states: np.ndarray, periods: float) -> BlockInterpolation:
-    """Choose block and interpolation for an average over some periods by trial on the next blocks.
+    """Choose the block length and the interpolation for an average over some periods, by trial on the next blocks.
 
     Shapes: states (starts, components).
     """
-    limit = max(0.01 * problem.scene.rtol, ALLOWED)  # later blocks of a chaotic orbit are up to ten times worse
+    limit = max(0.01 * problem.scene.rtol, ALLOWED)  # the error of later blocks may be ten times larger
     failed: list[InterpolationChoice] = []
     for choice in _choices(problem, states, periods):
         if any(choice.is_coarser(other) for other in failed):
@@ -148,14 +151,14 @@ def interpolation_for(problem: OrbitProblem, states: np.ndarray, periods: float)
 
 @dataclass(frozen=True, slots=True)
 class InterpolationChoice:
-    """A block and numbers of nodes, with their cost."""
+    """A length of a block and numbers of nodes, with their cost."""
 
     cost: float  # multiplications for a unit of time
     block: float
-    nodes: int  # of a panel
-    parts: int  # panels on each side
+    nodes: int  # number of nodes of a panel
+    parts: int  # number of panels on each side
     stick_nodes: int = (
-        0  # nodes of a panel that are integrated from landing to landing; 0 if all are, over whole blocks
+        0  # number of nodes of a panel that are integrated between landings; 0: all nodes, over whole blocks
     )
 
     def of(self, strengths: np.ndarray) -> BlockInterpolation:
@@ -165,17 +168,17 @@ class InterpolationChoice:
         return BlockInterpolation(self.block, outer, inner)
 
     def is_coarser(self, other: InterpolationChoice) -> bool:
-        """True if another choice has shorter blocks and more nodes, in each panel and in all, or as many.
+        """Return True if the other choice has blocks no longer, and nodes no fewer, both in a panel and in all.
 
-        Of as many nodes in all, those of few panels interpolate better.
+        Of two choices with the same number of nodes, the one with fewer panels interpolates better.
         """
         these, others = ((c.nodes, c.stick_nodes, c.nodes * c.parts, c.stick_nodes * c.parts) for c in (self, other))
         return self.block >= other.block and all(a <= b for a, b in zip(these, others, strict=True))
 
 
 def _choices(problem: OrbitProblem, states: np.ndarray, periods: float) -> list[InterpolationChoice]:
-    """Choices for an average over some periods, the cheapest first."""
-    # the steps that a single mode takes in a unit of time give the cost of a node
+    """Return the choices for an average over some periods, the cheapest first."""
+    # the cost of a node follows from the number of steps that a single mode takes in a unit of time
     one = problem.integrator(states, problem.strengths[:1], MODE_TOLERANCE_RATIO)
     one.advance(problem.unit)
     node_cost = STEP * problem.components * one.steps / len(states)
@@ -184,7 +187,7 @@ def _choices(problem: OrbitProblem, states: np.ndarray, periods: float) -> list[
     blocks = [b for b in BLOCKS if b <= max(4.0, periods / BATCHES) and periods % b == 0.0]
     choices: list[InterpolationChoice] = []
     if problem.lands and lines == 1:
-        # a body that sticks: one column of two is integrated, one entry of four is interpolated
+        # for bodies that stick, one column of two is integrated, and one entry of four is interpolated
         long_blocks = [b for b in blocks if b >= LONGEST_STICK]
         for block, stick_nodes, nodes, parts in itertools.product(long_blocks, NODES, NODES, PARTS):
             if stick_nodes < nodes:

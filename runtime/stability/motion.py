@@ -1,9 +1,10 @@
-"""Scales of a motion: the extent of each component, the time of a turn, and the size of the terms of rates.
+"""Measure the scales of a motion: the extent of each component, the time of a turn, and the size of terms of rates.
 
-They depend on no unit: lengths follow x -> s x + c for each component, times follow t -> k t.
+The scales depend on no unit: extents scale with x -> s x + c for each component, times with t -> k t.
 
-A path is integrated in steps short beside the extent so far (`path`); tops of its components, or the
-slowest rate of the equilibrium that it comes to, give the unit of time (`turns_of`).
+A path is integrated in steps that are short compared with the extent so far (`path`). The unit of time
+(`turns_of`) is the mean time between maxima of a component. If the path ends at an equilibrium, the unit
+follows from the slowest rate there.
 """
 
 from __future__ import annotations
@@ -24,24 +25,26 @@ from .averages import ROUNDING
 from .variational_integrator import VariationalIntegrator
 
 SHARE = 8
-"""Fewest steps of a path from one end of a component to the other (a choice)."""
+"""A path takes at least SHARE steps from one end of the extent of a component to the other (a choice)."""
 
 FINE = 6
-"""A step of a path is repeated in halves if it takes more than FINE integrator steps beyond twice those of the last one: it
-hides a spike."""
+"""A step of a path probably hides a spike, and is repeated in halves, if its number of integrator steps exceeds twice
+that
+of the last step by more than FINE."""
 
 TURNED, JUMP = 0.5, 32
-"""Least cosine of the angle by which the motion turns in a step of a path; a step JUMP times shorter than the last one may
-turn by more: rates jump there."""
+"""TURNED: least cosine of the angle by which the motion may turn in a step of a path. JUMP: a step JUMP times shorter
+than
+the last one may turn by more, because the rates jump there."""
 
 FIRST = 1e-6
-"""First step of a path, relative to the shortest time estimated at the start: nothing happens in it."""
+"""First step of a path, relative to the shortest time estimated at the start; the motion hardly changes in it."""
 
 SAMPLES, LOOKED, OFTEN = 4096, 64, 8
-"""Most steps of a path, steps between two counts of turns, and between two tests for an even drift (a choice)."""
+"""Most steps of a path; steps between two counts of turns; steps between two tests for an even drift (a choice)."""
 
 NOISE = 10.0
-"""Rates are constant if they change by less than NOISE rtol of their change over the extent."""
+"""Rates count as constant if they change by less than NOISE rtol times their change over the extent."""
 
 EVEN = 1e-3
 """Largest relative change of the speed of an even drift (a choice)."""
@@ -50,39 +53,44 @@ CLEAR = 1 / 32
 """Least rise and fall of a turn, relative to the extent of its component (a choice)."""
 
 ENOUGH = 12
-"""Turns of which the mean is taken (a choice)."""
+"""Number of turns in the mean (a choice)."""
 
 REST = 1e-9
-"""Rates are zero if they are below their change over this part of the extent of the motion."""
+"""Rates count as zero if they are below their change over this part of the extent of the motion."""
 
 DIGITS = 1e-10
-"""Errors of steps: a rate below this part of its terms is zero, a component that moves less than this part of its size rests."""
+"""Relative error of steps: a rate below this part of its terms counts as zero; a component that moves by less than this
+part of its size is at rest."""
 
 ASIDE = 1e-6
-"""Displacement of the difference quotients of rates, relative to the extent of the motion."""
+"""Displacement in difference quotients of rates, relative to the extent of the motion."""
 
 STILL = 1e-6
-"""A component whose later motion is below this part of all its motion has come to rest: its approach is its extent."""
+"""A component is at rest if its later motion is below this part of its whole motion; the whole motion is then its
+extent."""
 
 FLAT = 1e-6
-"""Rates of an equilibrium below this part of the fastest are not resolved by difference quotients."""
+"""Difference quotients do not resolve rates of an equilibrium below this part of the fastest rate."""
 
 REACH = 0.4
 """Largest distance of a further start in the first component, relative to the extent of the motion (a choice)."""
 
 
 class RateFunctions(NamedTuple):
-    """Rates (p,) of a state (p,) at time 0, and the sums of the sizes of their terms, with those of a drive at its largest."""
+    """Functions of a state (p,) at time 0: the rates (p,), and the sum of the absolute values of each rate's terms.
+
+    Terms of a drive count with their amplitude.
+    """
 
     values: Callable[[np.ndarray], np.ndarray]
     sizes: Callable[[np.ndarray], np.ndarray]
 
     def rounding(self, state: np.ndarray, time: float) -> np.ndarray:
-        """Return the distance (p,) that each component may move by rounding alone within a time."""
+        """Return the distance (p,) by which rounding alone may move each component within a time."""
         return np.asarray(ROUNDING * (np.abs(state) + np.nan_to_num(time * self.sizes(state))))
 
     def slopes(self, state: np.ndarray, extent: np.ndarray) -> np.ndarray:
-        """Return the change (p, p) of each rate if one component moves by its extent, to first order."""
+        """Return the change (p, p) of each rate, to first order, if one component moves by its extent."""
         here = self.values(state)
         with np.errstate(all="ignore"):
             moved = [self.values(state + move) - here for move in np.diag(ASIDE * extent)]
@@ -93,11 +101,11 @@ class Turns(NamedTuple):
     """A unit of time, and the extent of a motion."""
 
     time: float  # period of the drive, or mean time of a turn
-    extent: np.ndarray  # (p,): of each component
-    label: str = "unit of time"  # meaning of the time
+    extent: np.ndarray  # (p,): extent of each component
+    label: str = "unit of time"  # text that describes `time`
 
     def __str__(self) -> str:
-        """Meaning and length of the unit of time."""
+        """Return the meaning and the length of the unit of time."""
         return f"{self.label}, {self.time:.6g} units of time"
 
 
@@ -116,7 +124,10 @@ def rates_of(equations: Equations, parameters: dict[str, float]) -> RateFunction
 
 
 def _size(e: sp.Expr) -> sp.Expr:
-    """The sum of the sizes of the terms of an expression, in products too; waves of time count with their amplitude."""
+    """Return the sum of the absolute values of the terms of an expression, also inside products.
+
+    Sines and cosines of time count with their amplitude.
+    """
     if isinstance(e, sp.sin | sp.cos) and e.has(TIME):
         return sp.S.One
     if isinstance(e, sp.Add | sp.Mul):
@@ -129,28 +140,35 @@ def _size(e: sp.Expr) -> sp.Expr:
 def extent_of(
     states: np.ndarray, settled: np.ndarray, still: float = STILL, rounding: np.ndarray | float = 0.0
 ) -> np.ndarray:
-    """Return the extent of each component (…) in settled states (k, …), or in all states if it has come to rest.
+    """Return the extent of each component (…) in the `settled` states (k, …).
 
-    It rests if it moves by less than rounding, or by less than a part `still` of all its motion.
+    The extent of a component at rest is that in all `states`. A component is at rest if it moves by less than
+    `rounding`, or by less than the part `still` of its motion in all states.
     """
     later, total = np.ptp(settled, axis=0), np.ptp(states, axis=0)
     return np.where(later > np.maximum(still * total, rounding), later, total)
 
 
 def above(extent: np.ndarray, rounding: np.ndarray) -> np.ndarray:
-    """Return the extents (…), 0 for those that may be rounding."""
+    """Return the extents (…), with 0 for an extent that may be rounding alone."""
     return np.where(extent > rounding, extent, 0.0)
 
 
 def starts_near(state: np.ndarray, extent: np.ndarray, count: int, seed: int) -> np.ndarray:
-    """Return `count` states: the given one (p,), and copies up to REACH extents away in the first component, at random."""
+    """Return `count` states: `state` (p,), and copies with a random displacement of the first component.
+
+    The displacement is at most REACH times the extent.
+    """
     starts = np.tile(state, (count, 1))
     starts[1:, 0] += extent[0] * np.random.default_rng(seed).uniform(-REACH, REACH, count - 1)
     return starts
 
 
 def rests(rates: RateFunctions, state: np.ndarray, closed: float, extent: np.ndarray) -> bool:
-    """Return True if the rates at a state are zero: below rounding of their terms, or their change over a part `closed` of the extent."""
+    """Return True if the rates at a state count as zero.
+
+    A rate counts as zero if it is below the rounding of its terms, or below its change over `closed` times the extent.
+    """
     changes = np.abs(rates.slopes(state, extent)).sum(axis=1)
     here = np.abs(rates.values(state))
     return bool(np.all(here <= np.nan_to_num(closed * changes) + DIGITS * rates.sizes(state)))
@@ -159,11 +177,11 @@ def rests(rates: RateFunctions, state: np.ndarray, closed: float, extent: np.nda
 def path(
     integrator: VariationalIntegrator, rates: RateFunctions, shortest: float, hidden: int = 0
 ) -> Iterator[tuple[np.ndarray, float, np.ndarray, np.ndarray]]:
-    """Advance a single orbit by steps in which no component moves by more than a share of its extent, and the motion does not turn round.
+    """Advance one orbit by steps in which components move by a small part of their extents and the motion hardly turns.
 
-    Yield, after each step, the state before it, its length, the extent (p,) so far and the rates (p,) after it.  Steps of
-    the shortest length may move by more, as the first ones do, and so may turns at a jump of the rates.  The `hidden` last
-    states of the integrator are no part of the motion.
+    After each step, yield the state before the step, the length of the step, the extent (p,) so far, and the rates (p,)
+    after the step. A step of the shortest length may move or turn by more; the first steps do, and so do steps across a
+    jump of the rates. The last `hidden` states of the integrator are no part of the motion.
     """
     count = integrator.state.shape[1] - hidden
     step, low, high = shortest, integrator.state[0, :count].copy(), integrator.state[0, :count].copy()
@@ -185,14 +203,17 @@ def path(
 
 
 def _cosine(first: np.ndarray, second: np.ndarray, extent: np.ndarray) -> float:
-    """Cosine of the angle between two rates (p,), each component in units of its extent; NaN if one of them is zero."""
+    """Return the cosine of the angle between two vectors of rates (p,), in units of the extents.
+
+    NaN if a vector is zero.
+    """
     with np.errstate(all="ignore"):
         a, b = (np.where(extent > 0.0, rate / extent, 0.0) for rate in (first, second))
         return float(a @ b / np.sqrt((a @ a) * (b @ b)))
 
 
 def shortest_time(rates: RateFunctions, state: np.ndarray) -> float:
-    """Return a time in which nothing happens at a state that does not rest, by its rates and their slopes; 1 without any."""
+    """Return a time in which a state hardly changes, from its rates and their slopes; 1 if all of them are zero."""
     size, speed = np.abs(state), np.abs(rates.values(state))
     moving = (size > 0.0) & (speed > 0.0)
     times = [*(size[moving] / speed[moving])]
@@ -204,11 +225,11 @@ def shortest_time(rates: RateFunctions, state: np.ndarray) -> float:
 
 
 def turns_of(integrator: VariationalIntegrator, rates: RateFunctions, hidden: int = 0) -> Turns:
-    """Measure the mean return time of an undriven orbit, or the slowest rate of the equilibrium that it comes to.
+    """Measure the mean return time of an undriven orbit, or the slowest rate of the equilibrium that the orbit reaches.
 
-    A motion with constant rates, such as that of locked phases, is at an equilibrium that drifts.  A turn
-    of a component lasts from one top to the next, with a fall and a rise by CLEAR of its extent at least between them.
-    The component with most turns counts; they are looked for in the later three quarters of a path.
+    A motion with constant rates, such as that of locked phases, counts as an equilibrium that drifts. A turn of a
+    component lasts from one maximum to the next; between them the component falls and rises by at least CLEAR times its
+    extent. The component with the most turns gives the time. Only the later three quarters of a path are searched.
     """
     count = integrator.state.shape[1] - hidden
     start = integrator.state[0, :count].copy()
@@ -231,9 +252,9 @@ def turns_of(integrator: VariationalIntegrator, rates: RateFunctions, hidden: in
                     break
                 if k % OFTEN == 0 and _drift(rates, times, states, velocities, extent, closed) is not None:
                     break
-        except FloatingPointError:  # an unbounded motion is refused in its transient
+        except FloatingPointError:  # the transient raises the error for an unbounded motion
             pass
-    # beside an even drift only the approach to it counts as motion: locked phases turn on at one speed
+    # subtract an even drift, such as that of locked phases: only the approach to the drift counts as motion
     at_rest = rests(rates, states[-1], REST, extent)
     even = np.zeros_like(start) if at_rest else _drift(rates, times, states, velocities, extent, closed)
     early, path_states = len(times) // 4, np.array(states)
@@ -257,11 +278,11 @@ def _drift(
     extent: np.ndarray,
     closed: float,
 ) -> np.ndarray | None:
-    """The rates (p,) of a motion that have not changed in the later half of its time; None if they have."""
+    """Return the rates (p,) if they have not changed in the later half of the time, else None."""
     if len(states) <= LOOKED:
         return None
     first = bisect_left(times, 0.5 * times[-1])
-    # the slow part of a relaxation oscillation looks alike beside its jumps: wait until the motion has come far at one speed
+    # the slow part of a relaxation oscillation resembles a drift: wait until the motion has gone far at one speed
     far = (SHARE * np.abs(states[-1] - states[first]) >= extent) & (extent > 0.0)
     if not far.any():
         return None
@@ -274,7 +295,7 @@ def _drift(
 
 
 def _mean_turn(times: np.ndarray, states: np.ndarray, fewest: int) -> float:
-    """Mean time between tops of the component with most of them; 0 if there are fewer than `fewest` turns."""
+    """Return the mean time between maxima of the component with the most maxima; 0 for fewer than `fewest` turns."""
     best, mean = fewest, 0.0
     for x in states.T:
         extent = np.ptp(x)
@@ -287,7 +308,10 @@ def _mean_turn(times: np.ndarray, states: np.ndarray, fewest: int) -> float:
 
 
 def _tops(x: np.ndarray, least: float) -> list[int]:
-    """Where a component (k,) is largest between a rise and a fall by more than `least`; the first rise comes after a fall."""
+    """Return the indices of the maxima of a component (k,) between a rise and a fall by more than `least`.
+
+    The first rise must come after a fall.
+    """
     steps = np.diff(x)
     extremes = [*(np.flatnonzero(steps[1:] * steps[:-1] <= 0.0) + 1), len(x) - 1]
     tops, low, high, rising = list[int](), 0, 0, False
@@ -305,7 +329,7 @@ def _tops(x: np.ndarray, least: float) -> list[int]:
 
 
 def _slowest(rates: RateFunctions, state: np.ndarray, extent: np.ndarray) -> float:
-    """The slowest rate of an equilibrium that is resolved; 0 if there is none."""
+    """Return the slowest resolved rate of an equilibrium; 0 if no rate is resolved."""
     scale = np.where(extent > 0.0, extent, np.where(state != 0.0, np.abs(state), 1.0))
     slopes = rates.slopes(state, scale) / scale[None, :]
     if not np.isfinite(slopes).all():

@@ -1,13 +1,14 @@
-"""The master stability function of a scene: exponents, ranges where they are negative, their class.
+"""Compute the master stability function of a scene: exponents, ranges of negative exponents, and stability class.
 
-Each stage takes what the one before returns:
+Each stage takes the result of the stage before:
 
 1. `exponents.coupled_cell`: scene and keywords → one cell with a link between equal oscillators.
-2. `exponents.orbits_of`: cell, strengths alpha → `OrbitProblem` of the modes, and the starts.
-3. `exponents.along`: problem, starts → `Exponents`. Each start runs its transient; `find_attractor` looks for a
-   fixed point or a cycle, whose exponents are eigenvalues; other motion is averaged by a `March`.
-4. Here: `Exponents` on a line → `MSF`, with its class and, for the eigenvalues of a network, windows of sigma;
-   on a grid → `Plane`. Over a parameter of the scene, stages 2 and 3 run for each synchronous orbit.
+2. `exponents.orbits_of`: cell, strengths alpha → `OrbitProblem` of the modes, and initial states.
+3. `exponents.along`: problem, initial states → `Exponents`. After the transient of each start, `find_attractor`
+   looks for a fixed point or a cycle, whose exponents follow from eigenvalues; a `March` averages other motion.
+4. Here: `Exponents` on a line → `MSF`, with the stability class and the windows of sigma of the network;
+   `Exponents` on a grid → `Plane`. If an axis is a parameter of the scene, stages 2 and 3 run for each
+   synchronous orbit.
 
 Sources: classes by the zeros of the function on alpha > 0, Huang, Chen, Lai & Pecora, Phys. Rev. E
 80, 036204 (2009); several intervals ("ragged"), Stefański, Perlikowski & Kapitaniak, Phys. Rev. E
@@ -52,33 +53,39 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 STRENGTHS = ("alpha", "beta")
-"""Names of the axes of a plane that are strengths of a mode; a parameter may have such a name too."""
+"""Axes of a plane with these names are the real and imaginary part of a mode's strength. A parameter may have one of
+these
+names too."""
 
 NAMES = frozenset(
     {"attractor", "attractors", "contours", "exponent", "mode", "modes", "number", "start", "stderr", "windows"}
 )
-"""Names in the data of a plane that no axis may have, beside those of all results."""
+"""Names in the data of a plane that no axis may have, in addition to the reserved names of all results."""
 
 MOST_MODES = 6
-"""Most modes that a summary lists (a choice)."""
+"""Largest number of modes in a summary (a choice)."""
 
 LOOKED_UP = 2001
-"""Values of sigma at which the modes of a network are looked up in a plane (a choice)."""
+"""Number of values of sigma at which the exponents of a network's modes are interpolated in a plane (a choice)."""
 
 FINE = 1001
-"""Least number of strengths of a master stability function; ends of ranges are interpolated between them (a choice)."""
+"""Least number of strengths of a master stability function; ends of ranges are interpolated between strengths (a
+choice)."""
 
 
 STRENGTH_COUNT, TOP = 241, 1.2
-"""Strengths of a function by default, and the last one if the scene says none: twelve tenths, as in the paper's figures."""
+"""Default number of strengths of a function, and the last strength if the scene determines none: 1.2, as in the figures
+of
+the paper."""
 
 
 class StabilityClass(StrEnum):
-    """Class of a master stability function by its zeros on the grid of alpha.
+    """Stability class: the number and position of the zeros of a master stability function on the grid of alpha.
 
-    NEVER has no zero and is positive, EVERYWHERE no zero and is negative. HALF_LINE is stable from
-    one zero to the end of the grid. BOUNDED is one interval, which may begin with the grid.
-    UNDECIDED has no exponent that is negative by more than its error, but some that may be.
+    NEVER: the function is positive and has no zero. EVERYWHERE: it is negative and has no zero.
+    HALF_LINE: it is negative from one zero to the end of the grid. BOUNDED: it is negative in one
+    interval, which may begin with the grid. UNDECIDED: no exponent is negative by more than its error, but
+    some may be negative.
     """
 
     NEVER = "never stable"
@@ -91,7 +98,7 @@ class StabilityClass(StrEnum):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class MSF(Labelled):
-    """The function on a line of real strengths.
+    """Master stability function on a line of real strengths.
 
     Parameters
     ----------
@@ -100,7 +107,7 @@ class MSF(Labelled):
     alpha : ndarray, shape (m,)
         Requested strengths.
     fine : Exponents
-        The function on at least FINE strengths, which contain `alpha`.
+        The exponents at 1001 strengths or more, among them `alpha`.
     """
 
     scene: Scene
@@ -109,7 +116,7 @@ class MSF(Labelled):
 
     @property
     def data(self) -> xr.Dataset:
-        """The function over alpha, and the intervals where it is negative."""
+        """The function over alpha, and the intervals in which the function is negative."""
         windows = () if self._why_no_windows else self.windows
         return dataset(
             {
@@ -129,7 +136,7 @@ class MSF(Labelled):
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
-        """Scene, class, stable ranges of alpha and of sigma, whether the network can synchronise, sizes, motion."""
+        """Scene, class, stable ranges of alpha and sigma, whether the network can synchronise, sizes, motion."""
         fine, unknown = self.fine, self._why_no_windows
         sigma = [unknown] if unknown else [window.text() for window in self.windows]
         possible = [] if unknown else [("possible", self.verdict.text), *defective_rows(self.scene.topology)]
@@ -149,7 +156,7 @@ class MSF(Labelled):
 
     @property
     def _why_no_windows(self) -> str:
-        """The reason why the network has no windows; empty if it has."""
+        """The reason why windows are not defined for the network; empty if they are defined."""
         graph = self.scene.topology
         if not graph.link_count:
             return "not known: no links"
@@ -163,7 +170,7 @@ class MSF(Labelled):
 
     @property
     def verdict(self) -> Verdict:
-        """Whether the network can synchronise for some sigma > 0; GRID_ENDS if a longer line of alpha may change the answer."""
+        """Whether the network can synchronise for some sigma > 0; GRID_ENDS if a longer grid may change the answer."""
         on_grid = verdict(self.intervals, self.scene.topology, self.errors)
         first, last = self.fine.alpha[[0, -1]]
         longer = [(0.0 if a == first else a, math.inf if b == last else b) for a, b in self.intervals]
@@ -191,19 +198,19 @@ class MSF(Labelled):
 
     @property
     def uncertainties(self) -> tuple[Interval, ...]:
-        """Errors of the ends of the intervals, of averages and of interpolation; 0 at an end of the grid."""
+        """Errors of the ends of the intervals, from averages and interpolation; 0 at an end of the grid."""
         return tuple((low, high) for (_, low), (_, high) in self.fine.ranges)
 
     @property
     def kind(self) -> StabilityClass:
-        """Class of the function on its grid, by the signs that are certain."""
+        """Class of the function on its grid; only signs that are certain count."""
         if self.undecided and not self.intervals:
             return StabilityClass.UNDECIDED
         return classify(self.intervals, float(self.fine.alpha[-1]), float(self.fine.alpha[0]))
 
     @property
     def gamma(self) -> str:
-        """Class by the number of zeros on alpha > 0, Γ0, Γ1, Γ2 …, of a function that is positive before them; else empty."""
+        """Class Γ0, Γ1, Γ2 … by the number of zeros on alpha > 0; empty if the function is not positive at first."""
         alpha, inside = self.fine.alpha, [end for pair in self.intervals for end in pair]
         if (
             self.kind is StabilityClass.UNDECIDED
@@ -215,7 +222,7 @@ class MSF(Labelled):
 
     @property
     def undecided(self) -> tuple[Interval, ...]:
-        """Ranges of alpha where the exponent seems to change its sign, but by less than two errors."""
+        """Ranges of alpha where the exponent changes its sign by less than two standard errors."""
         return self.fine.undecided
 
     @property
@@ -225,7 +232,7 @@ class MSF(Labelled):
 
     @property
     def errors(self) -> tuple[Interval, ...] | None:
-        """The uncertainties of the ends; None if an average was too short to estimate them."""
+        """The uncertainties of the ends of the intervals; None if an average was too short to estimate them."""
         uncertainties = self.uncertainties
         return uncertainties if np.isfinite(uncertainties).all() else None
 
@@ -233,14 +240,15 @@ class MSF(Labelled):
     def windows(self) -> tuple[Window, ...]:
         """Ranges of sigma in which every mode of the scene's network is stable.
 
-        Eigenvalues must be real. At an end that comes from an end of the grid no mode is lost, and the error is infinite.
-        All errors but those at sigma = 0 are infinite if an average was too short to estimate them.
+        The eigenvalues must be real. An end of a window that follows from an end of the grid has no mode that becomes
+        unstable, and an infinite error. If an average was too short to estimate errors, all errors except those at
+        sigma = 0 are infinite.
         """
         first, last = map(float, self.fine.alpha[[0, -1]])
         windows_of_modes = windows(self.open_ranges, self.scene.topology, self.errors)
 
         def lost(sigma: float, mode: NetworkMode | None, grid_end: float) -> NetworkMode | None:
-            """The mode that is lost at an end, None where its strength is the end of the grid."""
+            """Return the mode that becomes unstable at an end; None if its strength there is the end of the grid."""
             return None if mode is None or math.isclose(sigma * mode.size, grid_end, rel_tol=1e-12) else mode
 
         def uncertainty(sigma: float, mode: NetworkMode | None, error: float) -> float:
@@ -255,7 +263,7 @@ class MSF(Labelled):
 
     @property
     def open_ranges(self) -> tuple[Interval, ...]:
-        """The intervals as used for a network: the function counts as unstable beyond the grid."""
+        """The intervals that are used for a network, for which the function counts as positive beyond the grid."""
         return self.intervals
 
     def plot(self, ax: Axes | None = None, sigma: float | None = None, **style: Any) -> Axes:
@@ -292,8 +300,8 @@ class MSF(Labelled):
         Returns
         -------
         dict
-            alpha, exponent, stderr, intervals, uncertainties, class, attractors, time, starts, windows and verdict; windows and
-            verdict are None without links and for complex eigenvalues.
+            alpha, exponent, stderr, intervals, uncertainties, class, attractors, time, starts, windows and verdict. The
+            windows and the verdict are None if the network has no links, or complex eigenvalues.
         """
         judged = not self._why_no_windows
         return as_json(
@@ -324,21 +332,21 @@ class Plane(Labelled):
     across, up : ndarray, shapes (a,) and (b,)
         The values of the axes.
     exponent : ndarray, shape (a, b)
-        Exponents per unit of non-dimensional time; over two parameters the largest one of all transversal modes.
+        Exponents per unit of non-dimensional time. Over two parameters, the largest exponent of all transversal modes.
     stderr : ndarray, shape (a, b)
         Standard errors.
     attractors : ndarray of str, shape (a or 1, b or 1, starts)
-        Kind of motion of each start; 1 for an axis that does not move the synchronous orbit.
+        Kind of motion of each start. The length is 1 along an axis that does not change the synchronous orbit.
     time : float
-        Time averaged over, the longest one.
+        Length of the longest average.
     names : (str, str)
         Names of the axes: "alpha", "beta", or parameters.
     modes : tuple of str
-        Over two parameters, the exact eigenvalues of each transversal mode, those of all layers together.
+        Over two parameters, the exact eigenvalues of each transversal mode, one for each layer.
     mode : ndarray of int, shape (a, b), optional
         Index in `modes` of the mode with the largest exponent.
     strengths : tuple of str
-        The axes of these names are strengths of a mode; all others are parameters.
+        Names of the axes that are strengths of a mode; all other axes are parameters.
     """
 
     scene: Scene
@@ -395,9 +403,9 @@ class Plane(Labelled):
             *[("zero contour", text) for text in contours or ["none"]],
             ("negative", f"at {stable.sum()} of {stable.size} points, {stable.mean():.1%}"),
         ]
-        if self.mode is not None:  # the most frequent modes first
+        if self.mode is not None:  # list the most frequent modes first
             counts = np.bincount(self.mode.ravel(), minlength=len(self.modes))
-            gammas = [text if ", " in text else text[1:-1] for text in self.modes]  # of one layer without brackets
+            gammas = [text if ", " in text else text[1:-1] for text in self.modes]  # no brackets for one layer
             most = [k for k in np.argsort(-counts, kind="stable")[:MOST_MODES] if counts[k]]
             rows += [("largest for", f"gamma = {gammas[k]}, at {counts[k]} of {stable.size} points") for k in most]
         if self.has_windows:
@@ -414,18 +422,19 @@ class Plane(Labelled):
 
     @property
     def has_windows(self) -> bool:
-        """True if the plane is that of complex strengths and the scene has a network."""
+        """True if both axes are strengths of a mode and the scene has a network."""
         return not self.parameters and self.scene.topology.link_count > 0
 
     @property
     def windows(self) -> tuple[Window, ...]:
         """Ranges of sigma in which every mode of the scene's network is stable, if both axes are strengths.
 
-        The exponent is interpolated between the strengths; beyond the plane it counts as unstable.
+        The exponent is interpolated between the strengths, and counts as positive beyond the plane.
         """
         from scipy.interpolate import RegularGridInterpolator
 
-        # sigma up to which no ray -sigma gamma of a mode leaves the plane, less a rounding error
+        # find the largest sigma, minus a rounding error, at which the strengths -sigma gamma of all modes are in the
+        # plane
         graph, units = self.scene.topology, [-complex(m.eigenvalue.value) for m in network_modes(self.scene.topology)]
         beta = max(-self.up[0], self.up[-1]) if self.up[0] < 0 else self.up[-1]
         across = [
@@ -435,7 +444,7 @@ class Plane(Labelled):
         top = (1 - 1e-12) * float(min(limits, default=0.0))
         if top <= 0.0:
             return ()
-        # interpolation needs finite numbers; conjugate strengths have the same exponent
+        # interpolation needs finite numbers; conjugate strengths have the same exponent, so `stable` tries both
         size = np.max(np.abs(self.exponent[np.isfinite(self.exponent)]), initial=1e-300)
         value = np.nan_to_num(self.exponent, nan=size, posinf=size, neginf=-size)
         at = RegularGridInterpolator((self.across, self.up), value, bounds_error=False, fill_value=math.inf)
@@ -448,13 +457,13 @@ class Plane(Labelled):
 
     @property
     def motion(self) -> np.ndarray:
-        """Kind of motion of each start, along the axes that move the synchronous orbit and then the starts."""
+        """Kind of motion; dimensions are the axes that change the synchronous orbit, followed by the starts."""
         along = [size for size in self.attractors.shape[:2] if size > 1]
         return self.attractors.reshape([*along, self.attractors.shape[2]])
 
     @property
     def contours(self) -> tuple[np.ndarray, ...]:
-        """The zero contour as lines, each of shape (points, 2), of both axes."""
+        """Lines of the zero contour, each of shape (points, 2), in the coordinates of both axes."""
         from contourpy import contour_generator
 
         lines = contour_generator(self.across, self.up, self.exponent.T).lines(0.0)
@@ -466,8 +475,9 @@ class Plane(Labelled):
         Returns
         -------
         dict
-            Both axes by their names, exponent and stderr (rows of the first), contours, attractors, time and windows, None
-            unless both axes are strengths and the scene has links; over two parameters "modes" and "mode" too.
+            Both axes by their names, exponent and stderr (one row for each value of the first axis), contours,
+            attractors, time and windows. The windows are None unless both axes are strengths and the scene has links.
+            Over two parameters, also "modes" and "mode".
         """
         of_modes = {} if self.mode is None else {"modes": self.modes, "mode": self.mode}
         return as_json(
@@ -509,8 +519,9 @@ def msf(
     scene : Scene
         Source of the oscillator and the coupling.
     alpha : array_like, shape (m,), optional
-        Increasing real strengths alpha = -sigma gamma. By default 241 that reach from 0 to all modes of the network at the
-        strengths that the scene sweeps, or at twice its strength; to 1.2 if that is 0.
+        Increasing real strengths alpha = -sigma gamma. By default 241 strengths from 0 on, which cover all modes of the
+        network at the values of sigma that the scene sweeps, or up to twice the scene's sigma. If sigma is 0, they end
+        at 1.2.
     {average}
     {starts}
     {progress}
@@ -573,26 +584,27 @@ def plane(
 ) -> Plane:
     """Compute transversal exponents over two axes: strengths of a mode, parameters of the scene, or one of each.
 
-    ``plane(scene, alpha, beta)`` is the master stability function over alpha + i beta = -sigma gamma.
-    ``plane(scene, alpha, g=values)`` is that over alpha and a parameter, such as the strength of links that act between equal
-    states, which moves the synchronous orbit.  ``plane(scene, k=values, g=values)`` is the largest exponent of all
-    transversal modes of the scene's network over two parameters, such as the strengths of two layers of links.  Averages are along
-    each synchronous orbit.
+    ``plane(scene, alpha, beta)`` computes the master stability function over alpha + i beta = -sigma gamma.
+    ``plane(scene, alpha, g=values)`` computes it over alpha and a parameter that changes the synchronous orbit, such as
+    the strength of links that act between equal states. ``plane(scene, k=values, g=values)`` computes the largest
+    exponent of all transversal modes of the scene's network over two parameters, such as the strengths of two layers of
+    links. Exponents are computed along every synchronous orbit.
 
     Parameters
     ----------
     scene : Scene
-        Source of the oscillator and the coupling; over two parameters, a network whose layers have matrices that commute.
+        Source of the oscillator and the coupling. Over two parameters, a network; the matrices of its layers must
+        commute.
     alpha : array_like, shape (a,), optional
         Increasing real parts.
     beta : array_like, shape (b,), optional
-        Increasing imaginary parts. Conjugate strengths have the same exponent, so that only abs(beta)
-        is integrated.
+        Increasing imaginary parts. Conjugate strengths have the same exponent, so that exponents are
+        computed at abs(beta) only.
     {average}
     {starts}
     {progress}
     parameters, **more
-        Parameters of the scene to set, by a number, or axes, by an increasing row of values.
+        Parameters of the scene. A number sets a parameter; an increasing sequence of numbers makes an axis.
 
     Returns
     -------
@@ -601,8 +613,8 @@ def plane(
     Raises
     ------
     ValueError
-        If there are not two axes, if the values of one do not increase or do not matter, if matrices of layers do not
-        commute, and as in `exponents`.
+        If there are not two axes, if the values of an axis do not increase or have no effect, if the matrices of the
+        layers do not commute, and as in `exponents`.
     FloatingPointError
         If an integration fails.
 
@@ -617,7 +629,7 @@ def plane(
     call.checked(with_partner(scene))
     rows, fixed = call.parted()
 
-    # two axes, of strengths or of parameters
+    # collect the two axes: strengths of a mode, or parameters
     strengths = {name: values for name, values in zip(STRENGTHS, (alpha, beta), strict=True) if values is not None}
     if both := strengths.keys() & rows.keys():
         raise ValueError(
@@ -635,7 +647,7 @@ def plane(
     if rows:
         return _over_parameters(shown, call, scene, axes, tuple(strengths), starts, rtol, averaging)
 
-    # both axes are strengths: modes along one orbit, each of conjugate ones once
+    # both axes are strengths: integrate all modes along one orbit, and only one of two conjugate strengths
     if "beta" not in call.values and check_scene(scene).takes("beta"):
         warn(
             "plane: found beta, the imaginary part of strengths, and a parameter of that name; "
@@ -660,13 +672,16 @@ def _over_parameters(
     rtol: float | None,
     averaging: Averaging,
 ) -> Plane:
-    """Exponents over two axes, `strengths` of them strengths, along one synchronous orbit after the other."""
+    """Compute exponents over two axes, one synchronous orbit after the other.
+
+    `strengths`: names of the axes that are strengths of a mode.
+    """
     rows = {name: values for name, values in axes.items() if name not in strengths}
     if len(rows) == 2 and not check_scene(scene).model.linked:
         raise ValueError(
             "plane: found two parameters and a scene without links; expected a network, or alpha and a parameter"
         )
-    if not strengths:  # exponents depend on all those of the scene
+    if not strengths:  # the exponents depend on all strengths of the scene
         call.expect_one_cell(scene)
     _, fixed = call.parted()
     at_first = {**fixed.values, **{name: values[0] for name, values in rows.items()}}
@@ -683,13 +698,13 @@ def _over_parameters(
             names = ", ".join((*orbit_parameters, *sorted(still)))
             raise ValueError(f"plane: no exponent depends on {name!r}; expected one of {names}")
 
-    # the points of the grid by their synchronous orbits
+    # group the points of the grid by synchronous orbit
     (first, second), shape = axes, tuple(map(len, axes.values()))
     modes = () if strengths else tuple(map(str, transversal_modes(cell)))
     if modes:
         grid = np.meshgrid(*axes.values(), indexing="ij")
         orbits = list(shared_orbits(cell, {name: values.ravel() for name, values in zip(axes, grid, strict=True)}))
-    else:  # one orbit for each value of the parameter, with the strengths alpha of a single mode
+    else:  # one orbit for each value of the parameter, with all strengths alpha
         points = np.arange(math.prod(shape)).reshape(shape)
         place = np.arange(shape[0])[:, None]
         orbits = [SharedOrbit(points[:, k], {second: float(x)}, axes[first], place) for k, x in enumerate(axes[second])]
@@ -702,7 +717,7 @@ def _over_parameters(
             problem, states = orbits_of(with_numbers(cell, orbit.parameters), orbit.strengths, starts, averaging)
             of_orbit = averaging.in_units(cell, problem.unit)
             found = along(problem, states, orbit.strengths, of_orbit, reporter)
-            # at each point the mode with the largest exponent counts
+            # keep the mode with the largest exponent at each point
             table, points_of_orbit = found.exponent[orbit.place], np.arange(len(orbit.cells))
             worst[at] = largest = table.argmax(axis=1)
             exponent[at] = table[points_of_orbit, largest]
@@ -716,25 +731,29 @@ def _over_parameters(
 
 
 def _coupling(scene: Scene) -> str:
-    """Return the coupling of a scene with a single one, also of a lone oscillator, for a summary."""
+    """Return the coupling for a summary; also for a lone oscillator with a single coupling."""
     return f" (coupling: {scene.coupling})" if scene.coupling else ""
 
 
 def _kinds(exponents: Exponents) -> np.ndarray:
-    """The kind of motion (starts,) of each start."""
+    """Return the kind of motion (starts,) of each start."""
     return np.array([attractor.kind for attractor in exponents.attractors])
 
 
 def _with_parameters(given: Given, scene: Scene, axes: Sequence[Axis] = ()) -> Scene:
-    """The scene with its parameters, and the axes that they do not fix; a lone oscillator has none of the links."""
+    """Return the scene with the parameters of a call, and with the axes that the call does not fix.
+
+    A lone oscillator has no parameters of links.
+    """
     values = {name: value for name, value in given.values.items() if scene.takes(name)}
     return with_numbers(scene, values, axes=[axis for axis in axes if axis.name not in values])
 
 
 def default_strengths(scene: Scene, count: int = STRENGTH_COUNT) -> np.ndarray:
-    """Return strengths (count,) from 0 to all modes of a network, at the strengths that its scene sweeps or at twice its own.
+    """Return strengths (count,) from 0 on that cover all modes of a network at every sigma that the scene sweeps.
 
-    They end at TOP without links and if the strength is 0.
+    If the scene does not sweep sigma, cover twice its sigma. Without links, and if sigma is 0, the strengths end at
+    TOP.
     """
     low = high = 0.0
     if len(scene.model.linked) == 1:
@@ -746,7 +765,7 @@ def default_strengths(scene: Scene, count: int = STRENGTH_COUNT) -> np.ndarray:
 
 
 def _rounded_up(value: float) -> float:
-    """Return a number rounded away from zero to two digits."""
+    """Return a number, rounded away from zero to two digits."""
     if value == 0.0:
         return 0.0
     unit = 10.0 ** (math.floor(math.log10(abs(value))) - 1)
@@ -754,7 +773,7 @@ def _rounded_up(value: float) -> float:
 
 
 def classify(intervals: Sequence[Interval], end: float, begin: float = 0.0) -> StabilityClass:
-    """Classify a function that is negative on some intervals of its grid."""
+    """Return the class of a function that is negative on some intervals of a grid from `begin` to `end`."""
     if not intervals:
         return StabilityClass.NEVER
     if len(intervals) > 1:

@@ -1,8 +1,7 @@
-"""Orbits with deviations along them: equations, strengths, unit of time and method as one value.
+"""Define `OrbitProblem`: the equations, strengths, unit of time and method of orbits with deviations, as one value.
 
-An `OrbitProblem` is a value: the scene, the variational equation, the strengths of the modes, the unit
-of time with the extent of the motion, and the integrator that suits all of them. States travel beside
-it. Whatever computes exponents or cycles makes a problem first:
+An `OrbitProblem` does not change after it is made, and contains no states. A function that computes exponents
+or cycles makes a problem first:
 
 * `OrbitProblem.of_modes` for transversal modes along the orbit of one oscillator,
 * `OrbitProblem.of` for any other variational equation (blocks of clusters, a whole network).
@@ -37,29 +36,32 @@ from .motion import RateFunctions, Turns, above, extent_of, rates_of, turns_of
 from .variational_integrator import VariationalIntegrator
 
 FAR = 300.0
-"""Factors of propagators beyond exp(±FAR) are kept as logarithms: floating-point numbers end at exp(±745)."""
+"""Factors of propagators beyond exp(±FAR) are stored as logarithms, before numbers underflow at exp(-745)."""
 
 OF_EXTENT = 1.0
-"""Largest absolute tolerance, relative to rtol times the least extent of a component that moves (a choice)."""
+"""Largest absolute tolerance, in units of rtol times the least extent of a component that moves (a choice)."""
 
 LOOKS, STROBES = 8, 16
-"""States within a period of the drive, and periods before them, from which the extent of a motion is measured (a choice)."""
+"""LOOKS: number of states within a drive period. STROBES: number of drive periods. The extent of a motion is measured
+from
+these states (a choice)."""
 
 TOGETHER = 100
-"""Units of time that a transient runs in one call: Ctrl-C is noticed between calls."""
+"""Number of units of time of a transient in one call; Ctrl-C acts between calls."""
 
 
 @dataclass(frozen=True, slots=True)
 class OrbitProblem:
-    """Orbits of a scene with deviations along them."""
+    """Orbits of a scene, with deviations along the orbits."""
 
     scene: Scene  # oscillator, coupling and numerical settings
     variation: Variation  # equations of the orbit and of its deviations
-    # (m,) or (m, layers), real or complex: strengths of the deviations; of modes alpha + i beta unless links have inertia
+    # (m,) or (m, layers), real or complex: strengths of the deviations; for modes of links without inertia, alpha + i
+    # beta
     strengths: np.ndarray
-    turns: Turns  # the unit of time, and the extent of the motion, 0 where it is not measured
-    method: Integrator  # the one that suits all strengths at the pace of the motion
-    columns: int  # deviations of each strength: all components for propagators of modes
+    turns: Turns  # the unit of time, and the extent of the motion; an extent of 0 has not been measured
+    method: Integrator  # the integrator for all strengths
+    columns: int  # number of deviations of each strength; for propagators, the number of components
     workers: int | None  # number of threads
 
     @classmethod
@@ -67,11 +69,15 @@ class OrbitProblem:
         cls, scene: Scene, variation: Variation, strengths: np.ndarray, starts: np.ndarray, columns: int = 1,
         workers: int | None = 1, turns: Turns | None = None,
     ) -> OrbitProblem:  # fmt: skip
-        """Return a problem in units of `turns`, else of the drive's period, else of 2 pi. Shapes: starts (starts, components)."""
+        """Return a problem with the unit of time `turns`; by default, the drive's period, or 2 pi without a drive.
+
+        Shapes: starts (starts, components).
+        """
         unit = turns or Turns(unit_of_time(scene), np.zeros(starts.shape[1]), "period of the drive")
         values = np.tile(_parameter_values(scene, variation.orbit), (len(starts), 1))
         rows = (variation, with_modes(variation.orbit, starts, values), values, _rows(strengths))
-        # without a drive, motion may be arbitrarily fast until it is observed: power series find the length of their steps
+        # undriven motion that is not yet observed may have any pace: infinity chooses power series, which find their
+        # steps
         pace = 2.0 * math.pi / unit.time if turns or variation.orbit.forced else math.inf
         return cls(scene, variation, strengths, unit, chosen_for_modes(scene, *rows, pace), columns, workers)
 
@@ -79,7 +85,7 @@ class OrbitProblem:
     def of_modes(
         cls, scene: Scene, strengths: np.ndarray, starts: np.ndarray, workers: int | None, turns: Turns | None = None
     ) -> OrbitProblem:
-        """Return the problem of transversal modes; undriven motion from the first start is observed for its unit of time.
+        """Return the problem of transversal modes; measure the unit of time of undriven motion from the first start.
 
         Shapes: strengths (m,) or (m, layers), starts (starts, components).
         """
@@ -99,7 +105,7 @@ class OrbitProblem:
         return problem.with_turns(problem.observed_turns(first, np.zeros_like(problem.strengths[:1])), starts)
 
     def with_turns(self, turns: Turns, starts: np.ndarray) -> OrbitProblem:
-        """Return the problem in another unit of time, with the integrator that suits its pace."""
+        """Return the problem with another unit of time, and with the integrator for the pace of the motion."""
         return OrbitProblem.of(self.scene, self.variation, self.strengths, starts, self.columns, self.workers, turns)
 
     def observed_turns(
@@ -107,10 +113,10 @@ class OrbitProblem:
     ) -> Turns:
         """Measure the mean return time and the extent of an undriven motion.
 
-        `hidden`: number of the last states that are no part of the motion, of which `rates` are not functions.
+        `hidden`: number of states at the end of the state that are no part of the motion and do not enter `rates`.
         """
         integrator = self.integrator(states, strengths)
-        integrator.observes = True  # steps are too short and too few to warn of
+        integrator.observes = True  # do not warn of short steps: the runs are too short
         return turns_of(integrator, rates or self.rates, hidden)
 
     @property
@@ -120,7 +126,7 @@ class OrbitProblem:
 
     @property
     def extent(self) -> np.ndarray:
-        """How far each component (p,) of the first orbit moves."""
+        """Extent of each component (p,) of the first orbit."""
         return self.turns.extent
 
     @property
@@ -145,23 +151,23 @@ class OrbitProblem:
 
     @property
     def lands(self) -> bool:
-        """True if a landing leaves one of the two components that a deviation has."""
+        """True if a deviation has two components, and a landing sets one of them to zero."""
         return self.variation.events is not None and self.variation.size == self.components == 2
 
     @property
     def linear(self) -> bool:
-        """True if no state occurs in the variational equation: it is the same along every orbit, bounded or not."""
+        """True if no state occurs in the variational equation, which is then the same along every orbit."""
         states = {sp.Symbol(name, real=True) for name in self.variation.orbit.state}
         return not any(e.free_symbols & states for _, e in self.variation.matrix)
 
     def with_slip_states(self, starts: np.ndarray) -> np.ndarray:
-        """Return starts (starts, components) with the slip states that their velocities and loads imply."""
+        """Return starts (starts, components) with the slip states that follow from velocities and loads."""
         return with_modes(self.variation.orbit, starts, np.tile(self.parameter_values, (len(starts), 1)))
 
     def integrator(
         self, states: np.ndarray, strengths: np.ndarray | None = None, tolerance_ratio: float = 1.0
     ) -> VariationalIntegrator:
-        """Return an integrator from states, with the deviations of all strengths, or of others (k,).
+        """Return an integrator from states, with deviations of the problem's strengths, or of `strengths` (k,).
 
         `tolerance_ratio`: tolerance of the deviations relative to that of the orbits.
         """
@@ -179,7 +185,7 @@ class OrbitProblem:
         return integrator
 
     def observed(self, state: np.ndarray) -> OrbitProblem:
-        """Return the problem with its extent measured on driven motion that begins at this state (components,)."""
+        """Return the problem with the extent of the driven motion from this state (components,)."""
         if not self.forced:
             return self
         states = [state[None], *driven_states(self, state)]
@@ -189,7 +195,10 @@ class OrbitProblem:
     def settled(
         self, states: np.ndarray, periods: float, advanced: Callable[[float], object] | None = None
     ) -> tuple[OrbitProblem, np.ndarray]:
-        """Run a transient of a number of units of time; return the problem with its extent, and the states after it."""
+        """Run a transient of `periods` units of time.
+
+        Return the problem with the measured extent, and the end states.
+        """
         problem = self.observed(states[0])
         integrator = problem.integrator(states, self.strengths[:1])
         left = max(round(periods), 0)
@@ -202,16 +211,17 @@ class OrbitProblem:
         return problem, integrator.state
 
     def unit_deviations(self, integrator: VariationalIntegrator) -> np.ndarray:
-        """Return the columns of the identity (starts, size, deviations), for each strength of an integrator."""
+        """Return identity matrices (starts, size, deviations), one for each strength of an integrator."""
         basis = np.zeros((len(integrator.state), self.variation.size, len(integrator.order)))
         for k in range(self.components):
             basis[:, k, k :: self.components] = 1.0
         return basis
 
     def propagators(self, integrator: VariationalIntegrator, units: float) -> tuple[np.ndarray, np.ndarray]:
-        """Advance an integrator by a number of units of time; return the propagators of its strengths.
+        """Advance an integrator by `units` units of time; return the propagators of its strengths.
 
-        Shapes: returns propagators (starts, k, components, components), logarithms of the factors they lack (starts, k).
+        Shapes: returns propagators (starts, k, components, components), and the logarithms (starts, k) of the factors
+        by which the propagators were divided.
         """
         starts, p = len(integrator.state), self.components
         integrator.set_deviations(self.unit_deviations(integrator))
@@ -219,13 +229,16 @@ class OrbitProblem:
         largest = growth.reshape(starts, -1, p).max(axis=-1)
         logarithms = np.where((np.abs(largest) > FAR) & np.isfinite(largest), largest, 0.0)
         matrices = integrator.deviations * np.exp(growth - np.repeat(logarithms, p, axis=-1))[:, None, :]
-        if self.variation.size != p:  # complex deviations: real parts above imaginary ones
+        if self.variation.size != p:  # complex deviations: rows of real parts, then of imaginary parts
             matrices = matrices[:, :p] + 1j * matrices[:, p:]
         return np.asarray(matrices.reshape(starts, p, -1, p).transpose(0, 2, 1, 3)), logarithms
 
 
 def driven_states(problem: OrbitProblem, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return states of a driven orbit at the beginning of its next STROBES periods, and LOOKS ones within each of the later half."""
+    """Return states of a driven orbit in its next STROBES periods.
+
+    Return the states at the beginning of each period, and LOOKS states within each period of the later half.
+    """
     integrator, strobes = problem.integrator(state[None], problem.strengths[:1]), []
     for _ in range(STROBES):
         integrator.advance(problem.unit)
@@ -234,7 +247,7 @@ def driven_states(problem: OrbitProblem, state: np.ndarray) -> tuple[np.ndarray,
 
 
 def within(problem: OrbitProblem, states: np.ndarray, periods: int = 1) -> np.ndarray:
-    """Return states (starts looks, components) of driven orbits within their next periods, LOOKS in each of the first few."""
+    """Return states (starts looks, components) of driven orbits, LOOKS within each of the next `periods` periods."""
     looks = LOOKS * min(periods, LOOKS)
     integrator = problem.integrator(np.tile(states, (looks, 1)), problem.strengths[:1])
     integrator.advance(problem.unit * np.repeat(np.arange(1, looks + 1), len(states)) / LOOKS)
@@ -242,7 +255,7 @@ def within(problem: OrbitProblem, states: np.ndarray, periods: int = 1) -> np.nd
 
 
 def unit_of_time(scene: Scene) -> float:
-    """Return the period of the drive, or 2 pi if there is none, in units of non-dimensional time."""
+    """Return the period of the drive in non-dimensional time; 2 pi without a drive."""
     drive = scene.drive
     if scene.forced and drive.frequency is None:
         raise ValueError(
@@ -253,13 +266,16 @@ def unit_of_time(scene: Scene) -> float:
 
 
 def pair_of(scene: Scene, **changes: Any) -> Scene:
-    """Return two copies of a lone oscillator that start where it does."""
+    """Return a scene of two copies of a lone oscillator, with the same initial state."""
     start = {name: values[0] for name, values in scene.initial.items() if name != SLIP.name}
     return scene.replace(topology=topology("chain", 2), initial=start, **changes)
 
 
 def _joined(scene: Scene, strengths: np.ndarray) -> Scene:
-    """A lone oscillator and a partner, joined by any link: its strength is 0; ValueError if it is not."""
+    """Return a lone oscillator with a partner, joined by a link of strength 0.
+
+    ValueError for a strength that is not 0.
+    """
     first = next(iter(scene.initial))
     if not np.any(strengths):
         return pair_of(scene, coupling=f"{first}->{first}")
@@ -271,13 +287,13 @@ def _joined(scene: Scene, strengths: np.ndarray) -> Scene:
 
 
 def _rows(strengths: np.ndarray) -> np.ndarray:
-    """The real numbers (rows, modes) of real or complex strengths: one or two rows for each layer."""
+    """Return real or complex strengths as real numbers (rows, modes), with one or two rows for each layer."""
     rows = strengths.reshape(len(strengths), -1).T
     return np.concatenate([rows.real, rows.imag]) if np.iscomplexobj(strengths) else rows
 
 
 def _of_modes(scene: Scene, alpha: np.ndarray) -> np.ndarray:
-    """Strengths alpha/(1 + b alpha) of modes whose links have inertia (`synchain.models.dynamics.mode_inertia`)."""
+    """Return the strengths alpha/(1 + b alpha) of modes of links with inertia b (`models.dynamics.mode_inertia`)."""
     _, share = inertia_of_modes(scene.equations)
     if share == 0:
         return alpha
@@ -290,18 +306,18 @@ def _of_modes(scene: Scene, alpha: np.ndarray) -> np.ndarray:
 
 
 def _parameter_values(scene: Scene, orbit: Equations) -> np.ndarray:
-    """Values (parameters,) of the parameters of an orbit; a shifted clock begins at phase 0."""
+    """Return the values (parameters,) of the parameters of an orbit; the phase of a shifted clock is 0."""
     values = {**scene.parameters, PHASE.name: 0.0}
     return np.array([values[name] for name in orbit.parameters])
 
 
 @lru_cache(maxsize=16)
 def _variation(equations: Equations, plane: bool) -> Variation:
-    """Variational equation of a mode; Newton's method on an orbit needs it at every step."""
+    """Return the variational equation of a mode; cached, as every Newton step needs the equation."""
     return mode(equations, plane=plane)
 
 
 @lru_cache(maxsize=16)
 def _rates(equations: Equations, values: tuple[float, ...]) -> RateFunctions:
-    """Rates of equations; Newton's method on a limit cycle needs them at every step."""
+    """Return the rate functions of equations; cached, as every Newton step on a limit cycle needs the rates."""
     return rates_of(equations, dict(zip(equations.parameters, values, strict=True)))

@@ -1,4 +1,4 @@
-"""Warn of undriven motion that is too slow for its transient and average."""
+"""Warn of undriven motion that is too slow for its transient and its average."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from synchain.models.inputs.keywords import warn
 from ..cells.paces import fastest_rates
 
 TURN = 2.0 * math.pi
-"""Least time in which motion turns or settles, in units of the inverse of its fastest rate: one turn."""
+"""Shortest time, times the fastest rate of a motion, in which the motion turns or settles: one full turn."""
 
 
 def warn_of_slow_motion(
@@ -20,7 +20,7 @@ def warn_of_slow_motion(
 ) -> None:
     """Warn if an average ends before undriven motion turns or settles.
 
-    Its batches agree because nothing has happened, and their error is too small.
+    The batches of such an average agree because nothing has happened yet, so that its error is too small.
     Shapes: states (any, states), parameter_values (parameters,).
     """
     if equations.forced:

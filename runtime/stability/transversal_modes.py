@@ -1,4 +1,4 @@
-"""The transversal modes of a network over the cells of a sweep, grouped by the synchronous orbit that the cells share."""
+"""Find the transversal modes of a network in the cells of a sweep, and group the cells by synchronous orbit."""
 
 from __future__ import annotations
 
@@ -16,32 +16,35 @@ from synchain.models.spectra.joint import JointEigenvalue, joint_spectrum
 class SharedOrbit:
     """Cells that have the same synchronous orbit."""
 
-    cells: np.ndarray  # (c,): the cells
-    parameters: dict[str, float]  # parameters of all cells that move the orbit
-    strengths: np.ndarray  # (m,) or (m, layers): the strengths -sigma gamma of all modes of all cells, each once
+    cells: np.ndarray  # (c,): indices of the cells
+    parameters: dict[str, float]  # values of the parameters that change the orbit
+    strengths: np.ndarray  # (m,) or (m, layers): the distinct strengths -sigma gamma of all modes of all cells
     place: np.ndarray  # (c, modes): index in `strengths` of each mode of each cell
 
 
 def transversal_modes(scene: Scene) -> tuple[JointEigenvalue, ...]:
-    """Return the distinct joint eigenvalues of the layers of a network, without one mode of equal states."""
+    """Return the distinct joint eigenvalues of the layers of a network, without the mode of synchronous motion."""
     modes = joint_spectrum(tuple(graph for _, graph in scene.model.linked))
     return tuple(mode for mode in modes if any(mode.values) or mode.multiplicity > 1)
 
 
 def still_strengths(scene: Scene) -> set[str]:
-    """Return the strengths that do not move the synchronous orbit: those of layers whose links vanish between equal states."""
+    """Return the names of strengths that do not change the synchronous orbit.
+
+    A strength does not change the orbit if the links of its layer vanish between equal states.
+    """
     pairs = zip(scene.strengths, scene.equations.layers, strict=True)
     return {name for name, layer in pairs if all(edge.diffusive for _, edge in layer.edge_of)}
 
 
 def unused_axes(scene: Scene) -> set[str]:
-    """Return the axes of strengths that do not move the synchronous orbit: exponents at given strengths do not depend on them."""
+    """Return the axes of strengths that do not change the synchronous orbit, nor the exponents at given strengths."""
     axes = {axis.name for axis in check_scene(scene).axes}
     return axes & still_strengths(scene) if axes else set()
 
 
 def shared_orbits(scene: Scene, columns: Mapping[str, np.ndarray]) -> Iterator[SharedOrbit]:
-    """Yield the cells of a sweep by their synchronous orbits. Shapes: columns (cells,)."""
+    """Yield the cells of a sweep, grouped by synchronous orbit. Shapes: columns (cells,)."""
     (count,) = {len(column) for column in columns.values()} or {1}
     gamma = np.array([mode.values for mode in transversal_modes(scene)])
     names, still = scene.strengths, still_strengths(scene)

@@ -1,6 +1,6 @@
-"""Integration of orbits together with deviations, one stretch of time after the other.
+"""Integrate orbits together with deviations, one stretch of time after the other.
 
-The arrays here surround the kernels of `synchain.codegen.kernels.mode_kernel`.
+This module lays out the arrays that the kernels of `synchain.codegen.kernels.mode_kernel` read and fill.
 """
 
 from __future__ import annotations
@@ -46,32 +46,34 @@ NO_PANELS = (
     np.zeros(0),  # places of their nodes
     np.zeros((0, 0, 0)),  # batch_starts
 )
-"""The last arguments of a kernel that carries deviations over one block, and moves no others."""
+"""The last arguments of a kernel that integrates deviations over one block, without interpolation."""
 
 NO_STICK_INTERVALS, NO_BATCH_STARTS = NO_PANELS[-4:-1], NO_PANELS[-1]
-"""Arguments where propagators are integrated over whole blocks, and where the starts of batches are not recorded."""
+"""Arguments for propagators that are integrated over whole blocks, and for starts of batches that are not recorded."""
 
 STEEP, LONG, HIGH, FEWEST_STEPS = 1.1, 3, 256.0, 16
-"""An orbit grows without bound if its steps per time grow by STEEP in each of LONG stretches, and by HIGH in all, as its size
-does; stretches of fewer than FEWEST_STEPS steps do not count. The kernel does the same within a stretch."""
+"""An orbit grows without bound if its number of steps per time grows by the factor STEEP in each of LONG successive
+stretches, and if both this number and the size of the state grow by HIGH in all. Stretches of fewer than FEWEST_STEPS
+steps
+do not count. The kernel makes the same test within a stretch."""
 
 
 @dataclass(slots=True)
 class Deviations:
-    """Deviations of all strengths, which propagators move."""
+    """Deviations of all strengths, which propagators multiply."""
 
-    registers: Registers  # how the propagators of all strengths follow from those of the nodes
+    registers: Registers  # interpolation from the propagators of the nodes to those of all strengths
     columns: int  # components of a deviation, real or complex
     vectors: np.ndarray  # (cells, any): the deviations at unit length, in registers
-    # of bodies that stick: how the propagators of the nodes follow from those that are integrated between landings
+    # for bodies that stick: interpolation from the propagators between landings to those of the nodes
     stick_intervals: Registers | None = None
-    error: float = 0.0  # largest error of the interpolation so far, relative to the size of a propagator
+    error: float = 0.0  # largest interpolation error so far, relative to the size of a propagator
 
     @classmethod
     def make(
         cls, registers: Registers, cells: int, columns: int, parts: int, stick_intervals: Registers | None = None
     ) -> Deviations:
-        """Return deviations along (1, 1, …); `parts`: real numbers of each."""
+        """Return deviations along (1, 1, …); `parts`: number of real numbers of a deviation."""
         lanes = registers.lanes
         start = np.zeros((cells, registers.room // lanes, parts, lanes))
         start[:, :, :columns] = 1.0 / math.sqrt(columns)
@@ -79,23 +81,27 @@ class Deviations:
 
     @property
     def interval_arrays(self) -> tuple[np.ndarray, ...]:
-        """Arguments of a kernel for stick intervals."""
+        """Return the arguments of a kernel for stick intervals."""
         own = self.stick_intervals
         return NO_STICK_INTERVALS if own is None else (own.panels, own.weights, own.where.astype(float))
 
 
 @dataclass(slots=True)
 class GrowthWatch:
-    """Finds orbits that grow without bound over several stretches of time, as a kernel does within one."""
+    """Find orbits that grow without bound over several stretches of time; a kernel does the same within one stretch."""
 
-    steps: np.ndarray = field(default_factory=lambda: np.zeros(1))  # (cells,): all so far
-    rises: np.ndarray = field(default_factory=lambda: np.zeros(1))  # (cells,): stretches since steps per time rise
-    # (2, cells): steps per time and largest size, before that rise and in the last stretch
+    steps: np.ndarray = field(default_factory=lambda: np.zeros(1))  # (cells,): number of steps so far
+    # (cells,): successive stretches with rising steps per time
+    rises: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    # (2, cells): steps per time and largest size of the state, before the first of these stretches and in the last one
     origins: np.ndarray = field(default_factory=lambda: np.zeros((2, 1)))
     last: np.ndarray = field(default_factory=lambda: np.array([[np.inf], [0.0]]))
 
     def status(self, codes: np.ndarray, steps: np.ndarray, times: np.ndarray, sizes: np.ndarray, most: float) -> Status:
-        """Return FINISHED, or why the first failing orbit fails. Shapes: (cells,); codes: those of the kernel."""
+        """Return FINISHED, or the status of the first orbit that fails.
+
+        `codes`: statuses from the kernel. All shapes: (cells,).
+        """
         bad = codes != Status.FINISHED
         if bad.any():
             return Status(int(codes[bad.argmax()]))
@@ -111,25 +117,25 @@ class GrowthWatch:
 
 @dataclass(slots=True)
 class VariationalIntegrator:
-    """Orbits with several deviations each, which differ in their strengths."""
+    """Orbits with several deviations along each orbit, which differ in their strengths."""
 
     variation: Variation  # orbit with its variational equation
-    kernel: Kernel  # the same, compiled
+    kernel: Kernel  # compiled kernel of `variation`
     state: np.ndarray  # (cells, dimension): states of the orbits
     parameter_values: np.ndarray  # (cells, parameters)
-    period: np.ndarray  # (cells,): time after which the clock restarts; 0 if it does not
-    control: np.ndarray  # tolerances, limits and the cancel flag for the kernel
+    period: np.ndarray  # (cells,): time after which the clock restarts; 0 if the clock never restarts
+    control: np.ndarray  # tolerances, limits and cancel flag of the kernel
     # (number of strengths, padded modes): strengths sorted by size, padded to a multiple of the lanes
     strengths: np.ndarray
     order: np.ndarray  # (modes,): position of each mode of the caller in `strengths`
     vectors: np.ndarray  # (cells, size, padded modes): deviations
     workers: int  # number of threads
     steps: int = 0  # steps taken so far
-    warned: bool = False  # whether a warning of steps that are short because modes are stiff was given
-    # whether stretches are so short that steps begin as long as the ones before, and their length is no cause to warn
+    warned: bool = False  # True after a warning of short steps because of stiff modes
+    # True if stretches of time are short: a stretch begins with the last step size, and short steps cause no warning
     observes: bool = False
-    slow: float = 1.0  # rate of the motion that steps must follow anyway
-    # ends orbits that grow without bound, or take more than `max_steps` steps in all
+    slow: float = 1.0  # rate of the motion, which limits the steps whether modes are stiff or not
+    # finds orbits that grow without bound, or take more than `max_steps` steps in all
     watch: GrowthWatch = field(default_factory=GrowthWatch)
 
     @classmethod
@@ -144,7 +150,7 @@ class VariationalIntegrator:
         tolerance_ratio: float = 1.0,
         method: Integrator | None = None,
     ) -> VariationalIntegrator:
-        """Prepare the kernel and the arrays; tolerances and the step budget are those of the scene.
+        """Prepare the kernel and the arrays, with the tolerances and the step budget of the scene.
 
         `tolerance_ratio`: tolerance of the deviations relative to that of the orbits.
         Shapes: state (cells, dimension), parameter_values (cells, parameters), strengths (number of strengths, modes).
@@ -152,7 +158,7 @@ class VariationalIntegrator:
         method = chosen_for_modes(scene, variation, state, parameter_values, strengths) if method is None else method
         kernel = _kernel(variation, method, native_width())
         width, count = kernel.origin.width, strengths.shape[1]
-        # strengths sorted by size, so that those in one register are alike; the last one fills it up
+        # sort strengths by size, so that strengths in one register are similar; repeat the last one to fill a register
         order = np.argsort(np.hypot.reduce(strengths, axis=0) if len(strengths) else np.zeros(count), kind="stable")
         padded = -(-count // width) * width
         columns = np.concatenate([order, np.full(padded - count, order[-1])])
@@ -186,7 +192,7 @@ class VariationalIntegrator:
 
     @property
     def deviations(self) -> np.ndarray:
-        """The deviations at unit length in the caller's order, shape (cells, size, modes)."""
+        """The normalised deviations (cells, size, modes), in the caller's order."""
         return self.vectors[:, :, self.order]
 
     def set_deviations(self, vectors: np.ndarray) -> None:
@@ -197,7 +203,10 @@ class VariationalIntegrator:
             self.vectors[:, :, -spare:] = self.vectors[:, :, -spare - 1 : -spare]
 
     def advance(self, length: float | np.ndarray) -> np.ndarray:
-        """Integrate over a length of time. Shapes: length (cells,); returns (cells, modes)."""
+        """Integrate over a length of time; return the logarithm of the growth of each deviation.
+
+        Shapes: length (cells,); returns (cells, modes).
+        """
         growth = np.empty((len(self.state), self.strengths.shape[1]))
         self._run(length, NO_PANELS, self.vectors, growth)
         return growth[:, self.order]
@@ -205,10 +214,10 @@ class VariationalIntegrator:
     def follow(
         self, length: float, batches: np.ndarray, deviations: Deviations, batch_starts: np.ndarray = NO_BATCH_STARTS
     ) -> np.ndarray:
-        """Integrate over blocks of time that follow each other, and move deviations by their propagators.
+        """Integrate over successive blocks of time, and multiply deviations by the propagators of the blocks.
 
-        Every block begins with the deviations that were set, p for each node, which are not changed.
-        Shapes: batches (b,), batch_starts (cells, b, any); returns logarithms of the growth (b, cells, strengths).
+        Every block begins with the integrator's own deviations, p for each node, which do not change.
+        Shapes: batches (b,), batch_starts (cells, b, any); returns the logarithm of the growth (b, cells, strengths).
         """
         cells, registers = len(self.state), deviations.registers
         places = self.order.reshape(-1, deviations.columns).astype(float)
@@ -216,15 +225,15 @@ class VariationalIntegrator:
         moved = (registers.panels, registers.weights, deviations.vectors, log_growth, interpolation_errors)
         panels = (batches, places, *moved, *deviations.interval_arrays, batch_starts)
         self._run(length, panels, self.vectors, np.empty((cells, self.strengths.shape[1])))
-        deviations.error = float(np.maximum(deviations.error, interpolation_errors.max()))  # NaN too
+        deviations.error = float(np.maximum(deviations.error, interpolation_errors.max()))  # a NaN remains
         return registers.of_strengths(log_growth.transpose(1, 0, 2))
 
     def loosen(self, ratio: float) -> None:
-        """Multiply the tolerances."""
+        """Multiply the tolerances by a ratio."""
         self.control[[Control.RTOL, Control.ATOL]] *= ratio
 
     def beside(self, state: np.ndarray, ratio: float) -> VariationalIntegrator:
-        """Return an integrator with the same deviations along other orbits, with looser tolerances.
+        """Return an integrator with the same deviations along other orbits, and with tolerances larger by a ratio.
 
         Shapes: state (cells, dimension).
         """
@@ -243,14 +252,14 @@ class VariationalIntegrator:
 
     @contextmanager
     def loosened(self, ratio: float) -> Iterator[None]:
-        """Multiply the tolerances inside; restore states, deviations and tolerances afterwards."""
+        """Multiply the tolerances inside the context; restore states, deviations and tolerances after it."""
         state, vectors, control = self.state, self.vectors.copy(), self.control.copy()
         self.loosen(ratio)
         yield
         self.state, self.vectors[:], self.control[:] = state, vectors, control
 
     def error_of_steps(self, length: float) -> np.ndarray:
-        """Advance by TRIED blocks; return the error of growth rates (cells, modes) by the steps, as `averages.error_of_steps`."""
+        """Advance by TRIED blocks; return the error of growth rates (cells, modes) from `averages.error_of_steps`."""
         usual, looser = [], []
         for _ in range(TRIED):
             with self.loosened(TOLERANCE_RATIO):
@@ -261,7 +270,7 @@ class VariationalIntegrator:
     def _run(
         self, length: float | np.ndarray, panels: tuple[np.ndarray, ...], vectors: np.ndarray, growth: np.ndarray
     ) -> None:
-        """Call the kernel for all cells, and continue from the states at its end."""
+        """Run the kernel for all cells, and store the states at the end."""
         cells, dimension = self.state.shape
         cell_times = np.zeros((cells, 4))
         cell_times[:, SpanColumn.END], cell_times[:, SpanColumn.PERIOD] = length, self.period
@@ -272,7 +281,8 @@ class VariationalIntegrator:
             self.kernel.drive(0, cells, *arguments)
         else:
             self._share(np.linspace(0, cells, min(cells, self.workers) + 1).astype(int), arguments)
-        # raise for orbits that grow without bound or take too many steps, in the kernel or over all stretches so far
+        # raise an error for an orbit that grows without bound or takes too many steps, in the kernel or over all
+        # stretches
         times = panels[0].sum() * cell_times[:, SpanColumn.END]
         status = self.watch.status(
             counts[:, 0], counts[:, 1:3].sum(axis=1), times, np.abs(end).max(axis=1), self.control[Control.MAX_STEPS]
@@ -281,12 +291,13 @@ class VariationalIntegrator:
             largest = np.hypot.reduce(self.strengths).max()
             modes = f" of strengths up to {largest:g}" if largest else ""
             raise FloatingPointError(f"the orbit with its deviations{modes} cannot be integrated: {status.message}")
-        # power series begin the next stretch with the mean step of this one, and warn if it was short
+        # begin the next stretch of a power series with the mean step of this one; warn if the mean step was short
         taken = int(counts[:, 1:3].sum())
         series = self.kernel.origin.method.series
         if taken and (series or self.observes):
             step = float(panels[0].sum()) * float(cell_times[:, SpanColumn.END].sum()) / taken
-            self.control[Control.FIRST_STEP] = step  # only a hint: step control corrects it within a few steps
+            # only a hint: step control corrects the step size within a few steps
+            self.control[Control.FIRST_STEP] = step
             self.warned = self.warned or (
                 series
                 and not self.observes
@@ -296,7 +307,7 @@ class VariationalIntegrator:
         self.steps += taken
 
     def _share(self, cuts: np.ndarray, arguments: tuple[np.ndarray, ...]) -> None:
-        """Run parts of the cells on threads; Ctrl-C stops them at once."""
+        """Run parts of the cells on threads; Ctrl-C stops all threads at once."""
         with ThreadPoolExecutor(self.workers) as pool:
             jobs = [pool.submit(self.kernel.drive, a, b, *arguments) for a, b in itertools.pairwise(cuts)]
             try:
@@ -309,5 +320,5 @@ class VariationalIntegrator:
 
 @lru_cache(maxsize=64)
 def _kernel(variation: Variation, method: Integrator, width: int) -> Kernel:
-    """Compiled kernel of a variational equation."""
+    """Return the compiled kernel of a variational equation."""
     return load(emit_modes(variation, method, width))
