@@ -1,1 +1,1 @@
-"""What a link between two nodes is: couplings as values, and the equations that they make. Knows no graph."""
+"""Links between two nodes: couplings as values, and the equations derived from a coupling. Imports no graph."""

@@ -1,11 +1,12 @@
-"""Couplings as values: entries of a matrix, energies of two ends, or any rates or potential.
+"""Couplings as values: entries of a matrix, energies of two ends, or arbitrary rates or potentials.
 
-Every coupling has parameters, checks the nodes that it joins (`check_ends`), and returns the terms that a link between two
-ends adds (`terms`); `synchain.models.interactions.link` derives the equations from these terms.
+Every coupling has parameters, checks the nodes that it joins (`check_ends`), and returns the terms of a link between
+two ends (`terms`).  `synchain.models.interactions.link` derives the equations from these terms.
 
-The text "y->x" lets the difference of y between two nodes enter the rate of x.  A link of weight w from node j to
-node i adds sigma w H (s_j - s_i) to the rates of the states s_i, so the entry "1/2 y->x" is 1/2 in the row of x and
-the column of y.  H is the matrix of the master stability function (Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998)).
+A coupling by components is linear.  With the text "y->x" the difference of y between two nodes is added to the rate of
+x.  A link of weight w from node j to node i adds sigma w H (s_j - s_i) to the rates of the states s_i, so the entry
+"1/2 y->x" is 1/2 in the row of x and the column of y.  H is the matrix of the master stability function (Pecora &
+Carroll, Phys. Rev. Lett. 80, 2109 (1998)).
 """
 
 from __future__ import annotations
@@ -39,13 +40,13 @@ __all__ = [
 ]
 
 STRENGTH = FrozenDict({"sigma": Parameter(0.0, "1", "strength of the coupling")})
-"""The parameters of every coupling by components; sigma may be negative."""
+"""The parameters of a coupling by components; sigma may be negative."""
 
 _POSITIONS = sp.symbols("q_i q_j", real=True)
 """The coordinates of the two ends in the energies of a coupling."""
 
 _SPEEDS = sp.symbols("v_i v_j", real=True)
-"""Their velocities."""
+"""The velocities of the two ends in the energies of a coupling."""
 
 _NUMBER = r"[0-9]{1,120}(?:/[0-9]{1,120}|(?:\.[0-9]{1,120})?(?:[eE][+-]?[0-9]{1,3}(?=[\s*]))?)"
 
@@ -62,7 +63,7 @@ _CHOSEN = re.compile(r"(?P<name>\S.*?)\s+on\s+(?P<coordinates>[^\W\d]\w*(?:\s*,\
 
 @dataclass(frozen=True, slots=True)
 class MatrixCoupling:
-    """A coupling that is linear in the states: the entries of its matrix H."""
+    """A coupling that is linear in the states, given by the non-zero entries of its matrix H."""
 
     # source component, target component, and the factor with which the difference enters the target's rate
     entries: tuple[tuple[str, str, Fraction], ...]
@@ -78,7 +79,7 @@ class MatrixCoupling:
 
     @classmethod
     def parse(cls, text: str) -> MatrixCoupling | None:
-        """Return the coupling of a text such as "x->x, 1/2 y->z"; None if the text names a coupling instead."""
+        """Return the coupling of a text such as "x->x, 1/2 y->z"; None if the text is the name of a coupling."""
         return cls(tuple(_read(text))) if "->" in text else None
 
     @property
@@ -92,12 +93,12 @@ class MatrixCoupling:
         return False
 
     def check_ends(self, single: Node, other: Node | None = None) -> None:
-        """Raise ValueError for components that nodes of one kind do not have."""
+        """Raise ValueError for components that nodes of one kind lack; for two kinds do nothing."""
         if other is None:
             self.check(tuple(s.name for s in single.state))
 
     def terms(self, pair: Pair) -> Terms:
-        """Return sigma weight H (there - here); between nodes of two kinds by the components that both have."""
+        """Return sigma weight H (there - here); between nodes of two kinds only entries whose components exist."""
         here, there = pair.names
         rates = [sp.S.Zero] * len(here)
         # Entries for which the target has both components and the source has the first one.
@@ -109,7 +110,7 @@ class MatrixCoupling:
         strength = sp.Symbol("sigma", real=True) * WEIGHT
         for source, target, factor in fitting:
             share = sp.Rational(factor.numerator, factor.denominator)
-            # Each difference is a factor by itself, exactly zero between equal states; an expanded sum would round.
+            # Keep each difference as one factor: exactly zero between equal states. An expanded sum would round.
             gap = pair.there[there.index(source)] - pair.here[here.index(source)]
             rates[here.index(target)] += sp.Mul(share, *strength.args, gap)
         return Terms(rates=tuple(rates))
@@ -134,8 +135,9 @@ class MatrixCoupling:
 class LagrangianCoupling:
     """A coupling by the energies of a link, as expressions of the coordinates and velocities of its two ends.
 
-    The ends are the real symbols q_i, q_j of `potential` and v_i, v_j of `kinetic` and `dissipation`, target first;
-    of a coupling `between` two named oscillators they are the states of these.  `WEIGHT` is the weight of the link.
+    The symbols are q_i, q_j in `potential` and v_i, v_j in `kinetic` and `dissipation`, where i is the target and j the
+    source.  For a coupling `between` two named oscillators the symbols are the states of these oscillators.  `WEIGHT`
+    is the weight of the link.
     """
 
     name: str  # in messages and scene files
@@ -143,8 +145,8 @@ class LagrangianCoupling:
     potential: sp.Expr = sp.S.Zero  # the energy stored, Rayleigh's function and the kinetic energy of a link
     dissipation: sp.Expr = sp.S.Zero
     kinetic: sp.Expr = sp.S.Zero
-    between: tuple[str, str] | None = None  # the names of the two oscillators that it joins, if it joins no others
-    coordinates: tuple[str, ...] | None = None  # the coordinates that it joins, all of them if left out
+    between: tuple[str, str] | None = None  # names of two oscillators, if the coupling joins only these
+    coordinates: tuple[str, ...] | None = None  # the joined coordinates; None for all
     summary: str = field(default="", compare=False)
     source: str = field(default="", compare=False)
 
@@ -165,7 +167,7 @@ class LagrangianCoupling:
         return tuple(name for name in names if name in self.coordinates)
 
     def canonical(self, state: tuple[str, ...], coordinates: tuple[str, ...]) -> LagrangianCoupling:
-        """Return the same coupling with its coordinates in the order of the nodes', none if it joins them all."""
+        """Return the same coupling with coordinates in the order of the nodes; None in place of all coordinates."""
         if self.coordinates is None:
             return self
         joined = self.joined(coordinates)
@@ -177,7 +179,7 @@ class LagrangianCoupling:
         return False
 
     def check_ends(self, single: Node, other: Node | None = None) -> None:
-        """Raise ValueError for nodes without velocities, and for nodes of one kind if it joins two."""
+        """Raise ValueError for nodes without velocities, and for nodes of one kind if `between` names two kinds."""
         for node in (single,) if other is None else (single, other):
             if self.between is not None and other is None:
                 raise ValueError(f"coupling {str(self)!r} joins {' and '.join(self.between)}; found nodes of one kind")
@@ -191,7 +193,7 @@ class LagrangianCoupling:
                 self.joined(tuple(s.name for s in node.state)[: max(len(node.state) // 2, 1)])
 
     def terms(self, pair: Pair) -> Terms:
-        """Return the energies of a link, summed over the coordinates that it joins."""
+        """Return the energies of a link, summed over the joined coordinates."""
         if self.between is not None:
             return self._between(self.between, pair)
         # Coordinates that both nodes have, by name.
@@ -207,7 +209,7 @@ class LagrangianCoupling:
             a, b = (states.index(name) for states in pair.names)
             positions = pair.here[a], pair.there[b]
             speeds = pair.here[half + a], pair.there[other_half + b]
-            # The energies of this coordinate, in the symbols of the link.
+            # Add the energies of this coordinate, in the symbols of the link.
             for terms, energy, symbols, (p, q) in (
                 (kinetic, self.kinetic, _SPEEDS, speeds),
                 (potential, self.potential, _POSITIONS, positions),
@@ -220,7 +222,7 @@ class LagrangianCoupling:
         return Terms(sp.Add(*kinetic), sp.Add(*potential), sp.Add(*dissipation), oriented=oriented)
 
     def _between(self, kinds: tuple[str, str], pair: Pair) -> Terms:
-        """Return the energies of a coupling that joins two named kinds of oscillator, in the names of their states."""
+        """Return the energies of a coupling between two named oscillators, in the symbols of the link."""
         if set(map(str, pair.oscillators)) != set(kinds):
             raise ValueError(
                 f"coupling {str(self)!r} joins {' and '.join(kinds)}; found a link between {pair.described}"
@@ -256,7 +258,7 @@ COUPLINGS = (MatrixCoupling, LagrangianCoupling, Rates, Potential)
 def _expect_known(
     coupling: Coupling, kind: str, all_of: str, names: Iterable[str], valid_names: tuple[str, ...]
 ) -> None:
-    """Raise ValueError for a component or coordinate that a coupling names and a node does not have."""
+    """Raise ValueError if a coupling names a component or coordinate that a node does not have."""
     for name in names:
         if name not in valid_names:
             raise ValueError(
@@ -266,7 +268,7 @@ def _expect_known(
 
 
 def split(text: str) -> tuple[str, tuple[str, ...] | None]:
-    """Return the name of a coupling and the coordinates that its text gives, as in "spring on x"; None for all."""
+    """Split a text such as "spring on x" into the name of a coupling and its coordinates; None for all coordinates."""
     match = _CHOSEN.fullmatch(text)
     if match is None:
         return text, None
@@ -274,7 +276,7 @@ def split(text: str) -> tuple[str, tuple[str, ...] | None]:
 
 
 def _read(coupling: str) -> Iterator[tuple[str, str, Fraction]]:
-    """Yield the entries of a text."""
+    """Yield the entries (source, target, factor) of a text."""
     for part in coupling.split(","):
         match = _ENTRY.fullmatch(part)
         if match is None:
@@ -302,7 +304,7 @@ def _read(coupling: str) -> Iterator[tuple[str, str, Fraction]]:
 
 
 def _front(factor: Fraction) -> str:
-    """Return the text of a factor before its entry: nothing for 1, a sign alone for -1."""
+    """Return the text of a factor in front of its entry: empty for 1, "-" for -1."""
     if abs(factor) == 1:
         return "" if factor > 0 else "-"
     return f"{factor} "

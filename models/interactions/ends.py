@@ -18,7 +18,7 @@ Symbols = tuple[sp.Symbol, ...]
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """One end of a link: its attributes are the symbols of the states and parameters of the node there."""
+    """One end of a link; the attributes are the symbols of the states and parameters of the node at this end."""
 
     _letter: str
     _states: tuple[str, ...]
@@ -39,12 +39,12 @@ class End:
 
 
 def ends(node: Oscillator, source: Oscillator | None = None) -> tuple[End, End, sp.Symbol]:
-    """Return the two ends of a link and its weight, from which the expressions of a coupling are made.
+    """Return the two ends of a link and its weight, for the expressions of a coupling.
 
     Parameters
     ----------
     node : Oscillator
-        The oscillator at the target, and at the source if there is no `source`.
+        The oscillator at the target; also at the source if `source` is left out.
     source : Oscillator, optional
         The oscillator at the source of a link between two kinds.
 
@@ -77,9 +77,9 @@ def ends(node: Oscillator, source: Oscillator | None = None) -> tuple[End, End, 
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """The terms of one link: energies in the symbols of both ends, or rates of the states of its target.
+    """The terms of one link: energies in the symbols of both ends, or rates of the states of the target.
 
-    `oriented` is True if an energy changes in the exchange of the ends (`synchain.models.interactions.link`).
+    `oriented` is True if the energy changes when the ends are exchanged (`synchain.models.interactions.link`).
     """
 
     kinetic: sp.Expr = sp.S.Zero
@@ -104,7 +104,7 @@ class Pair:
 
     @property
     def halves(self) -> tuple[int, int]:
-        """The numbers of coordinates of two nodes of coordinates and velocities."""
+        """The numbers of coordinates of the two nodes, whose states are coordinates followed by velocities."""
         return len(self.here) // 2, len(self.there) // 2
 
     @property
@@ -127,7 +127,7 @@ class Pair:
 
     @property
     def alike(self) -> list[tuple[sp.Symbol, sp.Symbol]]:
-        """The states of one name at both ends."""
+        """The pairs of states that have the same name at both ends."""
         there = dict(zip(self.names[1], self.there, strict=True))
         return [(s, there[name]) for name, s in zip(self.names[0], self.here, strict=True) if name in there]
 
@@ -138,19 +138,19 @@ class Pair:
 
     @property
     def theirs(self) -> dict[sp.Symbol, sp.Symbol]:
-        """Symbols for the parameters of the source, and those of its node."""
+        """For each symbol of a parameter of the source (m_j) the symbol in the template of the source (m)."""
         return {sp.Symbol(f"{s.name}_j", real=True): s for s in self.nodes[1].parameters}
 
     def symbols(self) -> dict[sp.Symbol, sp.Symbol]:
-        """Return the symbol in an edge for each symbol of `ends`: a parameter m_i of the target is called m there."""
+        """Return for each symbol of `ends` the symbol in an `Edge`: m in place of the parameter m_i of the target."""
         of_target = {sp.Symbol(f"{s.name}_i", real=True): s for s in self.nodes[0].parameters}
         return {**{s: s for s in (*self.here, *self.there, *self.theirs, WEIGHT, TIME)}, **of_target}
 
 
 def directed(energy: sp.Expr, exchanged: sp.Expr) -> tuple[sp.Expr, bool]:
-    """Return the energy of a link from the energy and that of exchanged ends, and True if the two differ.
+    """Return the energy of a link, and True if the energy changes when the ends are exchanged (`exchanged`).
 
-    An energy that differs is W^2 V_even + W V_odd (`synchain.models.interactions.link`).
+    If it changes, the energy of the link is W^2 V_even + W V_odd (`synchain.models.interactions.link`).
     """
     if sp.expand(energy - exchanged) == 0:
         return energy, False
@@ -159,6 +159,6 @@ def directed(energy: sp.Expr, exchanged: sp.Expr) -> tuple[sp.Expr, bool]:
 
 
 def has_velocities(node: Node) -> bool:
-    """Return True for a node of coordinates followed by their velocities."""
+    """Return True if the states of a node are coordinates followed by their velocities."""
     half = len(node.state) // 2
     return bool(node.events) or node.rhs[:half] == node.state[half:]

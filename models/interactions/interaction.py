@@ -1,6 +1,6 @@
-"""Any link as a value: rates of the states of its target, or a potential of the coordinates of both ends.
+"""Arbitrary links as values: rates of the states of the target, or a potential of the coordinates of both ends.
 
-Expressions are made of the symbols of `ends`: x_i is the state or parameter x of the target, x_j that of the source.
+Expressions contain the symbols of `ends`: x_i is the state or parameter x of the target, x_j is x of the source.
 """
 
 from __future__ import annotations
@@ -36,24 +36,24 @@ _TAKEN = frozenset({"pi", FRICTION_NAME, *FUNCTIONS})
 
 @dataclass(frozen=True, slots=True, init=False)
 class Rates:
-    """A link that adds to the rates of states of its target; nothing acts back on the source.
+    """A link that adds terms to the rates of its target and does not act back on the source.
 
-    The rate that a link of weight W from j to i adds may be any function of the states and parameters of both ends, of
-    W, of the parameters of the link and of time.  It need not vanish between equal states.
+    A term of a link of weight W from j to i may be any function of the states and parameters of both ends, of W, of the
+    parameters of the link and of time.  The term need not vanish between equal states.
 
     Parameters
     ----------
     rates : mapping of Symbol or str to Expr or str
-        Terms that a link adds to the rates of states of its target, such as {i.theta: K*W*sin(j.theta - i.theta)}, in the
-        symbols of `ends`, or as text, {"theta": "K*W*sin(theta_j - theta_i)"}.  Decimals are exact: 0.1 is 1/10.
+        The term for each state of the target: in the symbols of `ends`, such as {i.theta: K*W*sin(j.theta - i.theta)},
+        or as text, such as {"theta": "K*W*sin(theta_j - theta_i)"}.  Decimals are exact: 0.1 is 1/10.
     parameters : mapping of Symbol or str to number or Parameter
         Parameters of the link with their defaults.
 
     Raises
     ------
     ValueError, TypeError
-        For a rate of anything but a state of the target, a symbol that is not declared, a parameter or a weight that
-        nothing uses, and whatever is no expression.
+        For a key that is no state of the target, a symbol that is not declared, a parameter or weight that no term
+        contains, and a value that is no expression.
 
     Examples
     --------
@@ -101,7 +101,7 @@ class Rates:
         return any(e.has(TIME) for e in self.rates.values())
 
     def canonical(self, state: tuple[str, ...], coordinates: tuple[str, ...]) -> Rates:
-        """Return the coupling, which has one spelling."""
+        """Return the coupling itself: equal rates have one spelling."""
         return self
 
     def check_ends(self, single: Node, other: Node | None = None) -> None:
@@ -109,7 +109,7 @@ class Rates:
         self.terms(Pair((single, other or single), (None, None)))
 
     def terms(self, pair: Pair) -> Terms:
-        """Return what a link adds to the rates of its target."""
+        """Return the terms of a link in the rates of its target."""
         states = pair.names[0]
         for name in self.rates:
             if name not in states:
@@ -131,10 +131,10 @@ class Rates:
 
 @dataclass(frozen=True, slots=True, init=False)
 class Potential:
-    """A link with a potential of any coordinates and parameters of its two ends: forces on both.
+    """A link with a potential of the coordinates and parameters of its two ends, so that forces act on both ends.
 
-    A link of weight W between i and j stores the energy V(i, j).  If V changes in the exchange of its ends, a link has a
-    direction (`synchain.models.interactions.link`), and weights other than 1 are refused.
+    A link of weight W between i and j stores the energy V(i, j).  If V changes when the ends are exchanged, the link
+    has a direction (`synchain.models.interactions.link`), and weights other than 1 are refused.
 
     Parameters
     ----------
@@ -147,8 +147,8 @@ class Potential:
     Raises
     ------
     ValueError, TypeError
-        For a symbol that is not declared, a parameter or a weight that nothing uses, an energy of one end alone, and
-        whatever is no expression.
+        For a symbol that is not declared, a parameter or weight that the energy does not contain, an energy of only one
+        end, and a value that is no expression.
     """
 
     energy: sp.Expr
@@ -171,11 +171,11 @@ class Potential:
         return self.energy.has(TIME)
 
     def canonical(self, state: tuple[str, ...], coordinates: tuple[str, ...]) -> Potential:
-        """Return the coupling, which has one spelling."""
+        """Return the coupling itself: equal energies have one spelling."""
         return self
 
     def check_ends(self, single: Node, other: Node | None = None) -> None:
-        """Raise ValueError for nodes without velocities, unknown names and an energy of velocities."""
+        """Raise ValueError for nodes without velocities, unknown names and an energy that contains velocities."""
         for node in (single, other or single):
             if not has_velocities(node):
                 raise ValueError(
@@ -183,7 +183,7 @@ class Potential:
                     "which say what a link adds to each state"
                 )
         pair = Pair((single, other or single), (None, None))
-        # An energy of velocities is a kinetic energy or a dissipation, which is no potential.
+        # An energy that contains velocities is a kinetic energy or a dissipation, not a potential.
         used = _in_symbols_of(pair, self, self.energy).free_symbols
         speeds = sorted(s.name for s in used & set(pair.velocities))
         if speeds:
@@ -195,7 +195,7 @@ class Potential:
         """Return the energy of a link."""
         if pair.nodes[0] != pair.nodes[1]:
             return Terms(potential=_in_symbols_of(pair, self, self.energy))
-        # Between equal nodes: the energy with its ends exchanged decides whether the link has a direction.
+        # Between equal nodes compare the energy with the energy of exchanged ends: is the link oriented?
         exchange = {
             s: sp.Symbol(s.name[:-1] + ("j" if s.name.endswith("_i") else "i"), real=True) for s in self._of_ends()
         }
@@ -217,7 +217,7 @@ class Potential:
 
 
 def _of_link(names: Iterable[str]) -> set[sp.Symbol]:
-    """Return the symbols that belong to no end of a link: time, weight and its parameters."""
+    """Return the symbols of a link that belong to no end: time, weight and parameters of the link."""
     return {TIME, WEIGHT, *(sp.Symbol(name, real=True) for name in names)}
 
 
@@ -251,7 +251,7 @@ def _checked(
 
 
 def _parsed(what: str, value: object) -> object:
-    """Return the expression of a text; any other value unchanged."""
+    """Parse a text into an expression; return any other value unchanged."""
     return read(what, check_text(what, value, LENGTH), _AnyName()) if isinstance(value, str) else value
 
 
@@ -265,7 +265,7 @@ def _exact(what: str, value: object) -> sp.Expr:
 
 
 def _target(key: object) -> str:
-    """Return the name of the state of the target that a key of the rates names."""
+    """Return the name of the state of the target from a key of the rates, a symbol x_i or a text."""
     if isinstance(key, str):
         return check_text("rates of a link", key)
     if not isinstance(key, sp.Symbol):
@@ -276,12 +276,12 @@ def _target(key: object) -> str:
 
 
 def _parameters(what: str, defaults: Mapping[sp.Symbol | str, object] | None) -> FrozenDict[Parameter]:
-    """Return the parameters by name, in the order of the alphabet: equal contents make equal couplings."""
+    """Return the parameters in alphabetical order, so that equal contents make equal couplings."""
     parameters: dict[str, Parameter] = {}
     for key, value in check_table(f"{what}: parameters", {} if defaults is None else defaults).items():
         name = key.name if isinstance(key, sp.Symbol) else key
         if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
-            # A name that Python reserves gets the advice to append an underscore.
+            # For a keyword of Python the message suggests to append an underscore.
             reserved = isinstance(name, str) and keyword.iskeyword(name)
             why, close = (", a word of Python", f"{name}_") if reserved else ("", "K")
             raise ValueError(f"{what}: found the parameter {short_repr(key)}{why}; expected a name such as {close!r}")
@@ -295,7 +295,7 @@ def _parameters(what: str, defaults: Mapping[sp.Symbol | str, object] | None) ->
 
 
 def _parameter(what: str, value: object) -> Parameter:
-    """Return the parameter of a default, or of a table with its default, unit, meaning and range."""
+    """Return a parameter from its default, or from a table with default, unit, meaning and range."""
     if not isinstance(value, Mapping):
         return _plain(check_number(what, value))
     names = [f.name for f in fields(Parameter) if f.name != "scale"]
@@ -303,7 +303,7 @@ def _parameter(what: str, value: object) -> Parameter:
 
 
 def _in_symbols_of(pair: Pair, coupling: Rates | Potential, e: sp.Expr) -> sp.Expr:
-    """Return an expression of `ends` in the symbols of an edge; raise ValueError for a name that a node does not have."""
+    """Convert an expression from symbols of `ends` to symbols of an `Edge`; ValueError for names the nodes lack."""
     symbols = pair.symbols()
     for s in sorted(e.free_symbols - _of_link(coupling.parameters), key=lambda s: s.name):
         if s not in symbols:
@@ -352,7 +352,7 @@ def from_table(what: str, table: Mapping[object, object]) -> Rates | Potential:
 
 
 class _AnyName(Mapping[str, sp.Symbol]):
-    """A symbol for every name except those of constants and functions, before the nodes of a link are chosen."""
+    """Map every name except constants and functions to a symbol; used before the nodes of a link are known."""
 
     def __contains__(self, name: object) -> bool:
         return name not in _TAKEN

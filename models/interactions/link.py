@@ -1,8 +1,9 @@
-"""The equations of one link: what a coupling adds to the rates of its target, between nodes of one kind or of two.
+"""The equations of one link between nodes of one kind or of two: the terms in the rates of the target.
 
-The energy of some couplings changes if the two ends are exchanged: V(q_i, q_j) is not V(q_j, q_i).  The weight W of their
-links is a direction: W = 1 if the link runs from the target to the source, W = -1 if it runs from the source to the target.
-The energy of the link is W^2 V_even + W V_odd, with the parts of V that keep and that change their sign in the exchange.
+The energy of some couplings changes if the two ends are exchanged: V(q_i, q_j) is not V(q_j, q_i).  Links of such a
+coupling are oriented, and the weight W is the direction: W = 1 if the link runs from the target to the source, W = -1
+if the link runs from the source to the target.  The energy of the link is W^2 V_even + W V_odd.  An exchange of the
+ends keeps V_even and changes the sign of V_odd.
 """
 
 from __future__ import annotations
@@ -31,14 +32,14 @@ def edge(
     other: Node | None = None,
     partner: Oscillator | None = None,
 ) -> Edge:
-    """Derive what one link adds to the rates of its target.
+    """Derive the terms of one link in the rates of its target.
 
-    Rates of a coupling are added unchanged.  Energies act on coordinates and velocities, by the Euler-Lagrange equations of
-    a pair with that link alone; a kinetic energy adds inertia.  Forces are functions of differences, sigma w (x_j - x_i),
+    Rates of a coupling are added unchanged.  Energies give forces by the Euler-Lagrange equations of a pair of nodes
+    with only this link; a kinetic energy adds inertia.  Forces are written in differences, such as sigma w (x_j - x_i),
     so that they vanish exactly between equal states.
 
-    An undirected edge is two links of one symmetric template, whose forces are those of the potential.  A one-way link acts
-    on its target alone.  Set-valued friction balances the force of a link while its target sticks.
+    An undirected edge is two links of one symmetric template, so both ends feel the force of the potential.  A one-way
+    link acts only on its target.  Set-valued friction balances the force of a link while the target sticks.
     """
     if single.events:
         plain = Node(single.state[:2], (single.state[1], sp.S.Zero), single.parameters)
@@ -49,13 +50,13 @@ def edge(
     terms = coupling.terms(pair)
     if not terms.rates:
         rates, inertia = _by_lagrange(pair, terms)
-    elif single.inertia:  # the right-hand sides are M times the rates
+    elif single.inertia:  # right-hand sides of such nodes are M times the rates
         masses = sp.Matrix(single.inertia).xreplace(dict(zip(single.state, pair.here, strict=True)))
         rates, inertia = tuple(masses * sp.Matrix(terms.rates)), ()
     else:
         rates, inertia = terms.rates, ()
 
-    # All parameters of the coupling, and those of the nodes that occur.
+    # Parameters of the edge: all of the coupling, and those of the nodes that occur in the terms.
     used = {s for e in (*rates, *(e for block in inertia for row in block for e in row)) for s in e.free_symbols}
     strengths = tuple(sp.Symbol(name, real=True) for name in coupling.parameters)
     symbols = tuple(s for s in single.parameters if s not in strengths and s in used)
@@ -64,13 +65,13 @@ def edge(
 
 
 def strength(edge: Edge, parameters: Iterable[sp.Symbol] = ()) -> sp.Symbol:
-    """Return the parameter that is the strength of a link: sigma, or the only one that is a factor of the whole link."""
+    """Return the strength of a link: the parameter sigma, or the only parameter that is a factor of the whole link."""
 
     def is_factor(s: sp.Symbol, e: sp.Expr) -> bool:
         slope = e.diff(s)
         return bool(slope != 0 and not sp.expand(slope).has(s) and sp.expand(e - s * slope) == 0)
 
-    # The parameters of the link alone; sigma by its name, else the single common factor.
+    # Search the parameters of the link: sigma by its name, else the only common factor.
     of_nodes = set(parameters)
     of_link = [s for s in edge.parameters if s not in of_nodes]
     sigma = [s for s in of_link if s.name == "sigma"]
@@ -85,16 +86,16 @@ def strength(edge: Edge, parameters: Iterable[sp.Symbol] = ()) -> sp.Symbol:
 
 
 def _by_lagrange(pair: Pair, terms: Terms) -> tuple[tuple[sp.Expr, ...], tuple[Block, ...]]:
-    """Return the rates of the target by the energies of a link alone, and the blocks of its inertia, empty without one."""
+    """Return the rates of the target from the energies of one link, and the blocks of its inertia, empty without."""
     half = pair.halves[0]
     speeds = pair.here[half:]
 
-    # The pair by itself: M_link a = r, with the coordinates of both ends.
+    # The pair with the energies of the link only: M_link a = r, with the coordinates of both ends.
     forces = tuple(-terms.dissipation.diff(v) for v in pair.velocities)
     mechanics = Mechanics(pair.coordinates, pair.velocities, terms.kinetic, terms.potential, forces)
     r, link_masses = mechanics.balance()
 
-    # Rows of the target in units of its own masses m, which the node has divided by: m^-1 r and m^-1 M_link.
+    # The equations of the node are divided by its masses m: multiply the rows of the target by m^-1 as well.
     masses = sp.eye(half) if pair.nodes[0].inertia else _masses(pair.oscillators[0], pair.nodes[0], pair.here)
     accelerations = solve_masses(masses, [_in_differences(e, pair.alike, pair.here) for e in r[:half]], speeds)
     rates = (*[sp.S.Zero] * half, *accelerations)
@@ -102,7 +103,7 @@ def _by_lagrange(pair: Pair, terms: Terms) -> tuple[tuple[sp.Expr, ...], tuple[B
         return rates, ()
     columns = [solve_masses(masses, list(link_masses[:half, c]), speeds) for c in range(link_masses.cols)]
 
-    # The block of each end, with rows and columns for coordinates too, whose rates feel no inertia.
+    # The block of each end; rows and columns of coordinates are zero, since x' = v feels no inertia.
     blocks = []
     for end in (columns[:half], columns[half:]):
         zeros = [sp.S.Zero] * len(end)
@@ -113,7 +114,7 @@ def _by_lagrange(pair: Pair, terms: Terms) -> tuple[tuple[sp.Expr, ...], tuple[B
 
 
 def _on_sliding(plain: Edge, mode: sp.Symbol) -> Edge:
-    """Return a link between nodes with a mode: it acts on the velocity of a target that slips."""
+    """Return a link between nodes with set-valued friction, which acts on the velocity only while the target slips."""
     if plain.rhs[0] != 0:
         raise ValueError("set-valued contact: a link acts on the rate of the position; expected forces alone")
     if plain.inertia:
@@ -124,7 +125,7 @@ def _on_sliding(plain: Edge, mode: sp.Symbol) -> Edge:
 
 
 def _in_differences(e: sp.Expr, pairs: list[tuple[sp.Symbol, sp.Symbol]], here: Symbols) -> sp.Expr:
-    """Write an expression in terms of `there` - `here`, unchanged if it depends on more than these differences."""
+    """Write an expression in the differences `there` - `here`; return it unchanged if it is no function of these."""
     gaps = [sp.Dummy(f"d{k}", real=True) for k in range(len(pairs))]
     shifted = sp.expand(e.xreplace({q: p + d for (p, q), d in zip(pairs, gaps, strict=True)}))
     if shifted.free_symbols & set(here):
@@ -133,7 +134,7 @@ def _in_differences(e: sp.Expr, pairs: list[tuple[sp.Symbol, sp.Symbol]], here: 
 
 
 def _masses(oscillator: Oscillator | None, single: Node, here: Symbols) -> sp.Matrix:
-    """Return the mass matrix of the target by itself, in the symbols of a link's target."""
+    """Return the mass matrix of the target without links, in the symbols of the target in a link."""
     if oscillator is None or isinstance(oscillator.model, FieldModel):
         return sp.eye(len(here) // 2)
     system = nondimensional(oscillator)

@@ -1,8 +1,8 @@
-"""Links whose rates are finite sums of products: a function of the target times a function of the source.
+"""Write the rate of a link as a finite sum of products: a function of the target times a function of the source.
 
-Between all pairs of nodes such a link is a mean field: one loop over the nodes sums the functions of the source, a second
-one applies the sums (Kuramoto, Chemical Oscillations, Waves, and Turbulence, Springer, 1984, section 5.4, for the sine).
-On any other graph the functions are computed once for each node, and a link costs their products.
+On a complete graph such a link is a mean field: one loop over the nodes sums the functions of the source, and a second
+loop applies the sums (Kuramoto, Chemical Oscillations, Waves, and Turbulence, Springer, 1984, section 5.4, for the
+sine).  On any other graph each function is computed once for each node, and a link costs only the products.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import sympy as sp
 from ..mechanics.components import Edge
 
 MOST_PRODUCTS = 32
-"""Most products in the rate of one state, and highest power of a sum that is multiplied out (a choice)."""
+"""Most products in the rate of one state, and highest power of a sum that is expanded (a choice)."""
 
 ADDITION_THEOREMS: dict[type[sp.Expr], Callable[[sp.Expr, sp.Expr], tuple[tuple[sp.Expr, sp.Expr], ...]]] = {
     sp.sin: lambda a, b: ((sp.sin(a), sp.cos(b)), (sp.cos(a), sp.sin(b))),
@@ -33,18 +33,18 @@ _SLOPES = {sp.sin: (sp.cos, 1), sp.cos: (sp.sin, -1)}
 Symbols = frozenset[sp.Symbol]
 
 Products = dict[tuple[sp.Expr, sp.Expr], sp.Expr]
-"""Coefficients that all nodes share, by the functions (of target, of source) that they multiply."""
+"""A sum of products: for each pair (function of target, function of source) a coefficient common to all nodes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Separated:
-    """A link as sums of products."""
+    """A link between all pairs of nodes as sums of products."""
 
     # For each state of the target the terms of its rate: coefficient, function of the target, function of the source.
     products: tuple[tuple[tuple[sp.Expr, sp.Expr, sp.Expr], ...], ...]
-    own: tuple[sp.Expr, ...]  # rates of a link from a node to itself, which a sum over all nodes contains in excess
-    # States that enter as differences alone. Their values may be counted from that of one node, so that sums of powers
-    # and exponentials keep their digits however far all nodes have moved together.
+    own: tuple[sp.Expr, ...]  # rates of a link from a node to itself, to be subtracted from the sum over all nodes
+    # States that occur only in differences. They may be measured from the state of one node, so that sums of powers and
+    # exponentials do not lose digits when all nodes have moved far from the origin.
     shifted: tuple[int, ...]
 
     @property
@@ -55,12 +55,12 @@ class Separated:
 
 @dataclass(frozen=True, slots=True)
 class Summed:
-    """A link as products that are summed over the links of a node, and a remainder."""
+    """A link on any graph as products that are summed over the links of a node, and a remainder."""
 
-    # For each state of the target the terms of its rate: coefficient of all links, factor of each link, function of the
-    # target, function of the source.
+    # For each state of the target the terms of its rate: coefficient common to all links, factor of the single link,
+    # function of the target, function of the source.
     products: tuple[tuple[tuple[sp.Expr, sp.Expr, sp.Expr, sp.Expr], ...], ...]
-    rest: tuple[sp.Expr, ...]  # the terms of each rate that are no such products
+    rest: tuple[sp.Expr, ...]  # for each state the remaining terms of the rate
 
     @property
     def sources(self) -> tuple[sp.Expr, ...]:
@@ -70,10 +70,10 @@ class Summed:
 
 @lru_cache(maxsize=64)
 def summed(edge: Edge, varied: tuple[str, ...] = (), numbered: tuple[str, ...] = ()) -> Summed | None:
-    """Return a link with terms of sines and cosines as products; None if it has none.
+    """Write the terms of a link with sines and cosines as products; return None if there is no such term.
 
-    Sines and cosines are bounded: their addition theorems cost at most a rounding error of the rate.  Powers and
-    exponentials of differences stay in the remainder: far from the origin their products cancel.
+    Sines and cosines are bounded, so the addition theorems cost at most a rounding error of the rate.  Powers and
+    exponentials of differences stay in the remainder, because far from the origin their products are large and cancel.
     """
     if edge.inertia or edge.oriented or edge.forced:
         return None
@@ -99,7 +99,7 @@ def summed(edge: Edge, varied: tuple[str, ...] = (), numbered: tuple[str, ...] =
 
 @lru_cache(maxsize=64)
 def separated(edge: Edge, varied: tuple[str, ...] = ()) -> Separated | None:
-    """Return a link as sums of products; None unless the expanded difference is proved to be zero."""
+    """Return a link as sums of products; None unless the difference from the link is proved to be zero."""
     if edge.inertia or edge.oriented:
         return None
     # Symbols of the source, and of the target with parameters that differ from node to node.
@@ -112,15 +112,15 @@ def separated(edge: Edge, varied: tuple[str, ...] = ()) -> Separated | None:
         if row is None or len(row) > MOST_PRODUCTS or not _vanishes(e - sum(c * a * b for (a, b), c in row.items())):
             return None
         rows.append(tuple((c, a, b) for (a, b), c in row.items()))
-    # The sum over all nodes contains the node itself, h(s, s).
+    # The sum over all nodes includes h(s, s), the term of the node with itself.
     itself = {**dict(zip(edge.there, edge.here, strict=True)), **theirs}
     own = tuple(e.xreplace(itself) for e in edge.rhs)
     return Separated(tuple(rows), own, _shifted(edge, {b for row in rows for _, _, b in row}))
 
 
 def _products(e: sp.Expr, target: Symbols, source: Symbols, bounded: bool = False) -> Products | None:
-    """Return an expression as a sum of products, None if the rules find none; `bounded`: sines and cosines alone."""
-    # Constants and functions of one end are products already.
+    """Write an expression as a sum of products; None if no rule applies. `bounded`: only of sines and cosines."""
+    # A constant, or a function of one end, is already a product.
     here, there = bool(e.free_symbols & target), bool(e.free_symbols & source)
     if not here and not there:
         return {(sp.S.One, sp.S.One): e} if e != 0 else {}
@@ -136,7 +136,7 @@ def _products(e: sp.Expr, target: Symbols, source: Symbols, bounded: bool = Fals
     if not here:
         return {(sp.S.One, e): sp.S.One}
     states = target | source
-    # A sum whose terms are no polynomials of states is separated term by term.
+    # Separate a sum term by term if no term is a polynomial of states.
     if e.is_Add and not any(part.free_symbols & states and part.is_polynomial(*states) for part in e.args):
         return _sum([_products(part, target, source, bounded) for part in e.args])
     if bounded and e.func not in _SLOPES:
@@ -151,7 +151,7 @@ def _products(e: sp.Expr, target: Symbols, source: Symbols, bounded: bool = Fals
 
 
 def _by_theorem(e: sp.Expr, target: Symbols, source: Symbols) -> Products | None:
-    """Return f(own + theirs + lag) by its addition theorem, with arguments of the target, the source and neither."""
+    """Apply the addition theorem to f(own + theirs + lag): terms of the target, of the source, and of neither."""
     theorem = ADDITION_THEOREMS.get(e.func)
     if theorem is None:
         return None
@@ -163,14 +163,14 @@ def _by_theorem(e: sp.Expr, target: Symbols, source: Symbols) -> Products | None
         return None
     if e.func not in _SLOPES:
         return _sum([_one(sp.S.One, a, b) for a, b in theorem(own + lag, theirs)])
-    # cos(lag) and sin(lag) are coefficients, so that a lag costs nothing at the nodes.
+    # cos(lag) and sin(lag) become coefficients, so that a lag costs nothing at the nodes.
     slope, sign = _SLOPES[e.func]
     turned = ((sp.cos(lag), e.func), (sign * sp.sin(lag), slope))
     return _sum([_one(c, a, b) for c, wave in turned for a, b in ADDITION_THEOREMS[wave](own, theirs)])
 
 
 def _one(c: sp.Expr, a: sp.Expr, b: sp.Expr) -> Products:
-    """Return one product, with the numbers of both functions in its coefficient."""
+    """Return one product; move numerical factors of both functions into the coefficient."""
     (p, a), (q, b) = a.as_coeff_Mul(), b.as_coeff_Mul()
     return {(a, b): p * q * c}
 
@@ -192,12 +192,12 @@ def _times(left: Products | None, right: Products | None) -> Products | None:
 
 
 def _vanishes(e: sp.Expr) -> bool:
-    """Return True if the expansion of an expression in exponentials has no term."""
+    """Return True if an expression, written in exponentials and expanded, is 0."""
     return bool(sp.expand(e.rewrite([sp.sin, sp.cos, sp.sinh, sp.cosh], sp.exp)) == 0)
 
 
 def _shifted(edge: Edge, sources: set[sp.Expr]) -> tuple[int, ...]:
-    """Return the states whose common shift changes nothing, without those that enter sines and cosines alone."""
+    """Return the states whose common shift does not change the link; skip states only inside sines and cosines."""
     distance = sp.Dummy("shift", real=True)
     shifted = []
     for k, (here, there) in enumerate(zip(edge.here, edge.there, strict=True)):

@@ -107,7 +107,7 @@ class Edge:
     weight: sp.Symbol  # of an oriented edge: the sign of the link's direction
     rhs: tuple[sp.Expr, ...]
     parameters: tuple[sp.Symbol, ...]  # of the link and of the target
-    # Two blocks that the link adds to M in the rows of its target: columns of target and of source. Empty without inertia.
+    # Two blocks that the link adds to the rows of its target in M: columns of target, of source. Empty without inertia.
     inertia: tuple[Block, ...] = ()
     theirs: tuple[tuple[sp.Symbol, sp.Symbol], ...] = ()  # pairs: symbol in `rhs`, parameter of the source
     oriented: bool = False

@@ -1,1 +1,1 @@
-"""Models of networks: their kinds of nodes, layers of links and parameters by name, and their energy. Knows no scene."""
+"""Models of networks: kinds of nodes, layers of links, names of parameters, and the energy. Imports no scene."""

@@ -1,6 +1,7 @@
-"""The energy of a network and the power that changes it, as exact expressions for one node and one link of each kind.
+"""Energy and power of a network, as exact expressions for one node and one link of each kind.
 
-E is the sum of v dL/dv - L over nodes and links; dE/dt = sum v Q - (partial) dL/dt, with Q = -dR/dv of Rayleigh functions R.
+The energy E is the sum of v dL/dv - L over nodes and links.  The power is dE/dt = sum v Q - (partial) dL/dt, where the
+forces Q include -dR/dv of a Rayleigh function R.
 Source: Goldstein, Poole & Safko, Classical Mechanics, 3rd ed. (Addison-Wesley, 2002), sect. 2.7.
 """
 
@@ -28,7 +29,7 @@ from .model import Model, NodeKind
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """The energy of one node or one link, and the power that it feeds in."""
+    """The energy of one node or one link, and the power that the node or link feeds in."""
 
     energy: sp.Expr = sp.S.Zero
     power: sp.Expr = sp.S.Zero
@@ -36,10 +37,11 @@ class Share:
 
 @dataclass(frozen=True, slots=True)
 class EnergyTerms:
-    """Energy and power of a node of each kind, in its states, and of a link of each edge, in those of its two ends.
+    """Energy and power of one node of each kind and of one link of each `Edge`; all quantities are non-dimensional.
 
-    All is non-dimensional.  `nodes` follow equations.nodes, `links` equations.edges.  Two links, there and back, are one
-    spring or damper, of which `pairs` has one link.
+    `nodes` has the order of equations.nodes, `links` the order of equations.edges.  The expressions contain the states
+    of the node, or of both ends of the link.  The links i -> j and j -> i are one spring or damper; `pairs` contains
+    one of the two links.
     """
 
     equations: Equations
@@ -62,20 +64,20 @@ class EnergyTerms:
         return all(share.power == 0 for share in (*self.nodes, *self.links))
 
     def whole(self) -> tuple[sp.Expr, sp.Expr]:
-        """Return energy and power of the whole network in its state symbols (algebra grows with n: meant for small n)."""
+        """Return energy and power of the whole network in its state symbols; meant for small n (algebra grows with n)."""
         shares = [(share, values) for share, places in self._shares() for values in places]
         energy = sp.Add(*(share.energy.xreplace(values) for share, values in shares))
         return energy, sp.Add(*(share.power.xreplace(values) for share, values in shares))
 
     def rows(self) -> tuple[sp.Expr, tuple[ObservableRows, ...]]:
-        """Return the energy of the whole network as sums over nodes of each kind and links of each edge, for observables."""
+        """Return the energy of the network for observables: sums over the nodes of each kind and links of each `Edge`."""
         rows = [
             ObservableRows.of(share.energy, places) for share, places in self._shares() if places and share.energy != 0
         ]
         return sp.Add(*(RowSum(sp.Integer(k)) for k in range(len(rows)))), tuple(rows)
 
     def _shares(self) -> list[tuple[Share, list[dict[sp.Symbol, sp.Expr]]]]:
-        """Return the share of each kind of node and each edge, with the substitutions for its nodes and links."""
+        """Return the share of each kind of node and each `Edge`, with one substitution for each node or link."""
         eq = self.equations
         places = [list[dict[sp.Symbol, sp.Expr]]() for _ in (*self.nodes, *self.links)]
         for i, kind in enumerate(eq.kind_of):
@@ -102,11 +104,11 @@ def energy_of(model: Model, varied: tuple[str, ...] = ()) -> EnergyTerms:
         _check(coupling, graph)
         edges = []
         for (a, b), edge in layer.edge_of:
-            # The same terms that make the forces of the link give its energy.
+            # The energy follows from the same terms as the forces of the link.
             pair = Pair((equations.nodes[a], equations.nodes[b]), (kinds[a].oscillator, kinds[b].oscillator))
             share, joint = _of_link(edge, pair, coupling.terms(pair), equations.varied)
             if WEIGHT_NUMBER.name in layer.varied:
-                # Weights as numbers of the run are a parameter.
+                # Weights that are set for each run are the parameter `WEIGHT_NUMBER`.
                 share = Share(*(e.xreplace({edge.weight: WEIGHT_NUMBER}) for e in (share.energy, share.power)))
             links.append(share)
             edges.append(((a, b), joint))
@@ -115,7 +117,7 @@ def energy_of(model: Model, varied: tuple[str, ...] = ()) -> EnergyTerms:
 
 
 def _of_node(kind: NodeKind, contact: ContactModel) -> Share:
-    """Return energy and power of one oscillator by itself."""
+    """Return energy and power of one uncoupled oscillator."""
     system = nondimensional(kind.oscillator)
     lagrangian = system.kinetic - system.potential
     power = sp.Add(*(v * f for v, f in zip(system.velocities, system.forces, strict=True)))
@@ -138,7 +140,7 @@ def _check(coupling: Coupling, graph: Topology) -> None:
 
 
 def _of_link(edge: Edge, pair: Pair, terms: Terms, varied: tuple[str, ...]) -> tuple[Share, Edge]:
-    """Return the energy of a link and its power, -v dR/dv at both ends, and the edge with all parameters of the energy."""
+    """Return energy and power (-v dR/dv at both ends) of a link, and the edge with all parameters of the energy."""
     shared = {s: parameter for s, parameter in pair.theirs.items() if parameter.name not in varied}
     kinetic, potential, dissipation = (e.xreplace(shared) for e in (terms.kinetic, terms.potential, terms.dissipation))
     lost = sp.Add(*(v * derivative(dissipation, v) for v in pair.velocities))

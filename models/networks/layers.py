@@ -1,4 +1,4 @@
-"""The parts of a model from values, names of plug-ins and tables of a scene file."""
+"""Convert values, names of plug-ins and tables of a scene file into the parts of a model."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from ..mechanics.oscillator import Oscillator
 from .model import Group
 
 MOST = 100_000
-"""Most groups and layers that are read (a choice)."""
+"""Most groups, and most layers, of a scene (a choice)."""
 
 
 def as_oscillator(value: object, what: str = "oscillator") -> Oscillator:
-    """Return an oscillator, or that of a table or a name; raise ValueError or TypeError for other values."""
+    """Return an oscillator from an Oscillator, a table or a name; raise ValueError or TypeError for other values."""
     if isinstance(value, Mapping):
         return oscillator_of_table(value)
     return value if isinstance(value, Oscillator) else load_oscillator(part(what, value))
 
 
 def as_law(value: object, oscillator: Oscillator) -> FrictionLaw | None:
-    """Return a friction law, or that of a table or a name; None for "none"."""
+    """Return a friction law from a FrictionLaw, a table or a name; None for "none"."""
     if value == "default":
         return oscillator.friction
     if value is None or isinstance(value, FrictionLaw):
@@ -42,9 +42,9 @@ def as_law(value: object, oscillator: Oscillator) -> FrictionLaw | None:
 
 
 def as_contact(value: object, oscillators: Iterable[Oscillator]) -> ContactModel:
-    """Return the contact of a text; for None the contact of the oscillators that take friction.
+    """Return the contact model of a text; for None the default of the oscillators that have friction.
 
-    Raises ValueError if these differ.
+    Raises ValueError if the defaults of these oscillators differ.
     """
     if value is not None:
         contact = ContactModel.parse("contact", value)
@@ -60,7 +60,7 @@ def as_contact(value: object, oscillators: Iterable[Oscillator]) -> ContactModel
 
 
 def as_coupling(value: object) -> Coupling | None:
-    """Return a coupling, or that of a text or of a table of expressions; None for None and "none"."""
+    """Return a coupling from a Coupling, a text or a table of expressions; None for None and "none"."""
     if value is None or isinstance(value, COUPLINGS):
         return value
     if isinstance(value, Mapping):
@@ -72,7 +72,7 @@ def as_coupling(value: object) -> Coupling | None:
 
 
 def as_topology(value: object) -> Topology:
-    """Return a graph, or that of another form of it; one node for None."""
+    """Return a graph from a Topology or another form of a graph; a single node for None."""
     return topology("chain", 1) if value is None else checked_name("topology", readers.as_topology("topology", value))
 
 
@@ -91,7 +91,7 @@ def as_layers(links: object, coupling: Coupling | None, graph: object) -> tuple[
         layers.append((as_coupling(entry[0]), as_topology(entry[1])))
     if not layers:
         raise ValueError("links: found no layer; expected one at least, e.g. [('spring', ring(4))]")
-    # All layers join the same nodes.
+    # All layers must have the same number of nodes.
     sizes = sorted({graph.n for _, graph in layers})
     if len(sizes) > 1:
         raise ValueError(f"links: found graphs of {', '.join(map(str, sizes))} nodes; expected one number of nodes")

@@ -30,17 +30,17 @@ MOST_NODES = 1_000_000
 """Most nodes of a model (a choice: measured 2 s and 700 MB)."""
 
 MOST_NUMBERED = 1_000_000
-"""Most links with a value of a parameter for each (a choice): a name and a parameter each, more take gigabytes."""
+"""Most links with separate values of a parameter (a choice); names and values of more links take gigabytes."""
 
 WEIGHTS = WEIGHT_NUMBER.name
-"""Name of the weights of links where a run draws or sweeps them."""
+"""Name of the weights of links in runs that draw or sweep weights."""
 
 _WEIGHT = Parameter(1.0, "1", "weight of a link")
 
 
 @dataclass(frozen=True, slots=True)
 class NodeKind:
-    """An oscillator with its friction law, None if it takes none."""
+    """An oscillator with its friction law; None for an oscillator without friction."""
 
     oscillator: Oscillator
     friction: FrictionLaw | None
@@ -48,14 +48,14 @@ class NodeKind:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Nodes `at` (numbers from 1) of an oscillator with its friction law."""
+    """The nodes `at` (numbers from 1), which are an oscillator with a friction law."""
 
     oscillator: Oscillator
     friction: FrictionLaw | None
     at: tuple[int, ...]
 
     def as_dict(self) -> dict[str, object]:
-        """Return the group in the names of a scene file."""
+        """Return the group as a table of a scene file."""
         law = "none" if self.friction is None else as_name_or_table(self.friction)
         return {"oscillator": as_name_or_table(self.oscillator), "friction": law, "at": list(self.at)}
 
@@ -69,7 +69,7 @@ class Model:
     contact: ContactModel  # treatment of the jump of a friction law at rest
     layers: tuple[tuple[Coupling | None, Topology], ...]  # couplings and their graphs, at least one, of equal size
     unlinked: Equations = field(init=False, repr=False, compare=False)  # the equations of the nodes without links
-    # The parameters of all kinds, each with the default of the first kind that has it, and those of couplings with links.
+    # Parameters of all kinds, with the default of the first kind that has the name, and of couplings that have links.
     parameters: FrozenDict[Parameter] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -88,13 +88,13 @@ class Model:
         contact: ContactModel,
         layers: tuple[tuple[Coupling | None, Topology], ...],
     ) -> Model:
-        """Return the model of nodes of one kind, apart from those of some groups, with its couplings in one spelling."""
+        """Return the model of nodes of one kind, except the nodes of `groups`, with couplings in canonical spelling."""
         graph = layers[0][1]
         if graph.n > MOST_NODES:
             raise ValueError(
                 f"topology {graph.name}: n = {graph.n}; expected at most {MOST_NODES} nodes in a model: reduce n"
             )
-        # Equal groups are one kind, and kinds are numbered by their first nodes.
+        # Equal groups become one kind; kinds are numbered in the order of their first nodes.
         all_kinds = [kind, *(NodeKind(group.oscillator, group.friction) for group in groups)]
         nodes = [0] * graph.n
         for group, of_group in zip(groups, all_kinds[1:], strict=True):
@@ -103,7 +103,7 @@ class Model:
         kinds = tuple(all_kinds[k] for k in dict.fromkeys(nodes))
         model = cls(kinds, numbered(nodes), contact, tuple((None, graph) for _, graph in layers))
 
-        # The spelling of a coupling depends on the components of the nodes.
+        # Bring each coupling into its canonical spelling, which depends on the components of the nodes.
         spelt = []
         for coupling, graph in layers:
             if coupling is None and graph.link_count:
@@ -149,7 +149,7 @@ class Model:
         return tuple(dict.fromkeys(name for kind in self.kinds for name in kind.oscillator.coordinates))
 
     def equations(self, varied: tuple[str, ...] = ()) -> Equations:
-        """Return the equations of the network; the parameters of `varied` have a value for each node."""
+        """Return the equations of the network; parameters in `varied` have a value for each node or each link."""
         return _equations(self, varied)
 
     def check_links(self) -> None:
@@ -160,17 +160,17 @@ class Model:
             coupling.check_ends(self.unlinked.node)
 
     def holders(self, name: str) -> tuple[int, ...]:
-        """Return the nodes (counted from 0) that have a parameter, none for one of the links."""
+        """Return the nodes (counted from 0) that have a parameter; empty for a parameter of links."""
         apart = self.unlinked
         return apart.holders(name) if any(s.name == name for node in apart.nodes for s in node.parameters) else ()
 
     def defaults(self, name: str) -> list[float]:
-        """Return the default of a parameter at each node that has it, in that node's kind."""
+        """Return the default of a parameter at each node that has the parameter; kinds may have different defaults."""
         tables = [_kind_parameters(kind, self.contact, ()) for kind in self.kinds]
         return [float(tables[self.kind_of[i]][name].default) for i in self.holders(name)]
 
     def node_parameter(self, name: str) -> NodeName | None:
-        """Return the parts of the name of a parameter of one node, "a_2"; None for any other name."""
+        """Split the name of a parameter of one node, "a_2", into parameter and node; None for any other name."""
         parts = None if name in self.parameters else NodeName.parse(name)
         return parts if parts is not None and parts.index in self.holders(parts.base) else None
 
@@ -182,7 +182,7 @@ class Model:
         return self.parameters.get(name if parts is None else parts.base)
 
     def single(self, name: str) -> NodeName | LinkName | None:
-        """Return the parts of the name of a parameter of one node or link; raise ValueError if both have the name."""
+        """Split the name of a parameter of one node or one link; raise ValueError if the name has both meanings."""
         node, link = self.node_parameter(name), self.link_parameter(name)
         if node is not None and link is not None:
             raise ValueError(
@@ -192,32 +192,32 @@ class Model:
         return node or link
 
     def link_parameter(self, name: str) -> LinkName | None:
-        """Return the parts of the name of a parameter of one link, "k_1_2"; None for any other name."""
+        """Split the name of a parameter of one link, "k_1_2", into parameter, target, source; else return None."""
         parts = None if name in self.parameters else LinkName.parse(name)
         if parts is None or self.link_names(parts.base).get((parts.target, parts.source)) != parts:
             return None
         return parts
 
     def link_names(self, name: str) -> Mapping[tuple[int, int], LinkName]:
-        """Return the names of a parameter of links, or of their weights "W", by (target, source); none for one of nodes.
+        """Return the name of a parameter at each link (target, source), also of the weights "W".
 
-        A link that acts on both ends shares its name with the link that runs back.  Raises ValueError for more than
-        MOST_NUMBERED links.
+        The result is empty for a parameter of nodes.  The links i -> j and j -> i have one name if the coupling acts on
+        both ends.  Raises ValueError for more than MOST_NUMBERED links.
         """
         return _link_names(self, name)
 
     def on_graph(self, name: str) -> str:
-        """Return, for messages, the graph whose links have a parameter, or whose weights "W" are meant: " on ring(4)"."""
+        """Return " on ring(4)" for messages: the graph whose links have the parameter `name`, or the weights "W"."""
         graphs = (graph for coupling, graph in self.linked if name in (*coupling.parameters, WEIGHTS))
         return "".join(f" on {graph.name}({graph.n})" for graph in islice(graphs, 1))
 
     def no_link(self, name: str) -> str:
-        """Return the reason why no link has a name such as "k_1_9", with valid names; "" for a name of another form."""
+        """Return a message why no link has a name such as "k_1_9", with valid names; "" for a name of another form."""
         link = LinkName.parse(name)
         names = {} if link is None else self.link_names(link.base)
         if link is None or not names:
             return ""
-        # The link exists, but its name is that of its edge, with the smaller node first.
+        # The link exists, but both directions share the name with the smaller node first.
         back = names.get((link.target, link.source))
         if back is not None:
             return f"expected {str(back)!r}, the one number of a link that acts on both of its ends"
@@ -229,7 +229,7 @@ class Model:
         )
 
     def unknown(self, name: str, what: str, valid_names: Iterable[str]) -> str:
-        """Return the message that refuses a name, or a parameter of a coupling without links."""
+        """Return the error message for an unknown name, or for a parameter of a coupling without links."""
         known, reason = tuple(valid_names), self.no_link(name) or unsupported(name)
         if reason:
             return f"unknown {what} {name!r}; {reason}"
@@ -242,7 +242,7 @@ class Model:
         return f"unknown {what} {short_repr(name)}; known: {listed(known)}{suggestion(name, known)}"
 
     def check_state(self, name: str, what: str) -> None:
-        """Raise ValueError if a name such as "v_2" is no state of the network; `what` is its role, for the message."""
+        """Raise ValueError if a name such as "v_2" is no state of the network; `what` begins the message."""
         apart, parts = self.unlinked, NodeName.parse(name)
         if parts is not None and parts.base in apart.components and parts.index in apart.holders(parts.base):
             return
@@ -261,7 +261,7 @@ def _unlinked(kinds: tuple[NodeKind, ...], kind_of: tuple[int, ...], contact: Co
 def union_of(graphs: tuple[Topology, ...], name: str) -> Topology:
     """Return the union of graphs: a link of weight 1 wherever one of them has a link.
 
-    Raises ValueError if two graphs give their nodes different labels, or one order of them and another.
+    Raises ValueError if two graphs have different labels of nodes, or the same labels in another order.
     """
     n, labels = graphs[0].n, None
     for graph in graphs:
@@ -271,7 +271,7 @@ def union_of(graphs: tuple[Topology, ...], name: str) -> Topology:
                 "labels in all graphs"
             )
         labels = tuple(graph.labels) if graph.labelled else labels
-    # All pairs contain every other graph, and need no list.
+    # A complete graph contains every other graph, and needs no list of links.
     if any(graph.all_to_all is not None for graph in graphs):
         return Topology(name, n, rule=topology("complete", n).rule, labels=labels)
     pairs = sorted({link[:2] for graph in graphs for link in graph.links})
@@ -287,7 +287,7 @@ def _equations(model: Model, varied: tuple[str, ...]) -> Equations:
 
 @lru_cache(maxsize=64)
 def _link_names(model: Model, name: str) -> Mapping[tuple[int, int], LinkName]:
-    """Return the names of a parameter of links, or of their weights, by target and source."""
+    """Return the name of a parameter of links, or of the weights, at each link (target, source)."""
     link_names: dict[tuple[int, int], LinkName] = {}
     weights = name == WEIGHTS and name not in model.parameters and len(model.linked) == 1
     for coupling, graph in () if model.holders(name) else model.linked:
@@ -297,7 +297,7 @@ def _link_names(model: Model, name: str) -> Mapping[tuple[int, int], LinkName]:
                     f"{name}: found numbers of {graph.link_count} links; expected at most {MOST_NUMBERED} links with numbers of "
                     "their own"
                 )
-            # Forces of an energy act on both ends of an edge.
+            # The forces of an energy act on both ends, so both directions of a link share one value.
             mutual = isinstance(coupling, LagrangianCoupling | Potential) and graph.symmetric
             for target, source, _ in graph.links:
                 ends = (source, target) if mutual and source < target else (target, source)
@@ -315,7 +315,7 @@ def _kind_parameters(kind: NodeKind, contact: ContactModel, couplings: tuple[Cou
 def _parameters(
     kinds: tuple[NodeKind, ...], contact: ContactModel, couplings: tuple[Coupling, ...]
 ) -> FrozenDict[Parameter]:
-    """Return the parameters of all kinds, each with the default of the first kind that has it, then those of couplings."""
+    """Return the parameters of all kinds, with the default of the first kind that has a name, then of couplings."""
     parameters: dict[str, Parameter] = {}
     for joined in ((), couplings):
         for kind in kinds:
@@ -325,7 +325,7 @@ def _parameters(
 
 
 def _states(component: str, holders: tuple[int, ...]) -> str:
-    """Return the states of one component as text: x_1 … x_4, or of some nodes only theta_2, theta_3."""
+    """Return the states of one component as text: x_1 … x_4, or theta_2, theta_3 if only some nodes have it."""
     if len(holders) > 1 and holders == tuple(range(len(holders))):
         return f"{component}_1 … {component}_{len(holders)}"
     return ", ".join(str(NodeName(component, i)) for i in holders)

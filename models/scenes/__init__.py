@@ -1,1 +1,1 @@
-"""Scenes: a model with its numbers and its records, and the files that hold them."""
+"""Scenes: a model with its numbers and records, and scene files."""

@@ -39,7 +39,7 @@ class TimeUnit(Word):
 
 
 METHODS = Path(__file__).parents[2] / "codegen" / "integrators"
-"""The folder of the integrators, one file each: listed here, imported by the code generator alone."""
+"""Folder of the integrators, one file each.  This module lists the names; only the code generator imports the files."""
 
 LIMITS: Mapping[str, tuple[Any, Any]] = {
     "transient": (0.0, sys.float_info.max),
@@ -52,10 +52,13 @@ LIMITS: Mapping[str, tuple[Any, Any]] = {
     "realisations": (0, LIMIT),
     "rng": (0, SEED_LIMIT),
 }
-"""The range of each number that belongs to a keyword, both ends in it."""
+"""The range of each keyword that is a number, both ends included."""
 
 SAMPLES = (401, 100, 20_001)
-"""Points of a trajectory by default: the fewest, those of a unit of the window, the most; 40 a turn draw a smooth curve, and motions turn more than once in a unit."""
+"""Default points of a trajectory: fewest, points per unit of time of the window, most (choices).
+
+About 40 points per turn draw a smooth curve, and motions turn more than once in a unit of time.
+"""
 
 
 def integrators() -> tuple[str, ...]:
@@ -69,23 +72,23 @@ def _shipped_integrators() -> tuple[str, ...]:
 
 
 def complete(keywords: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values of a scene's keywords, and its model."""
+    """Return the values of all keywords of a scene, together with the model."""
     values = dict(keywords)
     values["title"] = check_text("title", keywords["title"])
     values["seed"] = check_integer("seed", keywords["seed"], *LIMITS["seed"])
-    # The model, on the union of the graphs that are drawn.
+    # Build the model, on the union of drawn graphs.
     values["draws"] = draws(keywords["draws"], keywords["realisations"])
     values["rng"] = check_integer("rng", keywords["rng"], *LIMITS["rng"])
     values |= _model(keywords, values["draws"], values["rng"])
     model: Model = values["model"]
-    # Axes, draws and parameters, which differ from node to node, or link to link, where one of them is swept or drawn.
+    # Axes, draws and parameters. A parameter has a value for each node or link if a single one is swept or drawn.
     values["axes"] = axes = read_axes(keywords["axes"], keywords["zipped"])
     check_cells(axes, keywords["zipped"], keywords["realisations"])
     drawn = drawn_axes(model, values["draws"], keywords["realisations"], values["rng"])
     values["parameters"] = parameter_values = parameters(model, keywords["parameters"], (*axes, *drawn))
     differing = varied(parameter_values, model.parameters)
     if any(model.link_names(name) for name in differing):
-        model.equations(differing)  # refuses links that cannot differ
+        model.equations(differing)  # raises ValueError for links whose parameters cannot differ
     if GRAPH in values["draws"]:
         _check_graphs(model, differing)
     # Start, records and times.
@@ -112,7 +115,7 @@ def complete(keywords: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _check_graphs(model: Model, differing: tuple[str, ...]) -> None:
-    """Refuse graphs by realisation if a link of weight 0, which represents no link, acts."""
+    """Raise ValueError for graphs by realisation if a link of weight 0, which stands for no link, still acts."""
     for edge in model.equations(differing).edges:
         acting = next((e for e in edge.expressions if e.xreplace({WEIGHT_NUMBER: sp.S.Zero}) != 0), None)
         if acting is not None:
@@ -122,14 +125,14 @@ def _check_graphs(model: Model, differing: tuple[str, ...]) -> None:
 
 
 def _model(keywords: Mapping[str, Any], drawn: Mapping[str, Draws], rng: int) -> dict[str, Any]:
-    """Return the model, on the union of the graphs that are drawn if there are any, and its parts."""
+    """Return the model and its parts, on the union of drawn graphs if there are any."""
     oscillator = as_oscillator(keywords["oscillator"])
     if keywords["links"] is not None and keywords["coupling"] not in (None, "spring"):
         raise ValueError("links: found a coupling beside it; expected each layer with its own coupling; leave one out")
     coupling = as_coupling(keywords["coupling"]) if keywords["links"] is None else None
     layers = as_layers(keywords["links"], coupling, keywords["topology"])
     if GRAPH in drawn:
-        nodes = drawn_nodes(drawn, rng)  # before any link is drawn
+        nodes = drawn_nodes(drawn, rng)  # number of nodes, found without drawing links
         if len(layers) > 1 or (keywords["topology"] is not None and layers[0][1].n != nodes):
             drawn_text = f"{len(layers)} layers of links" if len(layers) > 1 else f"graphs of {nodes} nodes"
             raise ValueError(
@@ -154,7 +157,7 @@ def _model(keywords: Mapping[str, Any], drawn: Mapping[str, Draws], rng: int) ->
 
 
 def _check_physics(model: Model, parameter_values: Mapping[str, float], axes: Sequence[Axis]) -> None:
-    """Refuse wrong physics at the scene's parameters and at the ends of its axes."""
+    """Check friction and masses at the parameters of the scene and at the ends of its axes."""
     if all(isinstance(kind.oscillator.model, FieldModel) and kind.friction is None for kind in model.kinds):
         return
     for ends in (min, max):
@@ -167,7 +170,7 @@ def _check_physics(model: Model, parameter_values: Mapping[str, float], axes: Se
 
 
 def _start(model: Model, initial: object, seed: int) -> FrozenDict[tuple[float, ...]]:
-    """Return the initial states by component; the default of each kind of node lies around its centre."""
+    """Return the initial states by component; by default around the initial state of each kind of node."""
     for name in model.components:
         base, _, number = name.rpartition("_")
         if base in model.components and number.isdecimal() and 1 <= int(number) <= model.n:
@@ -184,7 +187,7 @@ def _start(model: Model, initial: object, seed: int) -> FrozenDict[tuple[float, 
 
 
 def _records(model: Model, record: object) -> tuple[Record, ...]:
-    """Return the records in the order of `Record`; by default the synchronisation error if there are states to compare."""
+    """Return the records in the order of `Record`; by default the synchronisation error if states can be compared."""
     n, common = model.n, bool(model.unlinked.common)
     listed = ((Record.SYNC_ERROR,) if n > 1 and common else ()) if record is None else record
     if not isinstance(listed, (list, tuple)):
@@ -202,7 +205,7 @@ def _records(model: Model, record: object) -> tuple[Record, ...]:
 
 
 def _section(model: Model, section_text: object) -> Section:
-    """Return the section; by default a velocity of the first node, or the first state of a vector field, falls through 0."""
+    """Return the section; by default the first velocity, or the first state of a vector field, falls through 0."""
     states = tuple(s.name for s in model.unlinked.node_at(0).state)
     crossed = states[0] if isinstance(model.kinds[model.kind_of[0]].oscillator.model, FieldModel) else states[-1]
     default = f"{'v' if 'v' in states else crossed}_1 falling"
@@ -212,7 +215,7 @@ def _section(model: Model, section_text: object) -> Section:
 
 
 def _check_sections(values: Mapping[str, Any]) -> None:
-    """Refuse one name for two variables, and a section beside sections or a stop."""
+    """Raise ValueError for one name of two variables, and for a section together with sections or a stop."""
     other = "sections" if values["sections"] else "stop" if values["stop"] else None
     if Record.SECTION in values["record"] and other:
         raise ValueError(f"record: found 'section' beside {other}; expected one of them; make it one of the sections")
@@ -223,7 +226,7 @@ def _check_sections(values: Mapping[str, Any]) -> None:
 
 
 def _time_unit(model: Model, parameter_values: Mapping[str, float], unit_text: object) -> TimeUnit:
-    """Return the unit of time; by default the period of the drive if there is one at all values of the parameters."""
+    """Return the unit of time; by default the period of the drive if a period exists at all parameter values."""
     motion = drive(model, parameter_values)
     default = TimeUnit.TIME if motion.frequency is None or motion.by_values else TimeUnit.PERIOD
     unit = default if unit_text is None else TimeUnit.parse("time_unit", unit_text)
@@ -260,7 +263,7 @@ def _numerics(keywords: Mapping[str, object], records: Sequence[Record], window:
 
 
 def _check_friction(model: Model, parameter_values: Mapping[str, float], axes: Sequence[Axis], zipped: bool) -> None:
-    """Refuse set-valued friction whose static coefficient is below that of slip in a cell: it can neither hold nor slip."""
+    """Raise ValueError if static friction is below the friction of slow slip in a cell: no motion would be possible."""
     if model.contact != ContactModel.SET_VALUED:
         return
     swept = {axis.name: axis.values for axis in axes}
@@ -268,7 +271,7 @@ def _check_friction(model: Model, parameter_values: Mapping[str, float], axes: S
         for pair in kind.friction.order if kind.friction else ():
             low, high = (names[name] for name in pair)
             lows, highs = (swept.get(name, (parameter_values[name],)) for name in (low, high))
-            # On a grid the largest of one meets the smallest of the other; zipped axes meet value by value.
+            # On a grid compare the largest value of one with the smallest of the other; zipped axes value by value.
             together = zipped and low in swept and high in swept
             for a, b in zip(lows, highs, strict=True) if together else ((max(lows), min(highs)),):
                 if b < a:

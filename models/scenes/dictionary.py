@@ -1,4 +1,4 @@
-"""A scene as names and values in JSON types, and back."""
+"""Convert a scene to names and values in JSON types, and back."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ..sweeps.parameters import collected
 
 
 def arguments(values: object, keywords: Iterable[str], folder: Path | None = None) -> dict[str, Any]:
-    """Return the keywords of a scene from names and values as in a scene file, whose paths start in `folder`."""
+    """Return the keywords of a scene from names and values of a scene file; relative paths start at `folder`."""
     table = check_table("scene", values)
     check_keys("scene", table, ["sweep" if name == "axes" else name for name in keywords])
     read: dict[str, Any] = {str(key): value for key, value in table.items()}
@@ -35,7 +35,7 @@ def arguments(values: object, keywords: Iterable[str], folder: Path | None = Non
         read["axes"] = sweep
 
     def each(value: object, reader: Callable[[int, Any], object]) -> object:
-        """Read the entries of a list, counted from 1; `Scene` refuses anything else."""
+        """Read the entries of a list, counted from 1; return any other value, which `Scene` then refuses."""
         return [*map(reader, count(1), value)] if isinstance(value, list) else value
 
     def graph(what: str, value: object) -> Topology:
@@ -68,7 +68,7 @@ def arguments(values: object, keywords: Iterable[str], folder: Path | None = Non
 
 
 def _placed(name: object, folder: Path | None) -> object:
-    """Return a name, or a table of names, in which paths to files of code start in `folder`."""
+    """Return a name, or a table of names, with relative paths to files of code resolved against `folder`."""
     if isinstance(name, Mapping):
         return {key: _placed(e, folder) if key in ("oscillator", "friction") else e for key, e in name.items()}
     if not isinstance(name, str) or folder is None or not split(name)[0].endswith(".py"):
@@ -120,7 +120,7 @@ def _of_file(table: Mapping[object, Any], folder: Path | None) -> Topology:
 
 
 def _of_edges(table: Mapping[object, Any]) -> Topology:
-    """Return the graph of a list of edges between nodes 1 … n, between `labels`, or between the nodes that they name."""
+    """Return the graph of a list of edges between nodes 1 … n, between `labels`, or between all names in the edges."""
     name = check_text("topology name", table.get("name", "edges"))
     if "n" in table and "labels" in table:
         raise ValueError("topology: found n beside labels; expected one of them; leave n out")
@@ -134,7 +134,7 @@ def _of_edges(table: Mapping[object, Any]) -> Topology:
 
 
 def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
-    """Return a whole scene in JSON types, in the names of a scene file."""
+    """Return a scene with all its values in JSON types, under the names of a scene file."""
     written = dict(values)
     for name in ("contact", "time_unit", "continuation", "section"):
         written[name] = str(values[name])
@@ -148,7 +148,7 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
             {"coupling": as_text_or_table(coupling), "topology": graph_table(graph)} for coupling, graph in layers
         ]
     written["nodes"] = [group.as_dict() for group in values["nodes"]]
-    if values["atol"] == values["rtol"] / 10:  # the default, which follows another rtol too
+    if values["atol"] == values["rtol"] / 10:  # leave out the default, so that it follows a changed rtol
         del written["atol"]
     written["parameters"] = collected(values["parameters"], varied)
     written["initial"] = {name: list(states) for name, states in values["initial"].items()}
@@ -166,16 +166,16 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
 
 
 def _draw(drawn: Draws) -> object:
-    """Return a distribution or a random graph as text, or numbers or graphs by realisation."""
+    """Return a distribution or a random graph as text, and listed numbers or graphs as a list."""
     if isinstance(drawn, Draw | RandomGraph):
         return str(drawn)
     return [*map(graph_table, drawn.graphs)] if isinstance(drawn, Graphs) else [*map(list, drawn)]
 
 
 def graph_table(graph: Topology) -> dict[str, object]:
-    """Return a graph in JSON types, which `graph_of` reads: its family and options, or its edges.
+    """Return a graph in JSON types for `graph_of`: its family and options, or its edges.
 
-    A weighted complete graph, whose links may be too many to be listed, becomes the text of the operation.
+    A weighted complete graph may have too many links for a list, so it becomes text: "weighted(complete(100), 1/100)".
     """
     try:
         composed = graph.all_to_all is not None and is_composed(graph.name)

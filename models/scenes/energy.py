@@ -11,6 +11,6 @@ __all__ = ["energy"]
 def energy(scene: Scene) -> EnergyTerms:
     """Return the energy of a scene's network.
 
-    Raises ValueError as `energy_of`, for a network that has none.
+    Raises ValueError, as `energy_of` does, for a network without an energy.
     """
     return energy_of(scene.model, scene.varied)

@@ -1,4 +1,4 @@
-"""Scenes as text: TOML files and JSON-ready dictionaries with the names of `Scene`'s keywords."""
+"""Read scene files: TOML text whose keys are the keywords of `Scene`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 KEY_PARTS = 8
-"""Most parts of a dotted key in a scene file: more than any needs, few enough for the parser."""
+"""Most parts of a dotted key in a scene file (a choice): enough for every key, and few enough for the parser."""
 
 _STRINGS = (
     r'"""(?:\\.|[^\\])*?(?:"""|\Z)',
@@ -26,11 +26,11 @@ _STRINGS = (
 )
 
 _TOKEN = re.compile(rf"(?P<word>{'|'.join(_STRINGS)}|[\w+-]+|[ \t]+)|(?P<dot>\.)|(?P<end>#[^\n]*|.)", re.DOTALL)
-"""Tokens of TOML: strings, bare words and blanks, which continue a key, dots, and any other text, which ends a key."""
+"""Tokens of TOML: `word` (strings, bare words, blanks) continues a key, `dot` adds a part, `end` ends the key."""
 
 
 def scene_names() -> tuple[str, ...]:
-    """Return the names of the scenes that come with the package: the files of the folder `scenes`."""
+    """Return the names of the scenes that are shipped with the package."""
     folder = resources.files(f"{__package__}.library")
     return tuple(sorted(item.name[:-5] for item in folder.iterdir() if item.name.endswith(".toml")))
 
@@ -38,8 +38,8 @@ def scene_names() -> tuple[str, ...]:
 def load_scene(name_or_path: str | os.PathLike[str]) -> Scene:
     """Return the scene of a shipped name ("figure_4a") or of a file whose path ends in ".toml".
 
-    Raises ValueError or TypeError, with the file's name in front, on a missing or unreadable file and on
-    whatever `Scene` refuses.  Nothing in the file is run.
+    Raises ValueError or TypeError for a missing or unreadable file, and for values that `Scene` refuses; the message
+    begins with the name of the file.  No code in the file is executed.
 
     Examples
     --------
@@ -96,8 +96,8 @@ def _read(path: Path) -> bytes:
 
 
 def _scene(name: str, content: bytes, folder: Path | None) -> Scene:
-    """Return the scene of a file's content, whose paths start in `folder`."""
-    from .scene import Scene  # the list of scenes needs no SymPy
+    """Return the scene of the content of a file; relative paths start at `folder`."""
+    from .scene import Scene  # imported here, so that listing scenes does not load SymPy
 
     try:
         text = content.decode("utf-8-sig")
@@ -105,7 +105,7 @@ def _scene(name: str, content: bytes, folder: Path | None) -> Scene:
         raise ValueError(
             f"{name}: byte {error.start} is not UTF-8; expected UTF-8 text; save the file in that encoding"
         ) from None
-    # The time and memory of the parser rise with the square of the parts of a dotted key.
+    # Limit the parts of dotted keys: time and memory of the parser grow with the square of their number.
     dots = 0
     for token in _TOKEN.finditer(text):
         dots = 0 if token.lastgroup == "end" else dots + (token.lastgroup == "dot")

@@ -1,4 +1,4 @@
-"""The observables, sections and stop of a scene, checked against its model."""
+"""Check the observables, sections and stop of a scene against its model."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def observables(model: Model, values: Mapping[str, float], table: object) -> Fro
 
 
 def sections(model: Model, values: Mapping[str, float], table: object) -> FrozenDict[Section]:
-    """Return the sections on functions by their names, with all kept expressions spelled out; arguments as `observables`."""
+    """Return the sections on functions of the states by name, with `keep` filled in; arguments as in `observables`."""
     checked: dict[str, Section] = {}
     names = _Names(model, values)
     for name, value in names.entries("sections", table, ENDINGS):
@@ -64,9 +64,9 @@ def sections(model: Model, values: Mapping[str, float], table: object) -> Frozen
 
 
 def stop(model: Model, values: Mapping[str, float], text: object) -> str | None:
-    """Return the text of the function that ends a cell when it passes zero; None for none.
+    """Return the text of the function that ends a cell when the function passes zero; None without a stop.
 
-    Raise ValueError or TypeError as `observables`, and for set-valued contacts, whose events end steps themselves.
+    Raises ValueError or TypeError as `observables` does, and for set-valued friction, whose events already end steps.
     """
     if text is None:
         return None
@@ -82,13 +82,13 @@ def stop(model: Model, values: Mapping[str, float], text: object) -> str | None:
 
 
 def has_own_energy(model: Model) -> bool:
-    """Return whether a state or parameter is called energy, which observables mean then."""
+    """Return True if a state or parameter is called energy; the name in observables then means this symbol."""
     return ENERGY.name in {*model.parameters, *model.components}
 
 
 @dataclass
 class _Names:
-    """The names that expressions of a scene may hold."""
+    """The names that may occur in expressions of a scene."""
 
     model: Model
     values: Mapping[str, float]  # the parameters of the scene
@@ -104,11 +104,11 @@ class _Names:
         return (*self.model.unlinked.components, *(name for name in self.varied if self.model.holders(name)))
 
     def at_each_node(self, expr: sp.Expr) -> bool:
-        """Return whether an expression has a value for each node."""
+        """Return True if an expression has a value for each node."""
         return any(s.name in self.of_nodes for s in node_symbols(expr))
 
     def entries(self, keyword: str, table: object, endings: Sequence[str] = ("",)) -> Iterator[tuple[str, object]]:
-        """Yield names and values of a table; refuse names that mean something else in results, with one of the `endings`."""
+        """Yield names and values of a table; refuse a name that with one of `endings` has another meaning in results."""
         if table is None:
             return
         model = self.model
@@ -125,7 +125,7 @@ class _Names:
             yield name, value
 
     def check(self, what: str, expr: sp.Expr) -> None:
-        """Refuse symbols that are no state, parameter or t, states that some nodes lack, and constants."""
+        """Raise ValueError for symbols other than states, parameters and t, states that nodes lack, and constants."""
         network, model = self.model.unlinked, self.model
         partly = {name for name in self.of_nodes if network.holders(name) != tuple(range(model.n))}
         valid_names = (*self.of_nodes, *network.state, *self.values, TIME.name)
@@ -156,7 +156,7 @@ class _Names:
             raise ValueError(f"{what}: found the constant {short_repr(expr)}; expected an expression of states")
 
     def _no_energy(self) -> str:
-        """Return why the network has no energy; "" if it has one."""
+        """Return the reason why the network has no energy; "" if there is an energy."""
         try:
             energy_of(self.model, self.varied)
         except ValueError as problem:

@@ -1,4 +1,4 @@
-"""`Scene`: the model, its numbers, and what is recorded of it; every computation starts from one."""
+"""`Scene`: a model, its numbers and its records; every computation starts from a scene."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ __all__ = ["KEYWORDS", "Axis", "Scene", "Section", "check_scene"]
 
 @dataclass(frozen=True, slots=True, init=False, repr=False)
 class Scene(HasDrawing, HasLatex):
-    """A network of oscillators, its numbers, its start, what to record and what to sweep.
+    """A network of oscillators with parameters, initial states, records and axes of a sweep.
 
     Every keyword has a default; the same names are the keys of a scene file (see docs/scenes.md).  States,
     parameters and times are non-dimensional.
@@ -55,38 +55,40 @@ class Scene(HasDrawing, HasLatex):
     oscillator : Oscillator or str
         The nodes, by value (`Lagrangian`, `Field`) or by name.
     coupling : Coupling or str, optional
-        What joins the nodes: a name ("spring", "spring on x"), components ("x->x, 1/2 y->z"), `Rates` or a `Potential`.
+        The coupling: a name ("spring", "spring on x"), components ("x->x, 1/2 y->z"), `Rates` or a `Potential`.
     topology : Topology, optional
-        The graph; one node alone if left out.  Of several layers of links it is the union of their graphs.
+        The graph; a single node if left out.  With several layers of links it is the union of their graphs.
     title : str
-        What the scene is called.
+        The title of the scene.
     friction : FrictionLaw or str, optional
-        Their friction law; "default" is the one that the oscillator brings, None for none.
+        The friction law of the oscillators; "default" is the law of the oscillator itself, None is no friction.
     contact : str, optional
-        How the jump of a law at rest is treated: "atan", "sign" or "set-valued"; that of the oscillator if left out.
+        Treatment of the jump of a friction law at rest: "atan", "sign" or "set-valued"; by default the choice of the
+        oscillator.
     nodes : iterable of Group or tables, optional
         Nodes of other kinds.
     links : iterable of (Coupling or str, Topology), optional
         Several layers of links, each with its own graph, in place of `coupling` and `topology`.
     parameters : mapping, optional
-        Values of parameters: a number, or a list with one number for each node, of the coupling one for each edge or link.
+        Values of parameters: a number, or a list with one number for each node (for each edge or link, if the parameter
+        belongs to the coupling).
     initial : mapping, optional
         Initial states: a number, one number for each node, or {low, high, seed} for random ones.
     record : iterable of str, optional
-        What each cell records: "sync_error", "section", "trajectory".
+        Records of each cell: "sync_error", "section", "trajectory".
     observe : mapping of str to Observable or str, optional
-        What each cell observes over the window, by the names of the results' variables: `mean`, `maximum`, `minimum`,
-        `end` or `variance` of an expression of the states, such as ``"mean(nodes.mean(v**2/2))"``.
+        Observables of each cell by name: `mean`, `maximum`, `minimum`, `end` or `variance` over the window of an
+        expression of the states, such as ``"mean(nodes.mean(v**2/2))"``.  The result has a variable of each name.
     section : Section or str, optional
-        When section points are taken, such as "v_1 falling".
+        Condition at which section points are recorded, such as "v_1 falling".
     sections : mapping of str to Section or table, optional
-        Sections on functions of the states, by the names of the results' variables:
-        ``Section("x_1 - x_2", "rising", keep=("v_1", "v_2"))``.
+        Sections on functions of the states by name, such as
+        ``Section("x_1 - x_2", "rising", keep=("v_1", "v_2"))``.  The result has a variable of each name.
     stop : str or Expr, optional
-        A function of the states, parameters and t that ends a cell when it passes zero, in the transient too.  As with
-        terminal events of SciPy, a function that begins on one side of zero, or at zero, ends nothing before it passes.
+        A function of the states, parameters and t that ends a cell when it passes zero, also in the transient.  As with
+        terminal events of SciPy, the cell ends only when the function changes sign, not when it starts at zero.
     transient, window : float
-        Time before the records, and time of the records, in units of `time_unit`.
+        Duration before the records, and duration of the records, in units of `time_unit`.
     time_unit : str, optional
         "period" (of the drive; the default if the equations repeat themselves in time at all values of the parameters)
         or "time".
@@ -100,34 +102,34 @@ class Scene(HasDrawing, HasLatex):
     max_steps : int
         Most steps of a cell.
     axes : iterable of Axis or mapping
-        What is swept.
+        The parameters or initial states that are swept, with their values.
     zipped : bool
         True if the axes run together.
     continuation : str
-        "up" or "down" if cells start from the end of their neighbours along the last axis, of the scene or of a run,
-        else "none".
+        "up" or "down" if each cell starts from the final state of its neighbour along the last axis (of the scene or of
+        a run), else "none".
     seed : int
         Seed of random initial states.
     realisations : int
-        Realisations of what is drawn, a further dimension of the sweep; 0 for none.
+        Number of realisations of the draws, a further dimension of the sweep; 0 for no draws.
     draws : mapping, optional
-        What is drawn, by the names of parameters and initial states, or "W", the weights of links: `normal`, `uniform`,
-        `lorentzian` (of each node or edge by itself), or a list with one entry for each realisation; by the name
-        "topology" a list of graphs, or a random one as text, "erdos_renyi(20, p=0.3)".
+        Random numbers by the name of a parameter or initial state, or by "W" for the weights of links: `normal`,
+        `uniform`, `lorentzian` (drawn for each node or edge separately), or a list with one entry for each realisation.
+        The name "topology" draws graphs: a list of graphs, or a random graph as text, "erdos_renyi(20, p=0.3)".
     rng : int
-        Seed of what is drawn.
+        Seed of the draws.
 
     Attributes
     ----------
     model : Model
-        What decides on the equations.
+        The oscillators, friction laws, couplings and graphs, which determine the equations.
     given : mapping
-        Each keyword as it was given; None (or "default") for those that follow others.
+        Each keyword as the caller gave it; None (or "default") for keywords whose default depends on other keywords.
 
     Raises
     ------
     ValueError, TypeError
-        For unknown names, values out of range, and combinations that no model has.
+        For unknown names, values out of range, and combinations of keywords that exclude each other.
 
     See Also
     --------
@@ -236,7 +238,7 @@ class Scene(HasDrawing, HasLatex):
 
     @property
     def varied(self) -> tuple[str, ...]:
-        """Names of the parameters that have a value for each node or link: `parameters` has a_1 … a_n, or k_1_2 …"""
+        """Names of parameters with a value for each node or link, which `parameters` lists as a_1 … a_n or k_1_2 …"""
         return varied(self.parameters, self.model.parameters)
 
     @property
@@ -250,9 +252,9 @@ class Scene(HasDrawing, HasLatex):
 
     @property
     def strength(self) -> str:
-        """Name of the parameter that is the strength of the links: sigma, or the only one that is a factor of a link.
+        """Name of the strength of the links: sigma, or the only parameter that is a factor of the whole link.
 
-        Raises ValueError for several layers of links, without links, and if no parameter or more than one is a factor.
+        Raises ValueError for several layers of links, without links, and if none or several parameters are factors.
         """
         if len(self.model.linked) != 1:
             raise ValueError(f"strength of the links: found {len(self.model.linked)} layers of links; expected one")
@@ -260,7 +262,7 @@ class Scene(HasDrawing, HasLatex):
 
     @property
     def strengths(self) -> tuple[str, ...]:
-        """The strength of each layer that has links; ValueError if no parameter of one, or more than one, is a factor."""
+        """The name of the strength in each layer that has links; ValueError if a layer has no unique strength."""
         equations, names_of_layers = self.equations, []
         numbered = tuple(s for edge in equations.edges for s in edge.parameters if s.name in equations.numbered)
         for layer in equations.layers:
@@ -278,12 +280,12 @@ class Scene(HasDrawing, HasLatex):
 
     @property
     def drive(self) -> Drive:
-        """At which frequencies time enters the equations: expressions of the parameters, derived from the equations."""
+        """The drive: frequencies of the explicit time dependence as expressions of the parameters."""
         return drive(self.model, self.parameters)
 
     @property
     def angular_frequency(self) -> float | None:
-        """Angular frequency of the drive (an axis may sweep it), None if the equations do not repeat themselves."""
+        """Angular frequency of the drive at the parameters of the scene; None if the equations are not periodic."""
         frequency = self.drive.frequency
         if frequency is None:
             return None
@@ -301,19 +303,19 @@ class Scene(HasDrawing, HasLatex):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of cells along each dimension of the sweep, realisations last; zipped axes are one, no axes none."""
+        """Number of cells along each dimension of the sweep, realisations last; zipped axes are one dimension."""
         lengths = tuple(len(axis) for axis in self.axes)
         more = (self.realisations,) if self.realisations else ()
         return (*(lengths[:1] if self.zipped else lengths), *more)
 
     @property
     def continued(self) -> bool:
-        """True if cells start from the end of their neighbours along the last axis."""
+        """True if each cell starts from the final state of its neighbour along the last axis."""
         return bool(self.axes) and self.continuation != Continuation.NONE
 
     @property
     def drawn(self) -> tuple[Axis, ...]:
-        """Drawn parameters and states, with a value for each realisation; all share the last dimension of the sweep."""
+        """Drawn parameters and states, with a value for each realisation, along the last dimension of the sweep."""
         return drawn_axes(self.model, self.draws, self.realisations, self.rng)
 
     @property
@@ -323,30 +325,31 @@ class Scene(HasDrawing, HasLatex):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences about what is allowed but probably not meant."""
+        """Warnings: sentences about choices that are allowed but probably not intended."""
         unit = self.period or 1.0 if self.time_unit == TimeUnit.PERIOD else 1.0
         return warnings(self.model, self.varied, self._values(), (self.transient + self.window) * unit)
 
     def takes(self, name: str) -> bool:
-        """True for the name of a parameter, "a", and for that of a parameter of one node, "a_2"."""
+        """Return True for the name of a parameter, "a", or of a parameter of one node, "a_2"."""
         return self.model.parameter(check_text("name", name)) is not None
 
     def replace(self, **changes: Any) -> Scene:
-        """Return a scene with some keywords changed, checked anew: replace(rtol=1e-6, sigma=0.2).
+        """Return a new, checked scene with some keywords changed, as in replace(rtol=1e-6, sigma=0.2).
 
         Parameters
         ----------
         **changes
-            Keywords of `Scene`, or names of parameters (sigma above), which change that one alone; `parameters`
-            replaces them all.  What was not given follows its default.  Initial states that were given stay: a number
-            and a range fit every number of nodes; a list that no longer fits is refused.
+            Keywords of `Scene`, or names of parameters such as sigma.  The name of a parameter changes only this
+            parameter; `parameters` replaces all of them.  Keywords that were never given follow their defaults.  Given
+            initial states are kept: a number or a range fits every number of nodes; a list that no longer fits raises
+            ValueError.
 
         Raises
         ------
         ValueError, TypeError
-            For unknown names, and for whatever `Scene` refuses.
+            For unknown names, and for values that `Scene` refuses.
         """
-        # Names of parameters, names of keywords, and names that are neither.
+        # Separate names of parameters, names of keywords, and unknown names.
         single = {name: changes.pop(name) for name in tuple(changes) if name not in self.given and self.takes(name)}
         strange = next((name for name in changes if name not in self.given), None)
         if strange is not None:
@@ -360,10 +363,10 @@ class Scene(HasDrawing, HasLatex):
             changes["topology"] = as_topology(changes["topology"])
         start: Mapping[str, object] | None = self.given["initial"]
         if start and not {"contact", "friction", "oscillator", "nodes"}.isdisjoint(changes):
-            # The friction may be another; modes of contacts follow from x and v.
+            # Drop the modes of contacts: friction may have changed, and the modes follow from x and v.
             start = {name: at for name, at in start.items() if name != SLIP.name}
         keywords = {**self.given, "initial": start, **changes}
-        if keywords["links"] is not None:  # they replace the coupling and the graph of a single layer
+        if keywords["links"] is not None:  # layers of links replace the coupling and the graph of a single layer
             keywords |= {"coupling": None, "topology": None} | changes
         if keywords["parameters"] is not None or single:
             table = {} if keywords["parameters"] is None else check_table("parameters", keywords["parameters"])
@@ -382,11 +385,11 @@ class Scene(HasDrawing, HasLatex):
         return {name: getattr(self, name) for name in KEYWORDS}
 
     def as_dict(self) -> dict[str, object]:
-        """Return the whole scene in JSON types; `Scene.from_dict` makes an equal scene of it."""
+        """Return the scene in JSON types, from which `Scene.from_dict` returns an equal scene."""
         return as_dict(self._values(), self.varied)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the whole scene to a TOML file; `load_scene` makes an equal scene of it.
+        """Write the scene to a TOML file, from which `load_scene` returns an equal scene.
 
         Parameters
         ----------
@@ -396,7 +399,7 @@ class Scene(HasDrawing, HasLatex):
         Raises
         ------
         ValueError
-            For another ending, more than a megabyte, and parts that no file can say.
+            For another ending, for more than a megabyte, and for parts that a file cannot represent.
         """
         write(self.as_dict(), path)
 
@@ -409,7 +412,7 @@ class Scene(HasDrawing, HasLatex):
         values : mapping
             Names and values in JSON types, as `as_dict` returns them.
         folder : Path, optional
-            Where relative paths in them start; the working folder if left out.
+            Folder at which relative paths in `values` start; the working folder if left out.
 
         Raises
         ------
@@ -431,9 +434,9 @@ class Scene(HasDrawing, HasLatex):
 
 
 def _warn(scene: Scene, before: Scene | None = None) -> None:
-    """Warn of functions of single inputs, of a synchronisation error that cannot vanish, and of friction that is not resolved.
+    """Warn of firing rates of single inputs, of an error that cannot vanish, and of friction that is not resolved.
 
-    A scene that replaces another one, `before`, repeats no warning of that.
+    If the scene replaces the scene `before`, warnings of `before` are not repeated.
     """
     sentences = list[str]()
     if before is None or (scene.model, scene.varied) != (before.model, before.varied):
@@ -448,7 +451,7 @@ def _warn(scene: Scene, before: Scene | None = None) -> None:
 
 
 def _node_count(keywords: Mapping[str, Any]) -> int | None:
-    """Return the number of nodes of the links or of the graph; None if neither is a keyword, or readable."""
+    """Return the number of nodes of the links or the graph in the keywords; None if neither is given or readable."""
     try:
         graph = keywords["topology"] if keywords["links"] is None else keywords["links"][0][1]
     except (TypeError, LookupError):
@@ -473,11 +476,11 @@ _FOLLOWING = {
     "atol": None,
     "samples": None,
 }
-"""Keywords whose default depends on other keywords, with the value that means this default."""
+"""Keywords whose default depends on other keywords, with the value that stands for the default."""
 
 
 def _frozen_keywords(keywords: Mapping[str, Any], values: Mapping[str, Any]) -> FrozenDict[Any]:
-    """Return the keywords as immutable values; those with a default that follows other keywords stay open."""
+    """Return the keywords as immutable values; a default that depends on other keywords stays None or "default"."""
     frozen = {name: values[name] for name in KEYWORDS}
     for name, following in _FOLLOWING.items():
         if isinstance(keywords[name], str | None) and keywords[name] == following:
@@ -501,7 +504,7 @@ def _frozen_keywords(keywords: Mapping[str, Any], values: Mapping[str, Any]) -> 
 
 
 def _frozen_parameters(table: Mapping[str, object], model: Model, values: Mapping[str, float]) -> dict[str, object]:
-    """Return the parameters of a table: a number, or a tuple with one for each node or link."""
+    """Return the parameters of a table: a number, or a tuple with one number for each node or link."""
     frozen: dict[str, object] = {}
     for name in table:
         if name in values:
@@ -510,7 +513,7 @@ def _frozen_parameters(table: Mapping[str, object], model: Model, values: Mappin
             names = [*dict.fromkeys(map(str, model.link_names(name).values()))]
             names = names or [str(NodeName(name, i)) for i in model.holders(name)]
             frozen[name] = tuple(values[single] for single in names)
-        else:  # the parameter of one node, all of which have one number
+        else:  # the parameter of one node, such as a_2, where all nodes have one value
             parts = model.single(name)
             frozen[name] = values[parts.base] if parts else table[name]
     return frozen

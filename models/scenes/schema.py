@@ -1,4 +1,4 @@
-"""The JSON Schema of scene files, for editors: from the keywords of `Scene`, their types and their limits."""
+"""Derive the JSON Schema of scene files, for editors, from the keywords of `Scene`, their types and their limits."""
 
 from __future__ import annotations
 
@@ -39,15 +39,15 @@ EXPRESSIONS: Table = {"type": "object", "additionalProperties": NUMBER}
 
 WHOLE = {"type": "integer", "minimum": 1, "maximum": MOST_NODES}
 OPTIONS = {int: ["integer", "string"], str: ["number", "string"]}
-"""The types of an option of a family by the type of its default; other options are lists."""
+"""JSON types of an option of a family of graphs, by the type of its default; other options are lists."""
 
 
 def schema() -> Table:
     """Return the JSON Schema of scene files, in JSON types.
 
-    The schema lists the keys of every table, their types and ranges, and the names of all parts.
-    `Scene` checks all that depends on several keys, such as whether an oscillator has a parameter, and the
-    grammar of texts.  The words are those that draft 4 and draft 7 share, since editors read either.
+    The schema lists the keys of every table, their types and ranges, and the names of all parts.  `Scene` checks
+    conditions on several keys, such as whether an oscillator has a parameter, and the grammar of texts.  The schema
+    uses only keywords that draft 4 and draft 7 share, since editors read one or the other.
 
     References
     ----------
@@ -130,7 +130,7 @@ def _rows() -> dict[str, Table]:
 
 
 def _of_type(name: str, kind: Any) -> Table:
-    """Return the row of a keyword by its type: a word, several words, text, a number in its range, true or false."""
+    """Return the row of a keyword from its type: a word, several words, text, a number in its range, true or false."""
     if isinstance(kind, type) and issubclass(kind, Word):
         return {"enum": [str(word) for word in kind]}
     if get_origin(kind) is tuple:
@@ -202,7 +202,7 @@ def _graphs() -> list[Table]:
 
 
 def _family(graphs: Family) -> Table:
-    """Return the table of one family, its options by the types of their defaults."""
+    """Return the table of one family of graphs; types of options follow from the types of their defaults."""
     options: dict[str, Table] = {
         name: {"type": OPTIONS.get(type(default), ["array", "integer", "string"])}
         for name, default in graphs.options.items()
@@ -212,7 +212,7 @@ def _family(graphs: Family) -> Table:
 
 
 def _parameters() -> dict[str, str]:
-    """Return the meaning of each parameter in all parts that have it."""
+    """Return the meanings of each parameter in all oscillators, laws and couplings that have a parameter of the name."""
     parts: dict[str, Mapping[str, Parameter]] = {
         **{name: load_oscillator(name).parameters for name in plugins.names(OSCILLATOR)},
         **{f"friction {name}": load_friction_law(name).parameters for name in plugins.names(FRICTION_LAW)},

@@ -1,4 +1,4 @@
-"""The surface on which section points are taken: a state, or a function of the states, crosses a level."""
+"""The surface of a Poincaré section: a state, or a function of the states, crosses a level."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..inputs.words import Word
 
 
 class Direction(Word):
-    """In which direction a state crosses a level."""
+    """Direction in which a state crosses a level."""
 
     FALLING = "falling"
     RISING = "rising"
@@ -27,17 +27,17 @@ class Section:
     Parameters
     ----------
     variable : str or Expr
-        A state such as "v_1", or of the `sections` of a scene any function of states, parameters and t.
+        A state such as "v_1"; in the `sections` of a scene any function of states, parameters and t.
     direction : Direction or str
     level : float
     keep : iterable of str or Expr, optional
-        What the points of a function keep beside their time: expressions; one of a state of all nodes is kept of each.
-        All states if left out.
+        Expressions that are stored at each point beside the time; all states if left out.  An expression of the states
+        of one node, such as "x", is stored for each node.
 
     Raises
     ------
     ValueError, TypeError
-        On an unknown direction, a level that is no finite number, or an expression that cannot be read.
+        For an unknown direction, a level that is no finite number, or an expression that cannot be read.
     """
 
     variable: str
@@ -59,7 +59,7 @@ class Section:
 
     @classmethod
     def parse(cls, text: object) -> Section:
-        """Return the section written as "v_1 falling" or "x_2 rising 0.1"; a Section passes unchanged."""
+        """Return the section of a text such as "v_1 falling" or "x_2 rising 0.1"; return a Section unchanged."""
         if isinstance(text, Section):
             return text
         parts = check_text("section", text).split(maxsplit=2)
@@ -73,7 +73,7 @@ class Section:
 
     @classmethod
     def of_table(cls, what: str, value: object) -> Section:
-        """Return the section of a table {function, direction, level, keep}; a Section passes unchanged."""
+        """Return the section of a table {function, direction, level, keep}; return a Section unchanged."""
         if isinstance(value, Section):
             return value
         table = check_table(what, value)

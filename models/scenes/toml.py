@@ -35,7 +35,7 @@ def _lines(table: Mapping[str, object], path: tuple[str, ...]) -> Iterator[str]:
     """Yield the lines of a table: its values, then the tables in it, each below its title."""
     tables = {key: value for key, value in table.items() if isinstance(value, Mapping)}
     if path[-1:] == ("parameters",):
-        tables = {}  # each on one line, which keeps the order of all parameters
+        tables = {}  # write each table on one line, which keeps the order of all parameters
     if path and (len(tables) < len(table) or not table):
         yield f"\n[{'.'.join(map(_key, path))}]"
     for key, value in table.items():

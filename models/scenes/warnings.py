@@ -1,4 +1,4 @@
-"""Sentences about scenes that are allowed but probably not meant."""
+"""Warnings about scenes: choices that are allowed but probably not intended."""
 
 from __future__ import annotations
 
@@ -22,20 +22,21 @@ from ..sweeps.axis import Axis
 from ..sweeps.parameters import at_nodes
 
 STIFF = 100.0
-"""Frequency of a mode, and number of its swings, above which springs count as stiff: a choice."""
+"""Frequency of a mode, and number of its oscillations, above which springs count as stiff (a choice)."""
 
 STEEP = 100.0
-"""Least kappa times speed of a belt at which a smoothed law is near its jump: 1 - (2/pi) atan(100) is 0.6 %."""
+"""Least kappa times belt speed at which a smoothed law is close to the law: 1 - (2/pi) atan(100) is 0.6 %."""
 
 COUNTED = 200
-"""Most nodes of a graph with negative weights whose zero eigenvalues the characteristic polynomial counts: a choice of time."""
+"""Most nodes of a graph with negative weights whose characteristic polynomial is computed (a choice of time)."""
 
 
 def zero_multiplicity(graph: Topology) -> int:
-    """Return how often zero is an eigenvalue of the connectivity matrix; 1 means one connected whole.
+    """Return the multiplicity of the eigenvalue 0 of the connectivity matrix; 1 means a connected graph.
 
-    With positive weights it is the number of groups that no other node acts on (J. S. Caughman, J. J. P. Veerman,
-    Electron. J. Combin. 13, R39, 2006).  With negative weights it is at least that; up to COUNTED nodes it is exact.
+    With positive weights the multiplicity is the number of groups on which no other node acts (J. S. Caughman,
+    J. J. P. Veerman, Electron. J. Combin. 13, R39, 2006).  With negative weights this number is a lower bound; up to
+    COUNTED nodes the exact multiplicity is returned.
     """
     leading = graph.leading_groups
     if graph.n > COUNTED or not _has_negative(graph):
@@ -67,7 +68,7 @@ def warnings(model: Model, varied: tuple[str, ...], values: Mapping[str, Any], d
         *(function_of_inputs(coupling, graph) for coupling, graph in model.linked),
         _stiff_springs(model, values, duration),
     )
-    # The synchronisation error of oscillators that are alike and start from one state.
+    # The synchronisation error of equal oscillators that start from one state is zero.
     initial = values["initial"]
     moved = {name.base for axis in values["axes"] if (name := NodeName.parse(axis.name))} & set(initial)
     together = not moved and all(len(set(states)) <= 1 for states in initial.values())
@@ -81,14 +82,15 @@ def warnings(model: Model, varied: tuple[str, ...], values: Mapping[str, Any], d
 
 
 def asynchrony(model: Model, varied: tuple[str, ...]) -> tuple[str, str]:
-    """Return why the graph and why the links of a network leave no complete synchronisation; "" if they do not."""
+    """Return the reasons, of the graph and of the links, against complete synchronisation; "" without a reason."""
     return _in_parts(model.topology), _without_synchrony(model, varied) if len(model.kinds) == 1 else ""
 
 
 def unresolved_smoothing(model: Model, parameters: Mapping[str, float], axes: tuple[Axis, ...]) -> str:
-    """Return a sentence if a smoothed friction law is still near its middle at the speed of a belt; "" if none is.
+    """Return a warning if a smoothed friction law has not reached its plateau at the speed of a belt; else "".
 
-    Belts at rest, or with a speed that depends on states or time, are skipped.  The ends of an axis represent it.
+    Belts at rest, and belts with a speed that depends on states or time, are skipped.  Of an axis only the ends are
+    tested.
     """
     if model.contact != ContactModel.ATAN:
         return ""
@@ -111,7 +113,7 @@ def unresolved_smoothing(model: Model, parameters: Mapping[str, float], axes: tu
 
 @lru_cache(maxsize=64)
 def _belts(node: Node) -> tuple[tuple[tuple[str, ...], Callable[..., float]], ...]:
-    """Return kappa times the sliding velocity of a node at rest, for each law: names of parameters, and function of them."""
+    """Return kappa times the sliding velocity of a node at rest, for each smoothed law: parameter names, function."""
     kappa, belts = sp.Symbol("kappa", real=True), []
     smoothed = {a.args[0] for e in node.rhs for a in e.atoms(sp.atan) if a.has(kappa)}
     for argument in sorted(smoothed, key=str):
@@ -124,7 +126,7 @@ def _belts(node: Node) -> tuple[tuple[tuple[str, ...], Callable[..., float]], ..
 
 @lru_cache(maxsize=16)
 def _in_parts(graph: Topology) -> str:
-    """Return a sentence if some nodes cannot reach one another."""
+    """Return a warning if the graph is not connected."""
     multiplicity = zero_multiplicity(graph)
     if multiplicity <= 1:
         return ""
@@ -138,13 +140,13 @@ def _in_parts(graph: Topology) -> str:
 
 
 def _has_negative(graph: Topology) -> bool:
-    """Return whether a weight is negative."""
+    """Return True if a weight is negative."""
     weight = graph.all_to_all
     return any(w < 0 for _, _, w in graph.links) if weight is None else bool(graph.link_count and weight < 0)
 
 
 def _without_synchrony(model: Model, varied: tuple[str, ...]) -> str:
-    """Return a sentence if equal motion of all nodes is no solution, because couplings act between equal states."""
+    """Return a warning if equal motion of all nodes is no solution, because couplings act between equal states."""
     if all(isinstance(coupling, MatrixCoupling) for coupling, _ in model.linked):
         return ""
     equations = model.equations(tuple(name for name in varied if not model.holders(name)))
@@ -163,7 +165,7 @@ def _without_synchrony(model: Model, varied: tuple[str, ...]) -> str:
 
 
 def function_of_inputs(coupling: Coupling, graph: Topology) -> str:
-    """Return a sentence if a link is S(W x_j) where a node has several: S of their sum, a firing rate, is another model."""
+    """Return a warning if a link is S(W x_j) and a node has several links: a firing rate is S of the sum instead."""
     if not isinstance(coupling, Rates) or graph.link_count <= graph.n:
         return ""
     for rate in coupling.rates.values():
@@ -180,16 +182,16 @@ def function_of_inputs(coupling: Coupling, graph: Topology) -> str:
 
 
 def _stiff_springs(model: Model, values: Mapping[str, Any], duration: float) -> str:
-    """Return a sentence if a mode of the springs swings so often that its phase error adds up to more than rtol."""
+    """Return a warning if a mode of the springs oscillates so often that its phase error exceeds rtol."""
     if [str(coupling) for coupling, _ in model.linked] != ["spring"]:
         return ""
-    # The strengths of all links, and of single ones, in all cells.
+    # Collect the strengths of all links, and of single links, in all cells.
     strengths = [value for axis in values["axes"] if axis.name == "sigma" for value in axis.values]
     for name, value in values["parameters"].items():
         link = LinkName.parse(name)
         if name == "sigma" or (link and link.base == "sigma"):
             strengths.append(value)
-    # The largest sum d of the sizes of the weights that a node feels.
+    # d: the largest sum of |weight| over the links to a node.
     graph = model.topology
     if graph.all_to_all is not None:
         degree = abs(float(graph.all_to_all)) * (graph.n - 1)

@@ -1,1 +1,1 @@
-"""The numbers of cells: parameters, initial states, axes, and draws along an axis of realisations; no scene."""
+"""The numbers of all cells of a sweep: parameters, initial states, axes, random draws. Imports no scene."""

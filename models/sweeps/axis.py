@@ -1,4 +1,4 @@
-"""One direction of a sweep: a parameter or an initial state and the values it takes."""
+"""One axis of a sweep: the name of a parameter or an initial state, and its values."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ LIMIT = 10_000_000
 class Axis:
     """A parameter ("sigma") or an initial state ("x_1") and its values in the order of the sweep.
 
-    `values` may be any iterable of finite numbers, a NumPy array included; it is kept as a tuple of floats.
-    Raises TypeError or ValueError on an empty axis, anything but finite numbers, or more than LIMIT values.
+    `values` may be any iterable of finite numbers, such as a NumPy array, and is stored as a tuple of floats.
+    Raises TypeError or ValueError for an empty axis, for more than LIMIT values, and for values that are no finite
+    numbers.
 
     Examples
     --------
@@ -38,7 +39,7 @@ class Axis:
 
     @classmethod
     def between(cls, name: str, first: float, last: float, count: int) -> Axis:
-        """Return `count` equally spaced values, both ends included, each the float nearest to its decimal."""
+        """Return an axis of `count` equally spaced values, both ends included; each is the float nearest to its decimal."""
         what = f"axis {name}"
         ends = [Fraction(repr(check_number(f"{what}: {end}", value))) for end, value in (("from", first), ("to", last))]
         size = check_integer(f"{what}: count", count, 1, LIMIT)
@@ -69,13 +70,13 @@ class Axis:
 
 
 def known_length(values: object) -> int:
-    """Return the number of values of an axis in a table without making them; 1 if the axis must be made first."""
+    """Return the number of values of an axis in a table without computing the values; 1 if the number is not known."""
     size = values.get("count") if isinstance(values, Mapping) else len(values) if isinstance(values, Sized) else 1
     return size if isinstance(size, int) and 0 < size <= LIMIT else 1
 
 
 def _spaced(first: Fraction, last: Fraction, count: int) -> Iterator[float]:
-    """Yield equally spaced values by whole numbers over one denominator, each rounded once."""
+    """Yield equally spaced values; integers over one denominator, so that each value is rounded only once."""
     base = first.denominator * last.denominator
     a, b = first.numerator * last.denominator, last.numerator * first.denominator
     steps = max(count - 1, 1)

@@ -1,4 +1,4 @@
-"""The axes of a scene, checked against its model."""
+"""Check the axes of a scene against its model."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .parameters import drive
 
 
 class Continuation(Word):
-    """In which direction along the last axis cells start from the end of their neighbours."""
+    """Direction along the last axis in which each cell starts from the final state of its neighbour."""
 
     NONE = "none"
     UP = "up"
@@ -66,7 +66,7 @@ def check_sweep(model: Model, values: Mapping[str, Any]) -> Continuation:
                 f"axis {rest[0]}: found {rest[1]:g}, at which the drive has no period; "
                 'expected other values or time_unit = "time"'
             )
-    # A continued cell starts where its neighbour along the last axis ended.
+    # A continued cell starts from the final state of its neighbour along the last axis.
     continuation = Continuation.parse("continuation", values["continuation"])
     if continuation == Continuation.NONE or not axes:  # a run may sweep a scene without axes
         return continuation
@@ -84,7 +84,7 @@ def check_sweep(model: Model, values: Mapping[str, Any]) -> Continuation:
 
 
 def check_draws(model: Model, values: Mapping[str, Any], drawn: Sequence[Axis]) -> None:
-    """Refuse draws that are unknown, out of range or swept as well, and continued realisations."""
+    """Raise ValueError for draws that are unknown, out of range or also swept, and for continued realisations."""
     swept = {axis.name for axis in values["axes"]}
     for axis in drawn:
         if axis.name in swept:
@@ -99,13 +99,13 @@ def check_draws(model: Model, values: Mapping[str, Any], drawn: Sequence[Axis]) 
 
 
 def check_cells(axes: Sequence[Axis], zipped: object, realisations: int) -> None:
-    """Refuse too many cells, before a number is drawn for each realisation."""
+    """Raise ValueError for too many cells; called before numbers are drawn for the realisations."""
     lengths = [len(axis) for axis in axes]
     _cells([*(lengths[:1] if zipped is True else lengths), realisations or 1], False)
 
 
 def _cells(lengths: Sequence[int], zipped: object) -> int:
-    """Return the number of cells of axes of these lengths; ValueError if they or the values are too many."""
+    """Return the number of cells of axes of these lengths; ValueError for too many cells or values."""
     cells = max(lengths, default=1) if zipped is True else math.prod(lengths)
     if cells > CELL_LIMIT:
         raise ValueError(
@@ -120,7 +120,7 @@ def _cells(lengths: Sequence[int], zipped: object) -> int:
 
 
 def read_axes(value: object, zipped: object) -> tuple[Axis, ...]:
-    """Return the axes of a list of Axis objects or of a table of names and values, whose cells are counted first."""
+    """Return the axes from a list of Axis objects or a table; check the number of cells before making any values."""
     if isinstance(value, Mapping):
         _cells([known_length(values) for values in value.values()], zipped)
         return tuple(Axis.from_table(name, values) for name, values in value.items())
@@ -135,7 +135,7 @@ def read_axes(value: object, zipped: object) -> tuple[Axis, ...]:
 
 
 def _check_axis(model: Model, parameters: Mapping[str, float], axis: Axis) -> None:
-    """Refuse an axis that is neither a parameter in its range nor an initial state."""
+    """Raise ValueError for an axis that is neither a parameter in its range nor an initial state."""
     parameter = model.parameter(axis.name)
     if parameter is not None:
         for value in (min(axis.values), max(axis.values)):
@@ -161,9 +161,9 @@ def _check_axis(model: Model, parameters: Mapping[str, float], axis: Axis) -> No
 def rest_in_sweep(
     frequency: sp.Expr, parameters: Mapping[str, float], axes: Sequence[Axis], zipped: bool
 ) -> tuple[str, float] | None:
-    """Return the name of an axis and its first value at which a frequency is 0; None if there is none.
+    """Return the name of an axis and the first value at which the frequency is 0; None if there is no such value.
 
-    Grids in which several axes change the frequency are not searched.
+    A grid in which several axes change the frequency is not searched.
     """
     names = names_in(frequency)
     moving = {axis.name: axis.values for axis in axes if axis.name in names}

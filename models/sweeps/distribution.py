@@ -15,7 +15,7 @@ from ..inputs.reader import Algebra, NoMeaning, parse, unpaired
 from ..inputs.words import Word
 
 KNOWN = "normal(mean, deviation), uniform(low, high), lorentzian(centre, half width)"
-"""The distributions, in messages."""
+"""List of all distributions for messages."""
 
 
 class Distribution(Word):
@@ -28,10 +28,10 @@ class Distribution(Word):
 
 @dataclass(frozen=True, slots=True)
 class Draw:
-    """A distribution: normal with mean and standard deviation, uniform between two ends, or Lorentzian with its half width.
+    """A distribution: normal (mean, standard deviation), uniform (low, high) or Lorentzian (centre, half width).
 
-    Raises ValueError or TypeError on anything but finite numbers, a deviation or a half width that is not positive, and
-    ends that do not rise.
+    Raises ValueError or TypeError if a parameter is no finite number, if a deviation or half width is not positive, and
+    if low is not below high.
 
     Examples
     --------
@@ -56,7 +56,7 @@ class Draw:
             raise ValueError(f"uniform: found the ends {self.first!r} and {self.second!r}; expected rising ends")
 
     def value(self, chance: float) -> float:
-        """Return the value below which a share `chance` of the distribution lies."""
+        """Return the quantile: a random number lies below this value with the probability `chance`."""
         if self.distribution is Distribution.NORMAL:
             return NormalDist(self.first, self.second).inv_cdf(chance)
         if self.distribution is Distribution.LORENTZIAN:
@@ -78,13 +78,13 @@ def uniform(low: float, high: float) -> Draw:
 
 
 def lorentzian(centre: float, half_width: float) -> Draw:
-    """Return the distribution of Lorentz, or Cauchy, of a centre and a half width at half maximum."""
+    """Return the Lorentz (Cauchy) distribution of a centre and a half width at half maximum."""
     return Draw(Distribution.LORENTZIAN, centre, half_width)
 
 
 @dataclass(frozen=True, slots=True)
 class _Distributions(Algebra[Draw]):
-    """The call of a distribution with two constants."""
+    """Read a text that calls a distribution with two constants."""
 
     what: str
     deepest = 2
@@ -103,7 +103,7 @@ class _Distributions(Algebra[Draw]):
 
 
 def read_draw(what: str, text: str) -> Draw:
-    """Return the distribution of a text such as "normal(0, 1)"; ValueError, with `what` in front, for any other."""
+    """Return the distribution of a text such as "normal(0, 1)"; a ValueError for any other text begins with `what`."""
     expression = parse(check_text(what, text))
     if expression is None:
         raise ValueError(f"{what}: unreadable distribution {short_repr(text)}{unpaired(text)}; expected {KNOWN}")

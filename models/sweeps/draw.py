@@ -23,7 +23,7 @@ from .parameters import by_name, in_order
 
 @dataclass(frozen=True, slots=True)
 class Graphs:
-    """Graphs by realisation; ValueError unless all have as many nodes."""
+    """One graph for each realisation; ValueError unless all graphs have the same number of nodes."""
 
     graphs: tuple[Topology, ...]
 
@@ -35,21 +35,24 @@ class Graphs:
 
     @property
     def union(self) -> Topology:
-        """The union of the graphs, whose links a run steps: their weights are numbers of its cells, 0 for no link."""
+        """The union of the graphs.
+
+        A run integrates all links of the union.  Each cell sets the weights; a weight 0 means no link.
+        """
         return union_of(self.graphs, f"union of {len(self.graphs)} graphs")
 
 
 @dataclass(frozen=True, slots=True)
 class RandomGraph:
-    """A random graph, drawn anew for each realisation: a family or an operation as text, "erdos_renyi(20, p=0.3)".
+    """A random graph that is drawn anew for each realisation, as text such as "erdos_renyi(20, p=0.3)".
 
-    The text is one of `read_graph`, without seeds.
+    `read_graph` defines the grammar of the text; seeds are left out.
     """
 
     text: str
 
     def graphs(self, count: int, rng: int) -> Graphs:
-        """Return the graphs of `count` realisations, whose seeds are drawn by `rng`; more of them begin with the same ones."""
+        """Return the graphs of `count` realisations with seeds drawn from `rng`; a larger `count` appends graphs."""
         return _random_graphs(self.text, count, rng)
 
     def __str__(self) -> str:
@@ -57,14 +60,14 @@ class RandomGraph:
 
 
 Draws = Draw | tuple[tuple[float, ...], ...] | Graphs | RandomGraph
-"""A distribution; a row of numbers by realisation, one, or one for each node or link; graphs by realisation; a random graph."""
+"""A distribution, a listed row for each realisation (one number, or one a node or link), graphs, or a random graph."""
 
 GRAPH = "topology"
-"""The name of the graph among the draws."""
+"""The key of the graph in the draws."""
 
 
 def draws(value: object, realisations: object) -> FrozenDict[Draws]:
-    """Return the draws by the names of parameters and initial states."""
+    """Return the draws from the keyword of a scene, by the names of parameters and initial states."""
     count = check_integer("realisations", realisations, 0, LIMIT)
     table = {} if value is None else check_table("draws", value)
     if bool(table) != bool(count):
@@ -79,12 +82,12 @@ def draws(value: object, realisations: object) -> FrozenDict[Draws]:
 
 
 def drawn_graph(drawn: Mapping[str, Draws], count: int, rng: int) -> Topology:
-    """Return the union of the graphs of all realisations, which are drawn or listed."""
+    """Return the union of the graphs of all realisations, drawn or listed."""
     return _realised(_graphs_of(drawn), count, rng).union
 
 
 def drawn_nodes(drawn: Mapping[str, Draws], rng: int) -> int:
-    """Return the number of nodes of the graphs that are drawn or listed, without a link of a random one."""
+    """Return the number of nodes of the drawn or listed graphs, without drawing links."""
     graphs = _graphs_of(drawn)
     return graphs.graphs[0].n if isinstance(graphs, Graphs) else next(_random_graph(graphs.text, rng)).n
 
@@ -96,12 +99,12 @@ def _graphs_of(drawn: Mapping[str, Draws]) -> Graphs | RandomGraph:
 
 
 def _realised(graphs: Graphs | RandomGraph, count: int, rng: int) -> Graphs:
-    """Return the graphs of all realisations; draw them unless they are listed."""
+    """Return the graphs of all realisations: the listed graphs, or random graphs."""
     return graphs.graphs(count, rng) if isinstance(graphs, RandomGraph) else graphs
 
 
 def _graphs(what: str, value: object, count: int) -> Graphs | RandomGraph:
-    """Return graphs by realisation, or a random one."""
+    """Return the graphs of a list, or a random graph from a text."""
     if isinstance(value, str):
         return RandomGraph(check_text(what, value))
     if isinstance(value, RandomGraph):
@@ -120,12 +123,12 @@ def _graphs(what: str, value: object, count: int) -> Graphs | RandomGraph:
 
 @lru_cache(maxsize=8)
 def _random_graphs(text: str, count: int, rng: int) -> Graphs:
-    """Return the graphs of a text; their stream of seeds depends on `rng` alone."""
+    """Return random graphs of a text; the stream of their seeds depends only on `rng`."""
     return Graphs(_bounded(islice(_random_graph(text, rng), count), count))
 
 
 def _random_graph(text: str, rng: int) -> Iterator[Topology]:
-    """Yield graphs of a text without end; each draws its links when they are used first."""
+    """Yield endlessly random graphs of a text; a graph draws its links at their first use."""
     stream = random.Random(f"{rng} {GRAPH}")
     seeds, begin = iter(lambda: stream.getrandbits(52), None), stream.getstate()
     while True:
@@ -142,7 +145,7 @@ def _random_graph(text: str, rng: int) -> Iterator[Topology]:
 
 
 def _bounded(graphs: Iterable[Topology], count: int) -> tuple[Topology, ...]:
-    """Return the graphs; ValueError as soon as the links of their union have more than LIMIT weights in `count` realisations."""
+    """Return the graphs; ValueError as soon as the union needs more than LIMIT weights in `count` realisations."""
     bounded, union = [], set[tuple[int, int]]()
     for graph in graphs:
         bounded.append(graph)
@@ -158,7 +161,7 @@ def _bounded(graphs: Iterable[Topology], count: int) -> tuple[Topology, ...]:
 
 
 def _drawn(what: str, value: object, count: int) -> Draws:
-    """Return a distribution, or rows of numbers by realisation."""
+    """Return a distribution, or a row of numbers for each realisation."""
     if isinstance(value, Draw):
         return value
     if isinstance(value, str):
@@ -193,9 +196,9 @@ def _is_row(value: object) -> TypeGuard[Sequence[object]]:
 def drawn_axes(model: Model, drawn: FrozenDict[Draws], count: int, rng: int) -> tuple[Axis, ...]:
     """Return the drawn values of each parameter and initial state, one for each realisation.
 
-    A distribution of a parameter or state of nodes is drawn for each node separately, that of a parameter of links, or of
-    their weights "W", for each edge separately: links there and back have one number.  The random stream of a name depends
-    on `rng` and the name alone: neither workers nor other draws change it.
+    A parameter or state of nodes is drawn for each node separately.  A parameter of links, and the weights "W", are
+    drawn for each edge separately: the links i -> j and j -> i have one number.  The random stream of a name depends
+    only on `rng` and the name, not on the number of workers or on other draws.
     """
     axes: dict[str, Axis] = {}
     for name, how in drawn.items():
@@ -207,7 +210,7 @@ def drawn_axes(model: Model, drawn: FrozenDict[Draws], count: int, rng: int) -> 
 
 
 def _columns(model: Model, name: str, how: Draws, count: int, rng: int) -> Iterable[tuple[str, Sequence[float]]]:
-    """Return the names of single parameters and states of one draw, with a value for each realisation."""
+    """Return the parameters and states of single nodes and links of one draw, with a value for each realisation."""
     if isinstance(how, Graphs | RandomGraph):
         return _weights(model, _realised(how, count, rng).graphs)
     holders = model.unlinked.holders(name)
@@ -233,7 +236,7 @@ def _columns(model: Model, name: str, how: Draws, count: int, rng: int) -> Itera
 
 
 def _weights(model: Model, graphs: tuple[Topology, ...]) -> Iterable[tuple[str, Sequence[float]]]:
-    """Return the names and the values of the weights of graphs; 0 where a graph has no link."""
+    """Return the weights of all links of the union of graphs, by name; 0 where a graph has no link."""
     links = model.link_names(WEIGHTS)
     try:
         rows = [{at[:2]: float(at[2]) for at in graph.links} for graph in graphs]
@@ -253,9 +256,9 @@ def _link_columns(
     count: int,
     rng: int,
 ) -> Iterable[tuple[str, Sequence[float]]]:
-    """Return the names and the values of one draw of a parameter of links, or of their weights."""
+    """Return the values of one draw of a parameter of links, or of the weights, by name."""
     if isinstance(how, Draw):
-        # Links in both directions share the number of the edge, which has the name of the link with the smaller target.
+        # Both directions of a link share one number, under the name of the link with the smaller target.
         edges = {at: links[at[::-1]] if at[0] > at[1] and at[::-1] in links else link for at, link in links.items()}
         drawn = {edge: _numbers(how, f"{rng} {edge}", count) for edge in dict.fromkeys(edges.values())}
         return [(str(link), drawn[edges[link.target, link.source]]) for link in dict.fromkeys(links.values())]

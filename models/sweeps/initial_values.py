@@ -1,4 +1,4 @@
-"""Initial states of oscillators: numbers, reproducible random numbers, or the default."""
+"""Initial states of oscillators: given numbers, reproducible random numbers, or the default."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..inputs.checks import check_integer, check_keys, check_number, check_table
 from ..inputs.frozen import FrozenDict
 
 SEED_LIMIT = 2**63 - 1
-"""Largest seed: that of a signed integer of 64 bits, which netCDF and JSON readers keep."""
+"""Largest seed: the largest signed integer of 64 bits, which netCDF and JSON readers keep."""
 
 
 def default_start(
@@ -18,10 +18,10 @@ def default_start(
 ) -> dict[str, tuple[float, ...]]:
     """Return the default initial states: the first component differs between oscillators, the others are 0.
 
-    Up to four oscillators start at 0.30, 0.28, 0.26, 0.24: the first two are those of the source paper
-    (Marszal et al., Eur. Phys. J. Special Topics, 2016), the others continue them.  More are spread evenly
-    over the same range, 0.30 … 0.24, so that the initial spread does not grow with the network.
-    With a `centre` the same distances lie around that state.  Raises ValueError if it has an unknown component.
+    Up to four oscillators start at 0.30, 0.28, 0.26, 0.24.  The first two values are from the source paper (Marszal et
+    al., Eur. Phys. J. Special Topics, 2016); the others continue the sequence.  More oscillators are spread evenly over
+    0.30 … 0.24, so that the initial spread does not grow with the network.  A `centre` is a state around which the same
+    distances are taken.  Raises ValueError if `centre` has an unknown component.
     """
     if centre is None:
         if n <= 4:
@@ -41,7 +41,7 @@ def default_start(
 
 
 def chosen_start(value: object, defaults: Mapping[str, tuple[float, ...]], seed: int) -> FrozenDict[tuple[float, ...]]:
-    """Return {component: floats}: those of a table for some or all components, the others as in `defaults`."""
+    """Return {component: floats} from a table of some or all components; other components are taken from `defaults`."""
     table = check_table("initial", {} if value is None else value)
     check_keys("initial", table, tuple(defaults))
     states = dict(defaults)
@@ -52,7 +52,7 @@ def chosen_start(value: object, defaults: Mapping[str, tuple[float, ...]], seed:
 
 
 def _component(what: str, value: object, name: str, n: int, seed: int) -> tuple[float, ...]:
-    """Return the states of one component: a range with random numbers, one number for all, or one for each."""
+    """Return the states of one component from a random range, one number for all nodes, or one number for each."""
     if isinstance(value, Mapping):
         check_keys(what, value, ("low", "high", "seed"))
         for key in ("low", "high"):

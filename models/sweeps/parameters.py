@@ -1,4 +1,4 @@
-"""The parameters of a scene: one number each, one for each node (a_1 … a_n), or one for each link (k_1_2 …)."""
+"""Parameter values of a scene: one number, one for each node (a_1 … a_n), or one for each link (k_1_2 …)."""
 
 from __future__ import annotations
 
@@ -23,9 +23,10 @@ Place: TypeAlias = NodeName | LinkName
 
 
 def parameters(model: Model, table: object, axes: Sequence[Axis]) -> FrozenDict[float]:
-    """Return every parameter with its value; those that differ from node to node, or are swept at one, as a_1 … a_n.
+    """Return every parameter with its value.
 
-    Those that differ from link to link, or are swept at one, are k_1_2 where node 1 feels node 2.
+    A parameter that differs from node to node, or is swept at a single node, is returned as a_1 … a_n.  A parameter
+    that differs from link to link, or is swept at a single link, is returned as k_1_2 … (the link from node 2 to 1).
     """
     read = _Table(model)
     for name, value in check_table("parameters", {} if table is None else table).items():
@@ -54,17 +55,17 @@ def parameters(model: Model, table: object, axes: Sequence[Axis]) -> FrozenDict[
 
 
 class _Table:
-    """Parameters of a model from a table, in their ranges: numbers for all, lists, and numbers of one node or link."""
+    """Read the parameters of a model from a table: numbers for all, lists, and numbers of one node or link."""
 
     def __init__(self, model: Model) -> None:
         self.model = model
         self.shared = {name: float(parameter.default) for name, parameter in model.parameters.items()}
-        mixed = model.parameters if len(model.kinds) > 1 else ()  # each kind of node has its default
+        mixed = model.parameters if len(model.kinds) > 1 else ()  # kinds of nodes may have different defaults
         self.lists = {name: _at_nodes(model, name, model.defaults(name)) for name in mixed}
         self.single: dict[str, dict[Place, float]] = {}
 
     def add(self, name: str, value: Any) -> None:
-        """Add one of the parameters; ValueError or TypeError as `parameters`."""
+        """Add one entry of the table; raise ValueError or TypeError as `parameters` does."""
         model, valid = self.model, self.model.parameters
         place = model.single(name)
         if WEIGHTS not in valid and (name if place is None else place.base) == WEIGHTS:
@@ -85,7 +86,7 @@ class _Table:
             self.lists.pop(name, None)
 
     def by_place(self, name: str, shared: float, swept: bool) -> dict[Place, float]:
-        """Return the values of a parameter at each node or link if some have separate numbers or it is swept; else none."""
+        """Return the value of a parameter at each node or link; empty if one number holds for all of them."""
         if not (swept or name in self.lists or name in self.single):
             return {}
         nodes: Iterable[Place] = [NodeName(name, i) for i in self.model.holders(name)]
@@ -94,7 +95,7 @@ class _Table:
 
 
 def _at_nodes(model: Model, name: str, values: Iterable[float]) -> dict[Place, float]:
-    """Return the values of a parameter by the nodes that have it."""
+    """Return the value of a parameter at each node that has the parameter."""
     return {NodeName(name, i): value for i, value in zip(model.holders(name), values, strict=True)}
 
 
@@ -105,7 +106,7 @@ def _listed(value: object) -> bool:
 def _for_each_link(model: Model, name: str, value: Any) -> dict[Place, float]:
     """Return the values of a parameter of links from a list, a matrix, or the weights of a graph.
 
-    A list has the order of the graph's links, or of its edges (i < j) where links run both ways.
+    A list has the order of the links of the graph, or of the edges (i < j) if links run both ways.
     """
     parameter, links = model.parameters[name], model.link_names(name)
     what = f"parameter {name!r}{model.on_graph(name)}"
@@ -130,7 +131,7 @@ def _for_each_link(model: Model, name: str, value: Any) -> dict[Place, float]:
 def by_name(
     what: str, links: Mapping[tuple[int, int], LinkName], table: Mapping[tuple[int, int], float]
 ) -> dict[Place, float]:
-    """Return the numbers of links by the names of the links."""
+    """Return the numbers of a table of links (target, source) by the names of the links."""
     named: dict[Place, float] = {}
     for at, link in links.items():
         if named.setdefault(link, table[at]) != table[at]:
@@ -144,7 +145,7 @@ def by_name(
 def in_order(
     what: str, links: Mapping[tuple[int, int], LinkName], listed: Sequence[T], count: str
 ) -> dict[tuple[int, int], T]:
-    """Return the numbers of a list, one for each edge or each link, by target and source."""
+    """Return the numbers of a list, one for each edge or each link, by (target, source)."""
     edges = [at for at in links if at[0] < at[1]] if all(at[::-1] in links for at in links) else []
     if len(listed) == len(edges) != 0:
         table = dict(zip(edges, listed, strict=True))
@@ -166,7 +167,7 @@ def _matrix(what: str, n: int, listed: Sequence[Any]) -> dict[tuple[int, int], A
 
 
 def _for_each_node(model: Model, name: str, value: Any) -> list[float]:
-    """The values of a list, one for each node that has the parameter; ValueError for another number."""
+    """Return the values of a list, one for each node that has the parameter; ValueError for another length."""
     parameter, holders = model.parameters[name], model.holders(name)
     n = len(holders)
     if isinstance(value, set | frozenset):
@@ -180,14 +181,14 @@ def _for_each_node(model: Model, name: str, value: Any) -> list[float]:
 
 
 def varied(values: Mapping[str, float], valid_names: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of the parameters that have a value for each node or each link; "W" for weights that are swept."""
+    """Return the names of parameters with a value for each node or each link; "W" for swept weights."""
     names = dict.fromkeys(valid_names)
     weights = WEIGHTS not in names and any((link := LinkName.parse(name)) and link.base == WEIGHTS for name in values)
     return (*(name for name in names if name not in values), *((WEIGHTS,) if weights else ()))
 
 
 def at_nodes(model: Model, values: Mapping[str, T]) -> Iterator[tuple[NodeKind, dict[str, T]]]:
-    """Yield the kind and the parameters of every node that differs from those before."""
+    """Yield kind and parameter values of each node; skip nodes that equal an earlier node."""
     names = model.parameters
     holders = {name: dict.fromkeys(model.holders(name)) for name in names if name not in values}
     seen = set()
@@ -204,7 +205,7 @@ def at_nodes(model: Model, values: Mapping[str, T]) -> Iterator[tuple[NodeKind, 
 
 
 def drive(model: Model, values: Mapping[str, float]) -> Drive:
-    """Return at which frequencies time enters the equations of a model whose parameters have these values."""
+    """Return the drive of a model at parameter values."""
     timed = any(coupling.forced for coupling, _ in model.linked)
     differing = varied(values, model.parameters)
     edges = model.equations(differing).edges if timed else ()
@@ -216,7 +217,7 @@ def drive(model: Model, values: Mapping[str, float]) -> Drive:
 
 
 def without(model: Model, values: Mapping[object, object], names: Iterable[str]) -> dict[object, object]:
-    """Return the values of parameters without those that single nodes have of some `names`."""
+    """Return the parameter values without entries of single nodes or links, such as a_2, of the parameters `names`."""
     remaining, replaced = dict(values), set(names)
     for name in values:
         parts = model.single(name) if isinstance(name, str) else None
@@ -226,7 +227,7 @@ def without(model: Model, values: Mapping[object, object], names: Iterable[str])
 
 
 def collected(values: Mapping[str, float], varied: Iterable[str]) -> dict[str, float | list[float]]:
-    """Return the parameters in the form of a scene file: those of `varied` as lists, without weights."""
+    """Return the parameters in the form of a scene file: parameters in `varied` as lists; weights are left out."""
     lists: dict[str, list[float]] = {name: [] for name in varied}
     table: dict[str, float | list[float]] = {}
     for name, value in values.items():
