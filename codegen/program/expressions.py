@@ -1,7 +1,7 @@
-"""Expressions of a program: a tree that keeps the order of its terms, because rounding depends on it.
+"""Expressions of a program as a tree; the order of terms never changes, because rounding depends on the order.
 
-`a + b` and `a*b` append to the sum or product on their left, as Python reads them; a sum or product on the right becomes one
-term or factor. `plus` flattens both sides.
+As in Python, `a + b` appends b to the sum a, and `a*b` appends b to the product a. If b is a sum (or product) itself, b
+becomes a single term (or factor). `plus` flattens both sides.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class Quotient(Expression):
 
 @dataclass(frozen=True, slots=True)
 class PowerExpr(Expression):
-    """A power, for languages with a mathematical library; lanes have products and roots."""
+    """A power, for languages with a mathematical library; kernels use products and roots instead."""
 
     base: Expression
     exponent: Expression
@@ -105,7 +105,7 @@ class Negation(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Call(Expression):
-    """A function of the table in `functions`, or one of the kernel's own."""
+    """A call of a function that is listed in `functions` or defined in the kernel."""
 
     function: str
     arguments: tuple[Expression, ...]
@@ -113,7 +113,7 @@ class Call(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Conditional(Expression):
-    """One of two values, by a condition."""
+    """A choice between two values by a condition."""
 
     condition: Expression
     yes: Expression
@@ -146,7 +146,7 @@ class Not(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Load(Expression):
-    """A register of `width` elements of an array; without a width one element."""
+    """A load of `width` elements of an array into a register; of one element if `width` is None."""
 
     array: str
     index: Expression
@@ -207,7 +207,7 @@ def scaled(factor: Value, e: Expression) -> Expression:
 
 
 def linear(row: Iterable[float], values: Iterable[Value], start: Value | None = None) -> Expression:
-    """Return start + sum row_j * value_j without zero terms and unit factors; `ZERO` if no term is left."""
+    """Return start + sum row_j * value_j without zero terms and unit factors; return `ZERO` if all terms are zero."""
     terms: list[Expression] = [] if start is None else [as_expression(start)]
     for weight, value in zip(row, values, strict=False):
         if weight != 0.0:

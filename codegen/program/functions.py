@@ -1,4 +1,4 @@
-"""The functions of expressions, and their names in each language."""
+"""List the functions that expressions may call, with their names in each language."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ FUNCTIONS: dict[type, str] = {
     sp.atanh: "atanh", sp.atan2: "atan2", sp.floor: "floor", sp.ceiling: "ceiling", sp.Abs: "absolute",
     sp.sign: "sign", sp.Max: "maximum", sp.Min: "minimum", sp.erf: "erf",
 }  # fmt: skip
-"""Names of SymPy's functions in programs; a square root is a power there, and "sqrt" here."""
+"""Names in programs of SymPy's functions. A square root is a power in SymPy, and the function "sqrt" in programs."""
 
 NAMES = (*FUNCTIONS.values(), "sqrt")
 
@@ -25,11 +25,11 @@ LANES = _named("")
 """The functions on lanes."""
 
 C99 = _named("", absolute="fabs", maximum="fmax", minimum="fmin", ceiling="ceil")
-"""The functions of math.h, and one that the text defines: sign."""
+"""The functions of math.h, and `sign`, which the exported text defines."""
 
 NUMPY = _named("np.", asin="np.arcsin", acos="np.arccos", atan="np.arctan", asinh="np.arcsinh", acosh="np.arccosh",
                atanh="np.arctanh", atan2="np.arctan2", absolute="np.abs", ceiling="np.ceil", erf="erf")  # fmt: skip
-"""The functions of NumPy, and one of SciPy: erf."""
+"""The functions of NumPy, and SciPy's `erf`."""
 
 MATH = _named("math.", absolute="abs", sign="np.sign", maximum="max", minimum="min", ceiling="math.ceil")
-"""The functions of Python's math that Numba compiles."""
+"""The functions of Python's module `math` that Numba compiles."""

@@ -1,8 +1,8 @@
-"""From SymPy to the expressions of a program: how powers, roots and constants are computed.
+"""Translate SymPy expressions to expressions of a program, and choose how to compute powers, roots and constants.
 
-`Lowering` has the rules of lanes, which compute powers as products and roots and constants as one double; `Library` has those
-of languages with a mathematical library. A function without a counterpart, a floating-point number or a constant that
-is not real is an error.
+`Lowering` translates for lanes: a power becomes products and roots, a constant becomes one double. `Library` translates
+for languages with a mathematical library. Both raise an error for a function without a counterpart, for a
+floating-point number and for a constant that is not real.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ from .expressions import (
 SIGNS = {sp.StrictLessThan: "<", sp.LessThan: "<=", sp.StrictGreaterThan: ">", sp.GreaterThan: ">="}
 
 LARGEST_POWER = 16
-"""Largest whole exponent that lanes compute as a product. A choice."""
+"""Largest integer exponent for which lanes compute a power as a product. A choice."""
 
 
 class UnprintableError(ValueError):
-    """An expression without generated code; the message names the part and the remedy."""
+    """Raised for an expression that cannot be translated to code; the message names the part and the remedy."""
 
 
 class Lowering:
-    """The rules of lanes."""
+    """Translate expressions for lanes."""
 
     names: Mapping[str, str] = functions.LANES
 
@@ -57,7 +57,7 @@ class Lowering:
         if self.is_constant(e):
             return number(e)
         if e.is_Add:
-            # positive terms first, so that a sum begins without a sign
+            # put positive terms first, so that a sum does not begin with a minus sign
             terms = sorted(e.args, key=lambda term: (_is_negative(term), sp.default_sort_key(term)))
             return Sum(tuple(Negation(self(-t)) if _is_negative(t) else self(t) for t in terms))
         if e.is_Mul:
@@ -71,11 +71,11 @@ class Lowering:
         return self.function(e)
 
     def is_constant(self, e: sp.Expr) -> bool:
-        """True for a real number that is folded into one double: rationals, pi, e and their functions."""
+        """Return True for a real constant that is folded into one double: rationals, pi, e and functions of these."""
         return bool(e.is_number) and not e.atoms(sp.Float) and e.is_real is True
 
     def product(self, e: sp.Mul) -> Expression:
-        """Return one constant, factors, and negative powers as divisors."""
+        """Return a product: one constant first, then the factors; negative powers become divisors."""
         constants = [f for f in e.args if self.is_constant(f)]
         factors = [f for f in e.args if f not in constants]
         below = [f for f in factors if f.is_Pow and f.exp.is_number and f.exp.is_negative and f.base != sp.E]
@@ -97,7 +97,7 @@ class Lowering:
         return self.general_power(base, exponent)
 
     def general_power(self, base: sp.Expr, exponent: sp.Expr) -> Expression:
-        """Return a power with an exponent that is neither negative nor half an integer."""
+        """Return a power whose exponent is neither negative nor half an odd integer."""
         if not exponent.is_Integer:
             return call("exp", self(exponent * sp.log(base)))
         if exponent > LARGEST_POWER:
@@ -107,7 +107,7 @@ class Lowering:
         return ProductExpr((self(base),) * int(exponent))
 
     def function(self, e: sp.Expr) -> Expression:
-        """Return the call of a function; Max and Min of several arguments are nested pairs."""
+        """Return the call of a function; Max and Min of several arguments become nested calls with two arguments."""
         name = functions.FUNCTIONS.get(type(e), "")
         if name not in self.names:
             functions_here = ", ".join(sorted(set(self.names) - {"sqrt"}))
@@ -120,7 +120,7 @@ class Lowering:
         return Call(name, tuple(arguments))
 
     def choice(self, e: sp.Piecewise) -> Expression:
-        """Return the value of the first condition that holds, as nested choices."""
+        """Return a Piecewise as nested choices: the first condition that holds selects the value."""
         value, condition = e.args[-1]
         if condition is not sp.true:
             raise UnprintableError(f"{e} has no value where no condition holds; end it with (value, True)")
@@ -130,8 +130,8 @@ class Lowering:
         return choice
 
     def condition(self, e: Boolean) -> Expression:
-        """Return a condition; a symbol is the name of one that was computed before."""
-        e = sp.to_nnf(e, simplify=False)  # negations of names alone
+        """Return a condition; a symbol in the condition names a condition that was computed before."""
+        e = sp.to_nnf(e, simplify=False)  # then only names are negated
         if e.is_Symbol:
             return Name(e.name)
         if isinstance(e, sp.Not) and e.args[0].is_Symbol:
@@ -146,16 +146,16 @@ class Lowering:
 
 
 class Library(Lowering):
-    """The rules of languages with a mathematical library: any power, and factors 1/q as divisions."""
+    """Translate for languages with a mathematical library: keep any power, and write factors 1/q as divisions."""
 
     names = functions.C99
 
     def is_constant(self, e: sp.Expr) -> bool:
-        """True for every number; `number` raises an error if it is not real."""
+        """Return True for every constant; `number` raises an error for a constant that is not real."""
         return bool(e.is_number) and not e.atoms(sp.Float)
 
     def product(self, e: sp.Mul) -> Expression:
-        """Return factors, with negative rational powers and the denominator of a constant as divisors."""
+        """Return a product; negative rational powers and the denominator of a constant become divisors."""
         coefficient = sp.Mul(*(f for f in e.args if f.is_number))
         factors = [f for f in e.args if not f.is_number]
         below = [f for f in factors if f.is_Pow and f.exp.is_Rational and f.exp < 0]
@@ -163,26 +163,26 @@ class Library(Lowering):
         under = [self(1 / f) for f in below]
         under = _flat(under) if len(under) > 1 else under
         if coefficient.is_Rational and coefficient.p == 1 and coefficient.q > 1 and above:
-            under.insert(0, number(sp.Integer(coefficient.q)))  # x/3, which rounds once
+            under.insert(0, number(sp.Integer(coefficient.q)))  # x/3 rounds once, x*(1/3) twice
         elif coefficient != 1:
             above.insert(0, number(coefficient))
         return Quotient(product(above), product(under)) if under else product(above)
 
     def power(self, base: sp.Expr, exponent: sp.Expr) -> Expression:
-        """Return a power, by its exponent; roots other than sqrt are powers."""
+        """Return a power; a square root becomes sqrt, other roots stay powers."""
         if base == sp.E or exponent == sp.Rational(1, 2) or (exponent.is_Rational and exponent < 0):
             return super().power(base, exponent)
         return self.general_power(base, exponent)
 
     def general_power(self, base: sp.Expr, exponent: sp.Expr) -> Expression:
-        """Return a power; small ones of a variable are products."""
+        """Return a power; a small power of a variable becomes a product."""
         if exponent.is_Integer and base.is_Symbol and exponent <= 4:
             return ProductExpr((self(base),) * int(exponent))
         return PowerExpr(self(base), Number(int(exponent)) if exponent.is_Integer else self(exponent))
 
 
 lower = Lowering()
-"""Lowers to expressions of lanes."""
+"""Translates a SymPy expression to an expression for lanes."""
 
 
 def number(e: sp.Expr | Fraction) -> Number:

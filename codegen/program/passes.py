@@ -1,7 +1,6 @@
-"""Passes over expressions before they are lowered: names, fixed parts, common subexpressions.
+"""Passes over SymPy expressions before lowering: `Hoist` names fixed parts, `share` names common subexpressions.
 
-`Hoist` takes out parts that need not be computed again; `share` names subexpressions that occur twice. Their names are
-numbered and avoid those in use.
+A fixed part need not be computed again in each loop turn. `Names` supplies numbered names that are not in use.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from sympy.functions.elementary.piecewise import ExprCondPair
 
 
 def real(name: str) -> sp.Symbol:
-    """Return the real symbol of that name; all symbols of models are real."""
+    """Return the real symbol of this name; all symbols of models are real."""
     return sp.Symbol(name, real=True)
 
 
@@ -25,7 +24,7 @@ class Names:
         self.taken = set(taken)
 
     def fresh(self, prefix: str) -> Iterator[sp.Symbol]:
-        """Yield unused symbols with this prefix, for ever."""
+        """Yield unused symbols with this prefix, without end."""
         number = 0
         while True:
             name = f"{prefix}{number}"
@@ -37,9 +36,9 @@ class Names:
 
 @dataclass
 class Hoist:
-    """Replaces maximal subexpressions without `moving` symbols by names; equal ones share a name.
+    """Replace each largest subexpression without `moving` symbols by a name; equal subexpressions share a name.
 
-    table: the names by expression. A bare symbol gets a name only if it is one of `renamed`.
+    table: the name of each replaced expression. A single symbol is replaced only if it is in `renamed`.
     """
 
     moving: frozenset[sp.Symbol]
@@ -48,24 +47,24 @@ class Hoist:
     table: dict[sp.Expr, sp.Symbol] = field(default_factory=dict)
 
     def apply(self, e: sp.Expr) -> sp.Expr:
-        """Return the expression with its fixed parts named."""
+        """Return the expression with all fixed parts replaced by names."""
         if not e.free_symbols:
             return e
-        if isinstance(e, ExprCondPair):  # one branch of a Piecewise has no value outside of it
+        if isinstance(e, ExprCondPair):  # a branch of a Piecewise is no value by itself
             return e.func(*(self.apply(a) for a in e.args))
         if e.is_Symbol:
             return e if e in self.moving else self.name(e)
         if not e.free_symbols & self.moving:
             return self.name(e)
         if e.is_Add or e.is_Mul:
-            # all fixed terms or factors become one name; numbers alone stay
+            # give all fixed terms (or factors) together one name; leave plain numbers
             fixed = e.func(*(a for a in e.args if not a.free_symbols & self.moving))
             others = [self.apply(a) for a in e.args if a.free_symbols & self.moving]
             return e.func(self.name(fixed) if fixed.free_symbols else fixed, *others)
         return e.func(*(self.apply(a) for a in e.args))
 
     def name(self, e: sp.Expr) -> sp.Expr:
-        """Return the symbol of a fixed expression; e and -e share it."""
+        """Return the symbol for a fixed expression; e and -e share one symbol."""
         if e.is_Symbol and e not in self.renamed:
             return e
         if e.could_extract_minus_sign() and e.is_Mul:
@@ -77,14 +76,14 @@ class Hoist:
 
 @dataclass(frozen=True, slots=True)
 class StraightLine:
-    """Assignments, and the expressions in which they end."""
+    """A sequence of assignments, and the result expressions, which may use the assigned symbols."""
 
     statements: tuple[tuple[sp.Symbol, sp.Expr], ...]
     results: tuple[sp.Expr, ...]
 
     @property
     def symbols(self) -> set[sp.Symbol]:
-        """The symbols that are read and not assigned."""
+        """The symbols that are read but not assigned."""
         expressions = [*self.results, *(e for _, e in self.statements)]
         used: set[sp.Symbol] = set().union(*(e.free_symbols for e in expressions))
         return used - {s for s, _ in self.statements}

@@ -1,7 +1,7 @@
-"""Programs as text for readers: minimal parentheses, one printer for each language.
+"""Print programs as readable text with as few parentheses as possible; each language has a printer.
 
-`Printer` holds the grammar of expressions and statements. A language is a subclass: the names of its functions, templates
-of one line, and methods for statements of another form.
+`Printer` holds the grammar of expressions and statements. The subclass of a language holds the names of functions,
+templates of one-line statements, and methods for statements that need more than a template.
 """
 
 from __future__ import annotations
@@ -49,37 +49,37 @@ from .statements import (
 )
 
 SUM, TERM, POWER, ATOM = range(4)
-"""How tightly a piece of text holds together, from a sum to a name or a call."""
+"""Precedence levels of a piece of text, from the loosest (a sum) to the tightest (a name or a call)."""
 
 WIDEST = 110
-"""Columns of an assignment on one line; longer sums of lanes are broken. A choice."""
+"""Largest width of an assignment on one line; longer assignments of lanes are broken into lines. A choice."""
 
 OPTIONS = {Role.INLINED: ", forceinline=True", Role.CALLED: "", Role.ENTRY: ", cache=True"}
-"""Options of `njit` by the role of a function."""
+"""Options of `njit` for each role of a function."""
 
 
 class Printer:
-    """The grammar that all languages share; templates differ."""
+    """The grammar that all languages share; each language has other templates."""
 
     functions: Mapping[str, str]
     words: Mapping[str, str]  # "and", "or", "not"
     choice: str  # condition, value, other value
     comment = "# {}"
-    assign = whole = "{} = {}"  # of numbers, of indices
+    assign = whole = "{} = {}"  # assignment of a number, of an index
     power = "{}**{}"
     array = "{} = np.empty({})"
     identity: tuple[str, ...] = ("{name} = np.eye({size})",)
-    end = ""  # of a statement without an assignment to a name
+    end = ""  # end of a statement that does not assign to a name
 
     # -- expressions ------------------------------------------------------------------------------------------
 
     def text(self, e: Expression, level: int = SUM) -> str:
-        """Return an expression, in parentheses if it holds together less than `level`."""
+        """Return the text of an expression, in parentheses if its precedence is lower than `level`."""
         text, tight = self.piece(e)
         return text if tight >= level else f"({text})"
 
     def piece(self, e: Expression) -> tuple[str, int]:
-        """Return the text of an expression, and how tightly it holds together."""
+        """Return the text of an expression and its precedence level."""
         match e:
             case Name(text):
                 return text, ATOM
@@ -94,7 +94,7 @@ class Printer:
             case Negation(value):
                 return f"-{self.text(value, TERM)}", SUM
             case ProductExpr(factors):
-                # a negative number needs no parentheses in front
+                # a negative number needs no parentheses if it is the first factor
                 first, *others = factors
                 start = repr(first.value) if isinstance(first, Number) else self.text(first, TERM)
                 return "*".join([start, *(self.text(f, POWER) for f in others)]), TERM
@@ -121,7 +121,7 @@ class Printer:
             case Not(condition):
                 return f"{self.words['not']}{self.text(condition, ATOM)}"
             case Junction(word, conditions):
-                # `&` binds more tightly than `<`: comparisons take parentheses, names none
+                # in Python `&` binds more tightly than `<`: put comparisons, but not names, in parentheses
                 named = ((isinstance(c, Name | Not), self.text(c)) for c in conditions)
                 return self.words[word].join(text if name else f"({text})" for name, text in named)
         raise TypeError(f"no text for {type(e).__name__}; this is a mistake in the program")
@@ -141,7 +141,7 @@ class Printer:
         return [f"    {line}" for line in self.lines(statements)]
 
     def block(self, head: str, body: Iterable[Statement]) -> list[str]:
-        """Return statements behind a head."""
+        """Return a head line, followed by indented statements."""
         return [f"{head}:", *(self.indented(body) or ["    pass"])]
 
     def statement(self, s: Statement) -> list[str]:
@@ -173,7 +173,7 @@ class Printer:
                 return [f"return {', '.join(map(self.text, values))}{f'  # {remark}' if remark else ''}"]
 
     def place(self, array: str, index: Index) -> str:
-        """Return an element as the target of an assignment."""
+        """Return the text of an array element as the target of an assignment."""
         row_column = index if isinstance(index, tuple) else (index,)
         return f"{array}[{', '.join(map(self.text, row_column))}]"
 
@@ -195,39 +195,39 @@ class Printer:
         return [*self.block("while True", body), f"    if not {condition}:", "        break"]
 
     def titled(self, title: str, body: Iterable[Statement]) -> list[str]:
-        """Return statements behind a comment."""
+        """Return a comment, followed by statements."""
         return [title, *self.lines(body)]
 
 
 class Lanes(Printer):
-    """Kernels: functions of registers. A choice computes both values, and each lane takes its own."""
+    """Print kernels, whose functions work on registers. A choice computes both values and selects in each lane."""
 
     functions = functions.LANES
     words: Mapping[str, str] = {"and": " & ", "or": " | ", "not": "~"}
     choice = "select({}, {}, {})"
 
     def piece(self, e: Expression) -> tuple[str, int]:
-        """Return the text of an expression; both arguments of atan2 are registers."""
+        """Return the text of an expression; broadcast numbers in atan2, both of whose arguments must be registers."""
         if isinstance(e, Call) and e.function == "atan2" and any(isinstance(a, Number) for a in e.arguments):
             e = call("atan2", *(call("broadcast", a, "WIDTH") if isinstance(a, Number) else a for a in e.arguments))
         return super().piece(e)
 
     def load(self, array: str, index: Expression, width: str | None) -> str:
-        """Return the load of a register, or of a single number."""
+        """Return the text that loads a register, or a single number."""
         return super().load(array, index, width) if width is None else f"load({array}, {self.text(index)}, {width})"
 
     def store(self, array: str, index: Index, value: Expression) -> str:
-        """Return the store of a register."""
+        """Return the text that stores a register."""
         if not isinstance(index, Expression):
             raise TypeError("arrays of lanes have one index; this is a mistake in the program")
         return f"store({array}, {self.text(index)}, {self.text(value)})"
 
     def accumulate(self, array: str, index: Index, value: Expression) -> str:
-        """Return the addition of a register to one in memory."""
+        """Return the text that adds a register to a register in memory."""
         return self.store(array, index, plus(Load(array, index), value) if isinstance(index, Expression) else value)
 
     def statement(self, s: Statement) -> list[str]:
-        """Return the lines of one statement; long sums and products are broken between words."""
+        """Return the lines of one statement; break long sums and products at spaces."""
         lines = super().statement(s)
         is_long = isinstance(s, Assign) and isinstance(s.value, Sum | ProductExpr) and len(lines[0]) > WIDEST
         return broken(lines[0]) if is_long else lines
@@ -239,7 +239,7 @@ class Lanes(Printer):
 
 
 def broken(line: str) -> list[str]:
-    """Break an assignment into lines of at most WIDEST columns; a sign goes to the next line with its term."""
+    """Break an assignment into lines of at most WIDEST columns; a sign stays on the line of the term behind it."""
     target, _, value = line.partition(" = ")
     lines, row = [f"{target} = ("], "   "
     for word in value.split(" "):
@@ -252,7 +252,7 @@ def broken(line: str) -> list[str]:
 
 
 class NumPy(Printer):
-    """Functions of arrays or of numbers; a choice computes both values."""
+    """Print functions of arrays or of numbers with NumPy; a choice computes both values."""
 
     functions = functions.NUMPY
     words: Mapping[str, str] = {"and": " & ", "or": " | ", "not": "~"}
@@ -260,7 +260,7 @@ class NumPy(Printer):
 
 
 class Math(Printer):
-    """Functions of numbers that Numba compiles."""
+    """Print functions of numbers, with Python's module `math`, that Numba compiles."""
 
     functions = functions.MATH
     words: Mapping[str, str] = {"and": " and ", "or": " or ", "not": "not "}
@@ -268,7 +268,7 @@ class Math(Printer):
 
 
 class C(Printer):
-    """Functions of C99."""
+    """Print C99."""
 
     functions = functions.C99
     words: Mapping[str, str] = {"and": " && ", "or": " || ", "not": "!"}
@@ -283,7 +283,7 @@ class C(Printer):
     end = ";"
 
     def piece(self, e: Expression) -> tuple[str, int]:
-        """Return the text of an expression; a power is a call of pow, which takes doubles."""
+        """Return the text of an expression; a power becomes a call of pow with doubles."""
         match e:
             case PowerExpr(base, Number(value)):
                 return super().piece(call("pow", base, float(value)))

@@ -1,4 +1,4 @@
-"""Statements of a program; the operations, functions and names in them."""
+"""Statements of a program, and functions that list their operations, called functions and names."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .expressions import Call, Expression, Load, Name, PowerExpr, ProductExpr, Q
 
 @dataclass(frozen=True, slots=True)
 class Assign:
-    """Assign the results of an expression to variables; `whole` for indices."""
+    """Assign the results of an expression to variables; `whole` is True for integers such as indices."""
 
     targets: tuple[str, ...]
     value: Expression
@@ -59,7 +59,7 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """Run statements for each integer from `start` up or down to `stop`, without `stop`."""
+    """Run statements for each integer from `start`, up or down, to `stop` (exclusive)."""
 
     index: str
     start: Expression
@@ -70,7 +70,7 @@ class Loop:
 
 @dataclass(frozen=True, slots=True)
 class Repeat:
-    """Run statements once, and again while a condition holds."""
+    """Run statements once, then repeat them while a condition holds."""
 
     body: tuple[Statement, ...]
     condition: Expression
@@ -139,12 +139,12 @@ class Function:
 
 
 def let(name: str, value: Value) -> Assign:
-    """Return the assignment of a number."""
+    """Return the statement that assigns a floating-point value."""
     return Assign((name,), as_expression(value))
 
 
 def whole(name: str, value: Value) -> Assign:
-    """Return the assignment of an index."""
+    """Return the statement that assigns an integer, such as an index."""
     return Assign((name,), as_expression(value), whole=True)
 
 
@@ -159,7 +159,7 @@ def accumulate(array: str, index: Value, value: Value) -> Accumulate:
 
 
 def walk(statements: Iterable[Statement]) -> Iterator[Statement]:
-    """Yield all statements, with those of inner blocks."""
+    """Yield all statements, including those of inner blocks."""
     for statement in statements:
         yield statement
         if isinstance(statement, Loop | Repeat | If | Titled):
@@ -167,7 +167,7 @@ def walk(statements: Iterable[Statement]) -> Iterator[Statement]:
 
 
 def values(statements: Iterable[Statement]) -> Iterator[Expression]:
-    """Yield computed values, without conditions and indices."""
+    """Yield the values that the statements compute, except conditions and indices."""
     for statement in walk(statements):
         match statement:
             case Assign(_, value, False) | Store(_, _, value) | Accumulate(_, _, value) | Do(value):
@@ -187,7 +187,7 @@ def targets(statements: Iterable[Statement]) -> list[str]:
 
 
 def mentioned(statements: Iterable[Statement]) -> set[str]:
-    """Return all variables and arrays that are read, and arrays that are written: in indices, bounds and conditions too."""
+    """Return variables and arrays that are read, also in indices, bounds and conditions, and arrays that are written."""
     names = set()
     fields = ("value", "index", "start", "stop", "condition", "call")
     for s in walk(statements):
@@ -195,7 +195,7 @@ def mentioned(statements: Iterable[Statement]) -> set[str]:
         parts += s.values if isinstance(s, Return) else ()
         if isinstance(s, Store | Accumulate):
             names.add(s.array)
-        # an index of a loop is text, no expression
+        # the loop index is a string, not an expression: skip strings
         for e in (e for part in parts if isinstance(part, Expression) for e in part.walk()):
             match e:
                 case Name(text):
@@ -206,7 +206,7 @@ def mentioned(statements: Iterable[Statement]) -> set[str]:
 
 
 def operations(statements: Sequence[Statement]) -> int:
-    """Count sums, differences, products and quotients; loops and blocks count once."""
+    """Count sums, differences, products and quotients; count the body of a loop or block once."""
     return sum(map(_cost, values(statements))) + sum(isinstance(s, Accumulate) for s in walk(statements))
 
 

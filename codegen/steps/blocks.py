@@ -1,7 +1,7 @@
 """The equations of a node as straight-line blocks, sorted by how often they run.
 
-Terms in parameters alone run once a step, terms in time once for each stage time, terms in the state once for each node
-and stage.
+Terms that contain only parameters run once a step. Terms that contain the time but no state run once for each stage
+time. Terms that contain the state run once for each node and stage.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ from ..program.statements import Statement, let
 class NodeBlocks:
     """The blocks of one kind of node.
 
-    `constants` and `timed` are assignments. `rhs` ends in d(state)/dt; `linear` ends in d(state)/dt, the Jacobian row by
-    row and the partial time derivative. Results that are symbols or numbers need no code.
+    `constants`: assignments that run once a step. `timed`: assignments that run once for each stage time. `rhs`
+    computes d(state)/dt. `linear` computes d(state)/dt, the Jacobian row by row and the partial time derivative.
+    Results that are symbols or numbers need no code.
     """
 
     constants: tuple[tuple[sp.Symbol, sp.Expr], ...]
@@ -33,20 +34,20 @@ class NodeBlocks:
 
 
 def analyse(node: Node, names: Names, varied: Iterable[str] = ()) -> NodeBlocks:
-    """Split the equations of a node; parameters with a value for each node, `varied`, count as states."""
+    """Split the equations of a node. Parameters in `varied` have a value for each node and count as states."""
     size = len(node.state)
     entries = [e for row in node.jacobian() for e in row]
     outputs = [*node.rhs, *entries, *node.time_derivative()]
     moving = frozenset(node.state) | {real(name) for name in varied}
-    # first everything without a state, time itself included
+    # name the parts without a state: functions of time and parameters
     waves = Hoist(moving, names.fresh("hoisted_"), frozenset({TIME}))
     outputs = [waves.apply(e) for e in outputs]
-    # then the parts without time, of the rest and of the time terms
+    # name the parts without state and time, both in the remaining expressions and in the time terms
     steady = Hoist(moving | {TIME} | set(waves.table.values()), names.fresh("fixed_"))
     timed = {symbol: steady.apply(e) for e, symbol in waves.table.items() if e.has(TIME)}
     fixed = {symbol: e for e, symbol in waves.table.items() if not e.has(TIME)}
     fixed |= {symbol: e for e, symbol in steady.table.items()}
-    # short names in one numbering for symbols of two tables
+    # short names: p0, p1, … for constants, w0, w1, … for time terms
     short = dict(zip(fixed, names.fresh("p"), strict=False)) | dict(zip(timed, names.fresh("w"), strict=False))
     inner = names.fresh("z")
     rhs = share([e.xreplace(short) for e in outputs[:size]], inner)

@@ -1,13 +1,13 @@
-"""The functions that decide between stick and slip, for the events of codegen/driver/contacts.py.
+"""Write the functions that decide between stick and slip, for the events of codegen/driver/contacts.py.
 
-`pushes(t, y, p, out)` writes six groups of NODES numbers, one number for the event of each node:
+`pushes(t, y, p, out)` stores six groups of NODES numbers, one number for the contact of each node:
 
     0  level: sliding velocity          2, 3  limits: acceleration under static friction, either way
     1  target: velocity of the ground   4, 5  departures: acceleration at the start of slip, either way
 
-The driver keeps three more groups behind them. If anything jumps or has a kink in time, two numbers follow: they change
-where such an event passes, the first at the time t, the second soon after.
-`release` changes the velocities of deviations where a contact lets go.
+The driver stores three more groups behind these six. If a function of time has jumps or kinks, two numbers follow. Both
+change value when time passes a jump or kink: the first is evaluated at the time t, the second a shortest step later.
+`release` corrects the velocities of deviations where a contact changes from stick to slip.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ from .safe_names import NAMES
 from .step import lane
 
 ACCELERATIONS = (2, 3, 4, 5)
-"""The groups of `pushes` that the force of a link is added to."""
+"""The groups of `pushes` to which each link adds its force."""
 
 SIDES = 9
-"""The groups of NODES numbers before the two numbers on jumps and kinks in time."""
+"""Number of groups of NODES numbers in front of the two numbers on jumps and kinks in time."""
 
 SOON = sp.Rational(1, 10**13)
-"""The later time of these numbers is t + SOON max(1, t), a shortest step: SHORTEST in codegen/driver/contacts.py."""
+"""The second of the two numbers is evaluated at t + SOON max(1, t), a step of SHORTEST (codegen/driver/contacts.py)."""
 
 
 def push_functions(equations: Equations, names: Names, looped: bool = False) -> list[Function]:
-    """Return the function `pushes` if there are contacts, written out or with loops over nodes and links."""
+    """Return the function `pushes`, written out or `looped` over nodes and links; an empty list without contacts."""
     if not equations.sticks:
         return []
     body = (_looped if looped else _written_out)(equations, names)
@@ -59,13 +59,13 @@ def _columns(event: Event) -> tuple[sp.Expr, ...]:
 
 
 def _gaps(template: Node | Edge) -> list[sp.Expr]:
-    """Return the functions of time that pass zero at jumps and kinks, sorted."""
+    """Return the functions of time whose zeros are jumps or kinks of the right-hand side, sorted."""
     return sorted(gaps(template), key=sp.default_sort_key)
 
 
 def _sides(zeros: Iterable[sp.Expr]) -> tuple[sp.Expr, ...]:
-    """Return a number that changes if any of `zeros` passes zero, now and soon after; nothing if there are none."""
-    # signs are digits in base 3; a double keeps 30 of them apart
+    """Return two numbers, at t and soon after, that change if any of `zeros` changes sign; () if there are no zeros."""
+    # the signs are digits in base 3; a double holds 30 digits exactly
     signs = [3 ** (k % 30) * sp.sign(gap) for k, gap in enumerate(dict.fromkeys(zeros))]
     now = sp.Add(*signs)
     return (now, now.xreplace({TIME: TIME + SOON * sp.Max(1, TIME)})) if signs else ()
@@ -85,15 +85,15 @@ def _written_out(equations: Equations, names: Names) -> list[Statement]:
 
 
 def _looped(equations: Equations, names: Names) -> list[Statement]:
-    """Write a loop over the nodes and one over the links, behind the terms that all nodes share."""
+    """Write the terms that all nodes share, a loop over the nodes, and a loop over the links."""
     node, places = equations.node, StateLayout(equations)
     (event,) = node.events
-    # terms without states and parameters of single nodes are computed once
+    # compute terms once if they contain neither states nor parameters that differ from node to node
     varied = (real(name) for name in equations.varied)
     fixed = Hoist(frozenset((*node.state, *varied)), names.fresh("fixed"), frozenset({TIME}))
     body = share([fixed.apply(e) for e in _columns(event)], names.fresh("z"))
     forces, force = _force(equations, places, event)
-    # jumps in time with numbers that differ from node to node, or link to link, are left to step control
+    # skip jumps in time whose parameters differ from node to node or link to link: step control handles them
     differing = set(map(real, (*equations.varied, *equations.numbered)))
     parts: tuple[Node | Edge, ...] = (node, *equations.edges)
     zeros = [e for part in parts for e in _gaps(part) if not e.free_symbols & differing]
@@ -112,12 +112,12 @@ def _looped(equations: Equations, names: Names) -> list[Statement]:
 
 
 def _force(equations: Equations, places: StateLayout, event: Event) -> tuple[list[Statement], tuple[sp.Expr, ...]]:
-    """Return the statements that add the force of one link on a body that sticks, and that force."""
+    """Return the statements that load and add the force of one link on a sticking body, and the force itself."""
     if not equations.edges:
         return [], ()
     (joint,) = places.joints
     edge, swap = joint.edge, named(joint)
-    # in stick (mode one) the body moves with the ground
+    # in stick (mode 1) the body has the velocity of the ground
     velocity, mode = edge.here[1], edge.here[2]
     force = edge.rhs[1].xreplace({mode: sp.S.One, velocity: event.target})
     loop = [*link_ends(edge, edge.weight.name), *places.of_link(edge, force.free_symbols)]
@@ -172,5 +172,5 @@ def _release(events: Events, variation: Variation, names: Names) -> Function:
 
 
 def register(array: str, size: int, k: int) -> Load:
-    """Load register k of one group of modes, which fill `size` registers of an array."""
+    """Load register k of a group of modes; each group fills `size` registers of the array."""
     return Load(array, size * Name("which") + k, "LANES")

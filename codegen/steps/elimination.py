@@ -2,9 +2,11 @@
 
     pattern ─plan─▶ EliminationPlan;  entries ─write_factors─▶ Factors;  right-hand side ─write_solve─▶ statements
 
-The plan picks pivots on the diagonal by least fill (Markowitz, Management Science 3, 255, 1957). So positions of a
-mechanical network are eliminated before velocities, and a chain or any tree causes no fill. No numerical pivoting: the step control chooses the shift, and a bad pivot shows up as a rejected step.
-An infinite pivot, as of sqrt(x) at 0, would make the step and its error 0; its inverse is NaN, and so the error is.
+The plan picks diagonal pivots by least fill (Markowitz, Management Science 3, 255, 1957). Positions of a mechanical
+network are therefore eliminated before velocities, and a chain or any other tree causes no fill. Pivots are never
+exchanged by size: a bad pivot gives a large error, and step control rejects the step and changes the shift. An infinite
+pivot, such as that of sqrt(x) at 0, would make the step and its error 0. The inverse of an infinite pivot is therefore
+NaN, which makes the error NaN.
 """
 
 from __future__ import annotations
@@ -24,12 +26,12 @@ Entry = tuple[int, int]
 Entries = dict[Entry, sp.Expr]
 
 SOLVES = 8
-"""Solutions for each factorisation in the cost of a plan: the stages of rodas5p."""
+"""Number of solves per factorisation that the cost of a plan assumes: the stages of rodas5p."""
 
 
 @dataclass(frozen=True, slots=True)
 class EliminationPlan:
-    """Pivots in their order, and for each the rows below it and the columns after it in its row."""
+    """The order of the pivots; for each pivot, the rows it is eliminated from and the later columns in its row."""
 
     order: tuple[int, ...]
     below: tuple[tuple[int, ...], ...]
@@ -37,7 +39,7 @@ class EliminationPlan:
 
     @property
     def multiplications(self) -> int:
-        """The cost of one factorisation and its solutions."""
+        """Number of multiplications of one factorisation and SOLVES solutions."""
         pairs = list(zip(self.below, self.after, strict=True))
         return sum(len(b) * (1 + len(a)) for b, a in pairs) + SOLVES * sum(1 + len(b) + len(a) for b, a in pairs)
 
@@ -45,8 +47,8 @@ class EliminationPlan:
 def plan(size: int, pattern: set[Entry]) -> EliminationPlan:
     """Order the pivots 0 … size-1 by least Markowitz cost and list the fill.
 
-    A second order begins with the rows without a diagonal entry of J: their pivots need no division. It is taken where
-    it is not more expensive.
+    A second candidate begins with the rows without a diagonal entry of J, because their pivots need no division. The
+    second candidate is returned unless it costs more.
     """
     first = frozenset(k for k in range(size) if (k, k) not in pattern)
     plans = (_ordered(size, pattern, first), _ordered(size, pattern, frozenset()))
@@ -63,7 +65,7 @@ def _ordered(size: int, pattern: set[Entry], first: frozenset[int]) -> Eliminati
         pivot = min(remaining, key=lambda k: (k not in first, (len(rows[k]) - 1) * (len(columns[k]) - 1), k))
         remaining.remove(pivot)
         down, right = sorted(columns[pivot] - {pivot}), sorted(rows[pivot] - {pivot})
-        # each row below gets the entries of the pivot's row
+        # elimination adds the entries of the pivot's row to each row below: fill
         for r in down:
             rows[r] |= set(right)
             rows[r].discard(pivot)
@@ -78,7 +80,7 @@ def _ordered(size: int, pattern: set[Entry], first: frozenset[int]) -> Eliminati
 
 @dataclass(frozen=True, slots=True)
 class Factors:
-    """Statements that factorise, and the names (or 1.0, -1.0) of the factors."""
+    """The statements of a factorisation, and the factors: names, or the numbers 1.0 and -1.0."""
 
     statements: tuple[Statement, ...]
     lower: dict[Entry, Expression]
@@ -92,7 +94,7 @@ def write_factors(
     labels: tuple[str, ...],
     mass: Mapping[Entry, sp.Expr] | None = None,
 ) -> Factors:
-    """Write the elimination of (shift M - J), `mass` the entries of M, None or empty where it is the identity."""
+    """Write the elimination of (shift M - J). `mass` holds the entries of M; None or empty stands for the identity."""
     shift = sp.Symbol("shift")
     scaled = {(k, k): shift for k in steps.order} if not mass else {key: shift * e for key, e in mass.items()}
     return write_elimination(steps, scaled, jacobian, labels)
@@ -104,12 +106,12 @@ def write_elimination(
     subtracted: Mapping[Entry, sp.Expr],
     labels: tuple[str, ...],
 ) -> Factors:
-    """Write the elimination of `matrix` minus `subtracted`; a symmetric matrix takes half the operations, L D L^T."""
+    """Write the elimination of `matrix` - `subtracted`, L D L^T if `symmetric`, which halves the operations."""
     statements: list[Statement] = []
     names: dict[Expression, Name] = {}
 
     def assign(name: str, e: Expression) -> Name:
-        # equal expressions, of equal nodes, share one name
+        # equal nodes give equal expressions: they share one name
         if e not in names:
             names[e] = Name(name)
             statements.append(let(name, e))
@@ -122,7 +124,7 @@ def write_elimination(
     entries = {key: lower(matrix.get(key, sp.S.Zero) - subtracted.get(key, sp.S.Zero)) for key in both}
     symmetric = not subtracted and all(entries.get((c, r), ZERO) == e for (r, c), e in entries.items())
     diagonal = {k: entries[k, k] for k in steps.order}
-    # off-diagonal entries by name; units and names stay
+    # give each off-diagonal entry a name, unless it is a unit or a name already
     value: dict[Entry, Expression] = {}
     for key, e in entries.items():
         if key[0] != key[1] and e != ZERO:
@@ -131,10 +133,10 @@ def write_elimination(
     inverse: dict[int, Expression] = {}
     for k, down, right in zip(steps.order, steps.below, steps.after, strict=True):
         if diagonal[k] == Name("shift"):
-            inverse[k] = Name("reach")  # 1/shift, which the step has
+            inverse[k] = Name("reach")  # 1/shift, computed at the start of the step
         else:
             pivot = assign(label("pivot", k, k), diagonal[k])
-            inverse[k] = assign(label("inv", k, k), 1.0 / pivot + 0.0 * pivot)  # NaN of an infinite pivot
+            inverse[k] = assign(label("inv", k, k), 1.0 / pivot + 0.0 * pivot)  # NaN if the pivot is infinite
         for r in down:
             below[r, k] = assign(label("l", r, k), times(value[r, k], inverse[k]))
             for c in right:
@@ -152,7 +154,7 @@ def write_elimination(
 def write_solve(
     steps: EliminationPlan, factors: Factors, right: Mapping[int, str], result: Mapping[int, str]
 ) -> list[Statement]:
-    """Write the solution: names `right` of the right-hand sides are overwritten, `result` names the unknowns."""
+    """Write the solution. The right-hand sides (variables `right`) are overwritten; `result` names the unknowns."""
     statements: list[Statement] = []
     for k, down in zip(steps.order, steps.below, strict=True):
         statements += [let(right[r], less(Name(right[r]), factors.lower[r, k], Name(right[k]))) for r in down]
@@ -177,6 +179,6 @@ def times(x: Expression, y: Expression) -> Expression:
 
 
 def less(start: Expression | None, x: Expression, y: Expression) -> Expression:
-    """Return start - x*y with signs and unit factors folded; without a start -x*y."""
+    """Return start - x*y with signs and unit factors folded; return -x*y if `start` is None."""
     change = negative(times(x, y))
     return change if start is None else plus(start, change)

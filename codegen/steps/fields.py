@@ -1,13 +1,14 @@
-"""Links that are sums of products of both ends, as loops over nodes in place of a loop over pairs.
+"""Replace the loop over pairs by loops over nodes, for links that are sums of products f(target) g(source).
 
     rate of node i = sum over k of target_k(i) * (sum over j of source_k(j))
 
-`MeanField`: links of all pairs. One loop over the nodes adds up the sources, one applies the sums. The sums are compensated,
-so that their error does not grow with the number of nodes (W. Kahan, Commun. ACM 8, 40 (1965)).
-`LinkSums`: links in a list. One loop over the nodes computes the sources, one over the links adds them up at the targets, one
-over the nodes applies the sums of each node.
+`MeanField`: every pair is linked. A first loop over the nodes adds up the source functions; a second loop adds the
+rates. The sums are compensated, so that their error does not grow with the number of nodes (W. Kahan, Commun. ACM 8, 40
+(1965)).
+`LinkSums`: the links are listed. A loop over the nodes computes the source functions, a loop over the links adds them
+up at the targets, and a second loop over the nodes adds the rates.
 
-Both keep one number of each node for each function in the part FIELD of the workspace, meanwhile.
+Between the loops, the part FIELD of the workspace holds one number of each node for each function.
 """
 
 from __future__ import annotations
@@ -34,11 +35,11 @@ from .step import NOW, lane
 
 @dataclass(frozen=True, slots=True)
 class MeanField:
-    """The links of all pairs of a network, as sums over the nodes.
+    """The links between all pairs of nodes, as sums over the nodes.
 
-    shifted: states of which differences alone matter. sums: functions of the source that are summed, by the names of the
-    sums. shared: sums times factors that all nodes share, by name. rates: the rates of a node, in these names and functions
-    of the node.
+    shifted: states that enter the links only as differences between nodes. sums: the functions of the source that are
+    summed, by the name of each sum. shared: products of sums and of factors that all nodes share, by name. rates: the
+    rates of a node, in the names of `sums` and `shared` and in functions of the node.
     """
 
     edge: Edge
@@ -50,18 +51,18 @@ class MeanField:
 
     @classmethod
     def of(cls, number: int, edge: Edge, node: Node, pairs: AllPairs, parts: Separated) -> MeanField:
-        """Make the mean field of this number in a network."""
+        """Return mean field number `number` of a network."""
         weight = {edge.weight: sp.Rational(pairs.weight.numerator, pairs.weight.denominator)}
         symbols = {e: real(f"sum_{number}_{k}") for k, e in enumerate(parts.sources) if e != 1}
         totals = {sp.S.One: sp.Integer(pairs.n), **symbols}
         shared: dict[sp.Expr, sp.Symbol] = {}
         rates = []
         for itself, row in zip(parts.own, parts.products, strict=True):
-            # the sums with one function of the target are added before they are multiplied by it
+            # add the sums that multiply the same function of the target, then multiply once
             grouped: dict[sp.Expr, sp.Expr] = {}
             for factor, target, source in row:
                 grouped[target] = grouped.get(target, sp.S.Zero) + factor.xreplace(weight) * totals[source]
-            # the sums run over all nodes; a node has no link with itself
+            # the sums run over all nodes, but a node has no link to itself: subtract that term
             rate = -itself.xreplace(weight)
             for target, total in grouped.items():
                 s = shared.setdefault(total, real(f"sum_{number}_of_{len(shared)}"))
@@ -72,19 +73,21 @@ class MeanField:
 
     @property
     def alike(self) -> dict[sp.Symbol, sp.Expr]:
-        """The functions of the source that occur as functions of the target too, by the names of their sums."""
+        """Functions that occur both at the source and at the target, by the names of their sums."""
         functions = {s: e.xreplace(_as_target(self.edge)) for s, e in self.sums.items()}
         return {s: e for s, e in functions.items() if not e.is_Symbol and any(rate.has(e) for rate in self.rates)}
 
     def statements(self, places: StateLayout, base: str, out: str, start: int = 0) -> list[Statement]:
-        """Write both loops at one vector of states, and the shared terms between them; they add to the vector `out`.
+        """Write both loops for the states in vector `base`, with the shared terms between; the rates are added to
+        `out`.
 
-        Functions of the source and of the target are computed once, and kept in the rows of FIELD from `start` on.
+        A function that occurs at the source and at the target is computed once and stored in a row of FIELD, from
+        `start` on.
         """
         names = (real(f"sum_part_{k}") for k in count())
         swap = named(Joint(self.edge, self.node, self.node, span("e", 0))) | NOW
         rows = _rows(self.alike, start)
-        # 1. the sums, of states that are counted from those of the first node
+        # 1. the sums, of states minus those of the first node if `shifted`
         statements = places.read(self.node, base, "_first", "0") if self.shifted else []
         used = {s for e in self.sums.values() for s in e.free_symbols}
         body = share([e.xreplace(swap) for e in self.sums.values()], names)
@@ -107,7 +110,7 @@ class MeanField:
         return [*statements, _applied(places, out, loads, body)]
 
     def _states(self, places: StateLayout, base: str, suffix: str, index: str) -> list[Statement]:
-        """Load the states of a node, those `shifted` counted from the first node's: sums of large numbers lose digits."""
+        """Load the states of a node, `shifted` ones minus those of the first node, so that sums keep digits."""
         shifted = [self.node.state[k].name for k in self.shifted]
         moved = [let(f"{name}{suffix}", Name(f"{name}{suffix}") - Name(f"{name}_first")) for name in shifted]
         return [*places.read(self.node, base, suffix, index), *moved]
@@ -115,11 +118,11 @@ class MeanField:
 
 @dataclass(frozen=True, slots=True)
 class LinkSums:
-    """The part of a joint's links that is products of both ends, as sums over the links of each node.
+    """The terms of a joint's links that are products f(target) g(source), as sums over the links of each node.
 
-    functions: those of the source, by name. sums: the factor of each link and the name of the function that it multiplies
-    (or one), by the names of the sums. factors: functions of parameters that all links share, by name. rates: the rates of
-    a node, in these names and functions of the node.
+    functions: the functions g of the source, by name. sums: by the name of each sum, the factor of each link and the
+    name of the function g that the factor multiplies (or one). factors: functions of parameters that all links share,
+    by name. rates: the rates of a node, in the names of `sums` and `factors` and in functions of the node.
     """
 
     joint: Joint
@@ -130,7 +133,7 @@ class LinkSums:
 
     @classmethod
     def of(cls, number: int, joint: Joint, parts: Summed) -> LinkSums:
-        """Make the sums of the joint of this number."""
+        """Return the sums of joint number `number`."""
         functions = {e: real(f"sum_{number}_from_{k}") for k, e in enumerate(parts.sources)}
         sums: dict[tuple[sp.Expr, sp.Expr], sp.Symbol] = {}
         factors: dict[sp.Expr, sp.Symbol] = {}
@@ -140,7 +143,7 @@ class LinkSums:
             for factor, of_link, target, source in row:
                 part = (of_link, functions.get(source, sp.S.One))
                 total = sums.setdefault(part, real(f"sum_{number}_{len(sums)}"))
-                # a function or power is computed once, outside of the loops
+                # compute a function or a power once, outside of the loops
                 if factor.atoms(sp.Function, sp.Pow):
                     factor = factors.setdefault(factor, real(f"sum_{number}_by_{len(factors)}"))
                 grouped[target] = grouped.get(target, sp.S.Zero) + factor * total
@@ -155,26 +158,26 @@ class LinkSums:
 
     @property
     def kept(self) -> int:
-        """The rows of FIELD: numbers of each node between the loops."""
+        """Number of rows of FIELD: numbers of each node that are stored between the loops."""
         return len(self.functions) + len(self.sums)
 
     def of_node(self) -> list[sp.Expr]:
-        """Return the functions of the source, of the states and parameters of a node."""
+        """Return the functions of the source, in the states and parameters of a node."""
         edge = self.joint.edge
         swap = {**dict(zip(edge.there, self.joint.source.state, strict=True)), **dict(edge.theirs)}
         return [e.xreplace(swap) for e in self.functions.values()]
 
     def applied(self) -> list[sp.Expr]:
-        """Return the rates, with the functions of the target that are functions of the source too by their names."""
+        """Return the rates. Functions that occur at the target and at the source are replaced by their names."""
         alike = {e.xreplace(_as_target(self.joint.edge)): s for s, e in self.functions.items()}
         return [e.xreplace(alike) for e in self.rates]
 
     def statements(self, places: StateLayout, base: str, out: str, start: int) -> list[Statement]:
-        """Write the loops at one vector of states; they add to the vector `out` and use the rows of FIELD from `start` on."""
+        """Write the loops for the states in `base`; add the rates to `out`, and use rows of FIELD from `start` on."""
         names = (real(f"sum_part_{k}") for k in count())
         joint, edge, nodes = self.joint, self.joint.edge, span("j", "NODES")
         swap, rows = named(joint), _rows((*self.functions, *self.sums), start)
-        # 1. functions of the sources, and zeros
+        # 1. store the functions of each source, and zeros where the sums will be
         body = share([e.xreplace(swap) for e in self.functions.values()], names)
         used = {s for e in self.functions.values() for s in e.free_symbols}
         first = [*places.read(joint.source, base, "_there", "j"), *places.of_source(edge, used), *assigned(body)]
@@ -195,17 +198,17 @@ class LinkSums:
 
 
 def _as_target(edge: Edge) -> dict[sp.Symbol, sp.Symbol]:
-    """Rename the states and parameters of the source to those of the target."""
+    """Return the map from states and parameters of the source to those of the target."""
     return {**dict(zip(edge.there, edge.here, strict=True)), **dict(edge.theirs)}
 
 
 def _rows(symbols: Iterable[sp.Symbol], start: int) -> Mapping[sp.Symbol, Expression]:
-    """Return where the numbers of the nodes for each symbol begin in FIELD."""
+    """Return, for each symbol, the index in FIELD of its value at node 0; row `start` belongs to the first symbol."""
     return {s: Name("FIELD") + k * Name("NODES") for k, s in enumerate(symbols, start=start)}
 
 
 def _applied(places: StateLayout, out: str, loads: Sequence[Statement], body: StraightLine) -> Loop:
-    """Write the loop that adds the rates in which `body` ends to the nodes."""
+    """Write the loop over the nodes that adds the results of `body` to the rates in `out`."""
     rates = [add_to(out, places.place(c), lower(e)) for c, e in enumerate(body.results) if e != 0]
     return span("i", "NODES").over([*loads, *assigned(body), *rates])
 
@@ -224,9 +227,9 @@ def mean_fields(equations: Equations) -> list[MeanField]:
 
 
 def link_sums(equations: Equations, joints: Iterable[Joint]) -> tuple[list[LinkSums], list[Joint]]:
-    """Return the sums over links, and joints with the parts that are not sums.
+    """Return the sums over links, and the joints with the terms that are no products.
 
-    Networks with several kinds of nodes, and with contacts, have no sums.
+    Networks with contacts or with several kinds of nodes return no sums.
     """
     sums, others = list[LinkSums](), list[Joint]()
     if equations.mixed or equations.sticks:
@@ -242,7 +245,7 @@ def link_sums(equations: Equations, joints: Iterable[Joint]) -> tuple[list[LinkS
 
 
 def compensated(total: str, value: Value) -> Iterator[Statement]:
-    """Add a value to a sum; keep the part that rounding cuts off, and subtract it from the next value."""
+    """Add a value to a sum by Kahan's rule: store the rounding error, and subtract it from the next value."""
     rest, part, new = (f"{total}_{word}" for word in ("rest", "part", "new"))
     yield let(part, as_expression(value) - Name(rest))
     yield let(new, Name(total) + part)

@@ -1,14 +1,15 @@
-"""The statements of a step for a large network: loops over nodes and links around the functions of nodes.
+"""Write the step of a large network: loops over nodes and links that call the functions of nodes.
 
-The text has the same length for any number of nodes; it is compiled for each because that number is a constant of it.
-Nodes of several kinds have a loop for each kind, and their links one for each pair of kinds (codegen/steps/places.py).
+The text has the same length for any number of nodes. The number of nodes is a constant in the text, so each size is
+compiled once. Nodes of several kinds have a loop for each kind; their links have a loop for each pair of kinds
+(codegen/steps/places.py).
 
-All vectors are parts of the array `dense`, the workspace, behind the rows of the dense output:
+All vectors are parts of the array `dense`, the workspace. They follow the rows of the dense output:
 
-    K1, K2, …                   rates of the stages; explicit methods keep their right-hand sides there
+    K1, K2, …                   rates of the stages; for explicit methods these are the right-hand sides
     STATE                       state of a stage, and scratch memory of the linear algebra
     SLOPE, TIME_SLOPE           right-hand side of a stage; its partial time derivative at the start
-    MATRIX                      shift*M - J or M: the diagonal, then ENTRIES - DIMENSION others; incomplete factors follow
+    MATRIX                      shift*M - J or M: diagonal, then ENTRIES - DIMENSION others; incomplete factors follow
     RATES, MASS                 rates at the start and M, where a Rosenbrock step needs them
     FIELD                       functions of the sources of mean fields, sums over links, by node
 """
@@ -50,17 +51,17 @@ from .sparse_plan import SparsePlan, block_pattern
 from .step import NOW, StepWriter, lane, linearised
 
 SLOTS = ("here_slot", "there_slot")
-"""The arrays with matrix slots of a link's blocks: by its target, by its source."""
+"""The arrays that hold the matrix slots of a link's two blocks: derivatives by the target's states, by the source's."""
 
 STATES, PLACE = span("i", "DIMENSION"), Name("i")
-"""The loop over all states, and the place of a state in it."""
+"""The loop over all states, and the index of a state in the loop."""
 
 GROUPS = {"f": "SLOPE"}
-"""Vectors of slopes by their names in registers; those of stages, k1, k2, …, are K1, K2, …"""
+"""The vector in the workspace for each name that a written-out step uses; k1, k2, … of stages become K1, K2, …"""
 
 
 class LoopedStep(StepWriter):
-    """Keeps vectors in the workspace; `elimination` has the order of the pivots."""
+    """Write a step whose vectors lie in the workspace; `elimination` (SparsePlan) holds the order of the pivots."""
 
     def __init__(
         self, equations: Equations, kinds: Sequence[NodeBlocks], method: Integrator, elimination: SparsePlan
@@ -68,14 +69,14 @@ class LoopedStep(StepWriter):
         super().__init__(equations, kinds, method)
         self.places, self.elimination, self.fields = StateLayout(equations), elimination, mean_fields(equations)
         self.sums, self.joints = list[LinkSums](), list(self.places.joints)
-        if not method.implicit:  # the matrix of a Rosenbrock step needs both ends of each link anyway
+        if not method.implicit:  # a Rosenbrock step loops over the links in any case, for the matrix
             self.sums, self.joints = link_sums(equations, self.places.joints)
         self.mass = LoopMass(self)
 
     # -- memory -----------------------------------------------------------------------------------------------
 
     def opening(self) -> None:
-        """Name the parts of the workspace, load the parameters that all nodes share."""
+        """Name the parts of the workspace and load the parameters that all nodes share."""
         vectors = [*(f"K{j + 1}" for j in range(len(self.method.c))), "STATE", "SLOPE", "TIME_SLOPE", "MATRIX"]
         starts: dict[str, Expression] = {
             name: Name("DENSE_ROWS") * "DIMENSION" + i * Name("DIMENSION") for i, name in enumerate(vectors)
@@ -97,7 +98,7 @@ class LoopedStep(StepWriter):
 
     @property
     def workspace(self) -> int:
-        """The number of registers of the workspace; `opening` names its parts."""
+        """Number of registers in the workspace; `opening` names the parts."""
         eq, implicit, elimination = self.equations, self.method.implicit, self.elimination
         size = (len(self.method.c) + 3) * eq.dimension
         size += eq.n * (sum(len(field.alike) for field in self.fields) + sum(links.kept for links in self.sums))
@@ -108,26 +109,26 @@ class LoopedStep(StepWriter):
     # -- right-hand side --------------------------------------------------------------------------------------
 
     def slopes(self, base: str, out: str) -> None:
-        """Compute the right-hand side at one vector of states into another, by a function that all stages call."""
+        """Write a call of the function `slopes`: the right-hand side at the states in `base`, stored in `out`."""
         constants = self.slope_constants
         states = Name("y") if base == "y" else call("address", "dense", Name("STATE") * "WIDTH")
         self.put(Do(call("slopes", states, "dense", GROUPS.get(out, out.upper()), *constants)))
 
     @cached_property
     def slope_constants(self) -> list[str]:
-        """Write the function `slopes`; return its arguments behind states, workspace and place of the slopes."""
+        """Write the function `slopes`; return the arguments behind states, workspace and position of the slopes."""
         with self.apart() as body:
             for kind in self.places.kinds:
                 self.node_slopes(kind, "y", "out")
             self.links("y", "out")
-            rows = 0  # of FIELD
+            rows = 0  # rows of FIELD in use
             for field in self.fields:
                 self.put(*field.statements(self.places, "y", "out", rows))
                 rows += len(field.alike)
             for links in self.sums:
                 self.put(*links.statements(self.places, "y", "out", rows))
                 rows += links.kept
-        # the variables of the step so far that the body uses
+        # arguments of the function: the variables of the step that the body uses
         needed = mentioned(body)
         constants = [name for name in ("h", "p", *targets(self.statements), "weights") if name in needed]
         about = "Write the right-hand side at the states y behind the place `out` of the workspace."
@@ -135,7 +136,7 @@ class LoopedStep(StepWriter):
         return constants
 
     def node_slopes(self, kind: NodeKindLayout, base: str, out: str) -> None:
-        """Compute the right-hand side of the nodes of one kind."""
+        """Compute the right-hand side of all nodes of one kind."""
         body = self.kinds[kind.number].rhs
         names = [f"f_{s.name}" for s in kind.node.state]
         loop = self.places.read(kind.node, base) + self.places.own(body.symbols)
@@ -146,9 +147,10 @@ class LoopedStep(StepWriter):
         self.put(kind.span.over(loop))
 
     def links(self, base: str, out: str, start: bool = False, jacobian: bool = False) -> None:
-        """Add the rates of each link to the vector `out`, if any, at the time of a stage or at the `start` of the step.
+        """Add the rates of each link to the vector `out`, unless `out` is empty.
 
-        With `jacobian`, add its entries to the matrix and its time derivatives to TIME_SLOPE too.
+        `start`: at the time of the start of the step, not of a stage. `jacobian`: also subtract each link's Jacobian
+        entries from the matrix, and add each link's time derivatives to TIME_SLOPE.
         """
         place = self.places.place
         for joint in self.joints:
@@ -164,7 +166,7 @@ class LoopedStep(StepWriter):
             self.put(joint.span.over(loop))
 
     def link(self, joint: Joint, base: str, used: Sequence[sp.Expr], states: bool = True) -> list[Statement]:
-        """Load ends and weight of a link, the parameters in the expressions `used`, and the states of both ends."""
+        """Load ends and weight of a link, the parameters in `used`, and with `states` the states of both ends."""
         read, symbols = self.places.read, {s for e in used for s in e.free_symbols}
         loads = [*link_ends(joint.edge, joint.edge.weight.name), *self.places.of_link(joint.edge, symbols)]
         if states:
@@ -179,7 +181,7 @@ class LoopedStep(StepWriter):
         self.note("right-hand side, shift - J and time derivative at the start")
         self.timed("t", self.wanted([blocks.linear for blocks in self.kinds]))
         self.put(*filled("MATRIX", Name("shift")))
-        # rows of states without a time derivative have no time slope
+        # skip states whose right-hand side does not contain the time
         slopes = [self.kinds[kind.number].linear.results[-len(kind.node.state) :] for kind in kinds]
         slopes += [joint.edge.time_derivative() for joint in self.places.joints]
         self.timed_rows = {self.places.row_of(c) for row in slopes for c, e in enumerate(row) if e != 0}
@@ -195,7 +197,7 @@ class LoopedStep(StepWriter):
         size, place, names = len(state), self.places.place, linearised(state)
         loop = [*self.places.read(kind.node, "y"), *self.places.own(body.symbols)]
         loop += self.node_call("node_linear", kind.number, body, names, {})
-        # results: size rates, size*size entries of J row by row, size time derivatives
+        # the results are `size` rates, size*size entries of J row by row, and `size` time derivatives
         results = [e if self.is_plain(e) else real(name) for name, e in zip(names, body.results, strict=True)]
         for c in range(size):
             loop.append(store_in("SLOPE", place(c), lane(lower(results[c]))))
@@ -207,7 +209,7 @@ class LoopedStep(StepWriter):
         self.put(kind.span.over(loop))
 
     def matrix_of_link(self, joint: Joint) -> list[Statement]:
-        """Add the blocks of a link to shift*M - J."""
+        """Add the two blocks of a link to shift*M - J."""
         swap = named(joint)
         loop, blocks = self.mass.jacobian(joint)
         for block, slot in zip(blocks, SLOTS, strict=True):
@@ -224,7 +226,7 @@ class LoopedStep(StepWriter):
         change: Callable[[Expression], Expression] = negative,
         matrix: str = "MATRIX",
     ) -> list[Statement]:
-        """Add the non-zero entries of a block, changed by `change`, to the matrix: by default their negatives."""
+        """Add change(entry) to the matrix for each non-zero entry of a block; by default `change` negates."""
         return [
             add_to(matrix, self.places.entry(slot, a, b), change(lower(block[a][b].xreplace(swap))))
             for a, b in block_pattern(block)
@@ -233,7 +235,7 @@ class LoopedStep(StepWriter):
     # -- stages -----------------------------------------------------------------------------------------------
 
     def advance(self, i: int) -> None:
-        """Compute the state of stage i > 0: y + sum a_j k_j, the sum times h for explicit methods."""
+        """Compute the state of stage i > 0: y + sum a_j k_j, or y + h sum a_j k_j for explicit methods."""
         row = self.method.a[i]
         loop = [*self.load_stages(PLACE, row), let("old", Load("y", PLACE))]
         value = Name("old") + self.increment(row, self.stages(len(row)))
@@ -262,11 +264,11 @@ class LoopedStep(StepWriter):
         self.mass.solve(f"K{i + 1}", "SLOPE")
 
     def stages(self, count: int) -> list[str]:
-        """Return the names of the loaded stage values of one state."""
+        """Return the names of the rates k_1 … k_count of one state after they are loaded."""
         return [f"k{j + 1}" for j in range(count)]
 
     def load_stages(self, place: Expression, row: Sequence[float]) -> list[Statement]:
-        """Load the stage values of a state that a row of coefficients uses."""
+        """Load the rates k_j of one state for which the row of coefficients is not zero."""
         return [let(f"k{j}", load_from(f"K{j}", place)) for j, weight in enumerate(row, start=1) if weight != 0.0]
 
     # -- end --------------------------------------------------------------------------------------------------
@@ -274,7 +276,7 @@ class LoopedStep(StepWriter):
     def finish(self) -> None:
         """Compute the new state, the error and the dense output."""
         m = self.method
-        # stages of the dense output alone
+        # extra stages that only the dense output needs
         if len(m.c) > m.stages:
             with self.apart() as stages:
                 for i in range(m.stages, len(m.c)):
@@ -286,7 +288,7 @@ class LoopedStep(StepWriter):
             with self.apart() as masses:
                 self.mass.gather("y", "MASS")
             self.put(If(Name("DENSE"), tuple(masses)))
-        # one loop over all states unless some are angles
+        # use one loop over all states, unless some states are angles with a period
         loops = self.places.measured
         if len({period for *_, period in loops}) == 1:
             self.put(STATES.over(self.end_of(PLACE, loops[0][2])))
@@ -302,13 +304,13 @@ class LoopedStep(StepWriter):
         if len(m.e) == 1:
             loop.append(let("estimate", self.increment(m.e[0], values)))
         if m.dense_error:
-            # a large pivot damps the error of a state, but not that of its dense output
+            # in stiff components a large pivot damps the error of the state, but not the error of the dense output
             share = Name("shift") * load_from("MATRIX", place if self.elimination.exact else Name("ENTRIES") + place)
             share = share * load_from("MASS", place) if self.equations.inertial else share
             raised = let("estimate", self.stiff_error("estimate", linear(m.dense[-1], values), share))
             loop.append(If(Name("DENSE"), (raised,)))
         loop += [*self.embedded(values), let("estimate", self.scaled_error("estimate", "old", "new", period))]
-        # `total` keeps NaN, which a maximum may lose
+        # a maximum may drop NaN, a sum keeps NaN: `total` makes the step fail then
         loop += [let("total", Name("total") + "estimate"), let("error", call("maximum", "error", "estimate"))]
         dense: list[Statement] = self.load_stages(place, [float(i >= m.stages) for i in range(len(m.c))])
         for j, row in enumerate(m.dense):
@@ -317,9 +319,9 @@ class LoopedStep(StepWriter):
 
 
 class LoopMass:
-    """Writes the terms of a mass matrix M in a looped step, and all solutions of linear equations.
+    """Write the terms of a mass matrix M in a looped step, and all solves of linear equations.
 
-    The equations that a step solves are in the head of codegen/steps/mass_solve.py.
+    The head of codegen/steps/mass_solve.py states the equations that a step solves.
     """
 
     def __init__(self, writer: LoopedStep) -> None:
@@ -327,28 +329,28 @@ class LoopMass:
         self.inertial, self.constant = writer.equations.inertial, writer.equations.constant_mass
         self.joints = [joint for joint in writer.places.joints if joint.edge.inertia]
         self.heavy = [kind for kind in writer.places.kinds if kind.node.inertia]
-        # exact factors replace the matrix, incomplete ones follow it
+        # exact factors overwrite the matrix; incomplete factors are stored behind the matrix
         self.apart: Value = 0 if writer.elimination.exact else "ENTRIES"
 
     # -- linear algebra: codegen/driver/sparse.py -------------------------------------------------------------
 
     def factorise(self, matrix: str = "MATRIX") -> None:
-        """Factorise a matrix; STATE is lost."""
+        """Factorise a matrix; STATE is overwritten."""
         arrays = ("order", "place", "row_start", "after_start", "column")
         self.writer.put(Do(call("factorise", "dense", matrix, self.apart, "STATE", *arrays)))
 
     def solve(self, vector: str, scratch: str, matrix: str = "MATRIX") -> None:
-        """Solve in place for a vector; `scratch` and STATE are lost."""
+        """Replace a vector by the solution for this right-hand side; `scratch` and STATE are overwritten."""
         arrays = ("order", "row_start", "after_start", "column")
         self.writer.put(Do(call("solve", "dense", matrix, self.apart, vector, scratch, "STATE", *arrays)))
 
     def assemble(self, base: str, matrix: str) -> None:
-        """Compute M at a state and factorise it; STATE is lost."""
+        """Compute M at the states in `base` and factorise M; STATE is overwritten."""
         self.gather(base, matrix)
         self.factorise(matrix)
 
     def gather(self, base: str, matrix: str) -> None:
-        """Compute M at a state."""
+        """Compute M at the states in `base`."""
         w = self.writer
 
         def added(block: Block, end: int | None, swap: dict[sp.Symbol, sp.Symbol]) -> list[Statement]:
@@ -360,7 +362,7 @@ class LoopMass:
     def blocks(
         self, base: str, use: Callable[[Block, int | None, dict[sp.Symbol, sp.Symbol]], list[Statement]]
     ) -> None:
-        """Loop over the blocks of M - 1: `use` writes the statements for a block of a node, or of a link's end 0 or 1."""
+        """Loop over the blocks of M - 1; `use` writes the statements of a block, of a node or of a link's end 0 or 1."""
         w = self.writer
         for kind in self.heavy:
             block = added_masses(kind.node)
@@ -372,7 +374,7 @@ class LoopMass:
             w.put(joint.span.over([*loads, *ends]))
 
     def node(self, kind: NodeKindLayout, used: Block, base: str) -> list[Statement]:
-        """Load the states and parameters of a node that the entries of a block use."""
+        """Load the states and parameters of a node that occur in a block."""
         w, symbols = self.writer, {s for row in used for e in row for s in e.free_symbols}
         states = [] if kind.node.constant_inertia else w.places.read(kind.node, base)
         return [*states, *w.places.own(symbols)]
@@ -380,12 +382,12 @@ class LoopMass:
     # -- explicit methods: M rates = f ------------------------------------------------------------------------
 
     def opening(self) -> None:
-        """Factorise M once a step where it is constant."""
+        """Factorise M once a step, if M is constant."""
         if self.inertial and self.constant:
             self.assemble("y", "MATRIX")
 
     def explicit(self, base: str, out: str) -> None:
-        """Turn the right-hand side of a stage into rates."""
+        """Solve M F = f: replace the right-hand side f of a stage by the rates F."""
         if self.inertial:
             if not self.constant:
                 self.assemble(base, "MATRIX")
@@ -394,7 +396,7 @@ class LoopMass:
     # -- Rosenbrock methods: (shift M - J) k = M (F + rate sum c k) -------------------------------------------
 
     def at_start(self) -> bool:
-        """Compute the rates F at the start where M varies; return True if SLOPE has the rates of the links then."""
+        """If M varies, compute the rates F at the start and return True: SLOPE then contains the rates of the links."""
         if self.constant:
             return False
         w = self.writer
@@ -405,7 +407,7 @@ class LoopMass:
         return True
 
     def turn(self) -> None:
-        """Add d(M F)/dy of the nodes at fixed F to the matrix."""
+        """Add the nodes' part of d(M F)/dy, F fixed, to the matrix."""
         w = self.writer
         for kind in self.heavy:
             turned = turned_masses(kind.node, [real(f"g_{s.name}") for s in kind.node.state])
@@ -414,7 +416,7 @@ class LoopMass:
                 w.put(kind.span.over(loads + w.entries(turned, "node_slot", {}, lambda e: e)))
 
     def jacobian(self, joint: Joint) -> tuple[list[Statement], tuple[Block, Block]]:
-        """Return df/dy - d(M F)/dy at fixed F of one link, by target and source, behind the loads of the rates F."""
+        """Return statements that load the rates F of a link, and df/dy - d(M F)/dy, F fixed, by target and source."""
         edge, read = joint.edge, self.writer.places.read
         blocks = (edge.jacobian_here(), edge.jacobian_there())
         if self.constant or not edge.inertia:
@@ -430,7 +432,7 @@ class LoopMass:
         return loads, (by_target, by_source)
 
     def rates_of_stage(self, i: int) -> None:
-        """Turn the right-hand side of a stage in SLOPE into rates F where M varies."""
+        """If M varies, replace the right-hand side of a stage in SLOPE by the rates F."""
         if not self.constant:
             self.assemble("STATE", "MASS")
             self.solve("SLOPE", f"K{i + 1}", "MASS")
@@ -438,9 +440,10 @@ class LoopMass:
     def stage_terms(
         self, place: Expression, slope: Expression, total: Expression
     ) -> tuple[list[Statement], list[Expression]]:
-        """Return the terms of F + rate*total, `total` = sum c k, and statements before them.
+        """Return the terms of F + rate*total with total = sum c k, and the statements that must precede them.
 
-        For `carried`, STATE keeps `total` where M is constant (M F = f is no product), F + rate*total where M varies.
+        `carried` reads a vector from STATE: `total` if M is constant, since M F = f is known; F + rate*total if M
+        varies.
         """
         terms = [slope, ProductExpr((Name("rate"), total))]
         if not self.inertial:
@@ -450,7 +453,7 @@ class LoopMass:
         return [let("new", plus(*terms)), store_in("STATE", place, "new")], [Name("new")]
 
     def carried(self, i: int) -> None:
-        """Add (M - 1) s to the right-hand side of stage i, s as in STATE, times the rate where M is constant."""
+        """Add (M - 1) s to the right-hand side of stage i; s is STATE, times `rate` if M is constant."""
         places, rate = self.writer.places, [Name("rate")] if self.constant else []
 
         def pushed(block: Block, end: int | None, swap: dict[sp.Symbol, sp.Symbol]) -> list[Statement]:
@@ -465,6 +468,6 @@ class LoopMass:
 
 
 def filled(matrix: str, diagonal: Expression) -> list[Statement]:
-    """Fill a matrix with equal entries on its diagonal and zeros elsewhere."""
+    """Set all diagonal entries of a matrix to one value and all other entries to zero."""
     parts = ((span("k", "DIMENSION"), diagonal), (span("k", "ENTRIES", "DIMENSION"), 0.0 * Name("h")))
     return [part.over([store_in(matrix, Name("k"), value)]) for part, value in parts]

@@ -1,13 +1,13 @@
-"""The mass matrix of a network with inertia of nodes or links: M d(state)/dt = f, solved by a sparse elimination.
+"""Solve M d(state)/dt = f by sparse elimination, for networks whose nodes or links have inertia (mass matrix M).
 
 A Rosenbrock step for y' = F = M^-1 f solves
 
     (shift M - J) k_i = M (F(u_i) + rate sum c_ij k_j) + d_i h f_t,    J = df/dy - d(M F)/dy at fixed F,
 
-with M at the start of the step: that is the exact Jacobian, multiplied by M (Hairer & Wanner, Solving Ordinary Differential
-Equations II (Springer, 1996), section IV.7). Where M is constant, M F(u) = f(u) and no system in M is solved. Otherwise
-F(u) takes one sparse elimination of M a stage. Explicit methods solve M F = f in each stage.
-`Mass` writes this for steps in registers, `LoopMass` (looped_step) for steps in loops.
+with M at the start of the step. J is the exact Jacobian of F, multiplied by M (Hairer & Wanner, Solving Ordinary
+Differential Equations II (Springer, 1996), section IV.7). If M is constant, M F(u) = f(u) and no system in M is solved.
+Otherwise each stage computes F(u) by one sparse elimination of M. Explicit methods solve M F = f in each stage.
+`Mass` writes the solves of steps in registers; `LoopMass` (looped_step) writes the solves of steps in loops.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from .step import StepWriter, function_of, prefix
 
 
 def added_masses(node: Node) -> Block:
-    """Return M - 1 of one node, empty where M is the identity."""
+    """Return the block M - 1 of one node; empty if M is the identity."""
     return tuple(tuple(e - sp.Integer(r == c) for c, e in enumerate(row)) for r, row in enumerate(node.inertia))
 
 
 def turned_masses(node: Node, rates: Sequence[sp.Symbol]) -> Block:
-    """Return d(M F)/dy of one node at fixed rates F, by its states; empty where M is constant."""
+    """Return d(M F)/dy of one node for fixed rates F, y the node's states; empty if M is constant."""
     if node.constant_inertia:
         return ()
     momenta = [sp.Add(*(e * f for e, f in zip(row, rates, strict=True))) for row in node.inertia]
@@ -42,7 +42,7 @@ def turned_masses(node: Node, rates: Sequence[sp.Symbol]) -> Block:
 
 
 def momentum_slopes(edge: Edge, here: Sequence[sp.Symbol], there: Sequence[sp.Symbol]) -> tuple[Block, Block]:
-    """Return d(M F)/dy of one link at fixed rates F of its target, `here`, and its source, by the states of either."""
+    """Return d(M F)/dy of one link by the target's and by the source's states, for fixed rates F = `here`, `there`."""
     if not edge.inertia:
         zero = tuple((sp.S.Zero,) * len(edge.here) for _ in edge.here)
         return zero, tuple((sp.S.Zero,) * len(edge.there) for _ in edge.here)
@@ -58,11 +58,12 @@ def momentum_slopes(edge: Edge, here: Sequence[sp.Symbol], there: Sequence[sp.Sy
 
 
 class Mass:
-    """Writes the terms of a mass matrix M in a step in registers; nothing if M is the identity.
+    """Write the terms of a mass matrix M in a step that is written out; write nothing if M is the identity.
 
-    entries: the non-zero entries of M by row and column, empty for the identity. coupled: those that differ from the
-    identity. rows: the rows that are solved together, those with such entries and those of the rates they multiply.
-    names: the states of these rows. constant: M depends on parameters alone.
+    entries: the non-zero entries of M by (row, column); empty if M is the identity. coupled: the entries that differ
+    from the identity. rows: the rows and columns of all coupled entries, which are solved together. names: the states
+    of
+    `rows`. constant: True if M depends on parameters only.
     """
 
     def __init__(self, writer: StepWriter) -> None:
@@ -73,7 +74,7 @@ class Mass:
         self.names = [writer.state[row] for row in self.rows]
 
     def refuse(self, subject: str) -> None:
-        """Raise ValueError where M is not the identity."""
+        """Raise ValueError if M is not the identity."""
         if self.equations.inertial:
             parts = "links with inertia" if self.equations.inertial_links else "nodes with a mass matrix"
             raise ValueError(f"{subject}: found {parts}; expected none; use integrator 'rodas5p' or 'dop853'")
@@ -81,20 +82,20 @@ class Mass:
     # -- M rates = r ------------------------------------------------------------------------------------------
 
     def elimination(self, matrix: Mapping[Entry, sp.Expr]) -> tuple[EliminationPlan, Factors]:
-        """Eliminate the coupled rows of M; `matrix` has its entries, perhaps renamed."""
+        """Plan and write the elimination of the coupled rows of M; `matrix` holds the entries under any names."""
         index = {row: k for k, row in enumerate(self.rows)}
         inner = {(index[r], index[c]): e for (r, c), e in matrix.items() if r in index and c in index}
         steps = plan(len(index), set(inner))
         return steps, write_elimination(steps, inner, {}, tuple(f"mass_{name}" for name in self.names))
 
     def solution(self, steps: EliminationPlan, factors: Factors, out: str) -> list[Statement]:
-        """Solve for the right-hand sides r_x, …, which are overwritten."""
+        """Write the solve for the right-hand sides r_x, …, which are overwritten."""
         rights, results = ({k: f"{p}_{name}" for k, name in enumerate(self.names)} for p in ("r", out))
         return write_solve(steps, factors, rights, results)
 
     @cached_property
     def factors(self) -> tuple[EliminationPlan, Factors]:
-        """The factors of a constant M, written at first use: in the first stage."""
+        """Factors of a constant M; the first stage writes the factorisation."""
         steps, factors = self.elimination(self.entries)
         self.writer.note("factors of M")
         self.writer.put(*factors.statements)
@@ -102,9 +103,9 @@ class Mass:
 
     @cached_property
     def function(self) -> Function:
-        """The function that solves M rates = r where M depends on the state; stages call it."""
+        """The function that stages call to solve M rates = r if M depends on the state."""
         arguments = [*self.writer.state, *self.equations.parameters]
-        # functions such as cos(x_1 - x_2) are computed once
+        # compute functions such as cos(x_1 - x_2) once
         waves = sorted({f for e in self.entries.values() for f in e.atoms(sp.Function)}, key=sp.default_sort_key)
         once = dict(zip(waves, Names(arguments).fresh("z"), strict=False))
         steps, factors = self.elimination({key: e.xreplace(once) for key, e in self.entries.items()})
@@ -119,7 +120,7 @@ class Mass:
         return function
 
     def solve(self, base: str, source: str, out: str) -> None:
-        """Write out = M^-1 source for the rows that M couples, M at a vector of states."""
+        """Write out = M^-1 source for the rows that M couples; M is evaluated at the states in `base`."""
         w = self.writer
         if self.constant:
             steps, factors = self.factors
@@ -131,14 +132,14 @@ class Mass:
         w.put(Assign(tuple(f"{out}_{name}" for name in self.names), rates))
 
     def explicit(self, base: str, out: str) -> None:
-        """Turn the right-hand side `out` of a stage into rates."""
+        """Replace the right-hand side `out` of a stage by the rates M^-1 out."""
         if self.entries:
             self.solve(base, out, out)
 
     # -- Rosenbrock methods: (shift M - J) k = M (F + rate sum c k) -------------------------------------------
 
     def at_start(self, jacobian: Entries) -> Entries:
-        """Return J = df/dy - d(M F)/dy at fixed F from the entries of df/dy; the rates F are g_x, … where M couples them."""
+        """Return J = df/dy - d(M F)/dy, F fixed, from the entries of df/dy; rates F that M couples are named g_x, …"""
         if not self.entries or self.constant:
             return jacobian
         self.solve("y", "f", "g")
@@ -152,13 +153,13 @@ class Mass:
         return {key: e for key, e in entries.items() if e != 0}
 
     def stage_terms(self, sums: Mapping[str, Expression], i: int) -> dict[str, Expression]:
-        """Return M (F + rate sum c k) in stage i by the states that M couples; `sums` are the sums c k by state."""
+        """Return M (F + rate sum c k) in stage i for the states that M couples; `sums` holds sum c k by state."""
         if not self.entries or i == 0:
             return {}
         w, rate = self.writer, Name("rate")
         if not self.constant:
             self.solve("u", "f", "g")
-        # the vector that M multiplies: sum c k where M F = f, F + rate sum c k otherwise
+        # M multiplies this vector: sum c k if M is constant (then M F = f), else F + rate sum c k
         for name in self.names:
             w.let(f"g_{name}", sums[name] if self.constant else Name(f"g_{name}") + ProductExpr((rate, sums[name])))
         terms: dict[str, Expression] = {}

@@ -1,14 +1,15 @@
-"""Where the loops of a kernel find the states, parameters and matrix entries of a node or a link.
+"""Compute the index of each state, parameter and matrix entry of a node or a link in the arrays of a kernel.
 
-Nodes of one kind keep their numbers, and state c of node i is number c*NODES + i of the whole state.
-Nodes of several kinds are renumbered kind after kind, and links joint after joint, so that one loop runs over nodes or
-links of one template. The integer array `where` then holds
+Nodes of one kind keep their numbers: state c of node i is entry c*NODES + i of the whole state.
+Nodes of several kinds are renumbered kind after kind, and links joint after joint. Each loop then runs over nodes or
+links of one template. The integer array `where` holds at
 
-    c*NODES + i             the number of state c of node i,
-    (size + k)*NODES + i    the slot of the k-th parameter with a value for each node, size the most states of a node,
-    behind + k*LINKS + e    the slot of the k-th parameter with a value for each link, of link e,
+    c*NODES + i             the index of state c of node i in the whole state,
+    (size + k)*NODES + i    the slot, for node i, of the k-th parameter that differs between nodes,
+    behind + k*LINKS + e    the slot, for link e, of the k-th parameter that differs between links;
 
--1 where there is none; with one kind of nodes it has the last rows alone (behind = 0).
+`size` is the largest number of states of a node, and -1 stands for a missing state or parameter. With one kind of
+nodes, `where` holds the rows of links only (behind = 0).
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ class Span:
     stop: Expression
 
     def over(self, body: Iterable[Statement]) -> Loop:
-        """Return the loop over the range."""
+        """Return the loop over the range with these statements as its body."""
         return Loop(self.index, self.start, self.stop, tuple(body))
 
 
@@ -68,7 +69,7 @@ def add_to(vector: str, place: Expression, value: Value) -> Statement:
 
 @dataclass(frozen=True, slots=True)
 class NodeKindLayout:
-    """The nodes of one kind: their template, the number of the kind, the range of their numbers."""
+    """The nodes of one kind: template, number of the kind, range of the node numbers."""
 
     node: Node
     number: int
@@ -77,7 +78,7 @@ class NodeKindLayout:
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """The links of one template between two kinds of nodes, and the range of their numbers."""
+    """The links of one template between two kinds of nodes, and the range of the link numbers."""
 
     edge: Edge
     target: Node
@@ -86,7 +87,7 @@ class Joint:
 
 
 class StateLayout:
-    """Loops over the nodes and links of a network, and the places that they read and write."""
+    """Make the loops over nodes and links of a network, and the indices at which the loops read and write."""
 
     def __init__(self, equations: Equations) -> None:
         nodes, self.mixed = equations.nodes, equations.mixed
@@ -98,7 +99,7 @@ class StateLayout:
         self.slots = {name: slot for slot, name in enumerate(equations.parameters, start=equations.dimension)}
 
         def ranges(index: str, stop: str, counts: Sequence[int]) -> list[Span]:
-            # a single template has a bound that is a constant of the kernel, so that its text fits all sizes
+            # with a single template the bound is a named constant, so that the text is the same for all sizes
             if len(counts) == 1 and not self.mixed:
                 return [span(index, stop)]
             return [span(index, b, a) for a, b in pairwise(running_sums(counts, initial=0))]
@@ -114,14 +115,14 @@ class StateLayout:
 
     @property
     def rows(self) -> list[tuple[Span, Expression]]:
-        """Loops over all states, one for each state of a node where nodes are of one kind, and the place of a state."""
+        """Loops over all states, each with the index of a state; nodes of one kind have one loop per state."""
         if self.mixed:
             return [(span("i", "DIMENSION"), Name("i"))]
         return [(span("i", "NODES"), self.place(c)) for c in range(self.size)]
 
     @property
     def measured(self) -> list[tuple[Span, Expression, float | None]]:
-        """Loops over all states, the place of a state, and the period of angles, None for other states."""
+        """Loops over all states, each with the index of a state and its period, None if the state is no angle."""
         if len(alike := {period for periods in self.periods for period in periods}) == 1:
             (common,) = alike
             return [(span, place, common) for span, place in self.rows]
@@ -129,16 +130,16 @@ class StateLayout:
         return [(kind.span, self.place(c), period) for kind, periods in kinds for c, period in enumerate(periods)]
 
     def row_of(self, c: int) -> int:
-        """Return the index in `rows` of the loop with state c of the nodes."""
+        """Return the index in `rows` of the loop that contains state c of the nodes."""
         return 0 if self.mixed else c
 
     def place(self, c: int, index: str = "i") -> Expression:
-        """Return the number of state c of a node."""
+        """Return the index of state c of a node in the whole state."""
         number = c * Name("NODES") + index
         return Load("where", number, None) if self.mixed else number
 
     def entry(self, slot: str, a: int, b: int) -> Expression:
-        """Return the matrix slot of entry (a, b) in the block of a node or a link; `slot` is the array of its slots."""
+        """Return the matrix slot of entry (a, b) in a block of a node or a link; `slot` names the array of slots."""
         length, index = ("NODES", "i") if slot == "node_slot" else ("target.size", "e")
         return Load(slot, (a * self.size + b) * Name(length) + index, None)
 
@@ -149,23 +150,23 @@ class StateLayout:
         return [let(f"{prefix}{s.name}{suffix}", load) for s, load in zip(node.state, loads, strict=True)]
 
     def _parameter(self, number: int, index: str) -> Expression:
-        """Return the slot of a node in the bank for one of the parameters `varied`."""
+        """Return the slot, in the bank of parameters, of a node's value of the parameter varied[number]."""
         if self.mixed:
             return self.place(self.size + number, index)
         return Number(self.slots[f"{self.varied[number]}_1"]) + index
 
     def own(self, used: Container[sp.Symbol]) -> list[Assign]:
-        """Load the parameters `used` of a single node i."""
+        """Load those parameters in `used` that differ from node to node, for node i."""
         loads = ((name, Load("p", self._parameter(k, "i"))) for k, name in enumerate(self.varied))
         return [let(name, load) for name, load in loads if real(name) in used]
 
     def of_source(self, edge: Edge, used: Container[sp.Symbol], index: str = "j") -> list[Assign]:
-        """Load the parameters `used` that a link takes of its source."""
+        """Load those parameters in `used` that a link reads from its source node."""
         names = [parameter.name for s, parameter in edge.theirs if s in used]
         return [let(f"{name}_there", Load("p", self._parameter(self.varied.index(name), index))) for name in names]
 
     def of_link(self, edge: Edge, used: Container[sp.Symbol], index: str = "j") -> list[Assign]:
-        """Load the parameters `used` that differ from node to node or link to link: of the target, source and link."""
+        """Load those parameters in `used` that differ between nodes or links: of target, source and link."""
         places = ((name, Number(self.behind + k * self.links) + "e") for k, name in enumerate(self.numbered))
         of_links = [let(name, Load("p", Load("where", at, None))) for name, at in places if real(name) in used]
         return [*self.own(used), *self.of_source(edge, used, index), *of_links]
@@ -174,7 +175,7 @@ class StateLayout:
 def link_ends(edge: Edge, weight: str, source: str = "j") -> list[Statement]:
     """Load both ends of link e and its weight."""
     i, j, w = (Load(array, Name("e"), None) for array in ("target", "source", "weights"))
-    # a function or a condition of the weight alone takes a register
+    # if a function or a condition contains only the weight, its argument must be a register: broadcast the weight
     parts = (part for e in edge.expressions for part in e.atoms(sp.Function, sp.Pow))
     values = [part.args[0] for part in parts] + [c.lhs - c.rhs for e in edge.expressions for c in e.atoms(Relational)]
     alone = any(value.free_symbols == {edge.weight} for value in values)
@@ -182,7 +183,7 @@ def link_ends(edge: Edge, weight: str, source: str = "j") -> list[Statement]:
 
 
 def named(joint: Joint) -> dict[sp.Symbol, sp.Symbol]:
-    """Rename the states at both ends of a link, and the parameters of its source, to those in its loop."""
+    """Return the map from states at both ends of a link, and parameters of the source, to their names in the loop."""
     ends = ((joint.edge.here, joint.target, "_here"), (joint.edge.there, joint.source, "_there"))
     states = {
         s: real(f"{state.name}{suffix}")
@@ -193,7 +194,7 @@ def named(joint: Joint) -> dict[sp.Symbol, sp.Symbol]:
 
 
 def theirs(edge: Edge) -> dict[sp.Symbol, sp.Symbol]:
-    """Rename the parameters that a link takes of its source."""
+    """Return the map from parameters that a link reads from its source to their names in the loop."""
     return {s: real(f"{parameter.name}_there") for s, parameter in edge.theirs}
 
 
@@ -201,7 +202,7 @@ def theirs(edge: Edge) -> dict[sp.Symbol, sp.Symbol]:
 
 
 def joint_numbers(equations: Equations) -> list[int]:
-    """Return the number of the joint of each listed link."""
+    """Return, for each listed link, the number of its joint."""
     numbers, first = list[int](), 0
     for layer in equations.listed:
         number = {ends: k for k, (ends, _) in enumerate(layer.edge_of, start=first)}
@@ -214,26 +215,26 @@ def joint_numbers(equations: Equations) -> list[int]:
 
 
 def by_kind(equations: Equations) -> list[int]:
-    """Return the nodes (0-based) in the order of a kernel: kind after kind."""
+    """Return the nodes (0-based) in the order in which a kernel numbers them: kind after kind."""
     return sorted(range(equations.n), key=equations.kind_of.__getitem__)
 
 
 def by_joint(equations: Equations) -> list[tuple[Link, Layer]]:
-    """Return the listed links, with their layers, in the order of a kernel: joint after joint, then by rank at the target.
+    """Return the listed links and their layers in a kernel's order: joint after joint, then by rank at the target.
 
-    Neighbours in this order add to different nodes, so that no addition waits for the one before.
+    Consecutive links then add to different nodes, so that no addition waits for the previous one.
     """
     ranks, ordered = Counter[tuple[int, int]](), []
     pairs = ((link, layer) for layer in equations.listed for link in layer.links)
     for number, (link, layer) in zip(joint_numbers(equations), pairs, strict=True):
         ordered.append((number, ranks[number, link[0]], link, layer))
         ranks[number, link[0]] += 1
-    ordered.sort(key=lambda each: each[:2])  # a stable sort
+    ordered.sort(key=lambda each: each[:2])  # Python's sort is stable: equal keys keep the order of the links
     return [(link, layer) for _, _, link, layer in ordered]
 
 
 def where_table(equations: Equations) -> np.ndarray:
-    """Return the array `where`, see the head of this file; it is empty if nodes and links are all alike."""
+    """Return the array `where` (see the head of this file); empty if all nodes and all links are alike."""
     slots = {name: k for k, name in enumerate(equations.parameters, start=equations.dimension)}
     of_nodes: list[np.ndarray] = []
     if equations.mixed:

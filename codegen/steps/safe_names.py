@@ -1,4 +1,4 @@
-"""Names of the user's symbols in a kernel: unchanged, unless generated code or Python uses the word itself."""
+"""Rename the user's symbols for a kernel, if generated code or Python uses the same name."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ RESERVED = frozenset(
     | set(NAMES)
     | set(keyword.kwlist) | set(dir(builtins)) | set(elementary.__all__) | set(lanes.__all__) | set(special.__all__)
 )  # fmt: skip
-"""Words of generated code; a symbol of that name gets an underscore behind it."""
+"""Names that generated code uses; an underscore is appended to a user's symbol of the same name."""
 
 PREFIXES = (
     "m_", "l_", "pivot_", "inv_", "k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8", "k9", "u_", "f_", "r_", "at_", "ft_", "n_", "j_",
     "e_", "_", "along_", "value_", "bend_", "steady_", "g_", "mass_", "sum_", *(f"node{k}" for k in range(2, 10)),
 )  # fmt: skip
-"""Beginnings of names that steps give to values of states: k2_x_1, u_x_1, j_vx_1, …"""
+"""Prefixes of names that steps form from names of states: k2_x_1, u_x_1, j_vx_1, …"""
 
 SUFFIXES = ("_here", "_there", "_first")
-"""Ends of the names of states at both ends of a link, and at the first node."""
+"""Suffixes of states at the target and at the source of a link, and at the first node."""
 
 NUMBERED = re.compile(r"_\d+$")
-"""The end of a name that numbers a node: x_1 is x of the first one."""
+"""Matches a suffix that numbers a node: x_1 is the state x of the first node."""
 
 
 def tidy(equations: Equations) -> Equations:
@@ -59,12 +59,12 @@ def tidy(equations: Equations) -> Equations:
     taken = {s.name for s in shown} | {s.name for edge in edges for s in (*edge.here, *edge.there)}
     swap: dict[sp.Symbol, sp.Symbol] = {}
     for s in sorted(shown, key=str):
-        # x_1 of a user would be x of the first node
+        # a user's symbol x_1 would clash with state x of the first node
         numbered = s in states or s.name in equations.differing
         if _clashes(s.name) or (numbered and NUMBERED.search(s.name)):
             swap[s] = real(_free(s.name, taken))
             taken.add(swap[s].name)
-    # a weight with the name of a node's symbol is renamed within links alone
+    # if a link's weight has the name of a node's symbol, rename the weight, in links only
     in_links = swap | {s: real(_free(f"{s.name}_of_link", taken)) for s in sorted(weights & of_nodes, key=str)}
     if not in_links:
         return equations
@@ -74,7 +74,7 @@ def tidy(equations: Equations) -> Equations:
 
 
 def _clashes(name: str) -> bool:
-    """True for words of generated code and for names that Python cannot read or normalises."""
+    """Return True for names of generated code, and for names that Python cannot read or would normalise."""
     readable = name.isidentifier() and unicodedata.normalize("NFKC", name) == name
     return name in RESERVED or not readable or name.startswith(PREFIXES) or name.endswith(SUFFIXES)
 

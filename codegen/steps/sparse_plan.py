@@ -1,12 +1,12 @@
-"""The elimination of a large network as integer arrays that a few small loops run through.
+"""Plan the sparse elimination for a large network; integer arrays hold the plan, and a few small loops execute it.
 
     Equations ─patterns of the blocks of nodes and links─▶ _Network ─pivots and fill─▶ SparsePlan
 
-Chains, rings, stars and trees have an elimination without or almost without fill: it is exact, and its cost grows with the
-number of links. Where the fill of the exact elimination exceeds FILL_LIMIT (large grids, random graphs: it grows faster
-than the network), the factors keep no more than the first level of fill (J. A. Meijerink, H. A. van der Vorst, Math.
-Comput. 31, 148, 1977; levels: Y. Saad, Iterative Methods for Sparse Linear Systems, SIAM, 2003, section 10.3.3), and the
-kernel refines every solution to rounding.
+Chains, rings, stars and trees cause little fill or none: their elimination is exact, and its cost is proportional to
+the number of links. In large grids and random graphs, fill grows faster than the network. If the fill exceeds
+FILL_LIMIT, the factors are incomplete: only the first level of fill is stored (J. A. Meijerink, H. A. van der Vorst,
+Math. Comput. 31, 148, 1977; levels: Y. Saad, Iterative Methods for Sparse Linear Systems, SIAM, 2003, section 10.3.3).
+The kernel then refines every solution iteratively, to rounding.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from .mass_solve import added_masses, momentum_slopes, turned_masses
 from .places import by_joint, by_kind, joint_numbers, where_table
 
 FILL_LIMIT = 3.0
-"""Most entries of exact factors for each entry of the matrix; beyond it the elimination is incomplete. A choice."""
+"""Largest ratio of entries of the exact factors to entries of the matrix; above, factors are incomplete. A choice."""
 
 Pattern = tuple[Entry, ...]
 """Row and column of the non-zero entries of a small block."""
@@ -37,14 +37,22 @@ Pattern = tuple[Entry, ...]
 
 @dataclass(frozen=True, slots=True)
 class SparsePlan:
-    """Integer arrays in the order of NAMES, weights of the links, the number of matrix entries, exact or incomplete.
+    """The plan of an elimination: integer arrays in the order of NAMES, weights of links, number of matrix entries.
 
     target, source (links,): ends of each link.
-    node_slot (size**2 * n,), here_slot, there_slot (size**2 * links,): slots in the matrix of the entries of a node's block,
-    of a link's block by its target and by its source, -1 for zeros; `size` is that of the node with most states.
-    order (dimension,): pivots; place (dimension,): its inverse.
-    row_start (dimension + 1,): the off-diagonal entries of pivot order[q] are row_start[q] … row_start[q + 1] - 1.
-    after_start (dimension,): those from after_start[q] on belong to later pivots. column (entries,): column of each.
+
+    node_slot (size**2 * n,): matrix slots of the entries of each node's block; -1 for zeros. `size` is the largest
+    number of states of a node.
+
+    here_slot, there_slot (size**2 * links,): the same for each link's two blocks, the derivatives by the states of the
+    target and of the source.
+
+    order (dimension,): the pivots. place (dimension,): the inverse permutation of `order`.
+
+    row_start (dimension + 1,): the off-diagonal entries in the row of pivot order[q] have the numbers row_start[q] …
+    row_start[q + 1] - 1. after_start (dimension,): entries from after_start[q] on lie in columns of later pivots.
+    column (entries,): the column of each entry.
+
     where: see codegen/steps/places.py.
     """
 
@@ -56,10 +64,11 @@ class SparsePlan:
 
 @dataclass(frozen=True, slots=True)
 class _NetworkPattern:
-    """The structure of the matrix; equations that differ in symbols or numbers share it, and the plan.
+    """The pattern of the matrix. Equations that differ only in symbols or numbers share one pattern and one plan.
 
-    size: the most states of a node. kinds, joints: blocks of each kind of node and of each joint, and their counts.
-    links: in the order of the kernel. where (size, n) and more: the array of that name.
+    size: largest number of states of a node. kinds, joints: the block patterns of each kind of node and of each joint,
+    with the number of blocks. links: in the order of the kernel. where: the array of that name; the first size*n
+    entries are indices of states.
     """
 
     n: int
@@ -77,10 +86,10 @@ def block_pattern(block: Iterable[Iterable[object]]) -> Pattern:
 
 
 def sparse_plan(equations: Equations, fill: float = FILL_LIMIT, solves: bool = True) -> SparsePlan:
-    """Plan the elimination of (s - J) for a network; time and memory grow with its links.
+    """Plan the elimination of (s - J) for a network; time and memory are proportional to the number of links.
 
-    The factors are exact unless they would have more than `fill` entries for each entry of the matrix. A method that
-    `solves` nothing has a matrix without entries.
+    The factors are exact unless they have more than `fill` entries per entry of the matrix. If the method `solves` no
+    linear equations, the matrix has no entries.
     """
     edges = [edge for layer in equations.listed for _, edge in layer.edge_of]
     of_nodes = [_node_pattern(node) if solves else () for node in equations.nodes]
@@ -100,13 +109,13 @@ def sparse_plan(equations: Equations, fill: float = FILL_LIMIT, solves: bool = T
 
 
 def _node_pattern(node: Node) -> Pattern:
-    """Return the entries of shift M - J, J with d(M F)/dy at any rates F, of one node."""
+    """Return the pattern of shift M - J of one node; J contains d(M F)/dy for arbitrary rates F."""
     turned = turned_masses(node, [sp.Dummy(real=True) for _ in node.state])
     return tuple(sorted({*block_pattern(node.jacobian()), *block_pattern(added_masses(node)), *block_pattern(turned)}))
 
 
 def _link_patterns(edge: Edge) -> tuple[Pattern, Pattern]:
-    """Return the entries of shift M - J of one link, by its target and by its source."""
+    """Return the patterns of shift M - J of one link: derivatives by the states of the target, then of the source."""
     rates = [sp.Dummy(real=True) for _ in (*edge.here, *edge.there)]
     turned = momentum_slopes(edge, rates[: len(edge.here)], rates[len(edge.here) :])
     here, there = set(block_pattern(edge.jacobian_here())), set(block_pattern(edge.jacobian_there()))
@@ -118,12 +127,12 @@ def _link_patterns(edge: Edge) -> tuple[Pattern, Pattern]:
 
 @lru_cache(maxsize=4)
 def _plan(network: _NetworkPattern, fill: float) -> SparsePlan:
-    """Plan the elimination of one structure."""
+    """Plan the elimination of one pattern."""
     n, size, where = network.n, network.size, np.array(network.where, np.int64)
-    # (size, n) number of each state in the whole state, -1 where a node has fewer
+    # states (size, n): index of each state in the whole state; -1 if a node has fewer states
     states = where[: size * n].reshape(size, n) if network.mixed else np.arange(n * size).reshape(size, n)
     dimension = int((states >= 0).sum())
-    # the blocks of nodes, and those of links by their target and by their source
+    # the blocks of nodes, and the blocks of links: derivatives by the target, by the source
     nodes, (target, source) = np.arange(n), (np.array([link[k] for link in network.links], np.int64) for k in (0, 1))
     counts = [count for _, count in network.joints]
     blocks = [
@@ -133,7 +142,7 @@ def _plan(network: _NetworkPattern, fill: float) -> SparsePlan:
         blocks.append(_Blocks.of(states, target, end, [patterns[k] for patterns, _ in network.joints], counts))
     parts = [np.stack([rows, columns]) for each in blocks for *_, rows, columns in each.entries()]
     pattern = np.unique(np.concatenate(parts, axis=1), axis=1) if parts else np.zeros((2, 0), np.int64)
-    # pivots, and the off-diagonal entries of the factors, sorted by pivot of the row and of the column
+    # choose pivots; sort the off-diagonal entries of the factors by pivot of the row, then of the column
     pivots, entries, exact = _factors(dimension, pattern, fill)
     place = np.empty(dimension, np.int64)
     place[pivots] = np.arange(dimension)
@@ -148,10 +157,10 @@ def _plan(network: _NetworkPattern, fill: float) -> SparsePlan:
 
 @dataclass(frozen=True, slots=True)
 class _Blocks:
-    """The blocks of nodes, or of one end of links, in the matrix.
+    """The positions of many blocks in the matrix: blocks of nodes, or of one end of links.
 
-    states (size, n): number of a state in the whole state. rows, columns (blocks,): nodes. parts: ranges of blocks with
-    one pattern.
+    states (size, n): index of each state in the whole state. rows, columns (blocks,): the nodes whose states are the
+    rows and columns of each block. parts: ranges of blocks with the same pattern.
     """
 
     states: np.ndarray
@@ -163,12 +172,12 @@ class _Blocks:
     def of(
         cls, states: np.ndarray, rows: np.ndarray, columns: np.ndarray, patterns: list[Pattern], counts: list[int]
     ) -> _Blocks:
-        """Give blocks in a row `counts` times each pattern."""
+        """Make the blocks; each pattern holds for `counts` consecutive blocks."""
         ranges = [slice(a, b) for a, b in pairwise(accumulate(counts, initial=0))]
         return cls(states, rows, columns, tuple(zip(patterns, ranges, strict=True)))
 
     def entries(self) -> Iterator[tuple[int, int, slice, np.ndarray, np.ndarray]]:
-        """Yield row and column in the block, the range of blocks, rows and columns in the matrix."""
+        """Yield each entry: row and column in the block, range of blocks, rows and columns in the matrix."""
         for pattern, part in self.parts:
             for a, b in pattern:
                 yield a, b, part, self.states[a][self.rows[part]], self.states[b][self.columns[part]]
@@ -178,14 +187,14 @@ class _Blocks:
         size, dimension = len(self.states), len(place)
         table = np.full((size * size, len(self.rows)), -1, np.int64)
         for a, b, part, rows, columns in self.entries():
-            # the diagonal comes first, by state; then the other entries, by key
+            # the matrix stores the diagonal first, by state, then the other entries, sorted by key
             off = dimension + np.searchsorted(keys, place[rows] * dimension + place[columns])
             table[a * size + b, part] = np.where(rows == columns, rows, off)
         return table.reshape(-1)
 
 
 def _factors(dimension: int, pattern: np.ndarray, fill: float) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Return pivots, off-diagonal entries (2, count) of the factors, and whether they are exact."""
+    """Return pivots, off-diagonal entries (2, count) of the factors, and True if the factors are exact."""
     off = pattern[:, pattern[0] != pattern[1]]
     if not off.size:
         return np.arange(dimension), off, True
@@ -194,13 +203,13 @@ def _factors(dimension: int, pattern: np.ndarray, fill: float) -> tuple[np.ndarr
         lower = [(r, k) for k, below in zip(steps.order, steps.below, strict=True) for r in below]
         upper = [(k, c) for k, after in zip(steps.order, steps.after, strict=True) for c in after]
         return np.array(steps.order, np.int64), np.array([*lower, *upper], np.int64).reshape(-1, 2).T, True
-    # too much fill: rows without a diagonal entry of J come first, the rest in its order
+    # too much fill: take rows without a diagonal entry of J first, then all other rows in their order
     pivots = np.argsort(np.isin(np.arange(dimension), pattern[0, pattern[0] == pattern[1]]), kind="stable")
     return pivots, _first_level(dimension, off, pivots), False
 
 
 def _first_level(dimension: int, off: np.ndarray, pivots: np.ndarray) -> np.ndarray:
-    """Return the pattern and the fill of its own entries: (r, k) and (k, c) with pivot k before both make (r, c)."""
+    """Return the pattern with first-level fill: entries (r, k) and (k, c), pivot k before r and c, add (r, c)."""
     place = np.empty(dimension, np.int64)
     place[pivots] = np.arange(dimension)
     rows, columns = place[off]
@@ -209,7 +218,7 @@ def _first_level(dimension: int, off: np.ndarray, pivots: np.ndarray) -> np.ndar
     lower = np.stack([rows[below][down], columns[below][down]])  # by pivot
     right = np.argsort(rows[after], kind="stable")
     upper = np.stack([rows[after][right], columns[after][right]])
-    # pair each entry (r, k) below with all entries (k, c) after: `left` repeats the first, `offset` counts the second
+    # pair each entry (r, k) below with each entry (k, c) after: `left` repeats (r, k), `offset` counts (k, c)
     start = np.searchsorted(upper[0], np.arange(dimension + 1))
     counts = (start[1:] - start[:-1])[lower[1]]
     left = np.repeat(np.arange(lower.shape[1]), counts)
@@ -221,7 +230,9 @@ def _first_level(dimension: int, off: np.ndarray, pivots: np.ndarray) -> np.ndar
 
 
 def order(size: int, pattern: Collection[Entry], limit: float = np.inf) -> EliminationPlan | None:
-    """Order pivots by least degree in the symmetrised pattern, rows without a diagonal entry of J first; O(fill log n).
+    """Order pivots by least degree in the symmetrised pattern; rows without a diagonal entry of J come first.
+
+    The cost is O(fill log n).
 
     Return None as soon as the factors have more off-diagonal entries than the limit.
     """
@@ -242,12 +253,12 @@ def order(size: int, pattern: Collection[Entry], limit: float = np.inf) -> Elimi
     while heap:
         _, degree, k = heapq.heappop(heap)
         if done[k] or degree != len(near[k]):
-            continue  # an outdated entry: the current one is in the heap as well
+            continue  # outdated degree; the heap also holds the current degree of this row
         done[k] = 1
         pivots.append(k)
         below.append(tuple(sorted(columns[k])))
         after.append(tuple(sorted(rows[k])))
-        # each row with an entry in column k gets the entries of row k, and loses that of k
+        # each row with an entry in column k gains the entries of row k and loses entry k
         for r in columns[k]:
             count -= len(rows[r])
             rows[r] |= rows[k]

@@ -1,4 +1,4 @@
-"""The stages of one step, common to writers that keep states in registers and in memory."""
+"""Write the stages of one step: the part that writers of written-out steps and of looped steps share."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from ..program.statements import Assign, Comment, Function, Return, Role, Statem
 from .blocks import NodeBlocks, assigned
 
 LARGEST_INLINED = 400
-"""Most operations of a function that is inlined into each stage: copies of longer ones take long to compile."""
+"""Largest number of operations of a function that is inlined into each stage; copies of longer ones compile slowly."""
 
 NOW = {TIME: real("now")}
-"""Renames the time in expressions of links to the time of a stage."""
+"""Replaces the time in expressions of links by `now`, the time of a stage."""
 
 SCALED = '''
 @njit(error_model="numpy", forceinline=True)
@@ -42,54 +42,55 @@ def pair(e5, e3, h, old, new, rtol, atol):
 
 
 def scaling(method: Integrator) -> str:
-    """Return the text of the function that divides errors of a method by the tolerance."""
+    """Return the text of the function that divides the errors of a method by the tolerance."""
     return SCALED if len(method.e) == 1 else PAIR
 
 
 def function_name(name: str, kind: int) -> str:
-    """Return the name of a node function for one kind of node: node, node2, node2_linear."""
+    """Return the name of a function for one kind of node, such as node, node2, node2_linear."""
     return name if kind == 0 else name.replace("node", f"node{kind + 1}", 1)
 
 
 def node_function(
     name: str, about: str, body: StraightLine, arguments: Sequence[str], results: Sequence[sp.Expr]
 ) -> Function:
-    """Write a function of lanes that runs a straight line and returns its results."""
+    """Write a function on lanes that computes a straight line and returns the results."""
     return function_of(name, arguments, about, [*assigned(body), Return(tuple(map(lower, results)))])
 
 
 def function_of(name: str, arguments: Sequence[str], about: str, body: Sequence[Statement]) -> Function:
-    """Write a function of lanes for the stages of a step, inlined if it is small."""
+    """Write a function on lanes that stages call; inline the function if it is short."""
     role = Role.INLINED if operations(body) <= LARGEST_INLINED else Role.CALLED
     return Function(name, tuple(arguments), about, tuple(body), role)
 
 
 def lane(e: Expression, width: str = "WIDTH") -> Expression:
-    """Broadcast a number to a register; other values are registers already."""
+    """Broadcast a number to a register; return any other expression unchanged, as it is a register."""
     return call("broadcast", e, width) if isinstance(e, Number) else e
 
 
 def prefix(vector: str) -> str:
-    """Return the prefix of state names in a vector, none for `y`, the state at the start of the step."""
+    """Return the prefix of the names of states in a vector; "" for `y`, the state at the start of the step."""
     return "" if vector == "y" else f"{vector}_"
 
 
 def entry(r: sp.Symbol, c: sp.Symbol) -> str:
-    """Return the name of d(rhs of r)/dc: j_vx, and j_speed_by_place where letters run together."""
+    """Return the name of d(rhs of r)/dc: j_vx for one-letter names, j_speed_by_place for longer ones."""
     return f"j_{r.name}{c.name}" if len(r.name) == len(c.name) == 1 else f"j_{r.name}_by_{c.name}"
 
 
 def linearised(state: Sequence[sp.Symbol]) -> list[str]:
-    """Return the names of rates, of Jacobian entries row by row, and of time derivatives."""
+    """Return the names of a node's rates, Jacobian entries row by row, and time derivatives."""
     entries = (entry(r, c) for r in state for c in state)
     return [*(f"f_{r.name}" for r in state), *entries, *(f"ft_{r.name}" for r in state)]
 
 
 class StepWriter(ABC):
-    """Collects the statements of one step of `method`; `kinds` are the blocks of the kinds of nodes.
+    """Collect the statements of one step of `method`; `kinds` holds the NodeBlocks of each kind of node.
 
-    `write` is the same for every network. Subclasses decide where states are kept: `UnrolledStep` in registers, node by
-    node; `LoopedStep` in memory, with loops over nodes and links.
+    `write` is the same for every network. Subclasses choose where states are stored: `UnrolledStep` in registers, node
+    by node; `LoopedStep` in memory, with loops over nodes and links.
+
     A Rosenbrock method solves (shift M - J) k_i = M (f(y + sum a_ij k_j) + rate sum c_ij k_j) + d_i h f_t: Hairer &
     Wanner, Solving Ordinary Differential Equations II (Springer, 1996), section IV.7.
     """
@@ -99,7 +100,7 @@ class StepWriter(ABC):
         self.state = equations.state
         self.statements: list[Statement] = []
         self.functions: list[Function] = []
-        # symbols with a value for each node: states, parameters of single nodes, variables of node functions
+        # symbols with a value for each node: states, parameters that differ between nodes, variables of node functions
         bodies = (body for blocks in kinds for body in (blocks.rhs, blocks.linear))
         self.inner = {s for body in bodies for s, _ in body.statements}
         self.states = list(dict.fromkeys(s for node in equations.nodes for s in node.state))
@@ -119,7 +120,7 @@ class StepWriter(ABC):
 
     @contextmanager
     def apart(self) -> Iterator[list[Statement]]:
-        """Collect statements in a list for an inner block or another function."""
+        """Collect the statements written inside the `with` in a separate list, for an inner block or a function."""
         outside, self.statements = self.statements, []
         try:
             yield self.statements
@@ -137,7 +138,7 @@ class StepWriter(ABC):
         """Write the step; `after` may append statements after each stage."""
         self.opening()
         if self.method.implicit:
-            gamma = self.method.gamma  # (shift - J) k = …; reach = 1/shift, rate = 1/h
+            gamma = self.method.gamma  # the stages solve (shift - J) k = …; reach = 1/shift, rate = 1/h
             self.let("reach", Name("h") * gamma)
             self.let("shift", 1.0 / Name("reach"))
             self.let("rate", Name("shift") * gamma)
@@ -149,14 +150,14 @@ class StepWriter(ABC):
         self.finish()
 
     def stage(self, i: int) -> None:
-        """Write one stage: its state, its right-hand side, its rates."""
+        """Write one stage: compute its state, its right-hand side and its rates."""
         c, first = self.method.c, int(self.method.implicit)
         self.note(f"stage {i + 1}")
         if i > 0:
             self.advance(i)
-        # the first stage of a Rosenbrock method takes the right-hand side of the linearisation
+        # `linearise` has computed the right-hand side of the first stage of a Rosenbrock method
         if i >= first:
-            # consecutive stages at one time share its time terms
+            # consecutive stages at the same time share the time terms
             if i == first or c[i] != c[i - 1]:
                 self.let("now", linear((c[i],), ["h"], "t"))
                 self.timed("now", self.wanted([blocks.rhs for blocks in self.kinds]))
@@ -170,7 +171,7 @@ class StepWriter(ABC):
 
     @abstractmethod
     def linearise(self) -> None:
-        """Compute right-hand side and Jacobian at the start, and factorise."""
+        """Compute right-hand side and Jacobian at the start of the step, and factorise shift*M - J."""
 
     @abstractmethod
     def advance(self, i: int) -> None:
@@ -191,38 +192,38 @@ class StepWriter(ABC):
     # -- one state variable -----------------------------------------------------------------------------------
 
     def increment(self, row: Sequence[float], values: Sequence[str]) -> Expression:
-        """Return sum row_j k_j, times h for explicit methods, as their stages are rates and not increments."""
+        """Return sum row_j k_j; times h for explicit methods, whose k_j are rates (those of Rosenbrock: increments)."""
         total = linear(row, values)
         return total if self.method.implicit else ProductExpr((Name("h"), total))
 
     def dense_value(self, row: Sequence[float], values: Sequence[str]) -> Expression:
-        """Return a coefficient of the dense output as a register; it may be the number zero."""
+        """Return a coefficient of the dense output, as a register even if the coefficient is the number zero."""
         value = lane(linear(row, values))
         return value if self.method.implicit else ProductExpr((Name("h"), value))
 
     def embedded(self, values: Sequence[str]) -> list[Statement]:
-        """Compute the two error estimates of methods that have two."""
+        """Compute the second error estimate too, if the method has two (DOP853)."""
         rows = self.method.e if len(self.method.e) > 1 else ()
         return [let(name, linear(row, values)) for name, row in zip(("e5", "e3"), rows, strict=False)]
 
     def scaled_error(self, error: Value, old: Value, new: Value, period: float | None) -> Expression:
-        """Return the error in units of the tolerance; an angle counts as no larger than its `period`."""
+        """Return the error divided by the tolerance; the size of an angle is at most its `period`."""
         estimates = ("scaled", error) if len(self.method.e) == 1 else ("pair", "e5", "e3", "h")
         if period is not None:
             old, new = (call("minimum", call("absolute", state), period) for state in (old, new))
         return call(*estimates, old, new, "rtol", "atol")
 
     def stiff_error(self, error: Value, last: Expression, share: Expression) -> Expression:
-        """Return the error, raised to that of the dense output in the part of the state that is not stiff.
+        """Return the larger of the error and of the estimated error of the dense output in stiff components.
 
-        The bound is dense_error (1 - 2 share) |last|, `last` the last row of the dense output. `share` is the shift over
-        the pivot: one where the state is not stiff.
+        This estimate is dense_error (1 - 2 share) |last|; `last` is the last row of the dense output, and `share` is
+        shift/pivot: 1 if the state is not stiff (no estimate), near 0 if the state is stiff.
         """
         stiff = self.method.dense_error * (Number(1.0) - 2.0 * share) * call("absolute", last)
         return call("maximum", call("absolute", error), stiff)
 
     def time_slope(self, i: int, slope: Expression) -> list[Expression]:
-        """Return the term d_i h f_t of stage i of a Rosenbrock method, its sign folded; none if it is zero."""
+        """Return the term d_i h f_t of stage i of a Rosenbrock method, sign folded; an empty list for zero."""
         weight = self.method.d[i]
         if weight == 0.0 or slope == ZERO:
             return []
@@ -234,11 +235,11 @@ class StepWriter(ABC):
     # -- nodes and time ---------------------------------------------------------------------------------------
 
     def is_plain(self, e: sp.Expr) -> bool:
-        """True for a result that needs no function: a number, a parameter term, or one bare state."""
+        """Return True for a result that needs no function: a number, a parameter term, or a single state."""
         return (e.is_Symbol and e not in self.inner) or not e.free_symbols & self.of_nodes
 
     def arguments(self, body: StraightLine, results: Sequence[sp.Expr]) -> list[sp.Symbol]:
-        """Return the arguments of a node function: states first, then other symbols by name."""
+        """Return the arguments of a node function: states first, then all other symbols sorted by name."""
         used = StraightLine(body.statements, tuple(results)).symbols
         states = [s for s in self.states if s in used]
         return states + sorted(used.difference(states), key=lambda s: s.name)
@@ -246,24 +247,24 @@ class StepWriter(ABC):
     def node_call(
         self, function: str, kind: int, body: StraightLine, targets: Sequence[str], at: Mapping[sp.Symbol, sp.Symbol]
     ) -> list[Statement]:
-        """Assign the results of a node function to `targets`, its arguments renamed by `at`; leave out plain results."""
+        """Assign a node function's results to `targets`, with arguments renamed by `at`; skip plain results."""
         pairs = [(name, e) for name, e in zip(targets, body.results, strict=True) if not self.is_plain(e)]
         arguments = (at.get(s, s).name for s in self.arguments(body, [e for _, e in pairs]))
         value = call(function_name(function, kind), *arguments)
         return [Assign(tuple(name for name, _ in pairs), value)] if pairs else []
 
     def wanted(self, bodies: Sequence[StraightLine]) -> set[sp.Symbol]:
-        """Return the time terms that some bodies use."""
+        """Return the time terms that occur in the bodies."""
         return {s for blocks in self.kinds for s, _ in blocks.timed} & {s for body in bodies for s in body.symbols}
 
     def timed(self, time: str, wanted: set[sp.Symbol]) -> None:
-        """Compute the time terms `wanted` at the time in variable `time`."""
+        """Compute the time terms `wanted` at the time that the variable `time` holds."""
         for symbol, e in (pair for blocks in self.kinds for pair in blocks.timed):
             if symbol in wanted:
                 self.let(symbol.name, lower(e.xreplace({TIME: sp.Symbol(time)})))
 
     def parameters(self, skipped: Container[str] = ()) -> None:
-        """Load the parameters but those `skipped`, and compute the terms in parameters alone."""
+        """Load the parameters, except those in `skipped`, and compute the terms that contain only parameters."""
         for slot, name in enumerate(self.equations.parameters, start=len(self.state)):
             if name not in skipped:
                 self.let(name, Load("p", Number(slot)))

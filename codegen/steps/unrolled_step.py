@@ -1,12 +1,13 @@
-"""The statements of a step for a small network, written out node by node, its states in registers.
+"""Write the step of a small network node by node, with states in registers.
 
-The prefix of a name says which vector a state belongs to:
+The prefix of a name denotes the vector:
 
     x_1     at the start        u_x_1    in a stage             n_x_1    at the end
     f_x_1   right-hand side     k2_x_1   rate of stage 2        r_x_1    right-hand side of linear equations
     g_x_1   vector of mass_solve                                e_x_1    error
 
-Jacobian entries of nodes and links are added before they are lowered, so that zeros and units cost nothing.
+SymPy adds up the Jacobian entries of nodes and links before they are lowered to code, so that zeros and units cost no
+operation.
 """
 
 from __future__ import annotations
@@ -28,15 +29,15 @@ from .step import NOW, StepWriter, entry, lane, linearised, prefix
 
 
 class UnrolledStep(StepWriter):
-    """Keeps each state of each vector in a register."""
+    """Write a step that holds each state of each vector in a register."""
 
     @cached_property
     def mass(self) -> Mass:
-        """The mass matrix."""
+        """The writer of the mass matrix."""
         return Mass(self)
 
     def at(self, i: int, base: str) -> dict[sp.Symbol, sp.Symbol]:
-        """Rename the states of node i to those in a vector, and its parameters to those of node i."""
+        """Return the map from template symbols to those of node i: states in the vector `base`, and parameters."""
         states = self.equations.node_at(i).state
         return {**self.equations.at_node(i), **{s: real(f"{prefix(base)}{s.name}_{i + 1}") for s in states}}
 
@@ -53,7 +54,7 @@ class UnrolledStep(StepWriter):
     # -- right-hand side --------------------------------------------------------------------------------------
 
     def slopes(self, base: str, out: str) -> None:
-        """Compute the right-hand side at one vector of states into another."""
+        """Compute the right-hand side at the states in vector `base` into vector `out`."""
         for i, kind in enumerate(self.equations.kind_of):
             body, names = self.kinds[kind].rhs, self.at(i, base)
             targets = [f"{prefix(out)}{s.name}_{i + 1}" for s in self.equations.node_at(i).state]
@@ -64,7 +65,7 @@ class UnrolledStep(StepWriter):
         self.links(base, out)
 
     def links(self, base: str, out: str, at: Mapping[sp.Symbol, sp.Symbol] = NOW) -> None:
-        """Add the rates of all links, one sum for each state; `at` renames the time."""
+        """Add the rates of all links, one sum for each state; `at` renames the time, by default to that of a stage."""
         eq, terms = self.equations, dict[str, list[Expression]]()
         staged = {real(n): real(prefix(base) + n) for n in self.state} | dict(at)
         for link, edge in eq.linked():
@@ -87,7 +88,7 @@ class UnrolledStep(StepWriter):
         self.factors = write_factors(self.steps, entries, tuple(self.state), self.mass.entries)
         self.note(f"factors of {'shift*M - J' if self.mass.entries else 'shift - J'}")
         self.put(*self.factors.statements)
-        # partial time derivative by state: that of the node, then those of its links
+        # partial time derivative of each state's right-hand side: terms of the node, then of its links
         self.time_slopes = {
             k: lower(results[i][f"ft_{s.name}"])
             for i, places in enumerate(eq.places)
@@ -97,11 +98,11 @@ class UnrolledStep(StepWriter):
             self.time_slopes[k] = lower(e) if self.time_slopes[k] == ZERO else plus(self.time_slopes[k], lower(e))
 
     def linear_nodes(self) -> list[dict[str, sp.Expr]]:
-        """Write right-hand side, Jacobian and time derivative at the start; return the results of each node by name."""
+        """Write right-hand side, Jacobian and time derivative of each node at the start; return results by name."""
         eq = self.equations
         self.note("right-hand side, Jacobian and time derivative at the start")
         self.timed("t", self.wanted([blocks.linear for blocks in self.kinds]))
-        # stages assign the time terms again, so bare ones in the results are copied
+        # later stages overwrite the time terms, so copy those that are results
         plain = [e for blocks in self.kinds for e in blocks.linear.results if self.is_plain(e)]
         overwritten = self.wanted([blocks.rhs for blocks in self.kinds]) & {s for e in plain for s in e.free_symbols}
         copies = {s: real(f"at_{s.name}") for s in sorted(overwritten, key=lambda s: s.name)}
@@ -114,7 +115,7 @@ class UnrolledStep(StepWriter):
             self.put(*self.node_call("node_linear", kind, body, names, at))
             values = {}
             for k, (key, name, e) in enumerate(zip(keys, names, body.results, strict=True)):
-                # rates are variables, as links add to them; plain entries of J need none
+                # a rate needs a variable, because links add to it; a plain entry of J needs none
                 if self.is_plain(e) and k < len(state):
                     self.let(name, lane(lower(e.xreplace(at))))
                 values[key] = (e.xreplace(at) if self.is_plain(e) else real(name)).xreplace(copies)
@@ -131,7 +132,7 @@ class UnrolledStep(StepWriter):
             for row, r in zip(places, state, strict=True):
                 for column, c in zip(places, state, strict=True):
                     entries[row, column] = results[i][entry(r, c)]
-        # a W-method (inexact) leaves out entries between nodes: it eliminates each node alone
+        # a W-method (`inexact`) drops the entries between different nodes, so that each node is eliminated separately
         node = {k: i for i, places in enumerate(eq.places) for k in places}
         for key, e in eq.link_jacobian():
             if node[key[0]] == node[key[1]] or not self.method.inexact:
@@ -173,7 +174,7 @@ class UnrolledStep(StepWriter):
         """Compute the new state, the error and the dense output."""
         m = self.method
         self.note("new state and error")
-        errors: list[Expression] = []  # the first estimate
+        errors: list[Expression] = []  # of the first error estimate, by state
         for name in self.state:
             values = self.stages(name, m.stages)
             by_rates = Name(name) + self.increment(m.b, values)
@@ -182,7 +183,7 @@ class UnrolledStep(StepWriter):
         if m.dense_error:
             self.put(*(let(f"e_{name}", e) for name, e in zip(self.state, errors, strict=True)))
             errors = [Name(f"e_{name}") for name in self.state]
-        # the dense output, and stages that serve it alone
+        # the dense output, and the extra stages that only the dense output needs
         with self.apart() as dense:
             for i in range(m.stages, len(m.c)):
                 self.stage(i)
@@ -198,7 +199,7 @@ class UnrolledStep(StepWriter):
             self.put(store("y_new", slot, f"n_{name}"))
             self.put(*self.embedded(self.stages(name, m.stages)))
             self.let(f"e_{name}", self.scaled_error(e, name, f"n_{name}", periods[slot]))
-        # the largest error; `total` keeps NaN, which a maximum may lose
+        # the largest error; a maximum may drop NaN, a sum keeps NaN: `total`
         first, *others = terms = [Name(f"e_{name}") for name in self.state]
         self.let("total", plus(*terms))
         self.let("error", first)
@@ -206,7 +207,7 @@ class UnrolledStep(StepWriter):
         self.put(Return((Name("error") + 0.0 * Name("total"),), "NaN or infinite where any estimate is"))
 
     def stiff_errors(self) -> None:
-        """Raise the errors of states to those of the dense output, which a large pivot does not damp."""
+        """Raise the error of each state to that of its dense output, which stiffness does not damp."""
         self.note("the dense output has errors of its own where the state is stiff")
         last = self.method.dense[-1]
         for slot, name in enumerate(self.state):
@@ -218,7 +219,7 @@ class UnrolledStep(StepWriter):
 
 
 def stage_state(row: Sequence[float], previous: Sequence[float], name: str) -> Expression:
-    """Return y + sum a_j k_j, as the state of the previous stage plus its rate where the rows allow that."""
+    """Return y + sum a_j k_j; if both rows of `a` agree, as previous stage state plus the last k."""
     names = [f"k{j + 1}_{name}" for j in range(len(row))]
     if len(previous) > 0 and tuple(row) == (*previous, 1.0):
         return Name(f"u_{name}") + names[-1]
