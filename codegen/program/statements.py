@@ -187,7 +187,7 @@ def targets(statements: Iterable[Statement]) -> list[str]:
 
 
 def mentioned(statements: Iterable[Statement]) -> set[str]:
-    """Return variables and arrays that are read, also in indices, bounds and conditions, and arrays that are written."""
+    """Return variables and arrays that are read (indices, bounds and conditions too), and arrays that are written."""
     names = set()
     fields = ("value", "index", "start", "stop", "condition", "call")
     for s in walk(statements):

@@ -362,7 +362,7 @@ class LoopMass:
     def blocks(
         self, base: str, use: Callable[[Block, int | None, dict[sp.Symbol, sp.Symbol]], list[Statement]]
     ) -> None:
-        """Loop over the blocks of M - 1; `use` writes the statements of a block, of a node or of a link's end 0 or 1."""
+        """Loop over the blocks of M - 1; `use` writes the code for a block of a node or of a link's end 0 or 1."""
         w = self.writer
         for kind in self.heavy:
             block = added_masses(kind.node)

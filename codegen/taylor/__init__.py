@@ -1,4 +1,7 @@
-"""Steps of Taylor methods: recurrences of power series straight from expressions; neither the driver nor the disk."""
+"""Write steps of Taylor methods: recurrences of power series, derived from expressions.
+
+This package imports no driver code and reads no files.
+"""
 
 from __future__ import annotations
 

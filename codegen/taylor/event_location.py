@@ -1,17 +1,20 @@
-"""Where a series leaves its side of zero: the functions that steps with kinks or contacts call, and the calls.
+"""Locate the first time in a step at which a series changes sign: functions for kinks and contacts, and their calls.
 
-Between kinks the solution is analytic.  A step that would pass a kink ends just behind it, and the next step finds the
-series on the other side, so that nothing is remembered between steps.  A contact keeps its mode until its gap closes: the
-sliding velocity while it slips, and while it sticks the distances of its load from the limits of static friction.
+Between kinks the solution is analytic.  A step that would pass a kink ends just behind the kink.  The next step then
+finds the series on the other side of zero, so that no side is stored between steps.  A contact keeps its mode until one
+of its gaps closes.  In slip the gap is the sliding velocity; in stick the gaps are the distances between the load and
+the limits of static friction.
 
-`passage` finds the first zero of a polynomial p in 0 < x <= ratio.  With B = sum k (k - 1) |p_k| ratio**(k - 2), a bound of
-|p''|, the parabola p(x) + p'(x) d - B d**2/2 lies below p(x + d).  Its first zero lies before that of p, so that no zero is
-skipped; near a simple zero the distances shrink quadratically, as those of Newton's method do.
+`passage` finds the first zero of a polynomial p in 0 < x <= ratio.  The sum B = sum k (k - 1) |p_k| ratio**(k - 2)
+bounds |p''|, so the parabola p(x) + p'(x) d - B d**2/2 lies below p(x + d).  The first zero of the parabola lies before
+the first zero of p, so that iterating never skips a zero.  Near a simple zero the distances shrink quadratically, as in
+Newton's method.
 
-The numbers of the texts below are choices.  ROUNDING, 1e-15, is some four units in the last place of 1; what is closer to
-zero, as a part of its terms, begins at zero.  A passage counts from PASSED = 1e-10 of the way that the series goes in the
-step, so that what the step neglects behind the kink is of the order of 1e-20.  NEAREST = 1e-8 is the least part of a step
-that a passage leaves.  60 iterations are far more than quadratic convergence needs.
+The constants in the texts below are choices.  ROUNDING = 1e-15 is about four units in the last place of 1: a series
+whose first coefficient is smaller than ROUNDING times the sum of its terms begins at zero.  PASSED = 1e-10: the step
+ends where the series has passed zero by this share of its change in the step; the neglected effect behind the kink is
+then of the order of 1e-20.  NEAREST = 1e-8 is the smallest share of a step after which a passage may end the step.
+60 iterations are far more than quadratic convergence needs.
 """
 
 from __future__ import annotations
@@ -105,14 +108,14 @@ def found_side(begun, side):
 '''.strip()
 
 FUNCTIONS = {PASSAGE: {"side_of", "passage", "closing"}, CLOSING: {"closing"}, SIDES: {"side_or", "found_side"}}
-"""The texts, and the functions that need them where a step calls them."""
+"""For each text, the names of the functions that need the text; a step that calls one of them includes the text."""
 
 LATE = 1e-10
-"""How late a body may be set free, as a part of the way that its load goes in a step, if slip begins without a jump."""
+"""If slip begins without a jump: the load may pass the limit by this share of its change in the step."""
 
 
 class Stored(NamedTuple):
-    """A series whose coefficients are in memory: the size of the terms that it begins with, their first group, its order."""
+    """A series in memory: size of the terms of coefficient 0, first group of the coefficients, order."""
 
     size: Expression
     first: Expression
@@ -127,11 +130,11 @@ class Stored(NamedTuple):
 def closings(mode: str, exact: bool, gaps: Sequence[Stored], stuck: str, room: Expression) -> list[Statement]:
     """Return the statements that end a step where one of the two gaps of a contact closes.
 
-    stuck: the name of what is 1 in stick, 0 in slip; room: memory for the coefficients of a gap.
+    stuck: name of the variable that is 1 in stick and 0 in slip; room: memory for the coefficients of a gap.
     """
     late = 0.0 * Name("t") if exact else LATE * Name(stuck)
     statements: list[Statement] = [let(stuck, plus(ONE, Negation(Name(mode) * Name(mode))))]
-    # the first gap closes in slip too, the second one in stick alone
+    # the first gap can close in stick and in slip, the second gap only in stick
     for side, gap in zip((ONE + 0.0 * Name("t"), Name(stuck)), gaps, strict=True):
         coefficients = ("dense", gap.first, room, gap.order, "passed")
         statements.append(let("passed", call("closing", side, late, gap.size, "nearest", *coefficients)))
@@ -139,5 +142,5 @@ def closings(mode: str, exact: bool, gaps: Sequence[Stored], stuck: str, room: E
 
 
 def side_by(coefficient: Expression) -> Statement:
-    """Return the statement that sets `side` by a coefficient, if those before it were zero."""
+    """Return the statement that sets `side` to the sign of a coefficient, if all earlier coefficients were zero."""
     return let("side", call("side_or", "side", call("side_of", coefficient, 0.0)))

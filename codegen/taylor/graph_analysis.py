@@ -1,8 +1,9 @@
-"""Questions about series that decide how far a step may go: what they need, their degree, and what they may hide.
+"""Analyse the graph of series: operands, degrees, and series that are hidden from the choice of the step length.
 
-The step length follows from the last coefficients of the states (`step_length`).  They miss a series that is zero in double
-precision now and large soon after, such as exp(-1/x**2) near 0 or exp(-x**2) far from it.  `hidden` finds such series; the
-writers compare their high coefficients with their low ones (`step_length.unseen`).
+The step length follows from the last coefficients of the states (`step_length`).  A series can be zero in double
+precision now and large soon after, such as exp(-1/x**2) near 0 or exp(-x**2) far from 0; the coefficients of the states
+do not show such a series.  `hidden` finds these series, and the writers compare the high coefficients of each with its
+low coefficients (`step_length.unseen`).
 """
 
 from __future__ import annotations
@@ -28,14 +29,14 @@ from .series import (
 )
 
 STEADY = ("sin", "cos")
-"""sin and cos: their first coefficients never vanish together, so they need no check beyond that of their argument."""
+"""Functions whose first two coefficients never vanish together; only their arguments need a check."""
 
 PLAIN = 3
-"""Degree up to which the low coefficients of a polynomial of states show how large the high ones become; a choice."""
+"""Largest degree of a polynomial of states that needs no check: its low coefficients show its size.  A choice."""
 
 
 def needed(roots: Iterable[Series]) -> set[Series]:
-    """Return the roots and all series that they need for a coefficient."""
+    """Return the roots and all series whose coefficients enter those of the roots."""
     result, pending = set[Series](), list(roots)
     while pending:
         s = pending.pop()
@@ -53,14 +54,14 @@ def is_affine(series: Series) -> bool:
 
 
 def hidden(roots: Iterable[Series]) -> set[Series]:
-    """Return the terms of the roots, and of arguments of their functions, that are polynomials of no low degree."""
+    """Return terms of the roots, and of arguments of functions, that are no polynomials of degree PLAIN or less."""
     result, seen, pending = set[Series](), set[Series](), list(roots)
     while pending:
         s = pending.pop()
         if s in seen:
             continue
         seen.add(s)
-        # terms of sums and choices, and what functions are functions of
+        # continue with terms of sums, branches of choices, and arguments of functions
         match s:
             case Linear() | Choice() | Leaping():
                 pending += s.linear
@@ -68,7 +69,7 @@ def hidden(roots: Iterable[Series]) -> set[Series]:
             case Integral() | QuotientIntegral():
                 pending.append(s.argument)
             case Product() | Square() | Ratio() | SquareRoot() | Power():
-                # of factors: the terms of sums, and all functions below them
+                # from the factors of a product, take the terms of sums and all functions inside
                 parts = {*s.linear, *s.convolved} - {s}
                 pending += [part for factor in parts for part in factor.linear if isinstance(factor, Linear)]
                 pending += [part for part in needed(parts) if isinstance(part, Integral | QuotientIntegral)]
@@ -80,7 +81,7 @@ def hidden(roots: Iterable[Series]) -> set[Series]:
 
 
 def _degree(series: Series) -> float:
-    """Return the degree of a polynomial in states, time, and sines and cosines of such; inf for any other series."""
+    """Return the degree of a polynomial in states, time, and sines and cosines of these; inf for other series."""
     match series:
         case Linear() | Choice() | Leaping():
             return max(map(_degree, series.linear), default=0.0)

@@ -1,7 +1,7 @@
-"""Jumps as series: an expression with a jump becomes a choice between series by the sign of a gap.
+"""Replace each jump in an expression by a choice between series according to the sign of a gap.
 
-Between jumps the solution is analytic, so a step uses the series of one side and ends where the gap passes zero
-(`event_location`).
+Between jumps the solution is analytic.  A step therefore uses the series of one side, and ends where the gap passes
+zero (`event_location`).
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ RISING, STRICT = (sp.StrictGreaterThan, sp.GreaterThan), (sp.StrictGreaterThan, 
 
 
 class Jump(sp.Function):
-    """Jump(gap, above, at, below): one of three values by the sign of a gap, which do not agree at zero."""
+    """Jump(gap, above, at, below): `above` for gap > 0, `at` for gap = 0, `below` for gap < 0."""
 
     nargs = 4
     is_extended_real = True
 
 
 def with_jumps(expressions: Iterable[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:
-    """Return expressions with their jumps as `Jump` or sp.floor; jumps that no step passes are not replaced."""
+    """Return the expressions with jumps replaced by `Jump` or sp.floor; leave jumps that no step can pass."""
     old = list(expressions)
     parts = {part for part in jumps(old, moving) if decided_by_gaps(part)}
     return [_with_jumps(e, parts) for e in old] if parts else old
 
 
 def decided_by_gaps(part: sp.Expr) -> bool:
-    """Return False for a choice that inequalities alone do not make, or that may have no value."""
+    """Return False for a choice whose conditions are not all inequalities, or that may have no value."""
     if not isinstance(part, Piecewise):
         return True
     *conditions, last = (condition for _, condition in part.args)
@@ -39,7 +39,7 @@ def decided_by_gaps(part: sp.Expr) -> bool:
 
 
 def _with_jumps(e: sp.Basic, parts: Collection[sp.Expr]) -> sp.Basic:
-    """Return an expression with the jumps among `parts` replaced, inner ones first."""
+    """Return an expression with the jumps in `parts` replaced, inner jumps first."""
     if not e.args:
         return e
     inner = [_with_jumps(a, parts) for a in e.args]
@@ -54,7 +54,7 @@ def _with_jumps(e: sp.Basic, parts: Collection[sp.Expr]) -> sp.Basic:
 
 
 def _choice(pieces: Sequence[ExprCondPair]) -> sp.Expr:
-    """Return a choice between pieces as nested jumps, the first condition outside."""
+    """Return a choice between pieces as nested jumps; the first condition is the outermost jump."""
     (piece, condition), *others = pieces
     if condition == sp.true:
         return piece

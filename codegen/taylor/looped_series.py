@@ -1,12 +1,13 @@
-"""A Taylor step for a large network: loops over orders, nodes and links around the same recurrences.
+"""Write a Taylor step for a large network: loops over orders, nodes and links around the recurrences of `series`.
 
-The workspace behind the rows of the dense output holds the coefficients of the states, the rates of one order, and the
-coefficients of every series that a convolution reads: coefficient k of node i at `at_… + i*TERMS + k`, of link e at
-`at_… + e*TERMS + k`, of a function of time alone at `at_… + k`.  A convolution reads neighbours in memory, whatever the size
-of the network.
+The workspace follows the rows of the dense output.  The workspace holds the coefficients of the states, the rates of
+one order, and the coefficients of every series that a convolution reads.  Coefficient k of a series is stored at
+`at_… + i*TERMS + k` for node i, at `at_… + e*TERMS + k` for link e, and at `at_… + k` for a function of time alone.
+A convolution thus reads consecutive entries of memory for networks of any size.
 
-A section (`SeriesLoop`) is one loop of each order.  In the order of `LoopedSeries.parts`: functions of time alone, nodes of
-each kind, links of each joint, then mean fields and sums over links.  Sections read series of earlier sections from memory.
+A section (`SeriesLoop`) becomes one loop in each order.  `LoopedSeries.parts` lists the sections: functions of time
+alone, nodes of each kind, links of each joint, then mean fields and sums over links.  A section reads series of earlier
+sections from memory.
 """
 
 from __future__ import annotations
@@ -48,13 +49,13 @@ def convolution(dense, left, right, k, first, end):
         total = total + load(dense, left + j, WIDTH)*load(dense, right + (k - j), WIDTH)
     return total
 '''.strip()
-"""A function, because a loop in each sum would take most of the time of a compilation."""
+"""Text of the function that computes convolutions; a loop in each sum would take most of the compilation time."""
 
 GAPS = (Name("i"), Name("NODES") + "i")
-"""The entries of the two gaps of the contact of node i among those of one order."""
+"""Indices of the two gaps of node i's contact, among the gaps of one order."""
 
 START, ORDER = Number(0), Name("k")
-"""The order of the coefficients that a step begins with, and that of a loop over orders."""
+"""Order 0, with which a step begins, and the variable of the loop over all later orders."""
 
 NOTHING = 0.0 * Name("scale")
 """Zeros in all lanes."""
@@ -62,7 +63,7 @@ NOTHING = 0.0 * Name("scale")
 
 @dataclass(frozen=True, slots=True)
 class Hoisted:
-    """Rates in names: of series for functions of time alone, of constants for functions of parameters alone."""
+    """Rates in which names replace functions of time alone (series) and functions of parameters alone (constants)."""
 
     rates: list[sp.Expr]
     waves: dict[sp.Symbol, Series] = field(default_factory=dict)
@@ -70,13 +71,13 @@ class Hoisted:
 
 
 class Slot(NamedTuple):
-    """The memory of the coefficients of a series: a part of the workspace, and the number of a node, link or state."""
+    """Position of a series in memory: a part of the workspace, and the number of a node, link or state."""
 
     name: str
     number: Expression | None
 
     def at(self, order: Expression) -> Expression:
-        """Return the group of the coefficient of some order."""
+        """Return the index of the group that stores the coefficient of this order."""
         if self.number is None:
             return Name(f"at_{self.name}") + order
         return plus(Name(f"at_{self.name}"), self.number * Name("TERMS"), order)
@@ -90,20 +91,20 @@ class Slot(NamedTuple):
 
 @dataclass(eq=False, slots=True)
 class Outer(State):
-    """A state, or a series of another section, and the memory of its coefficients."""
+    """A state or a series of another section, with the memory that stores its coefficients."""
 
     slot: Slot
 
 
 @dataclass(eq=False)
 class SeriesLoop(SeriesWriter):
-    """A section: what is done alike for all nodes of a kind, for all links of a joint, or once, its coefficients in memory.
+    """A section: the series of all nodes of a kind, of all links of a joint, or of the network, with memory for each.
 
-    span, count: the loop and the number of its turns in the whole numbering; adds: rates are added to those of sections
-    before; setting: statements that load what a turn needs at any order; moving: symbols that stand for series; fixed:
-    symbols that stand for names; outer: series that the section reads and does not make; rates: series of rates, by state;
-    lent: series that other sections read; gaps: those of contacts, or what links add to them; k: the order that is written,
-    0 or that of a loop.
+    span, count: the loop, and the number of nodes or links in the whole network. adds: True if rates are added to those
+    of earlier sections. setting: statements that load the values a loop turn needs at any order. moving: series by
+    symbol. fixed: names by symbol. outer: series that the section reads but does not compute. rates: series of the
+    rates by state. lent: series that other sections read. gaps: the gaps of contacts, or the terms that links add to
+    gaps. k: the order to be written: 0, or the variable of the loop over orders.
     """
 
     span: Span | None = None
@@ -151,16 +152,16 @@ class SeriesLoop(SeriesWriter):
 
     @property
     def index(self) -> Name | None:
-        """Return the variable of the loop, if there is one."""
+        """Return the loop variable of the section; None for a section without a loop."""
         return None if self.span is None else Name(self.span.index)
 
     def reads(self, slot: Slot, name: str) -> Series:
-        """Return a series that this section reads from memory."""
+        """Return the series that stands for a slot, from which this section reads its coefficients."""
         self.outer.append(Outer(slot, name=name))
         return self.outer[-1]
 
     def slot(self, series: Series) -> Slot:
-        """Return the memory of a series."""
+        """Return the slot that stores the coefficients of a series."""
         return series.slot if isinstance(series, Outer) else Slot(series.name, self.index)
 
     def at(self, series: Series, k: int | Expression) -> Expression:
@@ -174,18 +175,18 @@ class SeriesLoop(SeriesWriter):
 
     @cached_property
     def in_memory(self) -> set[Series]:
-        """Return the series of which earlier coefficients are needed, here or in other sections."""
+        """Return the series whose earlier coefficients this section or other sections read."""
         convolved = {used for s in self.graph.series for used in s.convolved}
         return {*convolved, *self.graph.watched, *self.graph.positive, *self.lent} - {*self.outer}
 
     def room(self) -> dict[str, int]:
-        """Return how many groups of memory each name takes: coefficients, and what has one value for each turn."""
+        """Return the number of groups of memory for each name: coefficients, and values saved once for each turn."""
         names = sorted({s.name for s in self.in_memory} - {"t", ""})
         rooms = {name: (self.order + 1) * self.count for name in names}
         return rooms | {name: self.count for name in (*self.saved, *self.hints)}
 
     def single(self, name: str) -> Expression:
-        """Return the group of what has one value for each turn of the section, whatever the order."""
+        """Return the index of the group of a value that each turn of the section saves once for all orders."""
         return Name(f"at_{name}") if self.index is None else plus(Name(f"at_{name}"), self.index)
 
     def recall(self, name: str) -> Expression:
@@ -216,7 +217,7 @@ class SeriesLoop(SeriesWriter):
     # -- statements -----------------------------------------------------------------------------------------------
 
     def coefficients(self, order: Expression) -> list[Statement]:
-        """Return the statements for coefficients `order`: 0, or k for any later one."""
+        """Return the statements for the coefficients of an order: 0, or the loop variable k for any later order."""
         self.statements, self.k, first = list(self.setting), order, order == START
         if not first:
             self.put(*(let(name, self.recall(name)) for name in self.saved))
@@ -240,7 +241,7 @@ class SeriesLoop(SeriesWriter):
                 self.store_rate(plus(Name("at_sizes"), index), magnitude(self, gap))
 
     def store_rate(self, group: Expression, value: Expression) -> None:
-        """Store a value, or add it to what other sections have stored."""
+        """Store a value, or add the value to the one that earlier sections have stored."""
         if self.adds:
             self.put(let("value", add(Load("dense", group), value)), Store("dense", group, Name("value")))
         else:
@@ -258,7 +259,7 @@ class SeriesLoop(SeriesWriter):
 
 @dataclass(eq=False)
 class Totals(SeriesLoop):
-    """The sums over all nodes of some series, by their names."""
+    """A section that adds up series over all nodes; each sum has a name."""
 
     totals: list[tuple[str, Series]] = field(default_factory=list)
 
@@ -281,7 +282,7 @@ class Totals(SeriesLoop):
 
 @dataclass(eq=False)
 class Gathered(SeriesLoop):
-    """The sums over the links of each node of some series, by their names."""
+    """A section that adds up series over the links of each node; each sum has a name."""
 
     nodes: int = 0
     totals: list[tuple[str, Series]] = field(default_factory=list)
@@ -302,18 +303,18 @@ class Gathered(SeriesLoop):
 
 
 def of_state(index: Expression) -> Slot:
-    """Return the memory of a state."""
+    """Return the slot of the state with this index."""
     return Slot("states", index)
 
 
 def polynomial(name: str, degree: int, coefficient: Callable[[Expression], Expression]) -> list[Statement]:
-    """Return the statements for the value of a polynomial in `ratio` by Horner's rule."""
+    """Return the statements that evaluate a polynomial in `ratio` by Horner's rule."""
     turn = let(name, Name(name) * "ratio" + coefficient(ORDER))
     return [let(name, coefficient(Number(degree))), Loop(ORDER.text, Number(degree - 1), Number(-1), (turn,), step=-1)]
 
 
 def with_gaps(node: Node) -> list[sp.Expr]:
-    """Return the rates of a node, and the two gaps of each event."""
+    """Return the rates of a node, followed by the two gaps of each event."""
     return [*node.rhs, *(gap for event in node.events for gap in event.gaps)]
 
 
@@ -322,7 +323,7 @@ def symbols_in(expressions: Iterable[sp.Expr]) -> set[sp.Symbol]:
 
 
 class LoopedSeries(TaylorStepWriter):
-    """Writes loops around the recurrences, with a section for what each of them makes."""
+    """Write loops around the recurrences; each section becomes one loop in each order."""
 
     functions: Sequence[str] = (CONVOLUTION,)
 
@@ -336,7 +337,7 @@ class LoopedSeries(TaylorStepWriter):
         self.names = Names([*taken, *self.called.values(), *(s + end for s in taken for end in ("_here", "_there"))])
         self.varied = [real(name) for name in eq.differing]
 
-        # functions of time alone leave the rates of all sections first: they are one section, the first to be computed
+        # take functions of time alone out of all rates: they form the first section
         self.waves = SeriesLoop(SeriesGraph(self.names), order)
         kinds, (self.sums, joints) = self.layout.kinds, link_sums(equations, self.layout.joints)
         rates = [[*with_gaps(kind.node), *(e for links in self.sums for e in links.of_node())] for kind in kinds]
@@ -359,14 +360,14 @@ class LoopedSeries(TaylorStepWriter):
         for links in self.sums:
             self.parts += self.summed(links, {name: functions[name] for name in links.functions})
 
-        # the last order of all series is needed where a series ends steps
+        # if kinks or contacts may end a step, the last order of all series is needed, not that of the states alone
         self.ends = eq.sticks or any(section.graph.kinks for section in self.parts)
         self.orders = order + 1 if self.ends else order
 
     # -- rates ------------------------------------------------------------------------------------------------
 
     def hoisted(self, rates: Iterable[sp.Expr], moving: Sequence[sp.Symbol]) -> Hoisted:
-        """Return rates in which names stand for functions of time (and parameters), and of parameters alone."""
+        """Return rates in which names replace functions of time (and parameters) and functions of parameters alone."""
         hoist = Hoist(frozenset(moving), self.names.fresh("wave_"), frozenset({TIME}))
         reduced = [hoist.apply(e) for e in rates]
         waves: dict[sp.Symbol, Series] = {}
@@ -381,7 +382,7 @@ class LoopedSeries(TaylorStepWriter):
         return Hoisted(reduced, waves, constants)
 
     def of_links(self, edge: Edge, rates: Iterable[sp.Expr], more: Iterable[sp.Symbol] = ()) -> Hoisted:
-        """Return rates by links, hoisted as those of nodes if time enters them; `more` are symbols that move."""
+        """Return the rates of links, hoisted like those of nodes if they contain time; symbols in `more` move too."""
         if not edge.forced:
             return Hoisted(list(rates))
         moving = (edge.weight, *edge.here, *edge.there, *(s for s, _ in edge.theirs), *self.varied, *more)
@@ -389,7 +390,7 @@ class LoopedSeries(TaylorStepWriter):
 
     @staticmethod
     def pushes(joint: Joint) -> list[sp.Expr]:
-        """Return what a link adds to the rates of a node, and to the gaps of its contact: forces on a body that sticks."""
+        """Return a link's contributions to the rates of its target, and to the contact's gaps (force in stick)."""
         edge = joint.edge
         if not joint.target.events:
             return list(edge.rhs)
@@ -400,7 +401,7 @@ class LoopedSeries(TaylorStepWriter):
     # -- sections ---------------------------------------------------------------------------------------------
 
     def node(self, kind: NodeKindLayout, hoisted: Hoisted) -> SeriesLoop:
-        """Return the section of the rates of the nodes of a kind."""
+        """Return the section that computes the rates of all nodes of a kind."""
         node = kind.node
         section = SeriesLoop(SeriesGraph(self.names), self.order, span=kind.span, count=self.equations.n)
         self.read_states(section, node.state, node, ("", "i"), node.state)
@@ -408,7 +409,7 @@ class LoopedSeries(TaylorStepWriter):
         section.setting += self.loaded(self.layout.own(used))
         series, size = self.read(section, hoisted, node.inertia), len(with_gaps(node))
         self.store(section, node, series[:size])
-        # the functions of a node as a source of links that are summed are read from memory
+        # sums over links read functions of the source nodes from memory
         self.node_part, self.lent = section, series[size:]
         section.lent += [s for s in series[size:] if not isinstance(s, Constant)]
         for event in node.events:
@@ -419,7 +420,7 @@ class LoopedSeries(TaylorStepWriter):
         return section
 
     def link(self, joint: Joint, hoisted: Hoisted) -> SeriesLoop:
-        """Return the section of what the links of a joint add to the rates."""
+        """Return the section that adds the contributions of a joint's links to the rates."""
         edge, used = joint.edge, symbols_in(hoisted.rates)
         section = SeriesLoop(SeriesGraph(self.names), self.order, span=joint.span, count=self.layout.links, adds=True)
         section.setting += link_ends(edge, self.called[edge.weight.name], "j_there")
@@ -431,7 +432,7 @@ class LoopedSeries(TaylorStepWriter):
         return section
 
     def field(self, field: MeanField, sums: Hoisted, shared: Hoisted, rates: Hoisted) -> Iterator[SeriesLoop]:
-        """Yield the sections of a mean field: sums over the nodes, functions of the sums, and what they add to the rates."""
+        """Yield the sections of a mean field: sums over nodes, functions of the sums, contributions to the rates."""
         # 1. sums over the sources
         nodes, n = self.layout.kinds[0].span, self.equations.n
         totals = Totals(SeriesGraph(self.names), self.order, span=nodes, count=n)
@@ -443,7 +444,7 @@ class LoopedSeries(TaylorStepWriter):
         totals.totals = [(symbol.name, s) for symbol, s in series.items()]
         yield totals
 
-        # 2. what all nodes make of the sums
+        # 2. functions of the sums that all nodes share
         combined = SeriesLoop(SeriesGraph(self.names), self.order)
         self.see(combined, self.waves, shared.waves)
         self.see(combined, combined, {s: State(name=s.name) for s in field.sums})
@@ -451,7 +452,7 @@ class LoopedSeries(TaylorStepWriter):
         combined.lent += [s for s in common.values() if not isinstance(s, Constant)]
         yield combined
 
-        # 3. the rates of the targets; functions of a node that are those of a source too are series of the first section
+        # 3. the rates of the targets; a function that occurs at the source too is a series of section 1
         target = SeriesLoop(SeriesGraph(self.names), self.order, span=nodes, count=n, adds=True)
         lent = {e: series[s] for s, e in field.alike.items() if series[s] in totals.graph.series}
         borrowed = {e: real(s.name) for e, s in lent.items()}
@@ -467,7 +468,7 @@ class LoopedSeries(TaylorStepWriter):
         yield target
 
     def summed(self, links: LinkSums, functions: Mapping[sp.Symbol, Series]) -> Iterator[SeriesLoop]:
-        """Yield the sections of sums over links: of functions of their sources, and what they add to the rates."""
+        """Yield the sections of sums over links: the sums of functions of the sources, contributions to the rates."""
         edge, joint = links.joint.edge, links.joint
         sums = Gathered(
             SeriesGraph(self.names), self.order, span=joint.span, count=self.layout.links, nodes=self.equations.n
@@ -495,7 +496,7 @@ class LoopedSeries(TaylorStepWriter):
     # -- what a section reads and stores ----------------------------------------------------------------------
 
     def read(self, section: SeriesLoop, hoisted: Hoisted, inertia: Block = ()) -> list[Series]:
-        """Return the series of a section, and add the constants that each of its turns computes to its setting."""
+        """Return the series of a section; append to its setting the constants that each turn computes."""
         self.see(section, self.waves, hoisted.waves)
         graph, size, masses = section.graph, len(hoisted.rates), (e for row in inertia for e in row)
         template = Template.of([*hoisted.rates, *masses], section.moving, self.names.fresh("shared_"))
@@ -507,7 +508,7 @@ class LoopedSeries(TaylorStepWriter):
         return series
 
     def store(self, section: SeriesLoop, node: Node, series: Sequence[Series]) -> None:
-        """Let a section store the rates of a node, and behind them the gaps of its contact."""
+        """Let a section store the rates of a node, followed by the gaps of the node's contact."""
         size = len(node.state)
         section.rates = [(self.layout.place(c), rate) for c, rate in enumerate(series[:size])]
         section.gaps = list(series[size:])
@@ -522,10 +523,10 @@ class LoopedSeries(TaylorStepWriter):
     ) -> None:
         """Let a section read the used states of a node, or of one end of a link, under `symbols`.
 
-        `end` is the suffix of their names, and the number of the node.
+        `end`: the suffix of the names of the states, and the variable with the node's number.
         """
-        # states that move are series; one at rest, such as the mode of a contact, is a constant of the step.  Links that are
-        # summed by nodes can move a state too
+        # a state that moves is a series; a state at rest, such as the mode of a contact, is a constant of the step.
+        # links that are summed node by node can move a state too
         edges = [joint.edge for joint in self.layout.joints if joint.target == node]
         moves = moving(node, [*edges, *(field.edge for field in self.fields)])
         suffix, index = end
@@ -538,7 +539,7 @@ class LoopedSeries(TaylorStepWriter):
                 section.setting.append(let(name, Load("y", group)))
 
     def read_field_states(self, section: SeriesLoop, field: MeanField, suffix: str, used: Container[sp.Symbol]) -> None:
-        """Let a section read a node of a mean field; states of which differences alone matter count from the first node's."""
+        """Let a section read a node of a mean field; subtract the first node's states from `shifted` states."""
         symbols = field.edge.there if suffix == "_there" else field.edge.here
         self.read_states(section, symbols, field.node, (suffix, "i"), used)
         for k in field.shifted:
@@ -548,13 +549,13 @@ class LoopedSeries(TaylorStepWriter):
                 section.moving[symbols[k]] = section.graph.sum([(ONE, state), (MINUS, first)])
 
     def see(self, section: SeriesLoop, other: SeriesLoop, series: Mapping[sp.Symbol, Series]) -> None:
-        """Let a section read series of another one; constants are the same in both."""
+        """Let a section read series of another section from memory; copy constants."""
         for symbol, s in series.items():
             constant = isinstance(s, Constant)
             section.moving[symbol] = s if constant else section.reads(Slot(s.name, other.index), s.name)
 
     def loaded(self, loads: Sequence[Assign]) -> list[Statement]:
-        """Return statements that load parameters, under the names of the step."""
+        """Return statements that load parameters into variables with the names that the step uses."""
         return [let(self.called.get(name, name), s.value) for s in loads for name in s.targets]
 
     # -- statements -------------------------------------------------------------------------------------------
@@ -564,7 +565,7 @@ class LoopedSeries(TaylorStepWriter):
         return sum(self.room().values())
 
     def room(self) -> dict[str, int]:
-        """Return how many groups the parts of the workspace take, in their order."""
+        """Return the number of groups of each part of the workspace, in the order of the parts."""
         eq, terms = self.equations, self.order + 1
         rooms = {"states": terms * eq.dimension, "rates": eq.dimension}
         if self.waves.lent:
@@ -576,12 +577,12 @@ class LoopedSeries(TaylorStepWriter):
         return rooms
 
     def opening(self) -> list[Statement]:
-        # names of the parts of the workspace
+        # name the parts of the workspace by their offsets
         statements, group = list[Statement]([whole("TERMS", Number(self.order + 1))]), 0
         for name, groups in self.room().items():
             statements.append(whole(f"at_{name}", Name("DENSE_ROWS") * "DIMENSION" + group))
             group += groups
-        # the graph, and the parameters of the whole network
+        # load the arrays of links, and the parameters of the whole network
         eq = self.equations
         shared = [(slot, name) for slot, name in enumerate(eq.parameters, start=eq.dimension) if name not in eq.single]
         return [
@@ -611,16 +612,16 @@ class LoopedSeries(TaylorStepWriter):
         turn += self.next_states(Name("inverse") * "scale", ORDER)
         turn += [s for section in self.parts for s in section.coefficients(ORDER)]
         statements += [Comment("all further orders"), span("k", self.orders, 1).over(turn)]
-        # the last order of the states alone
+        # the last order: only the states need a coefficient, unless kinks or contacts may end the step
         last = [] if self.ends else self.next_states(1.0 / self.order * Name("scale"), Number(self.order))
         return [*statements, *last]
 
     def over_states(self, body: Callable[[Expression], Iterable[Statement]]) -> list[Statement]:
-        """Return loops over all states, with statements for the index of one."""
+        """Return loops over all states; `body` returns the statements for the state with a given index."""
         return [rows.over(body(index)) for rows, index in self.layout.rows]
 
     def next_states(self, factor: Expression, order: Expression) -> list[Statement]:
-        """Return the statements for coefficients of the states from those of the rates."""
+        """Return the statements that compute coefficients of the states from coefficients of the rates."""
 
         def one(index: Expression) -> list[Statement]:
             rate = Load("dense", plus(Name("at_rates"), index))
@@ -637,7 +638,7 @@ class LoopedSeries(TaylorStepWriter):
         return [rows.over(self.size(index, period)) for rows, index, period in self.layout.measured]
 
     def size(self, index: Expression, period: float | None) -> list[Statement]:
-        """Return the statements for one state, in units of its tolerance."""
+        """Return the statements for the sizes of one state's last coefficients, in units of its tolerance."""
         largest: Expression = absolute(Load("y", index))
         for k in (1, 2):
             largest = call("maximum", largest, absolute(of_state(index).load(Number(k))))
@@ -661,7 +662,7 @@ class LoopedSeries(TaylorStepWriter):
 
 
 def write_looped(equations: Equations, order: int) -> TaylorStep:
-    """Return the looped Taylor step of some order; see `write_step`."""
+    """Return the looped Taylor step of this order; see `write_step`."""
     if equations.inertial and equations.link_count:
         kind = "links with inertia" if equations.inertial_links else "links of nodes with a mass matrix"
         raise ValueError(f"taylor: found {kind} in a network that is stepped in loops; use dop853 or rodas5p")

@@ -1,7 +1,7 @@
-"""The rates of M rates = r as series, where nodes or links have inertia.
+"""Solve M rates = r for the series of the rates, if nodes or links have inertia.
 
-`Row` and `Unknown` are the forward and back substitution of one unknown; the pattern of M, known when the step is written,
-decides the order of elimination.
+`Row` is the forward substitution and `Unknown` the back substitution of one unknown.  The pattern of M is known when
+the step is written, and determines the order of elimination.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ UNIT = Constant(ONE)
 
 
 def moving(node: Node, edges: Iterable[Edge]) -> list[bool]:
-    """Return which states of a node move, by its own rates or by links to it; the mode of a contact does not."""
+    """Return, for each state of a node, True if the node or a link can change the state; False for a contact's mode."""
     return [any(moved) for moved in zip(_moved(node), *map(_moved, edges), strict=True)]
 
 
 def _moved(part: Node | Edge) -> list[bool]:
-    """Return which states a node or a link can move: by a right-hand side, or by masses that couple them to others."""
+    """Return, for each state, True if a node or link changes it by a right-hand side or by coupling masses."""
     blocks = [added_masses(part)] if isinstance(part, Node) else part.inertia
     coupled = [[any(e != 0 for e in row) for row in block] for block in blocks if block]
     return [e != 0 or any(block[c] for block in coupled) for c, e in enumerate(part.rhs)]
@@ -33,15 +33,15 @@ def _moved(part: Node | Edge) -> list[bool]:
 
 def solved(graph: SeriesGraph, masses: Mapping[Entry, Series], right: Mapping[int, Series]) -> dict[int, Series]:
     """Return the series of the rates by state, from the entries of M and the right-hand sides."""
-    # each nonzero entry as factor times series; a constant has the series 1
+    # split each nonzero entry into factor and series; a constant has the series 1
     entries = {key: (s.value, UNIT) if isinstance(s, Constant) else split(s) for key, s in masses.items()}
     entries = {key: e for key, e in entries.items() if e[0] != ZERO}
-    # rows and columns that differ from those of the identity, renumbered; the other rates are their right-hand sides
+    # renumber the rows and columns that differ from those of the identity; all other rates are their right-hand sides
     coupled = sorted({k for key, e in entries.items() if not (key[0] == key[1] and e == (ONE, UNIT)) for k in key})
     number = {slot: k for k, slot in enumerate(coupled)}
     inner = {(number[r], number[c]): e for (r, c), e in entries.items() if r in number and c in number}
     symmetric = all(inner.get((c, r)) == e for (r, c), e in inner.items())
-    # forward substitution in the order of elimination, back substitution in the reverse order
+    # substitute forward in the order of elimination, and back in the reverse order
     order = plan(len(coupled), set(inner)).order
     rows: list[Row] = []
     for r in order:

@@ -1,8 +1,8 @@
-"""Which equations a Taylor step can integrate: obstacles, singular places, kinks, linearity.
+"""Decide if a Taylor step can integrate some equations: find obstacles, singularities, kinks, and linear equations.
 
-A step needs a series of every right-hand side, up to its end.  Kinks and jumps are passed one side at a time
-(`event_location`), as long as motion crosses them; functions without a recurrence, and pieces that have no value where they
-are not chosen, are obstacles.
+A step needs the series of every right-hand side up to the end of the step.  A step passes a kink or a jump one side at
+a time (`event_location`), provided that motion crosses the kink and does not slide along it.  Obstacles are functions
+without a recurrence, and pieces of a Piecewise that have no value where other pieces are chosen.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ SIDED = (*KINKED, *JUMPING, Piecewise)
 """Functions that a step passes one side at a time."""
 
 SINGULAR = (sp.log, sp.tan, sp.asin, sp.acos, sp.acosh, sp.atanh)
-"""Functions with a pole, or without a value for some arguments."""
+"""Functions that have a pole, or no real value for some arguments."""
 
 STEEP = (sp.asin, sp.acos, sp.acosh)
-"""Functions with a value and no slope at the ends of their domain."""
+"""Functions that have a value, but no finite slope, at an end of their domain."""
 
 BOUNDED = (sp.sin, sp.cos, sp.tanh, sp.erf, sp.asinh)
-"""Functions that stay small, or nearly so, where their argument has a pole."""
+"""Functions that stay bounded, or grow only like a logarithm (asinh), at a pole of their argument."""
 
 Ends = tuple[tuple[sp.Symbol, ...], ...]
 
 
 def taylor_obstacle(equations: Equations) -> sp.Expr | None:
-    """Return a part of some equations that no Taylor step passes; None if there is none."""
+    """Return the first part of the equations that no Taylor step can pass; None if there is no such part."""
     return next(iter(_obstacles(equations)), None)
 
 
 def check_passable(equations: Equations) -> None:
-    """Raise ValueError for equations with a part that no Taylor step passes."""
+    """Raise ValueError if the equations contain a part that no Taylor step can pass."""
     for part, why in _obstacles(equations).items():
         raise ValueError(
             f"taylor: found {part}, {why}; expected functions with a series between zeros, and jumps that motion passes; "
@@ -50,10 +50,11 @@ def check_passable(equations: Equations) -> None:
 
 
 def unpassed(equations: Equations) -> Iterator[sp.Expr]:
-    """Yield the parts of some equations with a jump that no Taylor step passes.
+    """Yield the parts with a jump that no Taylor step can pass.
 
-    Motion can slide along a jump that enters the rate of what it depends on: sign(v) in the rate of v, not in that of x.
-    Contacts take the loads of bodies that stick as continuous, and the solution of a mass matrix jumps as a whole.
+    Motion can slide along a jump if the jump enters the rate of a state on which the jump depends: sign(v) in the rate
+    of v, but not in the rate of x.  Contacts require continuous loads on sticking bodies.  With a mass matrix, a jump
+    in one right-hand side makes all coupled rates jump.
     """
     parts_of = [(rates, ends, jumps(rates, moving)) for rates, ends, moving in _templates(equations)]
     jumping = {c for rates, ends, parts in parts_of for c in range(len(ends[0])) if rates[c].has(*parts)}
@@ -66,7 +67,7 @@ def unpassed(equations: Equations) -> Iterator[sp.Expr]:
 
 
 def may_cross_singularity(equations: Equations) -> bool:
-    """Return True if motion may pass a singular place: the end of an arc, log|x| at 0, tanh(1/x) at its pole."""
+    """Return True if motion may cross a singularity: asin(x) at x = 1, log|x| at 0, tanh(1/x) at 0."""
     return any(
         _ends_series(part, moving)
         for rates, _, moving in _templates(equations)
@@ -89,7 +90,7 @@ def is_linear(equations: Equations) -> bool:
     """Return True if the rates are sums of states with constant coefficients and of terms of time."""
     parts = [(node.rhs, node.state) for node in equations.nodes]
     parts += [(edge.rhs, (*edge.here, *edge.there)) for edge in equations.edges]
-    # `any` stops at the first slope that moves: all slopes of large nodes take seconds
+    # `any` stops at the first slope that depends on a state; differentiating all rates of a large node takes seconds
     moving_slopes = (
         derivative(e, s).free_symbols & {TIME, *states} for rates, states in parts for e in rates for s in states
     )
@@ -97,7 +98,7 @@ def is_linear(equations: Equations) -> bool:
 
 
 def _templates(equations: Equations) -> Iterator[tuple[Sequence[sp.Expr], Ends, set[sp.Symbol]]]:
-    """Yield right-hand sides and masses of each kind of node and link, the states at each end, and all that moves."""
+    """Yield, for each kind of node and link: right-hand sides and masses, states at each end, all moving symbols."""
     for node in equations.nodes:
         yield (*node.rhs, *(e for row in node.inertia for e in row)), (node.state,), {TIME, *node.state}
     for edge in equations.edges:
@@ -105,18 +106,18 @@ def _templates(equations: Equations) -> Iterator[tuple[Sequence[sp.Expr], Ends, 
 
 
 def _obstacles(equations: Equations) -> dict[sp.Expr, str]:
-    """Return the parts that no Taylor step passes, in a fixed order, and why."""
+    """Return the parts that no Taylor step can pass, in a fixed order, each with the reason."""
     why = dict.fromkeys(unpassed(equations), "along which motion may slide, or which a contact or a mass matrix feels")
     for rates, _, moving in _templates(equations):
-        # functions without a recurrence, and roots at a kink
+        # functions without a recurrence, and roots of a value that has a kink
         functions = {f for e in rates for f in e.atoms(sp.Function) if not isinstance(f, (*LANE_FUNCTIONS, *SIDED))}
         powers = (p for e in rates for p in e.atoms(sp.Pow) if p.exp.is_integer is not True)
         roots = {p for p in powers if any(isinstance(f, SIDED) for f in sp.Mul.make_args(p.base))}
         unserial = {f for f in functions if f.free_symbols & moving} | {
             p for p in roots if p.base.free_symbols & moving
         }
-        # all pieces of a choice have series, chosen or not, so that a piece without a value ends a step; series of an arc
-        # carry on over a pole of its argument
+        # a step computes the series of all pieces of a choice, even of those not chosen: a piece without a value breaks
+        # the step.  the series of atan continues analytically across a pole of the argument, where atan itself jumps
         sided = {part for e in rates for part in e.atoms(Piecewise, *JUMPING, sp.atan)}
         guarding = {
             part
@@ -129,7 +130,7 @@ def _obstacles(equations: Equations) -> dict[sp.Expr, str]:
 
 
 def _is_singular(e: sp.Expr, moving: Set[sp.Symbol]) -> bool:
-    """Return True for a root, a quotient or a function that has a pole, or no value, for some arguments."""
+    """Return True for a root, a quotient or a function that has a pole, or no real value, for some arguments."""
     argument = e.args[0]
     if not argument.free_symbols & moving or argument.is_positive:
         return False
@@ -144,9 +145,10 @@ def _is_pole(e: sp.Expr) -> bool:
 
 
 def _ends_series(e: sp.Expr, moving: Set[sp.Symbol]) -> bool:
-    """Return True for a part that stays finite, or has a finite integral, where its series ends.
+    """Return True if an expression stays finite, or has a finite integral, at a singularity that ends its series.
 
-    exp(-1/x) of a temperature never comes near its pole and does not count; exp(-1/x**2) and exp(-1/cos(t)) do.
+    Motion can reach such a singularity, for example in exp(-1/x**2) and exp(-1/cos(t)).  exp(-1/x) does not count: x is
+    then a temperature, which stays away from 0.
     """
     argument = e.args[0]
     if isinstance(e, STEEP):

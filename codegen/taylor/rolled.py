@@ -1,9 +1,10 @@
-"""A Taylor step of one large node: loops over series of one kind, whose memory a table lists.
+"""Write a Taylor step of one large node as loops over series of the same kind; a table lists where each is stored.
 
-A step that is written out has a statement for each coefficient of each series; from a hundred series on it takes some ten
-seconds to compile.  Here series are ranked by what they need of the same order, and those of one rank and kind (a `Run`) are
-one loop around one recurrence.  All coefficients are in memory, and the array `where` lists their groups, so that the text
-grows with the number of ranks alone.
+A step that is written out has a statement for each coefficient of each series.  With a hundred series or more, such a
+step takes some ten seconds to compile.  Here a series gets a rank: one more than the ranks of the series whose
+coefficient of the same order it needs.  Series of one rank and kind (a `Run`) share one loop around one recurrence.
+All coefficients are in memory, and the array `where` lists their groups, so that the text grows only with the number of
+ranks.
 """
 
 from __future__ import annotations
@@ -34,12 +35,12 @@ from .step_length import unseen
 from .taylor_step import TaylorStep
 
 LARGE = 200
-"""Operations in the rates of a node from which its step is rolled; a choice between two values counts as CHOICE."""
+"""Least number of operations in a node's rates for a rolled step; a choice between two values counts as CHOICE."""
 
 CHOICE = 10
 
 PLAIN, APART = "@njit(error_model='numpy')", "@njit(error_model='numpy', separate=True)"
-"""The decorators of a function that LLVM may inline in each loop that calls it, and of one that it may not."""
+"""Decorators of functions: PLAIN allows LLVM to inline the function into each loop that calls it; APART forbids it."""
 
 SUMS = """
 @njit(error_model='numpy', separate=True)
@@ -76,24 +77,24 @@ def sizes(dense, where, states, places, ends, terms, count):
 """.strip()
 
 MEMORY = (Name("dense"), Name("where"), Name("at_states"))
-"""The workspace, the table, and the group from which the entries of the table count."""
+"""The workspace, the table `where`, and the group to which the entries of the table are relative."""
 
 ROW = "at_row"
-"""The variable of loops; no symbol of a model begins like that."""
+"""The loop variable; no symbol of a model begins with this prefix."""
 
 COMPUTED = ("name", "inverse", "beyond")
-"""Fields of a series that its recurrence sets."""
+"""Fields of a series that are set while its recurrence is written; members of a run may differ in them."""
 
 Entry = tuple[str, int]
-"""A group of the workspace: the name of a part, and the offset of the group from its beginning."""
+"""A group of the workspace: the name of a part, and the offset of the group from the beginning of the part."""
 
 
 @dataclass(eq=False)
 class Run:
-    """Series of one rank and kind, and `model`, which stands for any of them in their loop.
+    """Series of one rank and kind, which one loop computes; the series `model` stands for each member in the loop.
 
-    columns: by name, the groups of the members and of the series that they read; saved: names of values that the model
-    computes once in a step.
+    columns: by name, the groups of the members and of the series that they read. saved: names of the values that the
+    model computes once in a step.
     """
 
     members: list[Series]
@@ -104,10 +105,10 @@ class Run:
 
 @dataclass(eq=False)
 class RolledSection(SeriesLoop):
-    """The series of a node, in runs.
+    """The series of one node, grouped into runs.
 
-    components: which state a series is; table: what `where` holds; entered: where entries begin in it; factors: numbers of
-    the factors of sums.
+    components: the index of each state's series. table: the content of `where`. entered: the position in `table` of
+    each sequence of entries. factors: the number of each factor in sums.
     """
 
     components: dict[Series, int] = field(default_factory=dict)
@@ -118,11 +119,11 @@ class RolledSection(SeriesLoop):
 
     @cached_property
     def in_memory(self) -> set[Series]:
-        return set(self.graph.series)  # each loop finds in memory what it reads
+        return set(self.graph.series)  # loops read all operands from memory
 
     @cached_property
     def runs(self) -> list[Run]:
-        """Return the series by rank and kind, in an order in which each finds what it needs."""
+        """Return the runs, sorted by rank, so that each run follows the runs whose coefficients it needs."""
         rank: dict[Series, int] = {}
         groups = defaultdict[tuple[object, ...], list[Series]](list)
         for s in self.graph.series:
@@ -131,7 +132,7 @@ class RolledSection(SeriesLoop):
         return [self.run_of(groups[key]) for key in sorted(groups, key=lambda key: int(str(key[0])))]
 
     def run_of(self, members: list[Series]) -> Run:
-        """Return the run of some series: in the model, each operand is a column of the table."""
+        """Return the run of these members; in `model`, each operand is a column of the table."""
         model = copy(members[0])
         model.name = self.graph.fresh(type(model).__name__.lower())
         columns = {"out": [(s.name, 0) for s in members]}
@@ -141,7 +142,7 @@ class RolledSection(SeriesLoop):
                 columns[part.name] = [self.entry_of(getattr(s, part.name)) for s in members]
                 setattr(model, part.name, Outer(Slot(name, None), name=f"value_{name}"))
         if isinstance(model, Kink):
-            # the size of the terms that each series begins with; a single term is as large as its value
+            # the size of the terms of coefficient 0; a single term has the size of the value itself
             bases = [kink.base for kink in members if isinstance(kink, Kink)]
             columns["size"] = [(f"size_{s.name}", 0) if isinstance(s, Linear) else self.entry_of(s) for s in bases]
         return Run(members, model, columns)
@@ -149,13 +150,13 @@ class RolledSection(SeriesLoop):
     # -- memory ---------------------------------------------------------------------------------------------------
 
     def entry_of(self, series: Series) -> Entry:
-        """Return the group at which the coefficients of a series begin."""
+        """Return the group that stores coefficient 0 of a series."""
         if series in self.components:
             return "states", self.components[series] * (self.order + 1)
         return (series.slot.name if isinstance(series, Outer) else series.name), 0
 
     def factor(self, e: Expression) -> Entry:
-        """Return the group of a factor of terms."""
+        """Return the group that stores a factor of terms in sums."""
         return "factors", self.factors.setdefault(e, len(self.factors))
 
     def slot(self, series: Series) -> Slot:
@@ -182,7 +183,7 @@ class RolledSection(SeriesLoop):
     # -- loops ----------------------------------------------------------------------------------------------------
 
     def rows(self, name: str, columns: dict[str, list[Entry]], body: Iterable[Statement]) -> list[Statement]:
-        """Return a loop over the rows of some columns, whose groups are at_<name>_<column> in each turn."""
+        """Return a loop over the rows of columns; each turn loads the group of a column as at_<name>_<column>."""
         table, width = list(zip(*columns.values(), strict=True)), len(columns)
         first = self.enter([entry for row in table for entry in row])
         groups = [
@@ -192,7 +193,7 @@ class RolledSection(SeriesLoop):
         return [Loop(ROW, START, Number(len(table)), (*groups, *body))] if table else []
 
     def enter(self, entries: Sequence[int | Entry]) -> int:
-        """Return where entries begin in the table; equal ones are there once."""
+        """Append entries to the table, unless it contains the same sequence; return where the sequence begins."""
         if (key := tuple(entries)) not in self.entered:
             self.entered[key] = len(self.table)
             self.table += entries
@@ -203,7 +204,7 @@ class RolledSection(SeriesLoop):
         return self.rows(run.model.name, run.columns, body)
 
     def over(self, series: Sequence[Series], name: str, body: Callable[[Series], list[Statement]]) -> list[Statement]:
-        """Return a loop that reads some series, one after another."""
+        """Return a loop over some series; each turn reads one of them."""
         statements = body(Outer(Slot(f"{name}_read", None), name=f"value_{name}")) if series else []
         return self.rows(name, {"read": [self.entry_of(s) for s in series]}, statements) if statements else []
 
@@ -225,7 +226,7 @@ class RolledSection(SeriesLoop):
                 case Linear():
                     statements += self.sums_of(run)
                 case Product() | Square():
-                    # rows of a product and its two factors, the base of a square twice
+                    # each row: a product and its two factors; for a square, the base twice
                     rows = [
                         (out, *([self.entry_of(e) for e in s.convolved] * (2 // len(s.convolved))))
                         for s, out in zip(run.members, run.columns["out"], strict=True)
@@ -236,7 +237,7 @@ class RolledSection(SeriesLoop):
                 case _:
                     statements += self.recurrence(run)
         self.current = None
-        # the rates: copies of series, or constants
+        # the rates: copy series, and store constants
         moving = {k: e for k, (_, e) in enumerate(self.rates) if not isinstance(e, Constant)}
         columns = {"from": [self.entry_of(e) for e in moving.values()], "to": [("rates", k) for k in moving]}
         rate = Slot("rate_from", None).load(self.k)
@@ -246,7 +247,7 @@ class RolledSection(SeriesLoop):
                 statements.append(Store("dense", plus(Name("at_rates"), state), lane(self.of(e))))
         if order != START:
             return statements
-        # the factors of sums are computed first, and the 1 by which their constants are multiplied
+        # store the factors of sums first, and the factor 1 of the constants of sums
         factors = [Store("dense", plus(Name("at_factors"), Number(k)), lane(e)) for e, k in self.factors.items()]
         return [*factors, Store("dense", Name("at_one"), lane(Number(1.0))), *statements]
 
@@ -266,7 +267,7 @@ class RolledSection(SeriesLoop):
         return self.over_run(run, self.statements)
 
     def sums_of(self, run: Run) -> list[Statement]:
-        """Return the call that computes sums of terms; the constant of a sum is a last term of order 0."""
+        """Return the call that computes sums of terms; the constant of a sum is its last term, at order 0 only."""
         first, terms, ends = self.k == START, list[tuple[Entry, Entry]](), [0]
         for s in run.members:
             assert isinstance(s, Linear)
@@ -305,7 +306,7 @@ class RolledSection(SeriesLoop):
 
 
 class Rolled(LoopedSeries):
-    """Writes the step of one node without links."""
+    """Write the rolled step of one node without links."""
 
     functions = (CONVOLUTION.replace(PLAIN, APART), SUMS)
     rolled: RolledSection
@@ -332,7 +333,7 @@ class Rolled(LoopedSeries):
             members[period].append(("states", c * (self.order + 1)))
         if len(members) == 1:
             return self.over_states(lambda index: self.size(index, *members))
-        # angles with one period, and all other states, are loops of their own
+        # write one loop for angles of each period, and one for all other states
         loops, section = list[Statement](), self.rolled
         for number, (period, entries) in enumerate(members.items()):
             name = f"state{number}"
@@ -341,14 +342,14 @@ class Rolled(LoopedSeries):
         return loops
 
     def statements(self) -> list[Statement]:
-        # parts of the workspace that only the table names need no name in the text
+        # drop the names of those parts of the workspace that only the table refers to
         statements = super().statements()
         used = mentioned(s for s in statements if not _part_named_by(s))
         return [s for s in statements if not _part_named_by(s) or _part_named_by(s) in used]
 
     def step(self, *more: str) -> TaylorStep:
         written = super().step(*more)
-        # LLVM takes a minute for dozens of passages within a function
+        # forbid inlining: LLVM takes a minute to compile dozens of inlined copies of `passage`
         called = [text.replace(f"{PLAIN}\ndef passage", f"{APART}\ndef passage") for text in written.called]
         called += [SIZES] if self.rolled.graph.kinks else []
         begin = dict(zip(self.room(), accumulate(self.room().values(), initial=0), strict=False))
@@ -357,24 +358,24 @@ class Rolled(LoopedSeries):
 
 
 def _part_named_by(s: Statement) -> str:
-    """Return the name that a statement gives to a part of the workspace, "" for another statement."""
+    """Return the name that a statement gives to a part of the workspace; "" for any other statement."""
     return s.targets[0] if isinstance(s, Assign) and s.whole and s.targets[0].startswith("at_") else ""
 
 
 def _moves(part: object) -> bool:
-    """Return True for a field of a series that is a series with coefficients."""
+    """Return True if a field of a series is itself a series with stored coefficients, not a constant."""
     return isinstance(part, Series) and not isinstance(part, Constant)
 
 
 def _operands(series: Series) -> list[Series]:
-    """Return the series that the recurrence of another one reads."""
+    """Return the series whose coefficients the recurrence of `series` reads."""
     if isinstance(series, Linear):
         return [inner for _, inner in series.terms]
     return [getattr(series, part.name) for part in fields(series) if _moves(getattr(series, part.name))]
 
 
 def _common(series: Series) -> tuple[object, ...]:
-    """Return what members of a run have in common: the kind, and all fields that are no series with coefficients."""
+    """Return the key of a run: the kind of the series, and all fields that are no series with coefficients."""
     if isinstance(series, Linear):
         return (Linear,)
     if isinstance(series, Product | Square):
@@ -385,7 +386,7 @@ def _common(series: Series) -> tuple[object, ...]:
 
 @lru_cache(maxsize=64)
 def is_large(equations: Equations) -> bool:
-    """Return True for one node without links whose step would take long to compile if it were written out."""
+    """Return True for a single node without links whose written-out step would take long to compile."""
     if equations.n > 1 or equations.link_count or equations.sticks or equations.varied:
         return False
     rates = equations.nodes[0].rhs
@@ -395,6 +396,6 @@ def is_large(equations: Equations) -> bool:
 
 
 def write_rolled(equations: Equations, order: int) -> TaylorStep:
-    """Return the Taylor step of some order of a node for which `is_large` holds; see `write_step`."""
+    """Return the Taylor step of this order for equations for which `is_large` is True; see `write_step`."""
     check_passable(equations)
     return Rolled(equations, order).step("graph", "weights")
